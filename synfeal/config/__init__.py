@@ -1,0 +1,16 @@
+"""Configuration: typed models, reading, and the table of experiments."""
+
+from synfeal.config.experiments import Experiment, Run, read_experiments, runs_of
+from synfeal.config.load import load_config, parse_config
+from synfeal.config.models import MODELS, Config
+
+__all__ = [
+    "MODELS",
+    "Config",
+    "Experiment",
+    "Run",
+    "load_config",
+    "parse_config",
+    "read_experiments",
+    "runs_of",
+]

@@ -1,0 +1,119 @@
+"""The paper's design as a table: which data set and which initialisation each table row needs."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+from pydantic import Field, ValidationError, model_validator
+
+from synfeal.config.load import describe
+from synfeal.config.models import MODELS, Config, NonNegative, Strict
+from synfeal.errors import InputError
+
+Source = Literal["synfeal", "sfm", "rgbd-toro", "rgbd-g2o", "noise"]
+Init = Literal["pretrained", "scratch"]
+TABLES = ("table2_ground_truth", "table3_inconsistencies", "table4_size", "table5_from_scratch")
+COLUMNS = ("table", "block", "scene", "size", "labels", "noise_m", "noise_deg", "init")
+
+
+class Experiment(Strict):
+    """One table row: five cells, one per localizer."""
+
+    table: Literal[
+        "table2_ground_truth", "table3_inconsistencies", "table4_size", "table5_from_scratch"
+    ]
+    block: Literal["", "orientation", "position", "both"] = Field(description="blocks of table 3")
+    scene: str
+    size: str
+    labels: Source
+    noise_m: NonNegative
+    noise_deg: NonNegative
+    init: Init
+
+    @model_validator(mode="after")
+    def _check(self) -> Experiment:
+        noisy = self.noise_m > 0 or self.noise_deg > 0
+        if noisy != (self.labels == "noise"):
+            raise ValueError("labels: must be `noise` exactly when noise_m or noise_deg is above 0")
+        if (self.table == "table3_inconsistencies") != (self.block != ""):
+            raise ValueError("block: rows of table 3, and only those, name one of three blocks")
+        return self
+
+    @property
+    def label_id(self) -> str:
+        """Directory name of the label set, e.g. ``sfm`` or ``noise-p0.1-r5``."""
+        if self.labels != "noise":
+            return self.labels
+        return f"noise-p{self.noise_m:g}-r{self.noise_deg:g}"
+
+
+@dataclass(frozen=True, order=True)
+class Run:
+    """One training: what the path of its results spells out."""
+
+    scene: str
+    size: str
+    labels: str
+    init: str
+    model: str
+    repetition: int
+
+    @property
+    def directory(self) -> str:
+        """Path below ``<root>/runs``."""
+        return (
+            f"{self.scene}/{self.size}/{self.labels}/{self.init}/{self.model}/seed{self.repetition}"
+        )
+
+
+def read_experiments(config: Config) -> tuple[Experiment, ...]:
+    """Read and check ``config.experiments`` against the scenes and sizes of the profile.
+
+    Raises:
+        InputError: naming file, row and column of the first problem.
+    """
+    path = config.experiments
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            reader = csv.DictReader(file)
+            rows = list(reader)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: cannot be read as CSV ({error})") from None
+    if tuple(reader.fieldnames or ()) != COLUMNS:
+        raise InputError(f"{path}: the header must be {','.join(COLUMNS)}")
+    experiments = tuple(_parse(row, f"{path}: row {i + 2}", config) for i, row in enumerate(rows))
+    if not experiments:
+        raise InputError(f"{path}: has no rows; nothing would be run")
+    return experiments
+
+
+def _parse(row: dict[str, str], where: str, config: Config) -> Experiment:
+    try:
+        experiment = Experiment.model_validate(row)
+    except ValidationError as error:
+        raise InputError(f"{where}: {describe(error)}") from None
+    if experiment.scene not in config.scenes:
+        raise InputError(f"{where}: scene '{experiment.scene}': allowed: {sorted(config.scenes)}")
+    sizes = config.scenes[experiment.scene].sizes
+    if experiment.size not in sizes:
+        raise InputError(f"{where}: size '{experiment.size}': allowed: {sorted(sizes)}")
+    if experiment.size not in config.training.samples_seen:
+        raise InputError(f"{where}: size '{experiment.size}' has no training.samples_seen entry")
+    return experiment
+
+
+def runs_of(experiments: tuple[Experiment, ...], repetitions: int) -> list[Run]:
+    """All distinct trainings behind some table rows; rows may share them."""
+    runs = {
+        Run(e.scene, e.size, e.label_id, e.init, model, repetition)
+        for e in experiments
+        for model in MODELS
+        for repetition in range(repetitions)
+    }
+    return sorted(runs)
+
+
+assert set(TABLES) == set(get_args(Experiment.model_fields["table"].annotation))

@@ -1,0 +1,1 @@
+"""Data sets on disk: 7-Scenes directories, packed frames, tables of poses."""

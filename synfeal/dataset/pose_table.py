@@ -1,0 +1,91 @@
+"""Tables of poses: plans, label sets and predictions are all one CSV format.
+
+Columns ``frame,path,tx,ty,tz,qw,qx,qy,qz``: frame index in its split, index of the straight path the
+frame belongs to, position in metres and unit quaternion of ``world_from_cam``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.errors import InputError
+from synfeal.files import atomic_path
+from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
+
+COLUMNS = ("frame", "path", "tx", "ty", "tz", "qw", "qx", "qy", "qz")
+HEADER = ",".join(COLUMNS)
+
+
+@dataclass(frozen=True)
+class PoseTable:
+    """Poses of consecutive frames.
+
+    Attributes:
+        frame: (N,) index within the split.
+        path: (N,) index of the straight path.
+        position_m: (N, 3) camera centres in the world.
+        quat_wxyz: (N, 4) unit quaternions of ``world_from_cam``, w >= 0.
+    """
+
+    frame: NDArray[np.int64]
+    path: NDArray[np.int64]
+    position_m: NDArray[np.float64]
+    quat_wxyz: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    @property
+    def world_from_cam(self) -> NDArray[np.float64]:
+        """Poses (N, 4, 4)."""
+        return pose_from_quat(self.position_m, self.quat_wxyz)
+
+    def with_poses(self, world_from_cam: NDArray[np.float64]) -> PoseTable:
+        """The same frames with other poses (N, 4, 4)."""
+        return PoseTable(
+            self.frame, self.path, world_from_cam[:, :3, 3].copy(), quat_wxyz_of(world_from_cam)
+        )
+
+    def first(self, count: int) -> PoseTable:
+        """The first ``count`` frames: smaller data sets are prefixes of larger ones."""
+        if count > len(self):
+            raise ValueError(f"asked for {count} frames of a table of {len(self)}")
+        return PoseTable(
+            self.frame[:count], self.path[:count], self.position_m[:count], self.quat_wxyz[:count]
+        )
+
+
+def write_pose_table(path: Path, table: PoseTable) -> None:
+    """Write the table with enough digits to read back the same float64 values."""
+    columns = [table.frame, table.path, *table.position_m.T, *table.quat_wxyz.T]
+    rows = [",".join(map(repr, row)) for row in zip(*(c.tolist() for c in columns), strict=True)]
+    with atomic_path(path) as temporary:
+        temporary.write_text("\n".join([HEADER, *rows]) + "\n", encoding="utf-8")
+
+
+def read_pose_table(path: Path) -> PoseTable:
+    """Read a table written by :func:`write_pose_table`.
+
+    Raises:
+        InputError: the file is missing, has another header, or holds anything but finite numbers.
+    """
+    try:
+        header, *lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as a pose table ({error})") from None
+    if header != HEADER:
+        raise InputError(f"{path}: header must be '{HEADER}', found '{header[:80]}'")
+    try:
+        values = np.array([[float(cell) for cell in line.split(",")] for line in lines])
+        values = values.reshape(len(lines), len(COLUMNS))
+    except ValueError as error:
+        raise InputError(f"{path}: {error}; every row needs {len(COLUMNS)} numbers") from None
+    if not np.isfinite(values).all():
+        bad = int(np.argmin(np.isfinite(values).all(axis=1)))
+        raise InputError(f"{path}: row {bad + 2} holds a value that is not finite")
+    index = values[:, :2].astype(np.int64)
+    return PoseTable(index[:, 0], index[:, 1], values[:, 2:5], values[:, 5:9])

@@ -1,0 +1,71 @@
+"""Rigid poses as 4x4 matrices; ``world_from_cam`` maps camera coordinates to world coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from synfeal.geometry.rotations import (
+    matrix_from_quat_wxyz,
+    quat_wxyz_from_matrix,
+    rotation_angle_rad,
+    slerp_quat_wxyz,
+)
+
+Array = NDArray[np.float64]
+
+
+def pose_matrix(rotation: ArrayLike, position_m: ArrayLike) -> Array:
+    """Poses (..., 4, 4) from rotations (..., 3, 3) and positions (..., 3)."""
+    rotation = np.asarray(rotation, dtype=np.float64)
+    pose = np.zeros((*rotation.shape[:-2], 4, 4))
+    pose[..., :3, :3] = rotation
+    pose[..., :3, 3] = position_m
+    pose[..., 3, 3] = 1.0
+    return pose
+
+
+def pose_from_quat(position_m: ArrayLike, quat_wxyz: ArrayLike) -> Array:
+    """Poses (..., 4, 4) from positions (..., 3) and quaternions (..., 4)."""
+    return pose_matrix(matrix_from_quat_wxyz(quat_wxyz), position_m)
+
+
+def quat_wxyz_of(pose: ArrayLike) -> Array:
+    """Quaternions (..., 4) of the rotations of poses (..., 4, 4)."""
+    return quat_wxyz_from_matrix(np.asarray(pose)[..., :3, :3])
+
+
+def inverse(pose: ArrayLike) -> Array:
+    """``cam_from_world`` (..., 4, 4) of ``world_from_cam``: transposes, never a general inverse."""
+    pose = np.asarray(pose, dtype=np.float64)
+    rotation_t = np.swapaxes(pose[..., :3, :3], -1, -2)
+    return pose_matrix(rotation_t, -(rotation_t @ pose[..., :3, 3:])[..., 0])
+
+
+def relative(world_from_a: ArrayLike, world_from_b: ArrayLike) -> Array:
+    """``a_from_b`` (..., 4, 4). Subtracts the positions first, so it is exact far from the origin."""
+    a = np.asarray(world_from_a, dtype=np.float64)
+    b = np.asarray(world_from_b, dtype=np.float64)
+    rotation_t = np.swapaxes(a[..., :3, :3], -1, -2)
+    offset = (rotation_t @ (b[..., :3, 3] - a[..., :3, 3])[..., None])[..., 0]
+    return pose_matrix(rotation_t @ b[..., :3, :3], offset)
+
+
+def interpolate(pose_a: ArrayLike, pose_b: ArrayLike, fraction: ArrayLike) -> Array:
+    """Poses (N, 4, 4) at fractions (N,) from a to b: straight line, constant angular velocity."""
+    a, b = np.asarray(pose_a, dtype=np.float64), np.asarray(pose_b, dtype=np.float64)
+    fraction = np.atleast_1d(np.asarray(fraction, dtype=np.float64))
+    position = a[:3, 3] + fraction[:, None] * (b[:3, 3] - a[:3, 3])
+    return pose_from_quat(position, slerp_quat_wxyz(quat_wxyz_of(a), quat_wxyz_of(b), fraction))
+
+
+def position_error_m(position_a_m: ArrayLike, position_b_m: ArrayLike) -> Array:
+    """Euclidean distances (...) between positions (..., 3)."""
+    return np.linalg.norm(np.asarray(position_a_m) - np.asarray(position_b_m), axis=-1)
+
+
+def pose_error(pose_a: ArrayLike, pose_b: ArrayLike) -> tuple[Array, Array]:
+    """Position error in metres and orientation error in radians between poses (..., 4, 4)."""
+    a, b = np.asarray(pose_a, dtype=np.float64), np.asarray(pose_b, dtype=np.float64)
+    position = position_error_m(a[..., :3, 3], b[..., :3, 3])
+    return position, rotation_angle_rad(quat_wxyz_of(a), quat_wxyz_of(b))
