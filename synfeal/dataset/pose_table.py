@@ -50,13 +50,18 @@ class PoseTable:
             self.frame, self.path, world_from_cam[:, :3, 3].copy(), quat_wxyz_of(world_from_cam)
         )
 
+    def between(self, start: int, stop: int) -> PoseTable:
+        """Frames ``start`` to ``stop`` (exclusive), which must all exist."""
+        if not 0 <= start <= stop <= len(self):
+            raise ValueError(f"asked for frames {start} to {stop} of a table of {len(self)}")
+        part = slice(start, stop)
+        return PoseTable(
+            self.frame[part], self.path[part], self.position_m[part], self.quat_wxyz[part]
+        )
+
     def first(self, count: int) -> PoseTable:
         """The first ``count`` frames: smaller data sets are prefixes of larger ones."""
-        if count > len(self):
-            raise ValueError(f"asked for {count} frames of a table of {len(self)}")
-        return PoseTable(
-            self.frame[:count], self.path[:count], self.position_m[:count], self.quat_wxyz[:count]
-        )
+        return self.between(0, count)
 
 
 def write_pose_table(path: Path, table: PoseTable) -> None:

@@ -1,0 +1,63 @@
+# From one textured mesh to every table of the Synfeal paper:
+#   snakemake --cores 2 all
+# Another profile:  snakemake --cores 2 --configfile config/smoke.yaml all
+# One experiment:   snakemake --cores 2 results/mini/runs/large_room/6k/synfeal/pretrained/posenet2/seed0/metrics.json
+from snakemake.utils import min_version
+
+min_version("9.0")
+
+
+configfile: "config/config.yaml"
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/collection.smk"
+include: "workflow/rules/groundtruth.smk"
+include: "workflow/rules/training.smk"
+include: "workflow/rules/evidence.smk"
+
+
+localrules:
+    all,
+    scenes,
+    datasets,
+    labels,
+    runs,
+    tables,
+
+
+rule all:
+    default_target: True
+    input:
+        f"{ROOT}/summary.md",
+        f"{ROOT}/tables/all_tables.tex",
+        f"{ROOT}/figures/error_by_size.png",
+
+
+rule scenes:
+    input:
+        expand(f"{ROOT}/scenes/{{scene}}/properties.json", scene=CONFIG.scenes),
+
+
+rule datasets:
+    input:
+        all_manifests(),
+
+
+rule labels:
+    input:
+        all_labels(),
+
+
+rule runs:
+    input:
+        all_metrics(),
+
+
+rule tables:
+    input:
+        expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
+
+
+onsuccess:
+    shell("cat {ROOT}/summary.txt 2>/dev/null || true")

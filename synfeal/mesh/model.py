@@ -1,0 +1,67 @@
+"""What the simulator knows of a scene: triangles with one base colour source per part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+WHITE = np.full(4, 255, np.uint8)
+
+
+@dataclass(frozen=True)
+class MeshPart:
+    """Triangles that share one material, in the world frame.
+
+    Attributes:
+        name: name of the part in its file, for messages.
+        vertices_m: (V, 3) float64, world, z up, metres.
+        faces: (F, 3) int64, indices into ``vertices_m``.
+        uv: (V, 2) float64 texture coordinates, origin at the BOTTOM left, or None.
+        texture: (H, W, 3 | 4) uint8, first row at the top, or None.
+        vertex_rgb: (V, 3) uint8, or None.
+        base_color: (4,) uint8; multiplies the texture or the vertex colours.
+        alpha_cutoff: fragments with less alpha than this are not drawn; None draws all of them.
+    """
+
+    name: str
+    vertices_m: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    uv: NDArray[np.float64] | None = None
+    texture: NDArray[np.uint8] | None = None
+    vertex_rgb: NDArray[np.uint8] | None = None
+    base_color: NDArray[np.uint8] = WHITE
+    alpha_cutoff: float | None = None
+
+
+@dataclass(frozen=True)
+class TexturedMesh:
+    """A scene: one or more parts in one world frame."""
+
+    parts: tuple[MeshPart, ...]
+
+    @property
+    def n_vertices(self) -> int:
+        """Vertices of all parts; a vertex on a texture seam counts once per copy."""
+        return sum(len(part.vertices_m) for part in self.parts)
+
+    @property
+    def n_faces(self) -> int:
+        """Triangles of all parts."""
+        return sum(len(part.faces) for part in self.parts)
+
+    @property
+    def bounds_m(self) -> NDArray[np.float64]:
+        """Corners (2, 3) of the axis-aligned bounding box, metres."""
+        lower = np.min([part.vertices_m.min(axis=0) for part in self.parts], axis=0)
+        upper = np.max([part.vertices_m.max(axis=0) for part in self.parts], axis=0)
+        return np.stack([lower, upper])
+
+    def merged(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Vertices (V, 3) and faces (F, 3) of all parts as one geometry, without colours."""
+        counts = [len(part.vertices_m) for part in self.parts]
+        offsets = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
+        vertices = np.concatenate([part.vertices_m for part in self.parts])
+        shifted = [part.faces + offset for part, offset in zip(self.parts, offsets, strict=True)]
+        return vertices, np.concatenate(shifted)

@@ -1,0 +1,126 @@
+# What the rules share: the checked configuration, and which files a target needs. No rules here.
+import sys
+
+from baselines.localizers.names import BACKBONE_OF
+from baselines.groundtruth.batches import batches_of
+from synfeal.config import parse_config, read_experiments, runs_of
+from synfeal.config.models import MODELS
+from synfeal.dataset.sequences import sequences_of
+from synfeal.errors import InputError
+from synfeal.seeds import seed_of
+
+try:
+    CONFIG = parse_config(config, " + ".join(map(str, workflow.configfiles)) or "config")
+    EXPERIMENTS = read_experiments(CONFIG)
+except InputError as error:
+    sys.exit(f"error: {error}")
+
+ROOT = CONFIG.root.as_posix()
+SPLITS = ("train", "test")
+RUNS = runs_of(EXPERIMENTS, CONFIG.training.repetitions)
+TABLE_NAMES = ["table1_meshes", *sorted({e.table for e in EXPERIMENTS})]
+RECONSTRUCTED = ("sfm", "rgbd-toro", "rgbd-g2o")
+
+
+wildcard_constraints:
+    scene="|".join(CONFIG.scenes),
+    split="train|test",
+    camera="network|groundtruth",
+    sequence=r"seq-\d+",
+    batch=r"\d+",
+    init="pretrained|scratch",
+    model="|".join(MODELS),
+    backbone="|".join(sorted(set(BACKBONE_OF.values()))),
+    repetition=r"\d+",
+    size=r"\w+",
+    reconstructed="|".join(RECONSTRUCTED),
+
+
+def dump(model, **kwargs):
+    """A configuration model as plain data: what a rule's parameters record and compare."""
+    return model.model_dump(mode="json", **kwargs)
+
+
+def n_frames(scene, camera, split):
+    """Frames of a split that have to be rendered with a camera: no more than a consumer asks for."""
+    if camera == "network":
+        return CONFIG.n_largest(scene, split)
+    sizes = {e.size for e in EXPERIMENTS if e.scene == scene and e.labels in RECONSTRUCTED}
+    return max((CONFIG.n_frames(scene, size, split) for size in sizes), default=0)
+
+
+def sequences(scene, camera):
+    counts = [n_frames(scene, camera, split) for split in SPLITS]
+    return sequences_of(*counts, CONFIG.shard_frames)
+
+
+def sequence_named(wildcards):
+    """The sequence of a wildcard: which split and which frames it holds."""
+    every = sequences(wildcards.scene, wildcards.camera)
+    return next(s for s in every if s.name == wildcards.sequence)
+
+
+def sequence_dirs(scene, camera, split=None, stop=None):
+    """Directories of a data set's sequences, of one split, with frames below ``stop``."""
+    return [
+        f"{ROOT}/datasets/{scene}/{camera}/{s.name}"
+        for s in sequences(scene, camera)
+        if split in (None, s.split) and (stop is None or s.start < stop)
+    ]
+
+
+def batch_of(wildcards):
+    count = CONFIG.n_frames(wildcards.scene, wildcards.size, wildcards.split)
+    return batches_of(count, CONFIG.groundtruth.batch_frames)[int(wildcards.batch)]
+
+
+def batch_files(wildcards, split):
+    count = CONFIG.n_frames(wildcards.scene, wildcards.size, split)
+    batches = batches_of(count, CONFIG.groundtruth.batch_frames)
+    stem = f"{ROOT}/groundtruth/{wildcards.scene}/{wildcards.size}/{wildcards.reconstructed}"
+    return [f"{stem}/{split}/batch-{b.index:03d}.csv" for b in batches]
+
+
+def backbone_weights(wildcards):
+    """The pretrained backbone a run starts from; nothing when it starts from scratch."""
+    if wildcards.init == "scratch":
+        return []
+    return f"{ROOT}/pretrained/{BACKBONE_OF[wildcards.model]}.pt"
+
+
+def metrics_of(experiments):
+    runs = runs_of(tuple(experiments), CONFIG.training.repetitions)
+    return [f"{ROOT}/runs/{run.directory}/metrics.json" for run in runs]
+
+
+def rows_of(table):
+    """The experiments of one table, as plain data: only their change makes the table anew."""
+    return [e for e in EXPERIMENTS if e.table == table]
+
+
+def table_metrics(wildcards):
+    """Every run a table shows; table 5 is read against the pretrained runs of the same size."""
+    rows = rows_of(wildcards.table)
+    if wildcards.table == "table5_from_scratch":
+        rows = rows + [row.model_copy(update={"init": "pretrained"}) for row in rows]
+    return metrics_of(rows)
+
+
+def all_metrics():
+    return [f"{ROOT}/runs/{run.directory}/metrics.json" for run in RUNS]
+
+
+def all_labels():
+    sets = sorted({(e.scene, e.size, e.label_id) for e in EXPERIMENTS})
+    return [f"{ROOT}/labels/{s}/{z}/{l}/{split}.csv" for s, z, l in sets for split in SPLITS]
+
+
+def all_manifests():
+    cameras = [("network", e.scene) for e in EXPERIMENTS]
+    cameras += [("groundtruth", e.scene) for e in EXPERIMENTS if e.labels in RECONSTRUCTED]
+    return [f"{ROOT}/datasets/{s}/{c}/manifest.json" for c, s in sorted(set(cameras))]
+
+
+def assistance_files():
+    sets = {(e.scene, e.size, e.label_id) for e in EXPERIMENTS if e.labels in RECONSTRUCTED}
+    return [f"{ROOT}/labels/{s}/{z}/{l}/assistance.json" for s, z, l in sorted(sets)]

@@ -1,0 +1,91 @@
+# One training per cell of the tables; predictions once, scores in a second, cheap pass.
+RUN = f"{ROOT}/runs/{{scene}}/{{size}}/{{labels}}/{{init}}/{{model}}/seed{{repetition}}"
+RUN_LOG = "{scene}/{size}/{labels}/{init}/{model}/seed{repetition}"
+
+
+rule pretrain:
+    input:
+        frames=(
+            f"{ROOT}/frames/{CONFIG.pretraining.scene}/train.npy"
+            if CONFIG.pretraining.source == "pretext"
+            else []
+        ),
+        labels=(
+            f"{ROOT}/plans/{CONFIG.pretraining.scene}/train.csv"
+            if CONFIG.pretraining.source == "pretext"
+            else []
+        ),
+    output:
+        weights=f"{ROOT}/pretrained/{{backbone}}.pt",
+    params:
+        pretraining=dump(CONFIG.pretraining),
+        network=dump(CONFIG.network),
+        seed=lambda w: seed_of(CONFIG.seed, "pretrain", w.backbone),
+    log:
+        f"{ROOT}/logs/pretrain/{{backbone}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/pretrain/{{backbone}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=4000,
+    conda:
+        "../envs/synfeal.yaml"
+    script:
+        "../scripts/pretrain.py"
+
+
+rule train:
+    input:
+        frames=f"{ROOT}/frames/{{scene}}/train.npy",
+        labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
+        test_frames=f"{ROOT}/frames/{{scene}}/test.npy",
+        test_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
+        weights=backbone_weights,
+    output:
+        model=f"{RUN}/model.pt",
+        history=f"{RUN}/history.csv",
+        predictions=f"{RUN}/predictions.csv",
+    params:
+        network=dump(CONFIG.network),
+        localizer=lambda w: dump(CONFIG.localizers[w.model]),
+        training=dump(CONFIG.training, exclude={"samples_seen", "repetitions"}),
+        samples_seen=lambda w: CONFIG.training.samples_seen[w.size],
+        seed=lambda w: seed_of(
+            CONFIG.seed, "train", w.scene, w.size, w.labels, w.init, w.model, w.repetition
+        ),
+    log:
+        f"{ROOT}/logs/train/{RUN_LOG}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/train/{RUN_LOG}.tsv"
+    threads: 1
+    resources:
+        mem_mb=4000,
+    conda:
+        "../envs/synfeal.yaml"
+    script:
+        "../scripts/train.py"
+
+
+rule score:
+    input:
+        predictions=f"{RUN}/predictions.csv",
+        history=f"{RUN}/history.csv",
+        labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
+        truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
+        train_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
+    output:
+        errors=f"{RUN}/errors.csv",
+        metrics=f"{RUN}/metrics.json",
+    params:
+        seed=CONFIG.seed,
+    log:
+        f"{ROOT}/logs/score/{RUN_LOG}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/score/{RUN_LOG}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    conda:
+        "../envs/synfeal.yaml"
+    script:
+        "../scripts/score.py"

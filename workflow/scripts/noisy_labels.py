@@ -1,0 +1,16 @@
+from pathlib import Path
+
+import numpy as np
+
+from synfeal.dataset.pose_table import read_pose_table, write_pose_table
+from synfeal.job import job
+from synfeal.labels.noise import add_noise
+
+with job(snakemake.log[0]):
+    noisy = add_noise(
+        read_pose_table(Path(snakemake.input.truth)),
+        float(snakemake.wildcards.noise_m),
+        float(snakemake.wildcards.noise_deg),
+        np.random.default_rng(snakemake.params.seed),
+    )
+    write_pose_table(Path(snakemake.output.labels), noisy)

@@ -1,0 +1,14 @@
+from pathlib import Path
+
+from synfeal.config.models import SceneConfig
+from synfeal.job import job
+from synfeal.scenes.prepare import prepare_scene
+
+with job(snakemake.log[0]):
+    prepare_scene(
+        snakemake.wildcards.scene,
+        SceneConfig(**snakemake.params.scene),
+        snakemake.params.collision_faces,
+        snakemake.params.seed,
+        Path(snakemake.output.mesh).parent,
+    )

@@ -1,0 +1,15 @@
+from pathlib import Path
+
+from baselines.training.score import score_run
+from synfeal.job import job
+
+with job(snakemake.log[0]):
+    score_run(
+        Path(snakemake.input.predictions),
+        Path(snakemake.input.labels),
+        Path(snakemake.input.truth),
+        Path(snakemake.input.train_truth),
+        Path(snakemake.output.errors),
+        Path(snakemake.output.metrics),
+        dict(snakemake.wildcards),
+    )
