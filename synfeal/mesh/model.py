@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ class MeshPart:
     uv: NDArray[np.float64] | None = None
     texture: NDArray[np.uint8] | None = None
     vertex_rgb: NDArray[np.uint8] | None = None
-    base_color: NDArray[np.uint8] = WHITE
+    base_color: NDArray[np.uint8] = field(default_factory=WHITE.copy)
     alpha_cutoff: float | None = None
 
 

@@ -1,0 +1,1 @@
+"""The report: tables, figures and summary from result files; it computes nothing upstream."""

@@ -1,0 +1,1 @@
+"""Convolutional backbones whose parameter names load torchvision's official ImageNet weights."""

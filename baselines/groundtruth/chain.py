@@ -1,0 +1,215 @@
+"""Chaining batches to one trajectory, with the assistance of section 4.1.
+
+A batch starts at the label its first frame got from the batch before, ``world_from_last``, and its
+poses follow as ``world_from_last @ first_from_cam``. After each batch the last pose is compared with
+the true one. When it is off by more than the thresholds it alone is replaced by the true pose, the
+batch counts as assisted, and the next batch starts from the replaced pose.
+
+Frames that a method did not register are filled in. Between two registered frames the motion is
+interpolated (straight line, constant angular velocity); after the last one its pose is held. The
+first frame always counts as known, since it is shared with the batch before.
+
+A batch with no registered frame besides the first is lost. It is assisted whatever its error, and its
+frames are interpolated between its start and the true last pose, so that no frame is ever dropped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.groundtruth.batches import Batch
+from baselines.groundtruth.trajectory import BatchTrajectory
+from synfeal.config.models import GroundTruthConfig
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.geometry.poses import interpolate, pose_error
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BatchRecord:
+    """What happened to one batch; errors are those of its last pose against the true one.
+
+    Attributes:
+        index: position of the batch in its split.
+        start: first frame.
+        stop: one past the last frame.
+        registered: frames whose pose the method found.
+        filled: frames whose label was interpolated or held.
+        lost: the method found no motion at all.
+        assisted: the last pose was replaced by the true one.
+        error_before_m: position error before assistance (of a lost batch: of standing still).
+        error_before_deg: orientation error before assistance.
+        error_after_m: position error the next batch starts with.
+        error_after_deg: orientation error the next batch starts with.
+    """
+
+    index: int
+    start: int
+    stop: int
+    registered: int
+    filled: int
+    lost: bool
+    assisted: bool
+    error_before_m: float
+    error_before_deg: float
+    error_after_m: float
+    error_after_deg: float
+
+
+@dataclass(frozen=True)
+class LabelError:
+    """Errors of all labels of a split against the true poses."""
+
+    median_m: float
+    max_m: float
+    median_deg: float
+    max_deg: float
+
+
+@dataclass(frozen=True)
+class Assistance:
+    """The record of one split."""
+
+    records: tuple[BatchRecord, ...]
+    label_error: LabelError
+
+    def to_json(self) -> dict[str, Any]:
+        """Totals, the error of the labels and one record per batch, as plain values."""
+        return {
+            "batches": len(self.records),
+            "assisted": sum(record.assisted for record in self.records),
+            "lost": sum(record.lost for record in self.records),
+            "filled_frames": sum(record.filled for record in self.records),
+            "label_error": asdict(self.label_error),
+            "records": [asdict(record) for record in self.records],
+        }
+
+
+def chain_batches(
+    batches: Sequence[Batch],
+    trajectories: Sequence[BatchTrajectory],
+    truth: PoseTable,
+    cfg: GroundTruthConfig,
+) -> tuple[PoseTable, Assistance]:
+    """Labels of a whole split from its batches, and what assistance they needed.
+
+    Args:
+        batches: all batches of the split in order, from ``batches_of(len(truth), ...)``.
+        trajectories: one estimate per batch.
+        truth: true poses of the split; the first one anchors the chain.
+        cfg: the two thresholds.
+
+    Returns:
+        The labels (frames and paths of ``truth``, other poses) and the record of the split.
+
+    Raises:
+        ValueError: batches, trajectories and truth do not fit together.
+    """
+    _check(batches, trajectories, len(truth))
+    true_world_from_cam = truth.world_from_cam
+    labels = true_world_from_cam.copy()
+    records = []
+    for batch, trajectory in zip(batches, trajectories, strict=True):
+        span = slice(batch.start, batch.stop)
+        poses, record = _place(
+            batch, trajectory, labels[batch.start], true_world_from_cam[batch.stop - 1], cfg
+        )
+        labels[span] = poses
+        records.append(record)
+    table = truth.with_poses(labels)
+    return table, Assistance(tuple(records), label_error(table, truth))
+
+
+def label_error(labels: PoseTable, truth: PoseTable) -> LabelError:
+    """Median and largest errors of labels against the true poses of the same frames."""
+    position_m, orientation_rad = pose_error(labels.world_from_cam, truth.world_from_cam)
+    orientation_deg = np.degrees(orientation_rad)
+    return LabelError(
+        float(np.median(position_m)),
+        float(position_m.max()),
+        float(np.median(orientation_deg)),
+        float(orientation_deg.max()),
+    )
+
+
+def fill_gaps(trajectory: BatchTrajectory) -> Array:
+    """Poses (n, 4, 4) of all frames: interpolated between known ones, held after the last.
+
+    The first frame is the identity by definition, registered or not.
+    """
+    poses = trajectory.first_from_cam.copy()
+    poses[0] = np.eye(4)
+    known = np.flatnonzero(trajectory.registered | (np.arange(len(poses)) == 0))
+    for before, after in zip(known[:-1], known[1:], strict=True):
+        gap = np.arange(before + 1, after)
+        if len(gap):
+            fraction = (gap - before) / (after - before)
+            poses[gap] = interpolate(poses[before], poses[after], fraction)
+    poses[known[-1] + 1 :] = poses[known[-1]]
+    return poses
+
+
+def _place(
+    batch: Batch,
+    trajectory: BatchTrajectory,
+    world_from_first: Array,
+    true_world_from_last: Array,
+    cfg: GroundTruthConfig,
+) -> tuple[Array, BatchRecord]:
+    """World poses (n, 4, 4) of one batch, assisted where needed, and its record."""
+    lost = not trajectory.registered[1:].any()
+    poses = world_from_first @ fill_gaps(trajectory)
+    before_m, before_deg = _error(poses[-1], true_world_from_last)
+    assisted = (
+        lost or before_m > cfg.assist_position_m or before_deg > cfg.assist_orientation_deg
+    )
+    if lost:
+        poses = interpolate(world_from_first, true_world_from_last, np.linspace(0, 1, len(batch)))
+    if assisted:
+        poses[-1] = true_world_from_last
+    poses[0] = world_from_first
+    after_m, after_deg = _error(poses[-1], true_world_from_last)
+    registered = int(trajectory.registered.sum())
+    filled = int((~trajectory.registered[1:]).sum())
+    return poses, BatchRecord(
+        batch.index,
+        batch.start,
+        batch.stop,
+        registered,
+        filled,
+        bool(lost),
+        bool(assisted),
+        before_m,
+        before_deg,
+        after_m,
+        after_deg,
+    )
+
+
+def _error(pose: Array, true_pose: Array) -> tuple[float, float]:
+    """Position error in metres and orientation error in degrees of one pose."""
+    position_m, orientation_rad = pose_error(pose, true_pose)
+    return float(position_m), float(np.degrees(orientation_rad))
+
+
+def _check(
+    batches: Sequence[Batch], trajectories: Sequence[BatchTrajectory], n_frames: int
+) -> None:
+    """Refuse batches that do not cover the split in order, or estimates of other lengths."""
+    if len(batches) != len(trajectories):
+        raise ValueError(f"{len(batches)} batches but {len(trajectories)} trajectories")
+    expected = 0
+    for batch, trajectory in zip(batches, trajectories, strict=True):
+        if batch.start != expected:
+            raise ValueError(f"batch {batch.index} starts at {batch.start}, not at {expected}")
+        if len(batch) != len(trajectory):
+            raise ValueError(f"batch {batch.index}: {len(trajectory)} poses, {len(batch)} frames")
+        expected = batch.stop - 1
+    if expected != n_frames - 1:
+        raise ValueError(f"the batches end at frame {expected}, the split at {n_frames - 1}")

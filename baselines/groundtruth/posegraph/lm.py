@@ -1,0 +1,32 @@
+"""The g2o row: Levenberg-Marquardt on the pose graph.
+
+g2o and gtsam solve the same non-linear least squares problem, the sum over the edges of the squared
+Mahalanobis norm of ``Log(measured^-1 predicted)``. gtsam is the maintained one with Python wheels.
+"""
+
+from __future__ import annotations
+
+import gtsam
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.groundtruth.posegraph.graph import PoseGraph, swapped_blocks
+
+# Fixes the first pose, which the edges leave free, to a nanometre.
+_ANCHOR_SIGMA = 1e-9
+
+
+def optimise_lm(graph: PoseGraph, iterations: int) -> NDArray[np.float64]:
+    """Optimised poses (n, 4, 4) relative to the first, after at most ``iterations`` steps."""
+    factors, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
+    for node, pose in enumerate(graph.first_from_cam):
+        values.insert(node, gtsam.Pose3(pose))
+    anchor = gtsam.noiseModel.Isotropic.Sigma(6, _ANCHOR_SIGMA)
+    factors.add(gtsam.PriorFactorPose3(0, gtsam.Pose3(), anchor))
+    for edge in graph.edges:
+        noise = gtsam.noiseModel.Gaussian.Information(swapped_blocks(edge.information))
+        factors.add(gtsam.BetweenFactorPose3(edge.i, edge.j, gtsam.Pose3(edge.i_from_j), noise))
+    params = gtsam.LevenbergMarquardtParams()
+    params.setMaxIterations(iterations)
+    result = gtsam.LevenbergMarquardtOptimizer(factors, values, params).optimize()
+    return np.array([result.atPose3(node).matrix() for node in range(len(graph))])

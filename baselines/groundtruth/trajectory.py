@@ -1,0 +1,83 @@
+"""What a method estimates for one batch: poses relative to the batch's first frame.
+
+Stored as CSV with columns ``frame,registered,tx,ty,tz,qw,qx,qy,qz``; frames count from 0 inside the
+batch, positions are in metres and rotations unit quaternions of ``first_from_cam``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.errors import InputError
+from synfeal.files import atomic_path
+from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
+
+COLUMNS = ("frame", "registered", "tx", "ty", "tz", "qw", "qx", "qy", "qz")
+HEADER = ",".join(COLUMNS)
+
+
+@dataclass(frozen=True)
+class BatchTrajectory:
+    """Estimated motion inside one batch.
+
+    Attributes:
+        first_from_cam: (n, 4, 4) poses relative to the first frame; where a frame is not registered
+            the entry is the identity and means nothing.
+        registered: (n,) whether the method found the frame's pose.
+    """
+
+    first_from_cam: NDArray[np.float64]
+    registered: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        n = len(self.registered)
+        if self.first_from_cam.shape != (n, 4, 4):
+            raise ValueError(f"{n} flags for poses of shape {self.first_from_cam.shape}")
+
+    def __len__(self) -> int:
+        return len(self.registered)
+
+
+def failed_trajectory(n_frames: int) -> BatchTrajectory:
+    """The result of a method that found nothing in ``n_frames`` frames."""
+    return BatchTrajectory(np.tile(np.eye(4), (n_frames, 1, 1)), np.zeros(n_frames, dtype=bool))
+
+
+def write_trajectory(path: Path, trajectory: BatchTrajectory) -> None:
+    """Write the trajectory with enough digits to read back the same positions and quaternions."""
+    pose = trajectory.first_from_cam
+    numbers = np.hstack([pose[:, :3, 3], quat_wxyz_of(pose)]).tolist()
+    flags = trajectory.registered.astype(int).tolist()
+    rows = [
+        ",".join(map(repr, [frame, flag, *row]))
+        for frame, (flag, row) in enumerate(zip(flags, numbers, strict=True))
+    ]
+    with atomic_path(path) as temporary:
+        temporary.write_text("\n".join([HEADER, *rows]) + "\n", encoding="utf-8")
+
+
+def read_trajectory(path: Path) -> BatchTrajectory:
+    """Read a file written by :func:`write_trajectory`.
+
+    Raises:
+        InputError: the file is missing, has another header, or holds anything but finite numbers.
+    """
+    try:
+        header, *lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as a batch trajectory ({error})") from None
+    if header != HEADER:
+        raise InputError(f"{path}: header must be '{HEADER}', found '{header[:80]}'")
+    try:
+        values = np.array([[float(cell) for cell in line.split(",")] for line in lines])
+        values = values.reshape(len(lines), len(COLUMNS))
+    except ValueError as error:
+        raise InputError(f"{path}: {error}; every row needs {len(COLUMNS)} numbers") from None
+    if not np.isfinite(values).all():
+        bad = int(np.argmin(np.isfinite(values).all(axis=1)))
+        raise InputError(f"{path}: row {bad + 2} holds a value that is not finite")
+    return BatchTrajectory(pose_from_quat(values[:, 2:5], values[:, 5:9]), values[:, 1] == 1)

@@ -1,0 +1,118 @@
+"""GoogLeNet with batch normalisation.
+
+Architecture: Szegedy et al., "Going deeper with convolutions", CVPR 2015, table 1; batch
+normalisation after every convolution: Ioffe and Szegedy, ICML 2015. Where torchvision departs from
+the papers (3x3 instead of 5x5 kernels in the third branch, 2x2 pooling before inception 5a, ceil-mode
+pooling) we follow it, because its official weights only fit that network.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+
+from baselines.localizers.backbones.channels import scaled_channels
+
+# Output channels of each block: 1x1 | 3x3 reduce, 3x3 | "5x5" reduce, "5x5" | pooling projection.
+INCEPTIONS: dict[str, tuple[int, int, int, int, int, int]] = {
+    "inception3a": (64, 96, 128, 16, 32, 32),
+    "inception3b": (128, 128, 192, 32, 96, 64),
+    "inception4a": (192, 96, 208, 16, 48, 64),
+    "inception4b": (160, 112, 224, 24, 64, 64),
+    "inception4c": (128, 128, 256, 24, 64, 64),
+    "inception4d": (112, 144, 288, 32, 64, 64),
+    "inception4e": (256, 160, 320, 32, 128, 128),
+    "inception5a": (256, 160, 320, 32, 128, 128),
+    "inception5b": (384, 192, 384, 48, 128, 128),
+}
+
+
+# The official weights were trained on images scaled to [-1, 1]. This turns images normalised with the
+# mean (0.485, 0.456, 0.406) and deviation (0.229, 0.224, 0.225) of ImageNet into those.
+INPUT_SCALE = (0.458, 0.448, 0.450)
+INPUT_SHIFT = (-0.030, -0.088, -0.188)
+
+
+class ConvBn(nn.Module):
+    """Convolution without bias, batch normalisation, ReLU."""
+
+    def __init__(self, n_in: int, n_out: int, kernel: int, stride: int = 1) -> None:
+        super().__init__()
+        self.conv = nn.Conv2d(n_in, n_out, kernel, stride, padding=kernel // 2, bias=False)
+        self.bn = nn.BatchNorm2d(n_out, eps=0.001)
+
+    def forward(self, maps: Tensor) -> Tensor:
+        """(B, n_in, H, W) to (B, n_out, ceil(H / stride), ceil(W / stride))."""
+        return torch.relu_(self.bn(self.conv(maps)))
+
+
+class Inception(nn.Module):
+    """Four parallel branches, concatenated along the channels."""
+
+    def __init__(self, n_in: int, spec: tuple[int, ...], width: float) -> None:
+        super().__init__()
+        one, reduce3, three, reduce5, five, pool = (scaled_channels(n, width) for n in spec)
+        self.branch1 = ConvBn(n_in, one, 1)
+        self.branch2 = nn.Sequential(ConvBn(n_in, reduce3, 1), ConvBn(reduce3, three, 3))
+        self.branch3 = nn.Sequential(ConvBn(n_in, reduce5, 1), ConvBn(reduce5, five, 3))
+        self.branch4 = nn.Sequential(nn.MaxPool2d(3, 1, 1), ConvBn(n_in, pool, 1))
+        self.n_out = one + three + five + pool
+
+    def forward(self, maps: Tensor) -> Tensor:
+        """(B, n_in, H, W) to (B, n_out, H, W)."""
+        branches = (self.branch1, self.branch2, self.branch3, self.branch4)
+        return torch.cat([branch(maps) for branch in branches], dim=1)
+
+
+class GoogLeNetMaps(NamedTuple):
+    """Feature maps: the two points where auxiliary heads branch off, and the last one."""
+
+    inception4a: Tensor
+    inception4d: Tensor
+    inception5b: Tensor
+
+
+class GoogLeNet(nn.Module):
+    """GoogLeNet without its classifiers.
+
+    Attributes:
+        n_aux: channels of ``inception4a`` and ``inception4d`` (512 and 528 at width 1).
+        n_out: channels of ``inception5b`` (1024 at width 1); the stride of that map is 32.
+    """
+
+    input_scale: Tensor
+    input_shift: Tensor
+
+    def __init__(self, width: float = 1.0) -> None:
+        super().__init__()
+        scale, shift = torch.tensor([INPUT_SCALE, INPUT_SHIFT]).view(2, 3, 1, 1)
+        self.register_buffer("input_scale", scale, persistent=False)
+        self.register_buffer("input_shift", shift, persistent=False)
+        stem, n = scaled_channels(64, width), scaled_channels(192, width)
+        self.conv1 = ConvBn(3, stem, 7, 2)
+        self.conv2 = ConvBn(stem, stem, 1)
+        self.conv3 = ConvBn(stem, n, 3)
+        n_out: dict[str, int] = {}
+        for name, spec in INCEPTIONS.items():
+            block = Inception(n, spec, width)
+            self.add_module(name, block)
+            n = n_out[name] = block.n_out
+        self.pool3 = nn.MaxPool2d(3, 2, ceil_mode=True)
+        self.pool2 = nn.MaxPool2d(2, 2, ceil_mode=True)
+        self.n_aux = (n_out["inception4a"], n_out["inception4d"])
+        self.n_out = n
+
+    def forward(self, images: Tensor) -> GoogLeNetMaps:
+        """Feature maps of images (B, 3, H, W) of zero mean and unit deviation per channel."""
+        maps = self.pool3(self.conv1(images * self.input_scale + self.input_shift))
+        maps = self.pool3(self.conv3(self.conv2(maps)))
+        points: dict[str, Tensor] = {}
+        for name in INCEPTIONS:
+            if name == "inception4a":
+                maps = self.pool3(maps)
+            elif name == "inception5a":
+                maps = self.pool2(maps)
+            maps = points[name] = self.get_submodule(name)(maps)
+        return GoogLeNetMaps(points["inception4a"], points["inception4d"], points["inception5b"])

@@ -1,0 +1,83 @@
+"""Backbones by name, and the weights they start from."""
+
+from __future__ import annotations
+
+import hashlib
+import urllib.request
+from pathlib import Path
+
+import torch
+from torch import Tensor, nn
+
+from baselines.localizers.backbones.googlenet import GoogLeNet
+from baselines.localizers.backbones.resnet import ResNet34
+from baselines.localizers.names import BackboneName
+from synfeal.errors import InputError
+from synfeal.files import atomic_path
+
+URL = "https://download.pytorch.org/models"
+# The eight digits are the beginning of each file's SHA-256.
+IMAGENET_FILES: dict[BackboneName, str] = {
+    "googlenet": "googlenet-1378be20.pth",
+    "resnet34": "resnet34-b627a593.pth",
+}
+# Classifiers of the ImageNet networks, which no localizer has.
+CLASSIFIERS = ("fc.", "aux1.", "aux2.")
+
+
+def build_backbone(name: BackboneName, width: float) -> GoogLeNet | ResNet34:
+    """A backbone without its classifier, randomly initialised."""
+    return GoogLeNet(width) if name == "googlenet" else ResNet34(width)
+
+
+def imagenet_weights_path(name: BackboneName, weights_dir: Path) -> Path:
+    """Where the official ImageNet weights are, downloaded and checked if they are not there yet.
+
+    Raises:
+        InputError: the file cannot be downloaded, or is not the one its name promises.
+    """
+    path = weights_dir / IMAGENET_FILES[name]
+    if not path.exists():
+        _download(f"{URL}/{path.name}", path)
+    return path
+
+
+def load_backbone_weights(backbone: nn.Module, path: Path) -> None:
+    """Load a state dict into a backbone; every parameter of it must be in the file.
+
+    Raises:
+        InputError: the file cannot be read as a state dict, or belongs to another shape of network.
+    """
+    try:
+        state: dict[str, Tensor] = torch.load(path, map_location="cpu", weights_only=True)
+        state = {k: v for k, v in state.items() if not k.startswith(CLASSIFIERS)}
+    except Exception as error:  # torch.load raises whatever the broken file provokes
+        raise InputError(f"{path}: cannot be read as backbone weights ({error})") from None
+    try:
+        backbone.load_state_dict(state)
+    except RuntimeError as error:
+        reason = str(error).splitlines()[1]
+        raise InputError(
+            f"{path}: does not fit {type(backbone).__name__} of this network.width ({reason}); "
+            "train the backbone again, or set the width it was trained with"
+        ) from None
+
+
+def _download(url: str, path: Path) -> None:
+    expected = path.stem.rsplit("-", 1)[1]
+    try:
+        with urllib.request.urlopen(url, timeout=30) as response:
+            content = response.read()
+    except OSError as error:
+        raise InputError(
+            f"{path}: ImageNet weights are missing and {url} cannot be downloaded ({error}); "
+            f"fetch it on a machine with a network and put it at {path}"
+        ) from None
+    found = hashlib.sha256(content).hexdigest()
+    if not found.startswith(expected):
+        raise InputError(
+            f"{path}: {url} answered with another file (SHA-256 begins {found[:8]}, "
+            f"expected {expected}); try again, or put the right file there"
+        )
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content)

@@ -1,0 +1,70 @@
+"""Hourglass-Pose.
+
+@inproceedings{melekhov2017hourglass,
+  title     = {Image-based Localization using Hourglass Networks},
+  author    = {Melekhov, Iaroslav and Ylioinas, Juha and Kannala, Juho and Rahtu, Esa},
+  booktitle = {IEEE International Conference on Computer Vision Workshops (ICCVW)},
+  year      = {2017}
+}
+
+Differences from the paper: of its two variants this is the one that sums encoder and decoder maps (the
+Synfeal authors' code concatenates them); batch normalisation in the decoder; q and -q count as the
+same rotation.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from baselines.localizers.backbones.channels import scaled_channels
+from baselines.localizers.backbones.resnet import ResNet34
+from baselines.localizers.base import Localizer, beta_loss
+from baselines.localizers.heads import PoseRegressor
+from baselines.localizers.losses import PosePrediction
+from synfeal.config.models import LocalizerConfig, NetworkConfig
+
+
+class UpBlock(nn.Module):
+    """Transposed convolution to the size of an encoder map, which is then added."""
+
+    def __init__(self, n_in: int, n_out: int) -> None:
+        super().__init__()
+        self.up = nn.ConvTranspose2d(n_in, n_out, 3, 2, padding=1, bias=False)
+        self.bn = nn.BatchNorm2d(n_out)
+
+    def forward(self, maps: Tensor, skip: Tensor) -> Tensor:
+        """(B, n_in, h, w) and (B, n_out, H, W), with h = ceil(H / 2), to (B, n_out, H, W)."""
+        upsampled = self.up(maps, output_size=list(skip.shape[-2:]))
+        return torch.relu_(self.bn(upsampled)) + skip
+
+
+class Hourglass(Localizer):
+    """ResNet-34 encoder, decoder with skip connections, regressor, fixed weight ``beta``."""
+
+    def __init__(self, network: NetworkConfig, hyper: LocalizerConfig) -> None:
+        super().__init__()
+        self.backbone = ResNet34(network.width)
+        one, two, three, four = self.backbone.n_stages
+        self.up3, self.up2, self.up1 = UpBlock(four, three), UpBlock(three, two), UpBlock(two, one)
+        n_maps = scaled_channels(32, network.width)
+        n_features = scaled_channels(1024, network.width)
+        side = -(-network.input_px // 4)  # layer1 has stride 4, rounded up
+        self.regressor = nn.Sequential(
+            nn.Conv2d(one, n_maps, 3, padding=1, bias=False),
+            nn.BatchNorm2d(n_maps),
+            nn.ReLU(),
+            nn.Flatten(),
+            nn.Linear(n_maps * side * side, n_features),
+            nn.ReLU(),
+            nn.Dropout(hyper.dropout),
+            PoseRegressor(n_features),
+        )
+        self.criterion = beta_loss("hourglass", hyper)
+
+    def forward(self, images: Tensor) -> list[PosePrediction]:
+        """One prediction."""
+        layer1, layer2, layer3, layer4 = self.backbone(images)
+        maps = self.up3(layer4, layer3)
+        maps = self.up2(maps, layer2)
+        return [self.regressor(self.up1(maps, layer1))]

@@ -1,0 +1,72 @@
+"""PoseLSTM.
+
+@inproceedings{walch2017poselstm,
+  title     = {Image-based Localization using {LSTMs} for Structured Feature Correlation},
+  author    = {Walch, Florian and Hazirbas, Caner and Leal-Taix{\\'e}, Laura and Sattler, Torsten and
+               Hilsenbeck, Sebastian and Cremers, Daniel},
+  booktitle = {IEEE International Conference on Computer Vision (ICCV)},
+  year      = {2017}
+}
+
+Differences from the paper: batch normalisation in the backbone; hidden states of 128 units per
+direction, as in the Synfeal authors' code, where the paper has 256; q and -q count as the same rotation.
+At a width below 1 both sides of the feature's reshape shrink with the square root of the width.
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor, nn
+
+from baselines.localizers.backbones.channels import scaled_channels
+from baselines.localizers.backbones.googlenet import GoogLeNet
+from baselines.localizers.base import Localizer, beta_loss
+from baselines.localizers.heads import PoseRegressor
+from baselines.localizers.losses import PosePrediction
+from synfeal.config.models import LocalizerConfig, NetworkConfig
+
+ROWS, COLUMNS, HIDDEN = 32, 64, 128
+
+
+class FourDirectionLstm(nn.Module):
+    """Reads a feature, laid out as a matrix, down, up, right and left; joins the four last states."""
+
+    def __init__(self, rows: int, columns: int, hidden: int) -> None:
+        super().__init__()
+        self.shape = (rows, columns)
+        self.vertical = nn.LSTM(columns, hidden, bidirectional=True)
+        self.horizontal = nn.LSTM(rows, hidden, bidirectional=True)
+        self.n_out = 4 * hidden
+
+    def forward(self, features: Tensor) -> Tensor:
+        """(B, rows * columns) to (B, 4 * hidden)."""
+        matrix = features.view(-1, *self.shape)
+        _, (vertical, _) = self.vertical(matrix.transpose(0, 1))  # steps: rows
+        _, (horizontal, _) = self.horizontal(matrix.permute(2, 0, 1))  # steps: columns
+        return torch.cat([*vertical, *horizontal], dim=1)
+
+
+class PoseLstm(Localizer):
+    """GoogLeNet, a feature reduced by LSTMs in four directions, fixed weight ``beta``."""
+
+    def __init__(self, network: NetworkConfig, hyper: LocalizerConfig) -> None:
+        super().__init__()
+        side = math.sqrt(network.width)
+        rows, columns = scaled_channels(ROWS, side), scaled_channels(COLUMNS, side)
+        self.backbone = GoogLeNet(network.width)
+        self.feature = nn.Sequential(
+            nn.AdaptiveAvgPool2d(1),
+            nn.Flatten(),
+            nn.Linear(self.backbone.n_out, rows * columns),
+            nn.ReLU(),
+        )
+        self.lstm = FourDirectionLstm(rows, columns, scaled_channels(HIDDEN, side))
+        self.regressor = nn.Sequential(nn.Dropout(hyper.dropout), PoseRegressor(self.lstm.n_out))
+        self.criterion = beta_loss("poselstm", hyper)
+
+    def forward(self, images: Tensor) -> list[PosePrediction]:
+        """One prediction."""
+        features = self.feature(self.backbone(images).inception5b)
+        return [self.regressor(self.lstm(features))]

@@ -1,0 +1,37 @@
+"""PoseNet2: PoseNet with learned weights of position and orientation.
+
+@inproceedings{kendall2017geometric,
+  title     = {Geometric Loss Functions for Camera Pose Regression with Deep Learning},
+  author    = {Kendall, Alex and Cipolla, Roberto},
+  booktitle = {IEEE Conference on Computer Vision and Pattern Recognition (CVPR)},
+  year      = {2017}
+}
+
+Differences from the paper: batch normalisation in the backbone; Euclidean norms, where the paper found
+L1 norms slightly better; no fine-tuning on reprojection errors, like Synfeal; q and -q count as the same
+rotation.
+"""
+
+from __future__ import annotations
+
+from torch import Tensor
+
+from baselines.localizers.backbones.googlenet import GoogLeNet
+from baselines.localizers.base import Localizer, learned_loss
+from baselines.localizers.heads import PooledRegressor
+from baselines.localizers.losses import PosePrediction
+from synfeal.config.models import LocalizerConfig, NetworkConfig
+
+
+class PoseNet2(Localizer):
+    """GoogLeNet, one regressor, learned weights."""
+
+    def __init__(self, network: NetworkConfig, hyper: LocalizerConfig) -> None:
+        super().__init__()
+        self.backbone = GoogLeNet(network.width)
+        self.regressor = PooledRegressor(self.backbone.n_out, network.width, hyper.dropout)
+        self.criterion = learned_loss(hyper)
+
+    def forward(self, images: Tensor) -> list[PosePrediction]:
+        """One prediction."""
+        return [self.regressor(self.backbone(images).inception5b)]

@@ -1,0 +1,68 @@
+"""What a mesh must fulfil before hours are spent on it; each failure is one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.errors import InputError
+from synfeal.mesh.model import TexturedMesh
+
+
+def check_mesh(mesh: TexturedMesh, path: Path) -> None:
+    """Faces, finite coordinates, valid indices and some colour.
+
+    Raises:
+        InputError: naming ``path`` and what is missing.
+    """
+    if not mesh.parts:
+        raise InputError(f"{path}: holds no faces; export the scene as a triangle mesh")
+    for part in mesh.parts:
+        bad = ~np.isfinite(part.vertices_m).all(axis=1)
+        if bad.any():
+            raise InputError(
+                f"{path}: part '{part.name}' has {bad.sum()} vertices that are NaN or infinite;"
+                " repair the mesh"
+            )
+        if part.faces.min() < 0 or part.faces.max() >= len(part.vertices_m):
+            raise InputError(f"{path}: part '{part.name}' has faces that name vertices it lacks")
+    if not has_colour(mesh):
+        raise InputError(
+            f"{path}: has neither a texture nor vertex colours; images of it would be of one colour."
+            " Export it with its texture"
+        )
+
+
+def has_colour(mesh: TexturedMesh) -> bool:
+    """Whether anything but one single colour can be seen."""
+    if any(part.texture is not None or part.vertex_rgb is not None for part in mesh.parts):
+        return True
+    return len({part.base_color.tobytes() for part in mesh.parts}) > 1
+
+
+def check_sampling_box(box: NDArray[np.float64], bounds_m: NDArray[np.float64], name: str) -> None:
+    """The box (2, 3) must overlap the mesh's bounds (2, 3) and be of a comparable size.
+
+    A box that misses the mesh, or a mesh more than a hundred times as large as the box, is almost
+    always a file in millimetres or centimetres read as metres, or another up axis.
+
+    Raises:
+        InputError: naming ``name``, both extents, and the settings to look at.
+    """
+    overlap = np.minimum(box[1], bounds_m[1]) - np.maximum(box[0], bounds_m[0])
+    ratio = float(np.max(bounds_m[1] - bounds_m[0]) / np.max(box[1] - box[0]))
+    if (overlap > 0).all() and ratio <= 100:
+        return
+    problem = "lies outside the mesh" if (overlap <= 0).any() else f"is {ratio:.0f} times smaller"
+    raise InputError(
+        f"{name}: sampling_box {_show(box)} {problem}, whose bounds are {_show(bounds_m)} m;"
+        " unit_m or up_axis is probably wrong"
+    )
+
+
+def _show(box: NDArray[np.float64]) -> str:
+    return " ".join(
+        f"{axis} {low:.3g}..{high:.3g}" for axis, low, high in zip("xyz", *box, strict=True)
+    )

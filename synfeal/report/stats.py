@@ -1,0 +1,104 @@
+"""From the scores of single runs to the numbers of one table cell."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import fmean, stdev
+from typing import Any
+
+from synfeal.errors import InputError
+
+MEASURES = ("position_m", "orientation_deg", "position_m_true", "orientation_deg_true")
+COUNTS = ("n_train", "n_test")
+Metrics = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Score:
+    """One median error over the repetitions of a cell.
+
+    Attributes:
+        value: the run's median, or the mean of the medians of several runs; None when all failed.
+        low: lower 95 % limit from the test frames (bootstrap), averaged over the runs.
+        high: upper limit, likewise.
+        sd: standard deviation of the medians over the runs; None below two runs.
+    """
+
+    value: float | None
+    low: float | None = None
+    high: float | None = None
+    sd: float | None = None
+
+
+@dataclass(frozen=True)
+class CellScores:
+    """What the repetitions of one cell came to.
+
+    Attributes:
+        scores: by measure (:data:`MEASURES`).
+        position_rms_m: median position error as the published code computes it, metres.
+        n_train: training frames.
+        n_test: test frames.
+        n_seeds: repetitions, failed ones included.
+        failed: repetitions without a score.
+    """
+
+    scores: dict[str, Score]
+    position_rms_m: float | None
+    n_train: int
+    n_test: int
+    n_seeds: int
+    failed: int
+
+
+def read_metrics(path: Path) -> Metrics:
+    """The scores of one run.
+
+    Raises:
+        InputError: the file is missing, is not JSON, or lacks a key.
+    """
+    try:
+        metrics: Metrics = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as JSON ({error}); run that training again") from None
+    needed = (*COUNTS, *MEASURES, *(f"{m}{end}" for m in MEASURES for end in ("_low", "_high")))
+    absent = [key for key in (*needed, "position_rms_m") if key not in metrics]
+    if absent:
+        raise InputError(f"{path}: {', '.join(absent)} missing; score that run again")
+    return metrics
+
+
+def combine(runs: Sequence[Metrics]) -> CellScores:
+    """Combine the repetitions of one cell; a failed run counts in ``failed`` and in nothing else."""
+    finished = [run for run in runs if run["position_m"] is not None]
+    return CellScores(
+        scores={measure: score_of(finished, measure) for measure in MEASURES},
+        position_rms_m=_mean(finished, "position_rms_m"),
+        n_train=runs[0]["n_train"],
+        n_test=runs[0]["n_test"],
+        n_seeds=len(runs),
+        failed=len(runs) - len(finished),
+    )
+
+
+def score_of(finished: Sequence[Metrics], measure: str) -> Score:
+    """One measure over the runs that finished."""
+    values = [run[measure] for run in finished]
+    return Score(
+        value=_mean(finished, measure),
+        low=_mean(finished, f"{measure}_low"),
+        high=_mean(finished, f"{measure}_high"),
+        sd=stdev(values) if len(values) > 1 else None,
+    )
+
+
+def percent_change(new: float | None, old: float | None) -> float | None:
+    """``100 (new - old) / old``; None where either is missing or ``old`` is zero."""
+    return None if new is None or not old else 100 * (new - old) / old
+
+
+def _mean(finished: Sequence[Metrics], key: str) -> float | None:
+    return fmean(run[key] for run in finished) if finished else None

@@ -1,0 +1,140 @@
+"""A canvas is what a texture painter gets: a size in pixels, a scale and a random generator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+Colour = tuple[float, float, float]
+Pixels = NDArray[np.float32]  # (H, W, 3) display-referred albedo in [0, 1], row 0 on top
+
+
+@dataclass(frozen=True)
+class Canvas:
+    """The rectangle a painter fills."""
+
+    rng: np.random.Generator
+    height_px: int
+    width_px: int
+    px_per_m: float
+
+    @property
+    def size_m(self) -> tuple[float, float]:
+        """Width and height in metres."""
+        return self.width_px / self.px_per_m, self.height_px / self.px_per_m
+
+    def plain(self, colour: Colour) -> Pixels:
+        """One colour everywhere."""
+        return np.broadcast_to(
+            np.asarray(colour, np.float32), (self.height_px, self.width_px, 3)
+        ).copy()
+
+    def coordinates_m(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Metres from the top-left corner: x as (1, W), y as (H, 1)."""
+        x = (np.arange(self.width_px, dtype=np.float32) + 0.5) / self.px_per_m
+        y = (np.arange(self.height_px, dtype=np.float32) + 0.5) / self.px_per_m
+        return x[None, :], y[:, None]
+
+    def noise(
+        self, cell_m: float | tuple[float, float], octaves: int = 4, persistence: float = 0.6
+    ) -> NDArray[np.float32]:
+        """Fractal value noise (H, W), zero mean and roughly unit deviation.
+
+        ``cell_m`` is the size of the coarsest cells (along x and y if a pair); each octave halves it.
+        """
+        cell_x, cell_y = cell_m if isinstance(cell_m, tuple) else (cell_m, cell_m)
+        total = np.zeros((self.height_px, self.width_px), np.float32)
+        power = 0.0
+        for octave in range(octaves):
+            step_x = max(1.0, cell_x * self.px_per_m / 2**octave)
+            step_y = max(1.0, cell_y * self.px_per_m / 2**octave)
+            weight = persistence**octave
+            total += weight * self._lattice_noise(step_x, step_y)
+            power += weight**2
+        return total / np.float32(np.sqrt(power))
+
+    def _lattice_noise(self, step_x: float, step_y: float) -> NDArray[np.float32]:
+        columns = int(np.ceil(self.width_px / step_x)) + 2
+        rows = int(np.ceil(self.height_px / step_y)) + 2
+        lattice = self.rng.standard_normal((rows, columns), dtype=np.float32)
+        box = (0.5, 0.5, 0.5 + self.width_px / step_x, 0.5 + self.height_px / step_y)
+        smooth = Image.fromarray(lattice).resize(
+            (self.width_px, self.height_px), Image.Resampling.BILINEAR, box=box
+        )
+        return np.asarray(smooth, np.float32) * np.float32(1.4)  # interpolation lowers the deviation
+
+
+Painter = Callable[[Canvas], Pixels]
+
+
+class Sketch:
+    """Vector drawing on a canvas in relative coordinates: x, y in [0, 1], y down."""
+
+    def __init__(self, background: Pixels) -> None:
+        self.height_px, self.width_px = background.shape[:2]
+        self._image = Image.fromarray(np.round(np.clip(background, 0, 1) * 255).astype(np.uint8))
+        self._draw = ImageDraw.Draw(self._image)
+
+    def _at(self, points: NDArray[np.float64]) -> list[tuple[float, float]]:
+        scaled = np.asarray(points, float) * (self.width_px, self.height_px)
+        return [(float(x), float(y)) for x, y in scaled]
+
+    def polygon(self, points: NDArray[np.float64], colour: Colour) -> None:
+        """A filled polygon (N, 2)."""
+        self._draw.polygon(self._at(points), fill=_bytes(colour))
+
+    def line(self, points: NDArray[np.float64], colour: Colour, width: float = 0.01) -> None:
+        """A polyline (N, 2); ``width`` relative to the canvas' height."""
+        width_px = max(1, round(width * self.height_px))
+        self._draw.line(self._at(points), fill=_bytes(colour), width=width_px, joint="curve")
+
+    def rectangle(self, x0: float, y0: float, x1: float, y1: float, colour: Colour) -> None:
+        """A filled axis-aligned rectangle."""
+        self.polygon(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), colour)
+
+    def ellipse(self, x: float, y: float, radius_x: float, radius_y: float, colour: Colour) -> None:
+        """A filled ellipse, radii relative to width and height."""
+        angle = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+        ring = np.stack([x + radius_x * np.cos(angle), y + radius_y * np.sin(angle)], axis=1)
+        self.polygon(ring, colour)
+
+    def text_lines(
+        self, rng: np.random.Generator, box: tuple[float, float, float, float], rows: int,
+        colour: Colour,
+    ) -> None:  # fmt: skip
+        """Rows of letter-like strokes inside ``box`` (x0, y0, x1, y1)."""
+        x0, y0, x1, y1 = box
+        pitch = (y1 - y0) / rows
+        for row in range(rows):
+            y, x = y0 + row * pitch, x0
+            end = x1 - rng.uniform(0, 0.35) * (x1 - x0)
+            letter = 0.5 * pitch * self.height_px / self.width_px
+            while x < end:
+                if rng.random() < 0.82:
+                    strokes = rng.uniform((x, y), (x + letter, y + 0.62 * pitch), (3, 2))
+                    self.line(strokes, colour, width=0.12 * pitch)
+                x += 1.3 * letter
+
+    def pixels(self) -> Pixels:
+        """The drawing as float pixels."""
+        return np.asarray(self._image, np.float32) / np.float32(255)
+
+
+def _bytes(colour: Colour) -> tuple[int, int, int]:
+    red, green, blue = (round(255 * min(1.0, max(0.0, float(channel)))) for channel in colour)
+    return red, green, blue
+
+
+def pick(rng: np.random.Generator, palette: tuple[Colour, ...]) -> Colour:
+    """One colour of a palette."""
+    return palette[int(rng.integers(len(palette)))]
+
+
+def shade(colour: Colour, factor: float) -> Colour:
+    """A lighter or darker version of a colour."""
+    red, green, blue = (min(1.0, channel * factor) for channel in colour)
+    return red, green, blue

@@ -1,0 +1,81 @@
+"""The workflow as a user meets it: what a dry run plans, and how a wrong configuration ends."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+
+
+def snakemake(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "snakemake", "--cores", "2", *arguments]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def planned_jobs(results: Path, *arguments: str) -> dict[str, int]:
+    """Jobs by rule that a dry run into an empty results directory plans."""
+    run = snakemake("--dry-run", "--config", f"results={results}", *arguments)
+    assert run.returncode == 0, run.stdout + run.stderr
+    return {name: int(n) for name, n in re.findall(r"^(\w+) +(\d+)$", run.stdout, re.MULTILINE)}
+
+
+def test_default_profile_plans_the_papers_design(tmp_path: Path) -> None:
+    jobs = planned_jobs(tmp_path)
+    assert jobs["train"] == jobs["score"] == 120  # 24 distinct data set x initialisation, 5 models
+    assert jobs["scene"] == 3
+    assert jobs["noisy_labels"] == 9 * 2
+    assert jobs["sfm"] == jobs["rgbd"] == 12 + 5  # 300 and 125 frames in batches of 25
+    assert jobs["posegraph"] == 2 * jobs["rgbd"]
+    assert jobs["chain"] == 3
+    assert jobs["table"] + jobs["table1_meshes"] == 5
+
+
+def test_a_single_experiment_is_a_target(tmp_path: Path) -> None:
+    target = f"{tmp_path}/mini/runs/large_room/6k/synfeal/scratch/posenet2/seed0/metrics.json"
+    jobs = planned_jobs(tmp_path, "--", target)
+    assert jobs["train"] == 1
+    assert "sfm" not in jobs
+    assert "pretrain" not in jobs
+    # Only what one scene's network frames need: no depth, no frames for reconstruction.
+    assert jobs["render"] == 10
+
+
+def test_changing_one_noise_level_adds_only_that_rows_jobs(tmp_path: Path) -> None:
+    changed = tmp_path / "experiments.csv"
+    shutil.copy(ROOT / "config/experiments.csv", changed)
+    text = changed.read_text()
+    row = "orientation,large_room,6k,noise,0,20,"
+    assert row in text
+    changed.write_text(text.replace(row, "orientation,large_room,6k,noise,0,25,"))
+    before = planned_runs(tmp_path)
+    after = planned_runs(tmp_path, f"experiments={changed}")
+    assert len(after - before) == len(before - after) == 5
+    assert all("noise-p0-r25" in path for path in after - before)
+
+
+def planned_runs(results: Path, *config: str) -> set[str]:
+    run = snakemake("--dry-run", "--config", f"results={results}", *config, "--", "runs")
+    assert run.returncode == 0, run.stdout + run.stderr
+    listing = snakemake("--summary", "--config", f"results={results}", *config, "--", "runs")
+    return set(re.findall(r"^\S+/metrics\.json", listing.stdout, re.MULTILINE))
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("scael=0.1", ["scael", "unknown key", "scale"]),
+        ("scale=2", ["scale", "less than or equal to 1"]),
+        ("experiments=nowhere.csv", ["nowhere.csv", "cannot be read"]),
+    ],
+)
+def test_wrong_configuration_ends_in_one_line(override: str, words: list[str]) -> None:
+    run = snakemake("--dry-run", "--config", override)
+    assert run.returncode == 1
+    errors = [line for line in run.stderr.splitlines() if line.startswith("error:")]
+    assert len(errors) == 1
+    assert all(word in errors[0] for word in words), errors[0]
+    assert "Traceback" not in run.stderr
