@@ -31,7 +31,9 @@ rule all:
     input:
         f"{ROOT}/summary.md",
         f"{ROOT}/tables/all_tables.tex",
-        f"{ROOT}/figures/error_by_size.png",
+        f"{ROOT}/tables/assistance.csv",
+        f"{ROOT}/figures",
+        all_manifests(),
 
 
 rule scenes:

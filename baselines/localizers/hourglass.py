@@ -7,9 +7,9 @@
   year      = {2017}
 }
 
-Differences from the paper: of its two variants this is the one that sums encoder and decoder maps (the
-Synfeal authors' code concatenates them); batch normalisation in the decoder; q and -q count as the
-same rotation.
+Differences from the paper: of its two variants this is the one that sums encoder and decoder maps
+(the Synfeal authors' code concatenates them); batch normalisation in the decoder; q and -q count as
+the same rotation.
 """
 
 from __future__ import annotations

@@ -17,14 +17,15 @@ class PosePrediction(NamedTuple):
 
 def position_distance(predicted_m: Tensor, true_m: Tensor) -> Tensor:
     """Mean Euclidean distance of positions (B, 3). The gradient at distance 0 is 0, not NaN."""
-    return torch.linalg.vector_norm(predicted_m - true_m, dim=1).mean()
+    distance: Tensor = torch.linalg.vector_norm(predicted_m - true_m, dim=1)
+    return distance.mean()
 
 
 def quat_distance(predicted_wxyz: Tensor, true_wxyz: Tensor) -> Tensor:
-    """Mean distance on the unit sphere's chords, the same for ``q`` and ``-q``.
+    """Mean distance of rotations as unit quaternions, the same for ``q`` and ``-q``.
 
-    ``min(|p - q|, |p + q|)`` with ``p`` the normalised prediction (B, 4) and ``q`` a unit quaternion
-    (B, 4). It is ``2 sin(angle / 4)``: near 0 half of the angle between the rotations, in radians.
+    ``min(|p - q|, |p + q|)`` with ``p`` the normalised prediction (B, 4) and ``q`` a unit
+    quaternion (B, 4). It is ``2 sin(angle / 4)``: near 0 half of the angle, in radians.
     """
     unit = nn.functional.normalize(predicted_wxyz, dim=1)
     same = torch.linalg.vector_norm(unit - true_wxyz, dim=1)
@@ -48,8 +49,8 @@ class BetaLoss(nn.Module):
 class LearnedWeightLoss(nn.Module):
     """``exp(-s_p) L_position + s_p + exp(-s_o) L_orientation + s_o`` with learned ``s``.
 
-    Homoscedastic uncertainty (Kendall and Cipolla, CVPR 2017, eq. 4). For constant errors the optimum
-    is ``s = log(L)``, so each term is weighted by the inverse of its size.
+    Homoscedastic uncertainty (Kendall and Cipolla, CVPR 2017, eq. 4). For constant errors the
+    optimum is ``s = log(L)``, so each term is weighted by the inverse of its size.
     """
 
     def __init__(self, s_position: float, s_orientation: float) -> None:

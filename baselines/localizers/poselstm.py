@@ -1,16 +1,17 @@
-"""PoseLSTM.
+r"""PoseLSTM.
 
 @inproceedings{walch2017poselstm,
   title     = {Image-based Localization using {LSTMs} for Structured Feature Correlation},
-  author    = {Walch, Florian and Hazirbas, Caner and Leal-Taix{\\'e}, Laura and Sattler, Torsten and
-               Hilsenbeck, Sebastian and Cremers, Daniel},
+  author    = {Walch, Florian and Hazirbas, Caner and Leal-Taix{\'e}, Laura and Sattler, Torsten
+               and Hilsenbeck, Sebastian and Cremers, Daniel},
   booktitle = {IEEE International Conference on Computer Vision (ICCV)},
   year      = {2017}
 }
 
 Differences from the paper: batch normalisation in the backbone; hidden states of 128 units per
-direction, as in the Synfeal authors' code, where the paper has 256; q and -q count as the same rotation.
-At a width below 1 both sides of the feature's reshape shrink with the square root of the width.
+direction, as in the Synfeal authors' code, where the paper has 256; q and -q count as the same
+rotation. At a width below 1 the feature's two sides and the hidden states shrink with its square
+root.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ ROWS, COLUMNS, HIDDEN = 32, 64, 128
 
 
 class FourDirectionLstm(nn.Module):
-    """Reads a feature, laid out as a matrix, down, up, right and left; joins the four last states."""
+    """Reads a feature, laid out as a matrix, in four directions; joins the four last states."""
 
     def __init__(self, rows: int, columns: int, hidden: int) -> None:
         super().__init__()

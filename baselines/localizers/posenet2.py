@@ -7,9 +7,9 @@
   year      = {2017}
 }
 
-Differences from the paper: batch normalisation in the backbone; Euclidean norms, where the paper found
-L1 norms slightly better; no fine-tuning on reprojection errors, like Synfeal; q and -q count as the same
-rotation.
+Differences from the paper: batch normalisation in the backbone; Euclidean norms, where the paper
+found L1 norms slightly better; no fine-tuning on reprojection errors, as in Synfeal; q and -q count
+as the same rotation.
 """
 
 from __future__ import annotations

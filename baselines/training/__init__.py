@@ -1,0 +1,1 @@
+"""Training, prediction and scoring of localizers; ``score`` works without torch."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal, get_args
 
 from pydantic import Field, ValidationError, model_validator
@@ -24,14 +23,19 @@ class Experiment(Strict):
 
     table: Literal[
         "table2_ground_truth", "table3_inconsistencies", "table4_size", "table5_from_scratch"
-    ]
-    block: Literal["", "orientation", "position", "both"] = Field(description="blocks of table 3")
-    scene: str
-    size: str
-    labels: Source
-    noise_m: NonNegative
-    noise_deg: NonNegative
-    init: Init
+    ] = Field(description="the table of the paper the row belongs to")
+    block: Literal["", "orientation", "position", "both"] = Field(
+        description="rows of table 3: its block; empty in the other tables"
+    )
+    scene: str = Field(description="a key of `scenes`")
+    size: str = Field(description="a key of `scenes.<scene>.sizes` and of `training.samples_seen`")
+    labels: Source = Field(
+        description="where the labels come from: `synfeal` the simulator's own poses, `noise` the "
+        "same with noise, the others re-estimated from the frames"
+    )
+    noise_m: NonNegative = Field(description="nominal position noise, metres")
+    noise_deg: NonNegative = Field(description="nominal orientation noise, degrees")
+    init: Init = Field(description="weights a training starts from: `pretrained` or `scratch`")
 
     @model_validator(mode="after")
     def _check(self) -> Experiment:
@@ -77,26 +81,37 @@ def read_experiments(config: Config) -> tuple[Experiment, ...]:
     """
     path = config.experiments
     try:
-        with path.open(encoding="utf-8", newline="") as file:
+        with path.open(encoding="utf-8-sig", newline="") as file:  # spreadsheets add a mark
             reader = csv.DictReader(file)
-            rows = list(reader)
+            rows = [(f"{path}: row {reader.line_num}", row) for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as CSV ({error})") from None
     if tuple(reader.fieldnames or ()) != COLUMNS:
         raise InputError(f"{path}: the header must be {','.join(COLUMNS)}")
-    experiments = tuple(_parse(row, f"{path}: row {i + 2}", config) for i, row in enumerate(rows))
+    experiments: dict[Experiment, str] = {}
+    for where, row in rows:
+        experiment = _parse(row, where, config)
+        if experiment in experiments:
+            raise InputError(f"{where}: the same as {experiments[experiment]}; remove one of them")
+        experiments[experiment] = where
     if not experiments:
         raise InputError(f"{path}: has no rows; nothing would be run")
-    return experiments
+    return tuple(experiments)
 
 
 def _parse(row: dict[str, str], where: str, config: Config) -> Experiment:
+    if None in row:
+        raise InputError(f"{where}: has more cells than the {len(COLUMNS)} columns of the header")
     try:
         experiment = Experiment.model_validate(row)
     except ValidationError as error:
         raise InputError(f"{where}: {describe(error)}") from None
     if experiment.scene not in config.scenes:
         raise InputError(f"{where}: scene '{experiment.scene}': allowed: {sorted(config.scenes)}")
+    if config.pretraining.source == "pretext" and experiment.scene == config.pretraining.scene:
+        raise InputError(
+            f"{where}: scene '{experiment.scene}': is what pretraining.scene trains on"
+        )
     sizes = config.scenes[experiment.scene].sizes
     if experiment.size not in sizes:
         raise InputError(f"{where}: size '{experiment.size}': allowed: {sorted(sizes)}")

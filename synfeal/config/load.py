@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 import yaml
 from pydantic import ValidationError
@@ -63,24 +63,36 @@ def describe(error: ValidationError) -> str:
     key = ".".join(str(part) for part in first["loc"] if part != "[key]")
     if first["type"] == "extra_forbidden":
         return f"{key}: unknown key; allowed here: {', '.join(_siblings(first['loc']))}"
+    if first["type"] == "missing":
+        return f"{key}: missing; it has no default"
     message = first["msg"].removeprefix("Value error, ")
     if first["type"] == "value_error":
         return f"{key}.{message}" if key else message
     more = len(error.errors()) - 1
-    return f"{key}: {message}, found {first['input']!r}" + (f" (and {more} more)" if more else "")
+    found = _shortened(repr(first["input"]))
+    return f"{key}: {message}, found {found}" + (f" (and {more} more)" if more else "")
+
+
+def _shortened(text: str, length: int = 60) -> str:
+    return text if len(text) <= length else f"{text[:length]}..."
 
 
 def _siblings(location: tuple[int | str, ...]) -> list[str]:
     """Keys allowed beside the unknown one at ``location``."""
-    model: Any = Config
+    annotation: Any = Config
     for part in location[:-1]:
-        if isinstance(model, type) and part in getattr(model, "model_fields", {}):
-            model = _model_in(model.model_fields[str(part)].annotation)
-    return sorted(getattr(model, "model_fields", {}))
+        annotation = _value_type(annotation, part)
+    return sorted(_fields(annotation))
 
 
-def _model_in(annotation: Any) -> Any:
-    """The model class inside ``X``, ``X | None`` or ``dict[str, X]``."""
-    if hasattr(annotation, "model_fields"):
-        return annotation
-    return next((m for m in map(_model_in, get_args(annotation)) if m is not None), None)
+def _value_type(annotation: Any, key: int | str) -> Any:
+    """What stands under ``key`` of a model or mapping, without ``| None``."""
+    fields = _fields(annotation)
+    found = fields[str(key)].annotation if fields else get_args(annotation)[1]
+    models = [a for a in get_args(found) if _fields(a)]
+    return models[0] if models and get_origin(found) is not dict else found
+
+
+def _fields(annotation: Any) -> dict[str, Any]:
+    fields: dict[str, Any] = getattr(annotation, "model_fields", {})
+    return fields

@@ -1,144 +1,61 @@
-"""Typed configuration. Every stage takes the one model it needs, so a change re-runs only its readers."""
+"""Typed configuration. A stage takes the model it needs, so a change re-runs its readers only."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-Slug = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_]*$")]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Fraction = Annotated[float, Field(ge=0, lt=1)]
-Count = Annotated[int, Field(ge=1)]
-Interval = tuple[float, float]
+from synfeal.config.collection import (
+    Angles,
+    Box,
+    CameraConfig,
+    CollectionConfig,
+    Count,
+    Finite,
+    Fraction,
+    NonNegative,
+    Positive,
+    SceneConfig,
+    SizeConfig,
+    Slug,
+    Strict,
+)
+
+__all__ = [
+    "MODELS",
+    "Angles",
+    "Box",
+    "CameraConfig",
+    "CollectionConfig",
+    "Config",
+    "GroundTruthConfig",
+    "LocalizerConfig",
+    "ModelName",
+    "NetworkConfig",
+    "NonNegative",
+    "PoseGraphConfig",
+    "PretrainingConfig",
+    "RgbdConfig",
+    "SceneConfig",
+    "SfmConfig",
+    "SizeConfig",
+    "Strict",
+    "TrainingConfig",
+]
 
 MODELS = ("posenet", "poselstm", "hourglass", "posenet2resnet", "posenet2")
 ModelName = Literal["posenet", "poselstm", "hourglass", "posenet2resnet", "posenet2"]
-
-
-class Strict(BaseModel):
-    """A model that refuses unknown keys and cannot be changed after it was checked."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-def _ordered(name: str, interval: Interval) -> None:
-    if not interval[0] < interval[1]:
-        raise ValueError(f"{name}: the first number must be below the second, got {list(interval)}")
-
-
-class Box(Strict):
-    """An axis-aligned box in the world, metres."""
-
-    x: Interval = Field(description="lower and upper bound along x, metres")
-    y: Interval = Field(description="lower and upper bound along y, metres")
-    z: Interval = Field(description="lower and upper bound along z, metres")
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        for axis in ("x", "y", "z"):
-            _ordered(axis, getattr(self, axis))
-        return self
-
-
-class Angles(Strict):
-    """Admissible angles of the camera, degrees."""
-
-    roll_deg: Interval = Field((-29.8, 29.8), description="roll bounds, degrees")
-    pitch_deg: Interval = Field((-29.8, 29.8), description="pitch bounds, degrees")
-    yaw_deg: Interval = Field((0.0, 360.0), description="yaw bounds, degrees")
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        for name in ("roll_deg", "pitch_deg", "yaw_deg"):
-            _ordered(name, getattr(self, name))
-        if not -90 < self.pitch_deg[0] < self.pitch_deg[1] < 90:
-            raise ValueError("pitch_deg: must lie within -90 and 90, where yaw and roll are distinct")
-        return self
-
-
-class SizeConfig(Strict):
-    """Frames of a data set at full scale, as the paper prints them."""
-
-    train: Count = Field(description="training frames at scale 1")
-    test: Count = Field(description="test frames at scale 1")
-
-
-class SceneConfig(Strict):
-    """One scene: where its mesh comes from and where the camera may go."""
-
-    source: Literal["procedural", "mesh"] = Field(
-        description="`procedural` builds the stand-in of this name; `mesh` reads `path`"
-    )
-    builder: Literal["large_room", "sanctuary", "pretext_room"] | None = Field(
-        None, description="procedural scenes: which stand-in to build"
-    )
-    path: Path | None = Field(None, description="mesh scenes: the file to read (.glb, .gltf, .obj, .ply)")
-    sha256: str | None = Field(
-        None, pattern=r"^[0-9a-f]{64}$", description="mesh scenes: expected hash of the file, if any"
-    )
-    up_axis: Literal["auto", "y", "z"] = Field(
-        "auto", description="axis that points up in the file; `auto` takes y for glTF, z otherwise"
-    )
-    unit_m: Positive = Field(1.0, description="length of one unit of the file in metres")
-    sampling_box: Box | None = Field(
-        None, description="where camera centres are sampled; the mesh's bounds when absent"
-    )
-    angles: Angles = Field(default_factory=Angles, description="angle bounds of sampled poses")
-    min_view_distance_m: NonNegative = Field(
-        1.2, description="least free distance along the optical axis of a target pose (the paper's d)"
-    )
-    sizes: dict[str, SizeConfig] = Field(
-        default_factory=dict, description="data set sizes by the paper's names, at scale 1"
-    )
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.source == "procedural" and self.builder is None:
-            raise ValueError("builder: a procedural scene needs one of large_room, sanctuary, pretext_room")
-        if self.source == "mesh" and self.path is None:
-            raise ValueError("path: a scene with `source: mesh` needs the path of its mesh file")
-        return self
-
-
-class CollectionConfig(Strict):
-    """How the camera moves (section 3 of the paper)."""
-
-    candidates: Count = Field(8, description="target pose candidates per path (the paper's k)")
-    frame_spacing_m: Positive = Field(0.03, description="distance between frames (the paper's other d)")
-    min_path_m: NonNegative = Field(1.5, description="shorter paths are drawn again")
-    max_tries: Count = Field(2000, description="rounds of candidates before a scene is called too narrow")
-    interpolation: Literal["rpy", "slerp"] = Field(
-        "rpy", description="`rpy` is the paper's component-wise interpolation, each angle the short way"
-    )
-    collision_faces: Count = Field(20_000, description="triangles the collision mesh is decimated to")
-
-
-class CameraConfig(Strict):
-    """A pinhole camera, principal point in the image centre, square pixels."""
-
-    width: Annotated[int, Field(ge=16, le=8192)] = Field(640, description="image width, pixels")
-    height: Annotated[int, Field(ge=16, le=8192)] = Field(480, description="image height, pixels")
-    horizontal_fov_deg: Annotated[float, Field(gt=1, lt=170)] = Field(
-        60.0, description="horizontal field of view, degrees"
-    )
-    near_m: Positive = Field(0.05, description="near clip plane, metres")
-    far_m: Positive = Field(100.0, description="far clip plane, metres")
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.near_m >= self.far_m:
-            raise ValueError("near_m: must be below far_m")
-        return self
 
 
 class SfmConfig(Strict):
     """Structure from motion with pycolmap."""
 
     max_features: Count = Field(2000, description="SIFT features per image")
-    overlap: Count = Field(10, description="sequential matching: neighbours each image is matched with")
+    overlap: Count = Field(
+        10, description="sequential matching: neighbours each image is matched with"
+    )
     min_num_inliers: Count = Field(15, description="least inliers of a verified pair")
     init_min_tri_angle_deg: Positive = Field(4.0, description="least angle of the initial pair")
 
@@ -148,7 +65,9 @@ class RgbdConfig(Strict):
 
     max_depth_m: Positive = Field(20.0, description="depth beyond this is not used")
     keyframe_every: Count = Field(5, description="frames between keyframes for loop closures")
-    max_rmse_m: Positive = Field(0.05, description="loop closures with a larger residual are rejected")
+    max_rmse_m: Positive = Field(
+        0.05, description="loop closures with a larger residual are rejected"
+    )
     min_fitness: Fraction = Field(0.3, description="loop closures with less overlap are rejected")
 
 
@@ -164,8 +83,12 @@ class GroundTruthConfig(Strict):
     """Label replacement as in section 4.1."""
 
     batch_frames: Annotated[int, Field(ge=2)] = Field(250, description="frames per batch")
-    assist_position_m: Positive = Field(0.20, description="assist when the last position is off by more")
-    assist_orientation_deg: Positive = Field(10.0, description="assist when the last orientation is")
+    assist_position_m: Positive = Field(
+        0.20, description="assist when the last position is off by more"
+    )
+    assist_orientation_deg: Positive = Field(
+        10.0, description="assist when the last orientation is"
+    )
     sfm: SfmConfig = Field(default_factory=SfmConfig, description="structure from motion")
     rgbd: RgbdConfig = Field(default_factory=RgbdConfig, description="RGB-D odometry")
     posegraph: PoseGraphConfig = Field(
@@ -176,7 +99,9 @@ class GroundTruthConfig(Strict):
 class NetworkConfig(Strict):
     """Shape shared by all localizers."""
 
-    input_px: Annotated[int, Field(ge=32, le=1024)] = Field(224, description="side of the square input")
+    input_px: Annotated[int, Field(ge=32, le=1024)] = Field(
+        224, description="side of the square input"
+    )
     width: Annotated[float, Field(gt=0, le=1)] = Field(
         1.0, description="factor on the channels of every backbone; only 1 loads ImageNet weights"
     )
@@ -185,12 +110,16 @@ class NetworkConfig(Strict):
 class LocalizerConfig(Strict):
     """Hyper-parameters of one localizer."""
 
-    learning_rate: Positive = Field(1e-4, description="peak learning rate of the one-cycle schedule")
+    learning_rate: Positive = Field(
+        1e-4, description="peak learning rate of the one-cycle schedule"
+    )
     weight_decay: NonNegative = Field(1e-4, description="decoupled weight decay")
     dropout: Fraction = Field(0.5, description="dropout before the regressors")
     beta: Positive | None = Field(None, description="weight of the orientation term (beta losses)")
-    s_position: float = Field(0.0, description="initial log-variance of position (learned losses)")
-    s_orientation: float = Field(-3.0, description="initial log-variance of orientation (learned losses)")
+    s_position: Finite = Field(0.0, description="initial log-variance of position (learned losses)")
+    s_orientation: Finite = Field(
+        -3.0, description="initial log-variance of orientation (learned losses)"
+    )
 
 
 class TrainingConfig(Strict):
@@ -242,7 +171,9 @@ class Config(Strict):
     pretraining: PretrainingConfig = Field(
         default_factory=PretrainingConfig, description="what pretrained runs start from"
     )
-    localizers: dict[ModelName, LocalizerConfig] = Field(description="hyper-parameters by localizer")
+    localizers: dict[ModelName, LocalizerConfig] = Field(
+        description="hyper-parameters by localizer"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -255,11 +186,11 @@ class Config(Strict):
             raise ValueError(
                 f"pretraining.scene: '{self.pretraining.scene}' is not one of {sorted(self.scenes)}"
             )
-        for name, camera in (("network_camera", self.network_camera),):
-            if min(camera.width, camera.height) <= self.network.input_px:
-                raise ValueError(
-                    f"{name}: both sides must exceed network.input_px ({self.network.input_px})"
-                )
+        camera = self.network_camera
+        if min(camera.width, camera.height) <= self.network.input_px:
+            raise ValueError(
+                f"network_camera: both sides must exceed network.input_px ({self.network.input_px})"
+            )
         return self
 
     @property

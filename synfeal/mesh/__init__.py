@@ -1,0 +1,1 @@
+"""Meshes: loading, checking, saving, decimation, ray queries."""

@@ -30,7 +30,7 @@ def check_mesh(mesh: TexturedMesh, path: Path) -> None:
             raise InputError(f"{path}: part '{part.name}' has faces that name vertices it lacks")
     if not has_colour(mesh):
         raise InputError(
-            f"{path}: has neither a texture nor vertex colours; images of it would be of one colour."
+            f"{path}: has neither a texture nor vertex colours; images would be of one colour."
             " Export it with its texture"
         )
 

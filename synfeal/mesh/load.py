@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from synfeal.errors import InputError
 from synfeal.mesh.checks import check_mesh
 from synfeal.mesh.materials import BaseMaterial, reduce_material
-from synfeal.mesh.model import WHITE, MeshPart, TexturedMesh
+from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.textures import RecordingResolver, warn_missing_textures
 
 UpAxis = Literal["auto", "y", "z"]
@@ -22,8 +21,6 @@ GLTF_SUFFIXES = (".glb", ".gltf")
 
 # Rotates y-up files: their y becomes the world's z, their z points towards the viewer (-y).
 WORLD_FROM_Y_UP: NDArray[np.float64] = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
-
-log = logging.getLogger("synfeal")
 
 
 def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> TexturedMesh:
@@ -48,7 +45,7 @@ def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> Text
         if isinstance(geometry, trimesh.Trimesh) and len(geometry.faces):
             vertices = trimesh.transform_points(geometry.vertices, file_from_part) @ scale.T
             parts.append(_part(_part_name(name), vertices, geometry, str(path)))
-    mesh = TexturedMesh(tuple(parts))
+    mesh = TexturedMesh(tuple(part for part in parts if part.is_drawn))
     check_mesh(mesh, path)
     return mesh
 
@@ -85,7 +82,8 @@ def _check_file(path: Path) -> None:
         raise InputError(f"{path}: the mesh file is empty; download or export it again")
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(
-            f"{path}: unknown kind of mesh '{path.suffix}'; convert it to one of {', '.join(SUFFIXES)}"
+            f"{path}: unknown kind of mesh '{path.suffix}'; convert it to one of"
+            f" {', '.join(SUFFIXES)}"
         )
 
 
@@ -122,6 +120,6 @@ def _textured_part(
         uv=np.asarray(visual.uv, dtype=np.float64) if has_texture else None,
         texture=material.texture if has_texture else None,
         vertex_rgb=None if color is None else np.asarray(color)[:, :3].astype(np.uint8),
-        base_color=WHITE if material.base_color is None else material.base_color,
+        base_color=material.base_color,
         alpha_cutoff=material.alpha_cutoff,
     )

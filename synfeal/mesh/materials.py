@@ -1,8 +1,8 @@
 """Materials reduced to what an unlit render shows: a base colour, a texture, an alpha cutoff.
 
-Metalness, roughness, normals and light are dropped on purpose: the light of a reconstruction is in its
-texture. Blended materials (glass, light shafts) become alpha-tested at one half, so that every pixel
-shows exactly one surface and its depth is that surface's.
+Metalness, roughness, normals and light are dropped on purpose: the light of a reconstruction is in
+its texture. Blended materials (glass, light shafts) become alpha-tested at one half, so that every
+pixel shows exactly one surface and its depth is that surface's.
 """
 
 from __future__ import annotations

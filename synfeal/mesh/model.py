@@ -34,6 +34,16 @@ class MeshPart:
     base_color: NDArray[np.uint8] = field(default_factory=WHITE.copy)
     alpha_cutoff: float | None = None
 
+    @property
+    def is_drawn(self) -> bool:
+        """Whether any fragment can pass the alpha test; light shafts and the like never do."""
+        if self.alpha_cutoff is None:
+            return True
+        alpha = self.base_color[3] / 255.0
+        if self.texture is not None and self.texture.shape[2] == 4:
+            alpha *= self.texture[..., 3].max() / 255.0
+        return bool(alpha >= self.alpha_cutoff)
+
 
 @dataclass(frozen=True)
 class TexturedMesh:

@@ -42,7 +42,9 @@ def warn_missing_textures(path: Path, missing: list[str]) -> None:
             materials = ", ".join(users[name])
             log.warning(
                 "%s: texture '%s' of material %s is missing; its base colour is used",
-                path, name, materials,
+                path,
+                name,
+                materials,
             )
 
 

@@ -1,8 +1,8 @@
 """What the paper published, one row per table cell, keyed by the design that produces the cell.
 
-The files in ``published/`` carry the columns of the experiments table, so that a cell is joined to its
-published value only when scene, size, labels, noise and initialisation all agree. Values stand as
-printed. ``flag`` marks what cannot be taken at face value: ``misprint`` (the orientation is
+The files in ``published/`` carry the columns of the experiments table, so that a cell is joined to
+its published value only when scene, size, labels, noise and initialisation all agree. Values stand
+as printed. ``flag`` marks what cannot be taken at face value: ``misprint`` (the orientation is
 impossible and is left out of comparisons) and ``suspect`` (probably a copy of its neighbour).
 """
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
 
-from synfeal.errors import InputError
+from synfeal.report.results import read_result
 
 MEASURES = ("position_m", "orientation_deg", "position_m_true", "orientation_deg_true")
-COUNTS = ("n_train", "n_test")
+COUNTS = ("n_train", "n_test", "failed")
+BASELINE = "baseline_position_m_true"
 Metrics = Mapping[str, Any]
 
 
@@ -40,17 +40,22 @@ class CellScores:
     Attributes:
         scores: by measure (:data:`MEASURES`).
         position_rms_m: median position error as the published code computes it, metres.
+        baseline_m: median error of always answering the mean training position, metres.
         n_train: training frames.
         n_test: test frames.
-        n_seeds: repetitions, failed ones included.
-        failed: repetitions without a score.
+        n_seeds: repetitions, those without a score included.
+        n_finished: repetitions with a score.
+        failed: predictions that were not finite, over all repetitions; a run scores them as
+            infinite errors, so it has no score when more than half of them failed.
     """
 
     scores: dict[str, Score]
     position_rms_m: float | None
+    baseline_m: float | None
     n_train: int
     n_test: int
     n_seeds: int
+    n_finished: int
     failed: int
 
 
@@ -60,27 +65,24 @@ def read_metrics(path: Path) -> Metrics:
     Raises:
         InputError: the file is missing, is not JSON, or lacks a key.
     """
-    try:
-        metrics: Metrics = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as JSON ({error}); run that training again") from None
-    needed = (*COUNTS, *MEASURES, *(f"{m}{end}" for m in MEASURES for end in ("_low", "_high")))
-    absent = [key for key in (*needed, "position_rms_m") if key not in metrics]
-    if absent:
-        raise InputError(f"{path}: {', '.join(absent)} missing; score that run again")
-    return metrics
+    limits = [f"{measure}_{end}" for measure in MEASURES for end in ("low", "high")]
+    return read_result(
+        path, (*COUNTS, *MEASURES, *limits, "position_rms_m"), "score that run again"
+    )
 
 
 def combine(runs: Sequence[Metrics]) -> CellScores:
-    """Combine the repetitions of one cell; a failed run counts in ``failed`` and in nothing else."""
+    """Combine the repetitions of one cell: scores of those that finished, counts of all."""
     finished = [run for run in runs if run["position_m"] is not None]
     return CellScores(
         scores={measure: score_of(finished, measure) for measure in MEASURES},
         position_rms_m=_mean(finished, "position_rms_m"),
+        baseline_m=_mean(runs, BASELINE),
         n_train=runs[0]["n_train"],
         n_test=runs[0]["n_test"],
         n_seeds=len(runs),
-        failed=len(runs) - len(finished),
+        n_finished=len(finished),
+        failed=sum(int(run["failed"]) for run in runs),
     )
 
 
@@ -100,5 +102,7 @@ def percent_change(new: float | None, old: float | None) -> float | None:
     return None if new is None or not old else 100 * (new - old) / old
 
 
-def _mean(finished: Sequence[Metrics], key: str) -> float | None:
-    return fmean(run[key] for run in finished) if finished else None
+def _mean(runs: Sequence[Metrics], key: str) -> float | None:
+    """Mean over runs; None without runs, or where a run has no finite value (a wide limit)."""
+    values = [run[key] for run in runs]
+    return fmean(values) if values and None not in values else None

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.scenes.lighting import Lighting
-from synfeal.scenes.patches import Block, Patch, bilinear
+from synfeal.scenes.patches import Block, Item, Patch, bilinear, joined
 
 ATLAS_PX = 2048
 GUTTER_PX = 6  # repeated rim around each picture; what mipmaps and filters may reach into
@@ -17,16 +17,14 @@ LIGHT_SPACING_M = 0.06
 CHUNK = 1 << 15  # surface points lit at once; fits the cache
 
 
-def baked_mesh(
-    parts: Mapping[str, Sequence[Patch]], blocks: Sequence[Block], lighting: Lighting
-) -> TexturedMesh:
-    """Light every patch and lay out each named group of patches in one texture."""
-    patches = [patch for group in parts.values() for patch in group]
-    tones = iter(_tones(patches, blocks, lighting))
+def baked_mesh(parts: Mapping[str, Item], lighting: Lighting) -> TexturedMesh:
+    """Light every patch and lay out the patches of each named item in one texture."""
+    everything = joined(parts.values())
+    tones = iter(_tones(everything.patches, everything.blocks, lighting))
     return TexturedMesh(
         tuple(
-            _part(name, list(group), [_lit(patch, next(tones)) for patch in group])
-            for name, group in parts.items()
+            _part(name, item.patches, [_lit(patch, next(tones)) for patch in item.patches])
+            for name, item in parts.items()
         )
     )
 
@@ -78,7 +76,7 @@ def pack(sizes_px: Sequence[tuple[int, int]]) -> tuple[list[tuple[int, int]], tu
     return corners, (-(-total // 16) * 16, -(-width_used // 16) * 16)
 
 
-def _part(name: str, patches: list[Patch], pictures: list[NDArray[np.uint8]]) -> MeshPart:
+def _part(name: str, patches: Sequence[Patch], pictures: list[NDArray[np.uint8]]) -> MeshPart:
     padded = [
         np.pad(picture, ((GUTTER_PX,) * 2, (GUTTER_PX,) * 2, (0, 0)), mode="edge") for picture in pictures
     ]
@@ -107,4 +105,5 @@ def _grid_faces(points: NDArray[np.float64]) -> NDArray[np.int64]:
     doubled = np.linalg.norm(
         np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1
     )
-    return faces[doubled > 1e-10].astype(np.int64)
+    solid: NDArray[np.int64] = faces[doubled > 1e-10].astype(np.int64)
+    return solid

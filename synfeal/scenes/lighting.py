@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from synfeal.scenes.canvas import Colour
 from synfeal.scenes.patches import Block
@@ -70,7 +70,7 @@ class Lighting:
         return np.asarray(light ** np.float32(1 / 2.2), np.float32)
 
     def _ambient_light(self, points: Vectors, normals: Vectors) -> Vectors:
-        lower, upper = np.float32(self.lower_m), np.float32(self.upper_m)
+        lower, upper = _single(self.lower_m), _single(self.upper_m)
         # Light arrives from the side a surface faces, so it is looked up a metre in front of it.
         share = np.clip((points + normals - lower) / (upper - lower), 0, 1)
         value = self.ambient.astype(np.float32)[None]
@@ -80,12 +80,16 @@ class Lighting:
         return np.asarray(value, np.float32)
 
 
+def _single(values: ArrayLike) -> NDArray[np.float32]:
+    return np.asarray(values, np.float32)
+
+
 def first_hit(origins: Vectors, segments: Vectors, blocks: Sequence[Block]) -> NDArray[np.float32]:
     """Share (N,) of each segment (N, 3) that is free of blocks: 1 if all of it, 0 from inside one."""
     free = np.ones(len(origins), np.float32)
     for block in blocks:
         cos, sin = np.float32(np.cos(block.yaw_rad)), np.float32(np.sin(block.yaw_rad))
-        start = origins - np.float32(block.centre_m)
+        start = origins - _single(block.centre_m)
         enter = np.zeros(len(origins), np.float32)
         leave = np.ones(len(origins), np.float32)
         local = (
@@ -93,7 +97,7 @@ def first_hit(origins: Vectors, segments: Vectors, blocks: Sequence[Block]) -> N
             (cos * start[:, 1] - sin * start[:, 0], cos * segments[:, 1] - sin * segments[:, 0]),
             (start[:, 2], segments[:, 2]),
         )
-        for (at, step), half in zip(local, np.float32(block.half_m), strict=True):
+        for (at, step), half in zip(local, _single(block.half_m), strict=True):
             inverse = 1 / np.where(np.abs(step) < 1e-9, np.float32(1e-9), step)
             middle, reach = -at * inverse, half * np.abs(inverse)
             np.maximum(enter, middle - reach, out=enter)
@@ -105,12 +109,12 @@ def first_hit(origins: Vectors, segments: Vectors, blocks: Sequence[Block]) -> N
 def _sky_directions(normals: Vectors) -> list[Vectors]:
     index = np.arange(N_SKY_RAYS) + 0.5
     radius, angle = np.sqrt(index / N_SKY_RAYS), index * np.pi * (3 - np.sqrt(5))
-    helper = np.where(np.abs(normals[:, 2:]) < 0.9, np.float32([0, 0, 1]), np.float32([1, 0, 0]))
+    helper = np.where(np.abs(normals[:, 2:]) < 0.9, _single([0, 0, 1]), _single([1, 0, 0]))
     side = np.cross(normals, helper)
     side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-6)
     other = np.cross(normals, side)
     return [
-        (r * np.cos(a) * side + r * np.sin(a) * other + np.sqrt(1 - r * r) * normals).astype(np.float32)
+        _single(r * np.cos(a) * side + r * np.sin(a) * other + np.sqrt(1 - r * r) * normals)
         for r, a in zip(radius, angle, strict=True)
     ]
 
@@ -123,24 +127,24 @@ def _openness(
     total = np.zeros(len(origins), np.float32)
     for direction in directions:
         total += first_hit(origins, np.float32(reach_m) * direction, blocks)
-    return 0.2 + 0.8 * total / len(directions)
+    return np.asarray(0.2 + 0.8 * total / len(directions), np.float32)
 
 
 def _lamp_light(lamp: Lamp, origins: Vectors, normals: Vectors, blocks: Sequence[Block]) -> Vectors:
-    towards = np.float32(lamp.position_m) - origins
+    towards = _single(lamp.position_m) - origins
     distance = np.linalg.norm(towards, axis=1)
     facing = np.sum(towards * normals, axis=1) / distance
-    leaving = -towards @ np.float32(lamp.axis) / distance
+    leaving = -towards @ _single(lamp.axis) / distance
     strength = np.clip(facing, 0, 1) * np.clip(leaving, 0, 1) / (distance**2 + np.float32(0.15))
     reached = np.flatnonzero(strength > 1e-3)
     visible = first_hit(origins[reached], np.float32(0.97) * towards[reached], blocks) >= 1
     light = np.zeros((len(origins), 3), np.float32)
-    light[reached] = (strength[reached] * visible)[:, None] * np.float32(lamp.colour)
+    light[reached] = (strength[reached] * visible)[:, None] * _single(lamp.colour)
     return light
 
 
 def _sun_light(sun: Sun, origins: Vectors, normals: Vectors, blocks: Sequence[Block]) -> Vectors:
-    towards = -np.float32(sun.direction) / np.float32(np.linalg.norm(sun.direction))
+    towards = -_single(sun.direction) / np.float32(np.linalg.norm(sun.direction))
     strength = np.clip(normals @ towards, 0, 1)
     for_any = np.zeros(len(origins), bool)
     for lower, upper in sun.openings:
@@ -155,5 +159,5 @@ def _sun_light(sun: Sun, origins: Vectors, normals: Vectors, blocks: Sequence[Bl
     segments = np.broadcast_to(np.float32(8) * towards, (len(lit), 3))
     visible = first_hit(origins[lit], segments, blocks) >= 1
     light = np.zeros((len(origins), 3), np.float32)
-    light[lit] = (strength[lit] * visible)[:, None] * np.float32(sun.colour)
+    light[lit] = (strength[lit] * visible)[:, None] * _single(sun.colour)
     return light

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.scenes.canvas import Canvas, Colour, Pixels
+from synfeal.scenes.canvas import Canvas, Colour, Painter, Pixels
 
 
 def mix(
@@ -22,6 +24,11 @@ def _tinted(colour: Colour, relief: NDArray[np.float32]) -> Pixels:
 def flat(canvas: Canvas, colour: Colour, wear: float = 0.03) -> Pixels:
     """Paint or plastic: one colour with a little wear."""
     return _tinted(colour, np.float32(wear) * canvas.noise(0.08, 3))
+
+
+def painted(colour: Colour, wear: float = 0.05) -> Painter:
+    """A painter of :func:`flat` in one colour."""
+    return partial(flat, colour=colour, wear=wear)
 
 
 def plaster(canvas: Canvas, colour: Colour, stains: float = 0.03, grain: float = 0.012) -> Pixels:

@@ -49,8 +49,9 @@ def _saint(sketch: Sketch, rng: np.random.Generator, x: float, top: float, canva
     sketch.polygon(
         np.array([(x + side, top + 2 * head), (x - 0.3 * side, top + 3 * head), (x + 1.4 * side, 0.75)]), mantle
     )
-    sketch.ellipse(x, top, head * aspect, 1.15 * head, SKIN)
-    sketch.ellipse(x, top - 0.6 * head, head * aspect, 0.6 * head, shade((0.3, 0.2, 0.1), rng.uniform(0.5, 2)))
+    hair = shade((0.3, 0.2, 0.1), rng.uniform(0.5, 2.5))
+    sketch.ellipse(x, top - 0.15 * head, 1.1 * head * aspect, 1.2 * head, hair)
+    sketch.ellipse(x, top + 0.25 * head, 0.8 * head * aspect, 0.95 * head, SKIN)
     staff = x + 1.6 * side
     sketch.line(np.array([(staff, top), (staff, foot)]), GOLD, 0.008)
 
@@ -59,7 +60,7 @@ def _border(sketch: Sketch, rng: np.random.Generator, colour: Colour, canvas: Ca
     edge_y = 0.1 / canvas.size_m[1]
     edge_x = 0.1 / canvas.size_m[0]
     for box in ((0, 0, 1, edge_y), (0, 1 - edge_y, 1, 1), (0, 0, edge_x, 1), (1 - edge_x, 0, 1, 1)):
-        sketch.rectangle(*box, colour)
+        sketch.rectangle(box[0], box[1], box[2], box[3], colour)
     for x in np.arange(edge_x, 1 - edge_x, 1.5 * edge_x):
         for y in (edge_y / 2, 1 - edge_y / 2):
             sketch.ellipse(x, y, 0.4 * edge_x, 0.4 * edge_y, shade(pick(rng, ROBES), 1.3))

@@ -123,6 +123,14 @@ class Item:
         )
         return Item(patches, blocks)
 
+    def clipped(self, lower_m: tuple[float, ...], upper_m: tuple[float, ...]) -> Item:
+        """The item pressed flat where it would stick out of a box, as leaves are by a wall."""
+        patches = tuple(
+            replace(patch, points_m=np.clip(patch.points_m, lower_m, upper_m))
+            for patch in self.patches
+        )
+        return Item(patches, self.blocks)
+
 
 def joined(items: Iterable[Item]) -> Item:
     """Several items as one."""

@@ -1,4 +1,4 @@
-"""Painters of things with content: posters, whiteboards, books, screens, windows, murals."""
+"""Painters of what hangs on walls: posters, paintings, whiteboards, windows, stained glass."""
 
 from __future__ import annotations
 
@@ -7,16 +7,18 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from synfeal.scenes.canvas import Canvas, Colour, Pixels, Sketch, pick, shade
-from synfeal.scenes.materials import marble, mix, plaster
+from synfeal.scenes.materials import mix, plaster
 
 VIVID: tuple[Colour, ...] = (
     (0.85, 0.15, 0.12), (0.95, 0.55, 0.08), (0.95, 0.85, 0.15), (0.15, 0.55, 0.25),
     (0.1, 0.35, 0.75), (0.45, 0.15, 0.6), (0.9, 0.35, 0.55), (0.1, 0.65, 0.7), (0.1, 0.1, 0.12),
 )  # fmt: skip
+FACADES: tuple[Colour, ...] = ((0.7, 0.5, 0.4), (0.75, 0.72, 0.65), (0.5, 0.55, 0.6))
 INK: tuple[Colour, ...] = ((0.1, 0.1, 0.12), (0.1, 0.2, 0.75), (0.8, 0.1, 0.1), (0.05, 0.5, 0.2))
 
 
-def _ramp(canvas: Canvas, first: Colour, second: Colour, angle_rad: float) -> Pixels:
+def ramp(canvas: Canvas, first: Colour, second: Colour, angle_rad: float) -> Pixels:
+    """From one colour to another along a direction (0 is right, π/2 is down)."""
     x, y = canvas.coordinates_m()
     width, height = canvas.size_m
     along = np.cos(angle_rad) * (x / width - 0.5) + np.sin(angle_rad) * (y / height - 0.5) + 0.5
@@ -35,7 +37,7 @@ def poster(canvas: Canvas, ground: Colour | None = None) -> Pixels:
     """A poster nobody else has: ramp, coloured shapes, rows of type, a white border."""
     rng = canvas.rng
     base = ground or pick(rng, VIVID)
-    sketch = Sketch(_ramp(canvas, base, shade(pick(rng, VIVID), 1.3), rng.uniform(0, 2 * np.pi)))
+    sketch = Sketch(ramp(canvas, base, shade(pick(rng, VIVID), 1.3), rng.uniform(0, 2 * np.pi)))
     for _ in range(int(rng.integers(10, 18))):
         x, y = rng.uniform(0.1, 0.9), rng.uniform(0.1, 0.7)
         colour = shade(pick(rng, VIVID), rng.uniform(0.7, 1.5))
@@ -47,37 +49,41 @@ def poster(canvas: Canvas, ground: Colour | None = None) -> Pixels:
     sketch.rectangle(0.08, 0.74, 0.92, 0.95, (0.95, 0.95, 0.92))
     sketch.text_lines(rng, (0.1, 0.76, 0.9, 0.82), 1, pick(rng, INK))
     sketch.text_lines(rng, (0.1, 0.84, 0.9, 0.94), 4, (0.2, 0.2, 0.2))
-    return _bordered(sketch.pixels(), 0.02, (0.93, 0.93, 0.9))
+    return bordered(sketch.pixels(), 0.02, (0.93, 0.93, 0.9))
 
 
-def _bordered(image: Pixels, share: float, colour: Colour) -> Pixels:
+def bordered(image: Pixels, share: float, colour: Colour) -> Pixels:
+    """The image with a frame that takes ``share`` of the shorter side."""
     margin = max(1, round(share * min(image.shape[:2])))
     for edge in (image[:margin], image[-margin:], image[:, :margin], image[:, -margin:]):
         edge[:] = np.asarray(colour, np.float32)
     return image
 
 
-def painting(canvas: Canvas, palette: tuple[Colour, ...] = VIVID, frame: Colour = (0.45, 0.3, 0.1)) -> Pixels:
+def painting(
+    canvas: Canvas, palette: tuple[Colour, ...] = VIVID, frame: Colour = (0.45, 0.3, 0.1)
+) -> Pixels:
     """An abstract landscape in a frame: noise layers as sky and hills, dabs of paint."""
     rng = canvas.rng
-    image = _ramp(canvas, shade(pick(rng, palette), 1.4), (0.95, 0.9, 0.8), np.pi / 2)
+    image = ramp(canvas, shade(pick(rng, palette), 1.4), (0.95, 0.9, 0.8), np.pi / 2)
     y = (np.arange(canvas.height_px, dtype=np.float32) / canvas.height_px)[:, None]
     for level in np.linspace(0.35, 0.85, 4):
         ridge = level + 0.07 * canvas.noise((canvas.size_m[0] / 3, 1e3), 4)
-        hill = np.asarray(pick(rng, palette), np.float32) * (1 + 0.15 * canvas.noise(0.05, 4, 0.8))[..., None]
-        image = np.where((y > ridge)[..., None], hill, image)
+        strokes = 1 + 0.15 * canvas.noise(0.05, 4, 0.8)
+        hill = np.asarray(pick(rng, palette), np.float32) * strokes[..., None]
+        image = np.where((y > ridge)[..., None], hill, image).astype(np.float32)
     sketch = Sketch(image)
     for _ in range(60):
-        x, at = rng.uniform(0.05, 0.95, 2)
-        sketch.ellipse(x, at, *rng.uniform(0.004, 0.03, 2), shade(pick(rng, palette), rng.uniform(0.5, 1.5)))
-    return _bordered(_bordered(sketch.pixels(), 0.07, frame), 0.025, shade(frame, 1.7))
+        (x, at), (wide, high) = rng.uniform(0.05, 0.95, 2), rng.uniform(0.004, 0.03, 2)
+        sketch.ellipse(x, at, wide, high, shade(pick(rng, palette), rng.uniform(0.5, 1.5)))
+    return bordered(bordered(sketch.pixels(), 0.07, frame), 0.025, shade(frame, 1.7))
 
 
 def whiteboard(canvas: Canvas) -> Pixels:
     """A whiteboard with formulas, diagrams and half-wiped smudges in an aluminium frame."""
     rng = canvas.rng
     sketch = Sketch(plaster(canvas, (0.93, 0.94, 0.95), 0.03))
-    for _ in range(9):
+    for _ in range(13):
         x, y = rng.uniform((0.04, 0.06), (0.7, 0.75))
         ink = pick(rng, INK)
         if rng.random() < 0.55:
@@ -88,7 +94,7 @@ def whiteboard(canvas: Canvas) -> Pixels:
             sketch.line(nodes, ink, 0.008)
             for node_x, node_y in nodes:
                 sketch.ellipse(node_x, node_y, 0.012, 0.012 * canvas.width_px / canvas.height_px, ink)
-    return _bordered(sketch.pixels(), 0.02, (0.6, 0.62, 0.65))
+    return bordered(sketch.pixels(), 0.02, (0.6, 0.62, 0.65))
 
 
 def noticeboard(canvas: Canvas, ground: Colour = (0.62, 0.45, 0.27)) -> Pixels:
@@ -103,54 +109,31 @@ def noticeboard(canvas: Canvas, ground: Colour = (0.62, 0.45, 0.27)) -> Pixels:
         sketch.text_lines(
             rng, (x + 0.01, y + 0.02, x + width - 0.01, y + height - 0.02), 6, pick(rng, INK)
         )
-    return _bordered(sketch.pixels(), 0.025, (0.35, 0.22, 0.12))
+    return bordered(sketch.pixels(), 0.025, (0.35, 0.22, 0.12))
 
 
-def screen(canvas: Canvas) -> Pixels:
-    """A computer screen: windows, a plot, lines of code."""
+def window_view(
+    canvas: Canvas, panes: tuple[int, int] = (2, 2), blind: float = 0.0, skyline: bool = True
+) -> Pixels:
+    """Sky behind glazing bars, with buildings and trees if there is a ``skyline``.
+
+    ``blind`` is the share that is covered by slats from above.
+    """
     rng = canvas.rng
-    sketch = Sketch(_ramp(canvas, shade(pick(rng, VIVID), 0.6), (0.1, 0.12, 0.2), rng.uniform(0, 6)))
-    for _ in range(3):
-        x, y = rng.uniform((0.04, 0.05), (0.5, 0.45))
-        x1, y1 = x + rng.uniform(0.3, 0.45), y + rng.uniform(0.35, 0.5)
-        dark = rng.random() < 0.5
-        sketch.rectangle(x, y, x1, y1, (0.12, 0.12, 0.15) if dark else (0.95, 0.95, 0.95))
-        sketch.rectangle(x, y, x1, y + 0.05, shade(pick(rng, VIVID), 0.9))
-        ink: Colour = (0.6, 0.9, 0.7) if dark else (0.15, 0.15, 0.2)
-        sketch.text_lines(rng, (x + 0.02, y + 0.08, x1 - 0.02, y1 - 0.03), 7, ink)
-    return _bordered(sketch.pixels(), 0.05, (0.06, 0.06, 0.07))
-
-
-def books(canvas: Canvas, rows: int, palette: tuple[Colour, ...] = VIVID) -> Pixels:
-    """Shelves seen from the front, filled with book spines of random colour, width and height."""
-    rng = canvas.rng
-    sketch = Sketch(plaster(canvas, (0.16, 0.12, 0.09), 0.1))
-    height = 1 / rows
-    for row in range(rows):
-        x, floor = 0.02, (row + 0.93) * height
-        while x < 0.96:
-            width = rng.uniform(0.018, 0.05) / max(canvas.size_m[0], 0.4)
-            if rng.random() < 0.88:
-                top = floor - height * rng.uniform(0.55, 0.85)
-                colour = shade(pick(rng, palette), rng.uniform(0.6, 1.3))
-                sketch.rectangle(x, top, min(x + width, 0.98), floor, colour)
-                band = top + (floor - top) * rng.uniform(0.1, 0.7)
-                sketch.rectangle(x, band, min(x + width, 0.98), band + 0.1 * height, shade(colour, 1.8))
-            x += width * 1.06
-        sketch.rectangle(0, floor, 1, (row + 1) * height, (0.5, 0.38, 0.24))
-    return _bordered(sketch.pixels(), 0.02, (0.5, 0.38, 0.24))
-
-
-def window_view(canvas: Canvas, panes: tuple[int, int] = (2, 2), blind: float = 0.0) -> Pixels:
-    """Sky, buildings and trees behind glazing bars; ``blind`` is the share covered from above."""
-    rng = canvas.rng
-    sky = _ramp(canvas, (0.62, 0.8, 1.0), (0.97, 0.98, 1.0), np.pi / 2)
+    sky = ramp(canvas, (0.62, 0.8, 1.0), (0.97, 0.98, 1.0), np.pi / 2)
     clouds = np.clip(canvas.noise((0.7, 0.3), 4), 0, 1)
     sketch = Sketch(mix(sky, np.ones(3, np.float32), clouds))
+    if skyline:
+        _skyline(sketch, rng)
+    _glazing(sketch, panes, blind)
+    return sketch.pixels()
+
+
+def _skyline(sketch: Sketch, rng: np.random.Generator) -> None:
     for _ in range(5):
         x, top = rng.uniform((0, 0.4), (0.9, 0.75))
         wide = rng.uniform(0.12, 0.3)
-        colour = shade(pick(rng, ((0.7, 0.5, 0.4), (0.75, 0.72, 0.65), (0.5, 0.55, 0.6))), rng.uniform(0.7, 1.2))
+        colour = shade(pick(rng, FACADES), rng.uniform(0.7, 1.2))
         sketch.rectangle(x, top, x + wide, 1, colour)
         for cx in np.arange(x + 0.02, x + wide - 0.02, 0.05):
             for cy in np.arange(top + 0.03, 0.95, 0.07):
@@ -158,8 +141,6 @@ def window_view(canvas: Canvas, panes: tuple[int, int] = (2, 2), blind: float = 
     for _ in range(26):
         x, y = rng.uniform((0, 0.78), (1, 1))
         sketch.ellipse(x, y, 0.07, 0.07, shade((0.25, 0.45, 0.18), rng.uniform(0.5, 1.3)))
-    _glazing(sketch, panes, blind)
-    return sketch.pixels()
 
 
 def _glazing(sketch: Sketch, panes: tuple[int, int], blind: float) -> None:
@@ -170,19 +151,6 @@ def _glazing(sketch: Sketch, panes: tuple[int, int], blind: float) -> None:
         sketch.rectangle(x - 0.02, 0, x + 0.02, 1, bar)
     for y in np.linspace(0, 1, panes[1] + 1):
         sketch.rectangle(0, y - 0.02, 1, y + 0.02, bar)
-
-
-def door(canvas: Canvas, colour: Colour, window: bool = False) -> Pixels:
-    """A door leaf with frame, panels, handle and, if wanted, a small window."""
-    sketch = Sketch(plaster(canvas, colour, 0.05, 0.03))
-    dark = shade(colour, 0.7)
-    for y0, y1 in ((0.1, 0.45), (0.55, 0.92)):
-        sketch.rectangle(0.18, y0, 0.82, y1, dark)
-        sketch.rectangle(0.2, y0 + 0.01, 0.8, y1 - 0.01, shade(colour, 1.1))
-    if window:
-        sketch.rectangle(0.35, 0.12, 0.65, 0.4, (0.75, 0.85, 0.9))
-    sketch.rectangle(0.85, 0.49, 0.93, 0.53, (0.8, 0.75, 0.5))
-    return _bordered(sketch.pixels(), 0.07, shade(colour, 0.55))
 
 
 def stained_glass(canvas: Canvas, palette: tuple[Colour, ...] = VIVID, cells: int = 160) -> Pixels:
@@ -197,9 +165,3 @@ def stained_glass(canvas: Canvas, palette: tuple[Colour, ...] = VIVID, cells: in
     image = colours[nearest[..., 0]].astype(np.float32)
     image[distance[..., 1] - distance[..., 0] < 0.012] = np.float32(0.05)
     return image
-
-
-def gilded(canvas: Canvas) -> Pixels:
-    """Gold leaf over carved wood."""
-    image = marble(canvas, (0.86, 0.66, 0.24), (0.4, 0.24, 0.06), 0.12)
-    return image * (1 + 0.15 * canvas.noise(0.03, 3))[..., None]

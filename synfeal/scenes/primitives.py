@@ -99,7 +99,7 @@ def turned(
     points[:, -1] = points[:, 0]
     patch = paint(rng, points, painter, px_per_m)
     low, high = profile[:, 1].min(), profile[:, 1].max()
-    half = np.median(profile[:, 0]) / np.sqrt(2)  # inside the surface, so it does not shade itself
+    half = 0.6 * np.median(profile[:, 0])  # well inside the surface, so it does not shade itself
     block = Block(np.array([0, 0, (low + high) / 2]), np.array([half, half, (high - low) / 2]))
     return Item((patch,), (block,) if casts else ())
 

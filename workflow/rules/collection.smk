@@ -8,19 +8,19 @@ rule scene:
         mesh=f"{ROOT}/scenes/{{scene}}/mesh.glb",
         collision=f"{ROOT}/scenes/{{scene}}/collision.ply",
         properties=f"{ROOT}/scenes/{{scene}}/properties.json",
-    params:
-        scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
-        collision_faces=CONFIG.collection.collision_faces,
-        seed=CONFIG.seed,
     log:
         f"{ROOT}/logs/scene/{{scene}}.log",
     benchmark:
         f"{ROOT}/benchmarks/scene/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
     threads: 1
     resources:
         mem_mb=4000,
-    conda:
-        "../envs/synfeal.yaml"
+    params:
+        scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
+        collision_faces=CONFIG.collection.collision_faces,
+        seed=CONFIG.seed,
     script:
         "../scripts/scene.py"
 
@@ -30,20 +30,20 @@ rule plan:
         collision=rules.scene.output.collision,
     output:
         plan=f"{ROOT}/plans/{{scene}}/{{split}}.csv",
+    log:
+        f"{ROOT}/logs/plan/{{scene}}/{{split}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/plan/{{scene}}/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
     params:
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
         collection=dump(CONFIG.collection),
         n_frames=lambda w: CONFIG.n_largest(w.scene, w.split),
         seed=lambda w: seed_of(CONFIG.seed, "plan", w.scene, w.split),
-    log:
-        f"{ROOT}/logs/plan/{{scene}}/{{split}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/plan/{{scene}}/{{split}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=2000,
-    conda:
-        "../envs/synfeal.yaml"
     script:
         "../scripts/plan.py"
 
@@ -54,20 +54,20 @@ rule render:
         plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w).split}.csv",
     output:
         frames=directory(f"{ROOT}/datasets/{{scene}}/{{camera}}/{{sequence}}"),
+    log:
+        f"{ROOT}/logs/render/{{scene}}/{{camera}}/{{sequence}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/render/{{scene}}/{{camera}}/{{sequence}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
     params:
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
         start=lambda w: sequence_named(w).start,
         stop=lambda w: sequence_named(w).stop,
         with_depth=lambda w: w.camera == "groundtruth",
-    log:
-        f"{ROOT}/logs/render/{{scene}}/{{camera}}/{{sequence}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/render/{{scene}}/{{camera}}/{{sequence}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=3000,
-    conda:
-        "../envs/synfeal.yaml"
     script:
         "../scripts/render.py"
 
@@ -79,20 +79,20 @@ rule dataset:
         manifest=f"{ROOT}/datasets/{{scene}}/{{camera}}/manifest.json",
         train=f"{ROOT}/datasets/{{scene}}/{{camera}}/TrainSplit.txt",
         test=f"{ROOT}/datasets/{{scene}}/{{camera}}/TestSplit.txt",
+    log:
+        f"{ROOT}/logs/dataset/{{scene}}/{{camera}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/dataset/{{scene}}/{{camera}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
     params:
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
         counts=lambda w: [n_frames(w.scene, w.camera, split) for split in SPLITS],
         shard_frames=CONFIG.shard_frames,
         seed=CONFIG.seed,
-    log:
-        f"{ROOT}/logs/dataset/{{scene}}/{{camera}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/dataset/{{scene}}/{{camera}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
-    conda:
-        "../envs/synfeal.yaml"
     script:
         "../scripts/dataset.py"
 
@@ -102,17 +102,17 @@ rule pack:
         sequences=lambda w: sequence_dirs(w.scene, "network", w.split),
     output:
         frames=f"{ROOT}/frames/{{scene}}/{{split}}.npy",
-    params:
-        input_px=CONFIG.network.input_px,
     log:
         f"{ROOT}/logs/pack/{{scene}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/pack/{{scene}}/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
     threads: 1
     resources:
         mem_mb=2000,
-    conda:
-        "../envs/synfeal.yaml"
+    params:
+        input_px=CONFIG.network.input_px,
     script:
         "../scripts/pack.py"
 
@@ -122,16 +122,16 @@ rule true_labels:
         plan=f"{ROOT}/plans/{{scene}}/{{split}}.csv",
     output:
         labels=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/{{split}}.csv",
-    params:
-        n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
     log:
         f"{ROOT}/logs/labels/{{scene}}/{{size}}/synfeal/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/labels/{{scene}}/{{size}}/synfeal/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
     threads: 1
     resources:
         mem_mb=1000,
-    conda:
-        "../envs/synfeal.yaml"
+    params:
+        n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
     script:
         "../scripts/true_labels.py"

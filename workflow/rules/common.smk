@@ -10,7 +10,9 @@ from synfeal.errors import InputError
 from synfeal.seeds import seed_of
 
 try:
-    CONFIG = parse_config(config, " + ".join(map(str, workflow.configfiles)) or "config")
+    CONFIG = parse_config(
+        config, " + ".join(map(str, workflow.configfiles)) or "config"
+    )
     EXPERIMENTS = read_experiments(CONFIG)
 except InputError as error:
     sys.exit(f"error: {error}")
@@ -45,7 +47,9 @@ def n_frames(scene, camera, split):
     """Frames of a split that have to be rendered with a camera: no more than a consumer asks for."""
     if camera == "network":
         return CONFIG.n_largest(scene, split)
-    sizes = {e.size for e in EXPERIMENTS if e.scene == scene and e.labels in RECONSTRUCTED}
+    sizes = {
+        e.size for e in EXPERIMENTS if e.scene == scene and e.labels in RECONSTRUCTED
+    }
     return max((CONFIG.n_frames(scene, size, split) for size in sizes), default=0)
 
 
@@ -112,15 +116,21 @@ def all_metrics():
 
 def all_labels():
     sets = sorted({(e.scene, e.size, e.label_id) for e in EXPERIMENTS})
-    return [f"{ROOT}/labels/{s}/{z}/{l}/{split}.csv" for s, z, l in sets for split in SPLITS]
+    return [
+        f"{ROOT}/labels/{s}/{z}/{l}/{split}.csv" for s, z, l in sets for split in SPLITS
+    ]
 
 
 def all_manifests():
     cameras = [("network", e.scene) for e in EXPERIMENTS]
-    cameras += [("groundtruth", e.scene) for e in EXPERIMENTS if e.labels in RECONSTRUCTED]
+    cameras += [
+        ("groundtruth", e.scene) for e in EXPERIMENTS if e.labels in RECONSTRUCTED
+    ]
     return [f"{ROOT}/datasets/{s}/{c}/manifest.json" for c, s in sorted(set(cameras))]
 
 
 def assistance_files():
-    sets = {(e.scene, e.size, e.label_id) for e in EXPERIMENTS if e.labels in RECONSTRUCTED}
+    sets = {
+        (e.scene, e.size, e.label_id) for e in EXPERIMENTS if e.labels in RECONSTRUCTED
+    }
     return [f"{ROOT}/labels/{s}/{z}/{l}/assistance.json" for s, z, l in sorted(sets)]

@@ -6,67 +6,71 @@ rule noisy_labels:
         truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/{{split}}.csv",
     output:
         labels=f"{ROOT}/labels/{{scene}}/{{size}}/noise-p{{noise_m}}-r{{noise_deg}}/{{split}}.csv",
-    params:
-        seed=lambda w: seed_of(
-            CONFIG.seed, "noise", w.scene, w.size, w.noise_m, w.noise_deg, w.split
-        ),
     log:
         f"{ROOT}/logs/labels/{{scene}}/{{size}}/noise-p{{noise_m}}-r{{noise_deg}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/labels/{{scene}}/{{size}}/noise-p{{noise_m}}-r{{noise_deg}}/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
     threads: 1
     resources:
         mem_mb=1000,
-    conda:
-        "../envs/synfeal.yaml"
+    params:
+        seed=lambda w: seed_of(
+            CONFIG.seed, "noise", w.scene, w.size, w.noise_m, w.noise_deg, w.split
+        ),
     script:
         "../scripts/noisy_labels.py"
 
 
 rule sfm:
     input:
-        sequences=lambda w: sequence_dirs(w.scene, "groundtruth", w.split, batch_of(w).stop),
+        sequences=lambda w: sequence_dirs(
+            w.scene, "groundtruth", w.split, batch_of(w).stop
+        ),
         truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/{{split}}.csv",
     output:
         trajectory=f"{ROOT}/groundtruth/{{scene}}/{{size}}/sfm/{{split}}/batch-{{batch}}.csv",
+    log:
+        f"{ROOT}/logs/sfm/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/sfm/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=4000,
     params:
         start=lambda w: batch_of(w).start,
         stop=lambda w: batch_of(w).stop,
         camera=dump(CONFIG.groundtruth_camera),
         sfm=dump(CONFIG.groundtruth.sfm),
         seed=lambda w: seed_of(CONFIG.seed, "sfm", w.scene, w.size, w.split, w.batch),
-    log:
-        f"{ROOT}/logs/sfm/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/sfm/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=4000,
-    conda:
-        "../envs/synfeal.yaml"
     script:
         "../scripts/sfm.py"
 
 
 rule rgbd:
     input:
-        sequences=lambda w: sequence_dirs(w.scene, "groundtruth", w.split, batch_of(w).stop),
+        sequences=lambda w: sequence_dirs(
+            w.scene, "groundtruth", w.split, batch_of(w).stop
+        ),
     output:
         graph=f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd/{{split}}/batch-{{batch}}.g2o",
+    log:
+        f"{ROOT}/logs/rgbd/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/rgbd/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=4000,
     params:
         start=lambda w: batch_of(w).start,
         stop=lambda w: batch_of(w).stop,
         camera=dump(CONFIG.groundtruth_camera),
         rgbd=dump(CONFIG.groundtruth.rgbd),
-    log:
-        f"{ROOT}/logs/rgbd/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/rgbd/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=4000,
-    conda:
-        "../envs/synfeal.yaml"
     script:
         "../scripts/rgbd.py"
 
@@ -76,19 +80,19 @@ rule posegraph:
         graph=f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd/{{split}}/batch-{{batch}}.g2o",
     output:
         trajectory=f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd-{{optimiser}}/{{split}}/batch-{{batch}}.csv",
-    wildcard_constraints:
-        optimiser="toro|g2o",
-    params:
-        posegraph=dump(CONFIG.groundtruth.posegraph),
     log:
         f"{ROOT}/logs/rgbd-{{optimiser}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
     benchmark:
         f"{ROOT}/benchmarks/rgbd-{{optimiser}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
+    wildcard_constraints:
+        optimiser="toro|g2o",
+    conda:
+        "../envs/synfeal.yaml"
     threads: 1
     resources:
         mem_mb=2000,
-    conda:
-        "../envs/synfeal.yaml"
+    params:
+        posegraph=dump(CONFIG.groundtruth.posegraph),
     script:
         "../scripts/posegraph.py"
 
@@ -103,16 +107,16 @@ rule chain:
         train=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/train.csv",
         test=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/test.csv",
         assistance=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/assistance.json",
-    params:
-        groundtruth=dump(CONFIG.groundtruth, exclude={"sfm", "rgbd", "posegraph"}),
     log:
         f"{ROOT}/logs/chain/{{scene}}/{{size}}/{{reconstructed}}.log",
     benchmark:
         f"{ROOT}/benchmarks/chain/{{scene}}/{{size}}/{{reconstructed}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
     threads: 1
     resources:
         mem_mb=1000,
-    conda:
-        "../envs/synfeal.yaml"
+    params:
+        groundtruth=dump(CONFIG.groundtruth, exclude={"sfm", "rgbd", "posegraph"}),
     script:
         "../scripts/chain.py"

@@ -17,19 +17,19 @@ rule pretrain:
         ),
     output:
         weights=f"{ROOT}/pretrained/{{backbone}}.pt",
-    params:
-        pretraining=dump(CONFIG.pretraining),
-        network=dump(CONFIG.network),
-        seed=lambda w: seed_of(CONFIG.seed, "pretrain", w.backbone),
     log:
         f"{ROOT}/logs/pretrain/{{backbone}}.log",
     benchmark:
         f"{ROOT}/benchmarks/pretrain/{{backbone}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
     threads: 1
     resources:
         mem_mb=4000,
-    conda:
-        "../envs/synfeal.yaml"
+    params:
+        pretraining=dump(CONFIG.pretraining),
+        network=dump(CONFIG.network),
+        seed=lambda w: seed_of(CONFIG.seed, "pretrain", w.backbone),
     script:
         "../scripts/pretrain.py"
 
@@ -45,23 +45,30 @@ rule train:
         model=f"{RUN}/model.pt",
         history=f"{RUN}/history.csv",
         predictions=f"{RUN}/predictions.csv",
+    log:
+        f"{ROOT}/logs/train/{RUN_LOG}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/train/{RUN_LOG}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=4000,
     params:
         network=dump(CONFIG.network),
         localizer=lambda w: dump(CONFIG.localizers[w.model]),
         training=dump(CONFIG.training, exclude={"samples_seen", "repetitions"}),
         samples_seen=lambda w: CONFIG.training.samples_seen[w.size],
         seed=lambda w: seed_of(
-            CONFIG.seed, "train", w.scene, w.size, w.labels, w.init, w.model, w.repetition
+            CONFIG.seed,
+            "train",
+            w.scene,
+            w.size,
+            w.labels,
+            w.init,
+            w.model,
+            w.repetition,
         ),
-    log:
-        f"{ROOT}/logs/train/{RUN_LOG}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/train/{RUN_LOG}.tsv"
-    threads: 1
-    resources:
-        mem_mb=4000,
-    conda:
-        "../envs/synfeal.yaml"
     script:
         "../scripts/train.py"
 
@@ -76,16 +83,16 @@ rule score:
     output:
         errors=f"{RUN}/errors.csv",
         metrics=f"{RUN}/metrics.json",
-    params:
-        seed=CONFIG.seed,
     log:
         f"{ROOT}/logs/score/{RUN_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/score/{RUN_LOG}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
     threads: 1
     resources:
         mem_mb=1000,
-    conda:
-        "../envs/synfeal.yaml"
+    params:
+        seed=CONFIG.seed,
     script:
         "../scripts/score.py"

@@ -2,8 +2,8 @@
 
 Architecture: Szegedy et al., "Going deeper with convolutions", CVPR 2015, table 1; batch
 normalisation after every convolution: Ioffe and Szegedy, ICML 2015. Where torchvision departs from
-the papers (3x3 instead of 5x5 kernels in the third branch, 2x2 pooling before inception 5a, ceil-mode
-pooling) we follow it, because its official weights only fit that network.
+the papers (3x3 instead of 5x5 kernels in the third branch, 2x2 pooling before inception 5a, pooling
+in ceil mode) we follow it, because its official weights only fit that network.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ INCEPTIONS: dict[str, tuple[int, int, int, int, int, int]] = {
 }
 
 
-# The official weights were trained on images scaled to [-1, 1]. This turns images normalised with the
-# mean (0.485, 0.456, 0.406) and deviation (0.229, 0.224, 0.225) of ImageNet into those.
+# The official weights were trained on images scaled to [-1, 1]. This turns images normalised with
+# ImageNet's mean (0.485, 0.456, 0.406) and deviation (0.229, 0.224, 0.225) into those.
 INPUT_SCALE = (0.458, 0.448, 0.450)
 INPUT_SHIFT = (-0.030, -0.088, -0.188)
 

@@ -15,6 +15,8 @@ from baselines.localizers.names import BackboneName
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
 
+Backbone = GoogLeNet | ResNet34
+
 URL = "https://download.pytorch.org/models"
 # The eight digits are the beginning of each file's SHA-256.
 IMAGENET_FILES: dict[BackboneName, str] = {
@@ -25,7 +27,7 @@ IMAGENET_FILES: dict[BackboneName, str] = {
 CLASSIFIERS = ("fc.", "aux1.", "aux2.")
 
 
-def build_backbone(name: BackboneName, width: float) -> GoogLeNet | ResNet34:
+def build_backbone(name: BackboneName, width: float) -> Backbone:
     """A backbone without its classifier, randomly initialised."""
     return GoogLeNet(width) if name == "googlenet" else ResNet34(width)
 

@@ -1,0 +1,30 @@
+"""Where networks run, and what the processor is told first."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import torch
+
+from synfeal.errors import InputError
+
+
+def open_device(wanted: Literal["auto", "cpu", "cuda"]) -> torch.device:
+    """The device to work on; ``auto`` takes the GPU if there is one.
+
+    On the CPU one thread is used: two trainings side by side are faster than one on two threads,
+    and one thread adds up in one order, so the same seed gives the same network. Denormal numbers
+    are flushed to zero; they carry no information and take many times as long.
+
+    Raises:
+        InputError: ``cuda`` is asked for and not there.
+    """
+    if wanted == "cuda" and not torch.cuda.is_available():
+        raise InputError(
+            "training.device: 'cuda' was asked for, but torch finds no GPU; use 'auto'"
+        )
+    if wanted != "cpu" and torch.cuda.is_available():
+        return torch.device("cuda")
+    torch.set_num_threads(1)
+    torch.set_flush_denormal(True)
+    return torch.device("cpu")

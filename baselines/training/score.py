@@ -1,0 +1,151 @@
+"""Errors of predictions: against the labels a data set carries, and against the true poses."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table
+from synfeal.errors import InputError
+from synfeal.files import atomic_path, write_json
+from synfeal.geometry.poses import position_error_m
+from synfeal.geometry.rotations import rotation_angle_rad
+from synfeal.seeds import generator_of
+
+Array = NDArray[np.float64]
+
+RESAMPLES = 1000
+CONFIDENCE = 0.95
+
+
+def score_run(
+    predictions: Path,
+    labels: Path,
+    truth: Path,
+    train_labels: Path,
+    out_errors: Path,
+    out_metrics: Path,
+    info: Mapping[str, Any],
+) -> None:
+    """Write the errors of every test frame and their medians.
+
+    ``position_m`` and ``orientation_deg`` are against ``labels``, which is what the paper reports;
+    the names ending in ``_true`` are against ``truth``. ``position_rms_m`` is the published code's
+    definition, the root mean square over the three axes. ``baseline_position_m_true`` is the median
+    error of always predicting the mean training position. ``failed`` counts predictions that are
+    not finite; their error is infinite. A median that is not finite is ``null`` in the JSON.
+
+    Args:
+        predictions: pose table of the test frames; may hold ``nan``.
+        labels: the test split's labels.
+        truth: the test split's true poses.
+        train_labels: labels of the training split.
+        out_errors: CSV to write, one row per frame.
+        out_metrics: JSON to write.
+        info: further keys of the JSON, e.g. what the run was.
+
+    Raises:
+        InputError: a file cannot be read, or the tables are not about the same frames.
+    """
+    predicted = _read_predictions(predictions)
+    label_table, true_table = _read_like(labels, predicted), _read_like(truth, predicted)
+    train = read_pose_table(train_labels)
+    errors = pose_errors(predicted, label_table)
+    errors |= {f"{name}_true": e for name, e in pose_errors(predicted, true_table).items()}
+    baseline = position_error_m(train.position_m.mean(axis=0), true_table.position_m)
+    metrics = {
+        **info,
+        **median_metrics(errors, predicted.path),
+        "n_train": len(train),
+        "n_test": len(predicted),
+        "failed": int(np.isinf(errors["position_m"]).sum()),
+        "baseline_position_m_true": float(np.median(baseline)),
+    }
+    _write_errors(out_errors, predicted.frame, errors)
+    write_json(out_metrics, metrics)
+
+
+def pose_errors(predicted: PoseTable, reference: PoseTable) -> dict[str, Array]:
+    """``position_m`` and ``orientation_deg`` (N,); infinite where a prediction is not finite."""
+    values = np.concatenate([predicted.position_m, predicted.quat_wxyz], axis=1)
+    good = np.isfinite(values).all(axis=1)
+    position, orientation = np.full(len(good), np.inf), np.full(len(good), np.inf)
+    position[good] = position_error_m(predicted.position_m[good], reference.position_m[good])
+    angles = rotation_angle_rad(predicted.quat_wxyz[good], reference.quat_wxyz[good])
+    orientation[good] = np.degrees(angles)
+    return {"position_m": position, "orientation_deg": orientation}
+
+
+def median_metrics(errors: Mapping[str, Array], path: NDArray[np.int64]) -> dict[str, float | None]:
+    """Median of each error with its limits ``_low`` and ``_high``, and ``position_rms_m``."""
+    limits = bootstrap_limits(errors, path)
+    metrics: dict[str, float | None] = {}
+    for name, values in errors.items():
+        metrics[name] = _finite(float(np.median(values)))
+        metrics[f"{name}_low"], metrics[f"{name}_high"] = map(_finite, limits[name])
+    metrics["position_rms_m"] = _finite(float(np.median(errors["position_m"])) / math.sqrt(3))
+    return metrics
+
+
+def bootstrap_limits(
+    errors: Mapping[str, Array], path: NDArray[np.int64]
+) -> dict[str, tuple[float, float]]:
+    """95 % percentile limits of the medians of errors (N,) over 1000 seeded resamples.
+
+    Whole paths are drawn, not frames: neighbouring frames of a path are nearly the same image, and
+    treating them as independent would give limits that are too narrow.
+    """
+    rng = generator_of("bootstrap", len(path))
+    members = [np.flatnonzero(path == name) for name in np.unique(path)]
+    stacked = np.stack(list(errors.values()))
+    medians = np.empty((RESAMPLES, len(stacked)))
+    for i in range(RESAMPLES):
+        drawn = rng.integers(len(members), size=len(members))
+        medians[i] = np.median(stacked[:, np.concatenate([members[d] for d in drawn])], axis=1)
+    tail = (1 - CONFIDENCE) / 2
+    # Always one of the medians: interpolating towards an infinite one would not be a number.
+    low, high = np.quantile(medians, [tail, 1 - tail], axis=0, method="inverted_cdf")
+    return {name: (float(low[i]), float(high[i])) for i, name in enumerate(errors)}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _read_predictions(path: Path) -> PoseTable:
+    """A pose table whose poses may be ``nan``, unlike labels."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            header = file.readline().strip()
+            values = np.loadtxt(file, delimiter=",", ndmin=2)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{path}: cannot be read as predictions ({error}); predict again"
+        ) from None
+    if header != HEADER or values.shape[1] != len(HEADER.split(",")) or len(values) == 0:
+        raise InputError(f"{path}: must have the header '{HEADER}' and rows like it; predict again")
+    index = values[:, :2].astype(np.int64)
+    return PoseTable(index[:, 0], index[:, 1], values[:, 2:5], values[:, 5:9])
+
+
+def _read_like(path: Path, predicted: PoseTable) -> PoseTable:
+    table = read_pose_table(path)
+    if not np.array_equal(table.frame, predicted.frame):
+        raise InputError(
+            f"{path}: its frames are not those of the predictions ({len(table)} and "
+            f"{len(predicted)} rows); predict again for these labels"
+        )
+    return table
+
+
+def _write_errors(path: Path, frame: NDArray[np.int64], errors: Mapping[str, Array]) -> None:
+    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["frame", *errors])
+        writer.writerows(zip(frame.tolist(), *(e.tolist() for e in errors.values()), strict=True))

@@ -1,0 +1,78 @@
+"""What a data set is made of: enough to check a copy and to know the camera without the config."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import synfeal
+from synfeal.config.models import CameraConfig
+from synfeal.dataset.sequences import Sequence
+from synfeal.errors import InputError
+from synfeal.files import write_json
+from synfeal.render.base import intrinsics_of
+
+MANIFEST = "manifest.json"
+LIBRARIES = ("numpy", "pillow", "pyrender", "trimesh")
+
+
+def write_manifest(
+    dataset_dir: Path,
+    sequences: Iterable[Sequence],
+    camera: CameraConfig,
+    extra: Mapping[str, Any],
+) -> None:
+    """Write ``manifest.json``: camera, frame counts, hash of each sequence, versions, ``extra``."""
+    sequences = list(sequences)
+    manifest = {
+        "format": "7-Scenes; depth along the optical axis, millimetres, 65535 invalid",
+        "camera": {**camera.model_dump(), **intrinsics_of(camera)._asdict()},
+        "frames": {
+            split: sum(len(s) for s in sequences if s.split == split) for split in ("train", "test")
+        },
+        "sequences": [
+            {
+                "name": sequence.name,
+                "split": sequence.split,
+                "frames": len(sequence),
+                "sha256": sequence_sha256(dataset_dir / sequence.name),
+            }
+            for sequence in sequences
+        ],
+        "versions": {"synfeal": synfeal.__version__, **{name: version(name) for name in LIBRARIES}},
+        **extra,
+    }
+    write_json(dataset_dir / MANIFEST, manifest)
+
+
+def verify_manifest(dataset_dir: Path) -> None:
+    """Check every sequence against the hash in the manifest.
+
+    Raises:
+        InputError: the manifest is missing or unreadable, or names the sequences that differ.
+    """
+    path = dataset_dir / MANIFEST
+    try:
+        entries = json.loads(path.read_text(encoding="utf-8"))["sequences"]
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(f"{path}: cannot be read as a manifest ({error!r})") from None
+    bad = [
+        entry["name"]
+        for entry in entries
+        if sequence_sha256(dataset_dir / entry["name"]) != entry["sha256"]
+    ]
+    if bad:
+        raise InputError(f"{path}: {', '.join(bad)} differ from what was written; copy them again")
+
+
+def sequence_sha256(directory: Path) -> str:
+    """SHA-256 over the names and contents of the files of a sequence, in order of name."""
+    digest = hashlib.sha256()
+    for path in sorted(directory.glob("frame-*")):
+        content = hashlib.sha256(path.read_bytes()).hexdigest()
+        digest.update(f"{content}  {path.name}\n".encode())
+    return digest.hexdigest()

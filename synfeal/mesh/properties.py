@@ -1,0 +1,31 @@
+"""The numbers of Table 1: how large a scene is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from synfeal.mesh.model import TexturedMesh
+
+
+def mesh_properties(mesh: TexturedMesh) -> dict[str, Any]:
+    """Vertices, faces, extents and volume of a scene.
+
+    ``volume_m3`` is the volume of the axis-aligned bounding box: a scan is an open surface, which
+    encloses no volume of its own.
+    """
+    extents = mesh.bounds_m[1] - mesh.bounds_m[0]
+    return {
+        "vertices": mesh.n_vertices,
+        "faces": mesh.n_faces,
+        "parts": len(mesh.parts),
+        "volume_m3": float(np.prod(extents)),
+        "extents_m": extents.tolist(),
+        "bounds_m": mesh.bounds_m.tolist(),
+        "texture_pixels": sum(
+            part.texture.shape[0] * part.texture.shape[1]
+            for part in mesh.parts
+            if part.texture is not None
+        ),
+    }

@@ -1,0 +1,50 @@
+"""Where the first path starts: a pose in the space the scene is about."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from synfeal.mesh.rays import RayCaster
+from synfeal.planning.sampling import PoseVectors, sample_poses
+from synfeal.planning.target import has_free_view
+
+N_POSES = 64
+
+
+def sample_start(
+    caster: RayCaster,
+    bounds: NDArray[np.float64],
+    min_view_distance_m: float,
+    max_tries: int,
+    rng: np.random.Generator,
+) -> NDArray[np.float64] | None:
+    """A pose vector (6,) with a free view in the largest free space within ``bounds`` (2, 6).
+
+    The paper does not say where the camera starts. Inside a cupboard it would stay there, since
+    every path must be free of collisions. Normals cannot tell inside from outside in a scan, but
+    visibility can: poses with a free view are sampled, those that see each other are joined, and
+    the start is one of the largest group. Samples are uniform in volume, so that group is the
+    largest space connected by free lines. None if ``max_tries`` rounds give no pose with a free view.
+    """
+    found = np.empty((0, 6))
+    for _ in range(max_tries):
+        poses = sample_poses(bounds, N_POSES, rng)
+        found = np.vstack([found, poses[has_free_view(caster, poses, min_view_distance_m)]])
+        if len(found) >= N_POSES:
+            break
+    if not len(found):
+        return None
+    start: NDArray[np.float64] = found[_largest_group(caster, found)[0]]
+    return start
+
+
+def _largest_group(caster: RayCaster, poses: PoseVectors) -> NDArray[np.intp]:
+    """Indices of the largest set of poses (N, 6) connected by free lines of sight."""
+    i, j = np.triu_indices(len(poses), k=1)
+    free = caster.sees(poses[i, :3], poses[j, :3]) if len(i) else np.empty(0, np.bool_)
+    graph = coo_array((np.ones(int(free.sum())), (i[free], j[free])), shape=(len(poses),) * 2)
+    _, group = connected_components(graph, directed=False)
+    return np.flatnonzero(group == np.bincount(group).argmax())

@@ -1,0 +1,73 @@
+"""Where a result comes from: commit, configuration, seed, versions and machine."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import subprocess
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+PACKAGES = (
+    "gtsam",
+    "numpy",
+    "open3d",
+    "pycolmap",
+    "pyrender",
+    "scipy",
+    "synfeal",
+    "torch",
+    "trimesh",
+)
+UNKNOWN = "unknown"
+
+
+def provenance(seed: int, config_hash: str) -> dict[str, Any]:
+    """What a sidecar file records, ready for JSON.
+
+    Args:
+        seed: root of all seeds.
+        config_hash: :func:`config_hash` of the configuration that was used.
+    """
+    return {
+        "commit": git_commit(Path(__file__).parent),
+        "config_sha256": config_hash,
+        "seed": seed,
+        "python": platform.python_version(),
+        "packages": {name: _version(name) for name in PACKAGES},
+        "platform": platform.platform(),
+        "cpus": os.cpu_count(),
+        "time_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def config_hash(model: BaseModel) -> str:
+    """SHA-256 of a configuration as canonical JSON: equal values, equal hash, in any key order."""
+    text = json.dumps(model.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def git_commit(folder: Path) -> str:
+    """Commit checked out around ``folder``, with ``-dirty`` after it when tracked files changed.
+
+    ``unknown`` outside a repository and without git: an installed package has no commit.
+    """
+    command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--abbrev=40"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return UNKNOWN
+    return done.stdout.strip() if done.returncode == 0 else UNKNOWN
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return UNKNOWN

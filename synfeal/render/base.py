@@ -1,0 +1,55 @@
+"""What the rest of the project knows of a renderer."""
+
+from __future__ import annotations
+
+import math
+from types import TracebackType
+from typing import NamedTuple, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.config.models import CameraConfig
+
+Rgb = NDArray[np.uint8]
+Depth = NDArray[np.float32]
+
+
+class Intrinsics(NamedTuple):
+    """Pinhole intrinsics in pixels; the centre of the top-left pixel is (0.5, 0.5)."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+
+def intrinsics_of(camera: CameraConfig) -> Intrinsics:
+    """Square pixels, principal point in the image centre."""
+    focal = camera.width / 2.0 / math.tan(math.radians(camera.horizontal_fov_deg) / 2.0)
+    return Intrinsics(focal, focal, camera.width / 2.0, camera.height / 2.0)
+
+
+class Renderer(Protocol):
+    """Unlit images of one mesh through one camera."""
+
+    def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
+        """Colours (H, W, 3) seen from a pose (4, 4)."""
+        ...
+
+    def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
+        """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
+        ...
+
+    def close(self) -> None:
+        """Give the mesh's memory back; the renderer must not be used afterwards."""
+        ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None: ...

@@ -1,0 +1,141 @@
+"""Rendering with pyrender on EGL: a GPU where there is one, Mesa's software renderer elsewhere.
+
+Images are unlit, since the light of a reconstruction is in its texture; surfaces show from both
+sides; textures are mip-mapped and edges multi-sampled, so that small images do not alias.
+
+pyrender cannot test alpha in unlit renders. Instead each alpha-tested texture is thresholded at its
+cutoff and OpenGL turns what alpha remains after filtering into sample coverage: the same cut-outs,
+with smooth edges, and exact depth.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.config.models import CameraConfig
+from synfeal.errors import InputError
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.render.base import Depth, Rgb, intrinsics_of
+
+# OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
+CAM_FROM_GL: NDArray[np.float64] = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+@functools.cache
+def _pyrender() -> Any:
+    """The pyrender module, set up for EGL and for the installed NumPy."""
+    os.environ["PYOPENGL_PLATFORM"] = "egl"
+    np.__dict__.setdefault("infty", np.inf)  # gone in NumPy 2, used by pyrender
+    import pyrender
+
+    return pyrender
+
+
+@functools.cache
+def _offscreen() -> Any:
+    """The one off-screen renderer of this process.
+
+    Deleting one terminates the EGL display all others share, so it is made once and kept.
+
+    Raises:
+        InputError: there is no EGL, or it offers no device.
+    """
+    try:
+        offscreen = _pyrender().OffscreenRenderer(16, 16)
+        from OpenGL import GL
+
+        GL.glEnable(GL.GL_SAMPLE_ALPHA_TO_COVERAGE)  # the new context is current here
+    except Exception as error:  # what is missing decides what is raised
+        raise InputError(
+            f"rendering needs EGL, which does not work here ({type(error).__name__}: {error});"
+            " on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri"
+        ) from error
+    return offscreen
+
+
+class PyrenderRenderer:
+    """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
+
+    def __init__(self, mesh: TexturedMesh, camera: CameraConfig) -> None:
+        self._offscreen = _offscreen()
+        pyrender = _pyrender()
+        self._flags = pyrender.RenderFlags.FLAT | pyrender.RenderFlags.SKIP_CULL_FACES
+        self._size = (camera.width, camera.height)
+        self._scene = pyrender.Scene(bg_color=np.zeros(4))
+        self._scene.add(pyrender.Mesh([_primitive(part) for part in mesh.parts]))
+        self._camera = self._scene.add(
+            pyrender.IntrinsicsCamera(
+                *intrinsics_of(camera), znear=camera.near_m, zfar=camera.far_m
+            )
+        )
+
+    def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
+        """Colours (H, W, 3) seen from a pose (4, 4); black where nothing is."""
+        return self.render_rgbd(world_from_cam)[0]
+
+    def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
+        """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
+        self._scene.set_pose(self._camera, world_from_cam @ CAM_FROM_GL)
+        self._offscreen.viewport_width, self._offscreen.viewport_height = self._size
+        rgb, depth = self._offscreen.render(self._scene, flags=self._flags)
+        return np.ascontiguousarray(rgb), np.where(depth > 0.0, depth, np.float32(np.inf))
+
+    def close(self) -> None:
+        """Drop the scene; its buffers are freed when another scene is rendered."""
+        self._scene.clear()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _primitive(part: MeshPart) -> Any:
+    """One part as vertex buffers and a material."""
+    pyrender = _pyrender()
+    return pyrender.Primitive(
+        positions=part.vertices_m.astype(np.float32),
+        indices=part.faces.astype(np.uint32),
+        texcoord_0=None if part.uv is None else part.uv.astype(np.float32),
+        color_0=_vertex_rgba(part),
+        material=_material(part),
+    )
+
+
+def _vertex_rgba(part: MeshPart) -> NDArray[np.float32] | None:
+    """Vertex colours (V, 4) in 0 to 1."""
+    if part.vertex_rgb is None:
+        return None
+    opaque = np.ones((len(part.vertex_rgb), 1), np.float32)
+    return np.hstack([part.vertex_rgb.astype(np.float32) / 255.0, opaque])
+
+
+def _material(part: MeshPart) -> Any:
+    """Base colour and texture; the alpha test is already decided in the texture."""
+    pyrender = _pyrender()
+    texture = None
+    if part.texture is not None:
+        pixels = _thresholded(part)
+        channels = "RGBA" if pixels.shape[2] == 4 else "RGB"
+        texture = pyrender.Texture(source=pixels, source_channels=channels)
+    return pyrender.MetallicRoughnessMaterial(
+        baseColorTexture=texture,
+        baseColorFactor=np.append(part.base_color[:3] / 255.0, 1.0),
+        doubleSided=True,
+    )
+
+
+def _thresholded(part: MeshPart) -> NDArray[np.uint8]:
+    """The texture with alpha 0 or 255, or without alpha where the part is opaque."""
+    assert part.texture is not None
+    if part.texture.shape[2] == 3 or part.alpha_cutoff is None:
+        return np.ascontiguousarray(part.texture[..., :3])
+    alpha = part.texture[..., 3] / 255.0 * (part.base_color[3] / 255.0)
+    drawn = np.where(alpha >= part.alpha_cutoff, 255, 0).astype(np.uint8)
+    return np.dstack([part.texture[..., :3], drawn])

@@ -1,0 +1,33 @@
+"""Reading the JSON files that the stages before the report leave behind."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from synfeal.errors import InputError
+
+
+def read_result(path: Path, needed: Iterable[str], remedy: str) -> dict[str, Any]:
+    """A mapping from a result file.
+
+    Args:
+        path: the file.
+        needed: keys it must have.
+        remedy: what to do when it cannot be used, e.g. ``score that run again``.
+
+    Raises:
+        InputError: the file is missing, is not JSON, is no mapping, or lacks a key.
+    """
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as JSON ({error}); {remedy}") from None
+    if not isinstance(value, dict):
+        raise InputError(f"{path}: must hold a mapping of keys; {remedy}")
+    absent = [key for key in needed if key not in value]
+    if absent:
+        raise InputError(f"{path}: {', '.join(absent)} missing; {remedy}")
+    return value

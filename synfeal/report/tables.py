@@ -1,0 +1,108 @@
+"""Tables 2 to 5 as files: tidy CSV, one row per cell, and LaTeX in the paper's layout."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from synfeal.config import Experiment
+from synfeal.files import atomic_path
+from synfeal.report.cells import FROM_SCRATCH, Cell, read_cells
+from synfeal.report.latex import write_latex
+from synfeal.report.layouts import grid_of
+from synfeal.report.stats import MEASURES
+
+KEYS: Mapping[str, tuple[str, ...]] = {
+    "table2_ground_truth": ("scene", "labels"),
+    "table3_inconsistencies": ("block", "noise_m", "noise_deg"),
+    "table4_size": ("scene", "size"),
+    "table5_from_scratch": ("scene", "size"),
+}
+LIMITS = tuple(f"{measure}_{end}" for measure in MEASURES for end in ("low", "high"))
+CHANGES = {
+    "position_m": "position_change_percent",
+    "orientation_deg": "orientation_change_percent",
+    "position_m_true": "position_true_change_percent",
+    "orientation_deg_true": "orientation_true_change_percent",
+}
+Value = str | int | float | None
+
+
+def write_table(
+    name: str,
+    rows: Sequence[Experiment],
+    repetitions: int,
+    root: Path,
+    out_csv: Path,
+    out_tex: Path,
+) -> None:
+    """Write one of tables 2 to 5 from the scores of its runs.
+
+    Args:
+        name: the table, e.g. ``table4_size``.
+        rows: the table's rows of the design.
+        repetitions: seeds per cell; with several, columns ``*_sd`` are added.
+        root: results directory of the profile, where ``runs`` is.
+        out_csv: one row per cell.
+        out_tex: a table environment; the packages it needs are named in its first lines.
+
+    Raises:
+        InputError: a run's scores are missing or unreadable.
+    """
+    cells = read_cells(name, rows, repetitions, root)
+    write_rows(out_csv, columns_of(name, repetitions), [record_of(name, cell) for cell in cells])
+    write_latex(out_tex, grid_of(name, cells))
+
+
+def columns_of(name: str, repetitions: int) -> list[str]:
+    """Columns of a table's CSV, in order."""
+    deviations = [f"{measure}_sd" for measure in MEASURES] if repetitions > 1 else []
+    change = [*CHANGES.values()] if name == FROM_SCRATCH else []
+    published = ["published_position_m", "published_orientation_deg"]
+    if name == FROM_SCRATCH:
+        published += [f"published_{CHANGES[m]}" for m in ("position_m", "orientation_deg")]
+    return [
+        *(*KEYS[name], "model", *MEASURES, "position_rms_m", *LIMITS, *deviations, *change),
+        *("n_train", "n_test", "n_seeds", "failed", *published, "published_flag"),
+    ]
+
+
+def record_of(name: str, cell: Cell) -> dict[str, Value]:
+    """One CSV row: everything known about a cell, by column name."""
+    record: dict[str, Value] = {key: getattr(cell.row, key) for key in KEYS[name]}
+    record["model"] = cell.model
+    for measure, score in cell.own.scores.items():
+        record[measure] = score.value
+        record[f"{measure}_low"] = score.low
+        record[f"{measure}_high"] = score.high
+        record[f"{measure}_sd"] = score.sd
+    for count in ("position_rms_m", "n_train", "n_test", "n_seeds", "failed"):
+        record[count] = getattr(cell.own, count)
+    record.update({CHANGES[m]: value for m, value in cell.change_percent.items()})
+    return record | _published_record(cell)
+
+
+def _published_record(cell: Cell) -> dict[str, Value]:
+    if cell.published is None:
+        return {}
+    measures = ("position_m", "orientation_deg", *list(CHANGES.values())[:2])
+    values: dict[str, Value] = {f"published_{m}": getattr(cell.published, m) for m in measures}
+    return values | {"published_flag": cell.published.flag}
+
+
+def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Mapping[str, Value]]) -> None:
+    """Write a CSV of some columns: floats with six significant digits, None as an empty cell."""
+    with (
+        atomic_path(path) as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as file,
+    ):
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows([_text(row.get(column)) for column in columns] for row in rows)
+
+
+def _text(value: Value) -> str:
+    if value is None:
+        return ""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

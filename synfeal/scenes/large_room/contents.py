@@ -1,0 +1,115 @@
+"""What stands in the laboratory: desks, cupboards, lamps, a pillar."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from synfeal.scenes import fronts, furniture, materials
+from synfeal.scenes.canvas import Colour, Painter
+from synfeal.scenes.large_room.boards import BEECH
+from synfeal.scenes.large_room.shell import HEIGHT_M, LENGTH_M, WHITE, WIDTH_M
+from synfeal.scenes.materials import painted
+from synfeal.scenes.patches import Item, joined, paint
+from synfeal.scenes.primitives import box, level, tube, turned
+
+Generator = np.random.Generator
+LAMPS_M = tuple((x, y) for x in (1.4, 3.6) for y in (1.2, 3.3, 5.4))
+LAMP_STRENGTHS = (0.9, 0.5, 0.95, 0.8, 0.05, 0.7)  # the fifth is off
+INNER_LOWER_M = (0.06, 0.01, 0.0)  # the windows stand 5 cm out of the west wall
+INNER_UPPER_M = (WIDTH_M - 0.01, LENGTH_M - 0.01, HEIGHT_M)
+ORANGE: Colour = (0.8, 0.4, 0.1)
+BLUE: Colour = (0.15, 0.25, 0.55)
+GREY: Colour = (0.3, 0.3, 0.32)
+DESKS: tuple[tuple[float, float, float, Colour], ...] = (  # x, y, yaw in degrees, chair
+    (0.55, 2.3, 90, BLUE),
+    (0.55, 4.3, 90, BLUE),
+    (0.55, 5.7, 90, GREY),
+    (4.6, 3.35, -90, BLUE),
+    (4.6, 4.85, -90, ORANGE),
+    (1.9, 6.2, 0, GREY),
+)
+OAK: Painter = partial(materials.wood, colour=(0.72, 0.55, 0.36))
+CONCRETE: Painter = partial(materials.plaster, colour=(0.5, 0.5, 0.48), grain=0.06)
+HAZARD: Painter = partial(
+    materials.masonry, palette=((0.95, 0.8, 0.1), (0.1, 0.1, 0.1)), block_m=(0.6, 0.1), joint_m=0.001
+)
+DIFFUSER: Painter = partial(
+    materials.masonry, palette=((1.0, 0.98, 0.92),), block_m=(0.3, 0.3), stagger=0, spread=0.02
+)
+
+
+def contents(rng: Generator) -> Item:
+    """All things with volume; nothing sticks out of the room."""
+    things = joined([_desks(rng), _storage(rng), _lamps(rng), _fittings(rng)])
+    return things.clipped(INNER_LOWER_M, INNER_UPPER_M)
+
+
+def _desks(rng: Generator) -> Item:
+    """Repeated desks with two screens each, and an island with one."""
+    things = []
+    for x, y, yaw, colour in DESKS:
+        desk = furniture.table(rng, (1.4, 0.7, 0.74), BEECH)
+        screens = [furniture.monitor(rng).placed(dx, 0.18, 0.74) for dx in (-0.32, 0.32)]
+        stuff = furniture.clutter(rng, 1.2, 0.6).placed(0, 0, 0.74)
+        turn = 180 + rng.uniform(-50, 50)
+        seat = furniture.chair(rng, colour).placed(rng.uniform(-0.3, 0.3), -0.6, 0, turn)
+        things.append(joined([desk, *screens, stuff, seat]).placed(x, y, 0, yaw))
+    island = furniture.table(rng, (0.9, 1.9, 0.74), OAK)
+    stuff = furniture.clutter(rng, 0.8, 1.7).placed(0, 0, 0.74)
+    lone = furniture.monitor(rng).placed(0.1, 0.6, 0.74, 25)
+    return joined([*things, joined([island, stuff, lone]).placed(2.55, 3.5)])
+
+
+def _storage(rng: Generator) -> Item:
+    """Cupboards, a bookcase, cartons, plants: large areas of one colour."""
+    cabinet, east = furniture.cabinet, WIDTH_M - 0.23
+    large = box(rng, (0.5, 0.4, 0.4), partial(fronts.label, colour=(0.65, 0.48, 0.3)), 200, "fblrt")
+    small = box(rng, (0.38, 0.35, 0.3), partial(fronts.label, colour=(0.7, 0.55, 0.36)), 200, "fblrt")
+    bin_profile = [(0.11, 0.05), (0.14, 0.35), (0.15, 0.35), (0.11, 0.0)]
+    waste = turned(rng, bin_profile, painted((0.1, 0.35, 0.3)), 100, 14)
+    return joined(
+        [
+            cabinet(rng, (0.9, 0.45, 1.95), (0.82, 0.35, 0.08)).placed(east, 0.5, 0, -90),
+            cabinet(rng, (1.0, 0.45, 1.2), (0.2, 0.45, 0.3), 2, 3).placed(east, 1.95, 0, -90),
+            cabinet(rng, (0.9, 0.5, 0.95), (0.72, 0.12, 0.15), 1, 4).placed(4.05, 0.27, 0, 180),
+            cabinet(rng, (0.6, 0.5, 1.85), (0.35, 0.37, 0.4), 1).placed(0.35, 0.27, 0, 180),
+            furniture.bookshelf(rng, (1.1, 0.35, 2.05)).placed(3.95, LENGTH_M - 0.18),
+            large.placed(4.72, 1.8, 1.2, -80),
+            small.placed(4.77, 0.5, 1.95, -95),
+            waste.placed(3.1, 6.3),
+            furniture.plant(rng, 1.1, (0.6, 0.3, 0.2)).placed(4.75, 5.95),
+            furniture.plant(rng, 0.5, (0.85, 0.85, 0.8), 24).placed(0.2, 3.3, 0.94),
+        ]
+    )
+
+
+def _lamps(rng: Generator) -> Item:
+    """Six ceiling lamps; a dark one looks dark."""
+    z, things = HEIGHT_M - 0.06, []
+    for (x, y), strength in zip(LAMPS_M, LAMP_STRENGTHS, strict=True):
+        frame = box(rng, (0.3, 1.2, 0.06), painted(WHITE), 60, "fblr", casts=False)
+        panel = level((x - 0.15, x + 0.15), (y - 0.6, y + 0.6), z, face_down=True)
+        shining = paint(rng, panel, DIFFUSER, 120, glow=0.95 if strength > 0.1 else 0.1)
+        things += [frame.placed(x, y, z), Item((shining,))]
+    return joined(things)
+
+
+def _fittings(rng: Generator) -> Item:
+    """A pillar, a red pipe, a cable tray with cables that hang from it."""
+    z, y = HEIGHT_M, LENGTH_M
+    pipe = [(4.7, at, z - 0.2) for at in (0, y / 2, y)]
+    tray = box(rng, (0.2, y, 0.08), painted((0.3, 0.32, 0.35)), 60, "lru")
+    cables = []
+    for at, colour in ((1.9, (0.9, 0.8, 0.1)), (2.0, (0.1, 0.1, 0.1)), (4.4, (0.1, 0.3, 0.8))):
+        sag = [(0.55, at, z - 0.28), (0.3, at + 0.1, 2.3), (0.04, at, 1.9), (0.04, at, 0.75)]
+        cables.append(tube(rng, sag, 0.015, painted(colour), 60, 5))
+    return joined(
+        [
+            Item((tube(rng, pipe, 0.07, painted((0.75, 0.15, 0.1)), 80, 10), *cables)),
+            box(rng, (0.3, 0.3, z), CONCRETE, 200, "fblr").placed(1.55, 4.6),
+            box(rng, (0.31, 0.31, 0.4), HAZARD, 200, "fblrt", casts=False).placed(1.55, 4.6, 0.9),
+            tray.placed(0.6, y / 2, z - 0.3),
+        ]
+    )
