@@ -6,6 +6,10 @@ taken from the true poses of the batch, as the published code does: the metric s
 the first frame, and the pose of the first registered camera. Its full pose is used, and not a
 similarity fitted to the camera centres, because the centres of a straight path leave the rotation about
 its line free.
+
+A view of one plane has two reconstructions, and a mapper that starts from the wrong one still registers
+every image. So the mapper runs from several initial images and the model that explains the most image
+points is taken: in the wrong ones, points leave the reprojection threshold and are dropped.
 """
 
 from __future__ import annotations
@@ -29,6 +33,12 @@ Array = NDArray[np.float64]
 # The published code's rule for the scale: the first 44 frames, none nearer than 5 cm to the first.
 _SCALE_FRAMES = 44
 _SCALE_MIN_M = 0.05
+
+# Rendered images have exact intrinsics and no blur: half of COLMAP's thresholds for photographs.
+_MAX_ERROR_PX = 2.0
+
+# Where in the batch the mapper starts, as a share of its length; None leaves the choice to it.
+_STARTS = (None, 0.25, 0.5, 0.75)
 
 
 def sfm_batch(
@@ -62,7 +72,7 @@ def sfm_batch(
     if len(color_paths) != len(true_world_from_cam):
         raise ValueError(f"{len(color_paths)} images, {len(true_world_from_cam)} poses")
     with tempfile.TemporaryDirectory(prefix="sfm-", dir=work_dir) as temporary:
-        model = _largest_model(color_paths, camera, cfg, seed % 2**31, Path(temporary))
+        model = _best_model(color_paths, camera, cfg, seed % 2**31, Path(temporary))
     return _metric_trajectory(*model, true_world_from_cam)
 
 
@@ -102,7 +112,7 @@ def _metric_trajectory(
     return trajectory
 
 
-def _largest_model(
+def _best_model(
     color_paths: Sequence[Path], camera: CameraConfig, cfg: SfmConfig, seed: int, work_dir: Path
 ) -> tuple[NDArray[np.int64], Array]:
     """Registered frames (m,) in order and their ``model_from_cam`` (m, 4, 4); m = 0 on failure."""
@@ -111,10 +121,10 @@ def _largest_model(
     images, database = work_dir / "images", work_dir / "database.db"
     _link_images(color_paths, images)
     _match(images, database, camera, cfg, seed)
-    models = pycolmap.incremental_mapping(database, images, work_dir, _mapping_options(cfg, seed))
+    models = _models(images, database, work_dir / "models", cfg, seed)
     if not models:
         return np.empty(0, dtype=np.int64), np.empty((0, 4, 4))
-    model = max(models.values(), key=lambda model: int(model.num_reg_images()))
+    model = max(models, key=lambda model: int(model.compute_num_observations()))
     found = {
         int(Path(image.name).stem): image.cam_from_world().matrix()
         for image in model.images.values()
@@ -123,6 +133,22 @@ def _largest_model(
     frames = np.array(sorted(found), dtype=np.int64)
     cam_from_model = np.array([found[frame] for frame in frames])
     return frames, inverse(pose_matrix(cam_from_model[:, :, :3], cam_from_model[:, :, 3]))
+
+
+def _models(
+    images: Path, database: Path, work_dir: Path, cfg: SfmConfig, seed: int
+) -> list[pycolmap.Reconstruction]:
+    """All models from all starts."""
+    work_dir.mkdir()
+    with pycolmap.Database.open(database) as opened:
+        ids = [image.image_id for image in sorted(opened.read_all_images(), key=lambda i: i.name)]
+    models: list[pycolmap.Reconstruction] = []
+    for start in _STARTS:
+        options = _mapping_options(cfg, seed)
+        if start is not None:
+            options.init_image_id1 = ids[int(start * len(ids))]
+        models += pycolmap.incremental_mapping(database, images, work_dir, options).values()
+    return models
 
 
 def _link_images(color_paths: Sequence[Path], images: Path) -> None:
@@ -168,18 +194,25 @@ def _mapping_options(cfg: SfmConfig, seed: int) -> pycolmap.IncrementalPipelineO
         random_seed=seed,
         min_num_matches=cfg.min_num_inliers,
         min_model_size=2,
-        max_num_models=3,
+        max_num_models=2,
         extract_colors=False,
         ba_refine_focal_length=False,
         ba_refine_principal_point=False,
         ba_refine_extra_params=False,
+        ba_global_frames_ratio=1.3,
+        ba_global_points_ratio=1.3,
     )
     options.mapper.random_seed = seed
     options.mapper.num_threads = 1
     options.mapper.abs_pose_refine_focal_length = False
     options.mapper.abs_pose_refine_extra_params = False
+    options.mapper.init_max_error = _MAX_ERROR_PX
+    options.mapper.abs_pose_max_error = 2 * _MAX_ERROR_PX
+    options.mapper.filter_max_reproj_error = _MAX_ERROR_PX
     options.mapper.init_min_num_inliers = 2 * cfg.min_num_inliers
     options.mapper.init_min_tri_angle = cfg.init_min_tri_angle_deg
     options.mapper.abs_pose_min_num_inliers = cfg.min_num_inliers
+    options.triangulation.complete_max_reproj_error = _MAX_ERROR_PX
+    options.triangulation.merge_max_reproj_error = _MAX_ERROR_PX
     options.triangulation.random_seed = seed
     return options

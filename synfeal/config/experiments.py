@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -14,7 +15,13 @@ from synfeal.errors import InputError
 
 Source = Literal["synfeal", "sfm", "rgbd-toro", "rgbd-g2o", "noise"]
 Init = Literal["pretrained", "scratch"]
-TABLES = ("table2_ground_truth", "table3_inconsistencies", "table4_size", "table5_from_scratch")
+# What tells the rows of a table apart; a table shows each once.
+KEYS: Mapping[str, tuple[str, ...]] = {
+    "table2_ground_truth": ("scene", "labels"),
+    "table3_inconsistencies": ("block", "noise_m", "noise_deg"),
+    "table4_size": ("scene", "size"),
+    "table5_from_scratch": ("scene", "size"),
+}
 COLUMNS = ("table", "block", "scene", "size", "labels", "noise_m", "noise_deg", "init")
 
 
@@ -88,15 +95,24 @@ def read_experiments(config: Config) -> tuple[Experiment, ...]:
         raise InputError(f"{path}: cannot be read as CSV ({error})") from None
     if tuple(reader.fieldnames or ()) != COLUMNS:
         raise InputError(f"{path}: the header must be {','.join(COLUMNS)}")
-    experiments: dict[Experiment, str] = {}
-    for where, row in rows:
-        experiment = _parse(row, where, config)
-        if experiment in experiments:
-            raise InputError(f"{where}: the same as {experiments[experiment]}; remove one of them")
-        experiments[experiment] = where
+    experiments = tuple(_parse(row, where, config) for where, row in rows)
     if not experiments:
         raise InputError(f"{path}: has no rows; nothing would be run")
-    return tuple(experiments)
+    _refuse_repeats(experiments, [where for where, _ in rows])
+    return experiments
+
+
+def _refuse_repeats(experiments: Sequence[Experiment], places: Sequence[str]) -> None:
+    seen: dict[tuple[str, ...], str] = {}
+    for experiment, where in zip(experiments, places, strict=True):
+        keys = KEYS[experiment.table]
+        identity = (experiment.table, *(str(getattr(experiment, key)) for key in keys))
+        if identity in seen:
+            message = (
+                f"{experiment.table} shows each {', '.join(keys)} once, as in {seen[identity]}"
+            )
+            raise InputError(f"{where}: {message}")
+        seen[identity] = where
 
 
 def _parse(row: dict[str, str], where: str, config: Config) -> Experiment:
@@ -131,4 +147,4 @@ def runs_of(experiments: tuple[Experiment, ...], repetitions: int) -> list[Run]:
     return sorted(runs)
 
 
-assert set(TABLES) == set(get_args(Experiment.model_fields["table"].annotation))
+assert set(KEYS) == set(get_args(Experiment.model_fields["table"].annotation))

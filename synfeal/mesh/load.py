@@ -97,10 +97,16 @@ def _part(
         material = reduce_material(visual.material, origin)
         return _textured_part(name, vertices, faces, visual, material)
     if visual.kind == "face":  # a colour per face: every face gets vertices of its own
-        vertices, rgb = vertices[faces.ravel()], np.repeat(visual.face_colors[:, :3], 3, axis=0)
-        return MeshPart(name, vertices, np.arange(faces.size).reshape(-1, 3), vertex_rgb=rgb)
-    rgb = visual.vertex_colors[:, :3].astype(np.uint8) if visual.kind == "vertex" else None
-    return MeshPart(name, vertices, faces, vertex_rgb=rgb)
+        vertices, colors = vertices[faces.ravel()], np.repeat(visual.face_colors, 3, axis=0)
+        faces = np.arange(faces.size).reshape(-1, 3)
+        return MeshPart(name, vertices, faces, vertex_rgb=_rgb(colors))
+    colors = visual.vertex_colors if visual.kind == "vertex" else None
+    return MeshPart(name, vertices, faces, vertex_rgb=_rgb(colors))
+
+
+def _rgb(colors: Any) -> NDArray[np.uint8] | None:
+    """Colours (N, 3) of trimesh colours (N, 3 | 4), if there are any."""
+    return None if colors is None else np.asarray(colors)[:, :3].astype(np.uint8)
 
 
 def _textured_part(
@@ -112,14 +118,13 @@ def _textured_part(
 ) -> MeshPart:
     """A part with a material; without a texture its coordinates are of no use and are dropped."""
     has_texture = material.texture is not None and visual.uv is not None
-    color = visual.vertex_attributes.get("color")
     return MeshPart(
         name=name,
         vertices_m=vertices,
         faces=faces,
         uv=np.asarray(visual.uv, dtype=np.float64) if has_texture else None,
         texture=material.texture if has_texture else None,
-        vertex_rgb=None if color is None else np.asarray(color)[:, :3].astype(np.uint8),
+        vertex_rgb=_rgb(visual.vertex_attributes.get("color")),
         base_color=material.base_color,
         alpha_cutoff=material.alpha_cutoff,
     )

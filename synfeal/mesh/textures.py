@@ -13,7 +13,7 @@ from trimesh.resolvers import FilePathResolver
 log = logging.getLogger("synfeal")
 
 
-class RecordingResolver(FilePathResolver):
+class RecordingResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is untyped
     """Reads the files a mesh refers to and remembers those that cannot be read.
 
     trimesh passes over missing textures silently; a grey scene should not surprise its user.

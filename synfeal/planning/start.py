@@ -27,7 +27,9 @@ def sample_start(
     every path must be free of collisions. Normals cannot tell inside from outside in a scan, but
     visibility can: poses with a free view are sampled, those that see each other are joined, and
     the start is one of the largest group. Samples are uniform in volume, so that group is the
-    largest space connected by free lines. None if ``max_tries`` rounds give no pose with a free view.
+    largest space connected by free lines.
+
+    Returns None if ``max_tries`` rounds give no pose with a free view.
     """
     found = np.empty((0, 6))
     for _ in range(max_tries):

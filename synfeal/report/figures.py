@@ -128,7 +128,7 @@ def _finish(figure: Figure, axes: list[list[Axes]]) -> Figure:
         [*handles, reference],
         [*labels, "published"],
         loc="outside lower center",
-        ncols=6,
+        ncols=6 if len(axes[0]) > 2 else 3,
         fontsize=8,
         frameon=False,
         handlelength=3.5,

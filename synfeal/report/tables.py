@@ -7,18 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from synfeal.config import Experiment
+from synfeal.config.experiments import KEYS
 from synfeal.files import atomic_path
 from synfeal.report.cells import FROM_SCRATCH, Cell, read_cells
 from synfeal.report.latex import write_latex
 from synfeal.report.layouts import grid_of
 from synfeal.report.stats import MEASURES
 
-KEYS: Mapping[str, tuple[str, ...]] = {
-    "table2_ground_truth": ("scene", "labels"),
-    "table3_inconsistencies": ("block", "noise_m", "noise_deg"),
-    "table4_size": ("scene", "size"),
-    "table5_from_scratch": ("scene", "size"),
-}
 LIMITS = tuple(f"{measure}_{end}" for measure in MEASURES for end in ("low", "high"))
 CHANGES = {
     "position_m": "position_change_percent",
