@@ -104,7 +104,7 @@ def test_glb_round_trip_keeps_geometry_texture_and_order(tmp_path: Path) -> None
         np.testing.assert_allclose(back.vertices_m, part.vertices_m, rtol=1e-6)
         np.testing.assert_array_equal(back.faces, part.faces)
         assert back.alpha_cutoff == part.alpha_cutoff
-        np.testing.assert_allclose(back.base_color.astype(int), part.base_color, atol=2)
+        np.testing.assert_allclose(back.base_color.astype(int), part.base_color, atol=3)
         for name in ("uv", "texture", "vertex_rgb"):
             np.testing.assert_equal(getattr(back, name), getattr(part, name))
 
@@ -383,7 +383,8 @@ def test_collision_mesh_does_not_lose_a_thin_bar() -> None:
     vertices, faces = collision_mesh(mesh, 100)
     caster = RayCaster(vertices, faces)
     through = np.random.default_rng(1).uniform(-1.9, 1.9, (200, 3)) * [1, 0, 1] - [0, 1, 0]
-    assert not caster.sees(through, through + [0, 2, 0]).any()
+    beyond = through + np.array([0, 2, 0])
+    assert not caster.sees(through, beyond).any()
 
 
 def test_small_meshes_are_not_decimated() -> None:

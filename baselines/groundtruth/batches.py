@@ -33,7 +33,9 @@ def batches_of(n_frames: int, batch_frames: int) -> list[Batch]:
         ValueError: ``n_frames`` or ``batch_frames`` is below 1.
     """
     if n_frames < 1 or batch_frames < 1:
-        raise ValueError(f"need at least one frame and batch_frames >= 1: {n_frames}, {batch_frames}")
+        raise ValueError(
+            f"need at least one frame and batch_frames >= 1: {n_frames}, {batch_frames}"
+        )
     last = n_frames - 1
     starts = range(0, last, batch_frames)
     return [

@@ -1,22 +1,24 @@
 """Chaining batches to one trajectory, with the assistance of section 4.1.
 
 A batch starts at the label its first frame got from the batch before, ``world_from_last``, and its
-poses follow as ``world_from_last @ first_from_cam``. After each batch the last pose is compared with
-the true one. When it is off by more than the thresholds it alone is replaced by the true pose, the
-batch counts as assisted, and the next batch starts from the replaced pose.
+poses follow as ``world_from_last @ first_from_cam``. After each batch the last pose is compared
+with the true one. When it is off by more than the thresholds it alone is replaced by the true pose,
+the batch counts as assisted, and the next batch starts from the replaced pose.
 
 Frames that a method did not register are filled in. Between two registered frames the motion is
 interpolated (straight line, constant angular velocity); after the last one its pose is held. The
 first frame always counts as known, since it is shared with the batch before.
 
-A batch with no registered frame besides the first is lost. It is assisted whatever its error, and its
-frames are interpolated between its start and the true last pose, so that no frame is ever dropped.
+A batch with no registered frame besides the first is lost. It is assisted whatever its error, and
+its frames are interpolated between its start and the true last pose, so that no frame is ever
+dropped.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -146,7 +148,7 @@ def fill_gaps(trajectory: BatchTrajectory) -> Array:
     poses = trajectory.first_from_cam.copy()
     poses[0] = np.eye(4)
     known = np.flatnonzero(trajectory.registered | (np.arange(len(poses)) == 0))
-    for before, after in zip(known[:-1], known[1:], strict=True):
+    for before, after in pairwise(known.tolist()):
         gap = np.arange(before + 1, after)
         if len(gap):
             fraction = (gap - before) / (after - before)
@@ -166,9 +168,7 @@ def _place(
     lost = not trajectory.registered[1:].any()
     poses = world_from_first @ fill_gaps(trajectory)
     before_m, before_deg = _error(poses[-1], true_world_from_last)
-    assisted = (
-        lost or before_m > cfg.assist_position_m or before_deg > cfg.assist_orientation_deg
-    )
+    assisted = lost or before_m > cfg.assist_position_m or before_deg > cfg.assist_orientation_deg
     if lost:
         poses = interpolate(world_from_first, true_world_from_last, np.linspace(0, 1, len(batch)))
     if assisted:

@@ -1,15 +1,16 @@
 """Structure from motion on one batch: the SfM row of table 2.
 
-The paper used openMVG; here it is the incremental mapper of COLMAP on SIFT features, with intrinsics
-that are known and kept fixed. An SfM model has no scale and no place in the world, so two things are
-taken from the true poses of the batch, as the published code does: the metric scale, from distances to
-the first frame, and the pose of the first registered camera. Its full pose is used, and not a
-similarity fitted to the camera centres, because the centres of a straight path leave the rotation about
-its line free.
+The paper used openMVG; here it is the incremental mapper of COLMAP on SIFT features, with
+intrinsics that are known and kept fixed. An SfM model has no scale and no place in the world, so
+two things are taken from the true poses of the batch, as the published code does: the metric scale,
+from distances to the first frame, and the pose of the first registered camera. Its full pose is
+used, and not a similarity fitted to the camera centres, because the centres of a straight path
+leave the rotation about its line free.
 
-A view of one plane has two reconstructions, and a mapper that starts from the wrong one still registers
-every image. So the mapper runs from several initial images and the model that explains the most image
-points is taken: in the wrong ones, points leave the reprojection threshold and are dropped.
+A view of one plane has two reconstructions, and a mapper that starts from the wrong one still
+registers every image. So the mapper runs from several initial images and the model that explains
+the most image points is taken: in the wrong ones, points leave the reprojection threshold and are
+dropped.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
+from baselines.groundtruth.pinhole import focal_length_px
 from baselines.groundtruth.trajectory import BatchTrajectory, failed_trajectory
 from synfeal.config.models import CameraConfig, SfmConfig
 from synfeal.errors import InputError
@@ -79,19 +81,14 @@ def sfm_batch(
 def metric_scale(true_position_m: Array, position: Array) -> float:
     """Metres per unit of the model, from camera centres (n, 3) of the same frames.
 
-    The published code takes the mean ratio of true to estimated distances from the first frame over its
-    first 44 frames, leaving out those under 5 cm; the median is as simple and bears a wrong pose. NaN
-    when no frame is left.
+    The published code takes the mean ratio of true to estimated distances from the first frame over
+    its first 44 frames, leaving out those under 5 cm; the median is as simple and bears a wrong
+    pose. NaN when no frame is left.
     """
     true_m = np.linalg.norm(true_position_m[:_SCALE_FRAMES] - true_position_m[0], axis=1)
     distance = np.linalg.norm(position[:_SCALE_FRAMES] - position[0], axis=1)
     usable = (true_m >= _SCALE_MIN_M) & (distance > 0)
     return float(np.median(true_m[usable] / distance[usable])) if usable.any() else math.nan
-
-
-def focal_length_px(camera: CameraConfig) -> float:
-    """Focal length of the pinhole camera in pixels."""
-    return camera.width / 2 / math.tan(math.radians(camera.horizontal_fov_deg) / 2)
 
 
 def _metric_trajectory(
@@ -182,13 +179,11 @@ def _match(images: Path, database: Path, camera: CameraConfig, cfg: SfmConfig, s
     )
     verification = pycolmap.TwoViewGeometryOptions(min_num_inliers=cfg.min_num_inliers)
     verification.ransac.random_seed = seed
-    pycolmap.match_sequential(
-        database, matching, pairing, verification, device=pycolmap.Device.cpu
-    )
+    pycolmap.match_sequential(database, matching, pairing, verification, device=pycolmap.Device.cpu)
 
 
 def _mapping_options(cfg: SfmConfig, seed: int) -> pycolmap.IncrementalPipelineOptions:
-    """Known intrinsics kept everywhere; thresholds lowered for short baselines and small batches."""
+    """Known intrinsics kept everywhere; thresholds lowered for short baselines."""
     options = pycolmap.IncrementalPipelineOptions(
         num_threads=1,
         random_seed=seed,

@@ -90,10 +90,11 @@ def read_experiments(config: Config) -> tuple[Experiment, ...]:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:  # spreadsheets add a mark
             reader = csv.DictReader(file)
+            header = tuple(reader.fieldnames or ())
             rows = [(f"{path}: row {reader.line_num}", row) for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as CSV ({error})") from None
-    if tuple(reader.fieldnames or ()) != COLUMNS:
+    if header != COLUMNS:
         raise InputError(f"{path}: the header must be {','.join(COLUMNS)}")
     experiments = tuple(_parse(row, where, config) for where, row in rows)
     if not experiments:

@@ -1,0 +1,1 @@
+"""Label sets that differ from the true poses."""

@@ -1,12 +1,12 @@
 """Injected label noise (section 4.2): errors of a known size in random directions.
 
-Every position moves by exactly ``noise_m`` in a direction uniform on the sphere, and every orientation
-turns by exactly ``noise_deg`` about an axis uniform on the sphere. So the median injected Euclidean
-and geodesic errors, the measures the paper reports, are the nominal values.
+Every position moves by exactly ``noise_m`` in a direction uniform on the sphere, and every
+orientation turns by exactly ``noise_deg`` about an axis uniform on the sphere. So the median
+injected Euclidean and geodesic errors, the measures the paper reports, are the nominal values.
 
-The published code differs. It moves positions by ``noise_m * sqrt(3)``, because its error is the RMS
-over the three axes, and adds ``noise_deg / sqrt(3)`` with a random sign to each of three Euler angles,
-so that the geodesic angle varies around the nominal value.
+The published code differs. It moves positions by ``noise_m * sqrt(3)``, because its error is the
+RMS over the three axes, and adds ``noise_deg / sqrt(3)`` with a random sign to each of three Euler
+angles, so that the geodesic angle varies around the nominal value.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ def add_noise(
 ) -> PoseTable:
     """The same frames with noisy poses; a noise of 0 leaves its part bit-identical.
 
-    Both sets of directions are drawn whatever the sizes, so with the same seed a variant with position
-    noise alone has the same displacements as the one with both.
+    Both sets of directions are drawn whatever the sizes, so with the same seed a variant with
+    position noise alone has the same displacements as the one with both.
 
     Args:
         table: clean labels.
@@ -50,6 +50,6 @@ def add_noise(
 
 
 def _unit_vectors(count: int, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Vectors (count, 3) uniform on the unit sphere: normal variates have no preferred direction."""
+    """Vectors (count, 3) uniform on the sphere: normal variates have no preferred direction."""
     vectors = rng.standard_normal((count, 3))
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True), dtype=np.float64)

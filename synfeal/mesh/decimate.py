@@ -29,8 +29,8 @@ def collision_mesh(mesh: TexturedMesh, n_faces: int) -> tuple[Vertices, Faces]:
     """Vertices (V, 3) and faces (F, 3) of about ``n_faces`` triangles that block the same lines.
 
     Simplification can close a doorway or lose a thin wall. So the result is compared with the full
-    mesh on random lines of sight through its bounds; where they disagree on more than 0.5 %, twice as many
-    triangles are tried, up to the full mesh. Alpha-tested surfaces block as a whole.
+    mesh on random lines of sight through its bounds; where they disagree on more than 0.5 %, twice
+    as many triangles are tried, up to the full mesh. Alpha-tested surfaces block as a whole.
     """
     vertices, faces = merge_vertices(*mesh.merged())
     reference = RayCaster(vertices, faces)

@@ -97,9 +97,9 @@ def _part(
         material = reduce_material(visual.material, origin)
         return _textured_part(name, vertices, faces, visual, material)
     if visual.kind == "face":  # a colour per face: every face gets vertices of its own
-        vertices, colors = vertices[faces.ravel()], np.repeat(visual.face_colors, 3, axis=0)
-        faces = np.arange(faces.size).reshape(-1, 3)
-        return MeshPart(name, vertices, faces, vertex_rgb=_rgb(colors))
+        soup = np.arange(faces.size).reshape(-1, 3)
+        face_rgb = _rgb(np.repeat(visual.face_colors, 3, axis=0))
+        return MeshPart(name, vertices[faces.ravel()], soup, vertex_rgb=face_rgb)
     colors = visual.vertex_colors if visual.kind == "vertex" else None
     return MeshPart(name, vertices, faces, vertex_rgb=_rgb(colors))
 

@@ -42,7 +42,8 @@ class _FastPng:
 def save_glb(path: Path, mesh: TexturedMesh) -> None:
     """Write ``mesh`` as binary glTF: y-up, metres, textures inside as PNG (lossless).
 
-    ``load_mesh(path)`` gives the same parts back, coordinates rounded to float32.
+    ``load_mesh(path)`` gives the same parts back: coordinates rounded to float32, base colours
+    that are not white within 3 levels (trimesh keeps linear factors in 8 bits).
 
     Raises:
         InputError: ``path`` does not end in ``.glb``.

@@ -47,15 +47,23 @@ def _offscreen() -> Any:
     """
     try:
         offscreen = _pyrender().OffscreenRenderer(16, 16)
-        from OpenGL import GL
-
-        GL.glEnable(GL.GL_SAMPLE_ALPHA_TO_COVERAGE)  # the new context is current here
+        _configure_context()
     except Exception as error:  # what is missing decides what is raised
         raise InputError(
             f"rendering needs EGL, which does not work here ({type(error).__name__}: {error});"
             " on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri"
         ) from error
     return offscreen
+
+
+def _configure_context() -> None:
+    """Set what pyrender leaves at its default, in the context that was just made current."""
+    from OpenGL import GL
+
+    GL.glEnable(GL.GL_SAMPLE_ALPHA_TO_COVERAGE)
+    # Texture rows are packed; by default OpenGL expects each to start at a multiple of 4 bytes,
+    # which shears textures of odd width.
+    GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
 
 
 class PyrenderRenderer:
@@ -67,7 +75,7 @@ class PyrenderRenderer:
         self._flags = pyrender.RenderFlags.FLAT | pyrender.RenderFlags.SKIP_CULL_FACES
         self._size = (camera.width, camera.height)
         self._scene = pyrender.Scene(bg_color=np.zeros(4))
-        self._scene.add(pyrender.Mesh([_primitive(part) for part in mesh.parts]))
+        self._scene.add(pyrender.Mesh([_primitive(part) for part in mesh.parts if part.is_drawn]))
         self._camera = self._scene.add(
             pyrender.IntrinsicsCamera(
                 *intrinsics_of(camera), znear=camera.near_m, zfar=camera.far_m

@@ -22,5 +22,7 @@ def build_scene(builder: str, seed: int) -> TexturedMesh:
         InputError: if there is no such builder.
     """
     if builder not in BUILDERS:
-        raise InputError(f"builder: no procedural scene '{builder}'; choose one of {sorted(BUILDERS)}")
+        raise InputError(
+            f"builder: no procedural scene '{builder}'; choose one of {sorted(BUILDERS)}"
+        )
     return BUILDERS[builder](seed)

@@ -14,7 +14,7 @@ from synfeal.scenes.patches import Block, Item, Patch, bilinear, joined
 ATLAS_PX = 2048
 GUTTER_PX = 6  # repeated rim around each picture; what mipmaps and filters may reach into
 LIGHT_SPACING_M = 0.06
-CHUNK = 1 << 15  # surface points lit at once; fits the cache
+CHUNK = 1 << 14  # surface points lit at once; fits the cache
 
 
 def baked_mesh(parts: Mapping[str, Item], lighting: Lighting) -> TexturedMesh:
@@ -55,9 +55,10 @@ def _lit(patch: Patch, tone: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def pack(sizes_px: Sequence[tuple[int, int]]) -> tuple[list[tuple[int, int]], tuple[int, int]]:
-    """Shelf packing: the top-left corner (row, column) of every (height, width), and the atlas' size.
+    """Shelf packing of (height, width): every top-left corner (row, column) and the atlas' size.
 
-    Rectangles do not overlap; gutters are not known here. Raises ValueError if they do not fit.
+    Raises:
+        ValueError: they do not fit into one atlas.
     """
     order = sorted(range(len(sizes_px)), key=lambda index: (-sizes_px[index][0], index))
     corners = [(0, 0)] * len(sizes_px)
@@ -78,7 +79,8 @@ def pack(sizes_px: Sequence[tuple[int, int]]) -> tuple[list[tuple[int, int]], tu
 
 def _part(name: str, patches: Sequence[Patch], pictures: list[NDArray[np.uint8]]) -> MeshPart:
     padded = [
-        np.pad(picture, ((GUTTER_PX,) * 2, (GUTTER_PX,) * 2, (0, 0)), mode="edge") for picture in pictures
+        np.pad(picture, ((GUTTER_PX,) * 2, (GUTTER_PX,) * 2, (0, 0)), mode="edge")
+        for picture in pictures
     ]
     corners, (height, width) = pack([(picture.shape[0], picture.shape[1]) for picture in padded])
     texture = np.full((height, width, 3), 128, np.uint8)
@@ -92,14 +94,18 @@ def _part(name: str, patches: Sequence[Patch], pictures: list[NDArray[np.uint8]]
         vertices.append(patch.points_m.reshape(-1, 3))
         faces.append(_grid_faces(patch.points_m) + count)
         count += len(vertices[-1])
-    return MeshPart(name, np.concatenate(vertices), np.concatenate(faces), np.concatenate(uv), texture)
+    return MeshPart(
+        name, np.concatenate(vertices), np.concatenate(faces), np.concatenate(uv), texture
+    )
 
 
 def _grid_faces(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Triangles (F, 3) of a grid, counter-clockwise from its front; those without area are left out."""
+    """Triangles (F, 3) of a grid, counter-clockwise from its front, without those of no area."""
     rows, columns = points.shape[:2]
     index = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]))
+    a, b, c, d = (
+        part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:])
+    )
     faces = np.concatenate([np.stack([a, c, d], axis=1), np.stack([a, d, b], axis=1)])
     corner = points.reshape(-1, 3)[faces]
     doubled = np.linalg.norm(

@@ -44,7 +44,8 @@ class Canvas:
     ) -> NDArray[np.float32]:
         """Fractal value noise (H, W), zero mean and roughly unit deviation.
 
-        ``cell_m`` is the size of the coarsest cells (along x and y if a pair); each octave halves it.
+        ``cell_m`` is the size of the coarsest cells (along x and y if a pair); the cells of each
+        octave are half as large as those of the one before.
         """
         cell_x, cell_y = cell_m if isinstance(cell_m, tuple) else (cell_m, cell_m)
         total = np.zeros((self.height_px, self.width_px), np.float32)
@@ -65,7 +66,9 @@ class Canvas:
         smooth = Image.fromarray(lattice).resize(
             (self.width_px, self.height_px), Image.Resampling.BILINEAR, box=box
         )
-        return np.asarray(smooth, np.float32) * np.float32(1.4)  # interpolation lowers the deviation
+        return np.asarray(smooth, np.float32) * np.float32(
+            1.4
+        )  # interpolation lowers the deviation
 
 
 Painter = Callable[[Canvas], Pixels]

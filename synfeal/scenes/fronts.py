@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from synfeal.scenes.canvas import Canvas, Colour, Pixels, Sketch, pick, shade
 from synfeal.scenes.materials import marble, plaster
 from synfeal.scenes.pictures import INK, VIVID, bordered, ramp
@@ -41,7 +39,9 @@ def books(canvas: Canvas, rows: int, palette: tuple[Colour, ...] = VIVID) -> Pix
                 colour = shade(pick(rng, palette), rng.uniform(0.6, 1.3))
                 sketch.rectangle(x, top, min(x + width, 0.98), floor, colour)
                 band = top + (floor - top) * rng.uniform(0.1, 0.7)
-                sketch.rectangle(x, band, min(x + width, 0.98), band + 0.1 * height, shade(colour, 1.8))
+                sketch.rectangle(
+                    x, band, min(x + width, 0.98), band + 0.1 * height, shade(colour, 1.8)
+                )
             x += width * 1.06
         sketch.rectangle(0, floor, 1, (row + 1) * height, (0.5, 0.38, 0.24))
     return bordered(sketch.pixels(), 0.02, (0.5, 0.38, 0.24))
@@ -84,7 +84,9 @@ def keyboard(canvas: Canvas) -> Pixels:
     for row in range(5):
         for column in range(16):
             x, y = (column + 0.12) / 16, (row + 0.12) / 5
-            sketch.rectangle(x, y, x + 0.048, y + 0.15, shade((0.28, 0.28, 0.3), canvas.rng.uniform(0.8, 1.2)))
+            sketch.rectangle(
+                x, y, x + 0.048, y + 0.15, shade((0.28, 0.28, 0.3), canvas.rng.uniform(0.8, 1.2))
+            )
     return sketch.pixels()
 
 

@@ -58,7 +58,9 @@ def clutter(rng: Generator, width_m: float, depth_m: float) -> Item:
         colour = pick(rng, VIVID)
         if rng.random() < 0.5:
             profile = [(0.03, 0.1), (0.042, 0.1), (0.04, 0.0)]
-            things.append(turned(rng, profile, painted(colour), 150, 10, casts=False).placed(x, y, 0.001))
+            things.append(
+                turned(rng, profile, painted(colour), 150, 10, casts=False).placed(x, y, 0.001)
+            )
         else:
             size = (rng.uniform(0.12, 0.25), rng.uniform(0.08, 0.16), rng.uniform(0.06, 0.18))
             carton = box(rng, size, partial(fronts.label, colour=colour), 300, "fblrt")
@@ -82,7 +84,11 @@ def chair(rng: Generator, colour: Colour) -> Item:
 
 
 def cabinet(
-    rng: Generator, size_m: tuple[float, float, float], colour: Colour, doors: int = 2, rows: int = 1
+    rng: Generator,
+    size_m: tuple[float, float, float],
+    colour: Colour,
+    doors: int = 2,
+    rows: int = 1,
 ) -> Item:
     """A closed cupboard with doors, or with rows of drawers."""
     front = partial(fronts.cabinet_front, colour=colour, doors=doors, rows=rows)
@@ -93,7 +99,14 @@ def bookshelf(rng: Generator, size_m: tuple[float, float, float], rows: int = 5)
     """A bookcase: painted books between real boards."""
     width, depth, height = size_m
     grain = partial(materials.wood, colour=(0.5, 0.36, 0.22))
-    body = box(rng, (width, depth - 0.1, height), grain, 120, "flrt", front=partial(fronts.books, rows=rows))
+    body = box(
+        rng,
+        (width, depth - 0.1, height),
+        grain,
+        120,
+        "flrt",
+        front=partial(fronts.books, rows=rows),
+    )
     boards = [
         box(rng, (width, 0.1, 0.025), grain, 90, "ftu", casts=False).placed(0, 0, z)
         for z in np.linspace(0, height - 0.025, rows + 1)
@@ -119,14 +132,21 @@ def plant(rng: Generator, height_m: float, pot: Colour, leaves: int = 40) -> Ite
         up = length * (rise * along - bend * along**2)
         half = width * np.sin(np.pi * np.clip(along, 0.04, 0.97)) / 2 + 0.002
         leaf = np.stack([np.stack([-half, out, up], -1), np.stack([half, out, up], -1)], axis=1)
-        green = shade(pick(rng, ((0.16, 0.4, 0.12), (0.25, 0.5, 0.15), (0.4, 0.55, 0.2))), rng.uniform(0.7, 1.3))
+        green = shade(
+            pick(rng, ((0.16, 0.4, 0.12), (0.25, 0.5, 0.15), (0.4, 0.55, 0.2))),
+            rng.uniform(0.7, 1.3),
+        )
         patch = paint(rng, leaf, painted(green, 0.12), 70)
         things.append(Item((patch,)).placed(0, 0, rng.uniform(0.28, height_m), rng.uniform(0, 360)))
-    stem = turned(rng, [(0.015, height_m), (0.02, 0.24)], painted((0.35, 0.25, 0.15)), 60, 6, casts=False)
+    stem = turned(
+        rng, [(0.015, height_m), (0.02, 0.24)], painted((0.35, 0.25, 0.15)), 60, 6, casts=False
+    )
     return joined([*things, stem])
 
 
-def cushion(rng: Generator, size_m: tuple[float, float, float], painter: Painter, px_per_m: float = 130) -> Item:
+def cushion(
+    rng: Generator, size_m: tuple[float, float, float], painter: Painter, px_per_m: float = 130
+) -> Item:
     """A soft box: one bulging sheet over top and sides."""
     width, depth, height = size_m
     grid = np.linspace(-1, 1, 11)
@@ -160,5 +180,8 @@ def sofa(rng: Generator, width_m: float, painter: Painter) -> Item:
         for x in (-width_m / 2 + 0.09, width_m / 2 - 0.09)
     ]
     inner = (width_m - 0.36) / 2
-    seats = [cushion(rng, (inner, 0.6, 0.16), painter).placed(x, -0.1, 0.315) for x in (-inner / 2, inner / 2)]
+    seats = [
+        cushion(rng, (inner, 0.6, 0.16), painter).placed(x, -0.1, 0.315)
+        for x in (-inner / 2, inner / 2)
+    ]
     return joined([base, back, *arms, *seats])

@@ -27,7 +27,7 @@ class Lamp:
 
 @dataclass(frozen=True)
 class Sun:
-    """Parallel light of ``direction`` that enters through rectangles ``(x0, y0, z0), (x1, y1, z1)``.
+    """Parallel light of ``direction`` that enters through rectangles, given by opposite corners.
 
     Every rectangle is axis-aligned: one of the three coordinates is the same in both corners.
     """
@@ -85,9 +85,9 @@ def _single(values: ArrayLike) -> NDArray[np.float32]:
 
 
 def first_hit(origins: Vectors, segments: Vectors, blocks: Sequence[Block]) -> NDArray[np.float32]:
-    """Share (N,) of each segment (N, 3) that is free of blocks: 1 if all of it, 0 from inside one."""
+    """Share (N,) of each segment (N, 3) before a block: 1 if all is free, 0 from inside one."""
     free = np.ones(len(origins), np.float32)
-    for block in blocks:
+    for block in _within_reach(origins, segments, blocks):
         cos, sin = np.float32(np.cos(block.yaw_rad)), np.float32(np.sin(block.yaw_rad))
         start = origins - _single(block.centre_m)
         enter = np.zeros(len(origins), np.float32)
@@ -104,6 +104,21 @@ def first_hit(origins: Vectors, segments: Vectors, blocks: Sequence[Block]) -> N
             np.minimum(leave, middle + reach, out=leave)
         np.minimum(free, np.where(enter <= leave, enter, np.float32(1)), out=free)
     return free
+
+
+def _within_reach(origins: Vectors, segments: Vectors, blocks: Sequence[Block]) -> list[Block]:
+    """The blocks whose bounding sphere touches the box around all segments; the others are free."""
+    if not len(origins):
+        return []
+    ends = origins + segments
+    lower = np.minimum(origins.min(axis=0), ends.min(axis=0))
+    upper = np.maximum(origins.max(axis=0), ends.max(axis=0))
+    near = []
+    for block in blocks:
+        nearest = np.clip(block.centre_m, lower, upper)
+        if np.linalg.norm(nearest - block.centre_m) <= np.linalg.norm(block.half_m):
+            near.append(block)
+    return near
 
 
 def _sky_directions(normals: Vectors) -> list[Vectors]:

@@ -11,7 +11,9 @@ from synfeal.scenes.canvas import Canvas, Colour, Painter, Pixels
 
 
 def mix(
-    first: Pixels | NDArray[np.float32], second: Pixels | NDArray[np.float32], share: NDArray[np.float32]
+    first: Pixels | NDArray[np.float32],
+    second: Pixels | NDArray[np.float32],
+    share: NDArray[np.float32],
 ) -> Pixels:
     """Per pixel ``first·(1 − share) + second·share``; ``share`` is (H, W)."""
     return np.asarray(first + (second - first) * share[..., None], np.float32)
@@ -82,8 +84,8 @@ def masonry(
     n_rows, n_columns = int(row.max()) + 1, int(column.max()) + 1
     choice = canvas.rng.integers(len(palette), size=(n_rows, n_columns))
     tint = 1 + spread * canvas.rng.standard_normal((n_rows, n_columns))
-    blocks = (np.asarray(palette)[choice] * tint[..., None]).astype(np.float32)
-    image = blocks[np.broadcast_to(row, column.shape), column]
+    blocks = np.asarray(np.asarray(palette)[choice] * tint[..., None], np.float32)
+    image: Pixels = blocks[np.broadcast_to(row, column.shape), column]
     image *= 1 + 0.05 * canvas.noise(0.06, 4, 0.8)[..., None]
     edge_x = np.abs((shifted + 0.5) % 1 - 0.5) * block_m[0]
     edge_y = np.abs((y / block_m[1] + 0.5) % 1 - 0.5) * block_m[1]
@@ -91,7 +93,9 @@ def masonry(
     return image
 
 
-def terrazzo(canvas: Canvas, colour: Colour, chips: tuple[Colour, ...], density: float = 1.6) -> Pixels:
+def terrazzo(
+    canvas: Canvas, colour: Colour, chips: tuple[Colour, ...], density: float = 1.6
+) -> Pixels:
     """A speckled floor: every chip colour lies where its own noise exceeds ``density``."""
     image = plaster(canvas, colour, 0.06, 0.03)
     for chip in chips:
@@ -99,13 +103,16 @@ def terrazzo(canvas: Canvas, colour: Colour, chips: tuple[Colour, ...], density:
     return image
 
 
-def fabric(canvas: Canvas, colour: Colour, stripe: Colour | None = None, pitch_m: float = 0.1) -> Pixels:
+def fabric(
+    canvas: Canvas, colour: Colour, stripe: Colour | None = None, pitch_m: float = 0.1
+) -> Pixels:
     """Cloth with a weave and, if given, stripes."""
     image = _tinted(colour, 0.06 * canvas.noise(0.012, 2) + 0.06 * canvas.noise(0.3, 3))
     if stripe is not None:
         x, _ = canvas.coordinates_m()
         inside = (x[0] / pitch_m) % 1 < 0.3
-        image[:, inside] *= np.asarray(stripe, np.float32) / np.asarray(colour, np.float32)
+        ratio = np.asarray(stripe, np.float32) / np.asarray(colour, np.float32)
+        image[:, inside] *= ratio.astype(np.float32)
     return image
 
 

@@ -22,7 +22,9 @@ def mural(canvas: Canvas, ground: Colour, sky: Colour, figures: int = 5) -> Pixe
     horizon = 0.55 + 0.06 * canvas.noise((canvas.size_m[0] / 3, 1e3), 3)
     share = np.clip((y - horizon) * 12 + 0.5, 0, 1).astype(np.float32)
     clouds = (1 + 0.12 * canvas.noise((0.6, 0.25), 4))[..., None]
-    image = mix(np.asarray(sky, np.float32) * clouds, np.asarray(ground, np.float32) * clouds, share)
+    image = mix(
+        np.asarray(sky, np.float32) * clouds, np.asarray(ground, np.float32) * clouds, share
+    )
     sketch = Sketch(image)
     for x in np.linspace(0.16, 0.84, figures) + rng.uniform(-0.04, 0.04, figures):
         _saint(sketch, rng, x, rng.uniform(0.3, 0.45), canvas)
@@ -36,9 +38,9 @@ def _saint(sketch: Sketch, rng: np.random.Generator, x: float, top: float, canva
     robe, head = pick(rng, ROBES), 0.055 * (1.0 - top)
     wide, foot = 2.2 * head * aspect, rng.uniform(0.86, 0.92)
     sketch.ellipse(x, top, 1.9 * head * aspect, 1.9 * head, GOLD)
-    body = np.array([
-        (x - wide, top + 2 * head), (x + wide, top + 2 * head), (x + 1.5 * wide, foot), (x - 1.5 * wide, foot),
-    ])  # fmt: skip
+    shoulder = top + 2 * head
+    hem_left, hem_right = (x - 1.5 * wide, foot), (x + 1.5 * wide, foot)
+    body = np.array([(x - wide, shoulder), (x + wide, shoulder), hem_right, hem_left])
     sketch.polygon(body, robe)
     for _ in range(6):
         fold = rng.uniform(-1.2, 1.2) * wide
@@ -47,7 +49,8 @@ def _saint(sketch: Sketch, rng: np.random.Generator, x: float, top: float, canva
     mantle = shade(pick(rng, ROBES), 1.2)
     side = rng.choice((-1, 1)) * wide
     sketch.polygon(
-        np.array([(x + side, top + 2 * head), (x - 0.3 * side, top + 3 * head), (x + 1.4 * side, 0.75)]), mantle
+        np.array([(x + side, shoulder), (x - 0.3 * side, top + 3 * head), (x + 1.4 * side, 0.75)]),
+        mantle,
     )
     hair = shade((0.3, 0.2, 0.1), rng.uniform(0.5, 2.5))
     sketch.ellipse(x, top - 0.15 * head, 1.1 * head * aspect, 1.2 * head, hair)
@@ -73,7 +76,9 @@ def starry_vault(canvas: Canvas, first: Colour, second: Colour) -> Pixels:
     """A painted vault: from ``first`` to ``second`` along x, golden stars, ribbons, medallions."""
     rng = canvas.rng
     x, _ = canvas.coordinates_m()
-    share = np.broadcast_to(x / canvas.size_m[0], (canvas.height_px, canvas.width_px)).astype(np.float32)
+    share = np.broadcast_to(x / canvas.size_m[0], (canvas.height_px, canvas.width_px)).astype(
+        np.float32
+    )
     image = mix(np.asarray(first, np.float32), np.asarray(second, np.float32), share)
     sketch = Sketch(image * (1 + 0.12 * canvas.noise(0.7, 5, 0.7))[..., None])
     aspect = canvas.width_px / canvas.height_px
@@ -95,10 +100,18 @@ def _star(sketch: Sketch, x: float, y: float, radius: float, aspect: float) -> N
 
 def _medallion(sketch: Sketch, rng: np.random.Generator, x: float, y: float, aspect: float) -> None:
     radius = rng.uniform(0.045, 0.075)
-    for scale, colour in ((1.0, GOLD), (0.85, pick(rng, ROBES)), (0.7, shade(pick(rng, ROBES), 1.4))):
+    for scale, colour in (
+        (1.0, GOLD),
+        (0.85, pick(rng, ROBES)),
+        (0.7, shade(pick(rng, ROBES), 1.4)),
+    ):
         sketch.ellipse(x, y, scale * radius / aspect, scale * radius, colour)
     for _ in range(7):
         dx, dy = rng.uniform(-0.4, 0.4, 2) * radius
         sketch.ellipse(
-            x + dx / aspect, y + dy, 0.18 * radius / aspect, 0.2 * radius, shade(pick(rng, ROBES), 1.2)
+            x + dx / aspect,
+            y + dy,
+            0.18 * radius / aspect,
+            0.2 * radius,
+            shade(pick(rng, ROBES), 1.2),
         )

@@ -1,9 +1,10 @@
-"""Patches: the one geometric element of a procedural scene, a grid of points with a picture on it."""
+"""Patches: the one element of a procedural scene, a grid of points with a picture on it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from synfeal.scenes.canvas import Canvas, Painter, Pixels
 
 Points = NDArray[np.float64]
+Real = TypeVar("Real", np.float32, np.float64)
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Patch:
         return _shares(self.points_m.swapaxes(0, 1))
 
     def sample(self, spacing_m: float) -> tuple[Points, Points]:
-        """Points and unit normals (A, B, 3) about every ``spacing_m``, first and last on the rim."""
+        """Points and unit normals (A, B, 3) about every ``spacing_m``, the rim included."""
         height_m, width_m = extent_m(self.points_m)
         rows = np.linspace(0, 1, int(np.ceil(height_m / spacing_m)) + 1)
         columns = np.linspace(0, 1, int(np.ceil(width_m / spacing_m)) + 1)
@@ -51,7 +53,7 @@ class Patch:
 
 def _shares(points: Points) -> NDArray[np.float64]:
     steps = np.linalg.norm(np.diff(points, axis=0), axis=-1).mean(axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
+    return np.asarray(np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum(), np.float64)
 
 
 def _normals(points: Points) -> Points:
@@ -60,16 +62,16 @@ def _normals(points: Points) -> Points:
 
 
 def bilinear(
-    grid: NDArray[np.floating], row_at: NDArray[np.float64], column_at: NDArray[np.float64]
-) -> NDArray[np.floating]:
+    grid: NDArray[Real], row_at: NDArray[np.float64], column_at: NDArray[np.float64]
+) -> NDArray[Real]:
     """Values of a (R, C, K) grid at fractional row and column indices, as (A, B, K)."""
     top = np.clip(np.floor(row_at).astype(np.int64), 0, grid.shape[0] - 2)
     left = np.clip(np.floor(column_at).astype(np.int64), 0, grid.shape[1] - 2)
     below = (row_at - top)[:, None, None].astype(grid.dtype)
     beside = (column_at - left)[None, :, None].astype(grid.dtype)
     rows = grid[top] * (1 - below) + grid[top + 1] * below
-    mixed: NDArray[np.floating] = rows[:, left] * (1 - beside) + rows[:, left + 1] * beside
-    return mixed
+    mixed = rows[:, left] * (1 - beside) + rows[:, left + 1] * beside
+    return mixed.astype(grid.dtype, copy=False)
 
 
 def extent_m(points: Points) -> tuple[float, float]:

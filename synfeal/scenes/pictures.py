@@ -93,7 +93,9 @@ def whiteboard(canvas: Canvas) -> Pixels:
             nodes = rng.uniform((x, y), (x + 0.25, y + 0.22), (6, 2))
             sketch.line(nodes, ink, 0.008)
             for node_x, node_y in nodes:
-                sketch.ellipse(node_x, node_y, 0.012, 0.012 * canvas.width_px / canvas.height_px, ink)
+                sketch.ellipse(
+                    node_x, node_y, 0.012, 0.012 * canvas.width_px / canvas.height_px, ink
+                )
     return bordered(sketch.pixels(), 0.02, (0.6, 0.62, 0.65))
 
 
@@ -161,7 +163,9 @@ def stained_glass(canvas: Canvas, palette: tuple[Colour, ...] = VIVID, cells: in
     grid = np.stack(np.broadcast_arrays(x, y), axis=-1)
     distance, nearest = cKDTree(seeds).query(grid, k=2)
     brightness = rng.uniform(0.8, 1.5, (cells, 1))
-    colours = np.clip(np.asarray(palette)[rng.integers(len(palette), size=cells)] * brightness, 0, 1)
-    image = colours[nearest[..., 0]].astype(np.float32)
+    colours = np.clip(
+        np.asarray(palette)[rng.integers(len(palette), size=cells)] * brightness, 0, 1
+    )
+    image: Pixels = colours[nearest[..., 0]].astype(np.float32)
     image[distance[..., 1] - distance[..., 0] < 0.012] = np.float32(0.05)
     return image

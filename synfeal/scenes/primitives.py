@@ -10,9 +10,10 @@ from synfeal.scenes.patches import Block, Item, Patch, Points, bilinear, paint
 
 
 def sheet(corners_m: ArrayLike, cell_m: float | None = None) -> Points:
-    """A grid over four corners (4, 3): top left, top right, bottom right, bottom left from the front.
+    """A grid over four corners (4, 3): top left, top right, bottom right, bottom left.
 
-    It is divided into cells of about ``cell_m``, or not at all.
+    Left and right are as seen from its front. It is divided into cells of about ``cell_m``, if
+    given.
     """
     top_left, top_right, bottom_right, bottom_left = np.asarray(corners_m, np.float64)
     corners = np.array([[top_left, top_right], [bottom_left, bottom_right]])
@@ -25,7 +26,7 @@ def sheet(corners_m: ArrayLike, cell_m: float | None = None) -> Points:
 
 
 def bumpy(rng: np.random.Generator, points_m: Points, height_m: float) -> Points:
-    """The grid pushed towards its front by up to ``height_m``; its rim stays, so seams stay closed."""
+    """The grid pushed to its front by up to ``height_m``; its rim stays, so seams stay closed."""
     down, right = np.gradient(points_m, axis=0), np.gradient(points_m, axis=1)
     normals = np.cross(down, right)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
@@ -61,8 +62,8 @@ def box(
 ) -> Item:  # fmt: skip
     """A box on z = 0, centred in x and y.
 
-    ``faces`` names those built: front (−y), back, left (−x), right, top, under; ``front`` paints the
-    front differently.
+    ``faces`` names those built: front (−y), back, left (−x), right, top, under. ``front`` paints
+    the front differently; a box that ``casts`` is a block for the light.
     """
     half_x, half_y, high = size_m[0] / 2, size_m[1] / 2, size_m[2]
     sides = {
@@ -117,7 +118,9 @@ def tube(
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     other = np.cross(tangent, side)
     angle = np.linspace(0, 2 * np.pi, segments + 1)[None, :, None]
-    points = path[:, None] + radius_m * (np.cos(angle) * side[:, None] + np.sin(angle) * other[:, None])
+    points = path[:, None] + radius_m * (
+        np.cos(angle) * side[:, None] + np.sin(angle) * other[:, None]
+    )
     points[:, -1] = points[:, 0]
     return paint(rng, points, painter, px_per_m)
 
@@ -131,6 +134,8 @@ def on_wall(
     width, height = size_m
     face = upright((-width / 2, -depth_m), (width / 2, -depth_m), -height / 2, height / 2)
     front = paint(rng, face, painter, px_per_m, glow)
-    rim = box(rng, (width, depth_m, height), lambda c: c.plain((0.3, 0.3, 0.3)), 40, "lrtu", casts=False)
+    rim = box(
+        rng, (width, depth_m, height), lambda c: c.plain((0.3, 0.3, 0.3)), 40, "lrtu", casts=False
+    )
     rim = rim.placed(0, -depth_m / 2, -height / 2)
     return Item((front, *rim.patches)).placed(*centre_m, yaw_deg)

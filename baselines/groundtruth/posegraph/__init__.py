@@ -1,0 +1,1 @@
+"""Pose graphs and the two optimisers of the paper."""

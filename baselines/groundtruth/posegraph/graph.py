@@ -1,9 +1,10 @@
 """Pose graphs: nodes are camera poses, edges are measured motions between two of them.
 
-Files are ``.g2o`` text with the records ``VERTEX_SE3:QUAT id x y z qx qy qz qw`` and ``EDGE_SE3:QUAT
-i j x y z qx qy qz qw`` followed by the upper triangle of the 6x6 information matrix, row by row. The
-information is translation first (per square metre), then rotation (per square radian of the rotation
-vector), here and in the files. gtsam and Open3D put the rotation first: see :func:`swapped_blocks`.
+Files are ``.g2o`` text with the records ``VERTEX_SE3:QUAT id x y z qx qy qz qw`` and
+``EDGE_SE3:QUAT i j x y z qx qy qz qw`` followed by the upper triangle of the 6x6 information
+matrix, row by row. The information is translation first (per square metre), then rotation (per
+square radian of the rotation vector), here and in the files. gtsam and Open3D put the rotation
+first: see :func:`swapped_blocks`.
 """
 
 from __future__ import annotations
@@ -93,7 +94,8 @@ def write_g2o(path: Path, graph: PoseGraph) -> None:
     ]
     for edge in graph.edges:
         upper = map(repr, edge.information[_UPPER].tolist())
-        lines.append(" ".join([_EDGE, str(edge.i), str(edge.j), *_pose_cells(edge.i_from_j), *upper]))
+        pose = _pose_cells(edge.i_from_j)
+        lines.append(" ".join([_EDGE, str(edge.i), str(edge.j), *pose, *upper]))
     with atomic_path(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 

@@ -5,27 +5,29 @@ estimates" (ICRA 2006), Grisetti et al., "A tree parameterization for efficientl
 likelihood maps using gradient descent" (RSS 2007), and Grisetti, Stachniss and Burgard, "Nonlinear
 constraint network optimization for efficient map learning" (T-ITS 2009), which takes it to 3D.
 
-Parameters. Each node but the first has a parent, the lowest-numbered node it shares an edge with, and
-is described by ``parent_from_node``. An edge (i, j) touches only the nodes on its path in the tree,
-from i up to the lowest common ancestor and down to j.
+Parameters. Each node but the first has a parent, the lowest-numbered node it shares an edge with,
+and is described by ``parent_from_node``. An edge (i, j) touches only the nodes on its path in the
+tree, from i up to the lowest common ancestor and down to j.
 
 Update. Along the path let ``G_k = i_from_(k-th node)``, k = 0..L. With the measured motion Z:
 
     rotation      B = R_Z R(G_L)^T;        R(G_k) <- slerp(I, B, g_r u_k) R(G_k)
     translation   d = t_Z - t(G_L);        t(G_k) <- t(G_k) + g_t v_k d
 
-where the translation residual is taken after the rotations have been changed. The cumulative weights
+where the translation residual is taken after the rotations have been changed. The cumulative
+weights
 
     u_k = sum_(m <= k) 1/M_m / sum_(m <= L) 1/M_m,     M_m = sum of w_e over the edges e through m
 
-share the residual out so that well-determined parameters move less: M is the diagonal preconditioner,
-and w_e is the smallest eigenvalue of the rotation block of the edge's information (for v_k: of the
-translation block). In iteration t the gain is ``g = min(1, L w_e / (t min_m M_m))``: the step of
-preconditioned gradient descent with a learning rate of 1/t, clipped so that no edge overshoots.
+share the residual out so that well-determined parameters move less: M is the diagonal
+preconditioner, and w_e is the smallest eigenvalue of the rotation block of the edge's information
+(for v_k: of the translation block). In iteration t the gain is ``g = min(1, L w_e / (t min_m
+M_m))``: the step of preconditioned gradient descent with a learning rate of 1/t, clipped so that no
+edge overshoots.
 
-Order. Edges are visited by the depth of the top node of their path, so that what is moved first carries
-the rest of the map with it. The descent stops when the summed error changes by less than ``epsilon``
-of itself.
+Order. Edges are visited by the depth of the top node of their path, so that what is moved first
+carries the rest of the map with it. The descent stops when the summed error changes by less than
+``epsilon`` of itself.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ def _east(rng: Generator) -> Item:
     """Posters between the cabinets and above the desks."""
     places = (
         (1.15, 1.75, 0.6, 0.85),
-        (3.35, 1.65, 0.85, 1.15),
+        (3.35, 1.8, 0.85, 1.15),
         (4.35, 1.75, 0.6, 0.8),
         (5.1, 1.9, 0.55, 0.4),
     )

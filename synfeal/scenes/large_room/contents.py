@@ -33,7 +33,10 @@ DESKS: tuple[tuple[float, float, float, Colour], ...] = (  # x, y, yaw in degree
 OAK: Painter = partial(materials.wood, colour=(0.72, 0.55, 0.36))
 CONCRETE: Painter = partial(materials.plaster, colour=(0.5, 0.5, 0.48), grain=0.06)
 HAZARD: Painter = partial(
-    materials.masonry, palette=((0.95, 0.8, 0.1), (0.1, 0.1, 0.1)), block_m=(0.6, 0.1), joint_m=0.001
+    materials.masonry,
+    palette=((0.95, 0.8, 0.1), (0.1, 0.1, 0.1)),
+    block_m=(0.6, 0.1),
+    joint_m=0.001,
 )
 DIFFUSER: Painter = partial(
     materials.masonry, palette=((1.0, 0.98, 0.92),), block_m=(0.3, 0.3), stagger=0, spread=0.02
@@ -66,7 +69,9 @@ def _storage(rng: Generator) -> Item:
     """Cupboards, a bookcase, cartons, plants: large areas of one colour."""
     cabinet, east = furniture.cabinet, WIDTH_M - 0.23
     large = box(rng, (0.5, 0.4, 0.4), partial(fronts.label, colour=(0.65, 0.48, 0.3)), 200, "fblrt")
-    small = box(rng, (0.38, 0.35, 0.3), partial(fronts.label, colour=(0.7, 0.55, 0.36)), 200, "fblrt")
+    small = box(
+        rng, (0.38, 0.35, 0.3), partial(fronts.label, colour=(0.7, 0.55, 0.36)), 200, "fblrt"
+    )
     bin_profile = [(0.11, 0.05), (0.14, 0.35), (0.15, 0.35), (0.11, 0.0)]
     waste = turned(rng, bin_profile, painted((0.1, 0.35, 0.3)), 100, 14)
     return joined(
@@ -102,8 +107,8 @@ def _fittings(rng: Generator) -> Item:
     pipe = [(4.7, at, z - 0.2) for at in (0, y / 2, y)]
     tray = box(rng, (0.2, y, 0.08), painted((0.3, 0.32, 0.35)), 60, "lru")
     cables = []
-    for at, colour in ((1.9, (0.9, 0.8, 0.1)), (2.0, (0.1, 0.1, 0.1)), (4.4, (0.1, 0.3, 0.8))):
-        sag = [(0.55, at, z - 0.28), (0.3, at + 0.1, 2.3), (0.04, at, 1.9), (0.04, at, 0.75)]
+    for at, colour in ((2.2, (0.9, 0.8, 0.1)), (2.3, (0.1, 0.1, 0.1)), (4.35, (0.1, 0.3, 0.8))):
+        sag = [(0.55, at, z - 0.28), (0.3, at + 0.04, 2.3), (0.04, at, 1.9), (0.04, at, 0.75)]
         cables.append(tube(rng, sag, 0.015, painted(colour), 60, 5))
     return joined(
         [

@@ -1,0 +1,308 @@
+"""Configuration: what is refused and how that reads, and the design of the shipped profiles."""
+
+import copy
+from collections import Counter
+from pathlib import Path
+
+import pytest
+import yaml
+
+from synfeal.config import load_config, parse_config, read_experiments, runs_of
+from synfeal.config.docs import documents, main
+from synfeal.config.load import merge, read_yaml
+from synfeal.errors import InputError
+
+CONFIG = Path(__file__).parent.parent / "config"
+PROFILES = {
+    "mini": ("config.yaml",),
+    "smoke": ("config.yaml", "smoke.yaml"),
+    "paper": ("config.yaml", "paper.yaml"),
+}
+
+
+@pytest.fixture(autouse=True)
+def _in_the_repository(monkeypatch):
+    monkeypatch.chdir(CONFIG.parent)  # profiles name files relative to it
+
+
+@pytest.fixture
+def raw():
+    return read_yaml(CONFIG / "config.yaml")
+
+
+def profile(name):
+    return load_config(*(CONFIG / file for file in PROFILES[name]))
+
+
+def with_value(raw, dotted, value):
+    changed = copy.deepcopy(raw)
+    inner = changed
+    *parents, last = dotted.split("/")
+    for key in parents:
+        inner = inner[key]
+    inner[last] = value
+    return changed
+
+
+REFUSED = [
+    # key to set, value, what the message has to say
+    ("sacle", 1, ["sacle: unknown key", "scale"]),
+    ("scenes/sanctuary/colour", 1, ["scenes.sanctuary.colour: unknown key", "sampling_box"]),
+    ("scenes/sanctuary/sampling_box/w", [0, 1], ["sampling_box.w: unknown key", "x, y, z"]),
+    ("scenes/sanctuary/sizes/6k/tset", 1, ["sizes.6k.tset: unknown key", "test, train"]),
+    ("groundtruth/sfm/featuers", 9, ["groundtruth.sfm.featuers: unknown key", "max_features"]),
+    ("localizers/posenet/lr", 1e-3, ["localizers.posenet.lr: unknown key", "learning_rate"]),
+    ("localizers/vit", {}, ["localizers.vit", "'poselstm'", "'posenet2'"]),
+    ("scale", "much", ["scale", "valid number", "'much'"]),
+    ("scale", 1.5, ["scale", "less than or equal to 1", "1.5"]),
+    ("scale", float("nan"), ["scale", "nan"]),
+    ("seed", -1, ["seed", "greater than or equal to 0", "-1"]),
+    ("profile", "My Profile", ["profile", "pattern"]),
+    ("scenes", None, ["scenes", "dictionary"]),
+    ("scenes/sanctuary/sampling_box/x", [1, float("inf")], ["sampling_box.x.1", "finite"]),
+    ("scenes/sanctuary/sampling_box/x", [1, 2, 3], ["sampling_box.x", "2 items"]),
+    ("scenes/sanctuary/sizes/6k/train", 0, ["sizes.6k.train", "greater than or equal to 1"]),
+    ("training/samples_seen/6k", 1.5, ["training.samples_seen.6k", "valid integer"]),
+    ("collection/interpolation", "lerp", ["collection.interpolation", "'rpy' or 'slerp'"]),
+    ("localizers/posenet/dropout", 1.0, ["localizers.posenet.dropout", "less than 1"]),
+    ("localizers/posenet2", {"s_position": float("nan")}, ["s_position", "finite"]),
+    # more than one key has to agree
+    ("scenes/sanctuary/sampling_box/x", [3, 1], ["scenes.sanctuary.sampling_box.x", "below"]),
+    ("scenes/sanctuary/angles", {"pitch_deg": [-90, 90]}, ["angles.pitch_deg", "within -90"]),
+    ("scenes/sanctuary/builder", None, ["scenes.sanctuary.builder", "large_room, sanctuary"]),
+    ("scenes/sanctuary/source", "mesh", ["scenes.sanctuary.path", "mesh file"]),
+    ("network_camera/near_m", 200, ["network_camera.near_m", "below far_m"]),
+    ("network/input_px", 96, ["network_camera", "exceed network.input_px (96)"]),
+    ("pretraining/scene", "attic", ["pretraining.scene", "'attic'", "pretext_room"]),
+    ("pretraining/source", "imagenet", ["network.width", "must be 1"]),
+]
+
+
+@pytest.mark.parametrize(("key", "value", "expected"), REFUSED)
+def test_a_wrong_value_is_refused_in_one_line_that_names_file_key_and_what_is_allowed(
+    raw, key, value, expected
+):
+    with pytest.raises(InputError) as refusal:
+        parse_config(with_value(raw, key, value), "my.yaml")
+    message = str(refusal.value)
+    assert message.startswith("my.yaml: ")
+    assert "\n" not in message
+    assert len(message) < 400
+    for part in expected:
+        assert part in message
+
+
+@pytest.mark.parametrize("key", ["scale", "training", "scenes/sanctuary/source"])
+def test_a_missing_key_is_named_without_printing_the_whole_file(raw, key):
+    *parents, last = key.split("/")
+    inner = raw
+    for parent in parents:
+        inner = inner[parent]
+    del inner[last]
+    with pytest.raises(InputError) as refusal:
+        parse_config(raw, "my.yaml")
+    assert str(refusal.value) == f"my.yaml: {key.replace('/', '.')}: missing; it has no default"
+
+
+def test_all_five_localizers_are_needed(raw):
+    del raw["localizers"]["hourglass"]
+    with pytest.raises(InputError, match=r"my\.yaml: localizers: hourglass missing"):
+        parse_config(raw, "my.yaml")
+
+
+def test_a_scene_may_be_called_like_a_key(raw):
+    raw["scenes"]["angles"] = {**raw["scenes"]["sanctuary"], "colour": 1}
+    with pytest.raises(InputError, match="allowed here: angles, builder, min_view_distance_m"):
+        parse_config(raw, "my.yaml")
+
+
+BROKEN_FILES = {
+    "missing": (None, "No such file"),
+    "list": (b"- 1\n- 2\n", "mapping of keys, found list"),
+    "empty": (b"", "mapping of keys, found NoneType"),
+    "latin-1": ("profile: caf\u00e9".encode("latin-1"), "utf-8"),
+    "not YAML": (b"a: [1, 2\nb: {", "cannot be read as YAML"),
+}
+
+
+@pytest.mark.parametrize(("content", "expected"), BROKEN_FILES.values(), ids=BROKEN_FILES)
+def test_a_file_that_is_no_configuration_is_refused_in_one_line(tmp_path, content, expected):
+    path = tmp_path / "mine.yaml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError) as refusal:
+        load_config(path)
+    message = str(refusal.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    assert expected in message
+
+
+def test_merging_goes_key_by_key_and_replaces_lists_whole():
+    base = {"a": {"b": 1, "c": [1, 2, 3]}, "d": {"e": 1}}
+    override = {"a": {"c": [9]}, "d": 5, "f": {"g": 1}}
+    kept = copy.deepcopy(base)
+    assert merge(base, override) == {"a": {"b": 1, "c": [9]}, "d": 5, "f": {"g": 1}}
+    assert base == kept
+
+
+def test_a_profile_overrides_the_default_and_the_message_names_both_files(tmp_path):
+    override = tmp_path / "mine.yaml"
+    override.write_text(yaml.safe_dump({"profile": "mine", "network": {"input_px": 48}}))
+    config = load_config(CONFIG / "config.yaml", override)
+    default = profile("mini")
+    assert (config.profile, config.network.input_px) == ("mine", 48)
+    assert (config.network.width, config.scenes) == (default.network.width, default.scenes)
+    override.write_text("network: {input_pixels: 48}")
+    with pytest.raises(InputError, match=r"config\.yaml \+ .*mine\.yaml: network\.input_pixels"):
+        load_config(CONFIG / "config.yaml", override)
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_the_shipped_profiles_and_their_designs_load(name):
+    config = profile(name)
+    assert config.profile == name
+    assert config.root == Path("results") / name
+    assert read_experiments(config)
+
+
+def test_a_configuration_cannot_be_changed_after_it_was_checked():
+    config = profile("mini")
+    with pytest.raises(ValueError, match="frozen"):
+        config.scale = 1.0
+
+
+@pytest.mark.parametrize("name", ["mini", "paper"])
+def test_the_design_is_the_papers(name):
+    config = profile(name)
+    experiments = read_experiments(config)
+    rows = Counter(row.table for row in experiments)
+    assert rows == {
+        "table2_ground_truth": 4,
+        "table3_inconsistencies": 12,
+        "table4_size": 8,
+        "table5_from_scratch": 4,
+    }
+    assert sum(rows.values()) == 28
+    runs = runs_of(experiments, 1)
+    assert len(runs) == len({run.directory for run in runs}) == 120
+    assert len(runs_of(experiments, 3)) == 360
+    assert "large_room/6k/noise-p0.1-r5/pretrained/posenet/seed0" in {r.directory for r in runs}
+    noise = {
+        (row.noise_m, row.noise_deg)
+        for row in experiments
+        if row.block == "both" and row.labels == "noise"
+    }
+    assert noise == {(0.1, 5.0), (0.2, 10.0), (0.3, 20.0)}
+
+
+def test_sizes_scale_with_the_profile():
+    mini, smoke, paper = profile("mini"), profile("smoke"), profile("paper")
+    assert mini.scale == 0.05
+    frames = [mini.n_frames("large_room", "6k", split) for split in ("train", "test")]
+    assert frames == [300, 125]
+    assert mini.n_frames("sanctuary", "95k", "train") == 4750
+    assert mini.n_largest("large_room", "train") == 4000
+    assert smoke.n_frames("large_room", "6k", "train") == 60
+    assert paper.n_frames("sanctuary", "95k", "train") == 95_000
+    tiny = mini.model_copy(update={"scale": 1e-6})
+    assert tiny.n_frames("large_room", "6k", "test") == 2  # a split is never empty
+
+
+GOOD = "table4_size,,large_room,6k,synfeal,0,0,pretrained"
+BAD_ROWS = [
+    ("table4_size,,kitchen,6k,synfeal,0,0,pretrained", ["scene 'kitchen'", "large_room"]),
+    ("table4_size,,large_room,95k,synfeal,0,0,pretrained", ["size '95k'", "'80k'"]),
+    ("table9,,large_room,6k,synfeal,0,0,pretrained", ["table", "table2_ground_truth"]),
+    ("table4_size,,large_room,6k,orb,0,0,pretrained", ["labels", "'rgbd-toro'", "'orb'"]),
+    ("table4_size,,large_room,6k,synfeal,0,0,imagenet", ["init", "'scratch'"]),
+    ("table4_size,,large_room,6k,synfeal,0.1,0,pretrained", ["labels", "`noise`"]),
+    ("table4_size,,large_room,6k,noise,0,0,pretrained", ["labels", "above 0"]),
+    ("table4_size,,large_room,6k,noise,-1,0,pretrained", ["noise_m", "greater than"]),
+    ("table4_size,,large_room,6k,noise,nan,0,pretrained", ["noise_m", "finite"]),
+    ("table4_size,both,large_room,6k,synfeal,0,0,pretrained", ["block", "table 3"]),
+    ("table3_inconsistencies,,large_room,6k,synfeal,0,0,pretrained", ["block", "three blocks"]),
+    ("table4_size,,large_room,6k,synfeal,0,0", ["init", "None"]),
+    ("table4_size,,large_room,6k,synfeal,0,0,pretrained,1", ["more cells than the 8 columns"]),
+    ("table4_size,,large_room,6k,synfeal,0,0,scratch", ["shows each scene, size once", "row 2"]),
+    ("table4_size,,pretext_room,6k,synfeal,0,0,pretrained", ["'pretext_room'", "pretraining"]),
+]
+
+
+def with_experiments(path, *lines):
+    header = "table,block,scene,size,labels,noise_m,noise_deg,init"
+    path.write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
+    return profile("mini").model_copy(update={"experiments": path})
+
+
+@pytest.mark.parametrize(("line", "expected"), BAD_ROWS)
+def test_a_wrong_experiment_is_refused_with_file_and_row(tmp_path, line, expected):
+    path = tmp_path / "design.csv"
+    with pytest.raises(InputError) as refusal:
+        read_experiments(with_experiments(path, GOOD, "", line))
+    message = str(refusal.value)
+    assert message.startswith(f"{path}: row 4: ")  # the empty line counts
+    assert "\n" not in message
+    for part in expected:
+        assert part in message
+
+
+def test_a_size_needs_a_training_length(tmp_path):
+    config = with_experiments(tmp_path / "design.csv", GOOD)
+    training = config.training.model_copy(update={"samples_seen": {"20k": 1}})
+    with pytest.raises(InputError, match=r"size '6k' has no training\.samples_seen entry"):
+        read_experiments(config.model_copy(update={"training": training}))
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (None, "No such file"),
+        (b"table,scene\n", "header must be table,block,scene"),
+        (b"", "header must be"),
+        ("caf\u00e9".encode("latin-1"), "cannot be read as CSV"),
+        (b"table,block,scene,size,labels,noise_m,noise_deg,init\n", "has no rows"),
+    ],
+)
+def test_a_design_that_cannot_be_read_is_refused(tmp_path, content, expected):
+    path = tmp_path / "design.csv"
+    if content is not None:
+        path.write_bytes(content)
+    config = profile("mini").model_copy(update={"experiments": path})
+    with pytest.raises(InputError, match=expected) as refusal:
+        read_experiments(config)
+    assert str(refusal.value).startswith(f"{path}: ")
+
+
+def test_a_spreadsheets_byte_order_mark_does_no_harm(tmp_path):
+    path = tmp_path / "design.csv"
+    config = with_experiments(path, GOOD)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert len(read_experiments(config)) == 1
+
+
+def test_the_generated_documentation_matches_the_models():
+    assert main(["--check", "--folder", str(CONFIG)]) == 0, "run python -m synfeal.config.docs"
+
+
+def test_documentation_that_drifted_is_noticed(tmp_path, capsys):
+    for name in ("config.yaml", "smoke.yaml", "paper.yaml"):
+        (tmp_path / name).write_bytes((CONFIG / name).read_bytes())
+    assert main(["--folder", str(tmp_path)]) == 0
+    assert main(["--check", "--folder", str(tmp_path)]) == 0
+    (tmp_path / "smoke.yaml").write_text("profile: smoke\nscale: 0.02\n")
+    assert main(["--check", "--folder", str(tmp_path)]) == 1
+    assert "README.md: out of date" in capsys.readouterr().err
+
+
+def test_the_documentation_has_every_key_with_a_meaning():
+    page = documents(CONFIG)["README.md"]
+    for key in (
+        "`scale` | number, above 0, at most 1 | required",
+        "`scenes.<name>.sampling_box.x` | list of 2: number | required",
+        "`groundtruth.posegraph.toro_iterations` | integer, at least 1 | `100`",
+        "`localizers.<name>.beta`",
+        "`noise_deg` | number, at least 0",
+    ):
+        assert f"| {key}" in page
+    assert "| None |" not in page

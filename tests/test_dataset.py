@@ -1,0 +1,288 @@
+"""Data sets on disk: 7-Scenes files, packed frames, manifests, and what prepares a scene."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from PIL import Image
+
+from synfeal.config.models import CameraConfig, SceneConfig
+from synfeal.dataset.contact_sheet import write_contact_sheet
+from synfeal.dataset.directories import atomic_directory
+from synfeal.dataset.manifest import verify_manifest, write_manifest
+from synfeal.dataset.packed import fit_frame, pack_frames
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.sequences import sequences_of
+from synfeal.dataset.sevenscenes import (
+    frame_paths,
+    read_depth_m,
+    read_pose,
+    read_split,
+    render_sequence,
+    write_depth,
+    write_pose,
+    write_sequence,
+    write_splits,
+)
+from synfeal.errors import InputError
+from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
+from synfeal.geometry.rotations import rotation_from_rpy
+from synfeal.mesh.decimate import load_collision_mesh
+from synfeal.mesh.load import load_mesh
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.save import save_glb
+from synfeal.scenes.prepare import prepare_scene
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
+
+CAMERA = CameraConfig.model_validate({"width": 40, "height": 30})
+
+
+def poses_of(count: int) -> PoseTable:
+    rng = np.random.default_rng(0)
+    poses = pose_matrix(
+        rotation_from_rpy(rng.uniform(-0.5, 0.5, (count, 3))), rng.uniform(-0.5, 0.5, (count, 3))
+    )
+    index = np.arange(count)
+    return PoseTable(index, index, poses[:, :3, 3].copy(), quat_wxyz_of(poses))
+
+
+def room_mesh() -> TexturedMesh:
+    box = trimesh.creation.box((4.0, 4.0, 4.0))
+    colors = np.random.default_rng(0).integers(0, 256, (8, 3), np.uint8)
+    return TexturedMesh(
+        (MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces), vertex_rgb=colors),)
+    )
+
+
+class FakeRenderer:
+    """Frames that say which pose they show; breaks after ``limit`` frames."""
+
+    def __init__(self, limit: int = 1000) -> None:
+        self.limit = limit
+
+    def render_rgbd(
+        self, world_from_cam: NDArray[np.float64]
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        self.limit -= 1
+        if self.limit < 0:
+            raise RuntimeError("the graphics card is on fire")
+        x = world_from_cam[0, 3]
+        return np.full((4, 6, 3), 100 + 100 * x, np.uint8), np.full((4, 6), 1 + x, np.float32)
+
+    def render(self, world_from_cam: NDArray[np.float64]) -> NDArray[np.uint8]:
+        return self.render_rgbd(world_from_cam)[0]
+
+
+@given(st.integers(0, 300), st.integers(0, 300), st.integers(1, 60))
+def test_sequences_cover_every_frame_once(n_train: int, n_test: int, shard: int) -> None:
+    sequences = sequences_of(n_train, n_test, shard)
+    for split, count in (("train", n_train), ("test", n_test)):
+        frames = [i for s in sequences if s.split == split for i in range(s.start, s.stop)]
+        assert frames == list(range(count))
+    assert all(1 <= len(sequence) <= shard for sequence in sequences)
+    assert [s.number for s in sequences] == list(range(1, len(sequences) + 1))
+
+
+def test_sequence_names_count_train_first() -> None:
+    found = [(s.name, s.split, s.start, s.stop) for s in sequences_of(1200, 300, 1000)]
+    assert found == [
+        ("seq-01", "train", 0, 1000),
+        ("seq-02", "train", 1000, 1200),
+        ("seq-03", "test", 0, 300),
+    ]
+
+
+def test_split_files_are_those_of_7_scenes(tmp_path: Path) -> None:
+    write_splits(tmp_path, sequences_of(5, 3, 3))
+    assert (tmp_path / "TrainSplit.txt").read_text() == "sequence1\nsequence2\n"
+    assert (tmp_path / "TestSplit.txt").read_text() == "sequence3\n"
+    assert read_split(tmp_path, "train") == [tmp_path / "seq-01", tmp_path / "seq-02"]
+    (tmp_path / "TestSplit.txt").write_text("seq-3\n")
+    with pytest.raises(InputError, match="seq-3"):
+        read_split(tmp_path, "test")
+
+
+def test_depth_is_16_bit_millimetres(tmp_path: Path) -> None:
+    depth = np.array([[0.5, 1.2344, np.inf], [65.534, 65.536, 100.0]], np.float32)
+    write_depth(tmp_path / "depth.png", depth)
+    stored = np.asarray(Image.open(tmp_path / "depth.png"))
+    assert stored.tolist() == [[500, 1234, 65535], [65534, 65535, 65535]]
+    back = read_depth_m(tmp_path / "depth.png")
+    np.testing.assert_allclose(back[0, :2], [0.5, 1.234], atol=1e-6)
+    assert np.isinf(back[[0, 1, 1], [2, 1, 2]]).all()
+
+
+def test_colour_image_is_no_depth(tmp_path: Path) -> None:
+    Image.new("RGB", (3, 3)).save(tmp_path / "depth.png")
+    with pytest.raises(InputError, match="16-bit"):
+        read_depth_m(tmp_path / "depth.png")
+
+
+def test_pose_file_is_four_rows_and_exact(tmp_path: Path) -> None:
+    pose = poses_of(1).world_from_cam[0]
+    write_pose(tmp_path / "pose.txt", pose)
+    rows = (tmp_path / "pose.txt").read_text().splitlines()
+    assert [len(row.split()) for row in rows] == [4, 4, 4, 4]
+    np.testing.assert_allclose(read_pose(tmp_path / "pose.txt"), pose, atol=1e-10)
+
+
+@pytest.mark.parametrize("text", ["", "1 2 3", "1 0 0 0\n" * 5, "a b c d\n" * 4, "nan 0 0 0\n" * 4])
+def test_bad_pose_files_are_named(tmp_path: Path, text: str) -> None:
+    (tmp_path / "frame.pose.txt").write_text(text)
+    with pytest.raises(InputError, match=r"frame\.pose\.txt"):
+        read_pose(tmp_path / "frame.pose.txt")
+
+
+def test_rendered_sequence_holds_what_the_poses_see(tmp_path: Path) -> None:
+    save_glb(tmp_path / "mesh.glb", room_mesh())
+    poses = poses_of(3)
+    render_sequence(tmp_path / "mesh.glb", CAMERA, poses, tmp_path / "out" / "seq-01", True)
+    directory = tmp_path / "out" / "seq-01"
+    assert len(list(directory.iterdir())) == 9
+    assert sorted(p.name for p in directory.glob("*000001*")) == [
+        "frame-000001.color.png",
+        "frame-000001.depth.png",
+        "frame-000001.pose.txt",
+    ]
+    for index, path in enumerate(frame_paths([directory], "pose.txt")):
+        np.testing.assert_allclose(read_pose(path), poses.world_from_cam[index], atol=1e-9)
+    centre = read_depth_m(directory / "frame-000002.depth.png")[15, 20]
+    origin, forward = poses.position_m[2], poses.world_from_cam[2, :3, 2]
+    wall = np.min((2.0 - np.sign(forward) * origin) / np.abs(forward))  # the box is 4 m wide
+    assert centre == pytest.approx(wall, abs=0.05)
+    with Image.open(directory / "frame-000000.color.png") as frame:
+        assert frame.size == (40, 30)
+
+
+def test_without_depth_none_is_written(tmp_path: Path) -> None:
+    write_sequence(FakeRenderer(), poses_of(2), tmp_path / "seq-01", False)  # type: ignore[arg-type]
+    assert not list((tmp_path / "seq-01").glob("*.depth.png"))
+
+
+def test_an_interrupted_sequence_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match="on fire"):
+        write_sequence(FakeRenderer(2), poses_of(5), tmp_path / "seq-01", True)  # type: ignore[arg-type]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_directories_that_hold_something_are_not_touched(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("years of work")
+    with pytest.raises(InputError, match="not empty"), atomic_directory(tmp_path / "mine"):
+        pass
+    assert (tmp_path / "mine" / "thesis.txt").read_text() == "years of work"
+
+
+def test_empty_sequences_are_named(tmp_path: Path) -> None:
+    (tmp_path / "seq-04").mkdir()
+    with pytest.raises(InputError, match="seq-04"):
+        frame_paths([tmp_path / "seq-04"], "color.png")
+
+
+def write_frames(directory: Path, values: list[int], size: tuple[int, int] = (40, 30)) -> None:
+    directory.mkdir()
+    for index, value in enumerate(values):
+        Image.new("RGB", size, (value, 0, 0)).save(directory / f"frame-{index:06d}.color.png")
+
+
+def test_packed_frames_keep_their_order(tmp_path: Path) -> None:
+    write_frames(tmp_path / "seq-01", [1, 2, 3])
+    write_frames(tmp_path / "seq-02", [4, 5])
+    pack_frames([tmp_path / "seq-01", tmp_path / "seq-02"], 16, tmp_path / "train.npy")
+    frames = np.load(tmp_path / "train.npy", mmap_mode="r")
+    assert (frames.shape, frames.dtype) == ((5, 16, 16, 3), np.uint8)
+    assert frames[:, 8, 8, 0].tolist() == [1, 2, 3, 4, 5]
+    assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize("size", [(128, 96), (96, 128), (80, 60), (101, 77)])
+def test_frames_are_resized_and_cropped_about_the_centre(size: tuple[int, int]) -> None:
+    rows, columns = np.indices((size[1], size[0]))
+    ramp = np.stack([columns * 255 / size[0], rows * 255 / size[1], 0 * rows], axis=2)
+    fitted = fit_frame(Image.fromarray(ramp.astype(np.uint8)), 32).astype(float)
+    assert fitted.shape == (32, 32, 3)
+    np.testing.assert_allclose(fitted[15:17, 15:17, :2].mean(axis=(0, 1)), 127, atol=6)
+    visible = 32 / 33 * min(size) / size[0]  # share of the width left after the crop
+    assert np.ptp(fitted[..., 0]) == pytest.approx(255 * visible, rel=0.07)
+
+
+def test_frames_are_averaged_not_subsampled() -> None:
+    checker = np.repeat((np.indices((96, 128)).sum(axis=0) % 2 * 255)[..., None], 3, axis=2)
+    fitted = fit_frame(Image.fromarray(checker.astype(np.uint8)), 16)
+    np.testing.assert_allclose(fitted.astype(int), 127, atol=25)
+
+
+def test_a_broken_frame_is_named(tmp_path: Path) -> None:
+    write_frames(tmp_path / "seq-01", [1, 2])
+    (tmp_path / "seq-01" / "frame-000001.color.png").write_bytes(b"\x89PNG nonsense")
+    with pytest.raises(InputError, match=r"frame-000001\.color\.png"):
+        pack_frames([tmp_path / "seq-01"], 16, tmp_path / "train.npy")
+    assert not (tmp_path / "train.npy").exists()
+
+
+def test_manifest_finds_a_changed_pixel(tmp_path: Path) -> None:
+    write_frames(tmp_path / "seq-01", [1, 2])
+    write_frames(tmp_path / "seq-02", [3])
+    write_manifest(tmp_path, sequences_of(2, 1, 2), CAMERA, {"scene": "room"})
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert manifest["frames"] == {"train": 2, "test": 1}
+    assert manifest["camera"]["fx"] == pytest.approx(20 / np.tan(np.pi / 6))
+    assert (manifest["camera"]["cx"], manifest["camera"]["cy"]) == (20.0, 15.0)
+    assert manifest["scene"] == "room"
+    verify_manifest(tmp_path)
+    Image.new("RGB", (40, 30), (9, 9, 9)).save(tmp_path / "seq-02" / "frame-000000.color.png")
+    with pytest.raises(InputError, match="seq-02 differ"):
+        verify_manifest(tmp_path)
+
+
+def test_contact_sheet_shows_frames_in_reading_order(tmp_path: Path) -> None:
+    write_frames(tmp_path / "seq-01", list(range(0, 240, 5)))  # 48 frames: every second is shown
+    paths = frame_paths([tmp_path / "seq-01"], "color.png")
+    write_contact_sheet(paths, tmp_path / "preview.png")
+    with Image.open(tmp_path / "preview.png") as sheet:
+        assert sheet.size == (6 * 240, 4 * 180)
+        assert sheet.getpixel((100, 90)) == (0, 0, 0)
+        assert sheet.getpixel((340, 90)) == (10, 0, 0)
+        assert sheet.getpixel((100, 270)) == (60, 0, 0)
+
+
+def test_a_mesh_scene_is_prepared(tmp_path: Path) -> None:
+    save_glb(tmp_path / "room.glb", room_mesh())
+    sha256 = hashlib.sha256((tmp_path / "room.glb").read_bytes()).hexdigest()
+    scene = SceneConfig.model_validate(
+        {"source": "mesh", "path": tmp_path / "room.glb", "sha256": sha256, "unit_m": 2.0}
+    )
+    prepare_scene("room", scene, 1000, 0, tmp_path / "out")
+    properties = json.loads((tmp_path / "out" / "properties.json").read_text())
+    assert (properties["vertices"], properties["faces"]) == (8, 12)
+    assert properties["volume_m3"] == pytest.approx(512.0)  # 4 units of 2 m, cubed
+    np.testing.assert_allclose(load_mesh(tmp_path / "out" / "mesh.glb").bounds_m[1], 4.0)
+    np.testing.assert_allclose(load_collision_mesh(tmp_path / "out" / "collision.ply")[0].max(), 4)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"sha256": "0" * 64}, "expected 0000"),
+        ({"sampling_box": {"x": [50, 60], "y": [0, 1], "z": [0, 1]}}, "unit_m"),
+        ({"path": "nowhere.glb", "sha256": "0" * 64}, "does not exist"),
+        ({"path": "nowhere.glb"}, "no such mesh file"),
+    ],
+)
+def test_a_scene_that_contradicts_its_config_is_refused(
+    tmp_path: Path, values: dict[str, object], message: str
+) -> None:
+    save_glb(tmp_path / "room.glb", room_mesh())
+    scene = SceneConfig.model_validate({"source": "mesh", "path": tmp_path / "room.glb", **values})
+    with pytest.raises(InputError, match=message):
+        prepare_scene("room", scene, 1000, 0, tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,226 @@
+"""Tables from results: known scores in, exact cells out."""
+
+import math
+from collections import Counter
+
+import pytest
+
+from synfeal.config import MODELS
+from synfeal.errors import InputError
+from synfeal.report.cells import table_runs
+from synfeal.report.stats import percent_change
+from tests.report_results import (
+    ROWS,
+    SIZES,
+    TABLE4,
+    cell,
+    complete_results,
+    experiment,
+    failed_metrics,
+    fill,
+    lines_of,
+    make,
+    metrics,
+    read,
+    shipped_design,
+    write_run,
+)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    return complete_results(tmp_path_factory.mktemp("results") / "mini")
+
+
+@pytest.fixture(scope="module")
+def design():
+    return shipped_design()
+
+
+@pytest.mark.parametrize(("table", "count"), [("table1_meshes", 2), *ROWS.items()])
+def test_a_complete_table_has_all_rows_and_no_empty_cell(results, table, count):
+    rows = read(results / "tables" / f"{table}.csv")
+    assert len(rows) == count
+    assert [k for row in rows for k, value in row.items() if value == ""] == []
+
+
+@pytest.mark.parametrize(
+    ("table", "keys"),
+    [
+        ("table2_ground_truth", ["scene", "labels", "model"]),
+        ("table3_inconsistencies", ["block", "noise_m", "noise_deg", "model"]),
+        (TABLE4, ["scene", "size", "model"]),
+        ("table5_from_scratch", ["scene", "size", "model"]),
+    ],
+)
+def test_key_columns_come_first_and_tell_all_rows_apart(results, table, keys):
+    rows = read(results / "tables" / f"{table}.csv")
+    assert list(rows[0])[: len(keys)] == keys
+    assert len({tuple(row[key] for key in keys) for row in rows}) == len(rows)
+
+
+def test_a_cell_carries_both_scores_limits_counts_and_the_published_value(results):
+    rows = read(results / "tables" / "table3_inconsistencies.csv")
+    found = cell(rows, block="both", noise_m="0.1", noise_deg="5", model="posenet")
+    # 1 + 3 * 0.1 from the noise level; true scores are half of it.
+    expected = {
+        "position_m": 1.3,
+        "orientation_deg": 26,
+        "position_m_true": 0.65,
+        "orientation_deg_true": 13,
+        "position_rms_m": 1.3 / math.sqrt(3),
+        "position_m_low": 1.17,
+        "orientation_deg_true_high": 15.6,
+        "n_train": 300,
+        "n_test": 125,
+        "n_seeds": 1,
+        "failed": 0,
+        "published_position_m": 0.35,
+        "published_orientation_deg": 11.47,
+    }
+    assert {k: float(found[k]) for k in expected} == pytest.approx(expected, rel=1e-5)
+    misprint = cell(rows, block="both", noise_m="0.1", model="posenet2")
+    assert (misprint["published_orientation_deg"], misprint["published_flag"]) == (
+        "0.75",
+        "misprint",
+    )
+
+
+def test_meshes_stand_beside_the_papers(results):
+    rows = read(results / "tables" / "table1_meshes.csv")
+    assert rows[0] == {
+        "scene": "large_room",
+        "vertices": "50000",
+        "faces": "90000",
+        "volume_m3": "88.25",
+        "published_vertices": "122248",
+        "published_faces": "192500",
+        "published_volume_m3": "89.4",
+    }
+    assert (rows[1]["published_faces"], rows[1]["published_volume_m3"]) == ("397516", "183.18")
+
+
+def test_table_5_gives_the_change_against_the_same_run_with_transfer_learning(results):
+    rows = read(results / "tables" / "table5_from_scratch.csv")
+    changes = ("position", "orientation", "position_true", "orientation_true")
+    for row in rows:  # scratch scores are twice the others
+        assert [row[f"{c}_change_percent"] for c in changes] == ["100"] * 4
+    found = cell(rows, size="80k", model="posenet2")
+    assert found["published_position_change_percent"] == "-25"
+    assert found["published_orientation_change_percent"] == "-1.96"
+    tex = (results / "tables" / "table5_from_scratch.tex").read_text()
+    assert tex.count(r"\textcolor{red!85!black}{$+$100.0\%}") == 40
+    assert r"\textcolor{green!45!black}{$-$25.0\%}, \textcolor{green!45!black}{$-$2.0\%}" in tex
+    assert r"\textcolor{green!45!black}{$+$0.0\%}" in tex  # the paper: 0.0 % is green
+
+
+def test_table_5_asks_for_the_runs_it_compares_with(design):
+    rows = [row for row in design if row.table == "table5_from_scratch"]
+    runs = table_runs("table5_from_scratch", rows, 2)
+    assert Counter(run.init for run in runs) == {"scratch": 40, "pretrained": 40}
+    assert len(table_runs(TABLE4, [row for row in design if row.table == TABLE4], 1)) == 40
+
+
+def test_a_level_the_paper_does_not_have_has_no_published_value(tmp_path):
+    noise = {"labels": "noise", "noise_m": 0.05, "noise_deg": 0}
+    row = experiment("table3_inconsistencies", block="position", **noise)
+    fill(tmp_path, [row])
+    rows, tex = make(row.table, [row], tmp_path)
+    assert len(rows) == 5
+    assert {r["published_position_m"] + r["published_flag"] for r in rows} == {""}
+    assert "0.05 m, 0$^\\circ$" in tex
+    assert "& paper &" not in tex.replace(r"\textcolor{gray}{paper}", "paper")
+
+
+def test_another_scene_or_initialisation_is_not_compared_with_the_papers(tmp_path):
+    rows = [experiment(TABLE4, init="scratch"), experiment(TABLE4, scene="sanctuary", size="80k")]
+    fill(tmp_path, rows)
+    found, _ = make(TABLE4, rows, tmp_path)
+    assert [row["published_position_m"] for row in found] == [""] * 10
+
+
+def test_the_best_of_each_column_is_bold_and_nothing_else(tmp_path):
+    rows = [experiment(TABLE4, size=size) for size in SIZES]
+    scores = [(0.50, 8.0), (0.304, 6.0), (0.296, 7.0), (0.40, 9.0)]
+    for row, (position, orientation) in zip(rows, scores, strict=True):
+        for model in MODELS:
+            write_run(tmp_path, row, model, metrics(row.size, position, orientation))
+    _, tex = make(TABLE4, rows, tmp_path)
+    first_model = [line[2] for line in lines_of(tex, "labels = truth")]
+    assert first_model == [
+        r"0.50 m, 8.00$^\circ$",
+        r"\textbf{0.30 m}, \textbf{6.00$^\circ$}",
+        r"\textbf{0.30 m}, 7.00$^\circ$",  # a tie as printed
+        r"0.40 m, 9.00$^\circ$",
+    ]
+
+
+def test_a_failed_run_is_shown_counted_and_never_bold(tmp_path):
+    rows = [experiment(TABLE4, size=size) for size in SIZES]
+    fill(tmp_path, rows)
+    write_run(tmp_path, rows[0], "poselstm", failed_metrics("6k"))
+    found, tex = make(TABLE4, rows, tmp_path)
+    failed = cell(found, size="6k", model="poselstm")
+    assert (failed["position_m"], failed["failed"], failed["n_seeds"]) == ("", "125", "1")
+    assert (failed["n_test"], failed["published_position_m"]) == ("125", "0.24")
+    assert lines_of(tex, "labels = truth")[0][3] == "failed$^{a}$"
+    assert "125 of 125 predictions failed" in tex
+
+
+def test_a_failed_run_with_transfer_learning_leaves_no_change_to_report(tmp_path):
+    row = experiment("table5_from_scratch", init="scratch")
+    fill(tmp_path, [row])
+    reference = row.model_copy(update={"init": "pretrained"})
+    write_run(tmp_path, reference, "posenet", failed_metrics("6k"))
+    found, tex = make(row.table, [row], tmp_path)
+    assert cell(found, model="posenet")["position_change_percent"] == ""
+    assert cell(found, model="posenet2")["position_change_percent"] == "100"
+    assert "no change known" in tex
+
+
+def test_repetitions_are_averaged_with_their_spread_and_failures_stay_visible(tmp_path):
+    row = experiment(TABLE4)
+    for k, score in enumerate((0.2, 0.3, 0.4)):
+        for model in MODELS:
+            write_run(tmp_path, row, model, metrics("6k", score, 10.0), k)
+    write_run(tmp_path, row, "posenet2", failed_metrics("6k"), 2)
+    found, tex = make(TABLE4, [row], tmp_path, repetitions=3)
+    whole = cell(found, model="posenet")
+    assert float(whole["position_m"]) == pytest.approx(0.3)
+    assert float(whole["position_m_sd"]) == pytest.approx(0.1)  # of 0.2, 0.3, 0.4
+    assert float(whole["position_m_low"]) == pytest.approx(0.27)
+    part = cell(found, model="posenet2")
+    assert float(part["position_m"]) == pytest.approx(0.25)
+    assert (part["n_seeds"], part["failed"]) == ("3", "125")
+    assert r"0.30 $\pm$ 0.10 m, 10.00 $\pm$ 0.00$^\circ$" in tex
+    assert "125 of 375 predictions failed, 2 of 3 runs have a score." in tex
+
+
+def test_percent_change():
+    assert percent_change(0.42, 0.28) == pytest.approx(50)
+    assert percent_change(0.14, 0.28) == pytest.approx(-50)
+    assert percent_change(None, 1.0) is None
+    assert percent_change(1.0, None) is None
+    assert percent_change(1.0, 0.0) is None
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (None, "No such file"),
+        ("{", "cannot be read as JSON"),
+        ("[]", "mapping"),
+        ('{"position_m": 1}', "orientation_deg, .* missing"),
+    ],
+)
+def test_unusable_scores_are_one_line_that_names_the_file(tmp_path, content, expected):
+    row = experiment(TABLE4)
+    fill(tmp_path, [row])
+    path = tmp_path / "runs/large_room/6k/synfeal/pretrained/posenet/seed0/metrics.json"
+    path.unlink()
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(InputError, match=expected) as refusal:
+        make(TABLE4, [row], tmp_path)
+    assert str(path) in str(refusal.value)
+    assert "\n" not in str(refusal.value)
