@@ -1,4 +1,4 @@
-"""What every batch job does around its work: keep a log, and say one line when a person can mend it."""
+"""What every batch job does around its work: keep a log, and say one line a person can act on."""
 
 from __future__ import annotations
 

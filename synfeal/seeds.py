@@ -8,7 +8,7 @@ import numpy as np
 
 
 def seed_of(*components: object) -> int:
-    """A 63-bit seed that depends on the components alone, e.g. ``seed_of(7, "large_room", "train")``."""
+    """A 63-bit seed of the components alone, e.g. ``seed_of(7, "large_room", "train")``."""
     text = "\x1f".join(map(str, components))
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big") >> 1
 

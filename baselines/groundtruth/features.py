@@ -18,7 +18,7 @@ from synfeal.geometry.poses import inverse, pose_matrix
 
 Array = NDArray[np.float64]
 
-_MAX_FEATURES = 800
+_MAX_FEATURES = 500
 _MAX_ERROR_PX = 2.0
 _MIN_MATCHES = 6
 

@@ -34,9 +34,9 @@ Array = NDArray[np.float64]
 
 # Depth images hold millimetres; 0 and 65535 mean that nothing was hit.
 _INVALID_MM = (0, 65535)
-# Standard deviations of an edge (metres, degrees): accepted motions were measured at 1 to 4 mm and
-# 0.02 to 0.1 deg; a guess is as uncertain as the motion between two frames is large.
-_ACCEPTED, _GUESSED = (0.004, 0.1), (0.1, 5.0)
+# Standard deviations of edges (metres, degrees), of the size measured on rendered rooms: of neighbours,
+# of loop closures, which overlap less, and of a guess, as large as the motion between two frames.
+_NEIGHBOUR, _LOOP, _GUESS = (0.003, 0.1), (0.01, 0.25), (0.1, 5.0)
 # The refinement may not leave its starting point by more.
 _MAX_CHANGE_M, _MAX_CHANGE_DEG = 0.25, 10.0
 # Inliers below which features are no starting point for a neighbour, and for a loop closure.
@@ -73,8 +73,8 @@ class _Odometry:
         depth_m = np.where(depth_m > self.cfg.max_depth_m, np.inf, depth_m).astype(np.float32)
         finite_m = np.where(np.isfinite(depth_m), depth_m, np.float32(0))
         rgbd = o3d.t.geometry.RGBDImage(
-            o3d.t.geometry.Image(o3d.core.Tensor(np.ascontiguousarray(color))),
-            o3d.t.geometry.Image(o3d.core.Tensor(finite_m)),
+            o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(np.ascontiguousarray(color))),
+            o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(finite_m)),
         )
         return _Frame(rgbd, depth_m, self.by_features.features(grey, depth_m))
 
@@ -88,8 +88,8 @@ class _Odometry:
             result = odometry.rgbd_odometry_multi_scale(
                 j.rgbd,
                 i.rgbd,
-                o3d.core.Tensor(intrinsic_matrix(self.camera, centre_shift_px=-0.5)),
-                o3d.core.Tensor(i_from_j),
+                o3d.core.Tensor.from_numpy(intrinsic_matrix(self.camera, centre_shift_px=-0.5)),
+                o3d.core.Tensor.from_numpy(i_from_j),
                 1.0,
                 self.cfg.max_depth_m,
                 steps,
@@ -146,12 +146,12 @@ def rgbd_graph(
     for j in range(1, len(frames)):
         motion, accepted = odometry.neighbour(frames[j - 1], frames[j], motion)
         poses.append(poses[-1] @ motion)
-        edges.append(Edge(j - 1, j, motion, _information(_ACCEPTED if accepted else _GUESSED)))
+        edges.append(Edge(j - 1, j, motion, _information(_NEIGHBOUR if accepted else _GUESS)))
     first_from_cam = np.array(poses)
     for i, j in loop_candidates(first_from_cam, cfg.keyframe_every):
         closure = odometry.loop(frames[i], frames[j])
         if closure is not None:
-            edges.append(Edge(i, j, closure, _information(_ACCEPTED)))
+            edges.append(Edge(i, j, closure, _information(_LOOP)))
     return PoseGraph(first_from_cam, tuple(edges))
 
 

@@ -14,11 +14,13 @@ def umeyama_sim3(source: ArrayLike, target: ArrayLike) -> tuple[float, Array, Ar
     Least squares over point pairs (N, 3), N >= 3 and not collinear (Umeyama, PAMI 1991, eq. 39-42).
 
     Raises:
-        ValueError: fewer than three pairs, or collinear points, whose rotation about the line is free.
+        ValueError: fewer than three pairs, or collinear points (their rotation about it is free).
     """
     source, target = np.asarray(source, np.float64), np.asarray(target, np.float64)
     if source.shape != target.shape or source.ndim != 2 or len(source) < 3:
-        raise ValueError(f"need equal (N >= 3, 3) point sets, got {source.shape} and {target.shape}")
+        raise ValueError(
+            f"need equal (N >= 3, 3) point sets, got {source.shape} and {target.shape}"
+        )
     source_mean, target_mean = source.mean(0), target.mean(0)
     source_c, target_c = source - source_mean, target - target_mean
     spread = np.linalg.svd(source_c, compute_uv=False)

@@ -43,7 +43,7 @@ def inverse(pose: ArrayLike) -> Array:
 
 
 def relative(world_from_a: ArrayLike, world_from_b: ArrayLike) -> Array:
-    """``a_from_b`` (..., 4, 4). Subtracts the positions first, so it is exact far from the origin."""
+    """``a_from_b`` (..., 4, 4); subtracts positions first, so it is exact far from the origin."""
     a = np.asarray(world_from_a, dtype=np.float64)
     b = np.asarray(world_from_b, dtype=np.float64)
     rotation_t = np.swapaxes(a[..., :3, :3], -1, -2)
@@ -61,7 +61,8 @@ def interpolate(pose_a: ArrayLike, pose_b: ArrayLike, fraction: ArrayLike) -> Ar
 
 def position_error_m(position_a_m: ArrayLike, position_b_m: ArrayLike) -> Array:
     """Euclidean distances (...) between positions (..., 3)."""
-    return np.linalg.norm(np.asarray(position_a_m) - np.asarray(position_b_m), axis=-1)
+    offset = np.asarray(position_a_m) - np.asarray(position_b_m)
+    return np.asarray(np.linalg.norm(offset, axis=-1))
 
 
 def pose_error(pose_a: ArrayLike, pose_b: ArrayLike) -> tuple[Array, Array]:

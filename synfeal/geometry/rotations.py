@@ -13,7 +13,7 @@ BODY_FROM_CAM: Array = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 
 
 
 def canonical_quat_wxyz(quat_wxyz: ArrayLike) -> Array:
-    """Unit quaternions (..., 4) with w >= 0; where w is 0 the first non-zero component is positive."""
+    """Unit quaternions (..., 4) with w >= 0; if w is 0, the first non-zero one is positive."""
     quat = np.array(quat_wxyz, dtype=np.float64)
     quat /= np.linalg.norm(quat, axis=-1, keepdims=True)
     first_nonzero = np.argmax(quat != 0.0, axis=-1)[..., None]
@@ -44,10 +44,9 @@ def rotation_angle_rad(quat_a_wxyz: ArrayLike, quat_b_wxyz: ArrayLike) -> Array:
     a = canonical_quat_wxyz(quat_a_wxyz)
     b = canonical_quat_wxyz(quat_b_wxyz)
     scalar = np.sum(a * b, axis=-1)
-    vector = (
-        a[..., :1] * b[..., 1:] - b[..., :1] * a[..., 1:] - np.cross(a[..., 1:], b[..., 1:])
-    )
-    return 2.0 * np.arctan2(np.linalg.norm(vector, axis=-1), np.abs(scalar))
+    vector = a[..., :1] * b[..., 1:] - b[..., :1] * a[..., 1:] - np.cross(a[..., 1:], b[..., 1:])
+    angle: Array = 2.0 * np.arctan2(np.linalg.norm(vector, axis=-1), np.abs(scalar))
+    return angle
 
 
 def rotation_from_rpy(rpy_rad: ArrayLike) -> Array:
@@ -57,7 +56,7 @@ def rotation_from_rpy(rpy_rad: ArrayLike) -> Array:
     """
     rpy = np.asarray(rpy_rad, dtype=np.float64)
     body = Rotation.from_euler("ZYX", rpy.reshape(-1, 3)[:, ::-1]).as_matrix()
-    return (body @ BODY_FROM_CAM).reshape(*rpy.shape[:-1], 3, 3)
+    return np.asarray(body @ BODY_FROM_CAM).reshape(*rpy.shape[:-1], 3, 3)
 
 
 def slerp_quat_wxyz(quat_a_wxyz: ArrayLike, quat_b_wxyz: ArrayLike, fraction: ArrayLike) -> Array:

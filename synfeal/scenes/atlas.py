@@ -13,8 +13,8 @@ from synfeal.scenes.patches import Block, Item, Patch, bilinear, joined
 
 ATLAS_PX = 2048
 GUTTER_PX = 6  # repeated rim around each picture; what mipmaps and filters may reach into
-LIGHT_SPACING_M = 0.06
-CHUNK = 1 << 14  # surface points lit at once; fits the cache
+LIGHT_SPACING_M = 0.08
+CHUNK = 1 << 13  # surface points lit at once; fits the cache
 
 
 def baked_mesh(parts: Mapping[str, Item], lighting: Lighting) -> TexturedMesh:

@@ -10,7 +10,9 @@ from synfeal.job import job
 
 params = snakemake.params
 with job(snakemake.log[0]), tempfile.TemporaryDirectory() as work_dir:
-    color = frame_paths(map(Path, snakemake.input.sequences), "color.png")[params.start : params.stop]
+    color = frame_paths(map(Path, snakemake.input.sequences), "color.png")[
+        params.start : params.stop
+    ]
     truth = read_pose_table(Path(snakemake.input.truth)).between(params.start, params.stop)
     camera, sfm = CameraConfig(**params.camera), SfmConfig(**params.sfm)
     trajectory = sfm_batch(color, camera, truth.world_from_cam, sfm, params.seed, Path(work_dir))

@@ -12,5 +12,25 @@ with job(snakemake.log[0]):
     training = TrainingConfig(**params.training, samples_seen={})
     weights = Path(str(inputs.weights)) if inputs.weights else None
     frames, labels = Path(inputs.frames), Path(inputs.labels)
-    train_localizer(name, frames, labels, network, hyper, training, params.samples_seen, weights, params.seed, model, Path(outputs.history))
-    predict_poses(name, model, Path(inputs.test_frames), Path(inputs.test_labels), network, hyper, Path(outputs.predictions))
+    train_localizer(
+        name,
+        frames,
+        labels,
+        network,
+        hyper,
+        training,
+        params.samples_seen,
+        weights,
+        params.seed,
+        model,
+        Path(outputs.history),
+    )
+    predict_poses(
+        name,
+        model,
+        Path(inputs.test_frames),
+        Path(inputs.test_labels),
+        network,
+        hyper,
+        Path(outputs.predictions),
+    )

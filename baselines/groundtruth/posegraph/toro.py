@@ -27,7 +27,8 @@ edge overshoots.
 
 Order. Edges are visited by the depth of the top node of their path, so that what is moved first
 carries the rest of the map with it. The descent stops when the summed error changes by less than
-``epsilon`` of itself.
+``epsilon`` of itself, but not while gains are clipped: full corrections in turn can go round in a
+circle that only the decreasing gain leaves.
 """
 
 from __future__ import annotations
@@ -72,6 +73,7 @@ def optimise_toro(graph: PoseGraph, iterations: int, epsilon: float) -> Array:
     parents = spanning_tree(graph)
     edges = sorted(_path_edges(graph, parents), key=lambda edge: edge.top_depth)
     stiffness = _stiffness(edges, len(graph))
+    clipped = max((len(edge.nodes) * edge.weight / stiffness.min(axis=0)).max() for edge in edges)
     parent_from_node = relative(graph.first_from_cam[parents], graph.first_from_cam)
     error = chi2(graph, _poses(parent_from_node, parents))
     for iteration in range(1, iterations + 1):
@@ -80,7 +82,7 @@ def optimise_toro(graph: PoseGraph, iterations: int, epsilon: float) -> Array:
             gain = np.minimum(1.0, length * edge.weight / (iteration * stiffness.min(axis=0)))
             _correct(parent_from_node, edge, gain, _shares(stiffness[edge.nodes - 1]))
         previous, error = error, chi2(graph, _poses(parent_from_node, parents))
-        if abs(previous - error) <= epsilon * previous:
+        if iteration >= clipped and abs(previous - error) <= epsilon * previous:
             break
     return _poses(parent_from_node, parents)
 
@@ -156,7 +158,7 @@ def _correct(parent_from_node: Array, edge: _PathEdge, gain: Array, shares: Arra
     between = np.swapaxes(rotations[:-1], 1, 2) @ rotations[1:]
     up = edge.upward
     between[up] = np.swapaxes(between[up], 1, 2)
-    steps[:, :3, :3] = between
+    steps[:, :3, :3] = Rotation.from_matrix(between).as_matrix()  # orthonormal again
     turned = _along(steps, up)
     offset_m = edge.i_from_j[:3, 3] - turned[-1, :3, 3]
     turned[1:, :3, 3] += gain[1] * shares[:, 1:] * offset_m

@@ -1,0 +1,206 @@
+"""Backbones: the layout of the official ImageNet files, shapes, and loading of weights."""
+
+from __future__ import annotations
+
+import io
+import urllib.error
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from baselines.localizers.backbones import weights
+from baselines.localizers.backbones.channels import scaled_channels
+from baselines.localizers.backbones.googlenet import GoogLeNet
+from baselines.localizers.backbones.resnet import ResNet34
+from baselines.localizers.backbones.weights import (
+    build_backbone,
+    imagenet_weights_path,
+    load_backbone_weights,
+)
+from baselines.localizers.names import BACKBONE_OF
+from synfeal.errors import InputError
+
+Shapes = dict[str, tuple[int, ...]]
+
+
+def batch_norm(name: str, channels: int) -> Shapes:
+    """Entries of one batch normalisation."""
+    vectors = ("weight", "bias", "running_mean", "running_var")
+    return {f"{name}.{v}": (channels,) for v in vectors} | {f"{name}.num_batches_tracked": ()}
+
+
+def conv_bn(name: str, n_in: int, n_out: int, kernel: int) -> Shapes:
+    """Entries of GoogLeNet's convolution with batch normalisation."""
+    return {f"{name}.conv.weight": (n_out, n_in, kernel, kernel)} | batch_norm(f"{name}.bn", n_out)
+
+
+def inception(name: str, n_in: int, *n: int) -> Shapes:
+    """Entries of one inception block as torchvision names them."""
+    return (
+        conv_bn(f"{name}.branch1", n_in, n[0], 1)
+        | conv_bn(f"{name}.branch2.0", n_in, n[1], 1)
+        | conv_bn(f"{name}.branch2.1", n[1], n[2], 3)
+        | conv_bn(f"{name}.branch3.0", n_in, n[3], 1)
+        | conv_bn(f"{name}.branch3.1", n[3], n[4], 3)
+        | conv_bn(f"{name}.branch4.1", n_in, n[5], 1)
+    )
+
+
+def official_googlenet() -> Shapes:
+    """What googlenet-1378be20.pth holds, without its classifiers."""
+    return (
+        conv_bn("conv1", 3, 64, 7)
+        | conv_bn("conv2", 64, 64, 1)
+        | conv_bn("conv3", 64, 192, 3)
+        | inception("inception3a", 192, 64, 96, 128, 16, 32, 32)
+        | inception("inception3b", 256, 128, 128, 192, 32, 96, 64)
+        | inception("inception4a", 480, 192, 96, 208, 16, 48, 64)
+        | inception("inception4b", 512, 160, 112, 224, 24, 64, 64)
+        | inception("inception4c", 512, 128, 128, 256, 24, 64, 64)
+        | inception("inception4d", 512, 112, 144, 288, 32, 64, 64)
+        | inception("inception4e", 528, 256, 160, 320, 32, 128, 128)
+        | inception("inception5a", 832, 256, 160, 320, 32, 128, 128)
+        | inception("inception5b", 832, 384, 192, 384, 48, 128, 128)
+    )
+
+
+def official_resnet34() -> Shapes:
+    """What resnet34-b627a593.pth holds, without its classifier."""
+    shapes: Shapes = {"conv1.weight": (64, 3, 7, 7)} | batch_norm("bn1", 64)
+    n_in = 64
+    for stage, (blocks, n) in enumerate([(3, 64), (4, 128), (6, 256), (3, 512)], start=1):
+        for i in range(blocks):
+            name = f"layer{stage}.{i}"
+            shapes |= {f"{name}.conv1.weight": (n, n_in, 3, 3)} | batch_norm(f"{name}.bn1", n)
+            shapes |= {f"{name}.conv2.weight": (n, n, 3, 3)} | batch_norm(f"{name}.bn2", n)
+            if n_in != n:
+                shapes |= {f"{name}.downsample.0.weight": (n, n_in, 1, 1)}
+                shapes |= batch_norm(f"{name}.downsample.1", n)
+            n_in = n
+    return shapes
+
+
+@pytest.mark.parametrize(
+    ("backbone", "official"),
+    [(GoogLeNet, official_googlenet()), (ResNet34, official_resnet34())],
+)
+def test_names_and_shapes_are_those_of_the_official_weights(backbone, official):
+    found = {name: tuple(value.shape) for name, value in backbone().state_dict().items()}
+    assert found == official
+
+
+@pytest.mark.parametrize(
+    ("backbone", "n_features", "total"),
+    [(GoogLeNet, 1024, 6_624_904), (ResNet34, 512, 21_797_672)],
+)
+def test_parameter_count_is_the_published_one(backbone, n_features, total):
+    classifier = n_features * 1000 + 1000
+    assert sum(p.numel() for p in backbone().parameters()) + classifier == total
+
+
+def test_googlenet_maps_have_the_papers_strides_and_channels():
+    maps = GoogLeNet().eval()(torch.zeros(1, 3, 224, 224))
+    assert [tuple(m.shape) for m in maps] == [
+        (1, 512, 14, 14),
+        (1, 528, 14, 14),
+        (1, 1024, 7, 7),
+    ]
+
+
+def test_resnet_maps_have_the_papers_strides_and_channels():
+    maps = ResNet34().eval()(torch.zeros(1, 3, 224, 224))
+    assert [tuple(m.shape)[1:] for m in maps] == [
+        (64, 56, 56),
+        (128, 28, 28),
+        (256, 14, 14),
+        (512, 7, 7),
+    ]
+
+
+def test_googlenet_sees_images_scaled_to_minus_one_to_one():
+    """Its official weights were trained so, and callers normalise with mean and deviation."""
+    backbone = GoogLeNet(0.125)
+    grey = torch.rand(1, 3, 8, 8)
+    mean = torch.tensor([0.485, 0.456, 0.406]).view(1, 3, 1, 1)
+    deviation = torch.tensor([0.229, 0.224, 0.225]).view(1, 3, 1, 1)
+    seen = (grey - mean) / deviation * backbone.input_scale + backbone.input_shift
+    torch.testing.assert_close(seen, 2 * grey - 1)
+
+
+@pytest.mark.parametrize("channels", [16, 64, 208, 528, 1024])
+def test_scaled_channels(channels):
+    assert scaled_channels(channels, 1.0) == channels
+    quarter = scaled_channels(channels, 0.25)
+    assert quarter % 8 == 0
+    assert abs(quarter - channels / 4) <= 4
+
+
+@pytest.mark.parametrize("name", ["googlenet", "resnet34"])
+@pytest.mark.parametrize("input_px", [33, 64])
+def test_narrow_backbones_run_at_any_size(name, input_px):
+    backbone = build_backbone(name, 0.125).eval()
+    last = backbone(torch.zeros(2, 3, input_px, input_px))[-1]
+    side = -(-input_px // 32)
+    assert last.shape == (2, backbone.n_out, side, side)
+
+
+@pytest.mark.parametrize("name", ["googlenet", "resnet34"])
+def test_weights_with_classifiers_load_and_are_equal(name, tmp_path):
+    source, target = build_backbone(name, 0.125), build_backbone(name, 0.125)
+    state = dict(source.state_dict())
+    state |= {"fc.weight": torch.zeros(1), "aux1.fc1.weight": torch.zeros(1)}
+    torch.save(state, tmp_path / "weights.pth")
+    load_backbone_weights(target, tmp_path / "weights.pth")
+    for loaded, expected in zip(
+        target.state_dict().values(), source.state_dict().values(), strict=True
+    ):
+        assert torch.equal(loaded, expected)
+
+
+def test_weights_of_another_width_are_refused(tmp_path):
+    torch.save(build_backbone("resnet34", 0.125).state_dict(), tmp_path / "narrow.pt")
+    with pytest.raises(InputError, match=r"narrow\.pt: does not fit ResNet34.*width"):
+        load_backbone_weights(build_backbone("resnet34", 0.25), tmp_path / "narrow.pt")
+
+
+def test_a_file_that_is_no_weights_is_refused(tmp_path):
+    (tmp_path / "broken.pt").write_bytes(b"not weights")
+    with pytest.raises(InputError, match=r"broken\.pt: cannot be read"):
+        load_backbone_weights(build_backbone("resnet34", 0.125), tmp_path / "broken.pt")
+
+
+def test_without_a_network_the_message_says_where_to_put_the_file(tmp_path, monkeypatch):
+    def refuse(url: str, timeout: float) -> None:
+        raise urllib.error.URLError("no route to host")
+
+    monkeypatch.setattr(weights.urllib.request, "urlopen", refuse)
+    with pytest.raises(InputError) as caught:
+        imagenet_weights_path("googlenet", tmp_path)
+    message = str(caught.value)
+    assert "no route to host" in message
+    assert str(tmp_path / "googlenet-1378be20.pth") in message
+    assert "https://download.pytorch.org/models/googlenet-1378be20.pth" in message
+    assert "\n" not in message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_download_with_another_hash_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        weights.urllib.request, "urlopen", lambda url, timeout: io.BytesIO(b"a login page")
+    )
+    with pytest.raises(InputError, match="expected b627a593"):
+        imagenet_weights_path("resnet34", tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_weights_that_are_there_are_not_downloaded(tmp_path, monkeypatch):
+    monkeypatch.setattr(weights.urllib.request, "urlopen", None)
+    path = Path(tmp_path / "resnet34-b627a593.pth")
+    np.zeros(1).tofile(path)
+    assert imagenet_weights_path("resnet34", tmp_path) == path
+
+
+def test_every_localizer_names_a_backbone():
+    assert set(BACKBONE_OF.values()) == set(weights.IMAGENET_FILES)

@@ -1,0 +1,234 @@
+"""One contract for all five localizers, and losses with closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from baselines.localizers.backbones.googlenet import GoogLeNet
+from baselines.localizers.heads import PoseRegressor
+from baselines.localizers.losses import (
+    BetaLoss,
+    LearnedWeightLoss,
+    PosePrediction,
+    position_distance,
+    quat_distance,
+)
+from baselines.localizers.names import BACKBONE_OF
+from baselines.localizers.poselstm import FourDirectionLstm
+from baselines.localizers.registry import LOCALIZERS, build_localizer
+from synfeal.config.models import MODELS, LocalizerConfig, NetworkConfig
+from synfeal.errors import InputError
+
+NETWORK = NetworkConfig(input_px=48, width=0.125)
+HYPER = LocalizerConfig(learning_rate=3e-3, dropout=0.0, beta=1.0, s_orientation=-1.0)
+AUXILIARY = {"posenet": 2}
+
+all_localizers = pytest.mark.parametrize("name", MODELS)
+
+
+@pytest.fixture(autouse=True)
+def _one_thread_and_seed():
+    torch.set_num_threads(1)
+    torch.manual_seed(0)
+
+
+def batch(count: int = 6, px: int = 48) -> tuple[Tensor, Tensor, Tensor]:
+    """Noise images, positions and unit quaternions."""
+    quat = torch.nn.functional.normalize(torch.randn(count, 4), dim=1)
+    return torch.randn(count, 3, px, px), torch.randn(count, 3), quat
+
+
+def test_the_registry_is_complete():
+    assert set(LOCALIZERS) == set(BACKBONE_OF) == set(MODELS)
+
+
+@all_localizers
+def test_predictions_have_the_contracts_shapes(name):
+    images, position_m, quat_wxyz = batch()
+    localizer = build_localizer(name, NETWORK, HYPER)
+    predictions = localizer(images)
+    assert len(predictions) == 1 + AUXILIARY.get(name, 0)
+    for prediction in predictions:
+        assert prediction.position_m.shape == (6, 3)
+        assert prediction.quat_wxyz.shape == (6, 4)
+    loss = localizer.loss(predictions, position_m, quat_wxyz)
+    assert loss.shape == ()
+    assert torch.isfinite(loss)
+
+
+@all_localizers
+def test_the_gradient_reaches_every_parameter(name):
+    images, position_m, quat_wxyz = batch()
+    localizer = build_localizer(name, NETWORK, HYPER)
+    localizer.loss(localizer(images), position_m, quat_wxyz).backward()
+    idle = [n for n, p in localizer.named_parameters() if p.grad is None or not p.grad.any()]
+    assert idle == []
+
+
+@all_localizers
+def test_the_backbone_is_the_one_named(name):
+    kind = "googlenet" if isinstance(build_localizer(name, NETWORK, HYPER).backbone, GoogLeNet) else "resnet34"
+    assert kind == BACKBONE_OF[name]
+
+
+@all_localizers
+def test_a_batch_can_be_learned_by_heart(name):
+    images, position_m, quat_wxyz = batch()
+    localizer = build_localizer(name, NETWORK, HYPER)
+    localizer.set_pose_prior(position_m.mean(0))
+    optimizer = torch.optim.AdamW(localizer.parameters(), 2e-3)
+    for step in range(150):
+        if step == 110:
+            optimizer.param_groups[0]["lr"] = 2e-4
+        optimizer.zero_grad()
+        localizer.loss(localizer(images), position_m, quat_wxyz).backward()
+        optimizer.step()
+    main = localizer(images)[0]
+    assert position_distance(main.position_m, position_m) < 0.2
+    assert quat_distance(main.quat_wxyz, quat_wxyz) < 0.1
+
+
+@all_localizers
+def test_images_are_judged_one_by_one(name):
+    """In evaluation, the company of other images in a batch changes nothing."""
+    images, _, _ = batch()
+    localizer = build_localizer(name, NETWORK, HYPER).eval()
+    with torch.inference_mode():
+        together, alone = localizer(images)[0], localizer(images[2:3])[0]
+    torch.testing.assert_close(together.position_m[2:3], alone.position_m, atol=1e-5, rtol=1e-4)
+    torch.testing.assert_close(together.quat_wxyz[2:3], alone.quat_wxyz, atol=1e-5, rtol=1e-4)
+
+
+@all_localizers
+def test_odd_input_sizes_work(name):
+    network = NetworkConfig(input_px=37, width=0.125)
+    localizer = build_localizer(name, network, HYPER)
+    assert localizer(torch.randn(2, 3, 37, 37))[0].position_m.shape == (2, 3)
+
+
+@all_localizers
+def test_the_pose_prior_moves_every_regressor(name):
+    localizer = build_localizer(name, NETWORK, HYPER)
+    mean = torch.tensor([10.0, -20.0, 30.0])
+    localizer.set_pose_prior(mean)
+    biases = [m.position.bias for m in localizer.modules() if isinstance(m, PoseRegressor)]
+    assert len(biases) == 1 + AUXILIARY.get(name, 0)
+    assert all(torch.equal(bias, mean) for bias in biases)
+
+
+def test_auxiliary_predictions_count_three_tenths():
+    localizer = build_localizer("posenet", NETWORK, HYPER)
+    position_m, quat_wxyz = torch.zeros(1, 3), torch.tensor([[1.0, 0.0, 0.0, 0.0]])
+    off = [PosePrediction(torch.tensor([[d, 0.0, 0.0]]), quat_wxyz) for d in (1.0, 10.0, 100.0)]
+    loss = localizer.loss(off, position_m, quat_wxyz)
+    assert loss.item() == pytest.approx(1.0 + 0.3 * 10.0 + 0.3 * 100.0)
+
+
+@pytest.mark.parametrize("name", ["posenet", "poselstm", "hourglass"])
+def test_a_fixed_weight_must_be_configured(name):
+    with pytest.raises(InputError, match=rf"localizers\.{name}\.beta"):
+        build_localizer(name, NETWORK, LocalizerConfig())
+
+
+def test_full_width_has_the_papers_sizes():
+    """Feature of 2048 units; PoseLSTM reads it as 32 x 64, with 128 units in each direction."""
+    network = NetworkConfig(input_px=64, width=1.0)
+    posenet2 = build_localizer("posenet2", network, HYPER)
+    assert posenet2.regressor[-1].position.in_features == 2048
+    poselstm = build_localizer("poselstm", network, HYPER)
+    assert poselstm.lstm.shape == (32, 64)
+    assert poselstm.regressor[-1].position.in_features == 4 * 128
+
+
+def test_the_lstm_reads_in_four_directions():
+    """The first unit read and the last unit read both reach the output, along rows and columns."""
+    lstm = FourDirectionLstm(4, 6, 5)
+    features = torch.randn(1, 24, requires_grad=True)
+    for part in lstm(features).split(5, dim=1):
+        features.grad = None
+        part.sum().backward(retain_graph=True)
+        assert (features.grad != 0).all()
+    matrix = features.detach().view(4, 6)
+    _, (state, _) = lstm.vertical(matrix[:, None, :])
+    torch.testing.assert_close(lstm(features)[0, :5], state[0, 0])
+    _, (state, _) = lstm.horizontal(matrix.T[:, None, :])
+    torch.testing.assert_close(lstm(features)[0, 10:15], state[0, 0])
+
+
+def test_position_distance_is_euclidean():
+    true_m = torch.zeros(2, 3)
+    predicted_m = torch.tensor([[3.0, 4.0, 0.0], [0.0, 0.0, 2.0]])
+    assert position_distance(predicted_m, true_m).item() == pytest.approx(3.5)
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 10.0, 90.0, 180.0])
+@pytest.mark.parametrize("scale", [-2.0, 0.5, 1.0])
+def test_quat_distance_is_the_chord_of_half_the_angle(angle_deg, scale):
+    """|p - q| = 2 sin(angle / 4) whatever the length and the sign of the prediction."""
+    half = math.radians(angle_deg) / 2
+    quat = torch.tensor([[math.cos(half), 0.0, math.sin(half), 0.0]])
+    distance = quat_distance(scale * quat, torch.tensor([[1.0, 0.0, 0.0, 0.0]]))
+    assert distance.item() == pytest.approx(2 * math.sin(half / 2), abs=1e-6)
+
+
+@pytest.mark.parametrize("criterion", [BetaLoss(7.0), LearnedWeightLoss(0.3, -2.0)])
+def test_opposite_quaternions_cost_the_same(criterion):
+    _, position_m, quat_wxyz = batch()
+    prediction = PosePrediction(torch.randn(6, 3), torch.randn(6, 4))
+    opposite = PosePrediction(prediction.position_m, -prediction.quat_wxyz)
+    loss = criterion(prediction, position_m, quat_wxyz)
+    torch.testing.assert_close(criterion(opposite, position_m, quat_wxyz), loss)
+    torch.testing.assert_close(criterion(prediction, position_m, -quat_wxyz), loss)
+
+
+@pytest.mark.parametrize("criterion", [BetaLoss(7.0), LearnedWeightLoss(0.3, -2.0)])
+def test_a_perfect_prediction_has_a_finite_gradient(criterion):
+    _, position_m, quat_wxyz = batch()
+    guess = PosePrediction(position_m.clone().requires_grad_(), quat_wxyz.clone().requires_grad_())
+    criterion(guess, position_m, quat_wxyz).backward()
+    assert torch.isfinite(guess.position_m.grad).all()
+    assert torch.isfinite(guess.quat_wxyz.grad).all()
+
+
+def off_by(distance_m: float, angle_rad: float) -> tuple[PosePrediction, Tensor, Tensor]:
+    """A prediction off by a distance and an angle, and what would have been right."""
+    quat = torch.tensor([[math.cos(angle_rad / 2), math.sin(angle_rad / 2), 0.0, 0.0]])
+    prediction = PosePrediction(torch.tensor([[0.0, distance_m, 0.0]]), quat)
+    return prediction, torch.zeros(1, 3), torch.tensor([[1.0, 0.0, 0.0, 0.0]])
+
+
+def test_beta_loss_in_closed_form():
+    loss = BetaLoss(10.0)(*off_by(0.7, 1.2))
+    assert loss.item() == pytest.approx(0.7 + 10.0 * 2 * math.sin(0.3), rel=1e-5)
+
+
+def test_learned_loss_in_closed_form():
+    loss = LearnedWeightLoss(0.5, -3.0)(*off_by(0.7, 1.2))
+    orientation = 2 * math.sin(0.3)
+    expected = math.exp(-0.5) * 0.7 + 0.5 + math.exp(3.0) * orientation - 3.0
+    assert loss.item() == pytest.approx(expected, rel=1e-5)
+
+
+def test_learned_weights_settle_at_the_logarithm_of_the_error():
+    criterion = LearnedWeightLoss(0.0, -3.0)
+    optimizer = torch.optim.Adam(criterion.parameters(), 0.05)
+    for _ in range(400):
+        optimizer.zero_grad()
+        criterion(*off_by(0.7, 1.2)).backward()
+        optimizer.step()
+    assert criterion.s_position.item() == pytest.approx(math.log(0.7), abs=1e-2)
+    assert criterion.s_orientation.item() == pytest.approx(math.log(2 * math.sin(0.3)), abs=1e-2)
+
+
+def test_initial_weights_depend_on_the_seed_alone():
+    def first_weights(seed: int) -> np.ndarray:
+        torch.manual_seed(seed)
+        return next(build_localizer("posenet2", NETWORK, HYPER).parameters()).detach().numpy()
+
+    assert np.array_equal(first_weights(1), first_weights(1))
+    assert not np.array_equal(first_weights(1), first_weights(2))

@@ -1,0 +1,147 @@
+"""Scores with known answers."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from baselines.training.score import bootstrap_limits, score_run
+from synfeal.dataset.pose_table import PoseTable, write_pose_table
+from synfeal.errors import InputError
+
+N = 40
+
+
+def poses(rng: np.random.Generator, count: int = N) -> PoseTable:
+    """Random poses, ten frames to a path."""
+    quat = Rotation.random(count, rng=rng).as_quat(canonical=True, scalar_first=True)
+    frame = np.arange(count)
+    return PoseTable(frame, frame // 10, rng.normal(size=(count, 3)), quat)
+
+
+def moved(table: PoseTable, offset_m: np.ndarray, angle_rad: float) -> PoseTable:
+    """Every pose shifted by ``offset_m`` and turned by ``angle_rad`` about its own axis."""
+    axes = np.random.default_rng(5).normal(size=(len(table), 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    turned = Rotation.from_quat(table.quat_wxyz, scalar_first=True) * Rotation.from_rotvec(
+        angle_rad * axes
+    )
+    quat = turned.as_quat(canonical=True, scalar_first=True)
+    return PoseTable(table.frame, table.path, table.position_m + offset_m, quat)
+
+
+@pytest.fixture
+def score(tmp_path):
+    """Score tables and return metrics and rows of errors."""
+
+    def run(predicted, labels, truth, train):
+        tables = {"pred": predicted, "labels": labels, "truth": truth, "train": train}
+        for name, table in tables.items():
+            write_pose_table(tmp_path / f"{name}.csv", table)
+        inputs = [tmp_path / f"{name}.csv" for name in tables]
+        outputs = tmp_path / "errors.csv", tmp_path / "metrics.json"
+        score_run(*inputs, *outputs, {"model": "posenet"})
+        with outputs[0].open(encoding="utf-8", newline="") as file:
+            return json.loads(outputs[1].read_text()), list(csv.DictReader(file))
+
+    return run
+
+
+def test_perfect_predictions_have_no_error(score):
+    table = poses(np.random.default_rng(0))
+    metrics, errors = score(table, table, table, table)
+    for name in ("position_m", "orientation_deg", "position_m_true", "orientation_deg_true"):
+        for end in ("", "_low", "_high"):
+            assert metrics[name + end] == pytest.approx(0.0, abs=1e-6)
+    assert len(errors) == metrics["n_test"] == metrics["n_train"] == N
+    assert metrics["failed"] == 0
+    assert metrics["model"] == "posenet"
+
+
+def test_known_motions_give_known_errors_against_labels_and_truth(score):
+    truth = poses(np.random.default_rng(1))
+    labels = moved(truth, np.array([3.0, 0.0, 4.0]), 0.0)
+    predicted = moved(truth, np.array([0.0, 0.0, 0.0]), math.radians(25))
+    metrics, errors = score(predicted, labels, truth, truth)
+    assert metrics["position_m"] == pytest.approx(5.0)
+    assert metrics["position_rms_m"] == pytest.approx(5.0 / math.sqrt(3))
+    assert metrics["position_m_true"] == pytest.approx(0.0, abs=1e-12)
+    assert metrics["orientation_deg"] == pytest.approx(25.0)
+    assert metrics["orientation_deg_true"] == pytest.approx(25.0)
+    assert all(float(row["orientation_deg"]) == pytest.approx(25.0) for row in errors)
+    assert [int(row["frame"]) for row in errors] == list(range(N))
+
+
+def test_the_opposite_quaternion_is_the_same_prediction(score):
+    table = poses(np.random.default_rng(2))
+    opposite = PoseTable(table.frame, table.path, table.position_m, -table.quat_wxyz)
+    metrics, _ = score(opposite, table, table, table)
+    assert metrics["orientation_deg"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_baseline_predicts_the_mean_training_position(score):
+    test = poses(np.random.default_rng(3))
+    train = poses(np.random.default_rng(4), 60)
+    distances = np.sort(np.sqrt(((test.position_m - train.position_m.mean(0)) ** 2).sum(1)))
+    metrics, _ = score(test, test, test, train)
+    assert metrics["baseline_position_m_true"] == pytest.approx(distances[19:21].mean())
+    assert metrics["n_train"] == 60
+
+
+@pytest.mark.parametrize(("lost", "is_null"), [(5, False), (N, True)])
+def test_predictions_that_are_not_finite_are_failures(score, lost, is_null):
+    table = poses(np.random.default_rng(5))
+    position = table.position_m + [1.0, 0.0, 0.0]
+    position[:lost] = np.nan
+    predicted = PoseTable(table.frame, table.path, position, table.quat_wxyz)
+    metrics, errors = score(predicted, table, table, table)
+    assert metrics["failed"] == lost
+    assert (metrics["position_m"] is None) == is_null
+    assert (metrics["position_m_high"] is None) == is_null
+    assert [math.isinf(float(row["position_m"])) for row in errors] == [i < lost for i in range(N)]
+    if not is_null:
+        assert metrics["position_m"] == pytest.approx(1.0)
+
+
+def test_tables_of_different_frames_are_refused(score):
+    table = poses(np.random.default_rng(6))
+    with pytest.raises(InputError, match="labels.csv: its frames are not those"):
+        score(table.first(10), table, table, table)
+
+
+def test_limits_of_independent_frames_agree_with_order_statistics():
+    """The limits of a median are, to good approximation, the order statistics n/2 +- 0.98 sqrt(n)."""
+    count = 400
+    values = np.random.default_rng(7).permutation(np.arange(count, dtype=float))
+    low, high = bootstrap_limits({"e": values}, np.arange(count))["e"]
+    half = 0.98 * math.sqrt(count)
+    assert low == pytest.approx(count / 2 - half, abs=4)
+    assert high == pytest.approx(count / 2 + half, abs=4)
+
+
+def test_limits_count_paths_not_frames():
+    """Copies of a frame add no information, so they must not narrow the limits."""
+    values = np.random.default_rng(8).normal(size=50)
+    path = np.arange(50)
+    single = bootstrap_limits({"e": values}, path)["e"]
+    copied = bootstrap_limits({"e": np.repeat(values, 20)}, np.repeat(path, 20))["e"]
+    assert copied[1] - copied[0] > 0.7 * (single[1] - single[0])
+
+
+def test_limits_are_the_same_every_time():
+    values = np.random.default_rng(9).normal(size=30)
+    path = np.arange(30) // 3
+    assert bootstrap_limits({"e": values}, path) == bootstrap_limits({"e": values}, path)
+
+
+def test_scoring_needs_no_torch():
+    code = "import sys, baselines.training.score, baselines.localizers.names; print(sorted(sys.modules))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "'torch'" not in result.stdout
