@@ -24,12 +24,12 @@ def position_distance(predicted_m: Tensor, true_m: Tensor) -> Tensor:
 def quat_distance(predicted_wxyz: Tensor, true_wxyz: Tensor) -> Tensor:
     """Mean distance of rotations as unit quaternions, the same for ``q`` and ``-q``.
 
-    ``min(|p - q|, |p + q|)`` with ``p`` the normalised prediction (B, 4) and ``q`` a unit
-    quaternion (B, 4). It is ``2 sin(angle / 4)``: near 0 half of the angle, in radians.
+    ``min(|p - q|, |p + q|)`` with ``p`` the prediction (B, 4) and ``q`` a unit quaternion (B, 4).
+    For a unit ``p`` it is ``2 sin(angle / 4)``: near 0 half of the angle, in radians. Like PoseNet
+    (section 3.1) it leaves ``p`` as it is: normalised, predictions grow long and stop learning.
     """
-    unit = nn.functional.normalize(predicted_wxyz, dim=1)
-    same = torch.linalg.vector_norm(unit - true_wxyz, dim=1)
-    opposite = torch.linalg.vector_norm(unit + true_wxyz, dim=1)
+    same = torch.linalg.vector_norm(predicted_wxyz - true_wxyz, dim=1)
+    opposite = torch.linalg.vector_norm(predicted_wxyz + true_wxyz, dim=1)
     return torch.minimum(same, opposite).mean()
 
 

@@ -7,8 +7,8 @@
   year      = {2015}
 }
 
-Differences from the paper: batch normalisation in the backbone; the predicted quaternion is
-normalised in the loss; q and -q count as the same rotation.
+Differences from the paper: batch normalisation in the backbone; q and -q count as the same
+rotation.
 """
 
 from __future__ import annotations
