@@ -11,14 +11,13 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
-from synfeal.geometry.poses import pose_matrix
 from synfeal.geometry.rotations import quat_wxyz_from_matrix, rotation_from_rpy
 
 CAMERA = CameraConfig(width=160, height=120, horizontal_fov_deg=60.0)
 TEXELS_PER_M = 100
 SUPERSAMPLING = 2
 
-# Points p of a plane have normal @ p = offset: a wall at x = 3 m, and a slope that rises towards it.
+# Points p of a plane have normal @ p = offset: a wall at x = 3 m and a slope that rises towards it.
 PLANES = [
     (np.array([1.0, 0.0, 0.0]), 3.0, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])),
     (np.array([0.5, 0.0, -1.0]), 1.7, np.array([1.0, 0.0, 0.5]), np.array([0.0, 1.0, 0.0])),
@@ -87,8 +86,3 @@ def write_frames(folder: Path, truth: PoseTable, camera: CameraConfig = CAMERA):
         depth_mm = np.round(1000 * depth_map(pose, camera)[0]).clip(0, 65535)
         Image.fromarray(depth_mm.astype(np.uint16)).save(depth_paths[-1])
     return color_paths, depth_paths
-
-
-def looking_along_x(position_m=(0.0, 0.0, 0.0)) -> np.ndarray:
-    """A pose with all angles zero."""
-    return pose_matrix(rotation_from_rpy([0.0, 0.0, 0.0]), position_m)

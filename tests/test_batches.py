@@ -1,4 +1,5 @@
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -67,7 +68,7 @@ def test_batches_share_one_frame_and_cover_the_split(n_frames, batch_frames):
     assert [b.index for b in batches] == list(range(len(batches)))
     assert batches[0].start == 0
     assert batches[-1].stop == n_frames
-    for before, after in zip(batches[:-1], batches[1:], strict=True):
+    for before, after in pairwise(batches):
         assert after.start == before.stop - 1
         assert len(before) == batch_frames + 1
     assert 2 <= len(batches[-1]) <= batch_frames + 1
@@ -170,7 +171,7 @@ def test_only_the_last_pose_is_replaced():
 
 
 def test_failed_batch_is_assisted_counted_and_interpolated():
-    rotation = Rotation.from_euler("z", 3.0 * np.arange(11), degrees=True).as_matrix()
+    rotation = Rotation.from_euler("z", 3.0 * np.arange(11)[:, None], degrees=True).as_matrix()
     position = np.column_stack([np.arange(11.0) ** 2, np.zeros(11), np.zeros(11)])
     truth = table_of(pose_matrix(rotation, position))
     batches = batches_of(11, 5)
@@ -199,7 +200,7 @@ def test_a_lost_batch_that_stood_still_is_assisted_too():
 def test_gaps_are_interpolated_and_the_end_is_held():
     angle = np.radians([0, 10, 20, 30, 40, 50, 60])
     poses = pose_matrix(
-        Rotation.from_euler("x", angle).as_matrix(),
+        Rotation.from_euler("x", angle[:, None]).as_matrix(),
         np.column_stack([2.0 * np.arange(7), np.zeros(7), -np.arange(7)]),
     )
     registered = np.array([False, False, True, False, False, True, False])

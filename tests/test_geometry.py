@@ -152,8 +152,8 @@ def test_relative_is_inverse_times_pose():
 
 def test_relative_is_exact_far_from_the_origin():
     shift = np.array([2.0**40, -(2.0**40), 0.0])
-    a = pose_matrix(np.eye(3), shift + [1, 2, 3])
-    b = pose_matrix(np.eye(3), shift + [1.5, 2.25, 3])
+    a = pose_matrix(np.eye(3), shift + np.array([1, 2, 3]))
+    b = pose_matrix(np.eye(3), shift + np.array([1.5, 2.25, 3]))
     np.testing.assert_array_equal(relative(a, b)[:3, 3], [0.5, 0.25, 0])
 
 

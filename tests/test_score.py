@@ -98,7 +98,7 @@ def test_the_baseline_predicts_the_mean_training_position(score):
 @pytest.mark.parametrize(("lost", "is_null"), [(5, False), (N, True)])
 def test_predictions_that_are_not_finite_are_failures(score, lost, is_null):
     table = poses(np.random.default_rng(5))
-    position = table.position_m + [1.0, 0.0, 0.0]
+    position = table.position_m + np.array([1.0, 0.0, 0.0])
     position[:lost] = np.nan
     predicted = PoseTable(table.frame, table.path, position, table.quat_wxyz)
     metrics, errors = score(predicted, table, table, table)
@@ -112,12 +112,12 @@ def test_predictions_that_are_not_finite_are_failures(score, lost, is_null):
 
 def test_tables_of_different_frames_are_refused(score):
     table = poses(np.random.default_rng(6))
-    with pytest.raises(InputError, match="labels.csv: its frames are not those"):
+    with pytest.raises(InputError, match=r"labels\.csv: its frames are not those"):
         score(table.first(10), table, table, table)
 
 
 def test_limits_of_independent_frames_agree_with_order_statistics():
-    """The limits of a median are, to good approximation, the order statistics n/2 +- 0.98 sqrt(n)."""
+    """The limits of a median are, nearly, the order statistics n/2 +- 0.98 sqrt(n)."""
     count = 400
     values = np.random.default_rng(7).permutation(np.arange(count, dtype=float))
     low, high = bootstrap_limits({"e": values}, np.arange(count))["e"]
@@ -142,6 +142,9 @@ def test_limits_are_the_same_every_time():
 
 
 def test_scoring_needs_no_torch():
-    code = "import sys, baselines.training.score, baselines.localizers.names; print(sorted(sys.modules))"
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    modules = "baselines.training.score, baselines.localizers.names"
+    code = f"import sys, {modules}; print(sorted(sys.modules))"
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
     assert "'torch'" not in result.stdout

@@ -53,7 +53,10 @@ def fit(
     Stops early when the loss is no longer finite: the run then scores as failed.
     """
     steps = -(-schedule.samples_seen // schedule.batch_size)
-    optimizer = torch.optim.AdamW(_parameter_groups(localizer, schedule.weight_decay), fused=True)
+    # A shorter memory of squared gradients than the default: it must fit into a few hundred steps.
+    optimizer = torch.optim.AdamW(
+        _parameter_groups(localizer, schedule.weight_decay), betas=(0.9, 0.99), fused=True
+    )
     scheduler = OneCycleLR(
         optimizer, schedule.learning_rate, total_steps=max(steps, 2), pct_start=0.2
     )

@@ -55,9 +55,9 @@ def check_sampling_box(box: NDArray[np.float64], bounds_m: NDArray[np.float64], 
     ratio = float(np.max(bounds_m[1] - bounds_m[0]) / np.max(box[1] - box[0]))
     if (overlap > 0).all() and ratio <= 100:
         return
-    problem = "lies outside the mesh" if (overlap <= 0).any() else f"is {ratio:.0f} times smaller"
+    problem = "lies outside" if (overlap <= 0).any() else f"is {ratio:.0f} times smaller than"
     raise InputError(
-        f"{name}: sampling_box {_show(box)} {problem}, whose bounds are {_show(bounds_m)} m;"
+        f"{name}: sampling_box {_show(box)} m {problem} the mesh, which spans {_show(bounds_m)} m;"
         " unit_m or up_axis is probably wrong"
     )
 

@@ -1,0 +1,141 @@
+import numpy as np
+import pytest
+from PIL import Image
+
+from baselines.groundtruth.features import FeatureOdometry
+from baselines.groundtruth.pinhole import focal_length_px, intrinsic_matrix
+from baselines.groundtruth.posegraph.lm import optimise_lm
+from baselines.groundtruth.posegraph.toro import optimise_toro
+from baselines.groundtruth.rgbd import depth_agreement, loop_candidates, rgbd_graph
+from synfeal.config.models import CameraConfig, RgbdConfig
+from synfeal.errors import InputError
+from synfeal.geometry.poses import inverse, pose_error, pose_matrix, relative
+from synfeal.geometry.rotations import rotation_from_rpy
+from tests.planar_scene import CAMERA, depth_map, straight_path, write_frames
+
+CFG = RgbdConfig(keyframe_every=3)
+TRUTH = straight_path(10, step_m=0.06, turn_deg=2.0)
+
+
+@pytest.fixture(scope="module")
+def paths(tmp_path_factory):
+    return write_frames(tmp_path_factory.mktemp("planes"), TRUTH)
+
+
+@pytest.fixture(scope="module")
+def graph(paths):
+    return rgbd_graph(*paths, CAMERA, CFG)
+
+
+def true_first_from_cam():
+    poses = TRUTH.world_from_cam
+    return relative(poses[0], poses)
+
+
+def test_neighbours_and_loop_closures_are_measured(graph):
+    pairs = [(edge.i, edge.j) for edge in graph.edges]
+    assert pairs[:9] == [(k, k + 1) for k in range(9)]
+    assert len(pairs) > 9
+    assert all(i % 3 == 0 and j % 3 == 0 and j > i for i, j in pairs[9:])
+    truth = true_first_from_cam()
+    for edge in graph.edges:
+        error_m, error_rad = pose_error(edge.i_from_j, relative(truth[edge.i], truth[edge.j]))
+        assert error_m < 0.02
+        assert np.degrees(error_rad) < 0.5
+
+
+@pytest.mark.parametrize("name", ["odometry", "lm", "toro"])
+def test_trajectory_is_recovered(graph, name):
+    first_from_cam = {
+        "odometry": lambda: graph.first_from_cam,
+        "lm": lambda: optimise_lm(graph, 20),
+        "toro": lambda: optimise_toro(graph, 100, 1e-5),
+    }[name]()
+    position_m, orientation_rad = pose_error(first_from_cam, true_first_from_cam())
+    assert position_m.max() < 0.04
+    assert np.degrees(orientation_rad.max()) < 1.0
+
+
+def test_result_is_repeatable(paths, graph):
+    again = rgbd_graph([p for p in paths[0]], paths[1], CAMERA, CFG)
+    np.testing.assert_array_equal(again.first_from_cam, graph.first_from_cam)
+
+
+def test_unmeasurable_pair_keeps_a_weak_edge(paths, tmp_path):
+    """Two empty frames in the middle: the graph stays connected, by guesses of low weight."""
+    color_paths, depth_paths = list(paths[0][:6]), list(paths[1][:6])
+    color_paths[3], depth_paths[3] = tmp_path / "color.png", tmp_path / "depth.png"
+    Image.new("RGB", (CAMERA.width, CAMERA.height)).save(color_paths[3])
+    empty = np.full((CAMERA.height, CAMERA.width), 65535, dtype=np.uint16)
+    Image.fromarray(empty).save(depth_paths[3])
+    graph = rgbd_graph(color_paths, depth_paths, CAMERA, RgbdConfig(keyframe_every=4))
+    weights = [edge.information[0, 0] for edge in graph.edges[:5]]
+    assert max(weights[2:4]) < 0.01 * min(weights[0], weights[1], weights[4])
+    np.testing.assert_array_equal(graph.edges[2].i_from_j, graph.edges[1].i_from_j)
+
+
+def test_depth_beyond_the_limit_is_not_used(paths):
+    with_limit = rgbd_graph(paths[0][:2], paths[1][:2], CAMERA, RgbdConfig(max_depth_m=0.5))
+    assert with_limit.edges[0].information[0, 0] < 1e3
+
+
+def test_features_find_a_large_turn(tmp_path):
+    """Twelve degrees between two frames, more than direct odometry bears."""
+    truth = straight_path(2, step_m=0.1, turn_deg=12.0)
+    color_paths, depth_paths = write_frames(tmp_path, truth)
+    odometry = FeatureOdometry(CAMERA)
+    features = [
+        odometry.features(
+            np.asarray(Image.open(color).convert("L")),
+            np.asarray(Image.open(depth)).astype(np.float32) / 1000,
+        )
+        for color, depth in zip(color_paths, depth_paths, strict=True)
+    ]
+    found = odometry.motion(*features)
+    assert found is not None
+    poses = truth.world_from_cam
+    error_m, error_rad = pose_error(found[0], relative(poses[0], poses[1]))
+    assert error_m < 0.03
+    assert np.degrees(error_rad) < 1.0
+    assert found[1] >= 12
+
+
+def test_depth_agreement_tells_right_from_wrong_motions():
+    poses = straight_path(2, step_m=0.1, turn_deg=3.0).world_from_cam
+    depth_i, depth_j = (depth_map(pose, CAMERA)[0].astype(np.float32) for pose in poses)
+    true = relative(poses[0], poses[1])
+    fitness, rmse_m = depth_agreement(depth_i, depth_j, true, CAMERA, CFG)
+    assert fitness > 0.8
+    assert rmse_m < 0.02
+    ahead = pose_matrix(np.eye(3), [0, 0, 0.5]) @ true
+    assert depth_agreement(depth_i, depth_j, ahead, CAMERA, CFG)[0] < 0.2
+    behind = (
+        pose_matrix(rotation_from_rpy([0, 0, np.pi]) @ rotation_from_rpy([0, 0, 0]).T, 0) @ true
+    )
+    assert depth_agreement(depth_i, depth_j, behind, CAMERA, CFG)[0] < 0.2
+    nothing = np.full_like(depth_i, np.inf)
+    assert depth_agreement(nothing, depth_j, true, CAMERA, CFG) == (0.0, np.inf)
+    assert depth_agreement(depth_i, nothing, true, CAMERA, CFG) == (0.0, np.inf)
+
+
+def test_loop_candidates_are_keyframes_that_look_the_same_way():
+    turned = pose_matrix(rotation_from_rpy([[0, 0, a] for a in (0, 0.3, np.pi, 0.1)]), np.zeros(3))
+    poses = inverse(turned[0]) @ turned[[0, 0, 1, 1, 2, 2, 3, 3]]
+    assert loop_candidates(poses, 2) == [(0, 2), (0, 6), (2, 6)]
+    poses[6, :3, 3] = [5.0, 0, 0]
+    assert loop_candidates(poses, 2) == [(0, 2)]
+
+
+def test_wrong_image_size_and_missing_image_are_named(paths):
+    with pytest.raises(InputError, match=r"is 160x120, the camera of the configuration 64x48"):
+        rgbd_graph(*paths, CameraConfig(width=64, height=48), CFG)
+    with pytest.raises(InputError, match=r"none\.png: cannot be read as an image"):
+        rgbd_graph([paths[0][0].with_name("none.png")], paths[1][:1], CAMERA, CFG)
+
+
+def test_intrinsics_of_a_right_angle():
+    camera = CameraConfig(width=200, height=100, horizontal_fov_deg=90.0)
+    assert focal_length_px(camera) == pytest.approx(100.0)
+    np.testing.assert_allclose(
+        intrinsic_matrix(camera, -0.5), [[100, 0, 99.5], [0, 100, 49.5], [0, 0, 1]]
+    )

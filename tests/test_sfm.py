@@ -1,0 +1,91 @@
+import numpy as np
+import pytest
+from PIL import Image
+
+from baselines.groundtruth.sfm import metric_scale, sfm_batch
+from synfeal.config.models import SfmConfig
+from synfeal.errors import InputError
+from synfeal.geometry.poses import pose_error, pose_from_quat, relative
+from tests.planar_scene import CAMERA, straight_path, write_frames
+
+CFG = SfmConfig(max_features=400)
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory):
+    truth = straight_path(8, step_m=0.08, turn_deg=2.0).world_from_cam
+    return write_frames(tmp_path_factory.mktemp("planes"), straight_path(8, 0.08, 2.0))[0], truth
+
+
+@pytest.fixture(scope="module")
+def estimate(frames, tmp_path_factory):
+    return sfm_batch(*_arguments(frames), CFG, 0, tmp_path_factory.mktemp("work"))
+
+
+def _arguments(frames):
+    return frames[0], CAMERA, frames[1]
+
+
+def test_every_frame_is_found_in_metres(frames, estimate):
+    truth = frames[1]
+    assert estimate.registered.all()
+    position_m, orientation_rad = pose_error(estimate.first_from_cam, relative(truth[0], truth))
+    assert position_m.max() < 0.01
+    assert np.degrees(orientation_rad.max()) < 0.3
+
+
+def test_first_pose_is_the_identity(estimate):
+    np.testing.assert_allclose(estimate.first_from_cam[0], np.eye(4), atol=1e-12)
+
+
+def test_same_seed_gives_the_same_result(frames, estimate, tmp_path):
+    again = sfm_batch(*_arguments(frames), CFG, 0, tmp_path)
+    np.testing.assert_array_equal(again.first_from_cam, estimate.first_from_cam)
+    assert list(tmp_path.iterdir()) == []  # temporary files are gone
+
+
+def test_result_does_not_depend_on_where_the_world_is(frames, estimate, tmp_path):
+    world_from_other = pose_from_quat([7.0, -3.0, 1.0], [0.5, 0.5, -0.5, 0.5])
+    color_paths, truth = frames
+    moved = sfm_batch(color_paths, CAMERA, world_from_other @ truth, CFG, 0, tmp_path)
+    np.testing.assert_allclose(moved.first_from_cam, estimate.first_from_cam, atol=1e-9)
+
+
+def test_frames_without_texture_are_lost_not_an_error(tmp_path):
+    paths = [tmp_path / f"{k}.png" for k in range(4)]
+    for path in paths:
+        Image.new("RGB", (CAMERA.width, CAMERA.height), (90, 90, 90)).save(path)
+    truth = straight_path(4, 0.08, 2.0).world_from_cam
+    estimate = sfm_batch(paths, CAMERA, truth, CFG, 0, tmp_path)
+    assert not estimate.registered.any()
+    assert len(estimate) == 4
+
+
+def test_missing_image_is_named(frames, tmp_path):
+    missing = tmp_path / "frame-000000.color.png"
+    with pytest.raises(InputError, match=r"frame-000000\.color\.png: no such image"):
+        sfm_batch([missing], CAMERA, frames[1][:1], CFG, 0, tmp_path)
+
+
+def test_images_and_poses_must_match(frames, tmp_path):
+    with pytest.raises(ValueError, match="8 images, 3 poses"):
+        sfm_batch(frames[0], CAMERA, frames[1][:3], CFG, 0, tmp_path)
+
+
+def test_scale_is_the_ratio_of_distances_to_the_first_frame():
+    model = np.random.default_rng(0).normal(size=(20, 3))
+    assert metric_scale(0.25 * model + [1, 2, 3], model) == pytest.approx(0.25)
+
+
+def test_scale_bears_wrong_poses_and_leaves_out_near_and_late_frames():
+    true = np.column_stack([0.04 * np.arange(60), np.zeros(60), np.zeros(60)])
+    model = true / 3
+    model[1] = [9, 9, 9]  # 4 cm from the first frame
+    model[44:] *= 5  # beyond the first 44 frames
+    model[10:15] *= 7  # wrong, but a minority
+    assert metric_scale(true, model) == pytest.approx(3.0)
+
+
+def test_no_scale_without_motion():
+    assert np.isnan(metric_scale(np.zeros((5, 3)), np.ones((5, 3))))
+    assert np.isnan(metric_scale(np.eye(3), np.zeros((3, 3))))
