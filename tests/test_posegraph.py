@@ -21,7 +21,7 @@ INFORMATION = np.diag([1e4] * 3 + [1e5] * 3)
 SIGMA_M, SIGMA_RAD = 1e-2, 1e5**-0.5
 OPTIMISERS = {
     "lm": lambda graph: optimise_lm(graph, 50),
-    "toro": lambda graph: optimise_toro(graph, 2000, 1e-9),
+    "toro": lambda graph: optimise_toro(graph, 150, 1e-9),
 }
 
 
@@ -111,7 +111,7 @@ def test_noise_free_loop_is_recovered_from_a_perturbed_start(name):
     assert pose_error(start.first_from_cam, truth)[0].max() > 0.05
     assert position_m.max() < 1e-6
     assert orientation_rad.max() < 1e-6
-    np.testing.assert_array_equal(found[0], np.eye(4))
+    np.testing.assert_allclose(found[0], np.eye(4), atol=1e-12)
 
 
 @pytest.mark.parametrize("name", OPTIMISERS)
@@ -133,14 +133,14 @@ def test_toro_comes_near_the_chi2_of_lm(seed):
     _, graph = loop_graph(12, 1.0, np.random.default_rng(seed))
     best = chi2(graph, optimise_lm(graph, 50))
     found = chi2(graph, optimise_toro(graph, 100, 1e-5))
-    assert best * (1 - 1e-3) <= found <= 1.5 * best
+    assert best * (1 - 1e-3) <= found <= 1.15 * best
     assert found < 0.7 * chi2(graph, graph.first_from_cam)
 
 
 @pytest.mark.parametrize("name", OPTIMISERS)
 def test_loop_closures_reduce_the_error_of_odometry(name):
     improved = []
-    for seed in range(5):
+    for seed in range(3):
         truth, graph = loop_graph(20, 1.0, np.random.default_rng(seed))
         before = pose_error(graph.first_from_cam, truth)[0].max()
         improved.append(pose_error(OPTIMISERS[name](graph), truth)[0].max() / before)
@@ -167,7 +167,7 @@ def test_toro_shares_a_loop_residual_evenly_along_equal_edges():
     graph = PoseGraph(poses, tuple(edges))
     # Rotations are pinned by their weight, so the problem is linear with this closed form.
     stiff = tuple(Edge(e.i, e.j, e.i_from_j, np.diag([1e4] * 3 + [1e12] * 3)) for e in graph.edges)
-    found = optimise_toro(PoseGraph(poses, stiff), 3000, 1e-12)
+    found = optimise_toro(PoseGraph(poses, stiff), 150, 1e-12)
     residuals = edge_residuals(graph, found)[:, :3]
     np.testing.assert_allclose(np.abs(residuals[:, 1]), 0.1, atol=0.01)
     np.testing.assert_allclose(residuals[:, [0, 2]], 0, atol=1e-6)

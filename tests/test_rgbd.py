@@ -57,8 +57,10 @@ def test_trajectory_is_recovered(graph, name):
 
 
 def test_result_is_repeatable(paths, graph):
-    again = rgbd_graph([p for p in paths[0]], paths[1], CAMERA, CFG)
-    np.testing.assert_array_equal(again.first_from_cam, graph.first_from_cam)
+    """Up to the rounding of Open3D's single precision, which depends on where memory lies."""
+    again = rgbd_graph(*paths, CAMERA, CFG)
+    assert [(e.i, e.j) for e in again.edges] == [(e.i, e.j) for e in graph.edges]
+    np.testing.assert_allclose(again.first_from_cam, graph.first_from_cam, atol=1e-3)
 
 
 def test_unmeasurable_pair_keeps_a_weak_edge(paths, tmp_path):

@@ -73,8 +73,8 @@ class _Odometry:
         depth_m = np.where(depth_m > self.cfg.max_depth_m, np.inf, depth_m).astype(np.float32)
         finite_m = np.where(np.isfinite(depth_m), depth_m, np.float32(0))
         rgbd = o3d.t.geometry.RGBDImage(
-            o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(np.ascontiguousarray(color)).clone()),
-            o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(finite_m).clone()),
+            o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(np.ascontiguousarray(color))),
+            o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(finite_m)),
         )
         return _Frame(rgbd, depth_m, self.by_features.features(grey, depth_m))
 

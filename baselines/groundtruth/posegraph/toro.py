@@ -19,11 +19,14 @@ weights
 
     u_k = sum_(m <= k) 1/M_m / sum_(m <= L) 1/M_m,     M_m = sum of w_e over the edges e through m
 
-share the residual out so that well-determined parameters move less: M is the diagonal
-preconditioner, and w_e is the smallest eigenvalue of the rotation block of the edge's information
-(for v_k: of the translation block). In iteration t the gain is ``g = min(1, L w_e / (t min_m
-M_m))``: the step of preconditioned gradient descent with a learning rate of 1/t, clipped so that no
-edge overshoots.
+share the residual out so that well-determined parameters move less: M is the diagonal preconditioner,
+and w_e is the smallest eigenvalue of the rotation block of the edge's information (for v_k: of the
+translation block). The gain in iteration t is ``g = min(1, rate_t L w_e / min_m M_m)``: the step of
+preconditioned gradient descent, clipped so that no edge overshoots.
+
+Learning rate. ``rate_t = 10 / (9 + t)``. Any harmonic decay converges to an equilibrium; the papers
+leave its constant open. Plain 1/t cools down before a loop is closed: after 100 iterations the error
+was up to 2.4 times that of Levenberg-Marquardt on graphs of rendered rooms, with the delay 1.07 times.
 
 Order. Edges are visited by the depth of the top node of their path, so that what is moved first
 carries the rest of the map with it. The descent stops when the summed error changes by less than
@@ -43,6 +46,9 @@ from baselines.groundtruth.posegraph.graph import PoseGraph, chi2
 from synfeal.geometry.poses import inverse, pose_from_quat, quat_wxyz_of, relative
 
 Array = NDArray[np.float64]
+
+# Iterations over which the learning rate stays of the order of 1.
+_DELAY = 10
 
 
 @dataclass(frozen=True)
@@ -73,16 +79,16 @@ def optimise_toro(graph: PoseGraph, iterations: int, epsilon: float) -> Array:
     parents = spanning_tree(graph)
     edges = sorted(_path_edges(graph, parents), key=lambda edge: edge.top_depth)
     stiffness = _stiffness(edges, len(graph))
-    clipped = max((len(edge.nodes) * edge.weight / stiffness.min(axis=0)).max() for edge in edges)
+    shares = [_shares(stiffness[edge.nodes - 1]) for edge in edges]
+    rates = [len(edge.nodes) * edge.weight / stiffness.min(axis=0) for edge in edges]
     parent_from_node = relative(graph.first_from_cam[parents], graph.first_from_cam)
     error = chi2(graph, _poses(parent_from_node, parents))
     for iteration in range(1, iterations + 1):
-        for edge in edges:
-            length = len(edge.nodes)
-            gain = np.minimum(1.0, length * edge.weight / (iteration * stiffness.min(axis=0)))
-            _correct(parent_from_node, edge, gain, _shares(stiffness[edge.nodes - 1]))
+        gains = np.minimum(1.0, np.array(rates) * _DELAY / (_DELAY + iteration - 1))
+        for edge, share, gain in zip(edges, shares, gains, strict=True):
+            _correct(parent_from_node, edge, gain, share)
         previous, error = error, chi2(graph, _poses(parent_from_node, parents))
-        if iteration >= clipped and abs(previous - error) <= epsilon * previous:
+        if gains.max() < 1 and abs(previous - error) <= epsilon * previous:
             break
     return _poses(parent_from_node, parents)
 

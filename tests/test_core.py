@@ -1,0 +1,114 @@
+"""What every stage leans on: whole files or none, seeds by name, one line for a person."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table, write_pose_table
+from synfeal.errors import InputError
+from synfeal.files import atomic_path, write_json
+from synfeal.seeds import generator_of, seed_of
+
+
+def random_table(n: int) -> PoseTable:
+    rng = np.random.default_rng(3)
+    quat = rng.normal(size=(n, 4))
+    quat /= np.linalg.norm(quat, axis=1, keepdims=True) * np.sign(quat[:, :1])
+    return PoseTable(np.arange(n), np.arange(n) // 3, rng.normal(size=(n, 3)) * 1e3, quat)
+
+
+def test_pose_table_round_trip_is_exact(tmp_path: Path) -> None:
+    table = random_table(10)
+    write_pose_table(tmp_path / "poses.csv", table)
+    read = read_pose_table(tmp_path / "poses.csv")
+    for name in ("frame", "path", "position_m", "quat_wxyz"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(table, name))
+
+
+def test_first_frames_are_a_prefix_and_too_many_are_refused() -> None:
+    table = random_table(10)
+    np.testing.assert_array_equal(table.first(4).position_m, table.position_m[:4])
+    with pytest.raises(ValueError, match="11"):
+        table.first(11)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "cannot be read"),
+        ("a,b\n1,2\n", "header"),
+        (f"{HEADER}\n0,0,1,2,3,1,0,0\n", "9 numbers"),
+        (f"{HEADER}\n0,0,1,2,x,1,0,0,0\n", "x"),
+        (f"{HEADER}\n0,0,1,2,nan,1,0,0,0\n", "row 2"),
+    ],
+)
+def test_broken_pose_table_is_named_in_one_line(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "poses.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_pose_table(path)
+    message = str(caught.value)
+    assert str(path) in message
+    assert words in message
+    assert "\n" not in message
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_other(tmp_path: Path) -> None:
+    path = tmp_path / "result.txt"
+    path.write_text("old")
+
+    def write_half() -> None:
+        with atomic_path(path) as temporary:
+            temporary.write_text("half of the n")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        write_half()
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_json_refuses_nan(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="JSON compliant"):
+        write_json(tmp_path / "a.json", {"error_m": float("nan")})
+    assert list(tmp_path.iterdir()) == []
+    write_json(tmp_path / "a.json", {"b": 1, "a": None})
+    assert json.loads((tmp_path / "a.json").read_text()) == {"a": None, "b": 1}
+
+
+def test_seeds_depend_on_every_component_and_on_nothing_else() -> None:
+    assert seed_of(0, "train", "posenet") == seed_of(0, "train", "posenet")
+    names = [(0, "a", "b"), (1, "a", "b"), (0, "ab"), (0, "a", "c"), (0, "b", "a")]
+    assert len({seed_of(*name) for name in names}) == len(names)
+    assert 0 <= seed_of("x") < 2**63
+    assert generator_of("x").integers(2**40) == generator_of("x").integers(2**40)
+
+
+def run_job(tmp_path: Path, body: str) -> subprocess.CompletedProcess[str]:
+    log = tmp_path / "job.log"
+    script = (
+        "import os, sys\nfrom synfeal.errors import InputError\nfrom synfeal.job import job\n"
+        f"with job({str(log)!r}):\n    print('spoken')\n    os.system('echo native')\n    {body}\n"
+    )
+    command = [sys.executable, "-c", script]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_job_tells_a_person_one_line_and_logs_the_rest(tmp_path: Path) -> None:
+    run = run_job(tmp_path, "raise InputError('mesh.glb: holds no faces;\\n export it again')")
+    assert run.returncode == 1
+    assert run.stderr == "error: mesh.glb: holds no faces; export it again\n"
+    assert run.stdout == ""
+    log = (tmp_path / "job.log").read_text()
+    assert "spoken" in log
+    assert "native" in log
+
+
+def test_job_keeps_the_traceback_of_a_defect(tmp_path: Path) -> None:
+    run = run_job(tmp_path, "1 / 0")
+    assert run.returncode == 1
+    assert "ZeroDivisionError" in (tmp_path / "job.log").read_text()
