@@ -34,8 +34,8 @@ Array = NDArray[np.float64]
 
 # Depth images hold millimetres; 0 and 65535 mean that nothing was hit.
 _INVALID_MM = (0, 65535)
-# Standard deviations of edges (metres, degrees), of the size measured on rendered rooms: of neighbours,
-# of loop closures, which overlap less, and of a guess, as large as the motion between two frames.
+# Standard deviations of edges (metres, degrees), of the size measured on rendered rooms: of
+# neighbours, of loop closures, which overlap less, and of guesses, as large as the motion itself.
 _NEIGHBOUR, _LOOP, _GUESS = (0.003, 0.1), (0.01, 0.25), (0.1, 5.0)
 # The refinement may not leave its starting point by more.
 _MAX_CHANGE_M, _MAX_CHANGE_DEG = 0.25, 10.0

@@ -19,14 +19,15 @@ weights
 
     u_k = sum_(m <= k) 1/M_m / sum_(m <= L) 1/M_m,     M_m = sum of w_e over the edges e through m
 
-share the residual out so that well-determined parameters move less: M is the diagonal preconditioner,
-and w_e is the smallest eigenvalue of the rotation block of the edge's information (for v_k: of the
-translation block). The gain in iteration t is ``g = min(1, rate_t L w_e / min_m M_m)``: the step of
-preconditioned gradient descent, clipped so that no edge overshoots.
+share the residual out so that well-determined parameters move less: M is the diagonal
+preconditioner, and w_e is the smallest eigenvalue of the rotation block of the edge's information
+(for v_k: of the translation block). The gain in iteration t is ``g = min(1, rate_t L w_e / min_m
+M_m)``: the step of preconditioned gradient descent, clipped so that no edge overshoots.
 
 Learning rate. ``rate_t = 10 / (9 + t)``. Any harmonic decay converges to an equilibrium; the papers
-leave its constant open. Plain 1/t cools down before a loop is closed: after 100 iterations the error
-was up to 2.4 times that of Levenberg-Marquardt on graphs of rendered rooms, with the delay 1.07 times.
+leave its constant open. Plain 1/t cools down before a loop is closed: after 100 iterations the
+error was up to 2.4 times that of Levenberg-Marquardt on graphs of rendered rooms, with the delay
+1.07 times.
 
 Order. Edges are visited by the depth of the top node of their path, so that what is moved first
 carries the rest of the map with it. The descent stops when the summed error changes by less than
