@@ -26,9 +26,11 @@ check: $(INSTALLED)  ## static checks alone: format, lint, types, workflow
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/mypy
+	$(BIN)/python -m synfeal.config.docs --check
 	$(BIN)/snakemake --lint
 
 format: $(INSTALLED)  ## format the code in place
+	$(BIN)/python -m synfeal.config.docs
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile workflow
