@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.errors import InputError
-from synfeal.files import atomic_path
+from synfeal.dataset.number_table import read_numbers, write_numbers
 from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
 
 COLUMNS = ("frame", "registered", "tx", "ty", "tz", "qw", "qx", "qy", "qz")
@@ -52,12 +51,8 @@ def write_trajectory(path: Path, trajectory: BatchTrajectory) -> None:
     pose = trajectory.first_from_cam
     numbers = np.hstack([pose[:, :3, 3], quat_wxyz_of(pose)]).tolist()
     flags = trajectory.registered.astype(int).tolist()
-    rows = [
-        ",".join(map(repr, [frame, flag, *row]))
-        for frame, (flag, row) in enumerate(zip(flags, numbers, strict=True))
-    ]
-    with atomic_path(path) as temporary:
-        temporary.write_text("\n".join([HEADER, *rows]) + "\n", encoding="utf-8")
+    rows = enumerate(zip(flags, numbers, strict=True))
+    write_numbers(path, HEADER, ([frame, flag, *row] for frame, (flag, row) in rows))
 
 
 def read_trajectory(path: Path) -> BatchTrajectory:
@@ -66,18 +61,5 @@ def read_trajectory(path: Path) -> BatchTrajectory:
     Raises:
         InputError: the file is missing, has another header, or holds anything but finite numbers.
     """
-    try:
-        header, *lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as a batch trajectory ({error})") from None
-    if header != HEADER:
-        raise InputError(f"{path}: header must be '{HEADER}', found '{header[:80]}'")
-    try:
-        values = np.array([[float(cell) for cell in line.split(",")] for line in lines])
-        values = values.reshape(len(lines), len(COLUMNS))
-    except ValueError as error:
-        raise InputError(f"{path}: {error}; every row needs {len(COLUMNS)} numbers") from None
-    if not np.isfinite(values).all():
-        bad = int(np.argmin(np.isfinite(values).all(axis=1)))
-        raise InputError(f"{path}: row {bad + 2} holds a value that is not finite")
+    values = read_numbers(path, HEADER, "batch trajectory")
     return BatchTrajectory(pose_from_quat(values[:, 2:5], values[:, 5:9]), values[:, 1] == 1)

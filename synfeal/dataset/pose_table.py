@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.errors import InputError
-from synfeal.files import atomic_path
+from synfeal.dataset.number_table import read_numbers, write_numbers
 from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
 
 COLUMNS = ("frame", "path", "tx", "ty", "tz", "qw", "qx", "qy", "qz")
@@ -67,9 +66,7 @@ class PoseTable:
 def write_pose_table(path: Path, table: PoseTable) -> None:
     """Write the table with enough digits to read back the same float64 values."""
     columns = [table.frame, table.path, *table.position_m.T, *table.quat_wxyz.T]
-    rows = [",".join(map(repr, row)) for row in zip(*(c.tolist() for c in columns), strict=True)]
-    with atomic_path(path) as temporary:
-        temporary.write_text("\n".join([HEADER, *rows]) + "\n", encoding="utf-8")
+    write_numbers(path, HEADER, zip(*(c.tolist() for c in columns), strict=True))
 
 
 def read_pose_table(path: Path) -> PoseTable:
@@ -78,19 +75,6 @@ def read_pose_table(path: Path) -> PoseTable:
     Raises:
         InputError: the file is missing, has another header, or holds anything but finite numbers.
     """
-    try:
-        header, *lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as a pose table ({error})") from None
-    if header != HEADER:
-        raise InputError(f"{path}: header must be '{HEADER}', found '{header[:80]}'")
-    try:
-        values = np.array([[float(cell) for cell in line.split(",")] for line in lines])
-        values = values.reshape(len(lines), len(COLUMNS))
-    except ValueError as error:
-        raise InputError(f"{path}: {error}; every row needs {len(COLUMNS)} numbers") from None
-    if not np.isfinite(values).all():
-        bad = int(np.argmin(np.isfinite(values).all(axis=1)))
-        raise InputError(f"{path}: row {bad + 2} holds a value that is not finite")
+    values = read_numbers(path, HEADER, "pose table")
     index = values[:, :2].astype(np.int64)
     return PoseTable(index[:, 0], index[:, 1], values[:, 2:5], values[:, 5:9])

@@ -1,0 +1,43 @@
+"""CSV files of numbers under a fixed header, written so that they read back exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.errors import InputError
+from synfeal.files import atomic_path
+
+
+def write_numbers(path: Path, header: str, rows: Iterable[Sequence[float]]) -> None:
+    """Write rows of Python numbers with enough digits to read back the same values."""
+    lines = [",".join(map(repr, row)) for row in rows]
+    with atomic_path(path) as temporary:
+        temporary.write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
+
+
+def read_numbers(path: Path, header: str, kind: str) -> NDArray[np.float64]:
+    """Values (N, columns of ``header``) of a file; ``kind`` names it in messages.
+
+    Raises:
+        InputError: the file is missing, has another header, or holds anything but finite numbers.
+    """
+    n_columns = header.count(",") + 1
+    try:
+        found, *lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as a {kind} ({error})") from None
+    if found != header:
+        raise InputError(f"{path}: header must be '{header}', found '{found[:80]}'")
+    try:
+        values = np.array([[float(cell) for cell in line.split(",")] for line in lines])
+        values = values.reshape(len(lines), n_columns)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}; every row needs {n_columns} numbers") from None
+    if not np.isfinite(values).all():
+        bad = int(np.argmin(np.isfinite(values).all(axis=1)))
+        raise InputError(f"{path}: row {bad + 2} holds a value that is not finite")
+    return values
