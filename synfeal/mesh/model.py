@@ -47,9 +47,15 @@ class MeshPart:
 
 @dataclass(frozen=True)
 class TexturedMesh:
-    """A scene: one or more parts in one world frame."""
+    """A scene: one or more parts in one world frame.
+
+    Attributes:
+        parts: what is drawn.
+        findings: what was named or repaired when the mesh was read, one sentence each.
+    """
 
     parts: tuple[MeshPart, ...]
+    findings: tuple[str, ...] = ()
 
     @property
     def n_vertices(self) -> int:
