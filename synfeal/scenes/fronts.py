@@ -25,26 +25,16 @@ def screen(canvas: Canvas) -> Pixels:
     return bordered(sketch.pixels(), 0.05, (0.06, 0.06, 0.07))
 
 
-def books(canvas: Canvas, rows: int, palette: tuple[Colour, ...] = VIVID) -> Pixels:
-    """Shelves seen from the front, filled with book spines of random colour, width and height."""
+def spine(canvas: Canvas, colour: Colour) -> Pixels:
+    """The back of a book: cloth, two bands and a title."""
     rng = canvas.rng
-    sketch = Sketch(plaster(canvas, (0.16, 0.12, 0.09), 0.1))
-    height = 1 / rows
-    for row in range(rows):
-        x, floor = 0.02, (row + 0.93) * height
-        while x < 0.96:
-            width = rng.uniform(0.018, 0.05) / max(canvas.size_m[0], 0.4)
-            if rng.random() < 0.88:
-                top = floor - height * rng.uniform(0.55, 0.85)
-                colour = shade(pick(rng, palette), rng.uniform(0.6, 1.3))
-                sketch.rectangle(x, top, min(x + width, 0.98), floor, colour)
-                band = top + (floor - top) * rng.uniform(0.1, 0.7)
-                sketch.rectangle(
-                    x, band, min(x + width, 0.98), band + 0.1 * height, shade(colour, 1.8)
-                )
-            x += width * 1.06
-        sketch.rectangle(0, floor, 1, (row + 1) * height, (0.5, 0.38, 0.24))
-    return bordered(sketch.pixels(), 0.02, (0.5, 0.38, 0.24))
+    sketch = Sketch(plaster(canvas, colour, 0.06, 0.03))
+    bands = shade(pick(rng, VIVID), rng.uniform(0.6, 1.6))
+    for y in (rng.uniform(0.06, 0.15), rng.uniform(0.8, 0.92)):
+        sketch.rectangle(0, y, 1, y + 0.04, bands)
+    top = rng.uniform(0.2, 0.4)
+    sketch.text_lines(rng, (0.2, top, 0.85, top + rng.uniform(0.2, 0.35)), 6, shade(bands, 1.4))
+    return sketch.pixels()
 
 
 def door(canvas: Canvas, colour: Colour, window: bool = False) -> Pixels:

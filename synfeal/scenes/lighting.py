@@ -1,4 +1,4 @@
-"""Light that is baked into the textures: lamps and sun with shadows, sky light with occlusion."""
+"""Light that is baked into the textures: lamps and sun with shadows, and what surfaces pass on."""
 
 from __future__ import annotations
 
@@ -8,12 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from synfeal.mesh.rays import RayCaster
 from synfeal.scenes.canvas import Colour
-from synfeal.scenes.patches import Block
+from synfeal.scenes.grids import Surface
 
 Vectors = NDArray[np.float32]
 LIFT_M = 0.015  # rays start this far in front of their surface
-N_SKY_RAYS = 14
+N_SKY_RAYS = 40
+N_BOUNCES = 3
+CHUNK = 1 << 14
+MEDIAN_LIGHT = 0.62  # what the median surface receives after exposure; 1 shows the bare albedo
+GLOW = 1.2  # radiance of a surface that shines by itself
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,6 @@ class Lighting:
         ambient: (2, 2, 2, 3) ambient light at its corners by x, y, z; linear in between.
         lamps: local sources.
         sun: sunlight through openings, if any.
-        shell: blocks outside of the room that darken its corners but let the sun in.
         reach_m: how far away something still darkens the ambient light.
     """
 
@@ -55,24 +59,12 @@ class Lighting:
     ambient: NDArray[np.float32]
     lamps: Sequence[Lamp]
     sun: Sun | None
-    shell: Sequence[Block]
-    reach_m: float = 1.0
+    reach_m: float = 1.5
 
-    def tone(self, points_m: Vectors, normals: Vectors, blocks: Sequence[Block]) -> Vectors:
-        """Factors (N, 3) on display-referred albedo at surface points (N, 3)."""
-        origins = points_m + np.float32(LIFT_M) * normals
-        light = self._ambient_light(points_m, normals)
-        light *= _openness(origins, normals, [*blocks, *self.shell], self.reach_m)[:, None]
-        for lamp in self.lamps:
-            light += _lamp_light(lamp, origins, normals, blocks)
-        if self.sun is not None:
-            light += _sun_light(self.sun, origins, normals, blocks)
-        return np.asarray(light ** np.float32(1 / 2.2), np.float32)
-
-    def _ambient_light(self, points: Vectors, normals: Vectors) -> Vectors:
+    def ambient_at(self, points: Vectors) -> Vectors:
+        """Ambient light (N, 3) at points (N, 3)."""
         lower, upper = _single(self.lower_m), _single(self.upper_m)
-        # Light arrives from the side a surface faces, so it is looked up a metre in front of it.
-        share = np.clip((points + normals - lower) / (upper - lower), 0, 1)
+        share = np.clip((points - lower) / (upper - lower), 0, 1)
         value = self.ambient.astype(np.float32)[None]
         for axis in range(3):
             along = share[:, axis].reshape(-1, *[1] * (value.ndim - 2))
@@ -84,44 +76,51 @@ def _single(values: ArrayLike) -> NDArray[np.float32]:
     return np.asarray(values, np.float32)
 
 
-def first_hit(origins: Vectors, segments: Vectors, blocks: Sequence[Block]) -> NDArray[np.float32]:
-    """Share (N,) of each segment (N, 3) before a block: 1 if all is free, 0 from inside one."""
-    free = np.ones(len(origins), np.float32)
-    for block in _within_reach(origins, segments, blocks):
-        cos, sin = np.float32(np.cos(block.yaw_rad)), np.float32(np.sin(block.yaw_rad))
-        start = origins - _single(block.centre_m)
-        enter = np.zeros(len(origins), np.float32)
-        leave = np.ones(len(origins), np.float32)
-        local = (
-            (cos * start[:, 0] + sin * start[:, 1], cos * segments[:, 0] + sin * segments[:, 1]),
-            (cos * start[:, 1] - sin * start[:, 0], cos * segments[:, 1] - sin * segments[:, 0]),
-            (start[:, 2], segments[:, 2]),
-        )
-        for (at, step), half in zip(local, _single(block.half_m), strict=True):
-            inverse = 1 / np.where(np.abs(step) < 1e-9, np.float32(1e-9), step)
-            middle, reach = -at * inverse, half * np.abs(inverse)
-            np.maximum(enter, middle - reach, out=enter)
-            np.minimum(leave, middle + reach, out=leave)
-        np.minimum(free, np.where(enter <= leave, enter, np.float32(1)), out=free)
-    return free
+def baked(
+    surface: Surface, albedo: Vectors, glow: NDArray[np.float32], lighting: Lighting
+) -> Vectors:
+    """Factors (V, 3) on display-referred albedo, after exposure.
+
+    Args:
+        surface: what receives, blocks and passes on the light.
+        albedo: (V, 3) linear.
+        glow: (V,) see :class:`synfeal.scenes.patches.Patch`.
+        lighting: where the light comes from.
+    """
+    caster = RayCaster(surface.points_m, surface.faces)
+    normals = surface.normals.astype(np.float32)
+    origins = surface.inner_m.astype(np.float32) + np.float32(LIFT_M) * normals
+    openness, hits = _gather_rays(caster, origins, normals, lighting.reach_m)
+    first = lighting.ambient_at(origins + normals) * openness[:, None]
+    for lamp in lighting.lamps:
+        first += _lamp_light(lamp, origins, normals, caster)
+    if lighting.sun is not None:
+        first += _sun_light(lighting.sun, origins, normals, caster)
+    light = first
+    for _ in range(N_BOUNCES):
+        radiance = albedo * light + np.float32(GLOW) * glow[:, None] * albedo
+        light = first + _gathered(radiance[surface.faces].mean(axis=1), hits)
+    exposed = light * np.float32(MEDIAN_LIGHT / np.median(light))
+    return np.asarray(exposed ** np.float32(1 / 2.2), np.float32)
 
 
-def _within_reach(origins: Vectors, segments: Vectors, blocks: Sequence[Block]) -> list[Block]:
-    """The blocks whose bounding sphere touches the box around all segments; the others are free."""
-    if not len(origins):
-        return []
-    ends = origins + segments
-    lower = np.minimum(origins.min(axis=0), ends.min(axis=0))
-    upper = np.maximum(origins.max(axis=0), ends.max(axis=0))
-    near = []
-    for block in blocks:
-        nearest = np.clip(block.centre_m, lower, upper)
-        if np.linalg.norm(nearest - block.centre_m) <= np.linalg.norm(block.half_m):
-            near.append(block)
-    return near
+def _gather_rays(
+    caster: RayCaster, origins: Vectors, normals: Vectors, reach_m: float
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Openness (N,) and the faces (N, K) hit by cosine-distributed rays, −1 where there is none.
+
+    Openness is the mean free length of the rays up to ``reach_m``, floored at one fifth.
+    """
+    total = np.zeros(len(origins), np.float32)
+    hits = np.empty((len(origins), N_SKY_RAYS), np.int32)
+    for index, direction in enumerate(_sky_directions(normals)):
+        free, hits[:, index] = caster.first_hits(origins, direction)
+        total += np.minimum(free / reach_m, 1).astype(np.float32)
+    return np.asarray(0.2 + 0.8 * total / N_SKY_RAYS, np.float32), hits
 
 
 def _sky_directions(normals: Vectors) -> list[Vectors]:
+    """K directions (N, 3), cosine-distributed around every normal, the same pattern for all."""
     index = np.arange(N_SKY_RAYS) + 0.5
     radius, angle = np.sqrt(index / N_SKY_RAYS), index * np.pi * (3 - np.sqrt(5))
     helper = np.where(np.abs(normals[:, 2:]) < 0.9, _single([0, 0, 1]), _single([1, 0, 0]))
@@ -134,34 +133,33 @@ def _sky_directions(normals: Vectors) -> list[Vectors]:
     ]
 
 
-def _openness(
-    origins: Vectors, normals: Vectors, blocks: Sequence[Block], reach_m: float
-) -> NDArray[np.float32]:
-    """Ambient occlusion (N,): mean free length of cosine-distributed rays, floored at one fifth."""
-    directions = _sky_directions(normals)
-    total = np.zeros(len(origins), np.float32)
-    for direction in directions:
-        total += first_hit(origins, np.float32(reach_m) * direction, blocks)
-    return np.asarray(0.2 + 0.8 * total / len(directions), np.float32)
+def _gathered(radiance: Vectors, hits: NDArray[np.int32]) -> Vectors:
+    """Mean radiance (N, 3) of the faces each point's rays hit; the outside is dark."""
+    padded = np.concatenate([radiance, np.zeros((1, 3), np.float32)])  # where −1 points to
+    means = [
+        padded[hits[start : start + CHUNK]].mean(axis=1) for start in range(0, len(hits), CHUNK)
+    ]
+    return np.concatenate(means)
 
 
-def _lamp_light(lamp: Lamp, origins: Vectors, normals: Vectors, blocks: Sequence[Block]) -> Vectors:
+def _lamp_light(lamp: Lamp, origins: Vectors, normals: Vectors, caster: RayCaster) -> Vectors:
     towards = _single(lamp.position_m) - origins
-    distance = np.linalg.norm(towards, axis=1)
+    distance = np.maximum(np.linalg.norm(towards, axis=1), np.float32(1e-3))
     facing = np.sum(towards * normals, axis=1) / distance
     leaving = -towards @ _single(lamp.axis) / distance
     strength = np.clip(facing, 0, 1) * np.clip(leaving, 0, 1) / (distance**2 + np.float32(0.15))
     reached = np.flatnonzero(strength > 1e-3)
-    visible = first_hit(origins[reached], np.float32(0.97) * towards[reached], blocks) >= 1
+    # A lamp hangs in or behind the panel that stands for it, so the last stretch does not count.
+    visible = caster.sees(origins[reached], origins[reached] + 0.94 * towards[reached])
     light = np.zeros((len(origins), 3), np.float32)
     light[reached] = (strength[reached] * visible)[:, None] * _single(lamp.colour)
     return light
 
 
-def _sun_light(sun: Sun, origins: Vectors, normals: Vectors, blocks: Sequence[Block]) -> Vectors:
+def _sun_light(sun: Sun, origins: Vectors, normals: Vectors, caster: RayCaster) -> Vectors:
     towards = -_single(sun.direction) / np.float32(np.linalg.norm(sun.direction))
     strength = np.clip(normals @ towards, 0, 1)
-    for_any = np.zeros(len(origins), bool)
+    light = np.zeros((len(origins), 3), np.float32)
     for lower, upper in sun.openings:
         low, high = np.minimum(lower, upper), np.maximum(lower, upper)
         axis = int(np.argmin(high - low))
@@ -169,10 +167,9 @@ def _sun_light(sun: Sun, origins: Vectors, normals: Vectors, blocks: Sequence[Bl
         at = origins + travel[:, None] * towards
         others = [other for other in range(3) if other != axis]
         inside = np.all((at[:, others] > low[others]) & (at[:, others] < high[others]), axis=1)
-        for_any |= inside & (travel > 0)
-    lit = np.flatnonzero(for_any & (strength > 0))
-    segments = np.broadcast_to(np.float32(8) * towards, (len(lit), 3))
-    visible = first_hit(origins[lit], segments, blocks) >= 1
-    light = np.zeros((len(origins), 3), np.float32)
-    light[lit] = (strength[lit] * visible)[:, None] * _single(sun.colour)
+        lit = np.flatnonzero(inside & (travel > 0) & (strength > 0))
+        # The window itself is a surface of the mesh; what is in front of it blocks the light.
+        reach = np.maximum(travel[lit] - 0.12, 0)[:, None]
+        visible = caster.sees(origins[lit], origins[lit] + reach * towards)
+        light[lit] += (strength[lit] * visible)[:, None] * _single(sun.colour)
     return light

@@ -6,64 +6,45 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from synfeal.scenes.canvas import Painter
-from synfeal.scenes.patches import Block, Item, Patch, Points, bilinear, paint
+from synfeal.scenes.patches import Item, Patch, Points, paint
 
 
-def sheet(corners_m: ArrayLike, cell_m: float | None = None) -> Points:
+def sheet(corners_m: ArrayLike) -> Points:
     """A grid over four corners (4, 3): top left, top right, bottom right, bottom left.
 
-    Left and right are as seen from its front. It is divided into cells of about ``cell_m``, if
-    given.
+    Left and right are as seen from its front.
     """
     top_left, top_right, bottom_right, bottom_left = np.asarray(corners_m, np.float64)
-    corners = np.array([[top_left, top_right], [bottom_left, bottom_right]])
-    if cell_m is None:
-        return corners
-    n_rows = max(1, round(float(np.linalg.norm(top_left - bottom_left)) / cell_m))
-    n_columns = max(1, round(float(np.linalg.norm(top_left - top_right)) / cell_m))
-    grid = bilinear(corners, np.linspace(0, 1, n_rows + 1), np.linspace(0, 1, n_columns + 1))
-    return np.asarray(grid, np.float64)
-
-
-def bumpy(rng: np.random.Generator, points_m: Points, height_m: float) -> Points:
-    """The grid pushed to its front by up to ``height_m``; its rim stays, so seams stay closed."""
-    down, right = np.gradient(points_m, axis=0), np.gradient(points_m, axis=1)
-    normals = np.cross(down, right)
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    height = rng.uniform(0, height_m, points_m.shape[:2])
-    height[[0, -1]] = 0
-    height[:, [0, -1]] = 0
-    return points_m + height[..., None] * normals
+    return np.array([[top_left, top_right], [bottom_left, bottom_right]])
 
 
 def upright(
     start_xy: tuple[float, float], end_xy: tuple[float, float], low_m: float, high_m: float,
-    cell_m: float | None = None, end_high_m: float | None = None,
+    end_high_m: float | None = None,
 ) -> Points:  # fmt: skip
     """A vertical sheet; from its front, ``start_xy`` is on the left and ``end_xy`` on the right."""
     top_right = high_m if end_high_m is None else end_high_m
     corners = [(*start_xy, high_m), (*end_xy, top_right), (*end_xy, low_m), (*start_xy, low_m)]
-    return sheet(corners, cell_m)
+    return sheet(corners)
 
 
 def level(
-    x_m: tuple[float, float], y_m: tuple[float, float], z_m: float,
-    cell_m: float | None = None, face_down: bool = False,
-) -> Points:  # fmt: skip
+    x_m: tuple[float, float], y_m: tuple[float, float], z_m: float, face_down: bool = False
+) -> Points:
     """A horizontal sheet that faces up (a floor) or down (a ceiling)."""
     x0, x1 = x_m[::-1] if face_down else x_m
     y0, y1 = y_m
-    return sheet([(x0, y1, z_m), (x1, y1, z_m), (x1, y0, z_m), (x0, y0, z_m)], cell_m)
+    return sheet([(x0, y1, z_m), (x1, y1, z_m), (x1, y0, z_m), (x0, y0, z_m)])
 
 
 def box(
     rng: np.random.Generator, size_m: tuple[float, float, float], painter: Painter, px_per_m: float,
-    faces: str = "fblrtu", front: Painter | None = None, casts: bool = True,
+    faces: str = "fblrtu", front: Painter | None = None,
 ) -> Item:  # fmt: skip
     """A box on z = 0, centred in x and y.
 
     ``faces`` names those built: front (−y), back, left (−x), right, top, under. ``front`` paints
-    the front differently; a box that ``casts`` is a block for the light.
+    the front differently.
     """
     half_x, half_y, high = size_m[0] / 2, size_m[1] / 2, size_m[2]
     sides = {
@@ -78,13 +59,12 @@ def box(
         paint(rng, sides[face], front if face == "f" and front is not None else painter, px_per_m)
         for face in faces
     )
-    block = Block(np.array([0, 0, high / 2]), np.array([half_x, half_y, high / 2]))
-    return Item(patches, (block,) if casts else ())
+    return Item(patches)
 
 
 def turned(
     rng: np.random.Generator, profile_m: ArrayLike, painter: Painter, px_per_m: float,
-    segments: int = 16, casts: bool = True,
+    segments: int = 16,
 ) -> Item:  # fmt: skip
     """A surface of revolution about z: ``profile_m`` (K, 2) is (radius, z) from top to bottom."""
     profile = np.asarray(profile_m, np.float64)
@@ -98,11 +78,7 @@ def turned(
         axis=-1,
     )
     points[:, -1] = points[:, 0]
-    patch = paint(rng, points, painter, px_per_m)
-    low, high = profile[:, 1].min(), profile[:, 1].max()
-    half = 0.6 * np.median(profile[:, 0])  # well inside the surface, so it does not shade itself
-    block = Block(np.array([0, 0, (low + high) / 2]), np.array([half, half, (high - low) / 2]))
-    return Item((patch,), (block,) if casts else ())
+    return Item((paint(rng, points, painter, px_per_m),))
 
 
 def tube(
@@ -119,7 +95,7 @@ def tube(
     other = np.cross(tangent, side)
     angle = np.linspace(0, 2 * np.pi, segments + 1)[None, :, None]
     points = path[:, None] + radius_m * (
-        np.cos(angle) * side[:, None] + np.sin(angle) * other[:, None]
+        np.cos(angle) * side[:, None] - np.sin(angle) * other[:, None]
     )
     points[:, -1] = points[:, 0]
     return paint(rng, points, painter, px_per_m)
@@ -134,8 +110,6 @@ def on_wall(
     width, height = size_m
     face = upright((-width / 2, -depth_m), (width / 2, -depth_m), -height / 2, height / 2)
     front = paint(rng, face, painter, px_per_m, glow)
-    rim = box(
-        rng, (width, depth_m, height), lambda c: c.plain((0.3, 0.3, 0.3)), 40, "lrtu", casts=False
-    )
+    rim = box(rng, (width, depth_m, height), lambda c: c.plain((0.3, 0.3, 0.3)), 40, "lrtu")
     rim = rim.placed(0, -depth_m / 2, -height / 2)
     return Item((front, *rim.patches)).placed(*centre_m, yaw_deg)

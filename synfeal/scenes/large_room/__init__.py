@@ -7,20 +7,26 @@ boards, cabinets and light that differs from wall to wall make every pose decida
 from __future__ import annotations
 
 from synfeal.mesh.model import TexturedMesh
-from synfeal.scenes.atlas import baked_mesh
-from synfeal.scenes.enclosure import ambient_corners, shell_blocks
+from synfeal.scenes.ambient import ambient_corners
+from synfeal.scenes.bake import scanned_mesh
 from synfeal.scenes.large_room.boards import SILL_M, WINDOW_M, WINDOWS_Y_M, boards
 from synfeal.scenes.large_room.contents import LAMP_STRENGTHS, LAMPS_M, contents
 from synfeal.scenes.large_room.shell import HEIGHT_M, LENGTH_M, WIDTH_M, shell
 from synfeal.scenes.lighting import Lamp, Lighting, Sun
+from synfeal.scenes.patches import joined
+from synfeal.scenes.scan import Scanner, stations
 from synfeal.seeds import generator_of
+
+LOWER_M, UPPER_M = (0.0, 0.0, 0.0), (WIDTH_M, LENGTH_M, HEIGHT_M)
+CELL_M = 0.0456  # gives the paper's number of faces
 
 
 def build(seed: int) -> TexturedMesh:
     """The laboratory; x 0 – 5 (windows at 0), y 0 – 6.6 (door at 0), z 0 – 2.71 m."""
     rng = generator_of("scene", "large_room", seed)
-    groups = {"shell": shell(rng), "boards": boards(rng), "furniture": contents(rng)}
-    return baked_mesh(groups, _lighting())
+    everything = joined([shell(rng), boards(rng), contents(rng)])
+    scanner = Scanner(CELL_M, stations(LOWER_M, UPPER_M, (2, 3, 1)), LOWER_M, UPPER_M)
+    return scanned_mesh(rng, everything, _lighting(), scanner)
 
 
 def _lighting() -> Lighting:
@@ -43,5 +49,4 @@ def _lighting() -> Lighting:
         ((0.0, y - half, SILL_M), (0.0, y + half, SILL_M + WINDOW_M[1])) for y in WINDOWS_Y_M[1:]
     )
     sun = Sun((0.75, -0.42, -0.62), (2.0, 1.6, 1.0), openings)
-    lower, upper = (0.0, 0.0, 0.0), (WIDTH_M, LENGTH_M, HEIGHT_M)
-    return Lighting(lower, upper, ambient, [*daylight, *ceiling], sun, shell_blocks(lower, upper))
+    return Lighting(LOWER_M, UPPER_M, ambient, [*daylight, *ceiling], sun)

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from synfeal.scenes import fronts, furniture, materials
+from synfeal.scenes import clutter, fronts, furniture, materials
 from synfeal.scenes.canvas import Colour, Painter
 from synfeal.scenes.large_room.boards import BEECH
 from synfeal.scenes.large_room.shell import HEIGHT_M, LENGTH_M, WHITE, WIDTH_M
@@ -45,7 +45,7 @@ DIFFUSER: Painter = partial(
 
 def contents(rng: Generator) -> Item:
     """All things with volume; nothing sticks out of the room."""
-    things = joined([_desks(rng), _storage(rng), _lamps(rng), _fittings(rng)])
+    things = joined([_desks(rng), _storage(rng), _lamps(rng), _fittings(rng), _small_things(rng)])
     return things.clipped(INNER_LOWER_M, INNER_UPPER_M)
 
 
@@ -55,12 +55,12 @@ def _desks(rng: Generator) -> Item:
     for x, y, yaw, colour in DESKS:
         desk = furniture.table(rng, (1.4, 0.7, 0.74), BEECH)
         screens = [furniture.monitor(rng).placed(dx, 0.18, 0.74) for dx in (-0.32, 0.32)]
-        stuff = furniture.clutter(rng, 1.2, 0.6).placed(0, 0, 0.74)
+        stuff = clutter.on_table(rng, 1.2, 0.6).placed(0, 0, 0.74)
         turn = 180 + rng.uniform(-50, 50)
         seat = furniture.chair(rng, colour).placed(rng.uniform(-0.3, 0.3), -0.6, 0, turn)
         things.append(joined([desk, *screens, stuff, seat]).placed(x, y, 0, yaw))
     island = furniture.table(rng, (0.9, 1.9, 0.74), OAK)
-    stuff = furniture.clutter(rng, 0.8, 1.7).placed(0, 0, 0.74)
+    stuff = clutter.on_table(rng, 0.8, 1.7).placed(0, 0, 0.74)
     lone = furniture.monitor(rng).placed(0.1, 0.6, 0.74, 25)
     return joined([*things, joined([island, stuff, lone]).placed(2.55, 3.5)])
 
@@ -84,8 +84,35 @@ def _storage(rng: Generator) -> Item:
             large.placed(4.72, 1.8, 1.2, -80),
             small.placed(4.77, 0.5, 1.95, -95),
             waste.placed(3.1, 6.3),
-            furniture.plant(rng, 1.1, (0.6, 0.3, 0.2)).placed(4.75, 5.95),
-            furniture.plant(rng, 0.5, (0.85, 0.85, 0.8), 24).placed(0.2, 3.3, 0.94),
+            clutter.plant(rng, 1.1, (0.6, 0.3, 0.2), 110).placed(4.75, 5.95),
+            clutter.plant(rng, 0.5, (0.85, 0.85, 0.8), 60).placed(0.2, 3.3, 0.94),
+        ]
+    )
+
+
+def _small_things(rng: Generator) -> Item:
+    """Shelves with bottles, pinned sheets of paper, coats, files on cupboards, more plants."""
+    sheets = [
+        *((WIDTH_M, y, z, -90) for y, z in ((2.6, 1.95), (2.85, 1.5), (4.0, 1.95), (4.75, 2.05))),
+        *((x, LENGTH_M, z, 0) for x, z in ((2.0, 2.3), (2.95, 1.5), (0.45, 1.35), (0.6, 2.3))),
+        *((0.0, y, z, 90) for y, z in ((2.15, 1.95), (2.4, 1.5), (4.35, 1.9), (6.35, 1.6))),
+        *((x, 0.0, z, 180) for x, z in ((2.2, 1.95), (0.72, 1.75), (2.1, 0.95))),
+    ]
+    files = partial(clutter.books, rng)
+    plant = partial(clutter.plant, rng)
+    return joined(
+        [
+            *(clutter.pinned_page(rng).placed(x, y, z, yaw) for x, y, z, yaw in sheets),
+            clutter.wall_shelf(rng, 1.2, 11).placed(WIDTH_M, 4.85, 1.42, -90),
+            clutter.wall_shelf(rng, 0.9, 8).placed(1.9, LENGTH_M, 1.25),
+            clutter.coat(rng, (0.2, 0.22, 0.28)).placed(0.68, 0.0, 1.65, 180),
+            clutter.coat(rng, (0.92, 0.92, 0.9)).placed(2.35, 0.0, 1.6, 180),
+            files(0.9, 0.25, 0.3).placed(WIDTH_M - 0.2, 2.05, 1.2, -90),
+            files(0.5, 0.25, 0.32).placed(0.35, 0.25, 1.85, 180),
+            files(0.8, 0.28, 0.3).placed(2.55, 4.3, 0.74, 180),
+            plant(0.55, (0.3, 0.35, 0.6), 70).placed(2.5, 2.75, 0.74),
+            plant(0.5, (0.7, 0.4, 0.25), 60).placed(4.3, 0.35, 0.95),
+            plant(0.6, (0.5, 0.5, 0.5), 70).placed(0.15, 1.0, 0.94),
         ]
     )
 
@@ -94,7 +121,7 @@ def _lamps(rng: Generator) -> Item:
     """Six ceiling lamps; a dark one looks dark."""
     z, things = HEIGHT_M - 0.06, []
     for (x, y), strength in zip(LAMPS_M, LAMP_STRENGTHS, strict=True):
-        frame = box(rng, (0.3, 1.2, 0.06), painted(WHITE), 60, "fblr", casts=False)
+        frame = box(rng, (0.3, 1.2, 0.06), painted(WHITE), 60, "fblr")
         panel = level((x - 0.15, x + 0.15), (y - 0.6, y + 0.6), z, face_down=True)
         shining = paint(rng, panel, DIFFUSER, 120, glow=0.95 if strength > 0.1 else 0.1)
         things += [frame.placed(x, y, z), Item((shining,))]
@@ -114,7 +141,7 @@ def _fittings(rng: Generator) -> Item:
         [
             Item((tube(rng, pipe, 0.07, painted((0.75, 0.15, 0.1)), 80, 10), *cables)),
             box(rng, (0.3, 0.3, z), CONCRETE, 200, "fblr").placed(1.55, 4.6),
-            box(rng, (0.31, 0.31, 0.4), HAZARD, 200, "fblrt", casts=False).placed(1.55, 4.6, 0.9),
+            box(rng, (0.31, 0.31, 0.4), HAZARD, 200, "fblrt").placed(1.55, 4.6, 0.9),
             tray.placed(0.6, y / 2, z - 0.3),
         ]
     )

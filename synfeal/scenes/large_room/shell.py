@@ -9,11 +9,10 @@ import numpy as np
 from synfeal.scenes import materials
 from synfeal.scenes.canvas import Canvas, Colour, Pixels
 from synfeal.scenes.patches import Item, paint
-from synfeal.scenes.primitives import bumpy, level, upright
+from synfeal.scenes.primitives import level, upright
 
 WIDTH_M, LENGTH_M = 5.0, 6.6
 HEIGHT_M = 89.4 / (WIDTH_M * LENGTH_M)  # the volume the paper prints
-CELL_M = 0.09
 WHITE: Colour = (0.9, 0.9, 0.88)
 TILES: tuple[Colour, ...] = ((0.85, 0.85, 0.82), (0.8, 0.8, 0.78))
 
@@ -30,10 +29,10 @@ def shell(rng: np.random.Generator) -> Item:
     )
     patches = []
     for start, end, colour, lower in surfaces:
-        points = bumpy(rng, upright(start, end, 0, z, CELL_M), 0.006)
+        points = upright(start, end, 0, z)
         patches.append(paint(rng, points, partial(wall, colour=colour, lower=lower), 125))
-    floor = bumpy(rng, level((0, x), (0, y), 0, CELL_M), 0.003)
-    ceiling = bumpy(rng, level((0, x), (0, y), z, CELL_M, face_down=True), 0.006)
+    floor = level((0, x), (0, y), 0)
+    ceiling = level((0, x), (0, y), z, face_down=True)
     return Item((*patches, paint(rng, floor, _floor, 180), paint(rng, ceiling, _ceiling, 100)))
 
 

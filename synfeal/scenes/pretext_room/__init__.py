@@ -6,8 +6,8 @@ It shares neither shape nor colours with the two scenes of the paper.
 from __future__ import annotations
 
 from synfeal.mesh.model import TexturedMesh
-from synfeal.scenes.atlas import baked_mesh
-from synfeal.scenes.enclosure import ambient_corners, shell_blocks
+from synfeal.scenes.ambient import ambient_corners
+from synfeal.scenes.bake import scanned_mesh
 from synfeal.scenes.lighting import Lamp, Lighting, Sun
 from synfeal.scenes.patches import joined
 from synfeal.scenes.pretext_room.contents import (
@@ -19,21 +19,20 @@ from synfeal.scenes.pretext_room.contents import (
     wall_hangings,
 )
 from synfeal.scenes.pretext_room.shell import HIGH_M, SIDE_M, ceiling_m, shell
+from synfeal.scenes.scan import Scanner, stations
 from synfeal.seeds import generator_of
+
+LOWER_M, UPPER_M = (0.0, 0.0, 0.0), (SIDE_M, SIDE_M, HIGH_M)
+CELL_M = 0.08  # nobody compares this one with a scan, so it may be coarser
 
 
 def build(seed: int) -> TexturedMesh:
     """The loft; x, y 0 – 5 with one corner cut off, z 0 – 3.1 m."""
     rng = generator_of("scene", "pretext_room", seed)
-    groups = {
-        "shell": shell(rng),
-        "pictures": wall_hangings(rng),
-        "furniture": joined([kitchen(rng), living(rng), structure(rng)]),
-    }
-    inside = {
-        name: item.clipped((0, 0, 0), (SIDE_M, SIDE_M, HIGH_M)) for name, item in groups.items()
-    }
-    return baked_mesh(inside, _lighting())
+    parts = [shell(rng), wall_hangings(rng), kitchen(rng), living(rng), structure(rng)]
+    inside = joined(parts).clipped(LOWER_M, UPPER_M)
+    scanner = Scanner(CELL_M, stations(LOWER_M, UPPER_M, (2, 2, 1)), LOWER_M, UPPER_M)
+    return scanned_mesh(rng, inside, _lighting(), scanner)
 
 
 def _lighting() -> Lighting:
@@ -49,5 +48,4 @@ def _lighting() -> Lighting:
     )
     (x0, x1), (y0, y1), height = SKYLIGHT_X_M, SKYLIGHT_Y_M, ceiling_m(sum(SKYLIGHT_Y_M) / 2)
     sun = Sun((-0.2, -0.75, -0.8), (1.2, 1.0, 0.7), (((x0, y0, height), (x1, y1, height)),))
-    lower, upper = (0.0, 0.0, 0.0), (SIDE_M, SIDE_M, HIGH_M)
-    return Lighting(lower, upper, ambient, lamps, sun, shell_blocks(lower, upper))
+    return Lighting(LOWER_M, UPPER_M, ambient, lamps, sun)

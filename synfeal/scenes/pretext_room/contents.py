@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from synfeal.scenes import fronts, furniture, materials, pictures
+from synfeal.scenes import clutter, fronts, furniture, materials, pictures
 from synfeal.scenes.canvas import Colour, Painter
 from synfeal.scenes.materials import painted
 from synfeal.scenes.patches import Item, joined, paint
@@ -97,7 +97,7 @@ def kitchen(rng: Generator) -> Item:
             furniture.cabinet(rng, hanging, rust).placed(0.17, 1.0, 1.55, 90),
             furniture.cabinet(rng, hanging, cream).placed(0.17, 2.4, 1.55, 90),
             box(rng, (2.45, 0.62, 0.04), GRANITE, 180).placed(0.32, 1.75, 0.86, 90),
-            furniture.clutter(rng, 2.2, 0.5).placed(0.3, 1.75, 0.9, 90),
+            clutter.on_table(rng, 2.2, 0.5).placed(0.3, 1.75, 0.9, 90),
             box(rng, (0.6, 0.58, 1.8), steel, 140, "flrt").placed(0.31, 3.3, 0, 90),
         ]
     )
@@ -108,19 +108,19 @@ def living(rng: Generator) -> Item:
     chairs = [furniture.chair(rng, colour).placed(x, y, 0, yaw) for x, y, yaw, colour in CHAIRS]
     dining = [
         furniture.table(rng, (1.3, 0.85, 0.75), WALNUT).placed(2.45, 1.9),
-        furniture.clutter(rng, 1.1, 0.75).placed(2.45, 1.9, 0.75),
+        clutter.on_table(rng, 1.1, 0.75).placed(2.45, 1.9, 0.75),
     ]
     return joined(
         [
             *chairs,
             *dining,
-            Item((paint(rng, level((2.4, 4.0), (2.9, 4.3), 0.012, 0.2), KILIM, 220),)),
+            Item((paint(rng, level((2.4, 4.0), (2.9, 4.3), 0.012), KILIM, 220),)),
             furniture.sofa(rng, 1.9, TICKING).placed(4.5, 2.1, 0, -90),
             furniture.bookshelf(rng, (1.0, 0.32, 1.9), 5).placed(1.0, 4.83),
             furniture.bookshelf(rng, (0.8, 0.3, 1.1), 3).placed(2.3, 4.84),
             _floor_lamp(rng).placed(0.35, 4.55),
-            furniture.plant(rng, 1.3, (0.3, 0.35, 0.6), 46).placed(4.5, 0.5),
-            furniture.plant(rng, 0.6, (0.85, 0.5, 0.2), 30).placed(3.85, 4.4),
+            clutter.plant(rng, 1.3, (0.3, 0.35, 0.6), 46).placed(4.5, 0.5),
+            clutter.plant(rng, 0.6, (0.85, 0.5, 0.2), 30).placed(3.85, 4.4),
         ]
     )
 
@@ -130,8 +130,8 @@ def _floor_lamp(rng: Generator) -> Item:
     cloth = partial(materials.fabric, colour=(0.95, 0.8, 0.55))
     return joined(
         [
-            turned(rng, foot, painted((0.1, 0.1, 0.1)), 70, 10, casts=False),
-            turned(rng, [(0.12, 1.75), (0.22, 1.4)], cloth, 140, 14, casts=False),
+            turned(rng, foot, painted((0.1, 0.1, 0.1)), 70, 10),
+            turned(rng, [(0.12, 1.75), (0.22, 1.4)], cloth, 140, 14),
         ]
     )
 

@@ -9,13 +9,12 @@ import numpy as np
 from synfeal.scenes import materials
 from synfeal.scenes.canvas import Painter
 from synfeal.scenes.patches import Item, paint
-from synfeal.scenes.primitives import bumpy, sheet, upright
+from synfeal.scenes.primitives import sheet, upright
 
 SIDE_M = 5.0
 CUT_X_M, CUT_Y_M = 3.9, 3.7  # the corner at (5, 5) is cut off between (5, 3.7) and (3.9, 5)
 PLAN_M = ((0.0, 0.0), (SIDE_M, 0.0), (SIDE_M, CUT_Y_M), (CUT_X_M, SIDE_M), (0.0, SIDE_M))
 LOW_M, HIGH_M = 2.3, 3.1  # ceiling at y = 0 and at y = 5
-CELL_M = 0.09
 BRICK: Painter = partial(
     materials.masonry,
     palette=((0.58, 0.24, 0.16), (0.66, 0.32, 0.2), (0.5, 0.2, 0.15), (0.7, 0.42, 0.3)),
@@ -65,8 +64,8 @@ def shell(rng: np.random.Generator) -> Item:
     patches = []
     for index, painter in enumerate(WALLS):
         right, left = PLAN_M[index], PLAN_M[(index + 1) % len(PLAN_M)]
-        points = upright(left, right, 0, ceiling_m(left[1]), CELL_M, ceiling_m(right[1]))
-        patches.append(paint(rng, bumpy(rng, points, 0.008), painter, 130))
+        points = upright(left, right, 0, ceiling_m(left[1]), ceiling_m(right[1]))
+        patches.append(paint(rng, points, painter, 130))
     for near_x, far_x, near_y, far_y in (
         (SIDE_M, SIDE_M, 0.0, CUT_Y_M),
         (SIDE_M, CUT_X_M, CUT_Y_M, SIDE_M),
@@ -74,6 +73,6 @@ def shell(rng: np.random.Generator) -> Item:
         ground = [(0, far_y, 0), (far_x, far_y, 0), (near_x, near_y, 0), (0, near_y, 0)]
         low, high = ceiling_m(near_y), ceiling_m(far_y)
         roof = [(far_x, far_y, high), (0, far_y, high), (0, near_y, low), (near_x, near_y, low)]
-        patches.append(paint(rng, bumpy(rng, sheet(ground, CELL_M), 0.003), PARQUET, 150))
-        patches.append(paint(rng, bumpy(rng, sheet(roof, CELL_M), 0.008), PANELLING, 100))
+        patches.append(paint(rng, sheet(ground), PARQUET, 150))
+        patches.append(paint(rng, sheet(roof), PANELLING, 100))
     return Item(tuple(patches))

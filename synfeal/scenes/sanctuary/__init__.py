@@ -6,27 +6,27 @@ Painted vault and walls, columns, pews, a gilded altar piece: rich in texture, a
 from __future__ import annotations
 
 from synfeal.mesh.model import TexturedMesh
-from synfeal.scenes.atlas import baked_mesh
-from synfeal.scenes.enclosure import ambient_corners, shell_blocks
+from synfeal.scenes.ambient import ambient_corners
+from synfeal.scenes.bake import scanned_mesh
 from synfeal.scenes.lighting import Lamp, Lighting, Sun
 from synfeal.scenes.patches import joined
 from synfeal.scenes.sanctuary.contents import CHANDELIER_M, altar, furnishing
 from synfeal.scenes.sanctuary.shell import CROWN_M, HALF_X_M, HALF_Y_M, vault_and_floor, walls
 from synfeal.scenes.sanctuary.walls import BAYS_Y_M, portal_wall, side_walls
+from synfeal.scenes.scan import Scanner, stations
 from synfeal.seeds import generator_of
+
+LOWER_M, UPPER_M = (-HALF_X_M, -HALF_Y_M, 0.0), (HALF_X_M, HALF_Y_M, CROWN_M)
+CELL_M = 0.0399  # gives the paper's number of faces
 
 
 def build(seed: int) -> TexturedMesh:
     """The nave; altar at y = +4.25, portal at y = −4.25, x ±2.75, z 0 – 3.92 m."""
     rng = generator_of("scene", "sanctuary", seed)
-    groups = {
-        "walls": walls(rng),
-        "vault_and_floor": vault_and_floor(rng),
-        "murals": joined([side_walls(rng), portal_wall(rng)]),
-        "altar": altar(rng),
-        "furniture": furnishing(rng),
-    }
-    return baked_mesh(groups, _lighting())
+    fabric = [walls(rng), vault_and_floor(rng), side_walls(rng), portal_wall(rng)]
+    everything = joined([*fabric, altar(rng), furnishing(rng)])
+    scanner = Scanner(CELL_M, stations(LOWER_M, UPPER_M, (2, 3, 2)), LOWER_M, UPPER_M)
+    return scanned_mesh(rng, everything, _lighting(), scanner)
 
 
 def _lighting() -> Lighting:
@@ -46,5 +46,4 @@ def _lighting() -> Lighting:
         ((-HALF_X_M, bay - 0.5, 1.05), (-HALF_X_M, bay + 0.5, 2.45)) for bay in BAYS_Y_M[:2]
     )
     sun = Sun((0.8, 0.3, -0.42), (1.8, 1.4, 0.8), openings)
-    lower, upper = (-HALF_X_M, -HALF_Y_M, 0.0), (HALF_X_M, HALF_Y_M, CROWN_M)
-    return Lighting(lower, upper, ambient, lamps, sun, shell_blocks(lower, upper))
+    return Lighting(LOWER_M, UPPER_M, ambient, lamps, sun)

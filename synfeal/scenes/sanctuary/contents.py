@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from synfeal.scenes import fronts, furniture, materials, murals
+from synfeal.scenes import clutter, fronts, furniture, materials, murals
 from synfeal.scenes.canvas import Colour, Painter
 from synfeal.scenes.materials import painted
 from synfeal.scenes.patches import Item, joined
@@ -46,7 +46,7 @@ def altar(rng: Generator) -> Item:
     """Steps, table, candles and a gilded altar piece with painted panels."""
     slender = partial(turned, rng, SLENDER, fronts.gilded, 130, 12)
     candle = partial(turned, rng, ((0.006, 0.36), (0.02, 0.32), (0.02, 0.0)))
-    flowers = partial(furniture.plant, rng, 0.45, (0.75, 0.6, 0.25), 30)
+    flowers = partial(clutter.plant, rng, 0.45, (0.75, 0.6, 0.25), 30)
     wax = painted((0.95, 0.92, 0.8))
     return joined(
         [
@@ -56,10 +56,7 @@ def altar(rng: Generator) -> Item:
             box(rng, (3.1, 0.12, 2.75), fronts.gilded, 130, "flrt").placed(0, 4.18, 0.28),
             box(rng, (3.3, 0.22, 0.16), fronts.gilded, 140).placed(0, 4.1, 2.85),
             *(slender().placed(x, 4.0) for x in (-1.5, -0.6, 0.6, 1.5)),
-            *(
-                candle(wax, 80, 8, casts=False).placed(x, 3.75, 1.03)
-                for x in (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)
-            ),
+            *(candle(wax, 80, 8).placed(x, 3.75, 1.03) for x in (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)),
             *(flowers().placed(x, 3.3, 0.14) for x in (-1.25, 1.2)),
             *_altar_panels(rng),
         ]

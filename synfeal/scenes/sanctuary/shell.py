@@ -9,12 +9,11 @@ import numpy as np
 from synfeal.scenes import materials, murals
 from synfeal.scenes.canvas import Canvas, Painter, Pixels
 from synfeal.scenes.patches import Item, Points, paint
-from synfeal.scenes.primitives import bumpy, level, upright
+from synfeal.scenes.primitives import level, upright
 
 HALF_X_M, HALF_Y_M = 2.75, 4.25
 CROWN_M = 183.18 / (4 * HALF_X_M * HALF_Y_M)  # the volume the paper prints
 SPRING_M = 2.55  # where walls end and the vault begins
-CELL_M = 0.11
 WEST: Painter = partial(
     materials.wainscot, colour=(0.45, 0.58, 0.5), lower=(0.3, 0.32, 0.36), grain=0.03
 )
@@ -42,28 +41,28 @@ def walls(rng: np.random.Generator) -> Item:
     """West and east wall, altar wall (+y) and portal wall (−y)."""
     x, y = HALF_X_M, HALF_Y_M
     surfaces = (
-        (upright((-x, -y), (-x, y), 0, SPRING_M, CELL_M), WEST),
-        (upright((x, y), (x, -y), 0, SPRING_M, CELL_M), EAST),
+        (upright((-x, -y), (-x, y), 0, SPRING_M), WEST),
+        (upright((x, y), (x, -y), 0, SPRING_M), EAST),
         (_end_wall(y), ALTAR),
         (_end_wall(-y), ASHLAR),
     )
-    return Item(tuple(paint(rng, bumpy(rng, points, 0.008), p, 120) for points, p in surfaces))
+    return Item(tuple(paint(rng, points, p, 120) for points, p in surfaces))
 
 
 def vault_and_floor(rng: np.random.Generator) -> Item:
     """The painted barrel vault and the marble floor."""
-    floor = level((-HALF_X_M, HALF_X_M), (-HALF_Y_M, HALF_Y_M), 0, CELL_M)
+    floor = level((-HALF_X_M, HALF_X_M), (-HALF_Y_M, HALF_Y_M), 0)
     return Item(
         (
-            paint(rng, bumpy(rng, _vault(), 0.012), VAULT, 130),
-            paint(rng, bumpy(rng, floor, 0.003), _floor, 150),
+            paint(rng, _vault(), VAULT, 130),
+            paint(rng, floor, _floor, 150),
         )
     )
 
 
 def _vault() -> Points:
     profile = arc()
-    y = np.linspace(HALF_Y_M, -HALF_Y_M, round(2 * HALF_Y_M / CELL_M) + 1)
+    y = np.array([HALF_Y_M, -HALF_Y_M])
     points = np.empty((len(profile), len(y), 3))
     points[..., 0], points[..., 1], points[..., 2] = profile[:, :1], y, profile[:, 1:]
     return points

@@ -1,0 +1,110 @@
+"""Items and light in, a textured mesh as a scanner delivers it out."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.scenes.atlas import laid_out
+from synfeal.scenes.grids import Grid, Surface, albedo_of, jittered, surface_of
+from synfeal.scenes.lighting import Lighting, baked
+from synfeal.scenes.patches import Item, Patch, Points, bilinear
+from synfeal.scenes.scan import Scanner, scanned, seen_faces
+
+log = logging.getLogger("synfeal")
+
+
+def scanned_mesh(
+    rng: np.random.Generator, item: Item, lighting: Lighting, scanner: Scanner
+) -> TexturedMesh:
+    """Light every patch, scan the whole, and lay the pictures out in textures of 4096 a side.
+
+    Light falls on the clean surfaces; the scan then rounds and bends them and leaves out what the
+    scanner could not see. Every texture becomes one part.
+    """
+    surface = surface_of(rng, item.patches, scanner.cell_m)
+    log.info("%d patches, %d faces", len(item.patches), len(surface.faces))
+    tones = _tones(surface, item.patches, lighting)
+    pictures = [
+        _lit(patch, grid, tone)
+        for patch, grid, tone in zip(item.patches, surface.grids, tones, strict=True)
+    ]
+    points, shares = _moved(rng, surface, scanned(rng, surface, scanner))
+    seen = seen_faces(points, surface.faces, scanner.stations_m)
+    log.info("%.1f %% of the faces are seen by a station", 100 * seen.mean())
+    return _textured(surface, points, shares, seen, pictures)
+
+
+def _moved(
+    rng: np.random.Generator, surface: Surface, points_m: Points
+) -> tuple[Points, list[NDArray[np.float64]]]:
+    """Unevenly placed vertices (V, 3), and where they lie on the picture of each patch (V', 2)."""
+    pieces = zip(surface.grids, surface.per_patch(points_m), strict=True)
+    moved = [jittered(rng, grid, piece) for grid, piece in pieces]
+    return np.concatenate([points for points, _ in moved]), [shares for _, shares in moved]
+
+
+def _tones(
+    surface: Surface, patches: Sequence[Patch], lighting: Lighting
+) -> list[NDArray[np.float32]]:
+    """Light (R, C, 3) at the vertices of every patch."""
+    albedo = [
+        albedo_of(patch, grid).reshape(-1, 3)
+        for patch, grid in zip(patches, surface.grids, strict=True)
+    ]
+    sizes = [len(grid.rows) * len(grid.columns) for grid in surface.grids]
+    glow = np.repeat(np.array([patch.glow for patch in patches], np.float32), sizes)
+    return surface.per_patch(baked(surface, np.concatenate(albedo), glow, lighting))
+
+
+def _lit(patch: Patch, grid: Grid, tone: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """The picture (H, W, 3) under the light at the vertices, which is interpolated."""
+    height_px, width_px = patch.picture.shape[:2]
+    rows = np.interp((np.arange(height_px) + 0.5) / height_px, grid.rows, np.arange(len(tone)))
+    columns = np.interp(
+        (np.arange(width_px) + 0.5) / width_px, grid.columns, np.arange(tone.shape[1])
+    )
+    factor = bilinear(tone, rows, columns) * (1 - patch.glow) + patch.glow
+    return np.round(np.minimum(patch.picture * factor, 255)).astype(np.uint8)
+
+
+def _textured(
+    surface: Surface,
+    points_m: Points,
+    shares: Sequence[NDArray[np.float64]],
+    seen: NDArray[np.bool_],
+    pictures: Sequence[NDArray[np.uint8]],
+) -> TexturedMesh:
+    """The seen faces, one part for each texture."""
+    places, textures = laid_out(pictures)
+    uv = np.concatenate(
+        [
+            _uv(share, picture.shape, place, textures[place[0]].shape)
+            for share, picture, place in zip(shares, pictures, places, strict=True)
+        ]
+    )
+    atlas_of_face = np.repeat([place[0] for place in places], surface.n_faces)
+    parts = []
+    for index, texture in enumerate(textures):
+        faces = surface.faces[seen & (atlas_of_face == index)]
+        used, compact = np.unique(faces, return_inverse=True)
+        compact = compact.reshape(-1, 3)
+        parts.append(MeshPart(f"scan-{index}", points_m[used], compact, uv[used], texture))
+    return TexturedMesh(tuple(parts))
+
+
+def _uv(
+    shares: NDArray[np.float64],
+    picture: tuple[int, ...],
+    place: tuple[int, int, int],
+    texture: tuple[int, ...],
+) -> NDArray[np.float64]:
+    """Texture coordinates (V, 2), origin bottom left, of places on a picture (row, column)."""
+    _, row, column = place
+    u = (column + shares[:, 1] * picture[1]) / texture[1]
+    v = 1 - (row + shares[:, 0] * picture[0]) / texture[0]
+    return np.stack([u, v], axis=-1)
