@@ -32,6 +32,7 @@ rule all:
         f"{ROOT}/summary.md",
         f"{ROOT}/tables/all_tables.tex",
         f"{ROOT}/tables/assistance.csv",
+        f"{ROOT}/tables/speed_vs_error.csv",
         f"{ROOT}/figures",
         all_manifests(),
 

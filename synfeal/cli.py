@@ -1,11 +1,11 @@
-"""Command line: ``synfeal collect`` makes a 7-Scenes data set from a textured mesh."""
+"""Command line: a first look at a textured mesh, and a 7-Scenes data set from it."""
 
 from __future__ import annotations
 
 import argparse
 import logging
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,21 +13,14 @@ from pydantic import ValidationError
 
 from synfeal import __version__
 from synfeal.config.load import describe
+from synfeal.config.mesh_files import check_mesh_file
 from synfeal.config.models import CameraConfig, CollectionConfig, SceneConfig
 from synfeal.errors import InputError
 
+Options = tuple[tuple[str, dict[str, Any]], ...]
+
 # Flag, and what argparse is told about it.
-COLLECT_OPTIONS: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("--mesh", {"type": Path, "required": True, "help": "GLB, glTF, OBJ or PLY file"}),
-    ("--frames", {"type": int, "required": True, "help": "training frames"}),
-    ("--out", {"type": Path, "required": True, "help": "directory to create"}),
-    ("--test-frames", {"type": int, "default": 0, "help": "test frames (default: 0)"}),
-    ("--width", {"type": int, "default": 640, "help": "image width, pixels (default: 640)"}),
-    ("--height", {"type": int, "default": 480, "help": "image height, pixels (default: 480)"}),
-    ("--fov", {"type": float, "default": 60.0, "help": "horizontal field of view, degrees (60)"}),
-    ("--spacing", {"type": float, "default": 0.03, "help": "metres between frames (0.03)"}),
-    ("--seed", {"type": int, "default": 0, "help": "root of all random numbers (0)"}),
-    ("--depth", {"action": "store_true", "help": "write depth images too"}),
+MESH_OPTIONS: Options = (
     (
         "--box",
         {
@@ -39,6 +32,18 @@ COLLECT_OPTIONS: tuple[tuple[str, dict[str, Any]], ...] = (
     ),
     ("--up-axis", {"choices": ("auto", "y", "z"), "default": "auto", "help": "up in the file"}),
     ("--unit-m", {"type": float, "default": 1.0, "help": "metres per unit of the file (1)"}),
+)
+COLLECT_OPTIONS: Options = (
+    ("--mesh", {"type": Path, "required": True, "help": "GLB, glTF, OBJ or PLY file"}),
+    ("--frames", {"type": int, "required": True, "help": "training frames"}),
+    ("--out", {"type": Path, "required": True, "help": "directory to create"}),
+    ("--test-frames", {"type": int, "default": 0, "help": "test frames (default: 0)"}),
+    ("--width", {"type": int, "default": 640, "help": "image width, pixels (default: 640)"}),
+    ("--height", {"type": int, "default": 480, "help": "image height, pixels (default: 480)"}),
+    ("--fov", {"type": float, "default": 60.0, "help": "horizontal field of view, degrees (60)"}),
+    ("--spacing", {"type": float, "default": 0.03, "help": "metres between frames (0.03)"}),
+    ("--seed", {"type": int, "default": 0, "help": "root of all random numbers (0)"}),
+    ("--depth", {"action": "store_true", "help": "write depth images too"}),
     (
         "--min-view-distance",
         {"type": float, "default": 1.2, "help": "min_view_distance_m: free view of targets (1.2)"},
@@ -48,6 +53,10 @@ COLLECT_OPTIONS: tuple[tuple[str, dict[str, Any]], ...] = (
         {"type": float, "default": 1.5, "help": "min_path_m: shorter paths are drawn again (1.5)"},
     ),
 )
+INSPECT_OPTIONS: Options = (
+    ("mesh", {"type": Path, "metavar": "MESH", "help": "GLB, glTF, OBJ or PLY file"}),
+    ("--out", {"type": Path, "help": "directory to write to (<name of the mesh>-inspect)"}),
+)
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -56,17 +65,40 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"synfeal {__version__}")
     commands = parser.add_subparsers(required=True)
     collect = commands.add_parser("collect", help="make a data set from a textured mesh")
-    for flag, options in COLLECT_OPTIONS:
-        collect.add_argument(flag, **options)
-    collect.set_defaults(action=run_collect)
+    _add(collect, COLLECT_OPTIONS + MESH_OPTIONS, run_collect)
+    inspect = commands.add_parser("inspect", help="numbers, picture and 3D view of a mesh")
+    _add(inspect, INSPECT_OPTIONS + MESH_OPTIONS, run_inspect)
     return parser
+
+
+def _add(
+    parser: argparse.ArgumentParser,
+    options: Options,
+    action: Callable[[argparse.Namespace], None],
+) -> None:
+    for flag, details in options:
+        parser.add_argument(flag, **details)
+    parser.set_defaults(action=action)
+
+
+def run_inspect(arguments: argparse.Namespace) -> None:
+    """Carry out ``synfeal inspect``."""
+    from synfeal.inspect.run import inspect_mesh  # imports a renderer: not for --help
+
+    out = arguments.out or Path(f"{arguments.mesh.stem}-inspect")
+    try:
+        scene = SceneConfig.model_validate(_scene_values(arguments))
+    except ValidationError as error:
+        raise InputError(f"inspect: {describe(error)}") from None
+    print(inspect_mesh(scene, out))
+    print(f"\n{out}: inspect.html, inspect.png and inspect.json")
 
 
 def run_collect(arguments: argparse.Namespace) -> None:
     """Carry out ``synfeal collect``."""
-    from synfeal.dataset.collect import CollectJob, collect  # imports a renderer: not for --help
-
     scene, collection, camera = collect_configs(arguments)
+    from synfeal.dataset.collect import CollectJob, collect  # imports a renderer: takes seconds
+
     job = CollectJob(
         scene=scene,
         collection=collection,
@@ -92,11 +124,7 @@ def collect_configs(
     try:
         scene = SceneConfig.model_validate(
             {
-                "source": "mesh",
-                "path": arguments.mesh,
-                "up_axis": arguments.up_axis,
-                "unit_m": arguments.unit_m,
-                "sampling_box": _box(arguments.box),
+                **_scene_values(arguments),
                 "min_view_distance_m": arguments.min_view_distance,
             }
         )
@@ -113,6 +141,18 @@ def collect_configs(
     except ValidationError as error:
         raise InputError(f"collect: {describe(error)}") from None
     return scene, collection, camera
+
+
+def _scene_values(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What ``MESH_OPTIONS`` and the mesh say of a scene; the mesh must be there."""
+    check_mesh_file(arguments.mesh, "--mesh")
+    return {
+        "source": "mesh",
+        "path": arguments.mesh,
+        "up_axis": arguments.up_axis,
+        "unit_m": arguments.unit_m,
+        "sampling_box": _box(arguments.box),
+    }
 
 
 def _box(values: Sequence[float] | None) -> dict[str, Sequence[float]] | None:

@@ -35,10 +35,10 @@ from synfeal.dataset.sevenscenes import (
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
 from synfeal.geometry.rotations import rotation_from_rpy
-from synfeal.mesh.decimate import load_collision_mesh
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
+from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.scenes.prepare import prepare_scene
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
@@ -261,7 +261,7 @@ def test_a_mesh_scene_is_prepared(tmp_path: Path) -> None:
     scene = SceneConfig.model_validate(
         {"source": "mesh", "path": tmp_path / "room.glb", "sha256": sha256, "unit_m": 2.0}
     )
-    prepare_scene("room", scene, 1000, 0, tmp_path / "out")
+    prepare_scene("room", scene, 0.995, 0, tmp_path / "out")
     properties = json.loads((tmp_path / "out" / "properties.json").read_text())
     assert (properties["vertices"], properties["faces"]) == (8, 12)
     assert properties["volume_m3"] == pytest.approx(512.0)  # 4 units of 2 m, cubed
@@ -284,5 +284,5 @@ def test_a_scene_that_contradicts_its_config_is_refused(
     save_glb(tmp_path / "room.glb", room_mesh())
     scene = SceneConfig.model_validate({"source": "mesh", "path": tmp_path / "room.glb", **values})
     with pytest.raises(InputError, match=message):
-        prepare_scene("room", scene, 1000, 0, tmp_path / "out")
+        prepare_scene("room", scene, 0.995, 0, tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -212,3 +213,33 @@ def test_importing_the_interface_loads_no_renderer() -> None:
     source = Path(__file__).parents[1] / "synfeal" / "render" / "__init__.py"
     head = source.read_text().split("def open_renderer")[0]
     assert "pyrender_backend" not in head
+
+
+def test_parts_with_too_many_vertices_are_drawn_in_pieces() -> None:
+    rng = np.random.default_rng(0)
+    vertices = rng.normal(size=(300, 3))
+    faces = rng.integers(0, 300, (500, 3))
+    uv, rgb = rng.random((300, 2)), rng.integers(0, 255, (300, 3), np.uint8)
+    part = MeshPart("part", vertices, faces, uv, vertex_rgb=rgb)
+    split = list(pyrender_backend.pieces(part, most_vertices=90))
+    assert max(len(piece.vertices_m) for piece in split) <= 90
+    for name, whole in (("vertices_m", vertices), ("uv", uv), ("vertex_rgb", rgb)):
+        corners = np.concatenate([getattr(piece, name)[piece.faces] for piece in split])
+        np.testing.assert_array_equal(corners, whole[faces])
+    assert list(pyrender_backend.pieces(part, most_vertices=300)) == [part]
+
+
+def test_images_do_not_depend_on_where_the_scene_lies() -> None:
+    """In map coordinates, single precision alone would move everything by centimetres."""
+    texture = np.random.default_rng(0).integers(0, 256, (64, 64, 3), np.uint8)
+    quad = facing_quad(3.0, 1.0, texture)
+    offset = np.array([512_345.0, 5_402_678.0, 345.0])
+    far = replace(quad, vertices_m=quad.vertices_m + offset)
+    moved = LOOK_ALONG_X.copy()
+    moved[:3, 3] += offset
+    with open_renderer(TexturedMesh((quad,)), camera_of()) as renderer:
+        rgb, depth = renderer.render_rgbd(LOOK_ALONG_X)
+    with open_renderer(TexturedMesh((far,)), camera_of()) as renderer:
+        far_rgb, far_depth = renderer.render_rgbd(moved)
+    assert np.abs(rgb.astype(int) - far_rgb).max() <= 1
+    np.testing.assert_allclose(far_depth, depth, atol=1e-5)

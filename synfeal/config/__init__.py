@@ -2,6 +2,7 @@
 
 from synfeal.config.experiments import Experiment, Run, read_experiments, runs_of
 from synfeal.config.load import load_config, parse_config
+from synfeal.config.mesh_files import check_mesh_files
 from synfeal.config.models import MODELS, Config
 
 __all__ = [
@@ -9,6 +10,7 @@ __all__ = [
     "Config",
     "Experiment",
     "Run",
+    "check_mesh_files",
     "load_config",
     "parse_config",
     "read_experiments",

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.errors import InputError
-from synfeal.mesh.model import TexturedMesh
+from synfeal.mesh.model import MeshPart, TexturedMesh
 
 
 def check_mesh(mesh: TexturedMesh, path: Path) -> None:
-    """Faces, finite coordinates, valid indices and some colour.
+    """Faces, finite coordinates and some colour.
 
     Raises:
         InputError: naming ``path`` and what is missing.
@@ -26,12 +26,22 @@ def check_mesh(mesh: TexturedMesh, path: Path) -> None:
                 f"{path}: part '{part.name}' has {bad.sum()} vertices that are NaN or infinite;"
                 " repair the mesh"
             )
-        if part.faces.min() < 0 or part.faces.max() >= len(part.vertices_m):
-            raise InputError(f"{path}: part '{part.name}' has faces that name vertices it lacks")
     if not has_colour(mesh):
         raise InputError(
             f"{path}: has neither a texture nor vertex colours; images would be of one colour."
             " Export it with its texture"
+        )
+
+
+def check_indices(part: MeshPart, path: Path) -> None:
+    """Every face names vertices that are there.
+
+    Raises:
+        InputError: naming ``path`` and the part.
+    """
+    if part.faces.min() < 0 or part.faces.max() >= len(part.vertices_m):
+        raise InputError(
+            f"{path}: part '{part.name}' has faces that name vertices it lacks; export it again"
         )
 
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import io
+import json
+import logging
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,14 +14,20 @@ import trimesh
 from numpy.typing import NDArray
 
 from synfeal.errors import InputError
-from synfeal.mesh.checks import check_mesh
-from synfeal.mesh.materials import BaseMaterial, reduce_material
+from synfeal.mesh.checks import check_indices, check_mesh
+from synfeal.mesh.colours import part_colours
+from synfeal.mesh.findings import Findings
+from synfeal.mesh.gltf import Gltf, read_gltf, simplified
+from synfeal.mesh.materials import BaseMaterial, MaterialReader
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.mesh.textures import RecordingResolver, warn_missing_textures
+from synfeal.mesh.refuse import refuse_extensions, refuse_kind
+from synfeal.mesh.repair import repaired
+from synfeal.mesh.resolver import RecordingResolver, report_missing
+from synfeal.mesh.textures import large_images_allowed
 
 UpAxis = Literal["auto", "y", "z"]
-SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off", ".dae")
 GLTF_SUFFIXES = (".glb", ".gltf")
+PARSER_LOG = logging.getLogger("trimesh")
 
 # Rotates y-up files: their y becomes the world's z, their z points towards the viewer (-y).
 WORLD_FROM_Y_UP: NDArray[np.float64] = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
@@ -26,6 +36,8 @@ WORLD_FROM_Y_UP: NDArray[np.float64] = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 
 def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> TexturedMesh:
     """Read a mesh, apply its scene graph, turn it z-up and scale it to metres.
 
+    What had to be left out, converted or removed is named in the findings of the result.
+
     Args:
         path: GLB, glTF, OBJ with MTL, or PLY with vertex colours or texture coordinates.
         up_axis: axis that points up in the file; ``auto`` is y for glTF and z otherwise.
@@ -33,21 +45,34 @@ def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> Text
 
     Raises:
         InputError: the file is missing, empty, of an unknown kind, unreadable, without faces, with
-            coordinates that are not finite, or without any colour.
+            coordinates that are not finite, without any colour, or stored in a way that is not
+            read, such as Draco.
     """
     path = Path(path)
-    scene = _read_scene(path)
-    scale = unit_m * _world_from_file(path, up_axis)
-    parts: list[MeshPart] = []
-    for node in sorted(scene.graph.nodes_geometry):  # a fixed order, whatever the parser does
-        file_from_part, name = scene.graph[node]
-        geometry = scene.geometry[name]
-        if isinstance(geometry, trimesh.Trimesh) and len(geometry.faces):
-            vertices = trimesh.transform_points(geometry.vertices, file_from_part) @ scale.T
-            parts.append(_part(_part_name(name), vertices, geometry, str(path)))
-    mesh = TexturedMesh(tuple(part for part in parts if part.is_drawn))
+    _check_file(path)
+    findings = Findings(path)
+    gltf = read_gltf(path) if path.suffix.lower() in GLTF_SUFFIXES else None
+    try:
+        parts = _read_parts(path, gltf, unit_m * _world_from_file(path, up_axis), findings)
+    except InputError:
+        raise
+    except Exception as error:  # parsers of foreign files fail in every way there is
+        reason = str(error) or type(error).__name__
+        raise InputError(f"{path}: cannot be read as a mesh ({reason})") from None
+    mesh = TexturedMesh(parts, findings.sentences)
     check_mesh(mesh, path)
     return mesh
+
+
+def _check_file(path: Path) -> None:
+    if not path.is_file():
+        raise InputError(
+            f"{path}: no such mesh file; check the path (config/scenes/README.md says where the"
+            " paper's meshes are)"
+        )
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: the mesh file is empty; download or export it again")
+    refuse_kind(path)
 
 
 def _world_from_file(path: Path, up_axis: UpAxis) -> NDArray[np.float64]:
@@ -56,75 +81,94 @@ def _world_from_file(path: Path, up_axis: UpAxis) -> NDArray[np.float64]:
     return WORLD_FROM_Y_UP if y_up else np.eye(3)
 
 
+def _read_parts(
+    path: Path, gltf: Gltf | None, world_from_file: NDArray[np.float64], findings: Findings
+) -> tuple[MeshPart, ...]:
+    """All parts that can be seen, in the order of the file's geometry, then of its nodes."""
+    if gltf is not None:
+        refuse_extensions(path, gltf.header)
+    materials = MaterialReader(None if gltf is None else gltf.header, findings)
+    with large_images_allowed():
+        scene = _read_scene(path, gltf, findings)
+        order = {name: index for index, name in enumerate(scene.geometry)}
+        nodes = sorted(
+            scene.graph.nodes_geometry, key=lambda node: (order[scene.graph[node][1]], node)
+        )
+        parts = []
+        for node in nodes:
+            file_from_part, name = scene.graph[node]
+            geometry = scene.geometry[name]
+            if isinstance(geometry, trimesh.Trimesh) and len(geometry.faces):
+                part = _part(_part_name(name), geometry, materials, findings)
+                check_indices(part, path)
+                parts.append(_placed(part, file_from_part, world_from_file))
+    mended = [repaired(part, findings) for part in parts]
+    return tuple(part for part in mended if len(part.faces) and _is_seen(part, findings))
+
+
+def _read_scene(path: Path, gltf: Gltf | None, findings: Findings) -> Any:
+    """The file as a trimesh scene, without merging or reordering vertices."""
+    resolver = RecordingResolver(path, b"" if gltf is None else gltf.binary)
+    PARSER_LOG.setLevel(logging.ERROR)  # it prints tracebacks of what the findings name
+    try:
+        if gltf is None:
+            return trimesh.load_scene(str(path), resolver=resolver, process=False)
+        text = json.dumps(simplified(gltf)).encode()
+        return trimesh.load_scene(
+            io.BytesIO(text), file_type="gltf", resolver=resolver, process=False
+        )
+    finally:
+        report_missing(resolver.missing, findings, gltf)
+
+
 def _part_name(name: str) -> str:
     """Name without the order prefix that :func:`synfeal.mesh.save.save_glb` writes."""
     prefix, _, rest = name.partition(":")
     return rest if prefix.isdigit() and rest else name
 
 
-def _read_scene(path: Path) -> Any:
-    """The file as a trimesh scene, without merging or reordering vertices."""
-    _check_file(path)
-    resolver = RecordingResolver(str(path))
-    try:
-        scene = trimesh.load_scene(str(path), resolver=resolver, process=False)
-    except Exception as error:  # parsers of foreign files fail in every way there is
-        reason = str(error) or type(error).__name__
-        raise InputError(f"{path}: cannot be read as a mesh ({reason})") from None
-    warn_missing_textures(path, resolver.missing)
-    return scene
-
-
-def _check_file(path: Path) -> None:
-    if not path.is_file():
-        raise InputError(f"{path}: no such mesh file; check the path")
-    if path.stat().st_size == 0:
-        raise InputError(f"{path}: the mesh file is empty; download or export it again")
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(
-            f"{path}: unknown kind of mesh '{path.suffix}'; convert it to one of"
-            f" {', '.join(SUFFIXES)}"
-        )
+def _placed(
+    part: MeshPart, file_from_part: NDArray[np.float64], world_from_file: NDArray[np.float64]
+) -> MeshPart:
+    """The part in the world; a mirrored one is turned inside out again, as glTF asks."""
+    vertices = trimesh.transform_points(part.vertices_m, file_from_part) @ world_from_file.T
+    is_mirrored = np.linalg.det(file_from_part[:3, :3]) < 0
+    faces = part.faces[:, ::-1].copy() if is_mirrored else part.faces
+    return replace(part, vertices_m=vertices, faces=faces)
 
 
 def _part(
-    name: str, vertices: NDArray[np.float64], geometry: trimesh.Trimesh, origin: str
+    name: str, geometry: trimesh.Trimesh, materials: MaterialReader, findings: Findings
 ) -> MeshPart:
-    """One geometry of the file; ``vertices`` are already in the world."""
-    visual = geometry.visual
+    """One geometry of the file, in its own frame."""
+    vertices = np.asarray(geometry.vertices, dtype=np.float64)
     faces = np.asarray(geometry.faces, dtype=np.int64)
-    if visual.kind == "texture":
-        material = reduce_material(visual.material, origin)
-        return _textured_part(name, vertices, faces, visual, material)
+    visual = geometry.visual
     if visual.kind == "face":  # a colour per face: every face gets vertices of its own
         soup = np.arange(faces.size).reshape(-1, 3)
-        face_rgb = _rgb(np.repeat(visual.face_colors, 3, axis=0))
+        face_rgb = np.repeat(np.asarray(visual.face_colors, np.uint8)[:, :3], 3, axis=0)
         return MeshPart(name, vertices[faces.ravel()], soup, vertex_rgb=face_rgb)
-    colors = visual.vertex_colors if visual.kind == "vertex" else None
-    return MeshPart(name, vertices, faces, vertex_rgb=_rgb(colors))
+    part = MeshPart(name, vertices, faces, vertex_rgb=part_colours(geometry, materials.is_gltf))
+    if visual.kind != "texture":
+        return part
+    return _with_material(part, visual.uv, materials.read(visual.material), findings)
 
 
-def _rgb(colors: Any) -> NDArray[np.uint8] | None:
-    """Colours (N, 3) of trimesh colours (N, 3 | 4), if there are any."""
-    return None if colors is None else np.asarray(colors)[:, :3].astype(np.uint8)
+def _with_material(part: MeshPart, uv: Any, material: BaseMaterial, findings: Findings) -> MeshPart:
+    """The part with its material; without a texture its coordinates are of no use and dropped."""
+    part = replace(part, base_color=material.base_color, alpha_cutoff=material.alpha_cutoff)
+    if material.texture is None:
+        return part
+    if uv is None or np.shape(uv)[0] != len(part.vertices_m):
+        findings.warn(
+            f"part '{part.name}': has a texture but no texture coordinates; its base colour is used"
+        )
+        return part
+    coordinates = material.transformed(np.asarray(uv, dtype=np.float64)[:, :2])
+    return replace(part, uv=coordinates, texture=material.texture)
 
 
-def _textured_part(
-    name: str,
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    visual: Any,
-    material: BaseMaterial,
-) -> MeshPart:
-    """A part with a material; without a texture its coordinates are of no use and are dropped."""
-    has_texture = material.texture is not None and visual.uv is not None
-    return MeshPart(
-        name=name,
-        vertices_m=vertices,
-        faces=faces,
-        uv=np.asarray(visual.uv, dtype=np.float64) if has_texture else None,
-        texture=material.texture if has_texture else None,
-        vertex_rgb=_rgb(visual.vertex_attributes.get("color")),
-        base_color=material.base_color,
-        alpha_cutoff=material.alpha_cutoff,
-    )
+def _is_seen(part: MeshPart, findings: Findings) -> bool:
+    if not part.is_drawn:
+        findings.note(f"part '{part.name}': nowhere opaque enough to be seen; left out")
+    return part.is_drawn

@@ -7,17 +7,21 @@ from typing import Any
 import numpy as np
 
 from synfeal.mesh.model import TexturedMesh
+from synfeal.mesh.triangles import merge_vertices
 
 
 def mesh_properties(mesh: TexturedMesh) -> dict[str, Any]:
     """Vertices, faces, extents and volume of a scene.
 
-    ``volume_m3`` is the volume of the axis-aligned bounding box: a scan is an open surface, which
-    encloses no volume of its own.
+    ``vertices`` counts distinct positions, as the file of a scan does; ``vertices_with_seams``
+    counts a vertex on a texture seam once per copy, as a renderer needs it. ``volume_m3`` is the
+    volume of the axis-aligned bounding box: a scan is an open surface, which encloses no volume of
+    its own.
     """
     extents = mesh.bounds_m[1] - mesh.bounds_m[0]
     return {
-        "vertices": mesh.n_vertices,
+        "vertices": len(merge_vertices(*mesh.merged())[0]),
+        "vertices_with_seams": mesh.n_vertices,
         "faces": mesh.n_faces,
         "parts": len(mesh.parts),
         "volume_m3": float(np.prod(extents)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -9,16 +10,19 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 from PIL import Image
-from trimesh.visual import ColorVisuals, TextureVisuals
+from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
+from synfeal.mesh.colours import SRGB_ATTRIBUTE
 from synfeal.mesh.materials import linear_from_srgb
 from synfeal.mesh.model import MeshPart, TexturedMesh
 
 # glTF is y-up: what is (x, y, z) in the world is stored as (x, z, -y).
 GLTF_FROM_WORLD: NDArray[np.float64] = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
+
+FLOAT32_BITS = 24  # of the mantissa
 
 
 class _FastPng:
@@ -42,8 +46,8 @@ class _FastPng:
 def save_glb(path: Path, mesh: TexturedMesh) -> None:
     """Write ``mesh`` as binary glTF: y-up, metres, textures inside as PNG (lossless).
 
-    ``load_mesh(path)`` gives the same parts back: coordinates rounded to float32, base colours
-    that are not white within 3 levels (trimesh keeps linear factors in 8 bits).
+    ``load_mesh(path)`` gives the same parts back, with colours exact and coordinates to about
+    1e-7 of the mesh's extents; saving those again changes nothing.
 
     Raises:
         InputError: ``path`` does not end in ``.glb``.
@@ -52,31 +56,60 @@ def save_glb(path: Path, mesh: TexturedMesh) -> None:
     if path.suffix.lower() != ".glb":
         raise InputError(f"{path}: a scene is saved as binary glTF; the name must end in .glb")
     scene = trimesh.Scene()
+    materials = _Materials()
+    origin_m, step_m = storage_grid(mesh.bounds_m)
     for index, part in enumerate(mesh.parts):
+        vertices = np.round(part.vertices_m / step_m) * step_m - origin_m
         # The index keeps the order and makes names unique; it is cut off again on loading.
-        scene.add_geometry(_geometry(part), geom_name=f"{index:04d}:{part.name}")
+        scene.add_geometry(
+            _geometry(part, vertices, materials.of(part)),
+            geom_name=f"{index:04d}:{part.name}",
+            transform=trimesh.transformations.translation_matrix(GLTF_FROM_WORLD @ origin_m),
+        )
     with atomic_path(path) as temporary:
-        temporary.write_bytes(scene.export(file_type="glb"))
+        exported = scene.export(file_type="glb", tree_postprocessor=materials.set_exact_factors)
+        temporary.write_bytes(exported)
 
 
-def _geometry(part: MeshPart) -> trimesh.Trimesh:
-    """One part as trimesh geometry in glTF axes."""
-    return trimesh.Trimesh(
-        vertices=part.vertices_m @ GLTF_FROM_WORLD.T,
-        faces=part.faces,
-        visual=_visual(part),
-        process=False,
-    )
+def storage_grid(bounds_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Where the origin of the stored coordinates lies, (3,), and the grid they are rounded to.
+
+    Coordinates are stored as float32, which is worth 6 cm a thousand kilometres from the origin.
+    So a mesh is stored around its own centre, in nodes that move it there in float64. Coordinates
+    and centre are rounded to a grid of which float32 holds every point between them exactly:
+    reading and saving again is then without loss, wherever the next centre comes to lie.
+    """
+    largest_m = float(np.max(bounds_m[1] - bounds_m[0])) or 1.0
+    step_m = 2.0 ** (math.ceil(math.log2(largest_m)) - FLOAT32_BITS)
+    return np.round(bounds_m.mean(axis=0) / step_m) * step_m, step_m
 
 
-def _visual(part: MeshPart) -> TextureVisuals | ColorVisuals:
-    """Material of a part; vertex colours carry the base colour, texture or plain parts a factor."""
-    if part.vertex_rgb is not None:
-        rgb = part.vertex_rgb.astype(np.float64) * part.base_color[:3] / 255.0
-        return ColorVisuals(vertex_colors=np.round(rgb).astype(np.uint8))
-    material = PBRMaterial(
-        name=part.name,
-        baseColorFactor=linear_from_srgb(part.base_color),
+class _Materials:
+    """The glTF materials of a mesh: one for all parts that look alike, with exact base colours."""
+
+    def __init__(self) -> None:
+        self._made: dict[tuple[int, bytes, float | None], PBRMaterial] = {}
+
+    def of(self, part: MeshPart) -> PBRMaterial:
+        """The material of a part."""
+        key = (id(part.texture), part.base_color.tobytes(), part.alpha_cutoff)
+        if key not in self._made:
+            self._made[key] = _material(part, f"{len(self._made)}:{part.name}")
+        return self._made[key]
+
+    def set_exact_factors(self, tree: dict[str, Any]) -> None:
+        """Replace the base colours of an exported glTF, which trimesh keeps in 8 linear bits."""
+        colours = [np.frombuffer(base, np.uint8) for _, base, _ in self._made]
+        for material in tree.get("materials", []):
+            index, _, name = material["name"].partition(":")
+            factor = linear_from_srgb(colours[int(index)]).tolist()
+            material.setdefault("pbrMetallicRoughness", {})["baseColorFactor"] = factor
+            material["name"] = name
+
+
+def _material(part: MeshPart, name: str) -> PBRMaterial:
+    return PBRMaterial(
+        name=name,
         baseColorTexture=None if part.texture is None else _FastPng(part.texture),
         metallicFactor=0.0,
         roughnessFactor=1.0,
@@ -84,5 +117,22 @@ def _visual(part: MeshPart) -> TextureVisuals | ColorVisuals:
         alphaMode="OPAQUE" if part.alpha_cutoff is None else "MASK",
         alphaCutoff=part.alpha_cutoff,
     )
-    uv = np.zeros((len(part.vertices_m), 2)) if part.uv is None else part.uv
-    return TextureVisuals(uv=uv, material=material)
+
+
+def _geometry(
+    part: MeshPart, vertices: NDArray[np.float64], material: PBRMaterial
+) -> trimesh.Trimesh:
+    """One part with ``vertices`` (V, 3) in world axes as trimesh geometry in glTF axes."""
+    uv = np.zeros((len(vertices), 2)) if part.uv is None else part.uv
+    geometry = trimesh.Trimesh(
+        vertices=vertices @ GLTF_FROM_WORLD.T,
+        faces=part.faces,
+        visual=TextureVisuals(uv=uv, material=material),
+        process=False,
+    )
+    if part.vertex_rgb is not None:
+        rgba = np.insert(part.vertex_rgb, 3, 255, axis=1)
+        linear = np.round(255.0 * linear_from_srgb(rgba)).astype(np.uint8)
+        geometry.visual.vertex_attributes["color"] = linear  # what other programs read
+        geometry.vertex_attributes[SRGB_ATTRIBUTE] = rgba
+    return geometry

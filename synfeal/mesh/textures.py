@@ -1,88 +1,89 @@
-"""Telling the user which texture files a mesh refers to that are not there."""
+"""Images of any kind as 8-bit RGB or RGBA that a renderer can hold."""
 
 from __future__ import annotations
 
-import json
-import logging
-import struct
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterator
+from contextlib import contextmanager
 
-from trimesh.resolvers import FilePathResolver
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
 
-log = logging.getLogger("synfeal")
+from synfeal.mesh.findings import Findings
+
+Pixels = NDArray[np.uint8]
+
+MAX_SIDE_PX = 16_384  # GL_MAX_TEXTURE_SIZE of Mesa's software renderer and of most GPUs
+MAX_PIXELS = 2**30  # 3 GB when decoded: what is larger is not decoded at all
 
 
-class RecordingResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is untyped
-    """Reads the files a mesh refers to and remembers those that cannot be read.
+@contextmanager
+def large_images_allowed() -> Iterator[None]:
+    """Inside, Pillow opens images beyond its limit against hostile files from the web.
 
-    trimesh passes over missing textures silently; a grey scene should not surprise its user.
+    Textures of scans exceed it regularly; :func:`decode` has a limit of its own.
     """
-
-    def __init__(self, source: str) -> None:
-        super().__init__(source)
-        self.missing: list[str] = []
-
-    def get(self, name: str) -> bytes:
-        """Bytes of a file beside the mesh."""
-        try:
-            return bytes(super().get(name))
-        except Exception:
-            self.missing.append(str(name))
-            raise
+    limit = Image.MAX_IMAGE_PIXELS
+    Image.MAX_IMAGE_PIXELS = None
+    try:
+        yield
+    finally:
+        Image.MAX_IMAGE_PIXELS = limit
 
 
-def warn_missing_textures(path: Path, missing: list[str]) -> None:
-    """One warning per missing file that carries colour, naming the material where it is known."""
-    users = gltf_base_color_files(path)
-    for name in dict.fromkeys(missing):
-        if users is None:
-            log.warning("%s: '%s' is missing; base colours are used instead", path, name)
-        elif name in users:
-            materials = ", ".join(users[name])
-            log.warning(
-                "%s: texture '%s' of material %s is missing; its base colour is used",
-                path,
-                name,
-                materials,
-            )
+def decode(image: Image.Image, owner: str, findings: Findings) -> Pixels | None:
+    """Pixels (H, W, 3 | 4) uint8 of any image Pillow opens; None where it is broken or too large.
 
-
-def gltf_base_color_files(path: Path) -> dict[str, list[str]] | None:
-    """Names of the materials by the base-colour file they use; None if the file is not glTF."""
-    header = _gltf_header(path)
-    if header is None:
+    Args:
+        image: opened, perhaps not yet read.
+        owner: what it belongs to, such as ``material 'Wall'``, for the findings.
+        findings: takes what was converted, made smaller or given up.
+    """
+    width, height = image.size
+    if width * height > MAX_PIXELS:
+        findings.warn(
+            f"{owner}: texture of {width} x {height} pixels is too large to be read; its base"
+            f" colour is used. Make it at most {MAX_SIDE_PX} pixels wide and high"
+        )
         return None
-    users: dict[str, list[str]] = {}
-    for material in header.get("materials", []):
-        file = _base_color_file(header, material)
-        if file is not None:
-            users.setdefault(file, []).append(f"'{material.get('name', 'unnamed')}'")
-    return users
-
-
-def _base_color_file(header: dict[str, Any], material: dict[str, Any]) -> str | None:
-    """URI of the base-colour (or specular-glossiness diffuse) texture of a glTF material."""
-    glossy = material.get("extensions", {}).get("KHR_materials_pbrSpecularGlossiness", {})
-    slot = material.get("pbrMetallicRoughness", {}).get("baseColorTexture")
-    slot = slot or glossy.get("diffuseTexture")
-    if slot is None:
+    try:
+        pixels = to_rgb(image)
+    except (OSError, SyntaxError, ValueError) as error:  # Pillow raises all three on damaged files
+        findings.warn(f"{owner}: texture cannot be decoded ({error}); its base colour is used")
         return None
-    source = header["textures"][slot["index"]].get("source")
-    uri = None if source is None else header["images"][source].get("uri")
-    return None if uri is None else str(uri)
+    if image.mode not in ("RGB", "RGBA") or pixels.shape[2] != len(image.getbands()):
+        kind = "RGBA" if pixels.shape[2] == 4 else "RGB"
+        findings.note(f"{owner}: texture converted from {image.mode} to 8-bit {kind}")
+    return within_limit(pixels, owner, findings)
 
 
-def _gltf_header(path: Path) -> dict[str, Any] | None:
-    """The JSON of a glTF or GLB file."""
-    suffix = path.suffix.lower()
-    if suffix == ".gltf":
-        text = path.read_bytes()
-    elif suffix == ".glb":
-        with path.open("rb") as file:
-            (length,) = struct.unpack("<12xI4x", file.read(20))
-            text = file.read(length)
-    else:
-        return None
-    header: dict[str, Any] = json.loads(text)
-    return header
+def within_limit(pixels: Pixels, owner: str, findings: Findings) -> Pixels:
+    """The pixels, made smaller where a side exceeds what renderers take."""
+    height, width = pixels.shape[:2]
+    if max(height, width) <= MAX_SIDE_PX:
+        return pixels
+    factor = MAX_SIDE_PX / max(height, width)
+    size = (max(1, round(width * factor)), max(1, round(height * factor)))
+    findings.warn(
+        f"{owner}: texture made smaller from {width} x {height} to {size[0]} x {size[1]} pixels,"
+        " which is what renderers take"
+    )
+    return np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX))
+
+
+def to_rgb(image: Image.Image) -> Pixels:
+    """Pixels (H, W, 3), or (H, W, 4) where the image carries transparency, as uint8.
+
+    Palette, grey, grey with alpha, 16-bit, float, CMYK and YCbCr images are converted.
+    """
+    if image.mode.startswith("I") or image.mode == "F":
+        return np.repeat(_grey_8bit(image)[..., None], 3, axis=2)
+    has_alpha = image.mode in ("LA", "PA", "La", "RGBA", "RGBa") or "transparency" in image.info
+    return np.asarray(image.convert("RGBA" if has_alpha else "RGB"))
+
+
+def _grey_8bit(image: Image.Image) -> Pixels:
+    """Grey (H, W) of an integer (16-bit range) or float (0 to 1) image."""
+    values = np.asarray(image, dtype=np.float64)
+    scale = 255.0 if image.mode == "F" else 255.0 / 65535.0
+    return np.clip(np.round(values * scale), 0, 255).astype(np.uint8)

@@ -12,8 +12,8 @@ from synfeal.dataset.pose_table import PoseTable
 from synfeal.errors import InputError
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.mesh.checks import check_sampling_box
-from synfeal.mesh.decimate import load_collision_mesh
 from synfeal.mesh.rays import RayCaster
+from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.planning.path import path_poses
 from synfeal.planning.sampling import pose_bounds, sample_poses
 from synfeal.planning.start import sample_start
@@ -78,7 +78,8 @@ def plan_split(
     if n_frames < 1:
         raise InputError(f"plan: {n_frames} frames asked for; at least 1 is needed")
     bounds = pose_bounds(box, scene.angles)
-    start = first_pose(caster, bounds, scene, collection, rng)
+    view_m, max_tries = scene.min_view_distance_m, collection.max_tries
+    start = sample_start(caster, bounds, view_m, max_tries, rng)  # itself no frame
     paths: list[Array] = []
     while sum(map(len, paths)) < n_frames:
         target = next_target(caster, start, bounds, scene, collection, rng)
@@ -86,23 +87,6 @@ def plan_split(
         paths.append(path_poses(start, target, spacing, collection.interpolation))
         start = target
     return _table(paths, n_frames)
-
-
-def first_pose(
-    caster: RayCaster,
-    bounds: Array,
-    scene: SceneConfig,
-    collection: CollectionConfig,
-    rng: np.random.Generator,
-) -> Array:
-    """The pose vector (6,) the first path starts from, itself no frame."""
-    start = sample_start(caster, bounds, scene.min_view_distance_m, collection.max_tries, rng)
-    if start is None:
-        raise InputError(
-            f"plan: no pose in the sampling box looks farther than min_view_distance_m"
-            f" ({scene.min_view_distance_m} m); lower it, or check sampling_box, unit_m and up_axis"
-        )
-    return start
 
 
 def next_target(

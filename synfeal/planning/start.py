@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from synfeal.errors import InputError
 from synfeal.mesh.rays import RayCaster
 from synfeal.planning.sampling import PoseVectors, sample_poses
 from synfeal.planning.target import has_free_view
@@ -20,7 +21,7 @@ def sample_start(
     min_view_distance_m: float,
     max_tries: int,
     rng: np.random.Generator,
-) -> NDArray[np.float64] | None:
+) -> NDArray[np.float64]:
     """A pose vector (6,) with a free view in the largest free space within ``bounds`` (2, 6).
 
     The paper does not say where the camera starts. Inside a cupboard it would stay there, since
@@ -29,7 +30,8 @@ def sample_start(
     the start is one of the largest group. Samples are uniform in volume, so that group is the
     largest space connected by free lines.
 
-    Returns None if ``max_tries`` rounds give no pose with a free view.
+    Raises:
+        InputError: ``max_tries`` rounds gave no pose with a free view; says what to relax.
     """
     found = np.empty((0, 6))
     for _ in range(max_tries):
@@ -38,7 +40,10 @@ def sample_start(
         if len(found) >= N_POSES:
             break
     if not len(found):
-        return None
+        raise InputError(
+            f"plan: no pose in the sampling box looks farther than min_view_distance_m"
+            f" ({min_view_distance_m} m); lower it, or check sampling_box, unit_m and up_axis"
+        )
     start: NDArray[np.float64] = found[_largest_group(caster, found)[0]]
     return start
 

@@ -25,11 +25,12 @@ def has_free_view(
 def admissible(
     caster: RayCaster, start: NDArray[np.float64], poses: PoseVectors, min_view_distance_m: float
 ) -> NDArray[np.bool_]:
-    """Which candidates (N, 6) a free line from ``start`` (6,) reaches and have a free view.
+    """Which candidates (N, 6) a free line from ``start`` reaches and have a free view, (N,).
 
+    ``start`` is one pose vector (6,) for all of them or one for each (N, 6).
     This is the set X_a of section 3.2: ``R(p_i, p_c) > |p_i - p_c|`` and ``R(p_c, p_c) > d``.
     """
-    starts = np.broadcast_to(start[:3], (len(poses), 3))
+    starts = np.broadcast_to(start[..., :3], (len(poses), 3))
     reachable = caster.sees(starts, poses[:, :3])
     return reachable & has_free_view(caster, poses, min_view_distance_m)
 

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import functools
 import os
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -22,6 +24,8 @@ from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render.base import Depth, Rgb, intrinsics_of
 
+# Mesa's software renderer silently draws nonsense from a buffer of 2^24 vertices on.
+MOST_VERTICES = 1 << 23
 # OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
 CAM_FROM_GL: NDArray[np.float64] = np.diag([1.0, -1.0, -1.0, 1.0])
 
@@ -75,7 +79,10 @@ class PyrenderRenderer:
         self._flags = pyrender.RenderFlags.FLAT | pyrender.RenderFlags.SKIP_CULL_FACES
         self._size = (camera.width, camera.height)
         self._scene = pyrender.Scene(bg_color=np.zeros(4))
-        self._scene.add(pyrender.Mesh([_primitive(part) for part in mesh.parts if part.is_drawn]))
+        # Vertex buffers hold single precision: exact around the scene's own centre, wherever it is.
+        self._centre_m = mesh.bounds_m.mean(axis=0)
+        parts = [piece for part in mesh.parts if part.is_drawn for piece in pieces(part)]
+        self._scene.add(pyrender.Mesh([_primitive(part, self._centre_m) for part in parts]))
         self._camera = self._scene.add(
             pyrender.IntrinsicsCamera(
                 *intrinsics_of(camera), znear=camera.near_m, zfar=camera.far_m
@@ -88,7 +95,9 @@ class PyrenderRenderer:
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
         """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
-        self._scene.set_pose(self._camera, world_from_cam @ CAM_FROM_GL)
+        centred = np.array(world_from_cam, np.float64)
+        centred[:3, 3] -= self._centre_m
+        self._scene.set_pose(self._camera, centred @ CAM_FROM_GL)
         self._offscreen.viewport_width, self._offscreen.viewport_height = self._size
         rgb, depth = self._offscreen.render(self._scene, flags=self._flags)
         return np.ascontiguousarray(rgb), np.where(depth > 0.0, depth, np.float32(np.inf))
@@ -104,11 +113,28 @@ class PyrenderRenderer:
         self.close()
 
 
-def _primitive(part: MeshPart) -> Any:
-    """One part as vertex buffers and a material."""
+def pieces(part: MeshPart, most_vertices: int = MOST_VERTICES) -> Iterator[MeshPart]:
+    """The part in pieces of at most ``most_vertices``, each with the vertices of its own faces."""
+    if len(part.vertices_m) <= most_vertices:
+        yield part
+        return
+    step = max(1, most_vertices // 3)
+    for start in range(0, len(part.faces), step):
+        used, faces = np.unique(part.faces[start : start + step], return_inverse=True)
+        yield replace(
+            part,
+            vertices_m=part.vertices_m[used],
+            faces=faces.reshape(-1, 3),
+            uv=None if part.uv is None else part.uv[used],
+            vertex_rgb=None if part.vertex_rgb is None else part.vertex_rgb[used],
+        )
+
+
+def _primitive(part: MeshPart, centre_m: NDArray[np.float64]) -> Any:
+    """One part as vertex buffers around ``centre_m`` and a material."""
     pyrender = _pyrender()
     return pyrender.Primitive(
-        positions=part.vertices_m.astype(np.float32),
+        positions=(part.vertices_m - centre_m).astype(np.float32),
         indices=part.faces.astype(np.uint32),
         texcoord_0=None if part.uv is None else part.uv.astype(np.float32),
         color_0=_vertex_rgba(part),

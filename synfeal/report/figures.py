@@ -1,9 +1,10 @@
-"""Figures from the tables: error against data set size, and error against label noise."""
+"""Figures from the tables: error against data set size, label noise, and speed."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -40,26 +41,31 @@ Row = dict[str, str]
 
 
 def write_figures(tables_dir: Path, out_dir: Path) -> None:
-    """Write ``error_by_size`` and ``error_by_noise`` as PNG and SVG.
+    """Write ``error_by_size``, ``error_by_noise`` and ``speed_vs_error_collision``: PNG and SVG.
 
     A figure whose table the profile does not make is not written.
 
     Args:
-        tables_dir: where ``table4_size.csv`` and ``table3_inconsistencies.csv`` are.
+        tables_dir: where ``table4_size.csv``, ``table3_inconsistencies.csv`` and
+            ``speed_vs_error.csv`` are.
         out_dir: where the figures go.
 
     Raises:
-        InputError: neither table is there.
+        InputError: none of these tables is there.
     """
-    sources = {"error_by_size": "table4_size", "error_by_noise": "table3_inconsistencies"}
-    drawers = {"error_by_size": size_figure, "error_by_noise": noise_figure}
-    present = {name: tables_dir / f"{table}.csv" for name, table in sources.items()}
-    present = {name: path for name, path in present.items() if path.exists()}
+    drawers = {
+        "error_by_size": ("table4_size", size_figure),
+        "error_by_noise": ("table3_inconsistencies", noise_figure),
+        "speed_vs_error_collision": ("speed_vs_error", collision_figure),
+    }
+    paths = {name: tables_dir / f"{table}.csv" for name, (table, _) in drawers.items()}
+    present = {name: path for name, path in paths.items() if path.exists()}
     if not present:
-        raise InputError(f"{tables_dir}: holds neither of {', '.join(sources.values())}.csv")
+        tables = ", ".join(table for table, _ in drawers.values())
+        raise InputError(f"{tables_dir}: holds neither of {tables}.csv")
     for name, path in present.items():
         with path.open(encoding="utf-8", newline="") as file:
-            _save(drawers[name](list(csv.DictReader(file))), out_dir / name)
+            _save(drawers[name][1](list(csv.DictReader(file))), out_dir / name)
 
 
 def size_figure(rows: Sequence[Row]) -> Figure:
@@ -88,6 +94,29 @@ def noise_figure(rows: Sequence[Row]) -> Figure:
         for line, measure in enumerate(MEASURES):
             _draw(axes[line][column], chosen, measure, labels)
     return _finish(figure, axes)
+
+
+def collision_figure(rows: Sequence[Row]) -> Figure:
+    """Wrong decisions against ray speed, one line per scene from the full mesh up to 100 faces."""
+    chosen = [row for row in rows if row["stage"] == "collision"]
+    scenes = list(dict.fromkeys(row["scene"] for row in chosen))
+    figure = Figure(figsize=(5.0, 3.4), layout="constrained")
+    axis = figure.subplots()
+    for scene, style in zip(scenes, cycle(STYLES.values()), strict=False):
+        line = [row for row in chosen if row["scene"] == scene]
+        speed = [float(row["items_per_s"]) / 1e6 for row in line]
+        percent = [100 * float(row["error"]) for row in line]
+        (used,) = (index for index, row in enumerate(line) if row["chosen"] == "1")
+        faces = f"{int(line[used]['faces']):,} of {int(line[0]['faces']):,} faces"
+        label = f"{scene_title(scene)}, chosen: {faces}"
+        axis.plot(speed, percent, linewidth=1.2, markersize=4, **style, label=label)
+        axis.plot(speed[used], percent[used], "o", mfc="none", mec=style["color"], markersize=13)
+    axis.set_yscale("symlog", linthresh=0.01)
+    axis.set_ylim(bottom=0)
+    axis.set_xlabel("million rays per second")
+    axis.set_ylabel("decisions that differ\nfrom the full mesh (%)")
+    axis.legend(fontsize=8, frameon=False)
+    return figure
 
 
 def _panels(measures: Sequence[str], titles: Sequence[str]) -> tuple[Figure, list[list[Axes]]]:

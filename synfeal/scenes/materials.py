@@ -41,14 +41,19 @@ def plaster(canvas: Canvas, colour: Colour, stains: float = 0.03, grain: float =
 
 
 def wainscot(
-    canvas: Canvas, colour: Colour, lower: Colour, height_m: float = 0.95, grain: float = 0.02
+    canvas: Canvas,
+    colour: Colour,
+    lower: Colour,
+    height_m: float = 0.95,
+    grain: float = 0.02,
+    stains: float = 0.03,
 ) -> Pixels:
     """Plaster with a differently painted band of ``height_m`` above the floor and a rail on it."""
-    image = plaster(canvas, colour, grain=grain)
+    image = plaster(canvas, colour, stains, grain)
     _, y = canvas.coordinates_m()
     above_floor = canvas.size_m[1] - y[:, 0]
     band = above_floor < height_m
-    image[band] = plaster(canvas, lower, 0.07, grain)[band]
+    image[band] = plaster(canvas, lower, 2 * stains, grain)[band]
     image[np.abs(above_floor - height_m) < 0.02] *= np.float32(0.55)
     image[above_floor < 0.09] *= np.float32(0.5)
     return image

@@ -15,7 +15,7 @@ Points = NDArray[np.float64]
 Real = TypeVar("Real", np.float32, np.float64)
 
 DETAIL = 2.6  # texels per metre over what a painter is asked for; 0.5 m at 640 px shows 1,100 px/m
-GRAIN = 0.025  # relative brightness of what is too small to be painted
+GRAIN = 0.012  # relative brightness of what is too small to be painted
 GRAIN_M = 0.006
 
 

@@ -5,34 +5,44 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
+from synfeal.config.mesh_files import check_mesh_file
 from synfeal.config.models import SceneConfig
 from synfeal.errors import InputError
 from synfeal.files import write_json
-from synfeal.mesh.decimate import collision_mesh, save_collision_mesh
+from synfeal.mesh.collision import collision_mesh, write_curve
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.properties import mesh_properties
 from synfeal.mesh.save import save_glb
+from synfeal.mesh.triangles import save_collision_mesh
 from synfeal.planning.plan import sampling_box_of
+from synfeal.seeds import generator_of
 
 
 def prepare_scene(
-    name: str, scene: SceneConfig, collision_faces: int, seed: int, out_dir: Path
+    name: str, scene: SceneConfig, collision_agreement: float, seed: int, out_dir: Path
 ) -> None:
-    """Write ``mesh.glb`` (world frame), ``collision.ply`` and ``properties.json`` into ``out_dir``.
+    """Write what later stages read of a scene into ``out_dir``.
+
+    These are ``mesh.glb`` (world frame), ``collision.ply``, how that was chosen
+    (``collision_curve.csv``, whose times differ between runs), and ``properties.json``.
 
     Raises:
         InputError: the mesh cannot be used, is not the expected file, or contradicts the
-            sampling box.
+            sampling box; or no pose in that box has a free view.
     """
     mesh = build_or_load(scene, seed, name)
-    sampling_box_of(scene, mesh.bounds_m, f"scenes.{name}")
-    vertices, faces = collision_mesh(mesh, collision_faces)
+    box = sampling_box_of(scene, mesh.bounds_m, f"scenes.{name}")
+    rng = generator_of(seed, "collision", name)
+    collision, curve = collision_mesh(mesh, scene, box, collision_agreement, rng)
     save_glb(out_dir / "mesh.glb", mesh)
-    save_collision_mesh(out_dir / "collision.ply", vertices, faces)
+    save_collision_mesh(out_dir / "collision.ply", collision)
+    write_curve(out_dir / "collision_curve.csv", curve)
     origin = scene.builder if scene.source == "procedural" else str(scene.path)
-    details = {"source": scene.source, "origin": origin, "collision_faces": len(faces)}
-    write_json(out_dir / "properties.json", {"scene": name, **mesh_properties(mesh), **details})
+    details = {"source": scene.source, "origin": origin, "collision_faces": len(collision.faces)}
+    found = {"findings": list(mesh.findings)}
+    properties = {"scene": name, **mesh_properties(mesh), **details, **found}
+    write_json(out_dir / "properties.json", properties)
 
 
 def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:
@@ -53,8 +63,7 @@ def check_sha256(path: Path, expected: str, name: str) -> None:
     Raises:
         InputError: the file is missing or is not the expected one.
     """
-    if not path.is_file():
-        raise InputError(f"scenes.{name}.path: {path} does not exist; download the mesh to it")
+    check_mesh_file(path, f"scenes.{name}.path")
     with path.open("rb") as file:
         found = hashlib.file_digest(file, "sha256").hexdigest()
     if found != expected:

@@ -7,6 +7,7 @@ rule scene:
     output:
         mesh=f"{ROOT}/scenes/{{scene}}/mesh.glb",
         collision=f"{ROOT}/scenes/{{scene}}/collision.ply",
+        curve=f"{ROOT}/scenes/{{scene}}/collision_curve.csv",
         properties=f"{ROOT}/scenes/{{scene}}/properties.json",
     log:
         f"{ROOT}/logs/scene/{{scene}}.log",
@@ -19,7 +20,7 @@ rule scene:
         mem_mb=4000,
     params:
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
-        collision_faces=CONFIG.collection.collision_faces,
+        collision_agreement=CONFIG.collection.collision_agreement,
         seed=CONFIG.seed,
     script:
         "../scripts/scene.py"

@@ -3,7 +3,7 @@ import sys
 
 from baselines.localizers.names import BACKBONE_OF
 from baselines.groundtruth.batches import batches_of
-from synfeal.config import parse_config, read_experiments, runs_of
+from synfeal.config import check_mesh_files, parse_config, read_experiments, runs_of
 from synfeal.config.models import MODELS
 from synfeal.dataset.sequences import sequences_of
 from synfeal.errors import InputError
@@ -13,6 +13,7 @@ try:
     CONFIG = parse_config(
         config, " + ".join(map(str, workflow.configfiles)) or "config"
     )
+    check_mesh_files(CONFIG.scenes)
     EXPERIMENTS = read_experiments(CONFIG)
 except InputError as error:
     sys.exit(f"error: {error}")

@@ -69,6 +69,29 @@ rule assistance:
         "../scripts/assistance.py"
 
 
+rule speed_vs_error:
+    input:
+        curves=expand(
+            f"{ROOT}/scenes/{{scene}}/collision_curve.csv",
+            scene=sorted({e.scene for e in EXPERIMENTS}),
+        ),
+    output:
+        csv=f"{ROOT}/tables/speed_vs_error.csv",
+    log:
+        f"{ROOT}/logs/tables/speed_vs_error.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/speed_vs_error.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        scenes=sorted({e.scene for e in EXPERIMENTS}),
+    script:
+        "../scripts/speed_vs_error.py"
+
+
 rule document:
     input:
         tex=expand(f"{ROOT}/tables/{{table}}.tex", table=TABLE_NAMES),
@@ -90,6 +113,7 @@ rule document:
 rule figures:
     input:
         tables=expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
+        speed=rules.speed_vs_error.output.csv,
     output:
         figures=directory(f"{ROOT}/figures"),
     log:

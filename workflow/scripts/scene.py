@@ -8,7 +8,7 @@ with job(snakemake.log[0]):
     prepare_scene(
         snakemake.wildcards.scene,
         SceneConfig(**snakemake.params.scene),
-        snakemake.params.collision_faces,
+        snakemake.params.collision_agreement,
         snakemake.params.seed,
         Path(snakemake.output.mesh).parent,
     )

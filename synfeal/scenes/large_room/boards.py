@@ -16,7 +16,7 @@ Generator = np.random.Generator
 WINDOWS_Y_M = (1.25, 3.3, 5.35)  # centres of the bays in the west wall
 WINDOW_M = (1.5, 1.25)
 SILL_M = 0.95
-BLINDS = (0.12, 0.0, 0.42)
+BLIND = 0.25
 BEECH: Painter = partial(materials.wood, colour=(0.8, 0.68, 0.5), contrast=0.08)
 RIBS: Painter = partial(
     materials.masonry, palette=((0.86, 0.86, 0.84),), block_m=(0.06, 1.0), joint_m=0.012
@@ -29,16 +29,18 @@ def boards(rng: Generator) -> Item:
 
 
 def _windows(rng: Generator) -> Item:
-    """Three bays in the west wall: view, sill and radiator; the blinds hang differently."""
-    things = []
-    for y, blind in zip(WINDOWS_Y_M, BLINDS, strict=True):
-        view = partial(pictures.window_view, blind=blind)
-        centre = (0.0, y, SILL_M + WINDOW_M[1] / 2)
-        things.append(on_wall(rng, centre, 90, WINDOW_M, view, 230, depth_m=0.05, glow=0.85))
-        sill = box(rng, (WINDOW_M[0] + 0.2, 0.2, 0.04), BEECH, 120)
-        things.append(sill.placed(0.1, y, SILL_M - 0.05, 90))
-        things.append(box(rng, (1.2, 0.1, 0.5), RIBS, 100, "flrt").placed(0.08, y, 0.2, 90))
-    return joined(things)
+    """Three equal bays in the west wall: view, sill and radiator."""
+    view = partial(pictures.window_view, blind=BLIND)
+    centre = (0.0, 0.0, SILL_M + WINDOW_M[1] / 2)
+    sill = box(rng, (WINDOW_M[0] + 0.2, 0.2, 0.04), BEECH, 120)
+    bay = joined(
+        [
+            on_wall(rng, centre, 90, WINDOW_M, view, 230, depth_m=0.05, glow=0.85),
+            sill.placed(0.1, 0, SILL_M - 0.05, 90),
+            box(rng, (1.2, 0.1, 0.5), RIBS, 100, "flrt").placed(0.08, 0, 0.2, 90),
+        ]
+    )
+    return joined(bay.placed(0, y) for y in WINDOWS_Y_M)
 
 
 def _south(rng: Generator) -> Item:

@@ -19,16 +19,14 @@ LAMPS_M = tuple((x, y) for x in (1.4, 3.6) for y in (1.2, 3.3, 5.4))
 LAMP_STRENGTHS = (0.9, 0.5, 0.95, 0.8, 0.05, 0.7)  # the fifth is off
 INNER_LOWER_M = (0.06, 0.01, 0.0)  # the windows stand 5 cm out of the west wall
 INNER_UPPER_M = (WIDTH_M - 0.01, LENGTH_M - 0.01, HEIGHT_M)
-ORANGE: Colour = (0.8, 0.4, 0.1)
 BLUE: Colour = (0.15, 0.25, 0.55)
-GREY: Colour = (0.3, 0.3, 0.32)
-DESKS: tuple[tuple[float, float, float, Colour], ...] = (  # x, y, yaw in degrees, chair
-    (0.55, 2.3, 90, BLUE),
-    (0.55, 4.3, 90, BLUE),
-    (0.55, 5.7, 90, GREY),
-    (4.6, 3.35, -90, BLUE),
-    (4.6, 4.85, -90, ORANGE),
-    (1.9, 6.2, 0, GREY),
+DESKS_M = (  # x, y, yaw in degrees
+    (0.55, 2.3, 90),
+    (0.55, 4.3, 90),
+    (0.55, 5.7, 90),
+    (4.6, 3.35, -90),
+    (4.6, 4.85, -90),
+    (1.9, 6.2, 0),
 )
 OAK: Painter = partial(materials.wood, colour=(0.72, 0.55, 0.36))
 CONCRETE: Painter = partial(materials.plaster, colour=(0.5, 0.5, 0.48), grain=0.06)
@@ -50,18 +48,19 @@ def contents(rng: Generator) -> Item:
 
 
 def _desks(rng: Generator) -> Item:
-    """Repeated desks with two screens each, and an island with one."""
+    """Equal desks with two equal screens and a chair each, and an island with one."""
+    screen = furniture.monitor(rng)
+    screens = [screen.placed(dx, 0.18, 0.74) for dx in (-0.32, 0.32)]
+    desk = joined([furniture.table(rng, (1.4, 0.7, 0.74), BEECH), *screens])
+    chair = furniture.chair(rng, BLUE)
     things = []
-    for x, y, yaw, colour in DESKS:
-        desk = furniture.table(rng, (1.4, 0.7, 0.74), BEECH)
-        screens = [furniture.monitor(rng).placed(dx, 0.18, 0.74) for dx in (-0.32, 0.32)]
+    for x, y, yaw in DESKS_M:
         stuff = clutter.on_table(rng, 1.2, 0.6).placed(0, 0, 0.74)
-        turn = 180 + rng.uniform(-50, 50)
-        seat = furniture.chair(rng, colour).placed(rng.uniform(-0.3, 0.3), -0.6, 0, turn)
-        things.append(joined([desk, *screens, stuff, seat]).placed(x, y, 0, yaw))
+        seat = chair.placed(rng.uniform(-0.3, 0.3), -0.6, 0, 180 + rng.uniform(-50, 50))
+        things.append(joined([desk, stuff, seat]).placed(x, y, 0, yaw))
     island = furniture.table(rng, (0.9, 1.9, 0.74), OAK)
     stuff = clutter.on_table(rng, 0.8, 1.7).placed(0, 0, 0.74)
-    lone = furniture.monitor(rng).placed(0.1, 0.6, 0.74, 25)
+    lone = screen.placed(0.1, 0.6, 0.74, 25)
     return joined([*things, joined([island, stuff, lone]).placed(2.55, 3.5)])
 
 

@@ -1,0 +1,1 @@
+"""Measurements run by hand; their tables lie under ``results/benchmarks``."""

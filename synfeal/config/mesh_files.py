@@ -1,0 +1,31 @@
+"""The mesh files a configuration asks for, before anything is built on them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from synfeal.config.collection import SceneConfig
+from synfeal.errors import InputError
+
+DOCUMENTATION = "config/scenes/README.md"
+
+
+def check_mesh_files(scenes: Mapping[str, SceneConfig]) -> None:
+    """Check that the file of every scene with ``source: mesh`` is there.
+
+    Raises:
+        InputError: naming the first that is not, its configuration key and the documentation.
+    """
+    for name, scene in scenes.items():
+        if scene.source == "mesh" and scene.path is not None:
+            check_mesh_file(scene.path, f"scenes.{name}.path")
+
+
+def check_mesh_file(path: Path, field: str) -> None:
+    """Check that the mesh file named by a configuration key, ``field``, is there."""
+    if not path.is_file():
+        raise InputError(
+            f"{field}: {path} does not exist; put the mesh there or change the path"
+            f" (see {DOCUMENTATION})"
+        )

@@ -1,0 +1,83 @@
+"""What looks wrong about a mesh: unit, up axis, colour, openness."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.inspect.freespace import FreeSpace
+
+Array = NDArray[np.float64]
+
+EXTENTS_M = (1.0, 200.0)
+ALIGNED_COS = np.cos(np.deg2rad(15.0))
+FLOOR_BIN_M = 0.1
+FLOOR_RATIO = 1.5
+MIN_ENCLOSURE = 0.9
+MAX_PLAIN = 0.5
+
+
+def doubts_of(
+    extents_m: Array, floors_m2: Array, area_m2: dict[str, float], space: FreeSpace
+) -> list[str]:
+    """Sentences, each with what to try; empty if nothing looks wrong.
+
+    Args:
+        extents_m: (3,) size of the mesh.
+        floors_m2: (3,) what :func:`floor_areas_m2` found along x, y and z.
+        area_m2: surface by what colours it, from :func:`synfeal.inspect.density.detail_of`.
+        space: the free space of the mesh.
+    """
+    doubts = [*_unit(extents_m), *_up_axis(floors_m2)]
+    plain = area_m2["plain"] / max(sum(area_m2.values()), 1e-12)
+    if plain > MAX_PLAIN:
+        doubts.append(f"{plain:.0%} of the surface has one plain colour: little to localize by")
+    if not space.is_free.any():
+        doubts.append("no free space was found: check unit, up axis and box")
+    elif space.enclosure < MIN_ENCLOSURE:
+        doubts.append(
+            f"the mesh is open: from half of its free points, more than {1 - space.enclosure:.0%}"
+            " of the rays leave it; images will show its background"
+        )
+    return doubts
+
+
+def floor_areas_m2(normal: Array, position_m: Array, area_m2: float) -> Array:
+    """Area (3,) of the largest floor if x, y or z pointed up.
+
+    A floor is surface within 15 degrees of perpendicular to the axis, within 10 cm along it, in the
+    lower half of the mesh.
+
+    Args:
+        normal: (N, 3) of points spread evenly over the mesh.
+        position_m: (N, 3) of the same points.
+        area_m2: area of the mesh.
+    """
+    middle_m = (position_m.min(axis=0) + position_m.max(axis=0)) / 2.0
+    areas = np.zeros(3)
+    for axis in range(3):
+        along = np.abs(normal[:, axis]) >= ALIGNED_COS
+        heights = position_m[along & (position_m[:, axis] <= middle_m[axis]), axis]
+        if len(heights):
+            _, counts = np.unique(np.floor(heights / FLOOR_BIN_M), return_counts=True)
+            areas[axis] = counts.max() * area_m2 / len(position_m)
+    return areas
+
+
+def _unit(extents_m: Array) -> list[str]:
+    longest = float(extents_m.max())
+    if EXTENTS_M[0] <= longest <= EXTENTS_M[1]:
+        return []
+    hint = "0.01 or 0.001" if longest > EXTENTS_M[1] else "more than 1"
+    return [f"the mesh is {longest:.3g} m long: the unit is probably wrong; try --unit-m {hint}"]
+
+
+def _up_axis(floors_m2: Array) -> list[str]:
+    axis = int(floors_m2.argmax())
+    if axis == 2 or floors_m2[axis] < FLOOR_RATIO * floors_m2[2]:
+        return []
+    areas = (
+        f"a floor of {floors_m2[axis]:.3g} m^2 if {'xy'[axis]} were up, {floors_m2[2]:.3g} m^2 now"
+    )
+    remedy = "try the other --up-axis" if axis == 1 else "turn the mesh before exporting it"
+    return [f"the up axis is probably wrong ({areas}); {remedy}"]

@@ -1,0 +1,118 @@
+"""Everything that is said about a mesh, as one value that goes into a file."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import synfeal
+from synfeal.config.models import SceneConfig
+from synfeal.inspect.density import detail_of
+from synfeal.inspect.doubts import doubts_of, floor_areas_m2
+from synfeal.inspect.freespace import DEFINITION, FreeSpace
+from synfeal.inspect.surface import SurfacePoints, triangle_areas_m2
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.properties import mesh_properties
+from synfeal.mesh.topology import mesh_topology
+from synfeal.mesh.triangles import merge_vertices
+
+Array = NDArray[np.float64]
+
+N_HOLES = 10  # of which the length is told
+
+
+def facts_of(
+    scene: SceneConfig,
+    mesh: TexturedMesh,
+    surface: SurfacePoints,
+    space: FreeSpace,
+    box_m: Array,
+    suggested_m: Array | None,
+) -> dict[str, Any]:
+    """Numbers, findings and doubts, ready for JSON.
+
+    Args:
+        scene: path, up axis and unit of the mesh.
+        mesh: the mesh.
+        surface: points spread over it.
+        space: its free space within ``box_m``.
+        box_m: (2, 3) the box that was searched.
+        suggested_m: (2, 3) the suggested sampling box, if there is one.
+    """
+    properties = mesh_properties(mesh)
+    detail = detail_of(mesh)
+    area_m2 = sum(detail["area_m2"].values())
+    floors_m2 = floor_areas_m2(surface.normal, surface.position_m, area_m2)
+    extents_m = np.array(properties["extents_m"])
+    return {
+        "mesh": {
+            "path": str(scene.path),
+            "sha256": sha256_of(Path(str(scene.path))),
+            "up_axis": scene.up_axis,
+            "unit_m": scene.unit_m,
+        },
+        "properties": properties,
+        "materials": len({_material_key(part) for part in mesh.parts}),
+        "parts": [_part(part) for part in mesh.parts],
+        "detail": detail,
+        "topology": _topology(mesh),
+        "findings": list(mesh.findings),
+        "free_space": {
+            "definition": DEFINITION,
+            "box_m": box_m.tolist(),
+            "share": space.share,
+            "volume_m3": space.share * float(np.prod(box_m[1] - box_m[0])),
+            "enclosure": space.enclosure,
+            "floor_m": space.floor_m,
+        },
+        "suggested_sampling_box": None if suggested_m is None else as_box(suggested_m),
+        "doubts": doubts_of(extents_m, floors_m2, detail["area_m2"], space),
+        "version": synfeal.__version__,
+    }
+
+
+def as_box(box_m: Array) -> dict[str, list[float]]:
+    """A box (2, 3) as the mapping a configuration file holds."""
+    return {axis: box_m[:, index].tolist() for index, axis in enumerate("xyz")}
+
+
+def sha256_of(path: Path) -> str:
+    """Hash of the mesh file itself, as ``sha256`` of a scene expects it."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _topology(mesh: TexturedMesh) -> dict[str, Any]:
+    topology = asdict(mesh_topology(*merge_vertices(*mesh.merged())))
+    lengths = topology.pop("hole_lengths_m")
+    return {**topology, "holes": len(lengths), "longest_holes_m": list(lengths[:N_HOLES])}
+
+
+def _part(part: MeshPart) -> dict[str, Any]:
+    texture = None if part.texture is None else [part.texture.shape[1], part.texture.shape[0]]
+    return {
+        "name": part.name,
+        "faces": len(part.faces),
+        "area_m2": float(triangle_areas_m2(part).sum()),
+        "colour": _colour(part),
+        "texture_px": texture,
+        "alpha_cutoff": part.alpha_cutoff,
+    }
+
+
+def _colour(part: MeshPart) -> str:
+    if part.texture is not None:
+        return "texture"
+    return "plain" if part.vertex_rgb is None else "vertices"
+
+
+def _material_key(part: MeshPart) -> tuple[str, bytes, float | None]:
+    """Equal for parts that are drawn alike."""
+    texture = b"" if part.texture is None else part.texture.tobytes()
+    kind = f"{_colour(part)} {hashlib.sha256(texture).hexdigest()}"
+    return kind, part.base_color.tobytes(), part.alpha_cutoff

@@ -1,0 +1,97 @@
+"""Coloured points spread evenly over a mesh: what textures, vertex and base colours show there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.mesh.model import MeshPart, TexturedMesh
+
+N_POINTS = 300_000
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Points on the triangles of a mesh.
+
+    Attributes:
+        position_m: (N, 3), world, metres.
+        normal: (N, 3), unit length, of the triangle.
+        rgb: (N, 3) uint8.
+        is_drawn: (N,), False where the alpha test cuts the surface out.
+    """
+
+    position_m: Array
+    normal: Array
+    rgb: NDArray[np.uint8]
+    is_drawn: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, mesh: TexturedMesh, rng: np.random.Generator, count: int = N_POINTS) -> Self:
+        """About ``count`` points, in proportion to area, at least one on every triangle."""
+        areas = [triangle_areas_m2(part) for part in mesh.parts]
+        per_m2 = count / max(sum(float(area.sum()) for area in areas), 1e-12)
+        pieces = [
+            _sample(part, area, per_m2, rng) for part, area in zip(mesh.parts, areas, strict=True)
+        ]
+        return cls(*(np.concatenate(column) for column in zip(*pieces, strict=True)))
+
+
+def triangle_areas_m2(part: MeshPart) -> Array:
+    """Area (F,) of each triangle, square metres."""
+    return np.asarray(np.linalg.norm(_cross(part), axis=1) / 2.0)
+
+
+def _cross(part: MeshPart) -> Array:
+    """Normals (F, 3) of the triangles, as long as twice their area."""
+    a, b, c = (part.vertices_m[part.faces[:, corner]] for corner in range(3))
+    return np.cross(b - a, c - a)
+
+
+def _sample(
+    part: MeshPart, area_m2: Array, per_m2: float, rng: np.random.Generator
+) -> tuple[Array, Array, NDArray[np.uint8], NDArray[np.bool_]]:
+    """Positions, normals, colours and whether they are drawn, of points on one part."""
+    expected = area_m2 * per_m2
+    counts = np.maximum(1, np.floor(expected + rng.random(len(expected)))).astype(np.int64)
+    index = np.repeat(np.arange(len(counts)), counts)
+    weight = _barycentric(len(index), rng)
+    corners = part.faces[index]
+    position = np.einsum("nc,ncd->nd", weight, part.vertices_m[corners])
+    cross = _cross(part)[index]
+    normal = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-30)
+    rgba = _rgba(part, corners, weight)
+    cutoff = -1.0 if part.alpha_cutoff is None else part.alpha_cutoff
+    return position, normal, np.round(rgba[:, :3]).astype(np.uint8), rgba[:, 3] / 255.0 >= cutoff
+
+
+def _barycentric(count: int, rng: np.random.Generator) -> Array:
+    """Weights (count, 3) of the corners, uniform over the triangle."""
+    u, v = rng.random((2, count))
+    root = np.sqrt(u)
+    return np.stack([1.0 - root, root * (1.0 - v), root * v], axis=1)
+
+
+def _rgba(part: MeshPart, corners: NDArray[np.int64], weight: Array) -> Array:
+    """Colours (N, 4) in 0 to 255: texture or vertex colours times the base colour."""
+    rgba = np.full((len(corners), 4), 255.0)
+    if part.texture is not None and part.uv is not None:
+        uv = np.einsum("nc,ncd->nd", weight, part.uv[corners])
+        texel = nearest_texels(part.texture, uv)
+        rgba[:, : texel.shape[1]] = texel
+    elif part.vertex_rgb is not None:
+        rgba[:, :3] = np.einsum("nc,ncd->nd", weight, part.vertex_rgb[corners].astype(np.float64))
+    return rgba * (part.base_color / 255.0)
+
+
+def nearest_texels(texture: NDArray[np.uint8], uv: Array) -> NDArray[np.uint8]:
+    """Texels (N, C) at coordinates (N, 2), origin at the bottom left, repeated beyond 0 to 1."""
+    height, width = texture.shape[:2]
+    column = np.floor((uv[:, 0] % 1.0) * width).astype(np.int64) % width
+    row = height - 1 - np.floor((uv[:, 1] % 1.0) * height).astype(np.int64) % height
+    return np.asarray(texture[row, column])

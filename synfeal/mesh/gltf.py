@@ -1,0 +1,159 @@
+"""glTF and GLB containers: their JSON, checked, and put into the few forms the parser reads right.
+
+trimesh parses the geometry. Of what glTF allows it silently drops or misreads a part: texture
+transforms, second sets of texture coordinates, colours that are not 8-bit, exact factors. So the
+JSON is read here, simplified before trimesh sees it, and kept for the materials.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from synfeal.errors import InputError
+
+GLB_MAGIC = b"glTF"
+JSON_CHUNK, BIN_CHUNK = b"JSON", b"BIN\0"
+BIN_URI = "synfeal-glb-binary-chunk"  # the name under which a resolver is asked for the BIN chunk
+SPECULAR_GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Gltf:
+    """A glTF file: its JSON as stored, and the BIN chunk of a GLB (empty in a .gltf)."""
+
+    header: Json
+    binary: bytes = b""
+
+
+def read_gltf(path: Path) -> Gltf:
+    """Read the container.
+
+    Raises:
+        InputError: the file is cut short, is no glTF 2.0, or its JSON is broken.
+    """
+    if path.suffix.lower() == ".gltf":
+        return Gltf(_parse_json(path, path.read_bytes()))
+    content = path.read_bytes()
+    _check_glb_head(path, content)
+    chunks = dict(reversed(list(_chunks(content))))  # the first of each kind counts
+    if JSON_CHUNK not in chunks:
+        raise InputError(f"{path}: the GLB holds no JSON; export it again")
+    return Gltf(_parse_json(path, chunks[JSON_CHUNK]), chunks.get(BIN_CHUNK, b""))
+
+
+def _check_glb_head(path: Path, content: bytes) -> None:
+    if content[:4] != GLB_MAGIC or len(content) < 20:
+        raise InputError(f"{path}: cannot be read as a mesh (not a GLB file, whatever its name)")
+    version, length = struct.unpack_from("<II", content, 4)
+    if version != 2:
+        raise InputError(f"{path}: is glTF {version}; convert it to glTF 2.0")
+    if len(content) < length:
+        raise InputError(
+            f"{path}: ends after {len(content)} of {length} bytes; download or export it again"
+        )
+
+
+def _chunks(content: bytes) -> list[tuple[bytes, bytes]]:
+    """Kind and content of all chunks of a GLB."""
+    chunks, start = [], 12
+    while start + 8 <= len(content):
+        length, kind = struct.unpack_from("<I4s", content, start)
+        chunks.append((kind, content[start + 8 : start + 8 + length]))
+        start += 8 + length
+    return chunks
+
+
+def _parse_json(path: Path, text: bytes) -> Json:
+    try:
+        header = json.loads(text)
+    except ValueError as error:  # also what is not UTF-8
+        raise InputError(
+            f"{path}: cannot be read as a mesh (its JSON is broken: {error}); export it again"
+        ) from None
+    if not isinstance(header, dict) or "asset" not in header:
+        raise InputError(f"{path}: cannot be read as a mesh (its JSON is not that of a glTF)")
+    version = str(header["asset"].get("version", "2.0"))
+    if not version.startswith("2"):
+        raise InputError(f"{path}: is glTF {version}; convert it to glTF 2.0")
+    return header
+
+
+def simplified(gltf: Gltf) -> Json:
+    """A copy of the JSON for trimesh.
+
+    Every primitive has a material, whose name is its index; so trimesh keeps vertex colours as they
+    are stored, and materials can be looked up. Nodes are named by their index, which tells their
+    order. Base colours come from one place and use the first set of texture coordinates. The BIN
+    chunk has a URI.
+    """
+    header = copy.deepcopy(gltf.header)
+    if gltf.binary and header.get("buffers"):
+        header["buffers"][0].setdefault("uri", BIN_URI)
+    nodes = header.get("nodes", [])
+    for index, node in enumerate(nodes):
+        node["name"] = f"{index:09d}"
+    if not header.get("scenes"):  # then all nodes are meant
+        children = {child for node in nodes for child in node.get("children", [])}
+        header["scenes"] = [{"nodes": [i for i in range(len(nodes)) if i not in children]}]
+    materials = header.setdefault("materials", [])
+    for index, material in enumerate(materials):
+        materials[index] = {"name": str(index), "pbrMetallicRoughness": base_color(material)}
+    materials.append({"name": str(len(materials))})
+    header.setdefault("bufferViews", [])  # without, trimesh leaves no materials to refer to
+    header.setdefault("accessors", [])
+    for mesh in header.get("meshes", []):
+        for primitive in mesh["primitives"]:
+            index = primitive.setdefault("material", len(materials) - 1)
+            _use_one_uv_set(primitive["attributes"], materials[index])
+    return header
+
+
+def base_color(material: Json) -> Json:
+    """What stands for ``pbrMetallicRoughness``, reduced to colour: texture and factor, if any.
+
+    Of the older specular-glossiness materials it is the diffuse colour.
+    """
+    source = material.get("pbrMetallicRoughness", {})
+    glossy = material.get("extensions", {}).get(SPECULAR_GLOSSINESS)
+    if glossy is not None:
+        renamed = {"diffuseTexture": "baseColorTexture", "diffuseFactor": "baseColorFactor"}
+        source = {renamed.get(key, key): value for key, value in glossy.items()}
+    return {key: source[key] for key in ("baseColorTexture", "baseColorFactor") if key in source}
+
+
+def _use_one_uv_set(attributes: Json, material: Json) -> None:
+    """Make the set of texture coordinates that the base colour uses the first one."""
+    slot = material.get("pbrMetallicRoughness", {}).get("baseColorTexture", {})
+    chosen = slot_texture_set(slot)
+    if chosen == 0:
+        return
+    attributes.pop("TEXCOORD_0", None)
+    if f"TEXCOORD_{chosen}" in attributes:
+        attributes["TEXCOORD_0"] = attributes[f"TEXCOORD_{chosen}"]
+
+
+def slot_texture_set(slot: Json) -> int:
+    """Which set of texture coordinates a texture reference uses."""
+    transform = slot.get("extensions", {}).get("KHR_texture_transform", {})
+    return int(transform.get("texCoord", slot.get("texCoord", 0)))
+
+
+def image_uri(header: Json, texture: int) -> str | None:
+    """The file an image comes from; None if it lies inside the glTF."""
+    source = image_index(header["textures"][texture])
+    uri = None if source is None else header["images"][source].get("uri")
+    return None if uri is None or uri.startswith("data:") else str(uri)
+
+
+def image_index(texture: Json) -> int | None:
+    """The image of a texture that can be read: WebP where offered, as trimesh chooses."""
+    webp = texture.get("extensions", {}).get("EXT_texture_webp", {})
+    index = webp.get("source", texture.get("source"))
+    return None if index is None else int(index)

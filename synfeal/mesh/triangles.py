@@ -1,0 +1,56 @@
+"""Geometry alone: what rays are cast against, and the file it is kept in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from synfeal.errors import InputError
+from synfeal.files import atomic_path
+
+MERGE_M = 1e-5  # copies of a vertex on a texture seam differ by rounding only
+
+
+class Triangles(NamedTuple):
+    """Vertices (V, 3), world, metres, and faces (F, 3)."""
+
+    vertices_m: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+
+def merge_vertices(vertices_m: NDArray[np.float64], faces: NDArray[np.int64]) -> Triangles:
+    """Join vertices at the same place, or a simplifier tears the mesh along its seams."""
+    keys = np.round(vertices_m / MERGE_M).astype(np.int64)
+    _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    joined = index.reshape(-1)[faces]
+    corners = np.sort(joined, axis=1)
+    has_area = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2])
+    return Triangles(vertices_m[first], joined[has_area].astype(np.int64))
+
+
+def save_collision_mesh(path: Path, mesh: Triangles) -> None:
+    """Write a binary PLY in double precision: scans may lie at map coordinates."""
+    import open3d as o3d  # takes a second: who only reads does not need it
+
+    vertices = o3d.utility.Vector3dVector(mesh.vertices_m)
+    faces = o3d.utility.Vector3iVector(mesh.faces.astype(np.int32))
+    with atomic_path(path) as temporary:
+        if not o3d.io.write_triangle_mesh(temporary, o3d.geometry.TriangleMesh(vertices, faces)):
+            raise OSError(f"{temporary}: Open3D could not write the collision mesh")
+
+
+def load_collision_mesh(path: Path) -> Triangles:
+    """Read what :func:`save_collision_mesh` wrote.
+
+    Raises:
+        InputError: the file is missing or is no PLY with faces.
+    """
+    try:
+        mesh = trimesh.load_mesh(str(path), process=False)
+        return Triangles(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64))
+    except Exception as error:  # parsers of foreign files fail in every way there is
+        raise InputError(f"{path}: cannot be read as a collision mesh ({error})") from None

@@ -1,0 +1,262 @@
+"""The collision mesh: what is kept, how it is chosen, and the curve that shows it."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from synfeal.config.models import SceneConfig
+from synfeal.dataset.number_table import read_numbers
+from synfeal.errors import InputError
+from synfeal.mesh.collision import (
+    CURVE_HEADER,
+    Rung,
+    Trial,
+    collision_mesh,
+    ladder,
+    last_agreeing,
+    search,
+    write_curve,
+)
+from synfeal.mesh.decimate import simplify
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.rays import RayCaster
+from synfeal.mesh.triangles import (
+    Triangles,
+    load_collision_mesh,
+    merge_vertices,
+    save_collision_mesh,
+)
+from synfeal.planning.questions import Questions, draw_questions
+from synfeal.planning.target import admissible, has_free_view
+from synfeal.report.figures import write_figures
+from synfeal.report.speed_vs_error import write_speed_vs_error
+from tests.report_results import read
+
+SCENE = SceneConfig.model_validate({"source": "mesh", "path": "scene.glb"})
+ROOM = np.array([[-3.0, -2.0, 0.0], [3.0, 2.0, 2.5]])
+N_QUESTIONS = 4000
+BOX = np.array([[-2.8, -1.8, 0.8], [2.8, 1.8, 1.8]])
+RUNG = Rung(100, 1.0, 0.99, 1.0, 0, 0, 1, 1, 0.0)
+
+
+def triangles_of(*meshes: trimesh.Trimesh) -> Triangles:
+    joined = trimesh.util.concatenate(list(meshes))
+    return merge_vertices(np.asarray(joined.vertices), np.asarray(joined.faces))
+
+
+def divided(mesh: trimesh.Trimesh, times: int) -> trimesh.Trimesh:
+    for _ in range(times):
+        mesh = mesh.subdivide()
+    return mesh
+
+
+def open_column() -> trimesh.Trimesh:
+    """Four sheets from floor to ceiling, without lids: 8 triangles a quadric holds for flat."""
+    box = trimesh.creation.box(bounds=[[-0.2, -0.2, 0.0], [0.2, 0.2, 2.5]])
+    return trimesh.Trimesh(box.vertices, box.faces[np.abs(box.face_normals[:, 2]) < 0.5])
+
+
+@pytest.fixture(scope="module")
+def furnished() -> Triangles:
+    """A room with a column, a plate and a cupboard, finely divided: 4,040 triangles."""
+    room = divided(trimesh.creation.box(bounds=ROOM), 4)
+    plate = divided(trimesh.creation.box(bounds=[[1.0, -1.0, 1.0], [2.0, 1.0, 1.01]]), 2)
+    cupboard = divided(trimesh.creation.box(bounds=[[-3.0, 1.0, 0.0], [-2.0, 2.0, 2.0]]), 3)
+    return triangles_of(room, open_column(), plate, cupboard)
+
+
+@pytest.fixture(scope="module")
+def questions(furnished: Triangles) -> Questions:
+    rng = np.random.default_rng(1)
+    return draw_questions(RayCaster(*furnished), SCENE, BOX, rng, N_QUESTIONS)
+
+
+@pytest.fixture(scope="module")
+def trials(furnished: Triangles, questions: Questions) -> list[Trial]:
+    return search(furnished, questions, 0.995)
+
+
+def test_a_divided_room_needs_few_of_its_triangles(
+    furnished: Triangles, trials: list[Trial]
+) -> None:
+    (chosen,) = (trial for trial in trials if trial.rung.chosen)
+    assert chosen.rung.faces == len(chosen.mesh.faces) < len(furnished.faces) / 8
+    full, few = RayCaster(*furnished), RayCaster(*chosen.mesh)
+    fresh = draw_questions(full, SCENE, BOX, np.random.default_rng(2))
+    # Questions it was not chosen on: 0.995 less three standard deviations of 4,000 and of 10,000.
+    assert np.mean(fresh.answers(full) == fresh.answers(few)) >= 0.991
+
+
+def test_every_line_of_the_curve_can_be_counted_again(
+    furnished: Triangles, questions: Questions, trials: list[Trial]
+) -> None:
+    expected = questions.answers(RayCaster(*furnished))
+    assert [trial.rung.faces for trial in trials] == sorted(
+        (trial.rung.faces for trial in trials), reverse=True
+    )
+    for trial in trials:
+        found, rung = questions.answers(RayCaster(*trial.mesh)), trial.rung
+        assert rung.agreement == np.mean(found == expected)
+        assert rung.wrongly_admitted == np.sum(found & ~expected)
+        assert rung.wrongly_refused == np.sum(~found & expected)
+        assert rung.agreement_low <= rung.agreement <= rung.agreement_high
+    assert trials[0].rung.agreement == 1.0
+    # Wilson at p = 1: n / (n + z²)
+    low = N_QUESTIONS / (N_QUESTIONS + 1.959964**2)
+    assert trials[0].rung.agreement_low == pytest.approx(low, abs=1e-6)
+
+
+def test_an_open_column_keeps_its_height() -> None:
+    column = triangles_of(divided(open_column(), 3))
+    for n_faces in (256, 64, 16):
+        caster = RayCaster(*simplify(column, n_faces))
+        starts = np.c_[np.full(50, -1.0), np.zeros(50), np.linspace(0.01, 2.49, 50)]
+        assert not caster.sees(starts, starts + np.array([2.0, 0.0, 0.0])).any()
+
+
+def test_simplification_is_the_same_at_map_coordinates(furnished: Triangles) -> None:
+    offset = np.array([5e5, 4e6, 100.0])
+    here = simplify(furnished, 1000)
+    there = simplify(Triangles(furnished.vertices_m + offset, furnished.faces), 1000)
+    start, far = np.array([[-1.0, 0.5, 1.5]]), np.random.default_rng(0).uniform(*BOX, (2000, 3))
+    starts = np.tile(start, (2000, 1))
+    same = RayCaster(*here).sees(starts, far) == RayCaster(*there).sees(
+        starts + offset, far + offset
+    )
+    assert np.mean(same) > 0.995
+
+
+def test_starts_are_admissible_poses_of_the_room(furnished: Triangles) -> None:
+    caster = RayCaster(*furnished)
+    questions = draw_questions(caster, SCENE, BOX, np.random.default_rng(3), 1000)
+    assert has_free_view(caster, questions.starts, SCENE.min_view_distance_m).all()
+    inside = (questions.starts[:, 0] < -2.0) & (questions.starts[:, 1] > 1.0)
+    assert not inside.any()  # none in the cupboard
+    hidden = (questions.candidates[:, 0] < -2.0) & (questions.candidates[:, 1] > 1.0)
+    assert hidden.any()
+    assert not questions.answers(caster)[hidden].any()
+
+
+def test_starts_for_each_candidate_are_judged_one_by_one(
+    furnished: Triangles, questions: Questions
+) -> None:
+    caster, some = RayCaster(*furnished), range(0, 200)
+    one_by_one = [
+        admissible(caster, questions.starts[i], questions.candidates[i : i + 1], 1.2)[0]
+        for i in some
+    ]
+    assert questions.answers(caster)[:200].tolist() == one_by_one
+
+
+@settings(derandomize=True, deadline=None)
+@given(st.lists(st.floats(0, 1), max_size=12), st.floats(0.5, 1))
+def test_the_choice_is_the_last_of_an_unbroken_run(rest: list[float], least: float) -> None:
+    rungs = [replace(RUNG, agreement=value) for value in (1.0, *rest)]
+    last = last_agreeing(rungs, least)
+    assert all(rung.agreement >= least for rung in rungs[: last + 1])
+    assert last + 1 == len(rungs) or rungs[last + 1].agreement < least
+
+
+@pytest.mark.parametrize(
+    ("n_faces", "expected"),
+    [(12, []), (100, []), (101, [100]), (1000, [800, 400, 200, 100])],
+)
+def test_ladder(n_faces: int, expected: list[int]) -> None:
+    assert ladder(n_faces) == expected
+
+
+def test_small_meshes_are_not_decimated() -> None:
+    box = trimesh.creation.box(bounds=ROOM)
+    mesh = TexturedMesh((MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces)),))
+    collision, curve = collision_mesh(mesh, SCENE, BOX, 0.995, np.random.default_rng(0))
+    assert len(collision.faces) == 12
+    assert [(rung.faces, rung.chosen) for rung in curve] == [(12, 1)]
+
+
+def test_full_agreement_keeps_whatever_a_question_noticed(
+    furnished: Triangles, questions: Questions
+) -> None:
+    (chosen,) = (trial.rung for trial in search(furnished, questions, 1.0) if trial.rung.chosen)
+    assert chosen.agreement == 1.0
+
+
+def test_the_choice_does_not_depend_on_the_clock(
+    furnished: Triangles, questions: Questions, trials: list[Trial]
+) -> None:
+    again = search(furnished, questions, 0.995)
+    for a, b in zip(trials, again, strict=True):
+        np.testing.assert_array_equal(a.mesh.vertices_m, b.mesh.vertices_m)
+        assert a.rung.chosen == b.rung.chosen
+
+
+def test_a_scene_without_a_free_view_is_refused() -> None:
+    box = trimesh.creation.box(bounds=ROOM)
+    mesh = TexturedMesh((MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces)),))
+    scene = SCENE.model_copy(update={"min_view_distance_m": 20.0})
+    with pytest.raises(InputError, match="min_view_distance_m"):
+        collision_mesh(mesh, scene, BOX, 0.995, np.random.default_rng(0))
+
+
+def test_seam_copies_are_merged() -> None:
+    box = trimesh.creation.box()
+    soup, faces = box.vertices[box.faces].reshape(-1, 3), np.arange(36).reshape(-1, 3)
+    vertices, merged = merge_vertices(soup, faces)
+    assert len(vertices) == 8
+    np.testing.assert_allclose(vertices[merged], soup[faces], atol=1e-5)
+
+
+def test_collision_mesh_file_keeps_map_coordinates(tmp_path: Path) -> None:
+    box = trimesh.creation.box()
+    offset = np.array([5e5, 4e6, 100.123456789])
+    mesh = Triangles(np.asarray(box.vertices) + offset, np.asarray(box.faces))
+    save_collision_mesh(tmp_path / "collision.ply", mesh)
+    back = load_collision_mesh(tmp_path / "collision.ply")
+    np.testing.assert_array_equal(back.vertices_m, mesh.vertices_m)
+    np.testing.assert_array_equal(back.faces, mesh.faces)
+    with pytest.raises(InputError, match="collision mesh"):
+        load_collision_mesh(tmp_path / "none.ply")
+
+
+def curve_of(*values: tuple[int, float, int, int, int]) -> list[Rung]:
+    return [
+        replace(RUNG, faces=n, agreement=a, rays_per_s=r, full_rays_per_s=f, chosen=c)
+        for n, a, r, f, c in values
+    ]
+
+
+def test_the_table_rids_speeds_of_what_else_the_machine_did(tmp_path: Path) -> None:
+    # The second pair was measured while the machine did half its work elsewhere.
+    curve = curve_of((4000, 1.0, 100, 100, 0), (800, 0.998, 75, 50, 1), (100, 0.9, 200, 100, 0))
+    write_curve(tmp_path / "scenes" / "large_room" / "collision_curve.csv", curve)
+    write_speed_vs_error(["large_room"], tmp_path, tmp_path / "tables" / "speed_vs_error.csv")
+    rows = read(tmp_path / "tables" / "speed_vs_error.csv")
+    assert [row["variant"] for row in rows] == ["full", "decimated", "decimated"]
+    assert [float(row["items_per_s"]) for row in rows] == [100.0, 150.0, 200.0]
+    assert [float(row["seconds_per_item"]) for row in rows] == pytest.approx(
+        [1 / 100, 1 / 150, 1 / 200], rel=1e-5
+    )
+    assert [float(row["error"]) for row in rows] == pytest.approx([0.0, 0.002, 0.1])
+    assert [row["chosen"] for row in rows] == ["0", "1", "0"]
+    assert {(row["stage"], row["scene"]) for row in rows} == {("collision", "large_room")}
+    write_figures(tmp_path / "tables", tmp_path / "figures")
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == {
+        "speed_vs_error_collision.png",
+        "speed_vs_error_collision.svg",
+    }
+
+
+def test_a_curve_reads_back_and_a_missing_one_is_named(tmp_path: Path) -> None:
+    curve = curve_of((4000, 1.0, 100, 100, 0), (800, 1 / 3, 75, 50, 1))
+    write_curve(tmp_path / "curve.csv", curve)
+    values = read_numbers(tmp_path / "curve.csv", CURVE_HEADER, "curve")
+    np.testing.assert_array_equal(values, [astuple(rung) for rung in curve])
+    with pytest.raises(InputError, match=r"sanctuary/collision_curve\.csv"):
+        write_speed_vs_error(["sanctuary"], tmp_path, tmp_path / "table.csv")
+    assert not (tmp_path / "table.csv").exists()

@@ -1,0 +1,164 @@
+"""``synfeal inspect`` as a person uses it."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+import yaml
+from PIL import Image
+
+from synfeal.cli import main
+from synfeal.config.models import SceneConfig
+from synfeal.inspect.views import top_view
+from synfeal.mesh.load import load_mesh
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.save import save_glb
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
+
+BOX = ("--box", "-2.9", "2.9", "-2.5", "2.5", "-1.5", "1.5")
+OUTPUTS = ["inspect.html", "inspect.json", "inspect.png"]
+
+
+@pytest.fixture(scope="module")
+def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A closed room of 6 x 5 x 3 m whose walls face inwards."""
+    box = trimesh.creation.box((6.0, 5.0, 3.0)).subdivide().subdivide()
+    colors = np.random.default_rng(0).integers(0, 256, (len(box.vertices), 3), np.uint8)
+    faces = np.asarray(box.faces)[:, ::-1]
+    part = MeshPart("walls", np.asarray(box.vertices), faces, vertex_rgb=colors)
+    path = tmp_path_factory.mktemp("mesh") / "My Room.glb"
+    save_glb(path, TexturedMesh((part,)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def inspected(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A directory the command was called in, with its default output, and what it printed."""
+    folder = tmp_path_factory.mktemp("called")
+    printed = io.StringIO()
+    with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
+        assert main(["inspect", str(mesh), *BOX]) == 0
+    return folder / "My Room-inspect", printed.getvalue()
+
+
+def test_it_writes_its_three_files(inspected: tuple[Path, str]) -> None:
+    out, _ = inspected
+    assert sorted(path.name for path in out.iterdir()) == OUTPUTS
+    assert (out / "inspect.html").stat().st_size < 10e6
+    with Image.open(out / "inspect.png") as picture:
+        assert picture.width == 1600
+        assert 800 <= picture.height <= 1000
+
+
+def test_its_numbers_are_those_of_the_room(inspected: tuple[Path, str], mesh: Path) -> None:
+    facts = json.loads((inspected[0] / "inspect.json").read_text())
+    assert facts["properties"]["volume_m3"] == pytest.approx(90.0)
+    assert facts["topology"]["watertight"] is True
+    assert facts["topology"]["enclosed_volume_m3"] == pytest.approx(-90.0)
+    assert facts["detail"]["area_m2"]["coloured_by_vertex"] == pytest.approx(126.0)
+    assert facts["free_space"]["box_m"] == [[-2.9, -2.5, -1.5], [2.9, 2.5, 1.5]]
+    assert facts["free_space"]["volume_m3"] == pytest.approx(5.8 * 5.0 * 3.0, rel=0.03)
+    assert facts["mesh"]["sha256"] == hashlib.sha256(mesh.read_bytes()).hexdigest()
+    assert facts["doubts"] == []
+
+
+def test_what_it_prints_can_be_pasted(inspected: tuple[Path, str], mesh: Path) -> None:
+    printed = inspected[1]
+    assert printed.isascii()
+    assert "90.00 m^3" in printed
+    text = printed[printed.index("  my_room:") :].split("\n\n")[0]
+    scene = SceneConfig.model_validate(yaml.safe_load("scenes:\n" + text)["scenes"]["my_room"])
+    assert scene.path == mesh
+    assert scene.sampling_box is not None
+    np.testing.assert_allclose(scene.sampling_box.x, [-2.7, 2.7], atol=0.2)
+    np.testing.assert_allclose(scene.sampling_box.y, [-2.2, 2.2], atol=0.2)
+    np.testing.assert_allclose(scene.sampling_box.z, [-0.7, 0.5], atol=0.2)
+
+
+def test_it_runs_again_over_its_own_files(inspected: tuple[Path, str], mesh: Path) -> None:
+    before = {path.name: path.read_bytes() for path in inspected[0].iterdir()}
+    assert main(["inspect", str(mesh), "--out", str(inspected[0]), *BOX]) == 0
+    assert {path.name: path.read_bytes() for path in inspected[0].iterdir()} == before
+
+
+def test_it_spares_files_of_others(
+    mesh: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    assert main(["inspect", str(mesh), "--out", str(tmp_path)]) == 1
+    assert "notes.txt" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--unit-m", "-1"], ["unit_m"]),
+        (["--box", "1", "0", "0", "1", "0", "1"], ["sampling_box", "x"]),
+        (["--box", "90", "91", "0", "1", "0", "1"], ["outside", "unit_m"]),
+    ],
+)
+def test_what_a_person_can_mend_is_one_line(
+    mesh: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    options: list[str],
+    words: list[str],
+) -> None:
+    assert main(["inspect", str(mesh), "--out", str(tmp_path / "out"), *options]) == 1
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1
+    assert all(word in lines[0] for word in words), lines
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_missing_mesh_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", str(tmp_path / "none.ply"), "--out", str(tmp_path / "out")]) == 1
+    assert "none.ply" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_top_view_shows_the_floor_in_its_place() -> None:
+    corners = np.array([[0.0, 0, 0], [4, 0, 0], [4, 2, 0], [0, 2, 0]])
+    two = np.array([[0, 1, 2], [0, 2, 3]])
+
+    def plate(offset: list[float], side: float, rgb: tuple[int, int, int]) -> MeshPart:
+        color = np.array([*rgb, 255], np.uint8)
+        return MeshPart("plate", corners * side + offset, two, base_color=color)
+
+    floor, ceiling = plate([0, 0, 0], 1.0, (0, 0, 255)), plate([0, 0, 3], 1.0, (9, 9, 9))
+    rug = plate([2.8, 1.4, 0.1], 0.2, (255, 0, 0))
+    view = top_view(TexturedMesh((floor, ceiling, rug)), 1.5)
+    x0, x1, y0, y1 = view.extent_m
+    height, width = view.rgb.shape[:2]
+
+    def seen(x: float, y: float) -> list[int]:
+        column, row = (x - x0) / (x1 - x0) * width, (y1 - y) / (y1 - y0) * height
+        return view.rgb[int(row), int(column)].tolist()  # type: ignore[no-any-return]
+
+    assert x0 < 0 < 4 < x1
+    assert seen(1.0, 1.0) == [0, 0, 255]
+    assert seen(3.2, 1.6) == [255, 0, 0]
+    assert seen(2.7, 1.6) == seen(3.2, 1.3) == [0, 0, 255]
+    assert seen(-0.05, 1.0) == [255, 255, 255]
+
+
+@pytest.mark.skipif("SYNFEAL_TEST_MESHES" not in os.environ, reason="no downloaded meshes")
+def test_a_downloaded_scene(tmp_path: Path) -> None:
+    path = Path(os.environ["SYNFEAL_TEST_MESHES"]) / "botanists-greenhouse" / "scene.gltf"
+    assert main(["inspect", str(path), "--out", str(tmp_path / "out")]) == 0
+    facts = json.loads((tmp_path / "out" / "inspect.json").read_text())
+    assert facts["properties"]["faces"] == load_mesh(path).n_faces
+    assert facts["properties"]["vertices"] < facts["properties"]["vertices_with_seams"]
+    assert any("open" in doubt for doubt in facts["doubts"])  # two of its walls are missing
+    assert any("M_Glass_01" in finding for finding in facts["findings"])
+    assert facts["suggested_sampling_box"] is not None

@@ -1,0 +1,153 @@
+"""Surface points, texel density and doubts, on surfaces small enough to work out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+
+from synfeal.inspect.density import detail_of, texels_per_m
+from synfeal.inspect.doubts import doubts_of, floor_areas_m2
+from synfeal.inspect.freespace import FreeSpace
+from synfeal.inspect.picture import round_length_m
+from synfeal.inspect.surface import SurfacePoints, nearest_texels
+from synfeal.mesh.model import MeshPart, TexturedMesh
+
+UNIT_UV = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+TWO = np.array([[0, 1, 2], [0, 2, 3]])
+ALL_TEXTURED = {"textured": 1.0, "coloured_by_vertex": 0.0, "plain": 0.0}
+
+
+def square(side_m: float, texture: NDArray[np.uint8] | None = None, **values: object) -> MeshPart:
+    """A horizontal square with the whole texture on it."""
+    corners = np.column_stack([UNIT_UV * side_m, np.zeros(4)])
+    uv = None if texture is None else UNIT_UV
+    return MeshPart("square", corners, TWO, uv, texture, **values)  # type: ignore[arg-type]
+
+
+def texture_of(height: int, width: int, channels: int = 3) -> NDArray[np.uint8]:
+    return np.zeros((height, width, channels), np.uint8)
+
+
+def closed_space(enclosure: float = 1.0) -> FreeSpace:
+    mask = np.ones((2, 2, 2), np.bool_)
+    axis = np.array([0.0, 1.0])
+    return FreeSpace((axis, axis, axis), mask, mask, enclosure, 0.0)
+
+
+def test_texels_per_metre_of_one_square() -> None:
+    assert texels_per_m([square(2.0, texture_of(64, 64))]) == pytest.approx([32.0] * 3)
+    assert texels_per_m([square(2.0, texture_of(64, 16))]) == pytest.approx([16.0] * 3)
+
+
+def test_texels_per_metre_are_weighted_by_area() -> None:
+    parts = [square(10.0, texture_of(100, 100)), square(1.0, texture_of(500, 500))]
+    assert texels_per_m(parts) == pytest.approx([10.0, 10.0, 10.0])  # 1 of 101 m²: beyond 95 %
+    parts = [square(10.0, texture_of(100, 100)), square(5.0, texture_of(500, 500))]
+    assert texels_per_m(parts) == pytest.approx([10.0, 10.0, 100.0])
+
+
+def test_a_triangle_without_area_has_no_density() -> None:
+    corners = np.zeros((4, 3))
+    part = MeshPart("point", corners, TWO, UNIT_UV, texture_of(4, 4))
+    assert texels_per_m([part]) is None
+
+
+def test_surface_by_what_colours_it() -> None:
+    rgb = np.zeros((4, 3), np.uint8)
+    detail = detail_of(
+        TexturedMesh((square(1.0, texture_of(8, 8)), square(2.0, vertex_rgb=rgb), square(3.0)))
+    )
+    assert detail["area_m2"] == pytest.approx(
+        {"textured": 1.0, "coloured_by_vertex": 4.0, "plain": 9.0}
+    )
+    assert detail["coloured_vertices_per_m"] == pytest.approx(1.0)  # 4 vertices on 4 m²
+    bare = detail_of(TexturedMesh((square(1.0),)))
+    assert bare["texels_per_m"] is None
+    assert bare["coloured_vertices_per_m"] is None
+
+
+def test_texels_are_looked_up_from_the_bottom_left_and_repeat() -> None:
+    texture = np.arange(4, dtype=np.uint8).reshape(2, 2, 1)  # 0 1 above 2 3
+    uv = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [1.75, -0.25], [0.0, 0.0], [1.0, 1.0]])
+    assert nearest_texels(texture, uv)[:, 0].tolist() == [2, 3, 0, 1, 2, 2]
+
+
+def test_points_are_spread_by_area_and_carry_the_texture() -> None:
+    texture = texture_of(2, 2, 4)
+    texture[:, 0] = [255, 0, 0, 255]
+    texture[:, 1] = [0, 0, 255, 100]
+    part = square(2.0, texture, alpha_cutoff=0.5)
+    points = SurfacePoints.of(TexturedMesh((part,)), np.random.default_rng(0), 20_000)
+    assert len(points.position_m) == pytest.approx(20_000, rel=0.02)
+    np.testing.assert_allclose(points.position_m.mean(axis=0), [1.0, 1.0, 0.0], atol=0.03)
+    np.testing.assert_allclose(points.position_m[:, :2].var(axis=0), [1 / 3, 1 / 3], atol=0.01)
+    assert (points.normal == [0, 0, 1]).all()
+    left = points.position_m[:, 0] < 1.0
+    assert (points.rgb[left] == [255, 0, 0]).all()
+    assert (points.rgb[~left] == [0, 0, 255]).all()
+    assert (points.is_drawn == left).all()
+
+
+def test_base_colours_multiply_vertex_colours() -> None:
+    rgb = np.full((4, 3), 100, np.uint8)
+    part = square(1.0, vertex_rgb=rgb, base_color=np.array([255, 51, 0, 255], np.uint8))
+    points = SurfacePoints.of(TexturedMesh((part,)), np.random.default_rng(0), 50)
+    assert (points.rgb == [100, 20, 0]).all()
+
+
+def doubts(extents: tuple[float, float, float], **values: object) -> str:
+    floors = np.array([1.0, 1.0, 10.0])
+    given = {"floors_m2": floors, "area_m2": ALL_TEXTURED, "space": closed_space(), **values}
+    return "\n".join(doubts_of(np.array(extents), **given))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("extents", "words"),
+    [
+        ((5.0, 6.0, 3.0), []),
+        ((5000.0, 6000.0, 3000.0), ["6e+03 m", "0.001"]),
+        ((0.5, 0.4, 0.3), ["0.5 m", "more than 1"]),
+    ],
+)
+def test_sizes_that_are_not_metres_are_doubted(
+    extents: tuple[float, float, float], words: list[str]
+) -> None:
+    found = doubts(extents)
+    assert bool(found) == bool(words)
+    assert all(word in found for word in words)
+
+
+def test_plain_and_open_meshes_are_doubted() -> None:
+    plain = {"textured": 1.0, "coloured_by_vertex": 0.0, "plain": 3.0}
+    assert "75%" in doubts((5.0, 5.0, 3.0), area_m2=plain)
+    assert "25%" in doubts((5.0, 5.0, 3.0), space=closed_space(0.75))
+
+
+@pytest.mark.parametrize(
+    ("turn", "words"), [((0, 1, 2), ""), ((0, 2, 1), "--up-axis"), ((2, 1, 0), "turn the mesh")]
+)
+def test_the_largest_floor_tells_the_up_axis(turn: tuple[int, ...], words: str) -> None:
+    room = trimesh.creation.box((8.0, 6.0, 3.0))  # its floor has 48 m², its walls 18 and 24
+    points, faces = trimesh.sample.sample_surface(room, 20_000, seed=0)
+    points, normals = np.asarray(points)[:, turn], np.asarray(room.face_normals)[faces][:, turn]
+    floors = floor_areas_m2(normals, points, room.area)
+    np.testing.assert_allclose(floors, np.array([18.0, 24.0, 48.0])[list(turn)], rtol=0.05)
+    found = doubts((8.0, 6.0, 3.0), floors_m2=floors)
+    assert found.isascii()
+    assert words in found
+    assert bool(found) == bool(words)
+
+
+def test_a_flat_floor_is_a_floor() -> None:
+    points = np.column_stack([np.random.default_rng(0).random((100, 2)), np.zeros(100)])
+    normals = np.tile([0.0, 0.0, -1.0], (100, 1))
+    assert floor_areas_m2(normals, points, 7.0).tolist() == [0.0, 0.0, pytest.approx(7.0)]
+
+
+@pytest.mark.parametrize(
+    ("length", "expected"), [(1.0, 1.0), (1.9, 1.0), (2.5, 2.0), (9.0, 5.0), (0.07, 0.05), (10, 10)]
+)
+def test_scale_bars_have_round_lengths(length: float, expected: float) -> None:
+    assert round_length_m(length) == pytest.approx(expected)

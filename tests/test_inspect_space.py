@@ -1,0 +1,129 @@
+"""Free space and the suggested box, in rooms whose free space is known."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+
+from synfeal.inspect.freespace import (
+    FreeSpace,
+    find_free_space,
+    ray_directions,
+    suggest_box,
+    viewpoint,
+)
+from synfeal.inspect.largest_box import UNWANTED_WEIGHT, largest_box
+from synfeal.mesh.rays import RayCaster
+
+ROOM_M = (6.0, 4.0, 3.0)
+
+
+def box_at(
+    extents: tuple[float, float, float], centre: tuple[float, float, float]
+) -> trimesh.Trimesh:
+    return trimesh.creation.box(extents).apply_translation(centre)
+
+
+def space_of(meshes: list[trimesh.Trimesh], box_m: NDArray[np.float64] | None = None) -> FreeSpace:
+    mesh = trimesh.util.concatenate(meshes)
+    surface, _ = trimesh.sample.sample_surface(mesh, 60_000, seed=0)
+    bounds = np.asarray(mesh.bounds) if box_m is None else box_m
+    return find_free_space(RayCaster(mesh.vertices, mesh.faces), np.asarray(surface), bounds)
+
+
+def room() -> trimesh.Trimesh:
+    """6 x 4 x 3 m, floor at z = 0."""
+    return box_at(ROOM_M, (0.0, 0.0, 1.5))
+
+
+def test_rays_are_spread_evenly_up_to_30_degrees() -> None:
+    directions = ray_directions()
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0)
+    assert directions[:, 2].max() <= 0.5  # the sine of 30 degrees
+    np.testing.assert_allclose(directions.mean(axis=0), [0.0, 0.0, -0.25], atol=0.02)
+    assert len(directions) >= 26
+
+
+def test_a_closed_room_is_free_and_its_box_keeps_off_the_walls() -> None:
+    space = space_of([room()])
+    assert space.share > 0.97
+    assert space.enclosure == 1.0
+    assert space.floor_m == pytest.approx(0.0, abs=1e-4)
+    box = suggest_box(space)
+    assert box is not None
+    low, high = np.array([-2.7, -1.7, 0.8]), np.array([2.7, 1.7, 2.0])
+    assert (box[0] >= low - 0.06).all()  # heights are of points; the box reaches a little beyond
+    assert (box[1] <= high + 0.06).all()
+    np.testing.assert_allclose(box, [low, high], atol=0.2)
+
+
+def test_a_room_without_a_ceiling_is_a_room() -> None:
+    mesh = room()
+    mesh.update_faces(mesh.face_normals[:, 2] < 0.5)
+    space = space_of([mesh], np.array([[-3.0, -2, 0], [3, 2, 2]]))
+    assert space.share > 0.95
+
+
+def test_above_an_open_plain_nothing_is_free() -> None:
+    plain = box_at((400.0, 400.0, 0.01), (0.0, 0.0, 0.0))
+    space = space_of([plain], np.array([[-3.0, -3, 0.5], [3, 3, 2.5]]))
+    assert space.share == 0.0
+    assert suggest_box(space) is None
+    assert viewpoint(space, None) is None
+
+
+def test_half_of_the_box_outside_the_room_is_not_free() -> None:
+    box_m = np.array([[-3.0, -2, 0], [9, 2, 3]])  # the room and as much beside it
+    assert space_of([room()], box_m).share == pytest.approx(0.5, abs=0.03)
+
+
+def test_the_inside_of_a_cupboard_is_not_where_cameras_go() -> None:
+    space = space_of([room(), box_at((1.5, 1.5, 2.9), (-2.0, 0.0, 1.45))])
+    x, y, z = space.axes_m
+    inside = np.ix_(np.abs(x + 2.0) < 0.7, np.abs(y) < 0.7, z < 2.8)
+    assert space.is_free[inside].mean() > 0.5
+    assert not space.is_clear[inside].any()
+    box = suggest_box(space)
+    assert box is not None
+    assert box[0, 0] >= -1.25 + 0.3 - 0.06  # in front of the cupboard
+    position = viewpoint(space, box)
+    assert position is not None
+    assert ((position >= box[0]) & (position <= box[1])).all()
+
+
+def test_furniture_below_the_cameras_is_no_obstacle() -> None:
+    space = space_of([room(), box_at((4.0, 1.0, 0.4), (0.0, 0.0, 0.2))])
+    assert space.floor_m == pytest.approx(0.0, abs=1e-4)
+    box = suggest_box(space)
+    assert box is not None
+    np.testing.assert_allclose(box[:, :2], [[-2.7, -1.7], [2.7, 1.7]], atol=0.2)
+
+
+def test_a_low_hall_of_60_m_still_has_points_at_camera_heights() -> None:
+    space = space_of([box_at((60.0, 60.0, 3.0), (0.0, 0.0, 1.5))])
+    box = suggest_box(space)
+    assert box is not None
+    assert box[0, 2] >= 0.7
+    assert box[1, 2] <= 2.1
+    np.testing.assert_allclose(box[:, :2], [[-29.7] * 2, [29.7] * 2], atol=1.5)
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("shape", [(5, 4, 3), (2, 9, 1), (1, 12, 1)])
+def test_largest_box_against_trying_them_all(shape: tuple[int, ...], seed: int) -> None:
+    wanted = np.random.default_rng(seed).random(shape) < 0.75
+    worth = np.where(wanted, 1.0, -UNWANTED_WEIGHT)
+
+    def worth_of(lower: tuple[int, ...], upper: tuple[int, ...]) -> float:
+        slices = tuple(slice(a, b + 1) for a, b in zip(lower, upper, strict=True))
+        return float(worth[slices].sum())
+
+    limits = [list(itertools.combinations_with_replacement(range(n), 2)) for n in wanted.shape]
+    best = max(
+        worth_of((a, c, e), (b, d, f)) for (a, b), (c, d), (e, f) in itertools.product(*limits)
+    )
+    assert worth_of(*largest_box(wanted)) == best

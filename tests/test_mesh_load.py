@@ -1,0 +1,289 @@
+"""Loading: scene graphs, axes, units, colours of vertices, and files that cannot be used."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from synfeal.errors import InputError
+from synfeal.mesh.load import load_mesh
+from synfeal.mesh.save import save_glb
+from tests.mesh_samples import (
+    FACE,
+    TRIANGLE,
+    UV,
+    Json,
+    add_attribute,
+    box_mesh,
+    store_glb,
+    store_gltf,
+    textured,
+    triangle_gltf,
+    write_gltf,
+    write_obj,
+)
+
+
+@pytest.fixture
+def paint(tmp_path: Path) -> list[str]:
+    Image.new("RGB", (2, 2), (1, 2, 3)).save(tmp_path / "paint.png")
+    return ["paint.png"]
+
+
+def z_up(points: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+    """Coordinates of a y-up file in the world."""
+    return np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1)
+
+
+def test_gltf_node_transform_axes_and_units(tmp_path: Path, paint: list[str]) -> None:
+    path = write_gltf(tmp_path, textured(), paint)
+    in_file = 2.0 * TRIANGLE + [10.0, 20.0, 30.0]  # scale, then translation
+    np.testing.assert_allclose(load_mesh(path).parts[0].vertices_m, z_up(in_file))
+    np.testing.assert_allclose(load_mesh(path, "z", 0.01).parts[0].vertices_m, 0.01 * in_file)
+
+
+def test_gltf_and_glb_of_one_scene_are_the_same(tmp_path: Path, paint: list[str]) -> None:
+    header, binary = triangle_gltf(textured(), paint)
+    plain = load_mesh(store_gltf(tmp_path, header, binary)).parts[0]
+    packed = load_mesh(store_glb(tmp_path, header, binary)).parts[0]
+    np.testing.assert_array_equal(packed.vertices_m, plain.vertices_m)
+    np.testing.assert_array_equal(packed.uv, plain.uv)
+    np.testing.assert_array_equal(packed.texture, plain.texture)
+
+
+def test_nested_nodes_and_instances(tmp_path: Path, paint: list[str]) -> None:
+    header, binary = triangle_gltf(textured(), paint)
+    quarter_turn = [0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)]  # about y: x becomes -z
+    header["nodes"] = [
+        {"children": [1, 2], "translation": [5.0, 0.0, 0.0]},
+        {"mesh": 0, "rotation": quarter_turn, "name": "turned"},
+        {"mesh": 0, "scale": [3.0, 1.0, 1.0], "name": "stretched"},
+    ]
+    parts = load_mesh(store_gltf(tmp_path, header, binary), "z").parts
+    x, y, z = TRIANGLE.T
+    np.testing.assert_allclose(parts[0].vertices_m, np.stack([z + 5.0, y, -x], axis=1), atol=1e-6)
+    np.testing.assert_allclose(parts[1].vertices_m, TRIANGLE * [3.0, 1.0, 1.0] + [5.0, 0.0, 0.0])
+    assert parts[0].texture is parts[1].texture  # decoded once
+
+
+def test_without_a_scene_all_nodes_are_meant(tmp_path: Path, paint: list[str]) -> None:
+    header, binary = triangle_gltf(textured(), paint)
+    expected = load_mesh(store_gltf(tmp_path, header, binary)).parts[0].vertices_m
+    header["nodes"].append({"children": [0]})
+    del header["scenes"], header["scene"]
+    (part,) = load_mesh(store_gltf(tmp_path, header, binary)).parts
+    np.testing.assert_array_equal(part.vertices_m, expected)
+
+
+def test_parts_keep_the_order_of_the_file(tmp_path: Path, paint: list[str]) -> None:
+    header, binary = triangle_gltf(textured(), paint)
+    primitive = header["meshes"][0]["primitives"][0]
+    header["meshes"] = [
+        {"name": "z", "primitives": [primitive, dict(primitive)]},
+        {"name": "a", "primitives": [dict(primitive)]},
+    ]
+    header["nodes"] = [{"children": [1, 2, 3]}, {"mesh": 1}, {"mesh": 0}, {"mesh": 0, "name": "n"}]
+    path = store_gltf(tmp_path, header, binary)
+    for _ in range(3):  # trimesh names the nodes of such primitives at random
+        assert [part.name for part in load_mesh(path).parts] == ["z", "z", "z_1", "z_1", "a"]
+
+
+@pytest.mark.parametrize("scale", [[-1.0, 1.0, 1.0], [1.0, 1.0, 1.0], [-2.0, -1.0, -3.0]])
+def test_mirrored_nodes_keep_the_outside_outside(tmp_path: Path, scale: list[float]) -> None:
+    box = trimesh.creation.box((1.0, 2.0, 3.0))
+    box.visual.vertex_colors = np.arange(32).reshape(8, 4).astype(np.uint8)
+    scene = trimesh.Scene()
+    scene.add_geometry(box, transform=np.diag([*scale, 1.0]))
+    scene.export(tmp_path / "box.glb")
+    (part,) = load_mesh(tmp_path / "box.glb").parts
+    a, b, c = part.vertices_m[part.faces].transpose(1, 0, 2)
+    volume = np.sum(np.cross(a, b) * c) / 6.0  # positive where faces point outwards
+    assert volume == pytest.approx(6.0 * abs(np.prod(scale)))
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        (np.array([[0.0, 0.2140, 1.0]] * 3, "<f4"), [0, 127, 255]),
+        (np.array([[0, 14025, 65535, 9]] * 3, "<u2"), [0, 127, 255]),
+        (np.array([[0, 55, 255, 255]] * 3, "u1"), [0, 128, 255]),
+    ],
+    ids=["float", "16-bit", "8-bit"],
+)
+@pytest.mark.parametrize("has_material", [True, False])
+def test_gltf_vertex_colours_are_linear(
+    tmp_path: Path,
+    values: np.ndarray,  # type: ignore[type-arg]
+    expected: list[int],
+    has_material: bool,
+) -> None:
+    # IEC 61966-2-1: linear 0.214 is display 0.5.
+    header, binary = triangle_gltf({}, [])
+    if not has_material:
+        del header["meshes"][0]["primitives"][0]["material"], header["materials"]
+    is_integer = values.dtype.kind == "u"
+    binary = add_attribute(header, binary, "COLOR_0", values, normalized=is_integer)
+    part = load_mesh(store_gltf(tmp_path, header, binary)).parts[0]
+    np.testing.assert_allclose(part.vertex_rgb, [expected] * 3, atol=1)
+
+
+def test_obj_with_material_and_texture(tmp_path: Path) -> None:
+    pixels = np.arange(2 * 2 * 3, dtype=np.uint8).reshape(2, 2, 3)
+    Image.fromarray(pixels).save(tmp_path / "wall.png")
+    part = load_mesh(write_obj(tmp_path)).parts[0]
+    np.testing.assert_array_equal(part.vertices_m[part.faces[0]], TRIANGLE)  # z-up: unchanged
+    assert part.uv is not None
+    np.testing.assert_allclose(part.uv[part.faces[0]], UV)
+    np.testing.assert_array_equal(part.texture, pixels)
+
+
+def test_obj_with_several_materials(tmp_path: Path) -> None:
+    (tmp_path / "two.mtl").write_text("newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n")
+    (tmp_path / "two.obj").write_text(
+        "mtllib two.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n"
+        "usemtl red\nf 1 2 3\nusemtl blue\nf -3 -1 -2\nusemtl red\nf 1 2 4\n"
+    )
+    parts = load_mesh(tmp_path / "two.obj").parts
+    colours = {tuple(part.base_color[:3]): len(part.faces) for part in parts}
+    assert colours == {(255, 0, 0): 2, (0, 0, 255): 1}
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary"])
+def test_ply_with_vertex_colours(tmp_path: Path, encoding: str) -> None:
+    colors = np.array([[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255]], np.uint8)
+    mesh = trimesh.Trimesh(TRIANGLE, FACE, vertex_colors=colors)
+    (tmp_path / "scan.ply").write_bytes(mesh.export(file_type="ply", encoding=encoding))
+    part = load_mesh(tmp_path / "scan.ply").parts[0]
+    np.testing.assert_array_equal(part.vertex_rgb, colors[:, :3])  # display colours, as they are
+    np.testing.assert_allclose(part.vertices_m, TRIANGLE)
+
+
+PLY_WITH_TEXTURE = """ply
+format ascii 1.0
+comment TextureFile paint.png
+element vertex 3
+property float x
+property float y
+property float z
+element face 2
+property list uchar int vertex_indices
+property list uchar float texcoord
+end_header
+0 0 0
+1 0 0
+0 2 3
+3 0 1 2 6 0 0 1 0 0.25 0.75
+3 2 1 0 6 0.25 0.75 1 0 0 0
+"""
+
+
+def test_ply_with_texture(tmp_path: Path, paint: list[str]) -> None:
+    (tmp_path / "scan.ply").write_text(PLY_WITH_TEXTURE)
+    mesh = load_mesh(tmp_path / "scan.ply")
+    part = mesh.parts[0]
+    assert mesh.findings == ("part 'scan.ply': 1 duplicate face removed",)
+    assert part.uv is not None
+    assert part.texture is not None
+    np.testing.assert_allclose(part.uv[part.faces[0]], UV)
+    assert part.texture[0, 0].tolist() == [1, 2, 3]
+
+
+def test_ply_with_face_colours(tmp_path: Path) -> None:
+    box = trimesh.creation.box()
+    box.visual.face_colors = np.arange(48).reshape(12, 4).astype(np.uint8)
+    box.export(tmp_path / "box.ply")
+    part = load_mesh(tmp_path / "box.ply").parts[0]
+    assert part.vertex_rgb is not None
+    for face, colour in zip(part.faces, box.visual.face_colors, strict=True):
+        assert (part.vertex_rgb[face] == colour[:3]).all()
+
+
+def test_material_from_another_writer(tmp_path: Path) -> None:
+    material = PBRMaterial(baseColorTexture=Image.new("P", (4, 4), 3), name="palette")
+    visual = TextureVisuals(uv=UV, material=material)
+    trimesh.Trimesh(TRIANGLE, FACE, visual=visual, process=False).export(tmp_path / "mesh.glb")
+    part = load_mesh(tmp_path / "mesh.glb").parts[0]
+    assert part.texture is not None
+    assert part.texture.shape[2] in (3, 4)
+
+
+HEADER_ONLY = b'{"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"attributes": {}}]}]}'
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("none.glb", None, "no such mesh file"),
+        ("empty.obj", b"", "empty"),
+        ("scene.fbx", b"x", "unknown kind"),
+        ("scan.stl", b"solid\nendsolid\n", "without colour.*as GLB"),
+        ("bad.glb", b"not a glb at all, but long enough to be read as a header", "not a GLB"),
+        ("old.glb", b"glTF" + struct.pack("<II", 1, 24) + b"\0" * 12, "glTF 1"),
+        ("bad.gltf", b"{]", "JSON is broken"),
+        ("other.gltf", b'["a", "b"]', "not that of a glTF"),
+        ("old.gltf", b'{"asset": {"version": "1.0"}}', r"glTF 1\.0"),
+        ("odd.gltf", HEADER_ONLY, "cannot be read"),
+        ("bad.ply", b"not a ply", "cannot be read"),
+        ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "faces"),
+        ("nan.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "NaN or infinite"),
+        ("index.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot be read"),
+        ("word.obj", b"v 0 0 0\nv 1 zero 0\nv 0 1 0\nf 1 2 3\n", "cannot be read"),
+        ("plain.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "neither a texture nor"),
+    ],
+)
+def test_unusable_files_are_one_line(
+    tmp_path: Path, name: str, content: bytes | None, message: str
+) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=message) as caught:
+        load_mesh(path)
+    assert name in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("share", [0.0005, 0.02, 0.5, 0.99])
+@pytest.mark.parametrize("suffix", [".glb", ".ply"])
+def test_truncated_binary_is_one_line(tmp_path: Path, suffix: str, share: float) -> None:
+    save_glb(tmp_path / "whole.glb", box_mesh())
+    box = trimesh.creation.icosphere(subdivisions=3)
+    box.visual.vertex_colors = [1, 2, 3, 255]
+    box.export(tmp_path / "whole.ply")
+    content = (tmp_path / f"whole{suffix}").read_bytes()
+    (tmp_path / f"cut{suffix}").write_bytes(content[: max(1, int(len(content) * share))])
+    with pytest.raises(InputError, match=r"cut\."):
+        load_mesh(tmp_path / f"cut{suffix}")
+
+
+def short_buffer(header: Json) -> None:
+    header["bufferViews"][0]["byteLength"] = 360
+    header["accessors"][0]["count"] = 30
+
+
+def absent_buffer(header: Json) -> None:
+    header["buffers"][0]["uri"] = "nowhere.bin"
+
+
+def wild_index(header: Json) -> None:
+    header["accessors"][1] = {**header["accessors"][0], "componentType": 5125, "type": "SCALAR"}
+    header["meshes"][0]["primitives"][0]["indices"] = 1
+
+
+def endless_scene(header: Json) -> None:
+    header["scenes"][0]["nodes"] = [7]
+
+
+@pytest.mark.parametrize("damage", [short_buffer, absent_buffer, wild_index, endless_scene])
+def test_contradictory_gltf_is_one_line(tmp_path: Path, damage: object) -> None:
+    header, binary = triangle_gltf({}, [])
+    damage(header)  # type: ignore[operator]
+    with pytest.raises(InputError, match=r"scene\.gltf"):
+        load_mesh(store_gltf(tmp_path, header, binary))

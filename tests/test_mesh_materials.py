@@ -1,0 +1,297 @@
+"""Materials and textures: every kind of image, alpha, and what is named when colour is lost."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from synfeal.errors import InputError
+from synfeal.mesh import textures
+from synfeal.mesh.findings import Findings
+from synfeal.mesh.load import load_mesh
+from synfeal.mesh.materials import linear_from_srgb, srgb_from_linear
+from synfeal.mesh.textures import MAX_SIDE_PX, decode, to_rgb
+from tests.mesh_samples import (
+    FACE,
+    TRIANGLE,
+    UV,
+    add_attribute,
+    store_gltf,
+    textured,
+    triangle_gltf,
+    write_gltf,
+    write_obj,
+)
+
+
+def test_gltf_names_a_missing_base_colour_texture_and_what_depends_on_it(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    material = textured({"normalTexture": {"index": 1}, "alphaMode": "BLEND"})
+    header, binary = triangle_gltf(material, ["wall.png", "bumps.png"])
+    binary = add_attribute(header, binary, "COLOR_0", np.array([[1, 2, 3, 4]] * 3, np.uint8))
+    with caplog.at_level(logging.WARNING, "synfeal"):
+        findings = load_mesh(store_gltf(tmp_path, header, binary)).findings
+    assert len(findings) == 3
+    assert "texture 'wall.png' of material 'Paint' is missing" in findings[0]
+    assert "not needed: 'bumps.png'" in findings[1]
+    assert "drawn opaque" in findings[2]
+    assert "wall.png" in caplog.text
+    assert "bumps.png" not in caplog.text
+
+
+def test_gltf_without_any_colour_left_is_refused(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with pytest.raises(InputError, match="one colour"):
+        load_mesh(write_gltf(tmp_path, textured(), ["wall.png"]))
+    assert "wall.png" in caplog.text
+
+
+def test_broken_texture_is_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    Image.effect_noise((64, 64), 50).save(tmp_path / "paint.png")
+    whole = (tmp_path / "paint.png").read_bytes()
+    (tmp_path / "paint.png").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="one colour"):
+        load_mesh(write_gltf(tmp_path, textured(), ["paint.png"]))
+    assert "material 'Paint': texture cannot be decoded" in caplog.text
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "-s 1 1 1 wall.png",
+        "textures/wall 1.png",
+        "textures/wall%201.png",
+        "C:\\art\\textures\\wall 1.png",
+    ],
+)
+def test_textures_are_found_as_exporters_write_them(tmp_path: Path, name: str) -> None:
+    (tmp_path / "textures").mkdir()
+    Image.new("RGB", (2, 2), (1, 2, 3)).save(tmp_path / "textures/wall 1.png")
+    Image.new("RGB", (2, 2), (1, 2, 3)).save(tmp_path / "wall 1.png")
+    Image.new("RGB", (2, 2), (1, 2, 3)).save(tmp_path / "wall.png")
+    part = load_mesh(write_obj(tmp_path, f"map_Kd {name}\n")).parts[0]
+    assert part.texture is not None
+    assert part.texture[0, 0].tolist() == [1, 2, 3]
+
+
+def test_obj_with_missing_texture_names_the_file(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with pytest.raises(InputError, match="one colour"):
+        load_mesh(write_obj(tmp_path))
+    assert "wall.png" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("mode", "cutoff", "finding"),
+    [
+        ({"alphaMode": "MASK"}, 0.5, "alpha-tested at 0.5"),
+        ({"alphaMode": "MASK", "alphaCutoff": 0.75}, 0.75, "alpha-tested at 0.75"),
+        ({"alphaMode": "BLEND"}, 0.5, "blended transparency"),
+        ({"alphaMode": "OPAQUE"}, None, None),
+        ({}, None, None),
+    ],
+)
+def test_alpha_mode_becomes_a_cutoff(
+    tmp_path: Path, mode: dict[str, object], cutoff: float | None, finding: str | None
+) -> None:
+    Image.new("RGBA", (2, 2), (1, 2, 3, 200)).save(tmp_path / "paint.png")
+    mesh = load_mesh(write_gltf(tmp_path, textured(mode), ["paint.png"]))
+    assert mesh.parts[0].alpha_cutoff == cutoff
+    assert mesh.parts[0].texture is not None
+    assert mesh.parts[0].texture[0, 0].tolist() == [1, 2, 3, 200]
+    assert len(mesh.findings) == (finding is not None)
+    assert finding is None or finding in mesh.findings[0]
+
+
+def test_a_blended_texture_without_holes_is_opaque(tmp_path: Path) -> None:
+    Image.new("RGBA", (2, 2), (1, 2, 3, 255)).save(tmp_path / "paint.png")
+    mesh = load_mesh(write_gltf(tmp_path, textured({"alphaMode": "BLEND"}), ["paint.png"]))
+    assert mesh.parts[0].alpha_cutoff is None
+    assert mesh.findings == ()
+
+
+def test_what_is_never_visible_is_dropped(tmp_path: Path) -> None:
+    Image.new("LA", (2, 2), (255, 255)).save(tmp_path / "paint.png")
+    material = textured({"alphaMode": "BLEND"})
+    material["pbrMetallicRoughness"]["baseColorFactor"] = [1, 1, 1, 0.03]
+    with pytest.raises(InputError, match="no faces"):
+        load_mesh(write_gltf(tmp_path, material, ["paint.png"]))
+
+
+@pytest.mark.parametrize(
+    ("mtl", "channels", "cutoff"),
+    [("map_Kd wall.png\nmap_d wall.png\n", 4, 0.5), ("map_Kd wall.png\n", 3, None)],
+)
+def test_obj_alpha_counts_where_the_mtl_says_so(
+    tmp_path: Path, mtl: str, channels: int, cutoff: float | None
+) -> None:
+    Image.new("RGBA", (2, 2), (1, 2, 3, 200)).save(tmp_path / "wall.png")
+    part = load_mesh(write_obj(tmp_path, mtl)).parts[0]
+    assert part.texture is not None
+    assert part.texture.shape == (2, 2, channels)
+    assert part.alpha_cutoff == cutoff
+
+
+@pytest.mark.parametrize("opacity", ["d 0.03", "Tr 0.97"])
+def test_obj_glass_is_not_drawn(tmp_path: Path, opacity: str) -> None:
+    Image.new("RGB", (2, 2)).save(tmp_path / "wall.png")
+    with pytest.raises(InputError, match="no faces"):
+        load_mesh(write_obj(tmp_path, f"map_Kd wall.png\n{opacity}\n"))
+
+
+def test_specular_glossiness_shows_its_diffuse_colour(tmp_path: Path) -> None:
+    Image.new("RGB", (2, 2), (9, 8, 7)).save(tmp_path / "paint.png")
+    Image.new("RGB", (2, 2), (1, 1, 1)).save(tmp_path / "fallback.png")
+    material = textured()
+    material["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 1
+    glossy = {"diffuseTexture": {"index": 0}, "diffuseFactor": [1.0, 0.2140, 1.0, 1.0]}
+    material["extensions"] = {"KHR_materials_pbrSpecularGlossiness": glossy}
+    part = load_mesh(write_gltf(tmp_path, material, ["paint.png", "fallback.png"])).parts[0]
+    assert part.texture is not None
+    assert part.texture[0, 0].tolist() == [9, 8, 7]
+    assert part.base_color.tolist() == [255, 127, 255, 255]
+
+
+def test_texture_transform_scales_turns_and_moves(tmp_path: Path) -> None:
+    Image.new("RGB", (2, 2)).save(tmp_path / "paint.png")
+    transform = {"offset": [0.5, 0.25], "scale": [2.0, 1.0], "rotation": np.pi / 2}
+    material = textured(extensions={"KHR_texture_transform": transform})
+    part = load_mesh(write_gltf(tmp_path, material, ["paint.png"])).parts[0]
+    assert part.uv is not None
+    # In glTF v points down: counter-clockwise takes (u, v) to (v, -u).
+    u, v = UV[:, 0] * 2.0, UV[:, 1]
+    np.testing.assert_allclose(part.uv, np.stack([v + 0.5, 1.0 - (-u + 0.25)], axis=1), atol=1e-12)
+
+
+def test_the_second_set_of_texture_coordinates_is_used_where_asked_for(tmp_path: Path) -> None:
+    Image.new("RGB", (2, 2)).save(tmp_path / "paint.png")
+    header, binary = triangle_gltf(textured(texCoord=1), ["paint.png"])
+    second = np.array([[0.5, 0.5], [0.25, 0.5], [1.0, 0.0]], "<f4")
+    binary = add_attribute(header, binary, "TEXCOORD_1", second)
+    part = load_mesh(store_gltf(tmp_path, header, binary)).parts[0]
+    np.testing.assert_allclose(part.uv, second * [1, -1] + [0, 1])
+
+
+def test_a_texture_without_coordinates_is_named(tmp_path: Path) -> None:
+    Image.new("RGB", (2, 2)).save(tmp_path / "paint.png")
+    material = textured()
+    header, binary = triangle_gltf(material, ["paint.png"])
+    del header["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"]
+    binary = add_attribute(header, binary, "COLOR_0", np.array([[1, 2, 3, 4]] * 3, np.uint8))
+    mesh = load_mesh(store_gltf(tmp_path, header, binary))
+    assert mesh.parts[0].texture is None
+    assert "no texture coordinates" in mesh.findings[0]
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_texture_coordinates_that_are_no_numbers_become_0(tmp_path: Path, bad: float) -> None:
+    Image.new("RGB", (2, 2)).save(tmp_path / "paint.png")
+    header, binary = triangle_gltf(textured(), ["paint.png"])
+    uv = UV.astype("<f4")
+    uv[1, 0] = bad
+    mesh = load_mesh(store_gltf(tmp_path, header, binary[:36] + uv.tobytes()))
+    assert mesh.parts[0].uv is not None
+    np.testing.assert_allclose(mesh.parts[0].uv[1], 0.0)
+    assert mesh.findings == (
+        "part 'GLTF': 1 texture coordinates that are NaN or infinite set to 0",
+    )
+
+
+@pytest.mark.parametrize(
+    ("image", "expected"),
+    [
+        (Image.new("L", (3, 2), 7), [7, 7, 7]),
+        (Image.new("LA", (3, 2), (7, 9)), [7, 7, 7, 9]),
+        (Image.new("1", (3, 2), 1), [255, 255, 255]),
+        (Image.new("RGBA", (3, 2), (1, 2, 3, 4)), [1, 2, 3, 4]),
+        (Image.new("RGB", (3, 2), (1, 2, 3)).quantize(4), [1, 2, 3]),
+        (Image.new("CMYK", (3, 2), (0, 0, 0, 0)), [255, 255, 255]),
+        (Image.new("F", (3, 2), 0.2), [51, 51, 51]),
+        (Image.fromarray(np.full((2, 3), 257 * 30, np.uint16)), [30, 30, 30]),
+    ],
+    ids=lambda value: getattr(value, "mode", ""),
+)
+def test_every_image_mode_becomes_8_bit_rgb(image: Image.Image, expected: list[int]) -> None:
+    pixels = to_rgb(image)
+    assert pixels.dtype == np.uint8
+    assert pixels.shape == (2, 3, len(expected))
+    assert (pixels == expected).all()
+
+
+@pytest.mark.parametrize(
+    ("mode", "named"), [("RGB", False), ("RGBA", False), ("LA", True), ("P", True), ("I;16", True)]
+)
+def test_conversion_is_a_finding(tmp_path: Path, mode: str, named: bool) -> None:
+    findings = Findings(tmp_path)
+    decode(Image.new(mode, (2, 2)), "material 'Wall'", findings)
+    assert [f"converted from {mode}" in sentence for sentence in findings.sentences] == [
+        True
+    ] * named
+
+
+def test_webp(tmp_path: Path) -> None:
+    Image.new("RGB", (2, 2), (10, 200, 30)).save(tmp_path / "paint.webp", lossless=True)
+    header, binary = triangle_gltf(textured(), ["paint.webp"])
+    header["textures"] = [{"extensions": {"EXT_texture_webp": {"source": 0}}}]
+    header["extensionsRequired"] = header["extensionsUsed"] = ["EXT_texture_webp"]
+    part = load_mesh(store_gltf(tmp_path, header, binary)).parts[0]
+    assert part.texture is not None
+    assert part.texture[0, 0].tolist() == [10, 200, 30]
+
+
+def test_a_texture_wider_than_renderers_take_is_made_smaller(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    halves = np.zeros((4, 2 * MAX_SIDE_PX, 3), np.uint8)
+    halves[:, MAX_SIDE_PX:] = 200
+    Image.fromarray(halves).save(tmp_path / "paint.png")
+    mesh = load_mesh(write_gltf(tmp_path, textured(), ["paint.png"]))
+    pixels = mesh.parts[0].texture
+    assert pixels is not None
+    assert pixels.shape == (2, MAX_SIDE_PX, 3)
+    assert (pixels == halves[::2, ::2]).all()
+    assert "from 32768 x 4 to 16384 x 2 pixels" in mesh.findings[0]
+    assert mesh.findings[0] in caplog.text
+
+
+def test_a_large_texture_is_no_decompression_bomb(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Image.new("RGB", (64, 64)).save(tmp_path / "paint.png")
+    path = write_gltf(tmp_path, textured(), ["paint.png"])
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)  # Pillow refuses twice as many
+    assert load_mesh(path).parts[0].texture is not None
+    assert Image.MAX_IMAGE_PIXELS == 100
+    monkeypatch.setattr(textures, "MAX_PIXELS", 100)
+    with pytest.raises(InputError, match="one colour"):
+        load_mesh(path)
+
+
+def test_srgb_curve_at_published_points() -> None:
+    # IEC 61966-2-1: linear 0.214 is display 0.5; alpha has no curve.
+    assert srgb_from_linear([0, 0.2140, 1, 0.5]).tolist() == [0, 127, 255, 128]
+    np.testing.assert_allclose(linear_from_srgb([0, 128, 255, 51]), [0, 0.2159, 1, 0.2], atol=1e-4)
+    every = np.repeat(np.arange(256)[:, None], 4, axis=1)
+    np.testing.assert_array_equal(srgb_from_linear(linear_from_srgb(every)), every)
+
+
+def test_parts_of_plain_colours_are_a_scene(tmp_path: Path) -> None:
+    header, binary = triangle_gltf({}, [])
+    header["materials"] = [
+        {"pbrMetallicRoughness": {"baseColorFactor": [0.008, 0.0, 0.0, 1.0]}},
+        {"pbrMetallicRoughness": {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]}},
+    ]
+    (primitive,) = header["meshes"][0]["primitives"]
+    header["meshes"][0]["primitives"] = [primitive, {**primitive, "material": 1}]
+    parts = load_mesh(store_gltf(tmp_path, header, binary)).parts
+    # 255 * (1.055 * 0.008 ** (1 / 2.4) - 0.055) = 21.96: 8-bit linear factors would give 22 or 13.
+    assert [part.base_color[0] for part in parts] == [22, 255]
+    assert (parts[0].faces == FACE).all()
+    assert len(parts[0].vertices_m) == len(TRIANGLE)

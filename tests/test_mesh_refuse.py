@@ -1,0 +1,131 @@
+"""glTF extensions that are not read: refused by name, unless the file holds the plain form too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from synfeal.errors import InputError
+from synfeal.mesh.load import load_mesh
+from tests.mesh_samples import Json, add_attribute, store_gltf, textured, triangle_gltf
+
+DRACO, BASISU = "KHR_draco_mesh_compression", "KHR_texture_basisu"
+
+
+def load_changed(folder: Path, change: Callable[[Json], None]) -> None:
+    Image.new("RGB", (2, 2), (1, 2, 3)).save(folder / "paint.png")
+    header, binary = triangle_gltf(textured(), ["paint.png"])
+    change(header)
+    load_mesh(store_gltf(folder, header, binary))
+
+
+def draco(header: Json) -> None:
+    header["meshes"][0]["primitives"][0]["extensions"] = {DRACO: {"bufferView": 0}}
+
+
+def draco_alone(header: Json) -> None:
+    draco(header)
+    del header["accessors"][0]["bufferView"]
+
+
+def meshopt(header: Json, name: str = "EXT_meshopt_compression") -> None:
+    header["bufferViews"][0]["extensions"] = {name: {"buffer": 0}}
+    header["buffers"][0]["extensions"] = {name: {"fallback": True}}
+
+
+def meshopt_alone(header: Json) -> None:
+    meshopt(header)
+    del header["buffers"][0]["uri"]
+
+
+def meshopt_of_khronos_alone(header: Json) -> None:
+    meshopt(header, "KHR_meshopt_compression")
+    del header["buffers"][0]["uri"]
+
+
+def basisu(header: Json) -> None:
+    header["images"].append({"uri": "paint.ktx2", "mimeType": "image/ktx2"})
+    header["textures"][0]["extensions"] = {BASISU: {"source": 1}}
+
+
+def basisu_alone(header: Json) -> None:
+    basisu(header)
+    del header["textures"][0]["source"]
+
+
+def normalised_positions(header: Json) -> None:
+    header["accessors"][0].update(componentType=5122, normalized=True)
+
+
+def short_texture_coordinates(header: Json) -> None:
+    header["accessors"][1].update(componentType=5123, normalized=True)
+
+
+def instancing(header: Json) -> None:
+    header["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": {}}}
+
+
+def unknown(header: Json) -> None:
+    header["extensionsRequired"] = ["ACME_voxels"]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (draco_alone, [DRACO, "gltf-transform copy"]),
+        (meshopt_alone, ["EXT_meshopt_compression", "gltf-transform dequantize"]),
+        (meshopt_of_khronos_alone, ["KHR_meshopt_compression", "gltf-transform dequantize"]),
+        (basisu_alone, [BASISU, "gltf-transform ktxdecompress"]),
+        (normalised_positions, ["KHR_mesh_quantization", "gltf-transform dequantize"]),
+        (short_texture_coordinates, ["KHR_mesh_quantization", "gltf-transform dequantize"]),
+        (instancing, ["EXT_mesh_gpu_instancing", "one node per instance"]),
+        (unknown, ["ACME_voxels", "export it without"]),
+    ],
+)
+def test_what_is_not_read_is_refused_by_name(
+    tmp_path: Path, change: Callable[[Json], None], words: list[str]
+) -> None:
+    with pytest.raises(InputError) as caught:
+        load_changed(tmp_path, change)
+    message = str(caught.value)
+    assert all(word in message for word in [*words, "scene.gltf"]), message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize("change", [draco, meshopt, basisu])
+def test_compressed_forms_beside_plain_ones_are_ignored(
+    tmp_path: Path, change: Callable[[Json], None]
+) -> None:
+    load_changed(tmp_path, change)
+
+
+@pytest.mark.parametrize("name", [DRACO, "EXT_meshopt_compression", BASISU])
+def test_a_required_extension_is_refused_even_so(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match=name):
+        load_changed(tmp_path, lambda header: header.update(extensionsRequired=[name]))
+
+
+def test_harmless_required_extensions_pass(tmp_path: Path) -> None:
+    names = ["KHR_materials_unlit", "KHR_texture_transform", "KHR_mesh_quantization"]
+    load_changed(tmp_path, lambda header: header.update(extensionsRequired=names))
+
+
+def test_integer_positions_without_scale_are_read(tmp_path: Path) -> None:
+    Image.new("RGB", (2, 2)).save(tmp_path / "paint.png")
+    header, binary = triangle_gltf(textured(), ["paint.png"])
+    corners = np.array([[0, 0, 0, 0], [300, 0, 0, 0], [0, 200, 100, 0]], "<i2")
+    binary = add_attribute(header, binary, "POSITION", corners)
+    header["accessors"][-1]["type"] = "VEC3"
+    header["bufferViews"][-1]["byteStride"] = 8
+    header["nodes"] = [{"mesh": 0, "scale": [0.01, 0.01, 0.01]}]
+    part = load_mesh(store_gltf(tmp_path, header, binary), "z").parts[0]
+    np.testing.assert_allclose(part.vertices_m, corners[:, :3] / 100.0)
+
+
+def test_sparse_accessors_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="sparse"):
+        load_changed(tmp_path, lambda header: header["accessors"][0].update(sparse={"count": 1}))

@@ -1,0 +1,109 @@
+"""What is removed from a mesh, what is kept, and that both are said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from synfeal.errors import InputError
+from synfeal.mesh.findings import Findings
+from synfeal.mesh.load import load_mesh
+from synfeal.mesh.model import MeshPart
+from synfeal.mesh.rays import RayCaster
+from synfeal.mesh.repair import repaired
+from tests.mesh_samples import FACE, TRIANGLE, UV
+
+
+def repair(part: MeshPart) -> tuple[MeshPart, tuple[str, ...]]:
+    findings = Findings(Path("mesh.glb"))
+    return repaired(part, findings), findings.sentences
+
+
+def test_a_sound_part_is_left_alone() -> None:
+    part = MeshPart("wall", TRIANGLE, FACE, UV, np.zeros((2, 2, 3), np.uint8))
+    same, findings = repair(part)
+    np.testing.assert_array_equal(same.vertices_m, part.vertices_m)
+    np.testing.assert_array_equal(same.faces, part.faces)
+    assert findings == ()
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("offset", [0.0, 1e6])
+def test_points_and_lines_are_removed_but_slivers_stay(scale: float, offset: float) -> None:
+    sliver = 1e-8 if offset == 0.0 else 1e-5
+    vertices = np.array(
+        [
+            [0.1, 0.2, 0.3],
+            [0.7, 0.2, 0.3],
+            [0.1, 0.2 + sliver, 0.3],  # a sliver with the first two
+            [0.2, 0.4, 0.6],
+            [0.3, 0.6, 0.9],  # on one line with the first and the fourth
+            [0.1, 0.2, 0.3],  # a copy of the first
+        ]
+    )
+    faces = np.array([[0, 1, 2], [0, 3, 4], [0, 5, 1], [1, 1, 2], [0, 1, 4]])
+    part, findings = repair(MeshPart("wall", vertices * scale + offset, faces))
+    assert part.vertices_m[part.faces].shape == (2, 3, 3)
+    assert findings[0] == "part 'wall': 3 zero-area faces removed"
+    assert findings[1] == "part 'wall': 2 unused vertices removed"
+    np.testing.assert_array_equal(part.faces, [[0, 1, 2], [0, 1, 3]])
+
+
+def test_duplicates_are_removed_and_faces_with_another_texture_kept() -> None:
+    vertices = np.vstack([TRIANGLE, TRIANGLE, TRIANGLE + 9])
+    faces = np.array([[0, 1, 2], [1, 2, 0], [2, 1, 0], [3, 4, 5], [6, 7, 8]])
+    part, findings = repair(MeshPart("wall", vertices, faces))
+    np.testing.assert_array_equal(part.faces, [[0, 1, 2], [3, 4, 5], [6, 7, 8]])
+    assert findings == (
+        "part 'wall': 2 duplicate faces removed",
+        "part 'wall': 1 coincident face kept: their vertices or texture differ",
+    )
+
+
+def test_unused_vertices_take_their_colours_and_coordinates_along() -> None:
+    vertices = np.vstack([[[99.0, 99, 99]], TRIANGLE, [[np.nan] * 3]])
+    rgb = np.arange(15, dtype=np.uint8).reshape(5, 3)
+    uv = np.arange(10.0).reshape(5, 2)
+    texture = np.zeros((2, 2, 3), np.uint8)
+    part, findings = repair(MeshPart("wall", vertices, FACE + 1, uv, texture, rgb))
+    np.testing.assert_array_equal(part.vertices_m, TRIANGLE)
+    np.testing.assert_array_equal(part.vertex_rgb, rgb[1:4])
+    np.testing.assert_array_equal(part.uv, uv[1:4])
+    assert findings == ("part 'wall': 2 unused vertices removed",)
+
+
+def test_what_is_removed_was_never_hit() -> None:
+    rng = np.random.default_rng(0)
+    sphere = trimesh.creation.icosphere(subdivisions=2)
+    lines = np.stack([sphere.faces[:, 0], sphere.faces[:, 1], sphere.faces[:, 1]], axis=1)
+    faces = np.concatenate([sphere.faces, lines, np.roll(sphere.faces, 1, axis=1)])
+    part, _ = repair(MeshPart("ball", np.asarray(sphere.vertices), faces))
+    assert len(part.faces) == len(sphere.faces)
+    origins, directions = rng.normal(size=(500, 3)) * 2.0, rng.normal(size=(500, 3))
+    before = RayCaster(sphere.vertices, faces).first_hit_m(origins, directions)
+    after = RayCaster(part.vertices_m, part.faces).first_hit_m(origins, directions)
+    np.testing.assert_allclose(after, before, rtol=1e-6)
+
+
+def test_open_and_non_manifold_surfaces_are_kept(tmp_path: Path) -> None:
+    # Three walls that meet in one edge: non-manifold there, open everywhere else.
+    colours = np.array([[255, 0, 0, 255]] * 4 + [[0, 255, 0, 255]], np.uint8)
+    vertices = np.array([[0.0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, -1, 0]])
+    faces = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+    trimesh.Trimesh(vertices, faces, vertex_colors=colours, process=False).export(
+        tmp_path / "walls.ply"
+    )
+    mesh = load_mesh(tmp_path / "walls.ply")
+    np.testing.assert_array_equal(mesh.parts[0].faces, faces)
+    assert mesh.findings == ()
+
+
+def test_a_file_without_any_area_has_no_faces(tmp_path: Path) -> None:
+    colours = np.array([[255, 0, 0, 255]] * 3, np.uint8)
+    line = np.array([[0.0, 0, 0], [1, 1, 1], [2, 2, 2]])
+    trimesh.Trimesh(line, FACE, vertex_colors=colours, process=False).export(tmp_path / "l.ply")
+    with pytest.raises(InputError, match="no faces"):
+        load_mesh(tmp_path / "l.ply")
