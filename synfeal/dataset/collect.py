@@ -18,7 +18,6 @@ from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.dataset.sequences import Sequence, sequences_of
 from synfeal.dataset.sevenscenes import frame_paths, write_sequence, write_splits
 from synfeal.errors import InputError
-from synfeal.mesh.collision import collision_mesh
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
@@ -79,10 +78,7 @@ def collect(job: CollectJob) -> None:
 def plan_splits(mesh: TexturedMesh, job: CollectJob) -> dict[str, PoseTable]:
     """Plans of the splits that have frames, each with random numbers of its own."""
     box = sampling_box_of(job.scene, mesh.bounds_m, str(job.scene.path))
-    rng = generator_of(job.seed, "collision")
-    agreement = job.collection.collision_agreement
-    collision, _ = collision_mesh(mesh, job.scene, box, agreement, rng)
-    caster = RayCaster(*collision)
+    caster = RayCaster(*mesh.merged())
     counts = {"train": job.n_train, "test": job.n_test}
     return {
         split: plan_split(
