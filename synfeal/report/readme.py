@@ -1,0 +1,177 @@
+"""The generated parts of the read-me: every number there comes from a tracked result file.
+
+A part stands between ``<!-- NAME -->`` and ``<!-- /NAME -->``. ``python -m synfeal.report.readme``
+writes all of them anew; with ``--check`` it says whether that would change anything.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+
+from synfeal.config import MODELS
+from synfeal.errors import InputError
+from synfeal.files import atomic_path
+from synfeal.report.layouts import SOURCES, TITLES, scene_title
+
+README = Path("README.md")
+ROOT = Path("results/mini")
+DIFFICULTY = Path("results/benchmarks/scene_difficulty")
+Row = Mapping[str, str]
+
+
+def size_table(root: Path) -> str:
+    """Table 4: errors against the true poses, published errors in brackets."""
+    return _localizer_table(
+        read_rows(root / "tables" / "table4_size.csv"),
+        "scene, size (frames here)",
+        lambda row: (
+            f"{scene_title(row['scene'])} {row['size']} ({row['n_train']}, {row['n_test']})"
+        ),
+    )
+
+
+def labels_table(root: Path) -> str:
+    """Table 2: errors against the true poses, published errors in brackets."""
+    return _localizer_table(
+        read_rows(root / "tables" / "table2_ground_truth.csv"),
+        "labels from",
+        lambda row: SOURCES.get(row["labels"], row["labels"]),
+    )
+
+
+def findings(root: Path) -> str:
+    """What the summary says of the run, sentence by sentence."""
+    lines = read_text(root / "summary.md").splitlines()
+    return "\n".join(line for line in lines if line.startswith("- "))
+
+
+def assistance(root: Path) -> str:
+    """Batches that needed assistance, and how good the labels are."""
+    head = "| labels from | batches | assisted | median error, training | median error, test |"
+    rows = [
+        f"| {SOURCES[row['method']]} | {row['batches']} | {row['assisted']}"
+        f" *({row['published_assisted']} of {row['published_batches']})*"
+        f" | {_pair(row, 'label_error_m_train', 'label_error_deg_train')}"
+        f" | {_pair(row, 'label_error_m_test', 'label_error_deg_test')} |"
+        for row in read_rows(root / "tables" / "assistance.csv")
+    ]
+    return "\n".join([head, "|---|---|---|---|---|", *rows])
+
+
+def difficulty(folder: Path = DIFFICULTY) -> str:
+    """How hard the scenes are for localisation, one line per scene that was measured."""
+    head = "| scene | pixels near a keypoint | keypoints | best match far away | assisted of 10 |"
+    names = sorted(path.name.removesuffix("-sift.csv") for path in folder.glob("*-sift.csv"))
+    return "\n".join([head, "|---|---|---|---|---|", *(_difficulty(folder, n) for n in names)])
+
+
+PARTS: dict[str, Callable[[Path], str]] = {
+    "findings": findings,
+    "size": size_table,
+    "labels": labels_table,
+    "assistance": assistance,
+    "difficulty": lambda root: difficulty(root.parent / "benchmarks" / "scene_difficulty"),
+}
+
+
+def rewritten(text: str, parts: Mapping[str, str]) -> str:
+    """The text with each of its generated parts replaced.
+
+    Raises:
+        InputError: a part has no place in the text.
+    """
+    for name, part in parts.items():
+        pattern = re.compile(rf"(<!-- {name} -->).*?(<!-- /{name} -->)", re.DOTALL)
+        if not pattern.search(text):
+            raise InputError(f"{README}: has no '<!-- {name} -->' … '<!-- /{name} -->'")
+        text = pattern.sub(lambda found, new=part: f"{found[1]}\n\n{new}\n\n{found[2]}", text)
+    return text
+
+
+def read_rows(path: Path) -> list[Row]:
+    """The rows of a result table.
+
+    Raises:
+        InputError: there is no such file.
+    """
+    return list(csv.DictReader(read_text(path).splitlines()))
+
+
+def read_text(path: Path) -> str:
+    """The text of a result file.
+
+    Raises:
+        InputError: there is no such file.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: missing; make the results first")
+    return path.read_text(encoding="utf-8")
+
+
+def _localizer_table(rows: Sequence[Row], heading: str, label: Callable[[Row], str]) -> str:
+    lines = [
+        f"| {heading} | {' | '.join(TITLES[model] for model in MODELS)} |",
+        f"|---|{'---|' * len(MODELS)}",
+    ]
+    for name, group in groupby(rows, key=label):
+        cells = {row["model"]: _cell(row) for row in group}
+        lines.append(f"| {name} | {' | '.join(cells[model] for model in MODELS)} |")
+    return "\n".join(lines)
+
+
+def _cell(row: Row) -> str:
+    own = "failed"
+    if row["position_m_true"]:
+        own = f"{float(row['position_m_true']):.2f} m, {float(row['orientation_deg_true']):.1f}°"
+    printed = float(row["published_position_m"]), float(row["published_orientation_deg"])
+    return f"{own} *({printed[0]:.2f} m, {printed[1]:.2f}°)*"
+
+
+def _pair(row: Row, position: str, orientation: str) -> str:
+    return f"{100 * float(row[position]):.1f} cm, {float(row[orientation]):.2f}°"
+
+
+def _difficulty(folder: Path, name: str) -> str:
+    (sift,) = read_rows(folder / f"{name}-sift.csv")
+    (repetition,) = read_rows(folder / f"{name}-repetition.csv")
+    share, low, high = (
+        f"{100 * float(sift[f'covered_share_{which}']):.0f} %" for which in ("mean", "q10", "q90")
+    )
+    methods = [
+        f"{SOURCES[row['method']]} {row['assisted']}"
+        for row in read_rows(folder / f"{name}-assistance.csv")
+    ]
+    return (
+        f"| {scene_title(name)} | {share} (10 % of the frames below {low}, 10 % above {high})"
+        f" | {float(sift['keypoints_mean']):.0f}"
+        f" | {100 * float(repetition['far_share']):.1f} % of the frames | {', '.join(methods)} |"
+    )
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write the generated parts of the read-me, or check them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="exit 1 if anything would change")
+    arguments = parser.parse_args(argv)
+    old = README.read_text(encoding="utf-8")
+    try:
+        new = rewritten(old, {name: part(ROOT) for name, part in PARTS.items()})
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    if arguments.check:
+        print(f"{README}: {'up to date' if new == old else 'run python -m synfeal.report.readme'}")
+        return int(new != old)
+    with atomic_path(README) as temporary:
+        temporary.write_text(new, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
