@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
 export PYTHONHASHSEED := 0
 
-.PHONY: help reproduce smoke test check format lock clean
+.PHONY: help reproduce smoke publish test check format lock clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -17,6 +17,9 @@ reproduce: $(INSTALLED)  ## install everything, then make every table (results/m
 
 smoke: $(INSTALLED)  ## every rule and every model at toy size (results/smoke)
 	$(BIN)/snakemake --cores $(CORES) --configfile config/smoke.yaml -- all
+
+publish: reproduce  ## make the tracked results anew, and the read-me's numbers from them
+	$(BIN)/python -m synfeal.report.readme
 
 test: check  ## static checks and the test suite
 	$(BIN)/pytest

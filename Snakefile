@@ -30,7 +30,10 @@ rule all:
     default_target: True
     input:
         f"{ROOT}/summary.md",
+        f"{ROOT}/report.html",
         f"{ROOT}/tables/all_tables.tex",
+        f"{ROOT}/claims.csv",
+        f"{ROOT}/report.tex",
         f"{ROOT}/tables/assistance.csv",
         f"{ROOT}/tables/speed_vs_error.csv",
         f"{ROOT}/figures",

@@ -1,4 +1,4 @@
-"""Command line: a first look at a textured mesh, and a 7-Scenes data set from it."""
+"""Command line: look at a mesh, make a 7-Scenes data set from it, compare two result trees."""
 
 from __future__ import annotations
 
@@ -57,6 +57,11 @@ INSPECT_OPTIONS: Options = (
     ("mesh", {"type": Path, "metavar": "MESH", "help": "GLB, glTF, OBJ or PLY file"}),
     ("--out", {"type": Path, "help": "directory to write to (<name of the mesh>-inspect)"}),
 )
+COMPARE_OPTIONS: Options = (
+    ("results_a", {"type": Path, "metavar": "RESULTS_A", "help": "results before, e.g. a copy"}),
+    ("results_b", {"type": Path, "metavar": "RESULTS_B", "help": "results after: results/mini"}),
+    ("--out", {"type": Path, "help": "directory for compare.csv, compare.md and compare.png"}),
+)
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -68,6 +73,8 @@ def build_parser() -> argparse.ArgumentParser:
     _add(collect, COLLECT_OPTIONS + MESH_OPTIONS, run_collect)
     inspect = commands.add_parser("inspect", help="numbers, picture and 3D view of a mesh")
     _add(inspect, INSPECT_OPTIONS + MESH_OPTIONS, run_inspect)
+    compare = commands.add_parser("compare", help="two result trees: did a change matter?")
+    _add(compare, COMPARE_OPTIONS, run_compare)
     return parser
 
 
@@ -111,6 +118,15 @@ def run_collect(arguments: argparse.Namespace) -> None:
     )
     collect(job)
     print(f"{arguments.out}: {job.n_train} training and {job.n_test} test frames")
+
+
+def run_compare(arguments: argparse.Namespace) -> None:
+    """Carry out ``synfeal compare``."""
+    from synfeal.report.compare.run import compare  # above this module, as in architecture.md
+
+    print(compare(arguments.results_a, arguments.results_b, arguments.out), end="")
+    if arguments.out:
+        print(f"\n{arguments.out}: compare.md, compare.png and compare.csv")
 
 
 def collect_configs(

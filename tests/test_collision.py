@@ -35,7 +35,7 @@ from synfeal.mesh.triangles import (
 )
 from synfeal.planning.questions import Questions, draw_questions
 from synfeal.planning.target import admissible, has_free_view
-from synfeal.report.figures import write_figures
+from synfeal.report.figures import Results, write_figures
 from synfeal.report.speed_vs_error import write_speed_vs_error
 from tests.report_results import read
 
@@ -245,7 +245,7 @@ def test_the_table_rids_speeds_of_what_else_the_machine_did(tmp_path: Path) -> N
     assert [float(row["error"]) for row in rows] == pytest.approx([0.0, 0.002, 0.1])
     assert [row["chosen"] for row in rows] == ["0", "1", "0"]
     assert {(row["stage"], row["scene"]) for row in rows} == {("collision", "large_room")}
-    write_figures(tmp_path / "tables", tmp_path / "figures")
+    write_figures(Results(tmp_path, (), 1), tmp_path / "figures")
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {
         "speed_vs_error_collision.png",
         "speed_vs_error_collision.svg",

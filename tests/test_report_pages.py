@@ -1,4 +1,4 @@
-"""What people read of the results: LaTeX, summary, figures, and the assistance table."""
+"""What people read of the results: LaTeX, summary, and the assistance table."""
 
 import shutil
 import subprocess
@@ -6,11 +6,9 @@ import subprocess
 import pytest
 
 from synfeal.config import MODELS
-from synfeal.errors import InputError
 from synfeal.report.alive import check_scenes, sentences
 from synfeal.report.assistance import write_assistance_table
 from synfeal.report.cells import read_cells
-from synfeal.report.figures import write_figures
 from synfeal.report.latex import escape, write_document
 from synfeal.report.summary import write_summary
 from tests.report_results import (
@@ -112,20 +110,6 @@ def test_the_checks_presume_no_outcome(tmp_path):
     assert "Hourglass failed" in first
     assert "position error falls for 1 of 5 (not PoseNet, PoseLSTM, Hourglass, " in second
     assert second.endswith("the orientation error for 4 of 5 (not Hourglass).")
-
-
-def test_figures_are_written_and_are_the_same_for_the_same_numbers(results, tmp_path):
-    write_figures(results / "tables", tmp_path / "a")
-    write_figures(results / "tables", tmp_path / "b")
-    names = {f"error_by_{kind}.{end}" for kind in ("size", "noise") for end in ("png", "svg")}
-    assert {path.name for path in (tmp_path / "a").iterdir()} == names
-    for name in names:
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
-
-
-def test_figures_need_a_table(tmp_path):
-    with pytest.raises(InputError, match=r"neither of table4_size"):
-        write_figures(tmp_path, tmp_path)
 
 
 def test_assistance_adds_up_both_splits_beside_the_papers_counts(results, design, tmp_path):

@@ -19,11 +19,12 @@ def write_numbers(path: Path, header: str, rows: Iterable[Sequence[float]]) -> N
         temporary.write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
 
 
-def read_numbers(path: Path, header: str, kind: str) -> NDArray[np.float64]:
+def read_numbers(path: Path, header: str, kind: str, finite: bool = True) -> NDArray[np.float64]:
     """Values (N, columns of ``header``) of a file; ``kind`` names it in messages.
 
     Raises:
-        InputError: the file is missing, has another header, or holds anything but finite numbers.
+        InputError: the file is missing, has another header, or holds anything but numbers; with
+            ``finite``, anything but finite ones.
     """
     n_columns = header.count(",") + 1
     try:
@@ -37,7 +38,7 @@ def read_numbers(path: Path, header: str, kind: str) -> NDArray[np.float64]:
         values = values.reshape(len(lines), n_columns)
     except ValueError as error:
         raise InputError(f"{path}: {error}; every row needs {n_columns} numbers") from None
-    if not np.isfinite(values).all():
+    if finite and not np.isfinite(values).all():
         bad = int(np.argmin(np.isfinite(values).all(axis=1)))
         raise InputError(f"{path}: row {bad + 2} holds a value that is not finite")
     return values

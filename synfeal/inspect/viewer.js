@@ -2,7 +2,7 @@
 /*
  * An orbiting view of a coloured mesh on a canvas: WebGL 2, no library, no network.
  *
- * synfealViewer(canvas, scene) returns {setCut, setBackFaces} or null without WebGL 2.
+ * synfealViewer(canvas, scene) returns {setCut, setBackFaces, setLine} or null without WebGL 2.
  *   scene.positions  base64 of int16 x y z; metres are offset_m + step_m * value, z up
  *   scene.colours    base64 of uint8 r g b, one per vertex
  *   scene.faces      base64 of uint32 triples; counter-clockwise triangles face the viewer
@@ -50,7 +50,8 @@ function synfealViewer(canvas, scene) {
     const array = gl.createVertexArray();
     gl.bindVertexArray(array);
     attribute(gl, line, "position", new Float32Array(polyline.points.flat()), gl.FLOAT, false);
-    return { array, count: polyline.points.length, colour: polyline.colour.map((c) => c / 255) };
+    const colour = polyline.colour.map((c) => c / 255);
+    return { array, count: polyline.points.length, colour, shown: true };
   });
 
   const home = {
@@ -79,7 +80,7 @@ function synfealViewer(canvas, scene) {
     gl.drawElements(gl.TRIANGLES, faces.length, gl.UNSIGNED_INT, 0);
     gl.useProgram(line);
     gl.uniformMatrix4fv(gl.getUniformLocation(line, "clipFromWorld"), false, clipFromWorld);
-    for (const { array, count, colour } of lines) {
+    for (const { array, count, colour } of lines.filter((polyline) => polyline.shown)) {
       gl.uniform3fv(gl.getUniformLocation(line, "colour"), colour);
       gl.bindVertexArray(array);
       gl.drawArrays(gl.LINE_STRIP, 0, count);
@@ -109,6 +110,7 @@ function synfealViewer(canvas, scene) {
     bounds,
     setCut: (metres) => { cut = metres; redraw(); },
     setBackFaces: (shown) => { backFaces = shown; redraw(); },
+    setLine: (index, shown) => { lines[index].shown = shown; redraw(); },
   };
 }
 

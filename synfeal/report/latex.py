@@ -25,6 +25,14 @@ SPECIAL = {
     "^": r"\textasciicircum{}",
     "°": r"$^\circ$",
     "±": r"$\pm$",
+    "−": "$-$",
+    "→": r"$\to$",
+    "≥": r"$\ge$",
+    "≤": r"$\le$",
+    "×": r"$\times$",
+    "·": r"$\cdot$",
+    "τ": r"$\tau$",
+    "…": r"\ldots{}",
     "³": r"$^3$",
     "–": "--",
 }
@@ -32,22 +40,30 @@ SPECIAL = {
 
 def write_latex(path: Path, grid: Grid) -> None:
     """Write one table environment, ready to be input by a document."""
-    _write(path, HEADER + table_latex(grid))
+    write_text(path, HEADER + table_latex(grid))
 
 
 def write_document(tables: Sequence[Path], out_tex: Path) -> None:
     """Write a complete document that holds the given tables, in order, and nothing else."""
-    bodies = [table.read_text(encoding="utf-8").removeprefix(HEADER) for table in tables]
-    packages = [f"\\usepackage{{{package}}}" for package in PACKAGES]
+    write_text(out_tex, document_latex(table_bodies(tables)))
+
+
+def table_bodies(tables: Sequence[Path]) -> list[str]:
+    """The table environments of files that :func:`write_latex` wrote."""
+    return [table.read_text(encoding="utf-8").removeprefix(HEADER).rstrip() for table in tables]
+
+
+def document_latex(pages: Sequence[str], packages: Sequence[str] = PACKAGES) -> str:
+    """A complete document of bodies that each begin a page."""
     lines = [
         r"\documentclass{article}",
         r"\usepackage[a4paper,margin=18mm]{geometry}",
-        *packages,
+        *(f"\\usepackage{{{package}}}" for package in packages),
         r"\begin{document}",
-        "\n\\clearpage\n".join(bodies).rstrip(),
+        "\n\n\\clearpage\n".join(pages),
         r"\end{document}",
     ]
-    _write(out_tex, "\n".join(lines) + "\n")
+    return "\n".join(lines) + "\n"
 
 
 def escape(text: str) -> str:
@@ -131,6 +147,7 @@ def _remarks(grid: Grid, marks: dict[str, str]) -> list[str]:
     return [r"\par\smallskip", rf"\begin{{minipage}}{{\linewidth}}{body}\end{{minipage}}"]
 
 
-def _write(path: Path, text: str) -> None:
+def write_text(path: Path, text: str) -> None:
+    """Write a file as a whole or not at all."""
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -7,7 +7,6 @@ writes all of them anew; with ``--check`` it says whether that would change anyt
 from __future__ import annotations
 
 import argparse
-import csv
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +16,9 @@ from pathlib import Path
 from synfeal.config import MODELS
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
+from synfeal.report.claims.table import claims_markdown
 from synfeal.report.layouts import SOURCES, TITLES, scene_title
+from synfeal.report.results import read_table
 
 README = Path("README.md")
 ROOT = Path("results/mini")
@@ -28,7 +29,7 @@ Row = Mapping[str, str]
 def size_table(root: Path) -> str:
     """Table 4: errors against the true poses, published errors in brackets."""
     return _localizer_table(
-        read_rows(root / "tables" / "table4_size.csv"),
+        read_table(root / "tables" / "table4_size.csv"),
         "scene, size (frames here)",
         lambda row: (
             f"{scene_title(row['scene'])} {row['size']} ({row['n_train']}, {row['n_test']})"
@@ -39,7 +40,7 @@ def size_table(root: Path) -> str:
 def labels_table(root: Path) -> str:
     """Table 2: errors against the true poses, published errors in brackets."""
     return _localizer_table(
-        read_rows(root / "tables" / "table2_ground_truth.csv"),
+        read_table(root / "tables" / "table2_ground_truth.csv"),
         "labels from",
         lambda row: SOURCES.get(row["labels"], row["labels"]),
     )
@@ -59,9 +60,14 @@ def assistance(root: Path) -> str:
         f" *({row['published_assisted']} of {row['published_batches']})*"
         f" | {_pair(row, 'label_error_m_train', 'label_error_deg_train')}"
         f" | {_pair(row, 'label_error_m_test', 'label_error_deg_test')} |"
-        for row in read_rows(root / "tables" / "assistance.csv")
+        for row in read_table(root / "tables" / "assistance.csv")
     ]
     return "\n".join([head, "|---|---|---|---|---|", *rows])
+
+
+def claims(root: Path) -> str:
+    """Every claim with its verdict under both scores."""
+    return claims_markdown(read_table(root / "claims.csv", ["id"])).rstrip()
 
 
 def difficulty(folder: Path = DIFFICULTY) -> str:
@@ -76,6 +82,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "size": size_table,
     "labels": labels_table,
     "assistance": assistance,
+    "claims": claims,
     "difficulty": lambda root: difficulty(root.parent / "benchmarks" / "scene_difficulty"),
 }
 
@@ -88,19 +95,11 @@ def rewritten(text: str, parts: Mapping[str, str]) -> str:
     """
     for name, part in parts.items():
         pattern = re.compile(rf"(<!-- {name} -->).*?(<!-- /{name} -->)", re.DOTALL)
-        if not pattern.search(text):
+        found = pattern.search(text)
+        if found is None:
             raise InputError(f"{README}: has no '<!-- {name} -->' … '<!-- /{name} -->'")
-        text = pattern.sub(lambda found, new=part: f"{found[1]}\n\n{new}\n\n{found[2]}", text)
+        text = f"{text[: found.end(1)]}\n\n{part}\n\n{text[found.start(2) :]}"
     return text
-
-
-def read_rows(path: Path) -> list[Row]:
-    """The rows of a result table.
-
-    Raises:
-        InputError: there is no such file.
-    """
-    return list(csv.DictReader(read_text(path).splitlines()))
 
 
 def read_text(path: Path) -> str:
@@ -138,14 +137,14 @@ def _pair(row: Row, position: str, orientation: str) -> str:
 
 
 def _difficulty(folder: Path, name: str) -> str:
-    (sift,) = read_rows(folder / f"{name}-sift.csv")
-    (repetition,) = read_rows(folder / f"{name}-repetition.csv")
+    (sift,) = read_table(folder / f"{name}-sift.csv")
+    (repetition,) = read_table(folder / f"{name}-repetition.csv")
     share, low, high = (
         f"{100 * float(sift[f'covered_share_{which}']):.0f} %" for which in ("mean", "q10", "q90")
     )
     methods = [
         f"{SOURCES[row['method']]} {row['assisted']}"
-        for row in read_rows(folder / f"{name}-assistance.csv")
+        for row in read_table(folder / f"{name}-assistance.csv")
     ]
     return (
         f"| {scene_title(name)} | {share} (10 % of the frames below {low}, 10 % above {high})"

@@ -1,7 +1,8 @@
-"""Reading the JSON files that the stages before the report leave behind."""
+"""Reading the files that the stages before the report leave behind."""
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Iterable
 from pathlib import Path
@@ -31,3 +32,23 @@ def read_result(path: Path, needed: Iterable[str], remedy: str) -> dict[str, Any
     if absent:
         raise InputError(f"{path}: {', '.join(absent)} missing; {remedy}")
     return value
+
+
+def read_table(path: Path, needed: Iterable[str] = ()) -> list[dict[str, str]]:
+    """Rows of a CSV file by column.
+
+    Raises:
+        InputError: it cannot be read, or lacks a column of ``needed``.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            reader = csv.DictReader(file, restval="")
+            rows = list(reader)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(
+            f"{path}: cannot be read as CSV ({error}); make that table again"
+        ) from None
+    absent = [column for column in needed if column not in (reader.fieldnames or ())]
+    if absent:
+        raise InputError(f"{path}: column {', '.join(absent)} missing; make that table again")
+    return rows

@@ -8,6 +8,8 @@ from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
 
+from scipy.stats import binomtest, kendalltau
+
 from synfeal.report.results import read_result
 
 MEASURES = ("position_m", "orientation_deg", "position_m_true", "orientation_deg_true")
@@ -100,6 +102,33 @@ def score_of(finished: Sequence[Metrics], measure: str) -> Score:
 def percent_change(new: float | None, old: float | None) -> float | None:
     """``100 (new - old) / old``; None where either is missing or ``old`` is zero."""
     return None if new is None or not old else 100 * (new - old) / old
+
+
+def sign_test(changes: Sequence[float]) -> tuple[int, int, float]:
+    """Two-sided sign test of changes; those that are exactly 0 are left out.
+
+    Returns:
+        How many are negative, how many count, and the probability of a split at least as uneven
+        when either sign is equally likely; 1 when none counts.
+    """
+    signed = [change for change in changes if change < 0 or change > 0]
+    negative = sum(change < 0 for change in signed)
+    chance = float(binomtest(negative, len(signed)).pvalue) if signed else 1.0
+    return negative, len(signed), chance
+
+
+def share_limits(count: int, total: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Exact (Clopper-Pearson) limits of a share observed as ``count`` of ``total`` > 0."""
+    found = binomtest(count, total).proportion_ci(confidence, method="exact")
+    return float(found.low), float(found.high)
+
+
+def kendall_tau(levels: Sequence[float], errors: Sequence[float]) -> float:
+    """Kendall's rank correlation (tau-b) of two series; NaN when all of one series is equal.
+
+    Ranks need no finite numbers: a failed run, of infinite error, is simply the worst.
+    """
+    return float(kendalltau(levels, errors).statistic)
 
 
 def _mean(runs: Sequence[Metrics], key: str) -> float | None:

@@ -7,6 +7,7 @@ from synfeal.config import check_mesh_files, parse_config, read_experiments, run
 from synfeal.config.models import MODELS
 from synfeal.dataset.sequences import sequences_of
 from synfeal.errors import InputError
+from synfeal.provenance import config_hash
 from synfeal.seeds import seed_of
 
 try:
@@ -120,6 +121,30 @@ def all_labels():
     return [
         f"{ROOT}/labels/{s}/{z}/{l}/{split}.csv" for s, z, l in sets for split in SPLITS
     ]
+
+
+def pose_labels():
+    """The true poses of every data set, and those that ground-truth methods estimated."""
+    sets = {(e.scene, e.size, "synfeal") for e in EXPERIMENTS}
+    sets |= {
+        (e.scene, e.size, e.labels) for e in EXPERIMENTS if e.labels in RECONSTRUCTED
+    }
+    return [
+        f"{ROOT}/labels/{s}/{z}/{l}/{split}.csv"
+        for s, z, l in sorted(sets)
+        for split in SPLITS
+    ]
+
+
+def errors_of(experiments):
+    return [m.replace("metrics.json", "errors.csv") for m in metrics_of(experiments)]
+
+
+def shown_frames():
+    """Test sequences as the localizers see them, with the manifests that list them."""
+    scenes = sorted({e.scene for e in EXPERIMENTS})
+    manifests = [f"{ROOT}/datasets/{s}/network/manifest.json" for s in scenes]
+    return manifests + [d for s in scenes for d in sequence_dirs(s, "network", "test")]
 
 
 def all_manifests():

@@ -8,7 +8,11 @@ rule table1_meshes:
             scene=sorted({e.scene for e in EXPERIMENTS}),
         ),
     output:
-        csv=f"{ROOT}/tables/table1_meshes.csv",
+        csv=report(
+            f"{ROOT}/tables/table1_meshes.csv",
+            caption="../report/table1_meshes.rst",
+            category="Tables",
+        ),
         tex=f"{ROOT}/tables/table1_meshes.tex",
     log:
         f"{ROOT}/logs/tables/table1_meshes.log",
@@ -29,7 +33,11 @@ rule table:
     input:
         metrics=table_metrics,
     output:
-        csv=f"{ROOT}/tables/{{table}}.csv",
+        csv=report(
+            f"{ROOT}/tables/{{table}}.csv",
+            caption="../report/table.rst",
+            category="Tables",
+        ),
         tex=f"{ROOT}/tables/{{table}}.tex",
     log:
         f"{ROOT}/logs/tables/{{table}}.log",
@@ -110,12 +118,32 @@ rule document:
         "../scripts/document.py"
 
 
+DRAWN_TABLES = ("table3_inconsistencies", "table4_size")
+
+
 rule figures:
     input:
-        tables=expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
+        tables=expand(
+            f"{ROOT}/tables/{{table}}.csv",
+            table=[t for t in TABLE_NAMES if t in DRAWN_TABLES],
+        ),
         speed=rules.speed_vs_error.output.csv,
+        labels=pose_labels(),
+        assistance=assistance_files(),
+        errors=errors_of(rows_of("table4_size")),
+        collision=expand(
+            f"{ROOT}/scenes/{{scene}}/collision.ply",
+            scene=sorted({e.scene for e in EXPERIMENTS}),
+        ),
+        frames=shown_frames(),
     output:
-        figures=directory(f"{ROOT}/figures"),
+        figures=report(
+            directory(f"{ROOT}/figures"),
+            patterns=["{figure}.png"],
+            caption="../report/figure.rst",
+            category="Figures",
+            labels={"figure": "{figure}"},
+        ),
     log:
         f"{ROOT}/logs/figures.log",
     benchmark:
@@ -124,7 +152,10 @@ rule figures:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=2000,
+    params:
+        rows=[dump(e) for e in EXPERIMENTS],
+        repetitions=CONFIG.training.repetitions,
     script:
         "../scripts/figures.py"
 
@@ -150,3 +181,109 @@ rule summary:
         repetitions=CONFIG.training.repetitions,
     script:
         "../scripts/summary.py"
+
+
+rule claims:
+    input:
+        tables=expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
+        assistance=rules.assistance.output.csv,
+        manifests=all_manifests(),
+    output:
+        csv=report(
+            f"{ROOT}/claims.csv",
+            caption="../report/claims.rst",
+            category="Claims",
+        ),
+    log:
+        f"{ROOT}/logs/claims.log",
+    benchmark:
+        f"{ROOT}/benchmarks/claims.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        rows=[dump(e) for e in EXPERIMENTS],
+        repetitions=CONFIG.training.repetitions,
+    script:
+        "../scripts/claims.py"
+
+
+rule provenance:
+    input:
+        tables=expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
+        speed=rules.speed_vs_error.output.csv,
+        assistance=rules.assistance.output.csv,
+        figures=rules.figures.output.figures,
+        summary=rules.summary.output.page,
+        claims=rules.claims.output.csv,
+    output:
+        record=f"{ROOT}/provenance.json",
+    log:
+        f"{ROOT}/logs/provenance.log",
+    benchmark:
+        f"{ROOT}/benchmarks/provenance.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        seed=CONFIG.seed,
+        config_hash=config_hash(CONFIG),
+    script:
+        "../scripts/provenance.py"
+
+
+rule report:
+    input:
+        provenance=rules.provenance.output.record,
+        tables=rules.provenance.input,
+        metrics=all_metrics(),
+        meshes=expand(
+            f"{ROOT}/scenes/{{scene}}/mesh.glb",
+            scene=sorted({e.scene for e in EXPERIMENTS}),
+        ),
+        plans=expand(
+            f"{ROOT}/plans/{{scene}}/{{split}}.csv",
+            scene=sorted({e.scene for e in EXPERIMENTS}),
+            split=SPLITS,
+        ),
+        labels=pose_labels(),
+    output:
+        page=f"{ROOT}/report.html",
+    log:
+        f"{ROOT}/logs/report.log",
+    benchmark:
+        f"{ROOT}/benchmarks/report.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=4000,
+    params:
+        rows=[dump(e) for e in EXPERIMENTS],
+        repetitions=CONFIG.training.repetitions,
+    script:
+        "../scripts/report.py"
+
+
+rule report_document:
+    input:
+        tex=rules.document.input.tex,
+        claims=rules.claims.output.csv,
+        figures=rules.figures.output.figures,
+    output:
+        tex=f"{ROOT}/report.tex",
+    log:
+        f"{ROOT}/logs/report_document.log",
+    benchmark:
+        f"{ROOT}/benchmarks/report_document.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    script:
+        "../scripts/report_document.py"

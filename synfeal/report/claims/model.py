@@ -1,0 +1,72 @@
+"""A claim of the paper, and what a run has to say about it."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+from synfeal.report.published import FOLDER
+
+Verdict = Literal["holds", "does not hold", "undecided at this scale", "not testable here"]
+HOLDS: Verdict = "holds"
+FAILS: Verdict = "does not hold"
+UNDECIDED: Verdict = "undecided at this scale"
+NOT_TESTABLE: Verdict = "not testable here"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim as printed.
+
+    Attributes:
+        id: ``C1`` to ``C16``.
+        section: of the paper.
+        statement: the claim in our words.
+        published: its figures, as printed.
+        numbers: those of the figures that the test compares with.
+        test: how it is tested and by which rule it is decided.
+        footnote: what is wrong or unclear in print, else empty.
+    """
+
+    id: str
+    section: str
+    statement: str
+    published: str
+    numbers: tuple[float, ...]
+    test: str
+    footnote: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run says about a claim, under one of the two scores.
+
+    Attributes:
+        verdict: decided by the rule of the claim's test.
+        measured: the statistic, as text.
+        interval: its 95 % limits, as text; empty where it has none.
+        reason: why the verdict is not the other one.
+    """
+
+    verdict: Verdict
+    measured: str = ""
+    interval: str = ""
+    reason: str = ""
+
+
+class Missing(Exception):  # noqa: N818 - not an error: it ends in the verdict `not testable here`
+    """This run does not have what a test needs; the message says what."""
+
+
+@cache
+def published_claims() -> tuple[Claim, ...]:
+    """The claims of the paper, in its order."""
+    with (FOLDER / "claims.csv").open(encoding="utf-8", newline="") as file:
+        return tuple(_claim(row) for row in csv.DictReader(file))
+
+
+def _claim(row: dict[str, str]) -> Claim:
+    numbers = tuple(map(float, row.pop("numbers").split()))
+    return Claim(numbers=numbers, **row)

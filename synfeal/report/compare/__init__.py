@@ -1,0 +1,1 @@
+"""Two result trees side by side: did a change matter?"""

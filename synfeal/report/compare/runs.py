@@ -1,0 +1,124 @@
+"""The runs of a result tree, and the errors of every test frame of one run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.dataset.number_table import read_numbers
+from synfeal.dataset.pose_table import HEADER
+from synfeal.errors import InputError
+from synfeal.report.stats import MEASURES, read_metrics
+
+ERRORS_HEADER = ",".join(("frame", *MEASURES))
+REMEDY = "score that run again"
+
+
+class RunKey(NamedTuple):
+    """What a run is, apart from its seed; the directories below ``runs``, in order."""
+
+    scene: str
+    size: str
+    labels: str
+    init: str
+    model: str
+
+    @property
+    def name(self) -> str:
+        """As printed, e.g. ``large_room/6k/synfeal/pretrained/posenet``."""
+        return "/".join(self)
+
+
+@dataclass(frozen=True)
+class RunErrors:
+    """The errors of one run over its test frames.
+
+    Attributes:
+        frame: (N,) index in the test split.
+        path: (N,) index of the straight path the frame belongs to.
+        errors: (seeds, 4, N) by :data:`~synfeal.report.stats.MEASURES`; a prediction that was not
+            finite has infinite errors.
+    """
+
+    frame: NDArray[np.int64]
+    path: NDArray[np.int64]
+    errors: NDArray[np.float64]
+
+    @property
+    def failed(self) -> int:
+        """Predictions that were not finite, over all seeds."""
+        return int(np.isinf(self.errors[:, 0]).sum())
+
+
+def find_runs(root: Path) -> dict[RunKey, list[Path]]:
+    """The directories of all seeds of every scored run of a tree, in the order of their names.
+
+    Raises:
+        InputError: there is no such directory, or no scored run in it.
+    """
+    found: dict[RunKey, list[Path]] = {}
+    for path in sorted(root.glob("runs/*/*/*/*/*/seed*/metrics.json")):
+        key = RunKey(*path.parent.relative_to(root / "runs").parts[:-1])
+        found.setdefault(key, []).append(path.parent)
+    if not found:
+        raise InputError(
+            f"{root}: not a results tree; name a directory that holds"
+            " runs/<scene>/<size>/<labels>/<init>/<model>/seed<k>/metrics.json"
+        )
+    return found
+
+
+def read_run(seeds: Sequence[Path]) -> RunErrors:
+    """The errors of a run from the directories of its seeds.
+
+    Raises:
+        InputError: a file is missing or broken, the seeds were tested on different frames, or
+            ``metrics.json`` does not belong to ``errors.csv``.
+    """
+    index = [_read_index(seed) for seed in seeds]
+    for seed, found in zip(seeds, index, strict=True):
+        if not np.array_equal(found, index[0]):
+            raise InputError(f"{seed}: was tested on other frames than {seeds[0]}; run both again")
+    errors = np.stack([_read_errors(seed, index[0][:, 0]) for seed in seeds])
+    return RunErrors(index[0][:, 0], index[0][:, 1], errors)
+
+
+def _read_index(seed: Path) -> NDArray[np.int64]:
+    """Frame and path (N, 2) of the predictions."""
+    path = seed / "predictions.csv"
+    values = read_numbers(path, HEADER, "table of predictions", finite=False)[:, :2]
+    if not len(values) or not np.isfinite(values).all():
+        raise InputError(f"{path}: every row needs frame and path; predict again")
+    return values.astype(np.int64)
+
+
+def _read_errors(seed: Path, frame: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Errors (4, N) of one seed."""
+    path = seed / "errors.csv"
+    values = read_numbers(path, ERRORS_HEADER, "table of errors", finite=False)
+    if not np.array_equal(values[:, 0], frame):
+        raise InputError(f"{path}: its frames are not those of predictions.csv; {REMEDY}")
+    errors = values[:, 1:].T
+    if (errors < 0).any():
+        raise InputError(f"{path}: holds an error below zero; {REMEDY}")
+    errors = np.where(np.isnan(errors), np.inf, errors)
+    _check_metrics(seed / "metrics.json", read_metrics(seed / "metrics.json"), errors)
+    return errors
+
+
+def _check_metrics(path: Path, metrics: Mapping[str, Any], errors: NDArray[np.float64]) -> None:
+    """Refuse a pair of files that stem from different scorings."""
+    for measure, values in zip(MEASURES, errors, strict=True):
+        median = float(np.median(values))
+        noted = math.inf if metrics[measure] is None else metrics[measure]
+        if not isinstance(noted, int | float) or not math.isclose(noted, median, rel_tol=1e-6):
+            raise InputError(
+                f"{path}: {measure} is {metrics[measure]}, the median of errors.csv {median:.6g};"
+                f" {REMEDY}"
+            )

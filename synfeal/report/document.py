@@ -1,0 +1,85 @@
+"""``report.tex``: claims, tables and figures as one document that compiles by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from synfeal.report.figures import CAPTIONS
+from synfeal.report.latex import PACKAGES, document_latex, escape, table_bodies, write_text
+from synfeal.report.results import read_table
+
+CLAIM_PACKAGES = (*PACKAGES, "longtable", "array")
+WIDTHS_MM = (8, 42, 24, 30, 30, 20, 20)
+CLAIM_COLUMNS = (
+    *("id", "statement", "published", "measured_labels", "measured_true"),
+    *("verdict_labels", "verdict_true"),
+)
+HEADINGS = (
+    *("", "Claim", "Published", "Measured against the labels (the paper's protocol)"),
+    *("Measured against the true poses", "Verdict, labels", "Verdict, true poses"),
+)
+
+
+def write_report_document(root: Path, tables: Sequence[Path], out_tex: Path) -> None:
+    """Write the document into ``root``; its figures are taken from ``root/figures``.
+
+    Args:
+        root: results directory of the profile, with ``claims.csv`` and ``figures``.
+        tables: the LaTeX tables, in order.
+        out_tex: the document; it compiles where it lies.
+
+    Raises:
+        InputError: ``claims.csv`` is missing or unreadable.
+    """
+    claims = read_table(root / "claims.csv", [*CLAIM_COLUMNS, "footnote"])
+    names = [name for name in CAPTIONS if (root / "figures" / f"{name}.png").is_file()]
+    pages = [
+        f"{title_latex(root.name)}\n{claims_latex(claims)}",
+        *table_bodies(tables),
+        *(figure_latex(name, CAPTIONS[name]) for name in names),
+    ]
+    write_text(out_tex, document_latex(pages, CLAIM_PACKAGES))
+
+
+def title_latex(profile: str) -> str:
+    """What the document is."""
+    return rf"\section*{{Synfeal, reproduced: profile {escape(profile)}}}"
+
+
+def claims_latex(claims: Sequence[Mapping[str, str]]) -> str:
+    """The claims as a table that may run over pages, footnotes below."""
+    columns = "".join(rf">{{\raggedright\arraybackslash}}p{{{width}mm}}" for width in WIDTHS_MM)
+    notes = [
+        rf"\noindent {row['id']}: {escape(row['footnote'])}" for row in claims if row["footnote"]
+    ]
+    lines = [
+        r"{\scriptsize\setlength{\tabcolsep}{1mm}",
+        rf"\begin{{longtable}}{{{columns}}}",
+        rf"\toprule {' & '.join(map(escape, HEADINGS))} \\ \midrule \endhead",
+        *map(_claim, claims),
+        r"\bottomrule",
+        r"\end{longtable}",
+        r"\addtocounter{table}{-1}",  # the paper's tables keep their numbers
+        "\n\n".join(notes),
+        "}",
+    ]
+    return "\n".join(lines)
+
+
+def _claim(row: Mapping[str, str]) -> str:
+    return " & ".join(escape(row[name]) for name in CLAIM_COLUMNS) + r" \\ \addlinespace"
+
+
+def figure_latex(name: str, caption: str) -> str:
+    """A figure as wide as the page, or as high as it."""
+    return "\n".join(
+        [
+            r"\begin{figure}[p]",
+            r"\centering",
+            r"\includegraphics[width=\linewidth,height=0.85\textheight,keepaspectratio]"
+            f"{{figures/{name}.png}}",
+            rf"\caption{{{escape(caption)}}}",
+            r"\end{figure}",
+        ]
+    )

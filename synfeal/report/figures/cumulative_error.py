@@ -1,0 +1,122 @@
+"""Which share of the test frames is localized how well, at the largest size of each scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from synfeal.config import MODELS, Experiment, runs_of
+from synfeal.errors import InputError
+from synfeal.report.figures.sources import Array, Results, counted, read_csv
+from synfeal.report.figures.style import MODEL_STYLES
+from synfeal.report.layouts import TITLES, scene_title
+
+MEASURES = {
+    "position_m_true": "position error against the true poses (m)",
+    "orientation_deg_true": "orientation error against the true poses (°)",
+}
+MARKED_AT = (0.1, 0.3, 0.5, 0.7, 0.9)
+
+
+@dataclass(frozen=True)
+class SceneErrors:
+    """Errors at the largest size of a scene.
+
+    Attributes:
+        title: scene, size and frames.
+        errors: by localizer and measure, the errors (N,) of all test frames of all repetitions;
+            infinite where a prediction failed.
+    """
+
+    title: str
+    errors: dict[str, dict[str, Array]]
+
+
+def draw(results: Results) -> Figure | None:
+    """Scenes across, measures down; nothing when the design has no rows of Table 4."""
+    rows = results.rows_of("table4_size")
+    if not rows:
+        return None
+    scenes = list(dict.fromkeys(row.scene for row in rows))
+    largest = [_largest(results, [row for row in rows if row.scene == scene]) for scene in scenes]
+    return figure_of([read_errors(results, row) for row in largest])
+
+
+def read_errors(results: Results, row: Experiment) -> SceneErrors:
+    """The errors of the five localizers on one data set.
+
+    Raises:
+        InputError: a run's errors are missing or unreadable.
+    """
+    errors: dict[str, dict[str, Array]] = {}
+    runs = runs_of((row,), results.repetitions)
+    for model in MODELS:
+        rows = []
+        for run in (run for run in runs if run.model == model):
+            path = results.root / "runs" / run.directory / "errors.csv"
+            found = read_csv(path, "score that run again")
+            if not found or not set(MEASURES) <= set(found[0]):
+                raise InputError(
+                    f"{path}: needs rows and columns {', '.join(MEASURES)}; score that run again"
+                )
+            rows += found
+        errors[model] = {m: np.array([float(line[m]) for line in rows]) for m in MEASURES}
+    counts = [len(results.labels(row.scene, row.size, "synfeal", s)) for s in ("train", "test")]
+    return SceneErrors(f"{scene_title(row.scene)}, {row.size}\n{counted(*counts)}", errors)
+
+
+def figure_of(scenes: list[SceneErrors]) -> Figure:
+    """The figure of some scenes."""
+    figure = Figure(figsize=(1.2 + 4.0 * len(scenes), 7.0), layout="constrained")
+    panels = figure.subplots(2, len(scenes), squeeze=False, sharey=True, sharex="row")
+    for column, scene in enumerate(scenes):
+        panels[0, column].set_title(scene.title)
+        for axes, (measure, label) in zip(panels[:, column], MEASURES.items(), strict=True):
+            draw_curves(axes, {model: found[measure] for model, found in scene.errors.items()})
+            axes.set_xlabel(label)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("test frames with at most this error (%)")
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2 if len(scenes) == 1 else 5)
+    return figure
+
+
+def draw_curves(axes: Axes, errors: Mapping[str, Array]) -> None:
+    """One curve per localizer; one whose predictions failed ends below 100 %."""
+    axes.axhline(50, color="0.85", linewidth=0.8, zorder=0)
+    for model, values in errors.items():
+        error, percent = cumulative(values)
+        marked = [int(share * (len(error) - 1)) for share in MARKED_AT]
+        axes.plot(
+            *(error, percent),
+            label=TITLES[model],
+            drawstyle="steps-post",
+            linewidth=1.4,
+            markersize=4.5,
+            markevery=marked,
+            **MODEL_STYLES[model],
+        )
+    axes.set_xscale("log")
+    axes.set_ylim(0, 100)
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.grid(axis="x", color="0.93")
+    axes.set_axisbelow(True)
+
+
+def cumulative(errors: Array) -> tuple[Array, Array]:
+    """The finite errors in rising order, and the per cent of all errors up to each of them."""
+    ordered = np.sort(errors)
+    percent = 100 * np.arange(1, len(errors) + 1) / len(errors)
+    return ordered[np.isfinite(ordered)], percent[np.isfinite(ordered)]
+
+
+def _largest(results: Results, rows: list[Experiment]) -> Experiment:
+    sizes = results.sizes(rows[0].scene)
+    return max(rows, key=lambda row: sizes.index(row.size))

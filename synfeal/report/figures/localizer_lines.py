@@ -1,0 +1,79 @@
+"""Panels with one line per localizer, 95 % limits, and the published line in grey."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+
+from synfeal.config import MODELS
+from synfeal.report.figures.sources import Array, Row, number
+from synfeal.report.figures.style import MODEL_STYLES, PUBLISHED
+from synfeal.report.layouts import TITLES
+
+# Localizers stand side by side so that their limits can be told apart; in widths of a place.
+ASIDE = dict(zip(MODELS, np.linspace(-0.16, 0.16, len(MODELS)), strict=True))
+PAPER_MEASURES = ("position_m", "orientation_deg")
+
+
+def draw_localizers(axes: Axes, rows: Sequence[Row], measure: str, published: bool) -> None:
+    """One line per localizer over the places 0, 1, ... of its rows.
+
+    Args:
+        axes: where to draw.
+        rows: rows of a table, for each localizer in the order of the places.
+        measure: column of the error; its limits are the columns ``_low`` and ``_high``.
+        published: also draw the paper's values of that error.
+    """
+    for model in MODELS:
+        chosen = [row for row in rows if row["model"] == model]
+        places = np.arange(len(chosen)) + ASIDE[model]
+        style = MODEL_STYLES[model]
+        if published:
+            paper = [published_value(row, measure.removesuffix("_true")) for row in chosen]
+            axes.plot(places, paper, **{**style, **PUBLISHED})
+        values = np.array([number(row[measure]) for row in chosen])
+        axes.errorbar(
+            places,
+            values,
+            yerr=_reach(chosen, measure, values),
+            label=TITLES[model],
+            linewidth=1.5,
+            markersize=4.5,
+            elinewidth=0.9,
+            capsize=1.8,
+            **style,
+        )
+    axes.grid(axis="y", color="0.92")
+    axes.set_axisbelow(True)
+
+
+def start_at_zero(panels: Iterable[Axes]) -> None:
+    """Let the error axes begin at 0; only when all is drawn, for it ends their adapting to data."""
+    for axes in panels:
+        axes.set_ylim(bottom=0)
+
+
+def published_value(row: Row, measure: str) -> float:
+    """The paper's value, left out where it is a misprint."""
+    misprint = measure == "orientation_deg" and row["published_flag"] == "misprint"
+    return float("nan") if misprint else number(row[f"published_{measure}"])
+
+
+def add_legend(figure: Figure | SubFigure, axes: Axes, columns: int, published: bool) -> None:
+    """A legend below everything: the localizers of ``axes``, and how the paper's are drawn."""
+    handles, labels = axes.get_legend_handles_labels()
+    if published:
+        (reference,) = axes.plot([], [], linestyle="-", **PUBLISHED)
+        handles, labels = [*handles, reference], [*labels, "published (grey)"]
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+
+
+def _reach(rows: Sequence[Row], measure: str, values: Array) -> Array:
+    """Distances (2, N) of the limits below and above the values; the limits enclose a median."""
+    low = np.array([number(row[f"{measure}_low"]) for row in rows])
+    high = np.array([number(row[f"{measure}_high"]) for row in rows])
+    reach: Array = np.clip(np.stack([values - low, high - values]), 0, None)
+    return np.nan_to_num(reach)

@@ -1,0 +1,86 @@
+"""All figures, in the order a report shows them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from matplotlib.figure import Figure
+
+from synfeal.report.figures import (
+    cumulative_error,
+    error_by_noise,
+    error_by_size,
+    frames,
+    label_error,
+    poses,
+    speed_vs_error,
+    trajectories,
+)
+from synfeal.report.figures.sources import Results
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A figure.
+
+    Attributes:
+        draw: makes it, or returns None when the design does not make what it shows.
+        caption: one sentence.
+        suffixes: the files it is written to.
+    """
+
+    draw: Callable[[Results], Figure | None]
+    caption: str
+    suffixes: tuple[str, ...] = (".svg", ".png")
+
+
+FIGURES: dict[str, Entry] = {
+    "frames": Entry(
+        frames.draw,
+        "Collected frames as the localizers see them, evenly over the largest test set of each "
+        "scene and labelled with their number in it.",
+        (".png",),
+    ),
+    "poses": Entry(
+        poses.draw,
+        "Camera poses of every data set from above, training and test, each with a tick along its "
+        "view, over the walls and furniture of the collision mesh (grey), with the frames used.",
+    ),
+    "trajectories": Entry(
+        trajectories.draw,
+        "Camera paths as each ground-truth method estimated them, over the true ones, from above; "
+        "rings are poses that assistance replaced by the true ones.",
+    ),
+    "label_error": Entry(
+        label_error.draw,
+        "Error of the labels of each ground-truth method along the training and the test sequence, "
+        "against the true poses; vertical lines are the borders of batches, and the bars below say "
+        "which batches were assisted.",
+    ),
+    "error_by_noise": Entry(
+        error_by_noise.draw,
+        "Median localization error against the noise in the labels, with 95 % limits: above "
+        "against the noisy labels of the test set, the paper's protocol, beside the published "
+        "values in grey; below the same predictions against the true poses.",
+    ),
+    "error_by_size": Entry(
+        error_by_size.draw,
+        "Median localization error against the size of the data set, with 95 % limits, against the "
+        "true poses, beside the published values in grey, which come from the paper's own meshes "
+        "and numbers of frames.",
+    ),
+    "cumulative_error": Entry(
+        cumulative_error.draw,
+        "Share of the test frames that each localizer places with at most a given error against "
+        "the true poses, at the largest size of each scene; the grey line is the median.",
+    ),
+    "speed_vs_error_collision": Entry(
+        partial(speed_vs_error.draw, stage="collision"),
+        "How fast rays are answered against how many decisions of the planner differ from the full "
+        "mesh's, for the face counts of the collision mesh that were tried; filled marks form the "
+        "Pareto front, the ring is the mesh that is used.",
+    ),
+}
+CAPTIONS: dict[str, str] = {name: entry.caption for name, entry in FIGURES.items()}

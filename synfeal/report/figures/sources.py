@@ -1,0 +1,90 @@
+"""What figures are drawn from: a profile's design and its result files."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.config import Experiment
+from synfeal.dataset.pose_table import PoseTable, read_pose_table
+from synfeal.errors import InputError
+
+Array = NDArray[np.float64]
+Row = dict[str, str]
+SPLITS = ("train", "test")
+
+
+@dataclass(frozen=True)
+class Results:
+    """A profile's results.
+
+    Attributes:
+        root: its directory.
+        rows: the whole design; what it leaves out is not drawn, whatever files there are.
+        repetitions: seeds per cell.
+    """
+
+    root: Path
+    rows: tuple[Experiment, ...]
+    repetitions: int
+
+    @property
+    def scenes(self) -> list[str]:
+        """The scenes of the design, in the order of their names."""
+        return sorted({row.scene for row in self.rows})
+
+    def rows_of(self, table: str) -> list[Experiment]:
+        """The rows of one table of the design."""
+        return [row for row in self.rows if row.table == table]
+
+    def table(self, name: str) -> list[Row]:
+        """Rows of ``tables/<name>.csv``.
+
+        Raises:
+            InputError: the table is missing or unreadable.
+        """
+        return read_csv(self.root / "tables" / f"{name}.csv", "make that table again")
+
+    def labels(self, scene: str, size: str, labels: str, split: str) -> PoseTable:
+        """The poses a data set carries; those of ``synfeal`` are the true ones.
+
+        Raises:
+            InputError: the labels are missing or unreadable.
+        """
+        return read_pose_table(self.root / "labels" / scene / size / labels / f"{split}.csv")
+
+    def sizes(self, scene: str) -> list[str]:
+        """Data set sizes of a scene in the design, the smallest first.
+
+        Raises:
+            InputError: the labels of a size are missing or unreadable.
+        """
+        names = dict.fromkeys(row.size for row in self.rows if row.scene == scene)
+        return sorted(names, key=lambda size: len(self.labels(scene, size, "synfeal", "train")))
+
+
+def read_csv(path: Path, remedy: str) -> list[Row]:
+    """Rows of a CSV file with a header.
+
+    Raises:
+        InputError: the file is missing or unreadable; ``remedy`` says what to do.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            return list(csv.DictReader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: cannot be read as CSV ({error}); {remedy}") from None
+
+
+def number(text: str) -> float:
+    """A value of a table; an empty cell is not a number and leaves a gap."""
+    return float(text) if text else float("nan")
+
+
+def counted(n_train: int | str, n_test: int | str) -> str:
+    """Frames of a data set as figures say it."""
+    return f"{int(n_train):,} training, {int(n_test):,} test frames"

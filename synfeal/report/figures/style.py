@@ -1,0 +1,47 @@
+"""How figures look: colours safe for the colour-blind; markers and dashes say the same in grey."""
+
+from __future__ import annotations
+
+from typing import Any
+
+# Okabe and Ito's colours; within each set no two lines share a marker or a dash pattern.
+BLACK, BLUE, VERMILION, GREEN = "#000000", "#0072B2", "#D55E00", "#009E73"
+PURPLE, ORANGE = "#CC79A7", "#E69F00"
+Style = dict[str, Any]
+
+MODEL_STYLES: dict[str, Style] = {
+    "posenet": {"color": BLACK, "marker": "o", "linestyle": "-"},
+    "poselstm": {"color": BLUE, "marker": "s", "linestyle": "--"},
+    "hourglass": {"color": VERMILION, "marker": "^", "linestyle": "-."},
+    "posenet2resnet": {"color": GREEN, "marker": "D", "linestyle": ":"},
+    "posenet2": {"color": PURPLE, "marker": "v", "linestyle": (0, (5, 1, 1, 1, 1, 1))},
+}
+METHOD_STYLES: dict[str, Style] = {
+    "sfm": {"color": BLUE, "marker": "o", "linestyle": "-"},
+    "rgbd-toro": {"color": VERMILION, "marker": "^", "linestyle": "--"},
+    "rgbd-g2o": {"color": GREEN, "marker": "s", "linestyle": "-."},
+}
+SPLIT_STYLES: dict[str, Style] = {
+    "train": {"color": ORANGE, "marker": "o"},
+    "test": {"color": BLUE, "marker": "^"},  # the darker one: drawn on top, and fewer
+}
+SCENE_STYLES: tuple[Style, ...] = tuple(MODEL_STYLES.values())
+PUBLISHED: Style = {"color": "0.74", "linewidth": 0.9, "markersize": 3, "zorder": 1}
+TRUTH: Style = {"color": "0.68", "linewidth": 3.0, "linestyle": "-"}
+
+# Text stays text in SVG; a fixed salt gives equal numbers equal identifiers.
+RC: dict[Any, Any] = {
+    "font.size": 9,
+    "axes.titlesize": 10,
+    "axes.labelsize": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "figure.titlesize": 11,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "legend.handlelength": 3.5,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "synfeal",
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+}

@@ -1,0 +1,1 @@
+"""One page of HTML with everything a run has found; it opens offline and loads nothing."""

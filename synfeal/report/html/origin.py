@@ -1,0 +1,80 @@
+"""The section on where the results come from: commit, versions, machine, and what it cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from synfeal.report.html.markup import Column, number_cell, plain_table, text_cell
+from synfeal.report.results import read_result
+
+NEEDED = ("commit", "config_sha256", "seed", "python", "packages", "platform", "time_utc")
+Record = Mapping[str, Any]
+
+
+def read_origin(path: Path) -> Record:
+    """``provenance.json``.
+
+    Raises:
+        InputError: it is unreadable or lacks a key.
+    """
+    return read_result(path, (*NEEDED, "machine", "stages"), "make it again")
+
+
+def origin_html(record: Record) -> str:
+    """Facts, and the stages as a table."""
+    machine = record["machine"]
+    facts = {
+        "Commit": record["commit"],
+        "Configuration (SHA-256)": record["config_sha256"],
+        "Seed": record["seed"],
+        "Written (UTC)": record["time_utc"],
+        "Processor": f"{machine['processor']}, {machine['usable_cores']} cores used",
+        "Memory": f"{machine['memory_gib']} GiB",
+        "GPU": machine["gpu"] or "none",
+        "System": record["platform"],
+        "Python": record["python"],
+        "Packages": ", ".join(f"{name} {v}" for name, v in record["packages"].items()),
+    }
+    lines = "".join(f"<dt>{name}</dt><dd>{escape(str(v))}</dd>" for name, v in facts.items())
+    return f'<dl class="facts">{lines}</dl>{_stages(record)}'
+
+
+def cost_sentence(record: Record) -> str:
+    """How much was computed, and on what."""
+    seconds = sum(stage["seconds"] for stage in record["stages"])
+    jobs = sum(stage["jobs"] for stage in record["stages"])
+    machine = record["machine"]
+    return (
+        f"{jobs} jobs took {duration(seconds)} of computing together, on {machine['processor']}"
+        f" ({machine['usable_cores']} cores)."
+    )
+
+
+def duration(seconds: float) -> str:
+    """Seconds as a person reads them."""
+    if seconds < 90:
+        return f"{seconds:.1f} s"
+    if seconds < 5400:
+        return f"{seconds / 60:.1f} min"
+    return f"{seconds / 3600:.1f} h"
+
+
+def _stages(record: Record) -> str:
+    titles = ("Jobs", "All jobs", "Median job", "Peak memory (MB)")
+    columns = [Column("Stage"), *(Column(title, True) for title in titles)]
+    rows = []
+    for stage in record["stages"]:
+        peak = stage["peak_mb"]
+        cells = [
+            text_cell(stage["stage"]),
+            number_cell(stage["jobs"], str(stage["jobs"])),
+            number_cell(stage["seconds"], duration(stage["seconds"])),
+            number_cell(stage["median_seconds"], duration(stage["median_seconds"])),
+            number_cell(peak, "–" if peak is None else f"{peak:,.0f}"),
+        ]
+        rows.append(f"<tr>{''.join(cells)}</tr>")
+    caption = "<b>Cost.</b> Time and largest resident memory of the jobs of each stage."
+    return plain_table("stages", caption, columns, rows)

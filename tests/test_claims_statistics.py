@@ -1,0 +1,159 @@
+"""Statistics of the claims against hand-worked cases, NumPy and SciPy."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from scipy.stats import kendalltau
+
+from synfeal.report.claims import bootstrap
+from synfeal.report.claims.bootstrap import (
+    difference,
+    limits,
+    mean_of,
+    medians,
+    path_counts,
+    relative_change,
+)
+from synfeal.report.stats import kendall_tau, share_limits, sign_test
+
+INF, NAN = math.inf, math.nan
+
+
+@pytest.mark.parametrize(
+    ("changes", "negative", "counted", "chance"),
+    [
+        ([-1] * 10, 10, 10, Fraction(2, 2**10)),
+        ([-1] * 9 + [1], 9, 10, Fraction(2 * (1 + 10), 2**10)),
+        ([-1] * 5 + [1] * 5, 5, 10, 1),
+        ([0, 0, -2, -0.5, 3], 2, 3, 1),  # those at 0 do not count
+        ([-INF, -1, INF, NAN], 2, 3, 1),
+        ([-1] * 8, 8, 8, Fraction(2, 2**8)),
+        ([0.0], 0, 0, 1),
+        ([], 0, 0, 1),
+    ],
+)
+def test_sign_test_by_counting_splits(changes, negative, counted, chance):
+    assert sign_test(changes) == (negative, counted, pytest.approx(float(chance)))
+
+
+def test_kendall_tau_by_counting_pairs():
+    assert kendall_tau([0, 1, 2, 3], [9, 5, 4, 1]) == pytest.approx(-1)
+    assert kendall_tau([0, 1, 2, 3], [1, 3, 2, 4]) == pytest.approx(4 / 6)  # 5 pairs for, 1 against
+    # One tie in the errors: (5 - 0) / sqrt(6 * 5).
+    assert kendall_tau([0, 1, 2, 3], [1, 2, 2, 4]) == pytest.approx(5 / math.sqrt(30))
+
+
+def test_kendall_tau_is_scipys_and_ranks_a_failure_last():
+    errors = np.random.default_rng(3).normal(size=9).round(1)
+    assert kendall_tau(range(9), errors) == pytest.approx(kendalltau(range(9), errors).statistic)
+    assert kendall_tau([0, 1, 2, 3], [INF, 3, 2, 1]) == pytest.approx(-1)
+    assert math.isnan(kendall_tau([0, 1], [2.0, 2.0]))
+
+
+def test_share_limits_are_the_closed_form_at_the_ends():
+    # None of n: the upper limit u solves (1 - u)^n = 0.025.
+    assert share_limits(0, 17) == pytest.approx((0, 1 - 0.025 ** (1 / 17)))
+    assert share_limits(17, 17) == pytest.approx((0.025 ** (1 / 17), 1))
+    assert share_limits(0, 17, 0.99) == pytest.approx((0, 1 - 0.005 ** (1 / 17)))
+
+
+@pytest.mark.parametrize(
+    ("errors", "counts", "expected"),
+    [
+        ([3, 1, 2], [1, 1, 1], 2),
+        ([4, 1, 3, 2], [1, 1, 1, 1], 2.5),  # an even count: mean of the middle two
+        ([4, 1, 3, 2], [0, 3, 0, 1], 1),  # 1 1 1 2
+        ([4, 1, 3, 2], [2, 2, 0, 0], 2.5),  # 1 1 4 4
+        ([1, INF, 2], [1, 1, 1], 2),
+        ([1, NAN, 2], [1, 1, 1], 2),  # not a number is as bad as infinite
+        ([1, INF], [1, 1], INF),
+        ([1, INF, NAN], [1, 1, 1], INF),
+        ([1, INF, 2, 3], [1, 1, 1, 1], 2.5),
+    ],
+)
+def test_medians_by_hand(errors, counts, expected):
+    values = np.array(errors, dtype=float)
+    assert medians(values, np.arange(len(values)), np.array([counts])).tolist() == [expected]
+
+
+def test_medians_of_resamples_are_numpys_of_the_repeated_frames(monkeypatch):
+    rng = np.random.default_rng(5)
+    path = np.repeat(np.arange(9), rng.integers(1, 6, size=9))
+    errors = rng.lognormal(size=len(path))
+    errors[rng.integers(len(path), size=6)] = INF
+    counts = path_counts(9, rng, 200)
+    repeated = [np.median(np.repeat(errors, row[path])) for row in counts]
+    assert medians(errors, path, counts).tolist() == repeated
+    assert repeated[0] == np.median(errors)
+    monkeypatch.setattr(bootstrap, "BLOCK", 100)  # as for more frames than are held at once
+    assert medians(errors, path, counts).tolist() == repeated
+
+
+def test_draws_are_of_whole_paths_and_as_many_as_there_are():
+    counts = path_counts(20, np.random.default_rng(0), 4000)
+    assert counts.shape == (4001, 20)
+    assert (counts[0] == 1).all()
+    assert (counts.sum(axis=1) == 20).all()
+    # Each path is drawn Binomial(20, 1/20) times: mean 1, and left out with chance 0.95^20.
+    assert counts[1:].mean(axis=0) == pytest.approx(np.ones(20), abs=0.08)
+    assert (counts[1:] == 0).mean() == pytest.approx(0.95**20, abs=0.005)
+
+
+def test_changes_of_failures():
+    new = np.array([0.5, INF, 1.0, INF])
+    old = np.array([1.0, 1.0, INF, INF])
+    assert relative_change(new, old)[:3].tolist() == [-50, INF, -100]
+    assert np.isnan(relative_change(new, old)[3])
+    assert np.isnan(difference(np.array([INF]), np.array([INF]))[0])
+    assert mean_of([np.array([1.0, INF]), np.array([3.0, 1.0])]).tolist() == [2, INF]
+
+
+def test_limits_leave_two_and_a_half_percent_on_either_side():
+    sample = np.concatenate([[50.0], np.random.default_rng(1).permutation(np.arange(1, 1001))])
+    assert limits(sample) == (26, 975)
+    assert limits(sample, 5) == (6, 995)
+
+
+def test_what_cannot_be_known_widens_limits_at_both_ends():
+    drawn = np.arange(1000.0)
+    drawn[500:550] = NAN
+    assert limits(np.concatenate([[0], drawn])) == (-INF, INF)
+    few = np.concatenate([[0], np.arange(995.0), [NAN] * 5])
+    assert limits(few) == (20, 974)  # without the five: 24 and 970
+
+
+SHIFT = -20.0  # percent, the true change of the median
+
+
+def _covered(n_paths, n_frames, trials, seed, by_path=True):
+    """Share of trials whose limits hold the true change of two log-normal medians, paired."""
+    rng = np.random.default_rng(seed)
+    path = np.repeat(np.arange(n_paths), n_frames)
+    unit = path if by_path else np.arange(len(path))
+    hits = 0
+    for _ in range(trials):
+        shared = rng.normal(0, 0.5, n_paths)
+        logs = [
+            (shared + rng.normal(0, 0.3, n_paths))[path] + rng.normal(0, 0.2, len(path))
+            for _ in range(2)
+        ]
+        counts = path_counts(unit[-1] + 1, rng, 400)
+        new, old = np.exp(logs[0]) * (1 + SHIFT / 100), np.exp(logs[1])
+        low, high = limits(relative_change(medians(new, unit, counts), medians(old, unit, counts)))
+        hits += low <= SHIFT <= high
+    return hits / trials
+
+
+@pytest.mark.parametrize("n_paths", [17, 40])
+def test_limits_hold_the_truth_in_93_to_97_percent_of_1000_trials(n_paths):
+    assert 0.93 <= _covered(n_paths, 6, 1000, seed=n_paths) <= 0.97
+
+
+def test_few_paths_give_limits_that_are_too_narrow_to_decide_on():
+    assert _covered(4, 6, 1000, seed=4) < 0.92
+
+
+def test_drawing_frames_instead_of_paths_would_be_too_sure():
+    assert _covered(20, 10, 300, seed=2, by_path=False) < 0.85

@@ -1,0 +1,266 @@
+"""``synfeal compare`` on small result trees whose errors are known."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from synfeal.cli import main
+from synfeal.dataset.pose_table import read_pose_table, write_pose_table
+from synfeal.files import write_json
+from synfeal.report.compare.run import OUTPUTS
+from synfeal.report.compare.summary import groups_of, remarks_of, summarise
+from synfeal.report.compare.trees import Comparison, compare_trees
+from synfeal.report.stats import MEASURES
+from tests.compare_trees import (
+    BETTER,
+    FAILED,
+    LABEL_OFFSET_M,
+    LABELS,
+    MODELS,
+    RUN,
+    SAME,
+    N,
+    poses,
+    write_tree,
+)
+
+
+@pytest.fixture(scope="module")
+def error_m() -> np.ndarray:
+    return np.random.default_rng(0).uniform(1, 2, N)
+
+
+@pytest.fixture
+def trees(tmp_path: Path, error_m: np.ndarray) -> tuple[Path, Path]:
+    """B: PoseNet 0.5 m better, PoseLSTM as before, Hourglass without a finite prediction."""
+    a = write_tree(tmp_path / "a", dict.fromkeys(MODELS, error_m))
+    changed = {BETTER: error_m - 0.5, SAME: error_m, FAILED: np.full(N, np.nan)}
+    return a, write_tree(tmp_path / "b", changed)
+
+
+@pytest.fixture
+def pair(tmp_path: Path, error_m: np.ndarray) -> tuple[Path, Path]:
+    """The same tree twice."""
+    return write_tree(tmp_path / "a", {BETTER: error_m}), write_tree(
+        tmp_path / "b", {BETTER: error_m}
+    )
+
+
+def by_model(comparison: Comparison, labels: str) -> Iterator[tuple[str, dict]]:
+    return ((r.key.model, r.differences) for r in comparison.runs if r.key.labels == labels)
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """What the command says when it refuses, on one line and with status 1."""
+    assert main(["compare", *map(str, arguments)]) == 1
+    message = capsys.readouterr().err
+    assert message.startswith("error: ")
+    assert message.count("\n") == 1
+    return message
+
+
+def test_known_changes_are_found_against_both_yardsticks(
+    trees: tuple[Path, Path], error_m: np.ndarray
+) -> None:
+    comparison = compare_trees(*trees)
+    assert all(run.paired and run.labels == "same" for run in comparison.runs)
+    assert [run.one_yardstick for run in comparison.runs] == [False] * 3 + [True] * 3
+    for labels, offset_m in zip(LABELS, (0, LABEL_OFFSET_M), strict=True):
+        found = dict(by_model(comparison, labels))
+        for measure, extra_m in (("position_m", offset_m), ("position_m_true", 0)):
+            better = found[BETTER][measure]
+            assert better.a == pytest.approx(np.median(error_m) + extra_m)
+            assert [better.low, better.value, better.high] == pytest.approx([-0.5] * 3)
+            verdicts = [found[model][measure].verdict for model in MODELS]
+            assert verdicts == ["better", "no difference seen", "worse"]
+        assert found[SAME]["position_m"].value == 0
+
+
+def test_summary_counts_runs_and_signs(trees: tuple[Path, Path]) -> None:
+    summary = {s.measure: s for s in summarise(compare_trees(*trees).runs)}
+    position, orientation = summary["position_m"], summary["orientation_deg"]
+    assert (position.better, position.worse, position.unseen) == (2, 2, 2)
+    assert (position.lower, position.higher, position.p_sign) == (2, 2, 1.0)
+    assert (orientation.lower, orientation.higher) == (0, 2)
+    assert orientation.p_sign == pytest.approx(0.5)  # two of two heads or two of two tails
+
+
+def test_group_means_are_of_relative_changes(trees: tuple[Path, Path], error_m: np.ndarray) -> None:
+    groups = {(g.grouping, g.name): g for g in groups_of(compare_trees(*trees).runs)}
+    assert {g: n.n_runs for g, n in groups.items() if g[0] != "model"} == {
+        ("scene", "room"): 6,
+        ("labels", "synfeal"): 3,
+        ("labels", "sfm"): 3,
+    }
+    median = float(np.median(error_m))
+    shares = [-50 / median, -50 / (median + LABEL_OFFSET_M)]
+    better = groups["model", BETTER].percent
+    assert better["position_m"] == pytest.approx(np.mean(shares))
+    assert better["position_m_true"] == pytest.approx(shares[0])
+    assert groups["model", FAILED].percent["position_m"] == np.inf
+    assert groups["model", SAME].percent == dict.fromkeys(MEASURES, 0.0)
+
+
+def test_other_test_paths_are_not_paired(pair: tuple[Path, Path]) -> None:
+    plan = pair[1] / "plans/room/test.csv"
+    write_pose_table(plan, poses(0.5))
+    comparison = compare_trees(*pair)
+    assert {run.plans for run in comparison.runs} == {"differ"}
+    widths = [run.differences["position_m"] for run in comparison.runs]
+    assert all(d.low < 0 < d.high for d in widths)
+    assert "in 2 the test frames differ" in remarks_of(comparison)[1]
+
+
+def test_a_missing_plan_is_said_and_not_paired(pair: tuple[Path, Path]) -> None:
+    (pair[0] / "plans/room/test.csv").unlink()
+    comparison = compare_trees(*pair)
+    assert not any(run.paired for run in comparison.runs)
+    assert "paired in 0 of 2 runs" in remarks_of(comparison)[1]
+
+
+def test_other_labels_are_said_and_frames_still_paired(pair: tuple[Path, Path]) -> None:
+    write_pose_table(pair[1] / "labels/room/6k/sfm/test.csv", poses(-3.0))
+    comparison = compare_trees(*pair)
+    assert [run.labels for run in comparison.runs] == ["differ", "same"]
+    assert all(run.paired for run in comparison.runs)
+    assert any(
+        text.startswith("Runs with other test labels in B: 1;") for text in remarks_of(comparison)
+    )
+
+
+def test_several_seeds_are_averaged(tmp_path: Path, error_m: np.ndarray) -> None:
+    a = write_tree(tmp_path / "a", {BETTER: error_m}, seeds=3)
+    b = write_tree(tmp_path / "b", {BETTER: error_m}, seeds=1)
+    run = compare_trees(a, b).runs[0]
+    assert run.n_seeds == (3, 1)
+    assert run.differences["position_m_true"].value == pytest.approx(-0.01)
+    assert run.differences["position_m_true"].sd_a == pytest.approx(0.01)
+
+
+def test_runs_of_one_tree_only_are_counted(tmp_path: Path, error_m: np.ndarray) -> None:
+    a = write_tree(tmp_path / "a", dict.fromkeys((BETTER, SAME), error_m))
+    b = write_tree(tmp_path / "b", dict.fromkeys((BETTER, FAILED, "posenet2"), error_m))
+    comparison = compare_trees(a, b)
+    assert (len(comparison.runs), comparison.only) == (2, (2, 4))
+
+
+def test_provenance_that_differs_is_printed(
+    pair: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    for root, rate in zip(pair, (0.1, 0.2), strict=True):
+        value = {"config": {"training": {"rate": rate, "kept": 1}}, f"only_{root.name}": "x"}
+        write_json(root / "provenance.json", value)
+    assert main(["compare", *map(str, pair)]) == 0
+    printed = capsys.readouterr().out
+    rows = [line.split() for line in printed.splitlines()[-3:]]
+    assert rows == [
+        ["config.training.rate", "0.1", "0.2"],
+        ["only_a", '"x"', "(none)"],
+        ["only_b", "(none)", '"x"'],
+    ]
+    assert "Keys of provenance.json that differ: 3." in printed
+
+
+def test_files_agree_with_each_other_and_are_written_again_alike(
+    trees: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["compare", *map(str, trees), "--out", str(out)]) == 0
+    assert sorted(path.name for path in out.iterdir()) == sorted(OUTPUTS)
+    first = {name: (out / name).read_bytes() for name in OUTPUTS}
+    with (out / "compare.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 6 * len(MEASURES)
+    failed = next(r for r in rows if (r["model"], r["labels"]) == (FAILED, "sfm"))
+    assert (failed["b"], failed["verdict"], failed["failed_b"]) == ("inf", "worse", str(N))
+    page = first["compare.md"].decode()
+    assert page.count("| failed |") == 3 * 2  # one yardstick of synfeal, two of sfm, two errors
+    with Image.open(out / "compare.png") as picture:
+        assert picture.width == 1650
+    assert main(["compare", *map(str, trees), "--out", str(out)]) == 0
+    assert first == {name: (out / name).read_bytes() for name in OUTPUTS}
+    assert "failed" in capsys.readouterr().out
+
+
+def test_terminal_columns_are_aligned(
+    trees: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["compare", *map(str, trees)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith("  model"))
+    ends = lines[start].index("position A") + len("position A")
+    rows = [line for line in lines[start + 1 : start + 12] if line.startswith("   ")]
+    assert rows
+    assert all(line[ends - 1] != " " and line[ends] == " " for line in rows)
+
+
+def test_foreign_files_are_left_alone(
+    pair: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "notes.txt").write_text("mine")
+    assert "notes.txt" in refusal(capsys, *pair, "--out", out)
+    assert [path.name for path in out.iterdir()] == ["notes.txt"]
+    assert "is a file" in refusal(capsys, *pair, "--out", out / "notes.txt")
+
+
+def test_what_is_no_results_tree_is_refused(
+    pair: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "not a results tree" in refusal(capsys, pair[0], tmp_path / "nowhere")
+    assert "not a results tree" in refusal(capsys, pair[0] / "runs", pair[1])
+    other = write_tree(tmp_path / "other", {SAME: np.ones(N)})
+    assert "no run in common" in refusal(capsys, pair[0], other)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("errors.csv", None, "errors.csv: cannot be read"),
+        ("errors.csv", "frame\n0\n", "errors.csv: header must be"),
+        ("errors.csv", f"frame,{','.join(MEASURES)}\n0,1,1,1,1\n", "not those of predictions"),
+        ("predictions.csv", None, "predictions.csv: cannot be read"),
+        ("metrics.json", "{", "metrics.json: cannot be read as JSON"),
+        ("metrics.json", "{}", "metrics.json: n_train"),
+    ],
+)
+def test_broken_files_are_named(
+    pair: tuple[Path, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+    content: str | None,
+    message: str,
+) -> None:
+    path = pair[1] / RUN / name
+    path.unlink()
+    if content is not None:
+        path.write_text(content)
+    assert message in refusal(capsys, *pair, "--out", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_scores_of_other_errors_are_refused(
+    pair: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = pair[1] / RUN / "metrics.json"
+    metrics = json.loads(path.read_text())
+    write_json(path, metrics | {"orientation_deg_true": 1.5})
+    assert "orientation_deg_true is 1.5" in refusal(capsys, *pair)
+
+
+def test_seeds_of_one_run_must_share_their_frames(
+    tmp_path: Path, error_m: np.ndarray, capsys: pytest.CaptureFixture[str]
+) -> None:
+    a = write_tree(tmp_path / "a", {BETTER: error_m}, seeds=2)
+    path = a / RUN / "predictions.csv"
+    write_pose_table(path, read_pose_table(path).first(N - 1))
+    assert "other frames" in refusal(capsys, a, a)

@@ -1,0 +1,134 @@
+"""Differences of medians: known shifts, scipy's bootstrap, and how often the limits hold."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from synfeal.report.compare.runs import RunErrors
+from synfeal.report.compare.stats import (
+    Difference,
+    compare_errors,
+)
+from synfeal.report.stats import MEASURES
+
+N = 120
+
+
+def run(*seeds: np.ndarray, path: np.ndarray | None = None) -> RunErrors:
+    """A run with the same errors in every measure, one path per frame unless told."""
+    frame = np.arange(seeds[0].shape[-1])
+    errors = np.stack([np.broadcast_to(values, (4, len(frame))) for values in seeds])
+    return RunErrors(frame, frame if path is None else path, errors)
+
+
+def difference(a: RunErrors, b: RunErrors, paired: bool = True) -> Difference:
+    found = compare_errors(a, b, paired)
+    assert list(found) == list(MEASURES)
+    return found["position_m"]
+
+
+@pytest.fixture
+def errors() -> np.ndarray:
+    return np.random.default_rng(1).lognormal(size=N)
+
+
+def test_identical_runs_do_not_differ(errors: np.ndarray) -> None:
+    found = difference(run(errors), run(errors))
+    assert (found.value, found.low, found.high, found.percent) == (0, 0, 0, 0)
+    assert found.verdict == "no difference seen"
+
+
+@pytest.mark.parametrize(("shift", "verdict"), [(0.25, "worse"), (-0.25, "better")])
+def test_paired_limits_of_a_constant_shift_are_the_shift(
+    errors: np.ndarray, shift: float, verdict: str
+) -> None:
+    found = difference(run(errors + 1), run(errors + 1 + shift))
+    assert [found.low, found.value, found.high] == pytest.approx([shift] * 3, abs=1e-12)
+    assert found.verdict == verdict
+    assert found.percent == pytest.approx(100 * shift / (1 + np.median(errors)))
+
+
+def test_unpaired_limits_hold_the_shift_and_are_wider(errors: np.ndarray) -> None:
+    found = difference(run(errors), run(errors + 0.25), paired=False)
+    assert found.low < 0.25 < found.high
+    assert found.high - found.low > 0.2
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_limits_are_those_of_scipy(paired: bool) -> None:
+    rng = np.random.default_rng(4)
+    a = rng.lognormal(size=200)
+    b = 1.1 * a * np.exp(0.3 * rng.normal(size=200))
+    found = difference(run(a), run(b), paired)
+    scipy_limits = stats.bootstrap(
+        (a, b),
+        lambda x, y, axis: np.median(y, axis=axis) - np.median(x, axis=axis),
+        paired=paired,
+        method="percentile",
+        n_resamples=5000,
+        rng=np.random.default_rng(5),
+    ).confidence_interval
+    width = scipy_limits.high - scipy_limits.low
+    assert [found.low, found.high] == pytest.approx(list(scipy_limits), abs=0.12 * width)
+
+
+def coverage(frames_are_independent: bool) -> float:
+    """How often the limits hold the true difference: 40 paths of 5 frames, hard ones for both."""
+    rng = np.random.default_rng(6)
+    path = np.repeat(np.arange(40), 5)
+    truth = math.exp(0.2) - 1
+    held = []
+    for _ in range(100):
+        shared = rng.normal(size=(4, 40))[:, path]
+        own = 0.5 * rng.normal(size=(2, 4, 40))[:, :, path]
+        noise = 0.3 * rng.normal(size=(2, 4, 200))
+        log_a, log_b = shared + own + noise
+        names = np.arange(200) if frames_are_independent else path
+        a, b = (RunErrors(np.arange(200), names, np.exp(v)[None]) for v in (log_a, log_b + 0.2))
+        held += [d.low <= truth <= d.high for d in compare_errors(a, b, paired=True).values()]
+    return float(np.mean(held))
+
+
+def test_paired_limits_hold_the_truth_as_often_as_they_say() -> None:
+    assert 0.92 <= coverage(frames_are_independent=False) <= 0.98
+
+
+def test_frames_instead_of_paths_would_give_limits_that_are_too_narrow() -> None:
+    assert coverage(frames_are_independent=True) < 0.85
+
+
+def test_failures_make_a_run_worst(errors: np.ndarray) -> None:
+    failed = np.full(N, np.inf)
+    worse = difference(run(errors), run(failed))
+    assert (worse.verdict, worse.value, worse.percent) == ("worse", math.inf, math.inf)
+    better = difference(run(failed), run(errors))
+    assert (better.verdict, better.value, better.percent) == ("better", -math.inf, -100)
+    both = difference(run(failed), run(failed))
+    assert (both.verdict, both.value, both.percent) == ("no difference seen", 0, 0)
+
+
+def test_few_failures_move_the_median_as_large_errors_would(errors: np.ndarray) -> None:
+    some, large = errors.copy(), errors.copy()
+    some[::3], large[::3] = np.inf, 1e9
+    assert difference(run(errors), run(some)) == difference(run(errors), run(large))
+    assert difference(run(errors), run(some)).value > 0
+
+
+def test_one_failed_seed_is_not_dropped(errors: np.ndarray) -> None:
+    found = difference(run(errors, errors), run(errors, np.full(N, np.inf)))
+    assert (found.b, found.verdict, found.sd_b, found.se_seeds) == (math.inf, "worse", None, None)
+
+
+def test_seeds_give_means_and_the_standard_error_of_welch(errors: np.ndarray) -> None:
+    a, b = [errors + s for s in (0.0, 0.3, 0.1)], [errors + s for s in (0.5, 0.9)]
+    found = difference(run(*a), run(*b))
+    medians = [[float(np.median(values)) for values in seeds] for seeds in (a, b)]
+    assert found.value == pytest.approx(0.7 - 0.4 / 3)
+    assert [found.sd_a, found.sd_b] == pytest.approx([np.std(m, ddof=1) for m in medians])
+    welch = stats.ttest_ind(medians[1], medians[0], equal_var=False)
+    assert found.se_seeds is not None
+    assert found.value / found.se_seeds == pytest.approx(welch.statistic)

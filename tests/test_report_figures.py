@@ -1,0 +1,174 @@
+"""Figures of tables: what is drawn is what is given."""
+
+import numpy as np
+import pytest
+
+from synfeal.config import MODELS
+from synfeal.report.figures import error_by_noise, error_by_size, speed_vs_error
+from synfeal.report.figures.cumulative_error import SceneErrors, cumulative
+from synfeal.report.figures.cumulative_error import figure_of as cumulative_figure
+from synfeal.report.figures.localizer_lines import ASIDE, published_value
+from synfeal.report.figures.pareto import pareto_front
+from synfeal.report.figures.style import METHOD_STYLES, MODEL_STYLES, PUBLISHED, SPLIT_STYLES
+from synfeal.report.layouts import TITLES
+from tests.report_results import ROWS, complete_results, read
+
+MODEL_OF = {title: model for model, title in TITLES.items()}
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory):
+    root = complete_results(tmp_path_factory.mktemp("results") / "mini")
+    return {name: read(root / "tables" / f"{name}.csv") for name in ROWS}
+
+
+def drawn(axes):
+    """By localizer: places, values, and the limits of each value."""
+    found = {}
+    for container in axes.containers:
+        line, _, (bars,) = container.lines
+        segments = [s if len(s) else np.full((2, 2), np.nan) for s in bars.get_segments()]
+        limits = np.array(segments)[:, :, 1]
+        found[MODEL_OF[container.get_label()]] = (line.get_xdata(), line.get_ydata(), limits)
+    return found
+
+
+def published(axes):
+    grey = PUBLISHED["color"]
+    lines = [line for line in axes.lines if line.get_color() == grey and len(line.get_xdata())]
+    return [line.get_ydata() for line in lines]
+
+
+def column(rows, name, **keys):
+    chosen = [row for row in rows if all(row[key] == value for key, value in keys.items())]
+    return [float(row[name]) for row in chosen]
+
+
+def check_panel(axes, rows, measure, **keys):
+    """Places, values and limits of all localizers; nothing lies outside the axes."""
+    lines = drawn(axes)
+    assert list(lines) == list(MODELS)
+    for model, (places, values, limits) in lines.items():
+        keys["model"] = model
+        expected = column(rows, measure, **keys)
+        np.testing.assert_allclose(values, expected)
+        np.testing.assert_allclose(limits[:, 0], column(rows, f"{measure}_low", **keys))
+        np.testing.assert_allclose(limits[:, 1], column(rows, f"{measure}_high", **keys))
+        np.testing.assert_allclose(places, np.arange(len(expected)) + ASIDE[model])
+        assert axes.get_ylim()[0] == 0
+        assert axes.get_ylim()[1] >= limits.max()
+
+
+def test_error_by_size_draws_the_true_errors_their_limits_and_the_published_ones(tables):
+    rows = tables["table4_size"]
+    figure = error_by_size.figure_of(rows)
+    panels = np.reshape(figure.axes, (2, 2))
+    for line, measure in enumerate(("position_m_true", "orientation_deg_true")):
+        for place, scene in enumerate(("large_room", "sanctuary")):
+            axes = panels[line, place]
+            check_panel(axes, rows, measure, scene=scene)
+            name = f"published_{measure.removesuffix('_true')}"
+            expected = [column(rows, name, scene=scene, model=model) for model in MODELS]
+            np.testing.assert_allclose(published(axes), expected)
+    labels = [label.get_text() for label in panels[1, 1].get_xticklabels()]
+    assert labels[0] == "6k\n300 frames"
+    assert labels[-1] == "95k\n4,750 frames"
+
+
+def test_error_by_noise_draws_both_scores_and_the_published_only_beside_the_papers(tables):
+    rows = tables["table3_inconsistencies"]
+    figure = error_by_noise.figure_of(rows, "title")
+    halves = [np.reshape(half.axes, (2, 3)) for half in figure.subfigs]
+    for end, panels in zip(("", "_true"), halves, strict=True):
+        for line, measure in enumerate(("position_m", "orientation_deg")):
+            for place, block in enumerate(("orientation", "position", "both")):
+                check_panel(panels[line, place], rows, measure + end, block=block)
+                assert len(published(panels[line, place])) == (0 if end else 5)
+    assert "paper's protocol" in figure.subfigs[0].get_suptitle()
+    assert "true poses" in figure.subfigs[1].get_suptitle()
+
+
+def test_a_misprint_and_a_failed_run_leave_a_gap(tables):
+    rows = tables["table3_inconsistencies"]
+    figure = error_by_noise.figure_of(rows, "title")
+    both = np.reshape(figure.subfigs[0].axes, (2, 3))[1, 2]
+    assert np.isnan(published(both)[MODELS.index("posenet2")][1])
+    flagged = {"published_flag": "misprint", "published_orientation_deg": "1"}
+    assert np.isnan(published_value(flagged, "orientation_deg"))
+    failed = [dict(row) for row in tables["table4_size"]]
+    failed[0] |= dict.fromkeys(("position_m_true", "position_m_true_low"), "")
+    failed[0]["position_m_true_high"] = ""
+    _, values, _ = drawn(error_by_size.figure_of(failed).axes[0])["posenet"]
+    assert np.isnan(values).tolist() == [True, False, False, False]
+
+
+def test_the_cumulative_share_is_a_count():
+    errors = np.random.default_rng(3).gamma(2.0, size=41)
+    errors[[4, 7]] = np.inf
+    ordered, percent = cumulative(errors)
+    assert len(ordered) == 39
+    for error, share in zip(ordered, percent, strict=True):
+        assert share == pytest.approx(100 * np.mean(errors <= error))
+    assert percent[-1] == pytest.approx(100 * 39 / 41)
+    # The median is where the curve passes a half.
+    assert ordered[np.searchsorted(percent, 50)] == pytest.approx(np.median(errors))
+
+
+def test_cumulative_error_draws_a_curve_per_localizer_measure_and_scene():
+    rng = np.random.default_rng(4)
+    names = ("position_m_true", "orientation_deg_true")
+    scenes = [
+        SceneErrors(title, {m: {name: rng.gamma(2.0, size=9) for name in names} for m in MODELS})
+        for title in ("first", "second")
+    ]
+    panels = np.reshape(cumulative_figure(scenes).axes, (2, 2))
+    for line, name in enumerate(names):
+        for place, scene in enumerate(scenes):
+            curves = {c.get_label(): c for c in panels[line, place].lines}
+            for model in MODELS:
+                curve = curves[TITLES[model]]
+                np.testing.assert_array_equal(curve.get_xdata(), np.sort(scene.errors[model][name]))
+                np.testing.assert_allclose(curve.get_ydata(), 100 * np.arange(1, 10) / 9)
+
+
+def dominated(one, all_of_them):
+    return any(
+        a[0] <= one[0] and a[1] <= one[1] and (a[0] < one[0] or a[1] < one[1]) for a in all_of_them
+    )
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_pareto_front_is_what_nothing_dominates(seed):
+    rng = np.random.default_rng(seed)
+    # Few distinct values: ties and equal variants are common.
+    variants = rng.integers(0, 5, (rng.integers(1, 14), 2)).astype(float)
+    expected = [not dominated(one, variants) for one in variants]
+    assert pareto_front(*variants.T).tolist() == expected
+
+
+def test_speed_vs_error_joins_the_front_and_rings_the_choice():
+    measured = ((1e6, 0.0, 0), (1.5e6, 0.004, 0), (1.2e6, 0.005, 1), (3e6, 0.2, 0))
+    rows = [
+        {
+            "stage": "collision",
+            "scene": "large_room",
+            "faces": str(1000 - 10 * i),
+            "items_per_s": str(speed),
+            "error": str(error),
+            "chosen": str(chosen),
+        }
+        for i, (speed, error, chosen) in enumerate(measured)
+    ]
+    (axes,) = speed_vs_error.figure_of(rows, speed_vs_error.STAGES["collision"]).axes
+    open_marks, front, ring = axes.lines
+    np.testing.assert_allclose(open_marks.get_xydata(), [[1.2, 0.5]])
+    np.testing.assert_allclose(front.get_xydata(), [[1.0, 0.0], [1.5, 0.4], [3.0, 20.0]])
+    np.testing.assert_allclose(ring.get_xydata(), [[1.2, 0.5]])
+    assert ring.get_label() == "Large Room: used, 980 of 1,000 faces"
+
+
+@pytest.mark.parametrize("styles", [MODEL_STYLES, METHOD_STYLES, SPLIT_STYLES])
+def test_styles_differ_without_their_colours(styles):
+    for key in ("color", "marker", "linestyle"):
+        values = [str(style[key]) for style in styles.values() if key in style]
+        assert len(set(values)) == len(values)

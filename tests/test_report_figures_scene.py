@@ -1,0 +1,239 @@
+"""Figures of scenes, label sets and frames, and the files all figures are written to."""
+
+import re
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+from synfeal.errors import InputError
+from synfeal.mesh.triangles import Triangles
+from synfeal.report.figures import (
+    CAPTIONS,
+    FIGURES,
+    Results,
+    cumulative_error,
+    frames,
+    label_error,
+    poses,
+    trajectories,
+    write_figures,
+)
+from synfeal.report.figures.label_sets import read_labelled_set
+from synfeal.report.figures.plan_view import floor_m, plan_of
+from synfeal.report.figures.style import METHOD_STYLES, RC
+from synfeal.report.layouts import SOURCES
+from tests.figure_results import (
+    LOOKS_ALONG_X,
+    METHODS,
+    N_FRAMES,
+    design,
+    fill_figures,
+    pixels,
+    room,
+    table_of,
+    true_poses,
+    wrong_poses,
+)
+from tests.report_results import TABLE4, fill, make
+
+SPEED_HEADER = "stage,scene,variant,faces,items_per_s,error,chosen\n"
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    root = fill_figures(tmp_path_factory.mktemp("results") / "toy")
+    fill(root, design())
+    make(TABLE4, [row for row in design() if row.table == TABLE4], root)
+    lines = "collision,large_room,full,90,10,0,0\ncollision,large_room,decimated,9,20,0.1,1\n"
+    (root / "tables" / "speed_vs_error.csv").write_text(SPEED_HEADER + lines)
+    return Results(root, design(), 1)
+
+
+@pytest.fixture(autouse=True)
+def style():
+    with matplotlib.rc_context(rc=RC):
+        yield
+
+
+def test_label_error_draws_the_errors_that_were_put_into_the_labels(results):
+    panels = np.reshape(label_error.draw(results).axes, (3, 2))
+    for place, count in enumerate((9, 5)):
+        for line, step in enumerate((0.01, 1.0)):
+            curves = {c.get_label(): c for c in panels[line, place].lines}
+            for k, method in enumerate(METHODS, start=1):
+                # The test labels are also 0.2 m off the true line.
+                offset = (0.01 * k * np.arange(count) - 0.2 * place, k * np.arange(count))[line]
+                curve = curves[SOURCES[method]]
+                np.testing.assert_array_equal(curve.get_xdata(), np.arange(count))
+                np.testing.assert_allclose(curve.get_ydata(), np.abs(offset), atol=1e-6 * step)
+
+
+def test_label_error_marks_borders_and_assisted_batches(results):
+    panels = np.reshape(label_error.draw(results).axes, (3, 2))
+    borders = [c.get_xdata()[0] for c in panels[0, 0].lines if len(set(c.get_xdata())) == 1]
+    assert borders == [4]
+    bars = [
+        (box.x0, box.x1, to_hex(bar.get_facecolor()[0]))
+        for bar in panels[2, 0].collections
+        for box in [bar.get_paths()[0].get_extents()]
+    ]
+    colours = [METHOD_STYLES[method]["color"].lower() for method in METHODS]
+    assert bars == [
+        (0, 4, "#ffffff"),
+        (4, 8, colours[0]),
+        (0, 4, "#ffffff"),
+        (4, 8, colours[1]),
+    ]
+
+
+def test_trajectories_draw_both_paths_and_ring_what_was_assisted(results):
+    panels = np.reshape(trajectories.draw(results).axes, (2, 2))
+    for column, k in enumerate((1, 2)):
+        lines = {line.get_label(): line.get_xydata() for line in panels[0, column].lines}
+        labels = wrong_poses(9, 0.01 * k, k)[:, :2, 3]
+        np.testing.assert_allclose(lines["true path"], true_poses(9)[:, :2, 3])
+        np.testing.assert_allclose(lines[SOURCES[METHODS[column]]], labels)
+        np.testing.assert_allclose(lines["assisted: replaced by the true pose"], labels[[8]])
+    assert "9 training, 5 test frames" in panels[0, 0].figure.get_suptitle()
+
+
+def test_a_design_without_such_labels_has_no_label_set(results):
+    rows = tuple(row for row in results.rows if row.table == TABLE4)
+    assert read_labelled_set(Results(results.root, rows, 1)) is None
+
+
+def test_poses_draw_every_camera_of_every_size(results):
+    small, large = poses.draw(results).axes
+    for axes, size in ((small, "6k"), (large, "20k")):
+        dots = {c.get_label(): c for c in axes.collections}
+        for split, y in (("train", 1.0), ("test", 1.2)):
+            count = N_FRAMES[size, split]
+            np.testing.assert_allclose(dots[split].get_offsets(), true_poses(count, y)[:, :2, 3])
+        text = f"{N_FRAMES[size, 'train']} train + {N_FRAMES[size, 'test']} test frames"
+        assert axes.get_title() == f"Large Room, {size}\n{text}"
+
+
+def test_ticks_point_where_cameras_look_as_seen_from_above():
+    cameras = true_poses(3)
+    down = np.diag([1.0, -1.0, -1.0])
+    left = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # looks along y
+    cameras[1, :3, :3], cameras[2, :3, :3] = down, left
+    ticks = poses.view_ticks(table_of(cameras))
+    np.testing.assert_allclose(ticks[:, 0], cameras[:, :2, 3])
+    expected = poses.TICK_M * np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
+    np.testing.assert_allclose(ticks[:, 1] - ticks[:, 0], expected, atol=1e-12)
+    np.testing.assert_allclose(LOOKS_ALONG_X @ [0, 0, 1], [1, 0, 0])
+
+
+def area(corners):
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2
+
+
+def test_a_plan_shows_walls_and_furniture_but_neither_floor_nor_ceiling():
+    plan = plan_of(room(), top_m=2.0)
+    # From above only the table has an area: its top and its underside.
+    assert area(plan.corners_m) == pytest.approx(2.0)
+    np.testing.assert_allclose(plan.bounds_m, [[0, 0], [4, 2]])
+    walls = plan.corners_m[np.abs(plan.corners_m[:, :, 0] - 4).max(axis=1) < 1e-9]
+    # The wall at x = 4, its triangles cut at the top.
+    assert (walls[:, :, 1].min(), walls[:, :, 1].max()) == (0, 2)
+    assert area(plan_of(room(), top_m=3.5).corners_m) == pytest.approx(2.0 + 8.0)  # and ceiling
+
+
+def test_a_slope_is_shown_as_far_as_it_is_between_floor_and_cut():
+    slope = np.array([[0, 0, 0], [3.0, 0, 3.0], [3.0, 1, 3.0], [0, 1, 0]])
+    floor = np.array([[0, 0, 0], [9.0, 0, 0], [9.0, 9, 0]])
+    mesh = Triangles(np.concatenate([slope, floor]), np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6]]))
+    x = plan_of(mesh, top_m=2.0).corners_m[:, :, 0]  # on the slope, height is x
+    assert (x.min(), x.max()) == pytest.approx((0.15, 2.0))
+
+
+def test_specks_below_the_floor_do_not_move_it():
+    corners = room().vertices_m[room().faces]
+    speck = np.array([[[0, 0, -5.0], [0.1, 0, -5.0], [0, 0.1, -5.0]]])
+    assert floor_m(np.concatenate([speck, corners])) == pytest.approx(0.0)
+
+
+def test_frames_show_the_files_in_order_with_their_numbers_in_the_test_set(results):
+    (part,) = frames.draw(results).subfigs
+    shown = [axes for axes in part.axes if axes.images]
+    assert [axes.texts[0].get_text() for axes in shown] == list("012345")
+    for number, axes in enumerate(shown):
+        np.testing.assert_array_equal(axes.images[0].get_array(), pixels(number))
+    assert part.get_suptitle() == "Large Room: 6 of 6 test frames"
+
+
+@pytest.mark.parametrize("count", [1, 5, 12, 13, 1000, 20_000])
+def test_frames_are_spread_evenly(count):
+    chosen = frames.evenly(count)
+    assert len(chosen) == len(set(chosen)) == min(12, count)
+    assert (chosen[0], chosen[-1]) == (0, count - 1)
+    if count > 1:
+        assert np.ptp(np.diff(chosen)) <= 1
+
+
+def test_cumulative_error_shows_the_largest_size_whatever_the_order_of_the_rows(results):
+    position, orientation = cumulative_error.draw(results).axes
+    assert position.get_title() == "Large Room, 20k\n12 training, 6 test frames"
+    for axes, errors in ((position, (0.1, 0.2, 0.4)), (orientation, (10, 20, 30))):
+        (curve,) = [line for line in axes.lines if line.get_label() == "PoseNet"]
+        # Of four predictions one failed.
+        np.testing.assert_allclose(curve.get_xydata().T, [errors, (25, 50, 75)])
+
+
+def test_what_the_design_makes_is_written_and_equal_results_give_equal_files(results, tmp_path):
+    names = write_figures(results, tmp_path / "a")
+    assert names == [name for name in FIGURES if name != "error_by_noise"]  # no rows of Table 3
+    write_figures(results, tmp_path / "b")
+    files = {path.name: path.read_bytes() for path in (tmp_path / "a").iterdir()}
+    assert files == {path.name: path.read_bytes() for path in (tmp_path / "b").iterdir()}
+    pictures = {f"{name}.svg" for name in names if name != "frames"}
+    assert set(files) == pictures | {f"{name}.png" for name in names}
+
+
+def test_svg_keeps_text_as_text_and_no_date(results, tmp_path):
+    write_figures(results, tmp_path)
+    for path in tmp_path.glob("*.svg"):
+        page = path.read_text()
+        assert len(re.findall(r"<text ", page)) > 5
+        assert "dc:date" not in page
+
+
+def test_captions_are_single_sentences_in_reading_order():
+    assert list(CAPTIONS) == list(FIGURES)
+    for caption in CAPTIONS.values():
+        assert re.fullmatch(r"[A-Z][^.]*\.", caption.replace("0.", "0")), caption
+
+
+def test_every_drawing_is_a_figure_or_left_out(results):
+    nothing = Results(results.root, (), 1)
+    drawn = {name for name, entry in FIGURES.items() if entry.draw(nothing) is not None}
+    assert drawn == {"speed_vs_error_collision"}
+    assert isinstance(FIGURES["error_by_size"].draw(results), Figure)
+
+
+@pytest.mark.parametrize(
+    "missing",
+    [
+        "labels/large_room/6k/sfm/assistance.json",
+        "labels/large_room/6k/sfm/test.csv",
+        "scenes/large_room/collision.ply",
+        "datasets/large_room/network/manifest.json",
+        "datasets/large_room/network/seq-03/frame-000001.color.png",
+        "runs/large_room/20k/synfeal/pretrained/posenet/seed0/errors.csv",
+        "tables/table4_size.csv",
+    ],
+)
+def test_a_missing_result_of_the_design_is_one_line_that_names_it(results, tmp_path, missing):
+    path = results.root / missing
+    kept = path.rename(path.with_suffix(".away"))
+    try:
+        with pytest.raises(InputError, match=re.escape(str(path))) as refusal:
+            write_figures(results, tmp_path)
+        assert "\n" not in str(refusal.value)
+    finally:
+        kept.rename(path)

@@ -1,0 +1,209 @@
+"""The page of results: every number from a file of the run, nothing loaded, nothing invented."""
+
+import base64
+import io
+import json
+import re
+import shutil
+import xml.etree.ElementTree as ET
+from html import unescape
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from synfeal.errors import InputError
+from synfeal.report.cells import read_cells
+from synfeal.report.html import page
+from synfeal.report.html.claims import claims_table, read_claims
+from synfeal.report.html.figures import LARGEST_SIDE_PX, data_address, figure_files
+from synfeal.report.html.skipped import missing_figures, missing_rows
+from synfeal.report.html.tables import score_table
+from tests.report_page import edit_json, large_room_design, page_results
+from tests.report_results import TABLE4, failed_metrics, fill, shipped_design, write_run
+
+RUN = "runs/large_room/6k/sfm/pretrained/posenet/seed0/metrics.json"
+TABLE5 = "table5_from_scratch"
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    return page_results(tmp_path_factory.mktemp("page") / "tiny")
+
+
+@pytest.fixture
+def root(finished, tmp_path, monkeypatch):
+    """A copy to change; the view of the scene is another test's."""
+    monkeypatch.setattr(page, "room_html", lambda scene, *_: f"<p>{scene} in 3D</p>")
+    return shutil.copytree(finished, tmp_path / "tiny")
+
+
+def text_of(html):
+    """What a person reads: no tags, no styles, no scripts."""
+    html = re.sub(r"(?s)<(style|script)\b.*?</\1>", "", html)
+    return " ".join(unescape(re.sub(r"<[^>]*>", " ", html)).split())
+
+
+def written(root):
+    page.write_report(large_room_design(), 1, root, root / "report.html")
+    return (root / "report.html").read_text()
+
+
+def table_of(name, root, design=None):
+    rows = [row for row in design or shipped_design() if row.table == name]
+    return ET.fromstring(score_table(name, read_cells(name, rows, 1, root)))
+
+
+def numbers_of(row, style):
+    """Texts of the ten cells of a row under one style, without interval."""
+    cells = [cell.find(f"div[@class='{style}']") for cell in row.findall("td[@class='number']")]
+    return [["".join(part.itertext()) for part in cell if part.tag != "small"] for cell in cells]
+
+
+# By file: what stands in it, what is written instead, and how that reads on the page.
+REPLACED = {
+    "claims.csv": ("p -41.5 %", "p -47.25 %", "p -47.25 %"),
+    "tables/table1_meshes.csv": ("50000", "51234", "51,234"),
+    "tables/assistance.csv": ("0.375", "0.875", "0.88 m, 3.50°"),
+    "tables/speed_vs_error.csv": ("4321", "4567", "4,567"),
+    "provenance.json": ("512.25", "777.25", "777"),
+}
+
+
+@pytest.mark.parametrize("name", REPLACED)
+def test_every_file_decides_what_the_page_says(root, name):
+    old, new, shown = REPLACED[name]
+    assert shown not in text_of(written(root))
+    content = (root / name).read_text()
+    assert old in content
+    (root / name).write_text(content.replace(old, new))
+    assert shown in text_of(written(root))
+
+
+def test_a_score_changes_the_table_and_the_switch_has_both(root):
+    assert "7.77 m" not in text_of(written(root))
+    edit_json(root / RUN, position_m=7.77, position_m_low=7.01, position_m_true=6.66)
+    table = table_of("table2_ground_truth", root)
+    sfm = table.find(".//tbody/tr")
+    assert numbers_of(sfm, "labels")[0] == ["7.77 m"]
+    assert numbers_of(sfm, "true")[0] == ["6.66 m"]
+    cell = sfm.find("td[@class='number']")
+    assert (cell.get("data-labels"), cell.get("data-true")) == ("7.77", "6.66")
+    assert cell.find("div[@class='labels']/small").text == "7.01–1.20"  # 1.2 m untouched
+    assert "".join(cell.find("div[@class='paper']").itertext()) == "0.34 m"
+    assert "7.77 m" in text_of(written(root))
+
+
+def test_bold_is_the_best_of_a_scene(finished):
+    rows = table_of(TABLE4, finished).findall(".//tbody/tr")
+    own = [len(row.findall("td/div[@class='labels']/b")) for row in rows]
+    paper = [len(row.findall("td/div[@class='paper']/b")) for row in rows]
+    assert own == [0, 0, 0, 10] * 2  # errors fall with the size
+    assert paper[:4] == [0, 0, 1, 9]  # PoseNet2ResNet's orientation is best at 40k
+    assert [row.get("class") for row in rows] == ["first", None, None, None] * 2
+
+
+def test_changes_have_a_sign_and_a_tone(root):
+    rows = [row for row in shipped_design() if row.table == TABLE5]
+    better = rows[0].model_copy(update={"init": "scratch"})
+    fill(root, rows)
+    values = {"position_m": 0.5, "position_m_true": 0.5}
+    write_run(root, better, "posenet", json_of(root, better) | values)
+    first = table_of(TABLE5, root).find(".//tbody/tr")
+    score, _, change = first.findall("td[@class='number']/div[@class='labels']")[0]
+    assert score.text == "0.50 m"
+    assert (change.text, change.get("class")) == ("−50.0%", "change better")
+    _, _, change = first.findall("td[@class='number']/div[@class='labels']")[2]
+    assert (change.text, change.get("class")) == ("+100.0%", "change worse")
+    printed = first.find("td[@class='number']/div[@class='paper']/span[@class='change worse']")
+    assert printed.text == "+44.8%"
+
+
+def json_of(root, row):
+    place = f"{row.scene}/{row.size}/{row.label_id}/{row.init}/posenet/seed0/metrics.json"
+    return json.loads((root / "runs" / place).read_text())
+
+
+def test_a_run_without_a_score_says_so_and_sorts_last(root):
+    rows = [row for row in shipped_design() if row.table == TABLE4]
+    write_run(root, rows[0], "hourglass", failed_metrics("6k"))
+    first = table_of(TABLE4, root).find(".//tbody/tr")
+    cells = first.findall("td[@class='number']")[4:6]
+    assert [cell.find("div[@class='labels']/span").text for cell in cells] == ["failed", "failed"]
+    assert [cell.get("data-labels") for cell in cells] == ["", ""]
+    notes = "".join(table_of(TABLE4, root).find("div[@class='notes']").itertext())
+    assert "125 of 125 predictions failed" in notes
+
+
+def test_claims_carry_both_scores_and_are_escaped(finished):
+    claims = read_claims(finished / "claims.csv")
+    html = claims_table(claims)
+    assert "A &lt;b&gt;&amp; c" in html
+    labels = re.findall(r'<div class="labels">(.*?)</div>', html)
+    true = re.findall(r'<div class="true">(.*?)</div>', html)
+    assert labels[0].startswith("p -41.5 %<small>95 %: p -50.0 % to -9.0 %")
+    assert true[0].startswith("p -33.5 %<small>95 %: p -44.0 % to +3.0 %")
+    assert text_of(labels[1]) == "✓ holds reaches it"
+    assert text_of(true[1]) == "? undecided at this scale stays short"
+
+
+def test_an_unknown_verdict_is_refused(root):
+    path = root / "claims.csv"
+    path.write_text(path.read_text().replace(",holds,", ",perhaps,"))
+    with pytest.raises(InputError, match="claim 'C2': verdict_labels must be one of"):
+        read_claims(path)
+
+
+def test_the_page_names_what_it_lacks(root):
+    for name in ("claims.csv", "provenance.json", "tables/speed_vs_error.csv"):
+        (root / name).unlink()
+        assert f"{name} is missing." in text_of(written(root))
+    for path in (root / "figures").iterdir():
+        path.unlink()
+    assert "figures is missing from this run." in text_of(written(root))
+    assert "error_by_noise" in text_of(written(root))
+
+
+def test_untested_claims_and_rows_left_out_are_listed(root):
+    text = text_of(written(root))
+    assert "C15 is not testable here: no row 40k" in text
+    assert (
+        "Table 4: 4 of the paper's 8 rows are not in this profile's table of experiments:"
+        " Sanctuary 6k; Sanctuary 20k; Sanctuary 40k; Sanctuary 95k." in text
+    )
+
+
+def test_a_complete_design_leaves_nothing_out():
+    assert missing_rows(shipped_design()) == []
+    assert missing_figures({"a": "", "b": ""}, ["b"]) == [
+        "Not drawn, for lack of its data in this profile: figure a."
+    ]
+
+
+def test_the_page_needs_nothing_else(root):
+    html = written(root)
+    assert not re.findall(r"https?://|@import|url\(|<link|src=\"(?!data:)", html)
+    assert "default-src 'none'" in html
+    links = re.findall(r'href="#([^"]*)"', html)
+    assert links
+    assert set(links) <= set(re.findall(r'id="([^"]*)"', html))
+    assert len(html) < 15e6
+
+
+def test_vector_graphics_are_preferred_and_captions_give_the_order(finished):
+    found = figure_files(finished / "figures", {"of_my_own": "x", "not there": "y"})
+    assert [path.name for path in found.values()] == ["of_my_own.png", "error_by_size.svg"]
+    address = data_address(found["error_by_size"])
+    assert address.startswith("data:image/svg+xml;base64,")
+    content = base64.b64decode(address.partition(",")[2])
+    assert content == found["error_by_size"].read_bytes()
+
+
+def test_large_pictures_are_made_small(tmp_path):
+    noise = np.random.default_rng(0).integers(0, 255, (300, 2000, 3), dtype=np.uint8)
+    Image.fromarray(noise).save(tmp_path / "large.png")
+    kind, _, content = data_address(tmp_path / "large.png").partition(",")
+    assert kind == "data:image/webp;base64"
+    assert len(content) < (tmp_path / "large.png").stat().st_size / 3
+    with Image.open(io.BytesIO(base64.b64decode(content))) as image:
+        assert image.size == (LARGEST_SIDE_PX, 300 * LARGEST_SIDE_PX // 2000)

@@ -1,0 +1,72 @@
+"""What a run cost, from the measurements of its jobs, and what it ran on."""
+
+import json
+
+import pytest
+
+from synfeal.errors import InputError
+from synfeal.report.html.origin import cost_sentence, duration, origin_html
+from synfeal.report.html.provenance import processor_name, write_provenance
+from synfeal.report.html.stages import Stage, read_stages
+
+HEADER = "s\th:m:s\tmax_rss\tmax_vms\n"
+
+
+def measure(path, seconds, peak_mb):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"{HEADER}{seconds}\t0:00:01\t{peak_mb}\t9\n")
+
+
+@pytest.fixture
+def benchmarks(tmp_path):
+    measure(tmp_path / "train" / "room" / "a.tsv", 10, 300.5)
+    measure(tmp_path / "train" / "room" / "b.tsv", 4, 200)
+    measure(tmp_path / "train" / "c.tsv", 1, "NA")
+    measure(tmp_path / "summary.tsv", 0.5, "-")
+    return tmp_path
+
+
+def test_jobs_are_summed_by_stage(benchmarks):
+    assert read_stages(benchmarks) == [
+        Stage("train", 3, 15.0, 4.0, 300.5),
+        Stage("summary", 1, 0.5, 0.5, None),
+    ]
+
+
+def test_a_broken_measurement_is_named(benchmarks):
+    (benchmarks / "summary.tsv").write_text("s\tmax_rss\nfast\t1\n")
+    with pytest.raises(InputError, match=r"summary\.tsv: cannot be read as a measurement"):
+        read_stages(benchmarks)
+
+
+def test_the_record_says_what_ran_where_and_for_how_long(benchmarks):
+    out = benchmarks / "provenance.json"
+    result, folder = benchmarks / "table.csv", benchmarks / "figures"
+    result.write_bytes(b"abc")
+    folder.mkdir()
+    (folder / "a.png").write_bytes(b"")
+    write_provenance(7, "feed", benchmarks, [result, folder], out)
+    record = json.loads(out.read_text())
+    assert (record["seed"], record["config_sha256"]) == (7, "feed")
+    assert record["stages"][0]["seconds"] == 15.0
+    # SHA-256 of "abc" and of nothing, as FIPS 180-2 and RFC 6234 print them.
+    assert record["files"] == {
+        "table.csv": "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad",
+        "figures/a.png": "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855",
+    }
+    assert record["machine"]["usable_cores"] >= 1
+    assert "4 jobs took 15.5 s of computing together" in cost_sentence(record)
+    assert record["commit"] in origin_html(record)
+
+
+def test_the_processor_is_the_kernels_word_for_it(tmp_path):
+    path = tmp_path / "cpuinfo"
+    path.write_text("processor : 0\nmodel name\t: Abacus 9 @ 1 GHz\nmodel name\t: other\n")
+    assert processor_name(path) == "Abacus 9 @ 1 GHz"
+    assert processor_name(tmp_path / "none")
+
+
+def test_durations_are_read_by_people():
+    assert [duration(s) for s in (0.25, 89.0, 90.0, 5399.0, 7200.0)] == [
+        *("0.2 s", "89.0 s", "1.5 min", "90.0 min", "2.0 h")
+    ]

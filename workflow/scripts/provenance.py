@@ -1,0 +1,14 @@
+from pathlib import Path
+
+from synfeal.job import job
+from synfeal.report.html.provenance import write_provenance
+
+with job(snakemake.log[0]):
+    out_json = Path(snakemake.output.record)
+    write_provenance(
+        snakemake.params.seed,
+        snakemake.params.config_hash,
+        out_json.parent / "benchmarks",
+        [Path(path) for path in snakemake.input],
+        out_json,
+    )
