@@ -56,14 +56,23 @@ def config_hash(model: BaseModel) -> str:
 def git_commit(folder: Path) -> str:
     """Commit checked out around ``folder``, with ``-dirty`` after it when tracked files changed.
 
+    Changed results do not count: a run that makes tracked results anew must change them.
     ``unknown`` outside a repository and without git: an installed package has no commit.
     """
-    command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--abbrev=40"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)
-    except (OSError, subprocess.TimeoutExpired):
+    commit = _git(folder, "rev-parse", "HEAD")
+    if commit is None or commit.returncode:
         return UNKNOWN
-    return done.stdout.strip() if done.returncode == 0 else UNKNOWN
+    changed = _git(folder, "diff", "--quiet", "HEAD", "--", ":(top)", ":(top,exclude)results")
+    clean = changed is not None and changed.returncode == 0
+    return commit.stdout.strip() + ("" if clean else "-dirty")
+
+
+def _git(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str] | None:
+    command = ["git", "-C", str(folder), *arguments]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
 
 
 def _version(package: str) -> str:
