@@ -156,6 +156,7 @@ def test_provenance_that_differs_is_printed(
 ) -> None:
     for root, rate in zip(pair, (0.1, 0.2), strict=True):
         value = {"config": {"training": {"rate": rate, "kept": 1}}, f"only_{root.name}": "x"}
+        value["files"] = {"summary.md": root.name}  # an outcome, no cause
         write_json(root / "provenance.json", value)
     assert main(["compare", *map(str, pair)]) == 0
     printed = capsys.readouterr().out

@@ -16,6 +16,7 @@ from synfeal.report.compare.stats import Difference, compare_errors
 from synfeal.report.results import read_result
 
 PROVENANCE = "provenance.json"
+OUTCOMES = ("files", "stages", "time_utc")  # differ between any two runs; no reason for anything
 # As for the claims: a bootstrap over fewer paths gives limits that are too narrow.
 FEWEST_PATHS = 10
 
@@ -134,9 +135,15 @@ def _n_paths(run: RunErrors) -> int:
 def _changes(path_a: Path, path_b: Path) -> tuple[ConfigChange, ...] | None:
     if not (path_a.exists() and path_b.exists()):
         return None
-    a, b = (_flat(read_result(path, (), "delete it or run again")) for path in (path_a, path_b))
+    a, b = (_flat(_causes(path)) for path in (path_a, path_b))
     keys = [key for key in sorted({*a, *b}) if a.get(key) != b.get(key)]
     return tuple(ConfigChange(key, a.get(key), b.get(key)) for key in keys)
+
+
+def _causes(path: Path) -> dict[str, Any]:
+    """What a run was made from, without what came out of it."""
+    record = read_result(path, (), "delete it or run again")
+    return {key: value for key, value in record.items() if key not in OUTCOMES}
 
 
 def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, str]:
