@@ -72,7 +72,7 @@ def claims(root: Path) -> str:
 
 def difficulty(folder: Path = DIFFICULTY) -> str:
     """How hard the scenes are for localisation, one line per scene that was measured."""
-    head = "| scene | pixels near a keypoint | keypoints | best match far away | assisted of 10 |"
+    head = "| scene | pixels near a keypoint | keypoints | best match far away | assisted batches |"
     names = sorted(path.name.removesuffix("-sift.csv") for path in folder.glob("*-sift.csv"))
     return "\n".join([head, "|---|---|---|---|---|", *(_difficulty(folder, n) for n in names)])
 
@@ -143,7 +143,7 @@ def _difficulty(folder: Path, name: str) -> str:
         f"{100 * float(sift[f'covered_share_{which}']):.0f} %" for which in ("mean", "q10", "q90")
     )
     methods = [
-        f"{SOURCES[row['method']]} {row['assisted']}"
+        f"{SOURCES[row['method']]} {row['assisted']} of {row['batches']}"
         for row in read_table(folder / f"{name}-assistance.csv")
     ]
     return (
