@@ -1,4 +1,9 @@
-"""The one exception that is meant for people."""
+"""The one exception that is meant for people, and what entry points make of it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
 
 
 class InputError(Exception):
@@ -11,3 +16,21 @@ class InputError(Exception):
 
     def __init__(self, message: str) -> None:
         super().__init__(" ".join(message.split()))
+
+
+def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
+    """Carry out ``action``: 0, or 1 with ``error: ...`` for what a person can mend.
+
+    Args:
+        action: what a command does.
+        if_interrupted: what Ctrl-C leaves behind, for the message of exit status 130.
+    """
+    try:
+        action()
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print(f"error: interrupted; {if_interrupted}", file=sys.stderr)
+        return 130
+    return 0

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render import open_renderer, pyrender_backend
-from synfeal.render.base import intrinsics_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 

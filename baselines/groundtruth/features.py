@@ -12,7 +12,7 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
-from baselines.groundtruth.pinhole import focal_length_px
+from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.geometry.poses import inverse, pose_matrix
 
@@ -50,13 +50,13 @@ class FeatureOdometry:
         matching = pycolmap.FeatureMatchingOptions(num_threads=1, use_gpu=False)
         self._extractor = pycolmap.FeatureExtractor.create(extraction, pycolmap.Device.cpu)
         self._matcher = pycolmap.FeatureMatcher.create(matching, pycolmap.Device.cpu)
-        self._focal_px = focal_length_px(camera)
-        self._centre_px = np.array([camera.width / 2, camera.height / 2])
+        fx, fy, cx, cy = intrinsics_of(camera)
+        self._focal_px, self._centre_px = np.array([fx, fy]), np.array([cx, cy])
         self._camera = pycolmap.Camera(
             model="PINHOLE",
             width=camera.width,
             height=camera.height,
-            params=[self._focal_px, self._focal_px, *self._centre_px],
+            params=[fx, fy, cx, cy],
         )
         self._estimation = pycolmap.AbsolutePoseEstimationOptions()
         self._estimation.ransac.max_error = _MAX_ERROR_PX

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from baselines.groundtruth.features import FeatureOdometry, FrameFeatures
-from baselines.groundtruth.pinhole import focal_length_px, intrinsic_matrix
 from baselines.groundtruth.posegraph.graph import Edge, PoseGraph
+from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig, RgbdConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
@@ -88,7 +88,7 @@ class _Odometry:
             result = odometry.rgbd_odometry_multi_scale(
                 j.rgbd,
                 i.rgbd,
-                o3d.core.Tensor.from_numpy(intrinsic_matrix(self.camera, centre_shift_px=-0.5)),
+                o3d.core.Tensor.from_numpy(intrinsics_of(self.camera).matrix(centre_shift_px=-0.5)),
                 o3d.core.Tensor.from_numpy(i_from_j),
                 1.0,
                 self.cfg.max_depth_m,
@@ -183,8 +183,8 @@ def depth_agreement(
     Returns:
         The share of the points of j that agree, and the RMS of their depth differences in metres.
     """
-    focal = focal_length_px(camera)
-    centre = np.array([camera.width / 2, camera.height / 2])
+    fx, fy, cx, cy = intrinsics_of(camera)
+    focal, centre = np.array([fx, fy]), np.array([cx, cy])
     row, column = np.mgrid[0 : camera.height : _STRIDE, 0 : camera.width : _STRIDE].reshape(2, -1)
     z = depth_j_m[row, column].astype(np.float64)
     measured = np.isfinite(z)

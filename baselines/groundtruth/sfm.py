@@ -24,8 +24,8 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
-from baselines.groundtruth.pinhole import focal_length_px
 from baselines.groundtruth.trajectory import BatchTrajectory, failed_trajectory
+from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig, SfmConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse, pose_matrix, relative
@@ -159,10 +159,9 @@ def _link_images(color_paths: Sequence[Path], images: Path) -> None:
 
 def _match(images: Path, database: Path, camera: CameraConfig, cfg: SfmConfig, seed: int) -> None:
     """Features of all images and verified matches between neighbours in time."""
-    focal, centre_x, centre_y = focal_length_px(camera), camera.width / 2, camera.height / 2
     reader = pycolmap.ImageReaderOptions()
     reader.camera_model = "PINHOLE"
-    reader.camera_params = f"{focal!r},{focal!r},{centre_x!r},{centre_y!r}"
+    reader.camera_params = ",".join(map(repr, intrinsics_of(camera)))
     extraction = pycolmap.FeatureExtractionOptions(num_threads=1, use_gpu=False)
     extraction.sift.max_num_features = cfg.max_features
     pycolmap.extract_features(

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from benchmarks.scene_difficulty.parts import PARTS
 from benchmarks.scene_difficulty.survey import open_survey, read_setting
-from synfeal.errors import InputError
+from synfeal.errors import InputError, exit_status
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -81,15 +81,8 @@ def work_directory(given: Path | None) -> Iterator[Path]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point: 0, or 1 with ``error: ...`` for what a person can mend."""
-    try:
-        measure(build_parser().parse_args(argv))
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("error: interrupted; batches that were done are kept", file=sys.stderr)
-        return 130
-    return 0
+    arguments = build_parser().parse_args(argv)
+    return exit_status(lambda: measure(arguments), "batches that were done are kept")
 
 
 if __name__ == "__main__":

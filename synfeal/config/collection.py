@@ -133,12 +133,23 @@ class CollectionConfig(Strict):
 
 
 class CameraConfig(Strict):
-    """A pinhole camera, principal point in the image centre, square pixels."""
+    """A camera: field of view or calibrated intrinsics, and lens distortion.
+
+    With a field of view alone pixels are square and the principal point is the image centre.
+    """
 
     width: Annotated[int, Field(ge=16, le=8192)] = Field(640, description="image width, pixels")
     height: Annotated[int, Field(ge=16, le=8192)] = Field(480, description="image height, pixels")
     horizontal_fov_deg: Annotated[float, Field(gt=1, lt=170)] = Field(
-        60.0, description="horizontal field of view, degrees"
+        60.0, description="horizontal field of view, degrees; unused where fx is given"
+    )
+    fx: Positive | None = Field(None, description="focal length along x, pixels")
+    fy: Positive | None = Field(None, description="focal length along y, pixels")
+    cx: Finite | None = Field(None, description="principal point, pixels from the left edge")
+    cy: Finite | None = Field(None, description="principal point, pixels from the top edge")
+    distortion: tuple[Finite, Finite, Finite, Finite, Finite] = Field(
+        (0.0, 0.0, 0.0, 0.0, 0.0),
+        description="Brown-Conrady coefficients in OpenCV's order: k1, k2, p1, p2, k3",
     )
     near_m: Positive = Field(0.05, description="near clip plane, metres")
     far_m: Positive = Field(100.0, description="far clip plane, metres")
@@ -147,4 +158,15 @@ class CameraConfig(Strict):
     def _check(self) -> Self:
         if self.near_m >= self.far_m:
             raise ValueError("near_m: must be below far_m")
+        intrinsics = (self.fx, self.fy, self.cx, self.cy)
+        if None in intrinsics and intrinsics != (None,) * 4:
+            raise ValueError("fx: fx, fy, cx and cy are given together or not at all")
         return self
+
+
+class RenderConfig(Strict):
+    """How images are drawn."""
+
+    backend: Literal["auto", "opengl", "pyrender", "raycast"] = Field(
+        "auto", description="`auto` takes the fastest that works on this machine, and says which"
+    )

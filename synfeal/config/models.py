@@ -17,6 +17,7 @@ from synfeal.config.collection import (
     Fraction,
     NonNegative,
     Positive,
+    RenderConfig,
     SceneConfig,
     SizeConfig,
     Slug,
@@ -37,6 +38,7 @@ __all__ = [
     "NonNegative",
     "PoseGraphConfig",
     "PretrainingConfig",
+    "RenderConfig",
     "RgbdConfig",
     "SceneConfig",
     "SfmConfig",
@@ -163,6 +165,7 @@ class Config(Strict):
     groundtruth_camera: CameraConfig = Field(
         default_factory=CameraConfig, description="camera of the frames SfM and RGB-D SLAM see"
     )
+    render: RenderConfig = Field(default_factory=RenderConfig, description="how images are drawn")
     groundtruth: GroundTruthConfig = Field(
         default_factory=GroundTruthConfig, description="label replacement"
     )

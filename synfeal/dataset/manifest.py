@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import synfeal
+from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.sequences import Sequence
 from synfeal.errors import InputError
 from synfeal.files import write_json
-from synfeal.render.base import intrinsics_of
 
 MANIFEST = "manifest.json"
 LIBRARIES = ("numpy", "pillow", "pyrender", "trimesh")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from synfeal.config.models import CameraConfig
+from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.mesh.model import TexturedMesh
 from synfeal.render.base import Renderer
 
 
-def open_renderer(mesh: TexturedMesh, camera: CameraConfig) -> Renderer:
+def open_renderer(
+    mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig | None = None
+) -> Renderer:
     """A renderer of ``mesh`` through ``camera``; a context manager.
 
     Raises:

@@ -2,32 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from types import TracebackType
-from typing import NamedTuple, Protocol, Self
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import CameraConfig
-
 Rgb = NDArray[np.uint8]
 Depth = NDArray[np.float32]
-
-
-class Intrinsics(NamedTuple):
-    """Pinhole intrinsics in pixels; the centre of the top-left pixel is (0.5, 0.5)."""
-
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-
-
-def intrinsics_of(camera: CameraConfig) -> Intrinsics:
-    """Square pixels, principal point in the image centre."""
-    focal = camera.width / 2.0 / math.tan(math.radians(camera.horizontal_fov_deg) / 2.0)
-    return Intrinsics(focal, focal, camera.width / 2.0, camera.height / 2.0)
 
 
 class Renderer(Protocol):

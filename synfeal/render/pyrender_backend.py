@@ -19,10 +19,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.render.base import Depth, Rgb, intrinsics_of
+from synfeal.render.base import Depth, Rgb
 
 # Mesa's software renderer silently draws nonsense from a buffer of 2^24 vertices on.
 MOST_VERTICES = 1 << 23

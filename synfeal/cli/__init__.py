@@ -1,0 +1,33 @@
+"""Command line: look at a mesh, make a 7-Scenes data set from it, compare two result trees."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+from collections.abc import Sequence
+
+from synfeal import __version__
+from synfeal.cli import collect, compare, inspect
+from synfeal.errors import exit_status
+
+COMMANDS = (collect.COMMAND, inspect.COMMAND, compare.COMMAND)
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The parser of the ``synfeal`` command."""
+    parser = argparse.ArgumentParser(prog="synfeal", description=__doc__)
+    parser.add_argument("--version", action="version", version=f"synfeal {__version__}")
+    commands = parser.add_subparsers(required=True)
+    for command in COMMANDS:
+        added = commands.add_parser(command.name, help=command.summary)
+        for flag, details in command.options:
+            added.add_argument(flag, **details)
+        added.set_defaults(action=command.run)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point: 0, 1 for what a person can mend, 2 for wrong usage, 130 after Ctrl-C."""
+    logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
+    arguments = build_parser().parse_args(argv)
+    return exit_status(lambda: arguments.action(arguments), "nothing was kept")

@@ -1,0 +1,8 @@
+"""``python -m synfeal.cli``."""
+
+import sys
+
+from synfeal.cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())
