@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import kendalltau
 
-from synfeal.report.claims import bootstrap
-from synfeal.report.claims.bootstrap import (
+from synfeal import bootstrap
+from synfeal.bootstrap import (
     difference,
     limits,
     mean_of,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from synfeal.report.claims.bootstrap import limits
+from synfeal.bootstrap import limits
 from synfeal.report.claims.model import FAILS, HOLDS, UNDECIDED, published_claims
 from synfeal.report.claims.text import ERRORS, PERCENT, limits_text, reached_text, values_text
 from synfeal.report.claims.verdicts import all_of, at_least, below_zero, near, reaches

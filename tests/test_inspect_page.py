@@ -57,9 +57,12 @@ function drag(dy) {
   }
 }
 (async () => {
+  // A headless window may change its size once after loading; what was drawn before is gone then.
+  await new Promise((done) => setTimeout(done, 1000));
   const found = [];
   for (const act of [ACTIONS]) {
     act();
+    viewer?.setBackFaces(document.getElementById("backs").checked);  // draws anew
     await new Promise((done) => requestAnimationFrame(done));
     found.push(shares());
   }

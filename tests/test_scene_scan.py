@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from synfeal.mesh.triangles import weld
 from synfeal.scenes.atlas import ATLAS_PX, GUTTER_PX, laid_out, pack
 from synfeal.scenes.bake import scanned_mesh
 from synfeal.scenes.grids import Surface, jittered, refined, surface_of
 from synfeal.scenes.lighting import MEDIAN_LIGHT, Lamp, Lighting, Sun, baked
 from synfeal.scenes.patches import Item, Patch, Points, bilinear
 from synfeal.scenes.primitives import box, level, tube, turned, upright
-from synfeal.scenes.scan import Scanner, displacement, rounded, seen_faces, stations, weld
+from synfeal.scenes.scan import Scanner, displacement, rounded, seen_faces, stations
 
 GREY = np.full((8, 8, 3), 128, np.uint8)
 DARK = np.zeros((2, 2, 2, 3), np.float32)

@@ -11,10 +11,10 @@ import pytest
 from synfeal.errors import InputError
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
+from synfeal.mesh.triangles import weld
 from synfeal.scenes import BUILDERS, build_scene
 from synfeal.scenes.atlas import ATLAS_PX
 from synfeal.scenes.canvas import Canvas
-from synfeal.scenes.scan import weld
 
 VOLUMES_M3 = {"large_room": 89.4, "sanctuary": 183.18}  # the paper's table 1
 COUNTS = {"large_room": (122_000, 192_000), "sanctuary": (199_000, 398_000)}  # likewise

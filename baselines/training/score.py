@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.bootstrap import limits, medians, path_counts
 from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table
 from synfeal.errors import InputError
 from synfeal.files import atomic_path, write_json
@@ -21,7 +22,6 @@ from synfeal.seeds import generator_of
 Array = NDArray[np.float64]
 
 RESAMPLES = 1000
-CONFIDENCE = 0.95
 
 
 def score_run(
@@ -84,11 +84,11 @@ def pose_errors(predicted: PoseTable, reference: PoseTable) -> dict[str, Array]:
 
 def median_metrics(errors: Mapping[str, Array], path: NDArray[np.int64]) -> dict[str, float | None]:
     """Median of each error with its limits ``_low`` and ``_high``, and ``position_rms_m``."""
-    limits = bootstrap_limits(errors, path)
+    bounds = bootstrap_limits(errors, path)
     metrics: dict[str, float | None] = {}
     for name, values in errors.items():
         metrics[name] = _finite(float(np.median(values)))
-        metrics[f"{name}_low"], metrics[f"{name}_high"] = map(_finite, limits[name])
+        metrics[f"{name}_low"], metrics[f"{name}_high"] = map(_finite, bounds[name])
     metrics["position_rms_m"] = _finite(float(np.median(errors["position_m"])) / math.sqrt(3))
     return metrics
 
@@ -101,17 +101,10 @@ def bootstrap_limits(
     Whole paths are drawn, not frames: neighbouring frames of a path are nearly the same image, and
     treating them as independent would give limits that are too narrow.
     """
-    rng = generator_of("bootstrap", len(path))
-    members = [np.flatnonzero(path == name) for name in np.unique(path)]
-    stacked = np.stack(list(errors.values()))
-    medians = np.empty((RESAMPLES, len(stacked)))
-    for i in range(RESAMPLES):
-        drawn = rng.integers(len(members), size=len(members))
-        medians[i] = np.median(stacked[:, np.concatenate([members[d] for d in drawn])], axis=1)
-    tail = (1 - CONFIDENCE) / 2
-    # Always one of the medians: interpolating towards an infinite one would not be a number.
-    low, high = np.quantile(medians, [tail, 1 - tail], axis=0, method="inverted_cdf")
-    return {name: (float(low[i]), float(high[i])) for i, name in enumerate(errors)}
+    _, place = np.unique(path, return_inverse=True)
+    n_paths = int(place.max()) + 1
+    counts = path_counts(n_paths, generator_of("bootstrap", len(path)), RESAMPLES)
+    return {name: limits(medians(values, place, counts)) for name, values in errors.items()}
 
 
 def _finite(value: float) -> float | None:

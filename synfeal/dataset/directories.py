@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -19,6 +19,27 @@ def refuse_existing(path: Path) -> None:
     """
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise InputError(f"{path}: exists and is not empty; delete it or choose another directory")
+
+
+def refuse_foreign(out: Path, own: Collection[str], origin: str) -> None:
+    """Refuse a directory with anything but what an earlier command of the same kind wrote.
+
+    Args:
+        out: the directory, which need not exist.
+        own: names of the files that may be replaced.
+        origin: what writes them, as in "is not from a comparison".
+
+    Raises:
+        InputError: ``out`` is a file or holds other files.
+    """
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out}: is a file; choose another directory with --out")
+    others = sorted(path.name for path in out.glob("*") if path.name not in own)
+    if others:
+        raise InputError(
+            f"{out}: holds '{others[0]}', which is not from {origin}; choose another directory"
+            " with --out"
+        )
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.models import SceneConfig
-from synfeal.errors import InputError
+from synfeal.dataset.directories import refuse_foreign
 from synfeal.files import atomic_path, write_json
 from synfeal.inspect.facts import facts_of
 from synfeal.inspect.freespace import find_free_space, suggest_box, viewpoint
@@ -44,7 +44,7 @@ def inspect_mesh(scene: SceneConfig, out: Path) -> str:
     Raises:
         InputError: the mesh cannot be used, the box misses it, or ``out`` holds other files.
     """
-    refuse_foreign(out)
+    refuse_foreign(out, OUTPUTS, "an inspection")
     path = cast(Path, scene.path)
     mesh = load_mesh(path, scene.up_axis, scene.unit_m)
     box_m = sampling_box_of(scene, mesh.bounds_m, str(path))
@@ -68,22 +68,6 @@ def inspect_mesh(scene: SceneConfig, out: Path) -> str:
     _write(out / OUTPUTS[2], page.encode("utf-8"))
     write_json(out / OUTPUTS[0], facts)
     return plain_text(facts)
-
-
-def refuse_foreign(out: Path) -> None:
-    """Refuse a directory with anything but what an earlier inspection wrote.
-
-    Raises:
-        InputError: ``out`` is a file or holds other files.
-    """
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: is a file; choose another directory with --out")
-    others = sorted(path.name for path in out.glob("*") if path.name not in OUTPUTS)
-    if others:
-        raise InputError(
-            f"{out}: holds '{others[0]}', which is not from an inspection; choose another directory"
-            " with --out"
-        )
 
 
 def box_lines(box_m: Array) -> list[Array]:

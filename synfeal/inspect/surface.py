@@ -7,6 +7,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+from trimesh.triangles import cross
 
 from synfeal.mesh.model import MeshPart, TexturedMesh
 
@@ -49,8 +50,7 @@ def triangle_areas_m2(part: MeshPart) -> Array:
 
 def _cross(part: MeshPart) -> Array:
     """Normals (F, 3) of the triangles, as long as twice their area."""
-    a, b, c = (part.vertices_m[part.faces[:, corner]] for corner in range(3))
-    return np.cross(b - a, c - a)
+    return np.asarray(cross(part.vertices_m[part.faces]))
 
 
 def _sample(

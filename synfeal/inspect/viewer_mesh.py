@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
+from trimesh.triangles import cross
 
 from synfeal.inspect.surface import SurfacePoints
 from synfeal.mesh.decimate import simplify
@@ -132,8 +133,8 @@ def _indexed(
 
 
 def _normals(corners: Array) -> Array:
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-30))
+    normals = cross(corners)
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30))
 
 
 def _features(position_m: Array, normal: Array) -> Array:

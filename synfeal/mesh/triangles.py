@@ -24,12 +24,18 @@ class Triangles(NamedTuple):
 
 def merge_vertices(vertices_m: NDArray[np.float64], faces: NDArray[np.int64]) -> Triangles:
     """Join vertices at the same place, or a simplifier tears the mesh along its seams."""
-    keys = np.round(vertices_m / MERGE_M).astype(np.int64)
-    _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    joined = index.reshape(-1)[faces]
+    places_m, index = weld(vertices_m)
+    joined = index[faces]
     corners = np.sort(joined, axis=1)
     has_area = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2])
-    return Triangles(vertices_m[first], joined[has_area].astype(np.int64))
+    return Triangles(places_m, joined[has_area])
+
+
+def weld(points_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Distinct places (W, 3) of points (V, 3), and the place (V,) of each point."""
+    keys = np.round(points_m / MERGE_M).astype(np.int64)
+    _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    return points_m[first], index.reshape(-1).astype(np.int64)
 
 
 def save_collision_mesh(path: Path, mesh: Triangles) -> None:

@@ -56,7 +56,7 @@ def _tones(
         albedo_of(patch, grid).reshape(-1, 3)
         for patch, grid in zip(patches, surface.grids, strict=True)
     ]
-    sizes = [len(grid.rows) * len(grid.columns) for grid in surface.grids]
+    sizes = [grid.n_points for grid in surface.grids]
     glow = np.repeat(np.array([patch.glow for patch in patches], np.float32), sizes)
     return surface.per_patch(baked(surface, np.concatenate(albedo), glow, lighting))
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+from trimesh.triangles import cross
 
 from synfeal.scenes.patches import Patch, Points, Real, bilinear
 
@@ -37,6 +38,11 @@ class Grid:
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""
         return len(self.rows), len(self.columns)
+
+    @property
+    def n_points(self) -> int:
+        """Vertices."""
+        return len(self.rows) * len(self.columns)
 
 
 def refined(patch: Patch, cell_m: float) -> Grid:
@@ -105,8 +111,7 @@ def grid_faces(rng: np.random.Generator, points: Points) -> NDArray[np.int64]:
     first = np.stack([a, c, np.where(falling, d, b)], axis=1)
     second = np.stack([b, np.where(falling, a, c), d], axis=1)
     faces = np.concatenate([first, second]).astype(np.int64)
-    corner = points.reshape(-1, 3)[faces]
-    doubled = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    doubled = cross(points.reshape(-1, 3)[faces])
     solid: NDArray[np.int64] = faces[np.linalg.norm(doubled, axis=1) > 1e-10]
     return solid
 
@@ -140,7 +145,7 @@ class Surface:
 
     def per_patch(self, values: NDArray[Real]) -> list[NDArray[Real]]:
         """Values (V, K) of all vertices as grids (R, C, K), one for each patch."""
-        sizes = [len(grid.rows) * len(grid.columns) for grid in self.grids]
+        sizes = [grid.n_points for grid in self.grids]
         pieces = np.split(values, np.cumsum(sizes)[:-1])
         return [
             piece.reshape(*grid.shape, -1) for piece, grid in zip(pieces, self.grids, strict=True)
@@ -150,7 +155,7 @@ class Surface:
 def surface_of(rng: np.random.Generator, patches: Sequence[Patch], cell_m: float) -> Surface:
     """All patches, refined to cells of about ``cell_m``."""
     grids = tuple(refined(patch, cell_m) for patch in patches)
-    sizes = [len(grid.rows) * len(grid.columns) for grid in grids]
+    sizes = [grid.n_points for grid in grids]
     first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     faces = [grid_faces(rng, g.points_m) + i for g, i in zip(grids, first, strict=True)]
     edges = [_grid_edges(grid.shape) + i for grid, i in zip(grids, first, strict=True)]

@@ -1,4 +1,4 @@
-"""Painters of building materials: plaster, wood, masonry, terrazzo, fabric, marble."""
+"""Painters of building materials: plaster, wood, masonry, fabric, marble."""
 
 from __future__ import annotations
 
@@ -95,16 +95,6 @@ def masonry(
     edge_x = np.abs((shifted + 0.5) % 1 - 0.5) * block_m[0]
     edge_y = np.abs((y / block_m[1] + 0.5) % 1 - 0.5) * block_m[1]
     image[np.minimum(edge_x, edge_y) < joint_m / 2] = np.asarray(joint, np.float32)
-    return image
-
-
-def terrazzo(
-    canvas: Canvas, colour: Colour, chips: tuple[Colour, ...], density: float = 1.6
-) -> Pixels:
-    """A speckled floor: every chip colour lies where its own noise exceeds ``density``."""
-    image = plaster(canvas, colour, 0.06, 0.03)
-    for chip in chips:
-        image[canvas.noise(0.035, 2, 0.5) > density] = np.asarray(chip, np.float32)
     return image
 
 

@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 from scipy.sparse import coo_array, csr_array
+from trimesh.triangles import cross
 
 from synfeal.mesh.rays import RayCaster
+from synfeal.mesh.triangles import weld
 from synfeal.scenes.grids import Surface
 from synfeal.scenes.patches import Points
 
 Faces = NDArray[np.int64]
 
-WELD_M = 1e-5
 ROUNDING = 0.35  # share of the way to the mean of its neighbours that every vertex goes
 WAVES = ((0.7, 0.006), (0.15, 0.0012))  # wavelength and deviation of the displacement, metres
 LIFT_M = 0.01  # rays start this far in front of their surface
@@ -59,13 +60,6 @@ def scanned(rng: np.random.Generator, surface: Surface, scanner: Scanner) -> Poi
     return np.asarray(fitted[index], np.float64)
 
 
-def weld(points_m: Points) -> tuple[Points, NDArray[np.int64]]:
-    """Distinct places (W, 3) of points (V, 3), and the place (V,) of each point."""
-    keys = np.round(points_m / WELD_M).astype(np.int64)
-    _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    return points_m[first], index.reshape(-1)
-
-
 def rounded(points: Points, edges: Faces, faces: Faces) -> Points:
     """Every vertex a step towards the mean of its neighbours along ``edges`` (E, 2).
 
@@ -106,7 +100,7 @@ def seen_faces(points_m: Points, faces: Faces, stations_m: Points) -> NDArray[np
     """Which faces (F,) a station sees, from either side, or touch one that is seen."""
     caster = RayCaster(points_m, faces)
     corners = points_m[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = cross(corners)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     middles = corners.mean(axis=1)
     seen = np.zeros(len(faces), bool)

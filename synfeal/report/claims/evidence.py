@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from synfeal.bootstrap import Array, Counts, mean_of, medians, path_counts
 from synfeal.config import MODELS, Experiment
 from synfeal.dataset.number_table import read_numbers
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
 from synfeal.report.cells import FROM_SCRATCH, pretrained
-from synfeal.report.claims.bootstrap import Array, Counts, mean_of, medians, path_counts
 from synfeal.report.claims.model import Missing
 from synfeal.report.stats import MEASURES
 from synfeal.seeds import generator_of

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from synfeal.bootstrap import Array, difference, limits, relative_change
 from synfeal.config import MODELS
 from synfeal.report.assistance import PUBLISHED_ASSISTED, assistance_record
-from synfeal.report.claims.bootstrap import Array, difference, limits, relative_change
 from synfeal.report.claims.evidence import Cell, Errors, Evidence
 from synfeal.report.claims.model import FAILS, HOLDS, UNDECIDED, Claim, Outcome, Verdict
 from synfeal.report.claims.text import (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from statistics import fmean
 
+from synfeal.bootstrap import Array, difference, mean_of, relative_change
 from synfeal.config import MODELS
-from synfeal.report.claims.bootstrap import Array, difference, mean_of, relative_change
 from synfeal.report.claims.evidence import Cell, Errors, Evidence
 from synfeal.report.claims.model import Claim, Outcome
 from synfeal.report.claims.text import (

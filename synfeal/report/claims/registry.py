@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from synfeal.bootstrap import FEWEST_PATHS
 from synfeal.report.claims import label_sources, noise, scratch, simulator, size
 from synfeal.report.claims.evidence import Evidence
 from synfeal.report.claims.model import (
@@ -15,9 +16,6 @@ from synfeal.report.claims.model import (
     Missing,
     Outcome,
 )
-
-# With fewer, limits miss the truth more often than they say, at corrected levels many times so.
-FEWEST_PATHS = 10
 
 JUDGES: Mapping[str, Callable[[Claim, Evidence], Outcome]] = {
     "C1": label_sources.lowest_of_all,

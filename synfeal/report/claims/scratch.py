@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from synfeal.bootstrap import limits, relative_change
 from synfeal.config import MODELS
-from synfeal.report.claims.bootstrap import limits, relative_change
 from synfeal.report.claims.evidence import Cell, Errors, Evidence
 from synfeal.report.claims.label_sources import changes
 from synfeal.report.claims.model import Claim, Missing, Outcome

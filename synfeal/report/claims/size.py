@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from synfeal.bootstrap import mean_of, relative_change
 from synfeal.config import MODELS
-from synfeal.report.claims.bootstrap import mean_of, relative_change
 from synfeal.report.claims.evidence import Cell, Errors, Evidence
 from synfeal.report.claims.model import Claim, Outcome
 from synfeal.report.claims.text import ERRORS, PERCENT, limits_text, reached_text, values_text

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from synfeal.report.claims.bootstrap import Array, limits
+from synfeal.bootstrap import Array, limits
 from synfeal.report.claims.model import FAILS, HOLDS, Claim, Verdict
 
 PERCENT = ("p {:+.1f} %", "o {:+.1f} %")

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from synfeal.report.claims.bootstrap import Array, limits
+from synfeal.bootstrap import Array, limits
 from synfeal.report.claims.model import FAILS, HOLDS, UNDECIDED, Verdict
 
 MARGIN = 0.2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from synfeal.errors import InputError
+from synfeal.dataset.directories import refuse_foreign
 from synfeal.files import atomic_path
 from synfeal.report.compare.figure import comparison_figure
 from synfeal.report.compare.page import markdown_of, text_of
@@ -35,27 +35,11 @@ def compare(root_a: Path, root_b: Path, out: Path | None) -> str:
         InputError: the trees cannot be compared, or ``out`` holds other files.
     """
     if out is not None:
-        refuse_foreign(out)
+        refuse_foreign(out, OUTPUTS, "a comparison")
     comparison = compare_trees(root_a, root_b)
     if out is not None:
         write_comparison(comparison, out)
     return text_of(comparison)
-
-
-def refuse_foreign(out: Path) -> None:
-    """Refuse a directory with anything but what an earlier comparison wrote.
-
-    Raises:
-        InputError: ``out`` is a file or holds other files.
-    """
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: is a file; choose another directory with --out")
-    others = sorted(path.name for path in out.glob("*") if path.name not in OUTPUTS)
-    if others:
-        raise InputError(
-            f"{out}: holds '{others[0]}', which is not from a comparison; choose another directory"
-            " with --out"
-        )
 
 
 def write_comparison(comparison: Comparison, out: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.report.claims.bootstrap import CONFIDENCE, mean_of, medians, path_counts
+from synfeal.bootstrap import CONFIDENCE, mean_of, medians, path_counts
 from synfeal.report.compare.runs import RunErrors
 from synfeal.report.stats import MEASURES
 from synfeal.seeds import generator_of

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import fmean
 
-from synfeal.report.claims.bootstrap import CONFIDENCE
-from synfeal.report.compare.trees import FEWEST_PATHS, Comparison, RunComparison
+from synfeal.bootstrap import CONFIDENCE, FEWEST_PATHS
+from synfeal.report.compare.trees import Comparison, RunComparison
 from synfeal.report.stats import MEASURES, sign_test
 
 GROUPINGS = ("scene", "labels", "model")

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from synfeal.bootstrap import FEWEST_PATHS
 from synfeal.errors import InputError
 from synfeal.report.compare.frames import FrameComparer, Sameness
 from synfeal.report.compare.runs import RunErrors, RunKey, find_runs, read_run
@@ -17,8 +18,6 @@ from synfeal.report.results import read_result
 
 PROVENANCE = "provenance.json"
 OUTCOMES = ("files", "stages", "time_utc")  # differ between any two runs; no reason for anything
-# As for the claims: a bootstrap over fewer paths gives limits that are too narrow.
-FEWEST_PATHS = 10
 
 
 @dataclass(frozen=True)

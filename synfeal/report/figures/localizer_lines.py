@@ -15,7 +15,6 @@ from synfeal.report.layouts import TITLES
 
 # Localizers stand side by side so that their limits can be told apart; in widths of a place.
 ASIDE = dict(zip(MODELS, np.linspace(-0.16, 0.16, len(MODELS)), strict=True))
-PAPER_MEASURES = ("position_m", "orientation_deg")
 
 
 def draw_localizers(axes: Axes, rows: Sequence[Row], measure: str, published: bool) -> None:

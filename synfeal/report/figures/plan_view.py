@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from trimesh.intersections import slice_faces_plane
+from trimesh.triangles import area
 
 from synfeal.mesh.triangles import Triangles, load_collision_mesh
 from synfeal.report.figures.sources import Array, Results
@@ -55,11 +56,9 @@ def plan_of(mesh: Triangles, top_m: float) -> Plan:
 
 def floor_m(corners_m: Array) -> float:
     """Height of the floor under triangles (N, 3, 3): 2 % of their area lies below it."""
-    sides = corners_m[:, 1:] - corners_m[:, :1]
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     height = corners_m[:, :, 2].mean(axis=1)
     order = np.argsort(height)
-    covered = np.cumsum(area[order])
+    covered = np.cumsum(area(corners_m)[order])
     return float(height[order][np.searchsorted(covered, FLOOR_SHARE * covered[-1])])
 
 
