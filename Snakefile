@@ -35,9 +35,11 @@ rule all:
         f"{ROOT}/claims.csv",
         f"{ROOT}/report.tex",
         f"{ROOT}/tables/assistance.csv",
+        f"{ROOT}/tables/label_error.csv",
         f"{ROOT}/tables/speed_vs_error.csv",
+        f"{ROOT}/tables/hard_cases.csv",
         f"{ROOT}/figures",
-        all_manifests(),
+        manifests("groundtruth"),
 
 
 rule scenes:
@@ -47,12 +49,17 @@ rule scenes:
 
 rule datasets:
     input:
-        all_manifests(),
+        manifests("network"),
+        manifests("groundtruth"),
 
 
 rule labels:
     input:
         all_labels(),
+        f"{ROOT}/tables/assistance.csv",
+        f"{ROOT}/tables/label_error.csv",
+        f"{ROOT}/tables/speed_vs_error.csv",
+        label_figures(),
 
 
 rule runs:

@@ -61,7 +61,7 @@ def _medians(ranked: Array, frame_counts: Counts) -> Array:
     total = reached[:, -1:]
     below = (reached > (total - 1) // 2).argmax(axis=1)
     above = (reached > total // 2).argmax(axis=1)
-    middle: Array = (ranked[below] + ranked[above]) / 2
+    middle: Array = ranked[below] / 2 + ranked[above] / 2  # their sum may be too large
     return middle
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 
+LONGEST = 900  # characters of a message
+
 
 class InputError(Exception):
     """Something a person gave us cannot be used.
@@ -15,7 +17,10 @@ class InputError(Exception):
     """
 
     def __init__(self, message: str) -> None:
-        super().__init__(" ".join(message.split()))
+        line = "".join(c if c.isprintable() else "?" for c in " ".join(message.split()))
+        if len(line) > LONGEST:  # what a file holds is quoted in part; the remedy stands at the end
+            line = f"{line[: LONGEST - 200]} ... {line[-190:]}"
+        super().__init__(line)
 
 
 def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
@@ -23,14 +28,15 @@ def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
 
     Args:
         action: what a command does.
-        if_interrupted: what Ctrl-C leaves behind, for the message of exit status 130.
+        if_interrupted: what Ctrl-C leaves behind, for the message of exit status 130, unless the
+            ``KeyboardInterrupt`` says it itself.
     """
     try:
         action()
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        print(f"error: interrupted; {if_interrupted}", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        print(f"error: interrupted; {str(interrupt) or if_interrupted}", file=sys.stderr)
         return 130
     return 0

@@ -4,18 +4,17 @@ import json
 
 import numpy as np
 import trimesh
-from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from synfeal.config import MODELS
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.geometry.poses import pose_matrix
 from synfeal.mesh.triangles import Triangles, save_collision_mesh
-from tests.report_results import TABLE4, experiment
+from tests.report_results import TABLE4, batch_record, experiment
 
 METHODS = ("sfm", "rgbd-toro")
 N_FRAMES = {("6k", "train"): 9, ("6k", "test"): 5, ("20k", "train"): 12, ("20k", "test"): 6}
-SEQUENCES = (("seq-01", "train", 12), ("seq-02", "test", 4), ("seq-03", "test", 2))
+N_TEST_FRAMES = 6
 BATCHES = {"train": ((0, 5), (4, 9)), "test": ((0, 5),)}
 LOOKS_ALONG_X = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
@@ -59,7 +58,7 @@ def room():
 
 
 def pixels(number):
-    return np.full((6, 8, 3), 20 * number, np.uint8)
+    return np.full((8, 8, 3), 20 * number, np.uint8)
 
 
 def fill_figures(root):
@@ -70,7 +69,7 @@ def fill_figures(root):
     for k, method in enumerate(METHODS, start=1):
         _fill_method(root / "labels" / "large_room" / "6k" / method, k)
     save_collision_mesh(root / "scenes" / "large_room" / "collision.ply", room())
-    _fill_frames(root / "datasets" / "large_room" / "network")
+    _fill_frames(root / "frames" / "large_room")
     for model in MODELS:
         folder = root / f"runs/large_room/20k/synfeal/pretrained/{model}/seed0"
         folder.mkdir(parents=True, exist_ok=True)
@@ -88,21 +87,11 @@ def _fill_method(folder, k):
         count = batches[-1][1]
         write_pose_table(folder / f"{split}.csv", table_of(wrong_poses(count, 0.01 * k, k)))
         splits[split] = {
-            "records": [
-                {"start": a, "stop": b, "assisted": (a, b) == batches[-1], "lost": False}
-                for a, b in batches
-            ]
+            "records": [batch_record(0, (a, b) == batches[-1], start=a, stop=b) for a, b in batches]
         }
     (folder / "assistance.json").write_text(json.dumps({"method": "", "splits": splits}))
 
 
 def _fill_frames(folder):
-    listed = [{"name": n, "split": s, "frames": count} for n, s, count in SEQUENCES]
     folder.mkdir(parents=True)
-    (folder / "manifest.json").write_text(json.dumps({"sequences": listed}))
-    number = 0
-    for name, split, count in SEQUENCES:
-        (folder / name).mkdir()
-        for index in range(count if split == "test" else 0):
-            Image.fromarray(pixels(number)).save(folder / name / f"frame-{index:06d}.color.png")
-            number += 1
+    np.save(folder / "test.npy", np.stack([pixels(number) for number in range(N_TEST_FRAMES)]))

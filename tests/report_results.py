@@ -1,7 +1,6 @@
 """A small results tree with known numbers, for the tests of the report."""
 
 import csv
-import json
 from pathlib import Path
 
 from synfeal.config import MODELS, Experiment, load_config, read_experiments
@@ -13,7 +12,7 @@ CONFIG = Path(__file__).parent.parent / "config"
 TABLE4 = "table4_size"
 SIZES = ("6k", "20k", "40k", "80k")
 ROWS = {
-    "table2_ground_truth": 20,
+    "table2_ground_truth": 25,
     "table3_inconsistencies": 60,
     "table4_size": 40,
     "table5_from_scratch": 20,
@@ -89,22 +88,33 @@ def fill_scenes(root):
         write_json(root / "scenes" / scene / "properties.json", values)
 
 
-def fill_assistance(root, size="6k"):
-    def split(batches, assisted):
-        return {
-            "batches": batches,
-            "assisted": assisted,
-            "lost": 1,
-            "filled_frames": 3,
-            "label_error": {"median_m": 0.25, "max_m": 1.0, "median_deg": 2.5, "max_deg": 9.0},
-            "records": [{"registered": 20, "filled": 3}, {"registered": 25, "filled": 0}],
-        }
+def batch_record(index, assisted=False, **values):
+    """A batch of 25 frames more; its last pose was 30 cm and 4 degrees off when assisted."""
+    off = {"m": 0.3, "deg": 4.0} if assisted else {"m": 0.1, "deg": 1.0}
+    return {
+        **{"index": index, "start": 25 * index, "stop": 25 * index + 26, "assisted": assisted},
+        **{"registered": 26, "filled": 0, "lost": False},
+        **{f"error_before_{unit}": value for unit, value in off.items()},
+        **{f"error_after_{unit}": 0.0 if assisted else value for unit, value in off.items()},
+        **values,
+    }
 
-    for method in ("sfm", "rgbd-toro", "rgbd-g2o"):
-        value = {"method": method, "splits": {"train": split(12, 4), "test": split(5, 2)}}
-        path = root / "labels" / "large_room" / size / method / "assistance.json"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(value))
+
+METHODS_RUN = ("sfm", "rgbd-toro", "rgbd-g2o", "kinect-fusion")
+
+
+def fill_assistance(root, assisted=None, size="6k", batches=(12, 5)):
+    """Records of the paper's methods; by method, how many batches were assisted, from the first.
+
+    The first batch of the training split registered six frames fewer, which were filled.
+    """
+    for method, count in (assisted or dict.fromkeys(METHODS_RUN, 6)).items():
+        flags = [k < count for k in range(sum(batches))]
+        splits = {"train": flags[: batches[0]], "test": flags[batches[0] :]}
+        records = {s: [batch_record(k, f) for k, f in enumerate(fs)] for s, fs in splits.items()}
+        records["train"][0] |= {"registered": 20, "filled": 6}
+        value = {"method": method, "splits": {s: {"records": r} for s, r in records.items()}}
+        write_json(root / "labels" / "large_room" / size / method / "assistance.json", value)
 
 
 def shipped_design():

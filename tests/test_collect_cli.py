@@ -11,7 +11,6 @@ import trimesh
 from PIL import Image
 
 from synfeal.cli import main
-from synfeal.dataset import collect as collect_module
 from synfeal.dataset.manifest import verify_manifest
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.sevenscenes import frame_paths, read_pose
@@ -50,6 +49,7 @@ def test_collect_makes_a_complete_data_set(mesh: Path, tmp_path: Path) -> None:
     assert names == [
         "TestSplit.txt",
         "TrainSplit.txt",
+        "coverage.json",
         "manifest.json",
         "preview.png",
         "seq-01",
@@ -133,14 +133,3 @@ def test_wrong_usage_exits_with_2(options: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(options)
     assert caught.value.code == 2
-
-
-def test_interruption_leaves_nothing(
-    mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(collect_module, "write_splits", interrupt)
-    assert main(arguments(mesh, tmp_path / "set", "--frames", "2")) == 130
-    assert list(tmp_path.iterdir()) == []

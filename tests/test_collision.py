@@ -36,7 +36,8 @@ from synfeal.mesh.triangles import (
 from synfeal.planning.questions import Questions, draw_questions
 from synfeal.planning.target import admissible, has_free_view
 from synfeal.report.figures import Results, write_figures
-from synfeal.report.speed_vs_error import write_speed_vs_error
+from synfeal.report.speed_vs_error import COLUMNS, collision_rows, write_speed_vs_error
+from synfeal.report.tables import write_rows
 from tests.report_results import read
 
 SCENE = SceneConfig.model_validate({"source": "mesh", "path": "scene.glb"})
@@ -235,8 +236,9 @@ def test_the_table_rids_speeds_of_what_else_the_machine_did(tmp_path: Path) -> N
     # The second pair was measured while the machine did half its work elsewhere.
     curve = curve_of((4000, 1.0, 100, 100, 0), (800, 0.998, 75, 50, 1), (100, 0.9, 200, 100, 0))
     write_curve(tmp_path / "scenes" / "large_room" / "collision_curve.csv", curve)
-    write_speed_vs_error(["large_room"], tmp_path, tmp_path / "tables" / "speed_vs_error.csv")
-    rows = read(tmp_path / "tables" / "speed_vs_error.csv")
+    table = tmp_path / "tables" / "speed_vs_error.csv"
+    write_rows(table, COLUMNS, collision_rows(tmp_path, "large_room"))
+    rows = read(table)
     assert [row["variant"] for row in rows] == ["full", "decimated", "decimated"]
     assert [float(row["items_per_s"]) for row in rows] == [100.0, 150.0, 200.0]
     assert [float(row["seconds_per_item"]) for row in rows] == pytest.approx(

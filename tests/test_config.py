@@ -178,7 +178,7 @@ def test_the_design_is_the_papers(name):
     experiments = read_experiments(config)
     rows = Counter(row.table for row in experiments)
     assert rows == {
-        "table2_ground_truth": 4,
+        "table2_ground_truth": 4 + 1,  # and KinectFusion, of which the paper only writes
         "table3_inconsistencies": 12,
         "table4_size": 8,
         "table5_from_scratch": 4,
@@ -214,7 +214,6 @@ BAD_ROWS = [
     ("table4_size,,kitchen,6k,synfeal,0,0,pretrained", ["scene 'kitchen'", "large_room"]),
     ("table4_size,,large_room,95k,synfeal,0,0,pretrained", ["size '95k'", "'80k'"]),
     ("table9,,large_room,6k,synfeal,0,0,pretrained", ["table", "table2_ground_truth"]),
-    ("table4_size,,large_room,6k,orb,0,0,pretrained", ["labels", "'rgbd-toro'", "'orb'"]),
     ("table4_size,,large_room,6k,synfeal,0,0,imagenet", ["init", "'scratch'"]),
     ("table4_size,,large_room,6k,synfeal,0.1,0,pretrained", ["labels", "`noise`"]),
     ("table4_size,,large_room,6k,noise,0,0,pretrained", ["labels", "above 0"]),
@@ -300,7 +299,7 @@ def test_the_documentation_has_every_key_with_a_meaning():
     for key in (
         "`scale` | number, above 0, at most 1 | required",
         "`scenes.<name>.sampling_box.x` | list of 2: number | required",
-        "`groundtruth.posegraph.toro_iterations` | integer, at least 1 | `100`",
+        "`groundtruth.posegraph.toro_iterations` | integer, at least 1, at most 1e+09 | `100`",
         "`localizers.<name>.beta`",
         "`noise_deg` | number, at least 0",
     ):

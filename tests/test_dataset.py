@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -14,22 +15,24 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from PIL import Image
 
-from synfeal.config.models import CameraConfig, SceneConfig
+from synfeal.config.models import CameraConfig, RenderConfig, SceneConfig
 from synfeal.dataset.contact_sheet import write_contact_sheet
 from synfeal.dataset.directories import atomic_directory
+from synfeal.dataset.frame_writer import MOST_WAITING
 from synfeal.dataset.manifest import verify_manifest, write_manifest
-from synfeal.dataset.packed import fit_frame, pack_frames
-from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.packed import fit_frame, join_packed, pack_frames
+from synfeal.dataset.packed_record import write_packed_record
+from synfeal.dataset.png import encode_png
+from synfeal.dataset.pose_table import PoseTable, write_pose_table
+from synfeal.dataset.render_sequence import render_packed, render_sequence, write_sequence
 from synfeal.dataset.sequences import sequences_of
 from synfeal.dataset.sevenscenes import (
+    depth_mm_of,
     frame_paths,
+    pose_text,
     read_depth_m,
     read_pose,
     read_split,
-    render_sequence,
-    write_depth,
-    write_pose,
-    write_sequence,
     write_splits,
 )
 from synfeal.errors import InputError
@@ -39,6 +42,7 @@ from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import load_collision_mesh
+from synfeal.render.choose import BACKENDS
 from synfeal.scenes.prepare import prepare_scene
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
@@ -113,7 +117,7 @@ def test_split_files_are_those_of_7_scenes(tmp_path: Path) -> None:
 
 def test_depth_is_16_bit_millimetres(tmp_path: Path) -> None:
     depth = np.array([[0.5, 1.2344, np.inf], [65.534, 65.536, 100.0]], np.float32)
-    write_depth(tmp_path / "depth.png", depth)
+    (tmp_path / "depth.png").write_bytes(encode_png(depth_mm_of(depth)))
     stored = np.asarray(Image.open(tmp_path / "depth.png"))
     assert stored.tolist() == [[500, 1234, 65535], [65534, 65535, 65535]]
     back = read_depth_m(tmp_path / "depth.png")
@@ -129,7 +133,7 @@ def test_colour_image_is_no_depth(tmp_path: Path) -> None:
 
 def test_pose_file_is_four_rows_and_exact(tmp_path: Path) -> None:
     pose = poses_of(1).world_from_cam[0]
-    write_pose(tmp_path / "pose.txt", pose)
+    (tmp_path / "pose.txt").write_text(pose_text(pose))
     rows = (tmp_path / "pose.txt").read_text().splitlines()
     assert [len(row.split()) for row in rows] == [4, 4, 4, 4]
     np.testing.assert_allclose(read_pose(tmp_path / "pose.txt"), pose, atol=1e-10)
@@ -166,6 +170,29 @@ def test_rendered_sequence_holds_what_the_poses_see(tmp_path: Path) -> None:
 def test_without_depth_none_is_written(tmp_path: Path) -> None:
     write_sequence(FakeRenderer(), poses_of(2), tmp_path / "seq-01", False)  # type: ignore[arg-type]
     assert not list((tmp_path / "seq-01").glob("*.depth.png"))
+
+
+class Remembering:
+    """Counts frames that were handed over and not yet written, as ``write_sequence`` sees them."""
+
+    def __init__(self) -> None:
+        self.shown: list[weakref.ref[NDArray[np.uint8]]] = []
+        self.most = 0
+
+    def render(self, world_from_cam: NDArray[np.float64]) -> NDArray[np.uint8]:
+        rgb = np.full((240, 320, 3), len(self.shown) % 256, np.uint8)
+        self.shown.append(weakref.ref(rgb))
+        self.most = max(self.most, sum(shown() is not None for shown in self.shown))
+        return rgb
+
+
+def test_only_some_frames_wait_to_be_written(tmp_path: Path) -> None:
+    renderer = Remembering()
+    write_sequence(renderer, poses_of(300), tmp_path / "seq-01", False)  # type: ignore[arg-type]
+    assert renderer.most <= MOST_WAITING + 2
+    for index in (0, 100, 299):
+        with Image.open(tmp_path / "seq-01" / f"frame-{index:06d}.color.png") as frame:
+            assert frame.getpixel((160, 120)) == (index % 256,) * 3
 
 
 def test_an_interrupted_sequence_leaves_nothing(tmp_path: Path) -> None:
@@ -227,6 +254,63 @@ def test_a_broken_frame_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"frame-000001\.color\.png"):
         pack_frames([tmp_path / "seq-01"], 16, tmp_path / "train.npy")
     assert not (tmp_path / "train.npy").exists()
+
+
+@pytest.mark.parametrize("damage", [b"", b"no array", b"\x93NUMPY"])
+def test_packed_frames_that_are_none_are_named(tmp_path: Path, damage: bytes) -> None:
+    (tmp_path / "seq-01.npy").write_bytes(damage)
+    with pytest.raises(InputError, match=r"seq-01\.npy"):
+        join_packed([tmp_path / "seq-01.npy"], tmp_path / "train.npy")
+    assert not (tmp_path / "train.npy").exists()
+
+
+def test_frames_rendered_into_an_array_are_those_of_the_files(tmp_path: Path) -> None:
+    save_glb(tmp_path / "mesh.glb", room_mesh())
+    plan, bounds = poses_of(5), ((0, 3), (3, 5))
+    shards = [tmp_path / f"seq-{number:02d}.npy" for number in (1, 2)]
+    for (start, stop), shard in zip(bounds, shards, strict=True):
+        poses = plan.between(start, stop)
+        render_packed(tmp_path / "mesh.glb", CAMERA, poses, 24, shard)
+        render_sequence(tmp_path / "mesh.glb", CAMERA, poses, shard.with_suffix(""), False)
+    join_packed(shards, tmp_path / "train.npy")
+    pack_frames([shard.with_suffix("") for shard in shards], 24, tmp_path / "files.npy")
+    assert (tmp_path / "train.npy").read_bytes() == (tmp_path / "files.npy").read_bytes()
+    write_pose_table(tmp_path / "plan.csv", plan)
+    records = [shard.with_suffix(".json") for shard in shards]
+    write_packed_record(
+        tmp_path / "train.npy", records, tmp_path / "plan.csv", CAMERA, RenderConfig()
+    )
+    record = json.loads((tmp_path / "train.json").read_text())
+    assert (record["frames"], record["input_px"]) == (5, 24)
+    assert [(s["name"], s["frames"]) for s in record["shards"]] == [("seq-01", 3), ("seq-02", 2)]
+    assert {s["backend"] for s in record["shards"]} <= set(BACKENDS)
+    for name, file in (("sha256", "train.npy"), ("plan_sha256", "plan.csv")):
+        assert record[name] == hashlib.sha256((tmp_path / file).read_bytes()).hexdigest()
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 3), (7, 5, 3), (30, 40, 3), (1, 1), (7, 5), (30, 40)])
+@pytest.mark.parametrize("kind", ["noise", "flat"])
+def test_png_files_hold_the_pixels(tmp_path: Path, shape: tuple[int, ...], kind: str) -> None:
+    dtype = np.uint8 if len(shape) == 3 else np.uint16
+    most = np.iinfo(dtype).max
+    pixels = np.random.default_rng(0).integers(0, most + 1, shape).astype(dtype)
+    if kind == "flat":
+        pixels[:] = most
+    path = tmp_path / "frame.png"
+    path.write_bytes(encode_png(pixels))
+    with Image.open(path) as image:
+        assert image.mode == ("RGB" if len(shape) == 3 else "I;16")
+        np.testing.assert_array_equal(np.asarray(image), pixels)
+    again = np.ascontiguousarray(pixels[::-1])[::-1]  # any memory layout will do
+    assert encode_png(again) == path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    "pixels", [np.zeros((4, 4), np.uint8), np.zeros((4, 4, 4), np.uint8), np.zeros((4, 4, 3))]
+)
+def test_other_pixels_are_no_frames(pixels: NDArray[np.uint8]) -> None:
+    with pytest.raises(ValueError, match="cannot encode"):
+        encode_png(pixels)
 
 
 def test_manifest_finds_a_changed_pixel(tmp_path: Path) -> None:

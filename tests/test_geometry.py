@@ -211,5 +211,10 @@ def test_umeyama_refuses_what_leaves_the_rotation_free():
     line = np.outer(np.arange(5.0), [1, 2, 3])
     with pytest.raises(ValueError, match="collinear"):
         umeyama_sim3(line, line)
+    far_line = np.linspace(0, 0.1, 20)[:, None] * [0.3, -0.5, 0.81] + [1e6, -7e5, 3e5]
+    with pytest.raises(ValueError, match="collinear"):  # up to rounding
+        umeyama_sim3(far_line, far_line)
+    with pytest.raises(ValueError, match="collinear"):
+        umeyama_sim3(np.random.default_rng(0).normal(size=line.shape), line)
     with pytest.raises(ValueError, match="N >= 3"):
         umeyama_sim3(np.eye(3)[:2], np.eye(3)[:2])

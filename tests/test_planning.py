@@ -18,7 +18,7 @@ from synfeal.planning.path import n_frames_of, path_poses, path_vectors, poses_o
 from synfeal.planning.plan import plan_split, sampling_box_of
 from synfeal.planning.sampling import pose_bounds, sample_poses, view_directions
 from synfeal.planning.start import sample_start
-from synfeal.planning.target import admissible, has_free_view, select_target
+from synfeal.planning.target import admissible, farthest_admissible, has_free_view
 
 ROOM = np.array([[-3.0, -2.0, 0.0], [3.0, 2.0, 2.5]])
 
@@ -91,14 +91,17 @@ def test_admissible_is_reachable_and_free() -> None:
     assert found.tolist() == [False, True, False]
 
 
-def test_target_is_the_farthest_admissible_candidate() -> None:
-    start = np.zeros(6)
-    poses = np.stack([vector(x, 0, 0, 0, 0, 0) for x in (1.0, 3.0, 2.0)])
-    target = select_target(start, poses, np.array([True, False, True]), 0.0)
-    assert target is not None
-    assert target[0] == 2.0
-    assert select_target(start, poses, np.array([True, False, True]), 2.1) is None
-    assert select_target(start, poses, np.zeros(3, np.bool_), 0.0) is None
+def test_target_is_the_farthest_admissible_candidate_of_the_first_round_with_one() -> None:
+    caster, start = caster_of(room()), vector(-2, 0, 1, 0, 0, 0)
+    rounds = np.stack([vector(x, 0, 1, 0, 0, 0) for x in (-1.5, 2, 0, 1, -1, 2.5)]).reshape(3, 2, 6)
+    rounds[0, 1, 1] = 9.0  # outside
+    has_view = np.ones((3, 2), np.bool_)
+    assert farthest_admissible(caster, start, rounds, has_view, 0.0) == (0, 0)
+    assert farthest_admissible(caster, start, rounds, has_view, 1.0) == (1, 1)
+    has_view[1, 1] = False
+    assert farthest_admissible(caster, start, rounds, has_view, 1.0) == (1, 0)
+    assert farthest_admissible(caster, start, rounds, has_view, 9.0) is None
+    assert farthest_admissible(caster, start, rounds, ~has_view & False, 0.0) is None
 
 
 @pytest.mark.parametrize(("length", "n"), [(0.0, 1), (0.01, 1), (0.29, 3), (0.31, 3), (1.0, 10)])

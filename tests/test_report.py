@@ -41,7 +41,9 @@ def design():
 def test_a_complete_table_has_all_rows_and_no_empty_cell(results, table, count):
     rows = read(results / "tables" / f"{table}.csv")
     assert len(rows) == count
-    assert [k for row in rows for k, value in row.items() if value == ""] == []
+    empty = {(row["labels"], k) for row in rows for k in row if row[k] == ""}
+    assert {labels for labels, _ in empty} <= {"kinect-fusion"}  # a row the paper has not
+    assert all(column.startswith("published_") for _, column in empty)
 
 
 @pytest.mark.parametrize(

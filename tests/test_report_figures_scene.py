@@ -25,6 +25,8 @@ from synfeal.report.figures.label_sets import read_labelled_set
 from synfeal.report.figures.plan_view import floor_m, plan_of
 from synfeal.report.figures.style import METHOD_STYLES, RC
 from synfeal.report.layouts import SOURCES
+from synfeal.report.speed_vs_error import COLUMNS as SPEED_COLUMNS
+from synfeal.report.tables import write_rows
 from tests.figure_results import (
     LOOKS_ALONG_X,
     METHODS,
@@ -39,7 +41,15 @@ from tests.figure_results import (
 )
 from tests.report_results import TABLE4, fill, make
 
-SPEED_HEADER = "stage,scene,variant,faces,items_per_s,error,chosen\n"
+SPEED_KEYS = ("stage", "scene", "variant", "faces", "items_per_s", "error", "chosen")
+SPEEDS = (
+    ("collision", "large_room", "full", 90, 10, 0, 0),
+    ("collision", "large_room", "decimated", 9, 20, 0.1, 1),
+    ("labels", "large_room", "SfM", None, 2, 0.02, 0),
+    ("labels", "large_room", "KinectFusion", None, 9, 0.1, 0),
+    ("render", "large_room", "64x48, opengl 2x2", 90, 100, 1.5, 1),
+)
+RENDERED = {"seconds_per_item": 0.01, "backend": "opengl", "supersampling": 2, "texture_scale": 1.0}
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +57,9 @@ def results(tmp_path_factory):
     root = fill_figures(tmp_path_factory.mktemp("results") / "toy")
     fill(root, design())
     make(TABLE4, [row for row in design() if row.table == TABLE4], root)
-    lines = "collision,large_room,full,90,10,0,0\ncollision,large_room,decimated,9,20,0.1,1\n"
-    (root / "tables" / "speed_vs_error.csv").write_text(SPEED_HEADER + lines)
+    speeds = [dict(zip(SPEED_KEYS, row, strict=True)) for row in SPEEDS]
+    speeds[-1] |= RENDERED | {"width": 64, "height": 48}
+    write_rows(root / "tables" / "speed_vs_error.csv", SPEED_COLUMNS, speeds)
     return Results(root, design(), 1)
 
 
@@ -95,9 +106,18 @@ def test_trajectories_draw_both_paths_and_ring_what_was_assisted(results):
         lines = {line.get_label(): line.get_xydata() for line in panels[0, column].lines}
         labels = wrong_poses(9, 0.01 * k, k)[:, :2, 3]
         np.testing.assert_allclose(lines["true path"], true_poses(9)[:, :2, 3])
-        np.testing.assert_allclose(lines[SOURCES[METHODS[column]]], labels)
+        np.testing.assert_allclose(lines["estimated path"], labels)
+        np.testing.assert_allclose(lines["first frame of a batch"], labels[[0, 4]])
+        assert (
+            panels[0, column].get_title() == f"{SOURCES[METHODS[column]]}\n1 of 2 batches assisted"
+        )
         np.testing.assert_allclose(lines["assisted: replaced by the true pose"], labels[[8]])
-    assert "9 training, 5 test frames" in panels[0, 0].figure.get_suptitle()
+        (wide,) = (c for c in panels[0, column].collections if c.get_label() == "assisted batch")
+        np.testing.assert_allclose(wide.get_segments()[0], labels[4:])
+    assert [part.get_suptitle() for part in panels[0, 0].figure.figure.subfigs] == [
+        "train: 9 frames",
+        "test: 5 frames",
+    ]
 
 
 def test_a_design_without_such_labels_has_no_label_set(results):
@@ -212,7 +232,8 @@ def test_captions_are_single_sentences_in_reading_order():
 def test_every_drawing_is_a_figure_or_left_out(results):
     nothing = Results(results.root, (), 1)
     drawn = {name for name, entry in FIGURES.items() if entry.draw(nothing) is not None}
-    assert drawn == {"speed_vs_error_collision"}
+    stages = ("collision", "labels", "render")
+    assert drawn == {f"speed_vs_error_{stage}" for stage in stages}
     assert isinstance(FIGURES["error_by_size"].draw(results), Figure)
 
 
@@ -222,8 +243,7 @@ def test_every_drawing_is_a_figure_or_left_out(results):
         "labels/large_room/6k/sfm/assistance.json",
         "labels/large_room/6k/sfm/test.csv",
         "scenes/large_room/collision.ply",
-        "datasets/large_room/network/manifest.json",
-        "datasets/large_room/network/seq-03/frame-000001.color.png",
+        "frames/large_room/test.npy",
         "runs/large_room/20k/synfeal/pretrained/posenet/seed0/errors.csv",
         "tables/table4_size.csv",
     ],

@@ -115,7 +115,7 @@ def test_sorting_follows_the_switch_and_puts_text_in_order(page, tmp_path):
     labels, real, sources = asked(page, tmp_path, probe)
     assert labels == sorted(labels)
     assert real == sorted(real) != labels
-    assert sources == ["RGB-D SLAM w/ g2o", "RGB-D SLAM w/ TORO", "SfM", "Synfeal"]
+    assert sources == ["KinectFusion", "RGB-D SLAM w/ g2o", "RGB-D SLAM w/ TORO", "SfM", "Synfeal"]
 
 
 def test_the_scene_is_drawn_and_paths_can_be_hidden(page, tmp_path):
@@ -133,7 +133,7 @@ def test_the_scene_is_drawn_and_paths_can_be_hidden(page, tmp_path):
     assert with_line > 30
     assert red > 5000
     assert without == 0
-    assert checked == [True, True, False, False, False]
+    assert checked == [True, True, False, False, False, False]
 
 
 def test_nothing_is_requested_and_nothing_sticks_out(page, tmp_path):
@@ -169,6 +169,7 @@ def test_trajectories_are_those_of_the_files(page):
     assert [t.title for t in found] == [
         *(title for title, _ in SPLITS.values()),
         *("SfM labels, 6k", "RGB-D SLAM w/ TORO labels, 6k", "RGB-D SLAM w/ g2o labels, 6k"),
+        "KinectFusion labels, 6k",
     ]
     assert [path.tolist() for path in found[0].paths_m] == [PLANS["train"]]
     shifted = [(np.array(PLANS[split]) + 0.25).tolist() for split in SPLITS]

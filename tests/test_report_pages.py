@@ -88,7 +88,7 @@ def test_the_summary_shows_every_table_and_what_was_measured(results, design):
     text = write_summary(design, 1, results, out)
     page = out.read_text()
     assert page.count("| PoseNet2ResNet |") == 4
-    assert "140 of 140 table cells have a score." in text
+    assert "145 of 145 table cells have a score." in text
     # 1 m at 300 frames falls with the root: 0.27 m at 4,000, less for later models; half is 0.5 m.
     assert "Large Room, 80k: 5 of 5 localizers" in text
     assert "(0.50 m): PoseNet 0.27 m" in text
@@ -112,20 +112,35 @@ def test_the_checks_presume_no_outcome(tmp_path):
     assert second.endswith("the orientation error for 4 of 5 (not Hourglass).")
 
 
-def test_assistance_adds_up_both_splits_beside_the_papers_counts(results, design, tmp_path):
-    write_assistance_table(design, results, tmp_path / "assistance.csv")
-    rows = read(tmp_path / "assistance.csv")
-    assert [(r["method"], r["published_assisted"], r["published_batches"]) for r in rows] == [
-        ("sfm", "3", "64"),
-        ("rgbd-toro", "6", "64"),
-        ("rgbd-g2o", "4", "64"),
+def test_assistance_counts_each_split_and_both_beside_the_papers_counts(results, design, tmp_path):
+    write_assistance_table(design, results, tmp_path / "a.csv", tmp_path / "a.tex")
+    rows = read(tmp_path / "a.csv")
+    assert [(r["method"], r["split"]) for r in rows[:3]] == [
+        ("sfm", "train"),
+        ("sfm", "test"),
+        ("sfm", "total"),
     ]
-    counts = {k: rows[0][k] for k in ("batches", "assisted", "lost", "registered", "filled")}
-    assert counts == {
-        "batches": "17",
-        "assisted": "6",
-        "lost": "2",
-        "registered": "90",
-        "filled": "6",
+    total = [row for row in rows if row["split"] == "total"]
+    assert [(r["method"], r["published_assisted"], r["published_batches"]) for r in total] == [
+        ("sfm", "3", "34"),
+        ("rgbd-toro", "6", "34"),
+        ("rgbd-g2o", "4", "34"),
+        ("kinect-fusion", "", ""),
+    ]
+    expected = {
+        # 12 batches of 25 frames beyond the first frame, and 5 of them.
+        "batches": ("12", "5", "17"),
+        "assisted": ("6", "0", "6"),
+        "lost": ("0", "0", "0"),
+        "frames": ("301", "126", "427"),
+        "registered": ("295", "126", "421"),
+        "filled": ("6", "0", "6"),
+        "last_m_before_median": ("0.2", "0.1", "0.1"),
+        "last_m_before_max": ("0.3", "0.1", "0.3"),
+        "last_m_after_median": ("0.05", "0.1", "0.1"),
+        "last_deg_after_max": ("1", "1", "1"),
+        "published_assisted": ("", "", "3"),
     }
-    assert (rows[0]["label_error_m_train"], rows[0]["label_error_deg_test"]) == ("0.25", "2.5")
+    for column, values in expected.items():
+        assert tuple(row[column] for row in rows[:3]) == values, column
+    assert "3 of 34" in (tmp_path / "a.tex").read_text()

@@ -18,7 +18,9 @@ def design():
 @pytest.mark.parametrize(("table", "count"), ROWS.items())
 def test_every_cell_of_the_design_has_one_published_counterpart(design, table, count):
     wanted = {key_of(row, m) for row in design if row.table == table for m in MODELS}
-    assert wanted == set(published_cells(table))
+    published = set(published_cells(table))
+    assert published <= wanted
+    assert {key[3] for key in wanted - published} <= {"kinect-fusion"}  # a row of our own
     assert len(wanted) == count
 
 

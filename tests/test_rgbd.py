@@ -5,13 +5,17 @@ from PIL import Image
 from baselines.groundtruth.features import FeatureOdometry
 from baselines.groundtruth.posegraph.lm import optimise_lm
 from baselines.groundtruth.posegraph.toro import optimise_toro
-from baselines.groundtruth.rgbd import depth_agreement, loop_candidates, rgbd_graph
+from baselines.groundtruth.rgbd import rgbd_graph
+from baselines.groundtruth.rgbd.agreement import depth_agreement
+from baselines.groundtruth.rgbd.loops import loop_candidates
 from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig, RgbdConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse, pose_error, pose_matrix, relative
 from synfeal.geometry.rotations import rotation_from_rpy
 from tests.planar_scene import CAMERA, depth_map, straight_path, write_frames
+from tests.room_scene import CAMERA as ROOM_CAMERA
+from tests.room_scene import pose_at, write_room
 
 CFG = RgbdConfig(keyframe_every=3)
 TRUTH = straight_path(10, step_m=0.06, turn_deg=2.0)
@@ -54,6 +58,25 @@ def test_trajectory_is_recovered(graph, name):
     position_m, orientation_rad = pose_error(first_from_cam, true_first_from_cam())
     assert position_m.max() < 0.04
     assert np.degrees(orientation_rad.max()) < 1.0
+
+
+def test_odometry_drifts_by_less_than_a_percent_of_the_way(tmp_path):
+    """Without closures, along 1.2 m before furniture; start and end of a bend included."""
+    step = np.arange(41)
+    poses = np.array(
+        [
+            pose_at([-1.8 + 0.03 * k, 0.1 * np.sin(k / 8), 1.4], yaw_deg=10 * np.sin(k / 10))
+            for k in step
+        ]
+    )
+    paths = write_room(tmp_path, poses)
+    graph = rgbd_graph(*paths, ROOM_CAMERA, RgbdConfig(loops_per_keyframe=0))
+    way_m = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum()
+    assert way_m > 1.2
+    assert [(edge.i, edge.j) for edge in graph.edges] == [(k, k + 1) for k in step[:-1]]
+    error_m, error_rad = pose_error(graph.first_from_cam, relative(poses[0], poses))
+    assert error_m.max() < 0.01 * way_m
+    assert np.degrees(error_rad.max()) < 0.5
 
 
 def test_result_is_repeatable(paths, graph):
@@ -106,18 +129,18 @@ def test_depth_agreement_tells_right_from_wrong_motions():
     poses = straight_path(2, step_m=0.1, turn_deg=3.0).world_from_cam
     depth_i, depth_j = (depth_map(pose, CAMERA)[0].astype(np.float32) for pose in poses)
     true = relative(poses[0], poses[1])
-    fitness, rmse_m = depth_agreement(depth_i, depth_j, true, CAMERA, CFG)
+    fitness, rmse_m = depth_agreement(depth_i, depth_j, true, CAMERA, 0.05)
     assert fitness > 0.8
     assert rmse_m < 0.02
     ahead = pose_matrix(np.eye(3), [0, 0, 0.5]) @ true
-    assert depth_agreement(depth_i, depth_j, ahead, CAMERA, CFG)[0] < 0.2
+    assert depth_agreement(depth_i, depth_j, ahead, CAMERA, 0.05)[0] < 0.2
     behind = (
         pose_matrix(rotation_from_rpy([0, 0, np.pi]) @ rotation_from_rpy([0, 0, 0]).T, 0) @ true
     )
-    assert depth_agreement(depth_i, depth_j, behind, CAMERA, CFG)[0] < 0.2
+    assert depth_agreement(depth_i, depth_j, behind, CAMERA, 0.05)[0] < 0.2
     nothing = np.full_like(depth_i, np.inf)
-    assert depth_agreement(nothing, depth_j, true, CAMERA, CFG) == (0.0, np.inf)
-    assert depth_agreement(depth_i, nothing, true, CAMERA, CFG) == (0.0, np.inf)
+    assert depth_agreement(nothing, depth_j, true, CAMERA, 0.05) == (0.0, np.inf)
+    assert depth_agreement(depth_i, nothing, true, CAMERA, 0.05) == (0.0, np.inf)
 
 
 def test_loop_candidates_are_keyframes_that_look_the_same_way():

@@ -19,7 +19,7 @@ def frames(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def estimate(frames, tmp_path_factory):
-    return sfm_batch(*_arguments(frames), CFG, 0, tmp_path_factory.mktemp("work"))
+    return sfm_batch(*_arguments(frames), CFG, 0, tmp_path_factory.mktemp("work")).trajectory
 
 
 def _arguments(frames):
@@ -39,7 +39,7 @@ def test_first_pose_is_the_identity(estimate):
 
 
 def test_same_seed_gives_the_same_result(frames, estimate, tmp_path):
-    again = sfm_batch(*_arguments(frames), CFG, 0, tmp_path)
+    again = sfm_batch(*_arguments(frames), CFG, 0, tmp_path).trajectory
     np.testing.assert_array_equal(again.first_from_cam, estimate.first_from_cam)
     assert list(tmp_path.iterdir()) == []  # temporary files are gone
 
@@ -47,7 +47,7 @@ def test_same_seed_gives_the_same_result(frames, estimate, tmp_path):
 def test_result_does_not_depend_on_where_the_world_is(frames, estimate, tmp_path):
     world_from_other = pose_from_quat([7.0, -3.0, 1.0], [0.5, 0.5, -0.5, 0.5])
     color_paths, truth = frames
-    moved = sfm_batch(color_paths, CAMERA, world_from_other @ truth, CFG, 0, tmp_path)
+    moved = sfm_batch(color_paths, CAMERA, world_from_other @ truth, CFG, 0, tmp_path).trajectory
     np.testing.assert_allclose(moved.first_from_cam, estimate.first_from_cam, atol=1e-9)
 
 
@@ -56,7 +56,7 @@ def test_frames_without_texture_are_lost_not_an_error(tmp_path):
     for path in paths:
         Image.new("RGB", (CAMERA.width, CAMERA.height), (90, 90, 90)).save(path)
     truth = straight_path(4, 0.08, 2.0).world_from_cam
-    estimate = sfm_batch(paths, CAMERA, truth, CFG, 0, tmp_path)
+    estimate = sfm_batch(paths, CAMERA, truth, CFG, 0, tmp_path).trajectory
     assert not estimate.registered.any()
     assert len(estimate) == 4
 

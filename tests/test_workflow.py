@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from baselines.groundtruth.methods import METHODS
+
 ROOT = Path(__file__).parent.parent
 
 
@@ -25,12 +27,13 @@ def planned_jobs(results: Path, *arguments: str) -> dict[str, int]:
 
 def test_default_profile_plans_the_papers_design(tmp_path: Path) -> None:
     jobs = planned_jobs(tmp_path)
-    assert jobs["train"] == jobs["score"] == 120  # 24 distinct data set x initialisation, 5 models
+    assert jobs["train"] == jobs["score"] == 125  # 25 distinct data set x initialisation, 5 models
     assert jobs["scene"] == 3
     assert jobs["noisy_labels"] == 9 * 2
     assert jobs["sfm"] == jobs["rgbd"] == 12 + 5  # 300 and 125 frames in batches of 25
     assert jobs["posegraph"] == 2 * jobs["rgbd"]
-    assert jobs["chain"] == 3
+    assert jobs["estimate"] == jobs["rgbd"]
+    assert jobs["chain"] == 4
     assert jobs["table"] + jobs["table1_meshes"] == 5
 
 
@@ -40,8 +43,26 @@ def test_a_single_experiment_is_a_target(tmp_path: Path) -> None:
     assert jobs["train"] == 1
     assert "sfm" not in jobs
     assert "pretrain" not in jobs
-    # Only what one scene's network frames need: no depth, no frames for reconstruction.
-    assert jobs["render"] == 10
+    # Only what one scene's network frames need: no image files, no frames for reconstruction.
+    assert jobs["render_packed"] == 10
+    assert "render" not in jobs
+
+
+def test_the_stretch_profile_labels_with_every_method_and_trains_nothing(tmp_path: Path) -> None:
+    jobs = planned_jobs(tmp_path, "--configfile", "config/stretch.yaml", "--", "labels")
+    assert not {"train", "score", "pretrain", "table"} & set(jobs)
+    assert jobs["sfm"] == jobs["rgbd"] == jobs["estimate"] == 4 + 1  # 1,000 and 250 frames
+    assert jobs["posegraph"] == 4 * jobs["rgbd"]
+    assert jobs["chain"] == len(METHODS)
+    assert jobs["assistance"] == jobs["label_error"] == jobs["speed_vs_error"] == 1
+    assert jobs["figures"] == 1
+
+
+def test_labels_of_the_papers_profile_come_from_34_batches_and_no_training(tmp_path: Path) -> None:
+    jobs = planned_jobs(tmp_path, "--configfile", "config/paper.yaml", "--", "labels")
+    assert jobs["sfm"] == jobs["rgbd"] == 24 + 10  # 6,000 and 2,500 frames in batches of 250
+    assert jobs["posegraph"] == 2 * 34
+    assert not {"train", "score", "pretrain", "figures"} & set(jobs)
 
 
 def test_changing_one_noise_level_adds_only_that_rows_jobs(tmp_path: Path) -> None:
@@ -70,9 +91,15 @@ def planned_runs(results: Path, *config: str) -> set[str]:
         ("scael=0.1", ["scael", "unknown key", "scale"]),
         ("scale=2", ["scale", "less than or equal to 1"]),
         ("experiments=nowhere.csv", ["nowhere.csv", "cannot be read"]),
+        ("experiments={wrong_labels}", ["labels 'orb'", "rgbd-toro"]),
     ],
 )
-def test_wrong_configuration_ends_in_one_line(override: str, words: list[str]) -> None:
+def test_wrong_configuration_ends_in_one_line(
+    tmp_path: Path, override: str, words: list[str]
+) -> None:
+    design = (ROOT / "config/experiments.csv").read_text().replace(",sfm,", ",orb,")
+    (tmp_path / "design.csv").write_text(design)
+    override = override.format(wrong_labels=tmp_path / "design.csv")
     run = snakemake("--dry-run", "--config", override)
     assert run.returncode == 1
     errors = [line for line in run.stderr.splitlines() if line.startswith("error:")]

@@ -65,30 +65,18 @@ class BatchRecord:
 
 
 @dataclass(frozen=True)
-class LabelError:
-    """Errors of all labels of a split against the true poses."""
-
-    median_m: float
-    max_m: float
-    median_deg: float
-    max_deg: float
-
-
-@dataclass(frozen=True)
 class Assistance:
     """The record of one split."""
 
     records: tuple[BatchRecord, ...]
-    label_error: LabelError
 
     def to_json(self) -> dict[str, Any]:
-        """Totals, the error of the labels and one record per batch, as plain values."""
+        """Totals and one record per batch, as plain values."""
         return {
             "batches": len(self.records),
             "assisted": sum(record.assisted for record in self.records),
             "lost": sum(record.lost for record in self.records),
             "filled_frames": sum(record.filled for record in self.records),
-            "label_error": asdict(self.label_error),
             "records": [asdict(record) for record in self.records],
         }
 
@@ -124,20 +112,22 @@ def chain_batches(
         )
         labels[span] = poses
         records.append(record)
-    table = truth.with_poses(labels)
-    return table, Assistance(tuple(records), label_error(table, truth))
+    return truth.with_poses(labels), Assistance(tuple(records))
 
 
-def label_error(labels: PoseTable, truth: PoseTable) -> LabelError:
-    """Median and largest errors of labels against the true poses of the same frames."""
-    position_m, orientation_rad = pose_error(labels.world_from_cam, truth.world_from_cam)
-    orientation_deg = np.degrees(orientation_rad)
-    return LabelError(
-        float(np.median(position_m)),
-        float(position_m.max()),
-        float(np.median(orientation_deg)),
-        float(orientation_deg.max()),
-    )
+def chain_unassisted(
+    batches: Sequence[Batch], trajectories: Sequence[BatchTrajectory], truth: PoseTable
+) -> PoseTable:
+    """What the labels were without assistance: no pose is replaced, a lost batch stands still.
+
+    Arguments and errors are those of :func:`chain_batches`.
+    """
+    _check(batches, trajectories, len(truth))
+    labels = truth.world_from_cam.copy()
+    for batch, trajectory in zip(batches, trajectories, strict=True):
+        world_from_first = labels[batch.start].copy()
+        labels[batch.start : batch.stop] = world_from_first @ fill_gaps(trajectory)
+    return truth.with_poses(labels)
 
 
 def fill_gaps(trajectory: BatchTrajectory) -> Array:

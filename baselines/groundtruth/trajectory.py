@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.dataset.number_table import read_numbers, write_numbers
+from synfeal.dataset.pose_table import check_unit, whole_numbers
+from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
 
 COLUMNS = ("frame", "registered", "tx", "ty", "tz", "qw", "qx", "qy", "qz")
@@ -59,7 +61,12 @@ def read_trajectory(path: Path) -> BatchTrajectory:
     """Read a file written by :func:`write_trajectory`.
 
     Raises:
-        InputError: the file is missing, has another header, or holds anything but finite numbers.
+        InputError: the file is missing, has another header, or holds anything but finite numbers,
+            frames counted from 0, flags 0 or 1, and unit quaternions.
     """
     values = read_numbers(path, HEADER, "batch trajectory")
+    frame, registered = whole_numbers(values[:, :2], path).T
+    if (frame != np.arange(len(frame))).any() or (registered > 1).any():
+        raise InputError(f"{path}: frames must count from 0, registered be 0 or 1; estimate again")
+    check_unit(values[:, 5:9], path, np.arange(len(values)) + 2)
     return BatchTrajectory(pose_from_quat(values[:, 2:5], values[:, 5:9]), values[:, 1] == 1)

@@ -35,7 +35,11 @@ def load_checkpoint(path: Path, localizer: Localizer, device: torch.device) -> I
     try:
         checkpoint = torch.load(path, map_location=device, weights_only=True)
         localizer.load_state_dict(checkpoint["localizer"])
-        return ImageStatistics(**checkpoint["images"])
+        found = ImageStatistics(**checkpoint["images"])
+        for value in (found.mean, found.deviation):
+            if value.shape != (1, 3, 1, 1) or not value.isfinite().all():
+                raise ValueError("its image statistics are damaged")
+        return found
     except Exception as error:  # torch.load raises whatever the broken file provokes
         reason = str(error)[:200]
         message = f"{path}: is no checkpoint of {type(localizer).__name__} at this network shape"

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from synfeal.dataset.packed import read_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
 
@@ -52,13 +53,8 @@ def read_images(path: Path, count: int, input_px: int, device: torch.device) -> 
     Raises:
         InputError: the file is no packed frames, has another size, or holds too few of them.
     """
-    try:
-        frames = np.load(path, mmap_mode="r")
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"{path}: cannot be read as packed frames ({error}); pack them again"
-        ) from None
-    if frames.dtype != np.uint8 or frames.shape[1:] != (input_px, input_px, 3):
+    frames = read_packed(path)
+    if frames.shape[1] != input_px:
         raise InputError(
             f"{path}: holds {frames.dtype} {frames.shape}, expected uint8 (N, {input_px}, "
             f"{input_px}, 3) for this network.input_px; pack the frames again"

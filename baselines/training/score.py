@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.bootstrap import limits, medians, path_counts
-from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table
+from synfeal.dataset.number_table import read_numbers
+from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table, whole_numbers
 from synfeal.errors import InputError
 from synfeal.files import atomic_path, write_json
 from synfeal.geometry.poses import position_error_m
@@ -72,9 +73,9 @@ def score_run(
 
 
 def pose_errors(predicted: PoseTable, reference: PoseTable) -> dict[str, Array]:
-    """``position_m`` and ``orientation_deg`` (N,); infinite where a prediction is not finite."""
+    """``position_m`` and ``orientation_deg`` (N,); infinite where a prediction is no pose."""
     values = np.concatenate([predicted.position_m, predicted.quat_wxyz], axis=1)
-    good = np.isfinite(values).all(axis=1)
+    good = (np.abs(values) < 1e100).all(axis=1) & (values[:, 3:] != 0).any(axis=1)
     position, orientation = np.full(len(good), np.inf), np.full(len(good), np.inf)
     position[good] = position_error_m(predicted.position_m[good], reference.position_m[good])
     angles = rotation_angle_rad(predicted.quat_wxyz[good], reference.quat_wxyz[good])
@@ -113,25 +114,18 @@ def _finite(value: float) -> float | None:
 
 def _read_predictions(path: Path) -> PoseTable:
     """A pose table whose poses may be ``nan``, unlike labels."""
-    try:
-        with path.open(encoding="utf-8") as file:
-            header = file.readline().strip()
-            values = np.loadtxt(file, delimiter=",", ndmin=2)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"{path}: cannot be read as predictions ({error}); predict again"
-        ) from None
-    if header != HEADER or values.shape[1] != len(HEADER.split(",")) or len(values) == 0:
-        raise InputError(f"{path}: must have the header '{HEADER}' and rows like it; predict again")
-    index = values[:, :2].astype(np.int64)
-    return PoseTable(index[:, 0], index[:, 1], values[:, 2:5], values[:, 5:9])
+    values = read_numbers(path, HEADER, "table of predictions", finite=False)
+    if not len(values):
+        raise InputError(f"{path}: has no rows; predict again")
+    frame, straight_path = whole_numbers(values[:, :2], path).T
+    return PoseTable(frame, straight_path, values[:, 2:5], values[:, 5:9])
 
 
 def _read_like(path: Path, predicted: PoseTable) -> PoseTable:
     table = read_pose_table(path)
     if not np.array_equal(table.frame, predicted.frame):
         raise InputError(
-            f"{path}: its frames are not those of the predictions ({len(table)} and "
+            f"{path}: its frames are not those of predictions.csv ({len(table)} and "
             f"{len(predicted)} rows); predict again for these labels"
         )
     return table

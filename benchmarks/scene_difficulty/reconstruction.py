@@ -71,7 +71,7 @@ def reconstruct(
     if stage == "sfm":
         with tempfile.TemporaryDirectory() as work:
             estimate = sfm_batch(color, camera, truth.world_from_cam, cfg.sfm, seed, Path(work))
-        write_trajectory(files.trajectory("sfm"), estimate)
+        write_trajectory(files.trajectory("sfm"), estimate.trajectory)
         write_json(files.seconds(stage), {"sfm": time.process_time() - start})
         return
     graph = rgbd_graph(color, frame_paths([frames], "depth.png"), camera, cfg.rgbd)
@@ -79,7 +79,7 @@ def reconstruct(
     seconds = {}
     for name in OPTIMISERS:
         start = time.process_time()
-        estimate = optimise(name, graph, cfg.posegraph)
+        trajectory = optimise(name, graph, cfg.posegraph)
         seconds[f"rgbd-{name}"] = odometry_s + time.process_time() - start
-        write_trajectory(files.trajectory(f"rgbd-{name}"), estimate)
+        write_trajectory(files.trajectory(f"rgbd-{name}"), trajectory)
     write_json(files.seconds(stage), seconds)

@@ -14,7 +14,7 @@ from benchmarks.scene_difficulty.pool import run_tasks
 from synfeal.config.load import merge, parse_config, read_yaml
 from synfeal.config.models import Config
 from synfeal.dataset.pose_table import PoseTable
-from synfeal.dataset.sevenscenes import render_sequence
+from synfeal.dataset.render_sequence import render_sequence
 from synfeal.errors import InputError
 from synfeal.files import write_json
 from synfeal.planning.plan import plan_scene

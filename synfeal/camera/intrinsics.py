@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.collection import CameraConfig
+if TYPE_CHECKING:
+    from synfeal.config.collection import CameraConfig
 
 
 class Intrinsics(NamedTuple):

@@ -1,4 +1,4 @@
-"""Command line: look at a mesh, make a 7-Scenes data set from it, compare two result trees."""
+"""Command line: look at a mesh, make a 7-Scenes data set from it, plan and compare runs."""
 
 from __future__ import annotations
 
@@ -7,10 +7,17 @@ import logging
 from collections.abc import Sequence
 
 from synfeal import __version__
-from synfeal.cli import collect, compare, inspect
+from synfeal.cli import collect, compare, export, inspect, plan, validate
 from synfeal.errors import exit_status
 
-COMMANDS = (collect.COMMAND, inspect.COMMAND, compare.COMMAND)
+COMMANDS = (
+    collect.COMMAND,
+    inspect.COMMAND,
+    validate.COMMAND,
+    export.COMMAND,
+    plan.COMMAND,
+    compare.COMMAND,
+)
 
 
 def build_parser() -> argparse.ArgumentParser:

@@ -4,25 +4,43 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import get_args
 
 from pydantic import ValidationError
 
+from synfeal.cli.camera import CAMERA_OPTIONS, camera_of
 from synfeal.cli.options import MESH_OPTIONS, Command, Options, scene_values
 from synfeal.config.load import describe
-from synfeal.config.models import CameraConfig, CollectionConfig, SceneConfig
+from synfeal.config.models import CameraConfig, CollectionConfig, RenderConfig, SceneConfig
 from synfeal.errors import InputError
+
+BACKENDS = get_args(RenderConfig.model_fields["backend"].annotation)
+MODES = get_args(CollectionConfig.model_fields["mode"].annotation)
 
 OPTIONS: Options = (
     ("--mesh", {"type": Path, "required": True, "help": "GLB, glTF, OBJ or PLY file"}),
     ("--frames", {"type": int, "required": True, "help": "training frames"}),
     ("--out", {"type": Path, "required": True, "help": "directory to create"}),
     ("--test-frames", {"type": int, "default": 0, "help": "test frames (default: 0)"}),
-    ("--width", {"type": int, "default": 640, "help": "image width, pixels (default: 640)"}),
-    ("--height", {"type": int, "default": 480, "help": "image height, pixels (default: 480)"}),
-    ("--fov", {"type": float, "default": 60.0, "help": "horizontal field of view, degrees (60)"}),
     ("--spacing", {"type": float, "default": 0.03, "help": "metres between frames (0.03)"}),
     ("--seed", {"type": int, "default": 0, "help": "root of all random numbers (0)"}),
     ("--depth", {"action": "store_true", "help": "write depth images too"}),
+    ("--packed", {"type": int, "metavar": "PX", "help": "write frames of PX x PX in one .npy too"}),
+    ("--backend", {"choices": BACKENDS, "default": "auto", "help": "what draws (auto)"}),
+    ("--workers", {"type": int, "default": 1, "help": "processes that render (1)"}),
+    (
+        "--shard",
+        {"metavar": "I/N", "help": "render this part only, say 3/8 (docs/collecting.md)"},
+    ),
+    ("--mode", {"choices": MODES, "default": "path", "help": "where cameras go (path)"}),
+    (
+        "--poses",
+        {
+            "type": Path,
+            "metavar": "FILE",
+            "help": "mode repeat: data set, 7-Scenes frames, pose table (.csv) or TUM trajectory",
+        },
+    ),
     (
         "--min-view-distance",
         {"type": float, "default": 1.2, "help": "min_view_distance_m: free view of targets (1.2)"},
@@ -37,20 +55,26 @@ OPTIONS: Options = (
 def run(arguments: argparse.Namespace) -> None:
     """Carry out the command."""
     scene, collection, camera = collect_configs(arguments)
-    from synfeal.dataset.collect import CollectJob, collect
+    from synfeal.dataset.collect import collect
+    from synfeal.dataset.collect_job import CollectJob
+    from synfeal.dataset.shards import read_shard
 
+    shard = read_shard(arguments.shard) if arguments.shard is not None else None
     job = CollectJob(
         scene=scene,
         collection=collection,
         camera=camera,
+        render=RenderConfig(backend=arguments.backend),
         n_train=arguments.frames,
         n_test=arguments.test_frames,
         seed=arguments.seed,
         with_depth=arguments.depth,
+        packed_px=arguments.packed,
         out=arguments.out,
     )
-    collect(job)
-    print(f"{arguments.out}: {job.n_train} training and {job.n_test} test frames")
+    collect(job, arguments.workers, shard)
+    frames = f"{job.n_train} training and {job.n_test} test frames"
+    print(f"{arguments.out}: {f'shard {arguments.shard} of ' if shard else ''}{frames}")
 
 
 def collect_configs(
@@ -66,18 +90,18 @@ def collect_configs(
             {**scene_values(arguments), "min_view_distance_m": arguments.min_view_distance}
         )
         collection = CollectionConfig.model_validate(
-            {"frame_spacing_m": arguments.spacing, "min_path_m": arguments.min_path}
-        )
-        camera = CameraConfig.model_validate(
             {
-                "width": arguments.width,
-                "height": arguments.height,
-                "horizontal_fov_deg": arguments.fov,
+                "mode": arguments.mode,
+                "repeat": arguments.poses,
+                "frame_spacing_m": arguments.spacing,
+                "min_path_m": arguments.min_path,
             }
         )
     except ValidationError as error:
         raise InputError(f"collect: {describe(error)}") from None
-    return scene, collection, camera
+    return scene, collection, camera_of(arguments)
 
 
-COMMAND = Command("collect", "make a data set from a textured mesh", OPTIONS + MESH_OPTIONS, run)
+COMMAND = Command(
+    "collect", "make a data set from a textured mesh", OPTIONS + CAMERA_OPTIONS + MESH_OPTIONS, run
+)

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
-Slug = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_]*$")]
+from synfeal.camera.calibration_files import read_calibration
+from synfeal.camera.rays import refuse_fold
+from synfeal.errors import InputError
+
+# Names of directories below the results.
+Slug = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_]*$", max_length=64)]
+SizeName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$", max_length=64)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, lt=1)]
-Count = Annotated[int, Field(ge=1)]
+Count = Annotated[int, Field(ge=1, le=10**9)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Interval = tuple[Finite, Finite]
 
@@ -20,6 +28,22 @@ class Strict(BaseModel):
     """A model that refuses unknown keys and cannot be changed after it was checked."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _refuse_coercion(cls, value: Any, info: ValidationInfo) -> Any:
+        """Refuse true and false where a number is meant, and NUL, which no path can hold."""
+        annotation = cls.model_fields[str(info.field_name)].annotation
+        is_flag = annotation is bool
+        parts = value if isinstance(value, list | tuple) else [value]
+        if isinstance(value, dict) and get_origin(annotation) is dict:  # else another model's keys
+            parts = list(value.values())
+        for part in parts:
+            if isinstance(part, bool) and not is_flag:
+                raise PydanticCustomError("no_number", "Input should not be true or false")
+            if isinstance(part, str | Path) and "\0" in str(part):
+                raise PydanticCustomError("no_text", "Input should not hold the character NUL")
+        return value
 
 
 def _ordered(name: str, interval: Interval) -> None:
@@ -95,7 +119,7 @@ class SceneConfig(Strict):
         1.2,
         description="least free distance along the optical axis of a target pose (the paper's d)",
     )
-    sizes: dict[str, SizeConfig] = Field(
+    sizes: dict[SizeName, SizeConfig] = Field(
         default_factory=dict, description="data set sizes by the paper's names, at scale 1"
     )
 
@@ -113,6 +137,16 @@ class SceneConfig(Strict):
 class CollectionConfig(Strict):
     """How the camera moves (section 3 of the paper)."""
 
+    mode: Literal["path", "random", "repeat"] = Field(
+        "path",
+        description="`path` is the paper's; `random` takes independent admissible poses; `repeat`"
+        " takes those of an earlier data set",
+    )
+    repeat: Path | None = Field(
+        None,
+        description="mode `repeat`: a data set, a directory of 7-Scenes frames, a pose table (.csv)"
+        " or a TUM trajectory (.txt)",
+    )
     candidates: Count = Field(8, description="target pose candidates per path (the paper's k)")
     frame_spacing_m: Positive = Field(
         0.03, description="distance between frames (the paper's other d)"
@@ -131,13 +165,30 @@ class CollectionConfig(Strict):
         " agree with the full mesh; 1 keeps all that any of 10,000 decisions needs",
     )
 
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.mode == "repeat" and self.repeat is None:
+            raise ValueError("repeat: mode `repeat` needs the poses to repeat")
+        if self.mode != "repeat" and self.repeat is not None:
+            raise ValueError(f"repeat: mode `{self.mode}` repeats nothing; leave it out")
+        return self
+
 
 class CameraConfig(Strict):
     """A camera: field of view or calibrated intrinsics, and lens distortion.
 
-    With a field of view alone pixels are square and the principal point is the image centre.
+    With a field of view alone pixels are square and the principal point is the image centre. A
+    calibration is replaced by its numbers when it is read, so a file that changes or moves later
+    changes nothing.
     """
 
+    calibration: Path | None = Field(
+        None,
+        exclude=True,
+        description="file of a calibration (OpenCV or ROS .yaml or .json, COLMAP cameras.txt);"
+        " gives intrinsics and distortion, and the size unless width or height is given,"
+        " to which it is then scaled",
+    )
     width: Annotated[int, Field(ge=16, le=8192)] = Field(640, description="image width, pixels")
     height: Annotated[int, Field(ge=16, le=8192)] = Field(480, description="image height, pixels")
     horizontal_fov_deg: Annotated[float, Field(gt=1, lt=170)] = Field(
@@ -154,6 +205,13 @@ class CameraConfig(Strict):
     near_m: Positive = Field(0.05, description="near clip plane, metres")
     far_m: Positive = Field(100.0, description="far clip plane, metres")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _read_calibration(cls, values: Any) -> Any:
+        if not isinstance(values, dict) or values.get("calibration") is None:
+            return values
+        return _calibrated(values)
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.near_m >= self.far_m:
@@ -161,7 +219,30 @@ class CameraConfig(Strict):
         intrinsics = (self.fx, self.fy, self.cx, self.cy)
         if None in intrinsics and intrinsics != (None,) * 4:
             raise ValueError("fx: fx, fy, cx and cy are given together or not at all")
+        if any(self.distortion):
+            refuse_fold(self)
         return self
+
+
+def _calibrated(values: dict[str, Any]) -> dict[str, Any]:
+    """A camera's values with those of its calibration in place of the path."""
+    fixed = ("horizontal_fov_deg", "fx", "fy", "cx", "cy", "distortion")
+    for name in fixed:
+        if values.get(name) is not None:
+            raise ValueError(f"calibration: {name} comes from the file; leave one of the two out")
+    sides = [values.get(name) for name in ("width", "height")]
+    for name, side in zip(("width", "height"), sides, strict=True):
+        if side is not None and not (type(side) is int and side > 0):
+            raise ValueError(f"{name}: must be a whole number of pixels, found {side!r}")
+    path = values["calibration"]
+    if not isinstance(path, str | Path):
+        raise ValueError(f"calibration: must be a path, found {path!r}")
+    try:
+        calibration = read_calibration(Path(path)).scaled(*sides)
+    except (InputError, ValueError) as error:
+        raise ValueError(f"calibration: {error}") from None
+    kept = {name: value for name, value in values.items() if name not in fixed}
+    return {**kept, **asdict(calibration), "calibration": None}
 
 
 class RenderConfig(Strict):
@@ -169,4 +250,16 @@ class RenderConfig(Strict):
 
     backend: Literal["auto", "opengl", "pyrender", "raycast"] = Field(
         "auto", description="`auto` takes the fastest that works on this machine, and says which"
+    )
+    supersampling: Annotated[int, Field(ge=1, le=4)] = Field(
+        2, description="samples per pixel along each axis; 1 is fastest and aliases"
+    )
+
+
+class RenderSpeedConfig(Strict):
+    """How speed and error of rendering are measured, for `speed_vs_error.csv`."""
+
+    poses: Count = Field(6, description="views of each scene; half as many at the larger sizes")
+    sizes: Annotated[int, Field(ge=1, le=3)] = Field(
+        3, description="of network_camera, groundtruth_camera and 640 x 480, the smallest first"
     )

@@ -13,7 +13,6 @@ from synfeal.config.load import describe
 from synfeal.config.models import MODELS, Config, NonNegative, Strict
 from synfeal.errors import InputError
 
-Source = Literal["synfeal", "sfm", "rgbd-toro", "rgbd-g2o", "noise"]
 Init = Literal["pretrained", "scratch"]
 # What tells the rows of a table apart; a table shows each once.
 KEYS: Mapping[str, tuple[str, ...]] = {
@@ -36,9 +35,9 @@ class Experiment(Strict):
     )
     scene: str = Field(description="a key of `scenes`")
     size: str = Field(description="a key of `scenes.<scene>.sizes` and of `training.samples_seen`")
-    labels: Source = Field(
+    labels: str = Field(
         description="where the labels come from: `synfeal` the simulator's own poses, `noise` the "
-        "same with noise, the others re-estimated from the frames"
+        "same with noise, or a key of `METHODS` in `baselines/groundtruth/methods.py`: re-estimated"
     )
     noise_m: NonNegative = Field(description="nominal position noise, metres")
     noise_deg: NonNegative = Field(description="nominal orientation noise, degrees")
@@ -51,6 +50,9 @@ class Experiment(Strict):
             raise ValueError("labels: must be `noise` exactly when noise_m or noise_deg is above 0")
         if (self.table == "table3_inconsistencies") != (self.block != ""):
             raise ValueError("block: rows of table 3, and only those, name one of three blocks")
+        for name in ("noise_m", "noise_deg"):
+            if float(f"{getattr(self, name):g}") != getattr(self, name):
+                raise ValueError(f"{name}: at most six digits, for they name the label set")
         return self
 
     @property
@@ -92,14 +94,17 @@ def read_experiments(config: Config) -> tuple[Experiment, ...]:
             reader = csv.DictReader(file)
             header = tuple(reader.fieldnames or ())
             rows = [(f"{path}: row {reader.line_num}", row) for row in reader]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except (OSError, ValueError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as CSV ({error})") from None
     if header != COLUMNS:
         raise InputError(f"{path}: the header must be {','.join(COLUMNS)}")
     experiments = tuple(_parse(row, where, config) for where, row in rows)
     if not experiments:
         raise InputError(f"{path}: has no rows; nothing would be run")
-    _refuse_repeats(experiments, [where for where, _ in rows])
+    places = [where for where, _ in rows]
+    _refuse_repeats(experiments, places)
+    if any(config.groundtruth_camera.distortion):
+        _refuse_depth_methods(experiments, places)
     return experiments
 
 
@@ -114,6 +119,16 @@ def _refuse_repeats(experiments: Sequence[Experiment], places: Sequence[str]) ->
             )
             raise InputError(f"{where}: {message}")
         seen[identity] = where
+
+
+def _refuse_depth_methods(experiments: Sequence[Experiment], places: Sequence[str]) -> None:
+    """Refuse labels that are estimated from depth; of the estimators only SfM knows distortion."""
+    for experiment, where in zip(experiments, places, strict=True):
+        if experiment.labels not in ("synfeal", "noise", "sfm"):
+            raise InputError(
+                f"{where}: labels '{experiment.labels}' need pinhole images; leave"
+                " groundtruth_camera.distortion at zero (a calibration sets it) or drop the row"
+            )
 
 
 def _parse(row: dict[str, str], where: str, config: Config) -> Experiment:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import yaml
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
+from synfeal.camera.calibration_files import PlainLoader
 from synfeal.config.models import Config
 from synfeal.errors import InputError
 
@@ -40,8 +42,8 @@ def read_yaml(path: Path) -> dict[str, Any]:
         InputError: the file is missing, is not UTF-8, is not YAML, or is no mapping.
     """
     try:
-        value = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        value = yaml.load(path.read_text(encoding="utf-8"), PlainLoader)
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise InputError(f"{path}: cannot be read as YAML ({error})") from None
     if not isinstance(value, dict):
         raise InputError(f"{path}: must hold a mapping of keys, found {type(value).__name__}")
@@ -57,19 +59,24 @@ def merge(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, Any
     return merged
 
 
-def describe(error: ValidationError) -> str:
-    """The first problem in one line: dotted key, what is wrong, what was found, what is allowed."""
+def describe(error: ValidationError, model: type[BaseModel] = Config) -> str:
+    """The first problem in one line: dotted key, what is wrong, what was found, what is allowed.
+
+    Args:
+        error: from the validation of ``model``.
+        model: whose keys are named where one is unknown.
+    """
     first = error.errors()[0]
     key = ".".join(str(part) for part in first["loc"] if part != "[key]")
     if first["type"] == "extra_forbidden":
-        return f"{key}: unknown key; allowed here: {', '.join(_siblings(first['loc']))}"
+        return f"{key}: unknown key; allowed here: {', '.join(_siblings(model, first['loc']))}"
     if first["type"] == "missing":
         return f"{key}: missing; it has no default"
     message = first["msg"].removeprefix("Value error, ")
     if first["type"] == "value_error":
         return f"{key}.{message}" if key else message
     more = len(error.errors()) - 1
-    found = _shortened(repr(first["input"]))
+    found = _shortened(reprlib.repr(first["input"]))
     return f"{key}: {message}, found {found}" + (f" (and {more} more)" if more else "")
 
 
@@ -77,9 +84,9 @@ def _shortened(text: str, length: int = 60) -> str:
     return text if len(text) <= length else f"{text[:length]}..."
 
 
-def _siblings(location: tuple[int | str, ...]) -> list[str]:
-    """Keys allowed beside the unknown one at ``location``."""
-    annotation: Any = Config
+def _siblings(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+    """Keys allowed beside the unknown one at ``location`` of a model."""
+    annotation: Any = model
     for part in location[:-1]:
         annotation = _value_type(annotation, part)
     return sorted(_fields(annotation))

@@ -23,8 +23,16 @@ def check_mesh_files(scenes: Mapping[str, SceneConfig]) -> None:
 
 
 def check_mesh_file(path: Path, field: str) -> None:
-    """Check that the mesh file named by a configuration key, ``field``, is there."""
-    if not path.is_file():
+    """Check that the mesh file named by a configuration key, ``field``, is there.
+
+    Raises:
+        InputError: it is not.
+    """
+    try:
+        found = path.is_file()
+    except OSError:  # a name that is too long
+        found = False
+    if not found:
         raise InputError(
             f"{field}: {path} does not exist; put the mesh there or change the path"
             f" (see {DOCUMENTATION})"

@@ -18,6 +18,7 @@ from synfeal.config.collection import (
     NonNegative,
     Positive,
     RenderConfig,
+    RenderSpeedConfig,
     SceneConfig,
     SizeConfig,
     Slug,
@@ -31,7 +32,9 @@ __all__ = [
     "CameraConfig",
     "CollectionConfig",
     "Config",
+    "DepthConfig",
     "GroundTruthConfig",
+    "KinectFusionConfig",
     "LocalizerConfig",
     "ModelName",
     "NetworkConfig",
@@ -39,6 +42,7 @@ __all__ = [
     "PoseGraphConfig",
     "PretrainingConfig",
     "RenderConfig",
+    "RenderSpeedConfig",
     "RgbdConfig",
     "SceneConfig",
     "SfmConfig",
@@ -55,22 +59,67 @@ class SfmConfig(Strict):
     """Structure from motion with pycolmap."""
 
     max_features: Count = Field(2000, description="SIFT features per image")
+    peak_threshold: Positive = Field(
+        0.002, description="SIFT features: least contrast, on a scale where white is 1"
+    )
     overlap: Count = Field(
-        10, description="sequential matching: neighbours each image is matched with"
+        5, description="sequential matching: images further on that each image is matched with"
+    )
+    quadratic_overlap: bool = Field(
+        True, description="which ones: 1, 2, 4, 8, ... further on, else 1, 2, 3, 4, ..."
+    )
+    guided_matching: bool = Field(
+        False, description="match again along the epipolar lines of a verified pair"
     )
     min_num_inliers: Count = Field(15, description="least inliers of a verified pair")
-    init_min_tri_angle_deg: Positive = Field(4.0, description="least angle of the initial pair")
+    mapper: Literal["incremental", "global"] = Field(
+        "incremental", description="COLMAP's mapper: image by image, or all at once (GLOMAP)"
+    )
+    init_min_tri_angle_deg: Positive = Field(
+        4.0, description="incremental mapper: least angle of the initial pair"
+    )
+    min_explained: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.67,
+        description="incremental mapper: a model that explains a smaller share of the matched image"
+        " points is doubtful, and another start is tried, up to four",
+    )
+    max_mapping_s: Count = Field(
+        1800, description="incremental mapper: stop after this time with the best model so far"
+    )
 
 
-class RgbdConfig(Strict):
+class DepthConfig(Strict):
+    """Depth images as a method reads them."""
+
+    sensor: Literal["ideal", "kinect"] = Field(
+        "ideal", description="`kinect` quantises disparity, adds its noise and sees 0.5 to 4.5 m"
+    )
+    max_depth_m: Positive = Field(20.0, description="depth beyond this is not used")
+
+
+class RgbdConfig(DepthConfig):
     """RGB-D odometry and loop closures with Open3D."""
 
-    max_depth_m: Positive = Field(20.0, description="depth beyond this is not used")
-    keyframe_every: Count = Field(5, description="frames between keyframes for loop closures")
-    max_rmse_m: Positive = Field(
-        0.05, description="loop closures with a larger residual are rejected"
+    method: Literal["point-to-plane", "hybrid", "intensity"] = Field(
+        "point-to-plane", description="what the dense odometry compares: depth, both, colour"
     )
-    min_fitness: Fraction = Field(0.3, description="loop closures with less overlap are rejected")
+    start: Literal["motion", "features", "identity"] = Field(
+        "motion", description="first guess: motion of the pair before, feature matches, no motion"
+    )
+    keyframe_every: Count = Field(10, description="frames between keyframes for loop closures")
+    loops_per_keyframe: Annotated[int, Field(ge=0, le=10**9)] = Field(
+        6, description="most loop closures from a keyframe to earlier ones; 0 closes none"
+    )
+    max_rmse_m: Positive = Field(0.05, description="motions with a larger residual are rejected")
+    min_fitness: Fraction = Field(0.3, description="motions with less overlap are rejected")
+
+
+class KinectFusionConfig(DepthConfig):
+    """Frame-to-model tracking with Open3D's dense SLAM."""
+
+    voxel_m: Positive = Field(0.02, description="edge of a voxel of the model")
+    max_rmse_m: Positive = Field(0.05, description="tracking with a larger residual is lost")
+    min_fitness: Fraction = Field(0.3, description="tracking with less overlap is lost")
 
 
 class PoseGraphConfig(Strict):
@@ -84,7 +133,7 @@ class PoseGraphConfig(Strict):
 class GroundTruthConfig(Strict):
     """Label replacement as in section 4.1."""
 
-    batch_frames: Annotated[int, Field(ge=2)] = Field(250, description="frames per batch")
+    batch_frames: Annotated[int, Field(ge=2, le=10**9)] = Field(250, description="frames per batch")
     assist_position_m: Positive = Field(
         0.20, description="assist when the last position is off by more"
     )
@@ -93,6 +142,9 @@ class GroundTruthConfig(Strict):
     )
     sfm: SfmConfig = Field(default_factory=SfmConfig, description="structure from motion")
     rgbd: RgbdConfig = Field(default_factory=RgbdConfig, description="RGB-D odometry")
+    kinect_fusion: KinectFusionConfig = Field(
+        default_factory=KinectFusionConfig, description="frame-to-model tracking"
+    )
     posegraph: PoseGraphConfig = Field(
         default_factory=PoseGraphConfig, description="pose-graph optimisers"
     )
@@ -150,7 +202,7 @@ class Config(Strict):
     """A profile: everything a run depends on."""
 
     profile: Slug = Field(description="name of the profile and of its directory under `results`")
-    seed: int = Field(0, ge=0, description="root of all seeds")
+    seed: int = Field(0, ge=0, lt=2**63, description="root of all seeds")
     scale: Annotated[float, Field(gt=0, le=1)] = Field(description="share of the paper's frames")
     experiments: Path = Field(Path("config/experiments.csv"), description="the design as a table")
     results: Path = Field(Path("results"), description="where everything is written")
@@ -166,6 +218,9 @@ class Config(Strict):
         default_factory=CameraConfig, description="camera of the frames SfM and RGB-D SLAM see"
     )
     render: RenderConfig = Field(default_factory=RenderConfig, description="how images are drawn")
+    render_speed: RenderSpeedConfig = Field(
+        default_factory=RenderSpeedConfig, description="what rendering is measured on"
+    )
     groundtruth: GroundTruthConfig = Field(
         default_factory=GroundTruthConfig, description="label replacement"
     )

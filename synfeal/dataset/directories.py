@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -40,6 +40,24 @@ def refuse_foreign(out: Path, own: Collection[str], origin: str) -> None:
             f"{out}: holds '{others[0]}', which is not from {origin}; choose another directory"
             " with --out"
         )
+
+
+@contextmanager
+def writing_to(path: Path, remedy: Callable[[], str]) -> Iterator[None]:
+    """Say in one line that a file could not be written: a full disk, a read-only one.
+
+    Args:
+        path: named where the system names no file.
+        remedy: what to do then.
+
+    Raises:
+        InputError: in place of any OSError.
+    """
+    try:
+        yield
+    except OSError as error:
+        name, reason = error.filename or path, error.strerror or error
+        raise InputError(f"{name}: {reason}; {remedy()}") from error
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import json
+import re
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -14,10 +14,11 @@ from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.sequences import Sequence
 from synfeal.errors import InputError
-from synfeal.files import write_json
+from synfeal.files import read_json, write_json
 
 MANIFEST = "manifest.json"
-LIBRARIES = ("numpy", "pillow", "pyrender", "trimesh")
+NAME = re.compile(r"seq-[0-9]{2,9}")
+LIBRARIES = ("isal", "numpy", "pillow", "pyrender", "trimesh")
 
 
 def write_manifest(
@@ -30,7 +31,7 @@ def write_manifest(
     sequences = list(sequences)
     manifest = {
         "format": "7-Scenes; depth along the optical axis, millimetres, 65535 invalid",
-        "camera": {**camera.model_dump(), **intrinsics_of(camera)._asdict()},
+        "camera": _camera(camera),
         "frames": {
             split: sum(len(s) for s in sequences if s.split == split) for split in ("train", "test")
         },
@@ -43,10 +44,26 @@ def write_manifest(
             }
             for sequence in sequences
         ],
-        "versions": {"synfeal": synfeal.__version__, **{name: version(name) for name in LIBRARIES}},
+        "versions": versions(),
         **extra,
     }
     write_json(dataset_dir / MANIFEST, manifest)
+
+
+def _camera(camera: CameraConfig) -> dict[str, Any]:
+    """All values of a camera, intrinsics included, without the field of view that they replaced."""
+    unused = {"horizontal_fov_deg"} if camera.fx is not None else set()
+    return {**camera.model_dump(exclude=unused), **intrinsics_of(camera)._asdict()}
+
+
+def camera_record(camera: CameraConfig) -> dict[str, Any]:
+    """A camera with its intrinsics, ready for JSON."""
+    return {**camera.model_dump(mode="json"), **intrinsics_of(camera)._asdict()}
+
+
+def versions() -> dict[str, str]:
+    """The versions that decide what frames look like."""
+    return {"synfeal": synfeal.__version__, **{name: version(name) for name in LIBRARIES}}
 
 
 def verify_manifest(dataset_dir: Path) -> None:
@@ -57,14 +74,13 @@ def verify_manifest(dataset_dir: Path) -> None:
     """
     path = dataset_dir / MANIFEST
     try:
-        entries = json.loads(path.read_text(encoding="utf-8"))["sequences"]
-    except (OSError, ValueError, KeyError) as error:
+        entries = [(str(e["name"]), e["sha256"]) for e in read_json(path)["sequences"]]
+        unknown = [name for name, _ in entries if not NAME.fullmatch(name)]
+        if unknown:
+            raise ValueError(f"'{unknown[0]}' is no name of a sequence")
+    except (OSError, ValueError, TypeError, LookupError) as error:
         raise InputError(f"{path}: cannot be read as a manifest ({error!r})") from None
-    bad = [
-        entry["name"]
-        for entry in entries
-        if sequence_sha256(dataset_dir / entry["name"]) != entry["sha256"]
-    ]
+    bad = [name for name, found in entries if sequence_sha256(dataset_dir / name) != found]
     if bad:
         raise InputError(f"{path}: {', '.join(bad)} differ from what was written; copy them again")
 

@@ -2,15 +2,31 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from synfeal.dataset.png import IMAGE_DAMAGE
 from synfeal.dataset.sevenscenes import frame_paths
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
+
+
+@contextmanager
+def new_packed(out: Path, n_frames: int, input_px: int) -> Iterator[NDArray[np.uint8]]:
+    """An array (n_frames, input_px, input_px, 3) to fill; the file appears when the block ends."""
+    shape = (n_frames, input_px, input_px, 3)
+    with atomic_path(out) as temporary:
+        frames = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.uint8, shape=shape)
+        with temporary.open("r+b") as file:  # else a full disk kills the process that fills a page
+            os.posix_fallocate(file.fileno(), 0, temporary.stat().st_size)
+        yield frames
+        frames.flush()
 
 
 def pack_frames(sequence_dirs: list[Path], input_px: int, out: Path) -> None:
@@ -23,12 +39,42 @@ def pack_frames(sequence_dirs: list[Path], input_px: int, out: Path) -> None:
         InputError: a sequence has no frames, or a frame cannot be read.
     """
     paths = frame_paths(sequence_dirs, "color.png")
-    shape = (len(paths), input_px, input_px, 3)
-    with atomic_path(out) as temporary:
-        frames = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.uint8, shape=shape)
+    with new_packed(out, len(paths), input_px) as packed:
         for index, path in enumerate(paths):
-            frames[index] = fit_frame(_open(path), input_px)
-        frames.flush()
+            packed[index] = fit_frame(_open(path), input_px)
+
+
+def join_packed(parts: list[Path], out: Path) -> None:
+    """Write packed frames one after the other into one file; at most one part is in memory.
+
+    Raises:
+        InputError: a part cannot be read, or its frames have another size.
+    """
+    arrays = [read_packed(path) for path in parts]
+    input_px = arrays[0].shape[1]
+    for path, array in zip(parts, arrays, strict=True):
+        if array.shape[1] != input_px:
+            raise InputError(f"{path}: holds frames of {array.shape[1]} px, others {input_px} px")
+    with new_packed(out, sum(map(len, arrays)), input_px) as packed:
+        np.concatenate(arrays, out=packed)
+
+
+def read_packed(path: Path) -> NDArray[np.uint8]:
+    """Packed frames (N, S, S, 3) as a memory map.
+
+    Raises:
+        InputError: the file is missing or holds no packed frames.
+    """
+    try:
+        frames: NDArray[np.uint8] = np.lib.format.open_memmap(path, mode="r")
+    except Exception as error:  # a damaged header is refused in every way there is
+        raise InputError(
+            f"{path}: cannot be read as packed frames ({error}); render it again"
+        ) from None
+    side = frames.shape[1] if frames.ndim == 4 else 0
+    if frames.dtype != np.uint8 or frames.shape[1:] != (side, side, 3):
+        raise InputError(f"{path}: holds {frames.dtype} {frames.shape}, not packed frames")
+    return frames
 
 
 def fit_frame(image: Image.Image, input_px: int) -> NDArray[np.uint8]:
@@ -42,6 +88,7 @@ def fit_frame(image: Image.Image, input_px: int) -> NDArray[np.uint8]:
 
 def _open(path: Path) -> Image.Image:
     try:
-        return Image.open(path).convert("RGB")
-    except (OSError, SyntaxError) as error:  # Pillow raises both on damaged files
+        with Image.open(path) as image:
+            return image.convert("RGB")
+    except IMAGE_DAMAGE as error:
         raise InputError(f"{path}: cannot be read as an image ({error})") from None

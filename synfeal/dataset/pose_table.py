@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.dataset.number_table import read_numbers, write_numbers
+from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
 
 COLUMNS = ("frame", "path", "tx", "ty", "tz", "qw", "qx", "qy", "qz")
 HEADER = ",".join(COLUMNS)
+UNIT_TOLERANCE = 1e-2
 
 
 @dataclass(frozen=True)
@@ -73,8 +75,48 @@ def read_pose_table(path: Path) -> PoseTable:
     """Read a table written by :func:`write_pose_table`.
 
     Raises:
-        InputError: the file is missing, has another header, or holds anything but finite numbers.
+        InputError: the file is missing, has another header, or holds anything but finite numbers,
+            whole ones for frame and path, and unit quaternions.
     """
     values = read_numbers(path, HEADER, "pose table")
-    index = values[:, :2].astype(np.int64)
-    return PoseTable(index[:, 0], index[:, 1], values[:, 2:5], values[:, 5:9])
+    frame, straight_path = whole_numbers(values[:, :2], path).T
+    check_unit(values[:, 5:9], path, np.arange(len(values)) + 2)
+    return PoseTable(frame, straight_path, values[:, 2:5], values[:, 5:9])
+
+
+def read_frames(path: Path, start: int, stop: int) -> PoseTable:
+    """Frames ``start`` to ``stop`` (exclusive) of a pose table.
+
+    Raises:
+        InputError: as :func:`read_pose_table`, or the table is too short.
+    """
+    table = read_pose_table(path)
+    if len(table) < stop:
+        raise InputError(f"{path}: holds {len(table)} poses, {stop} are needed; make it again")
+    return table.between(start, stop)
+
+
+def whole_numbers(values: NDArray[np.float64], path: Path) -> NDArray[np.int64]:
+    """The leading columns (N, C) of a table as the indices they are.
+
+    Raises:
+        InputError: naming the first row with anything but whole numbers, 0 or above.
+    """
+    good = ((values >= 0) & (values < 2**53) & (values == np.floor(values))).all(axis=1)
+    if not good.all():
+        row = int(np.argmin(good)) + 2
+        raise InputError(f"{path}: row {row} must begin with whole numbers, 0 or above")
+    return values.astype(np.int64)
+
+
+def check_unit(quat_wxyz: NDArray[np.float64], path: Path, line_of: NDArray[np.int64]) -> None:
+    """Refuse quaternions (N, 4) that are not of unit length; files of others hold few digits."""
+    with np.errstate(over="ignore"):
+        length = np.linalg.norm(quat_wxyz, axis=1)
+    off = np.abs(length - 1.0) > UNIT_TOLERANCE
+    if off.any():
+        bad = int(np.argmax(off))
+        raise InputError(
+            f"{path}: line {line_of[bad]} holds a quaternion of length {length[bad]:.3g};"
+            " a rotation has length 1"
+        )

@@ -73,11 +73,11 @@ def _chunks(content: bytes) -> list[tuple[bytes, bytes]]:
 def _parse_json(path: Path, text: bytes) -> Json:
     try:
         header = json.loads(text)
-    except ValueError as error:  # also what is not UTF-8
+    except (ValueError, RecursionError) as error:  # also what is not UTF-8
         raise InputError(
             f"{path}: cannot be read as a mesh (its JSON is broken: {error}); export it again"
         ) from None
-    if not isinstance(header, dict) or "asset" not in header:
+    if not isinstance(header, dict) or not isinstance(header.get("asset"), dict):
         raise InputError(f"{path}: cannot be read as a mesh (its JSON is not that of a glTF)")
     version = str(header["asset"].get("version", "2.0"))
     if not version.startswith("2"):

@@ -53,10 +53,15 @@ def load_collision_mesh(path: Path) -> Triangles:
     """Read what :func:`save_collision_mesh` wrote.
 
     Raises:
-        InputError: the file is missing or is no PLY with faces.
+        InputError: the file is missing, is no PLY with faces, or holds faces without vertices or
+            vertices that are not finite.
     """
     try:
         mesh = trimesh.load_mesh(str(path), process=False)
-        return Triangles(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64))
+        found = Triangles(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64))
+        in_range = (found.faces >= 0) & (found.faces < len(found.vertices_m))
+        if not (found.faces.size and in_range.all() and np.isfinite(found.vertices_m).all()):
+            raise ValueError("its faces or vertices are damaged; make the scene again")
+        return found
     except Exception as error:  # parsers of foreign files fail in every way there is
         raise InputError(f"{path}: cannot be read as a collision mesh ({error})") from None

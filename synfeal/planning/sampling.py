@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.models import Angles
-from synfeal.geometry.rotations import rotation_from_rpy
 
 # A pose as the paper writes it: (x, y, z, roll, pitch, yaw), metres and radians.
 PoseVectors = NDArray[np.float64]
@@ -25,5 +24,10 @@ def sample_poses(bounds: NDArray[np.float64], count: int, rng: np.random.Generat
 
 
 def view_directions(poses: PoseVectors) -> NDArray[np.float64]:
-    """Unit vectors (N, 3) along the optical axes of pose vectors (N, 6), in the world."""
-    return rotation_from_rpy(poses[:, 3:])[..., 2]
+    """Unit vectors (N, 3) along the optical axes of pose vectors (N, 6), in the world.
+
+    The third column of :func:`synfeal.geometry.rotations.rotation_from_rpy`; roll turns about it.
+    """
+    pitch, yaw = poses[:, 4], poses[:, 5]
+    level = np.cos(pitch)
+    return np.stack([level * np.cos(yaw), level * np.sin(yaw), -np.sin(pitch)], axis=1)

@@ -26,8 +26,27 @@ def sample_start(
 
     The paper does not say where the camera starts. Inside a cupboard it would stay there, since
     every path must be free of collisions. Normals cannot tell inside from outside in a scan, but
-    visibility can: poses with a free view are sampled, those that see each other are joined, and
-    the start is one of the largest group. Samples are uniform in volume, so that group is the
+    visibility can: the start is one of the largest group of poses that see each other.
+
+    Raises:
+        InputError: ``max_tries`` rounds gave no pose with a free view; says what to relax.
+    """
+    group = largest_group(caster, bounds, min_view_distance_m, max_tries, N_POSES, rng)
+    start: NDArray[np.float64] = group[0]
+    return start
+
+
+def largest_group(
+    caster: RayCaster,
+    bounds: NDArray[np.float64],
+    min_view_distance_m: float,
+    max_tries: int,
+    n_poses: int,
+    rng: np.random.Generator,
+) -> PoseVectors:
+    """The largest group (M, 6) among ``n_poses`` sampled poses with a free view.
+
+    Those that see each other are joined. Samples are uniform in volume, so the group is in the
     largest space connected by free lines.
 
     Raises:
@@ -35,17 +54,16 @@ def sample_start(
     """
     found = np.empty((0, 6))
     for _ in range(max_tries):
-        poses = sample_poses(bounds, N_POSES, rng)
+        poses = sample_poses(bounds, n_poses, rng)
         found = np.vstack([found, poses[has_free_view(caster, poses, min_view_distance_m)]])
-        if len(found) >= N_POSES:
+        if len(found) >= n_poses:
             break
     if not len(found):
         raise InputError(
             f"plan: no pose in the sampling box looks farther than min_view_distance_m"
             f" ({min_view_distance_m} m); lower it, or check sampling_box, unit_m and up_axis"
         )
-    start: NDArray[np.float64] = found[_largest_group(caster, found)[0]]
-    return start
+    return found[_largest_group(caster, found)]
 
 
 def _largest_group(caster: RayCaster, poses: PoseVectors) -> NDArray[np.intp]:

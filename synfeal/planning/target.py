@@ -35,17 +35,30 @@ def admissible(
     return reachable & has_free_view(caster, poses, min_view_distance_m)
 
 
-def select_target(
+def farthest_admissible(
+    caster: RayCaster,
     start: NDArray[np.float64],
-    poses: PoseVectors,
-    is_admissible: NDArray[np.bool_],
+    rounds: PoseVectors,
+    has_view: NDArray[np.bool_],
     min_path_m: float,
-) -> NDArray[np.float64] | None:
-    """The admissible candidate (6,) farthest from ``start``; None if none is ``min_path_m`` away.
+) -> tuple[int, int] | None:
+    """Index of the first round with an admissible candidate, and there of the farthest.
 
-    The least length is the published collector's: a path of a few centimetres adds no new view.
+    None if no round has an admissible candidate at least ``min_path_m`` from ``start`` (6,). The
+    least length is the published collector's: a path of a few centimetres adds no new view.
+
+    Args:
+        caster: rays against the collision mesh.
+        start: where the path starts, (6,).
+        rounds: (R, k, 6) rounds of candidates.
+        has_view: (R, k) which have a free view, see :func:`has_free_view`.
+        min_path_m: least length of a path.
     """
-    distance = np.linalg.norm(poses[:, :3] - start[:3], axis=1)
-    distance = np.where(is_admissible, distance, -1.0)
-    farthest = int(np.argmax(distance))
-    return poses[farthest] if distance[farthest] >= max(min_path_m, 0.0) else None
+    length_m = np.linalg.norm(rounds[..., :3] - start[:3], axis=-1)
+    fit = has_view & (length_m >= min_path_m)
+    ends = rounds[fit, :3]
+    fit[fit] = caster.sees(np.broadcast_to(start[:3], ends.shape), ends)
+    if not fit.any():
+        return None
+    first = int(np.argmax(fit.any(axis=1)))
+    return first, int(np.argmax(np.where(fit[first], length_m[first], -1.0)))

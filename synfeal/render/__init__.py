@@ -13,8 +13,12 @@ def open_renderer(
     """A renderer of ``mesh`` through ``camera``; a context manager.
 
     Raises:
-        InputError: this machine offers no way to render off screen.
+        InputError: the backend named in ``render`` does not work on this machine, or none does.
     """
-    from synfeal.render.pyrender_backend import PyrenderRenderer  # takes a second: only when needed
+    if any(camera.distortion):
+        from synfeal.render.distorted import DistortedRenderer  # loads SciPy: only when needed
 
-    return PyrenderRenderer(mesh, camera)
+        return DistortedRenderer(lambda pinhole: open_renderer(mesh, pinhole, render), camera)
+    from synfeal.render.choose import open_chosen
+
+    return open_chosen(mesh, camera, render or RenderConfig())

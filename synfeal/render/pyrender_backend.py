@@ -1,11 +1,8 @@
 """Rendering with pyrender on EGL: a GPU where there is one, Mesa's software renderer elsewhere.
 
 Images are unlit, since the light of a reconstruction is in its texture; surfaces show from both
-sides; textures are mip-mapped and edges multi-sampled, so that small images do not alias.
-
-pyrender cannot test alpha in unlit renders. Instead each alpha-tested texture is thresholded at its
-cutoff and OpenGL turns what alpha remains after filtering into sample coverage: the same cut-outs,
-with smooth edges, and exact depth.
+sides; textures are mip-mapped and a pixel is the mean of a grid of samples, so that small images do
+not alias. Depth is exact at the pixel's centre.
 """
 
 from __future__ import annotations
@@ -14,7 +11,7 @@ import functools
 import os
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +21,11 @@ from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render.base import Depth, Rgb
+from synfeal.render.cutouts import thresholded
 
 # Mesa's software renderer silently draws nonsense from a buffer of 2^24 vertices on.
 MOST_VERTICES = 1 << 23
+SUPERSAMPLING = 2
 # OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
 CAM_FROM_GL: NDArray[np.float64] = np.diag([1.0, -1.0, -1.0, 1.0])
 
@@ -41,9 +40,17 @@ def _pyrender() -> Any:
     return pyrender
 
 
+class _Context(NamedTuple):
+    """The OpenGL context of this process, and what is drawn in it."""
+
+    platform: Any
+    colour: Any
+    depth: Any
+
+
 @functools.cache
-def _offscreen() -> Any:
-    """The one off-screen renderer of this process.
+def _context() -> _Context:
+    """The one context of this process.
 
     Deleting one terminates the EGL display all others share, so it is made once and kept.
 
@@ -51,21 +58,28 @@ def _offscreen() -> Any:
         InputError: there is no EGL, or it offers no device.
     """
     try:
-        offscreen = _pyrender().OffscreenRenderer(16, 16)
+        _pyrender()
+        from pyrender.platforms import egl
+
+        device = egl.get_device_by_index(int(os.environ.get("EGL_DEVICE_ID", "0")))
+        platform = egl.EGLPlatform(16, 16, device)
+        platform.init_context()
         _configure_context()
+        from synfeal.render.pyrender_passes import ColourPass, DepthPass
+
+        uploaded: set[Any] = set()
+        return _Context(platform, ColourPass(uploaded), DepthPass(uploaded))
     except Exception as error:  # what is missing decides what is raised
         raise InputError(
             f"rendering needs EGL, which does not work here ({type(error).__name__}: {error});"
             " on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri"
         ) from error
-    return offscreen
 
 
 def _configure_context() -> None:
     """Set what pyrender leaves at its default, in the context that was just made current."""
     from OpenGL import GL
 
-    GL.glEnable(GL.GL_SAMPLE_ALPHA_TO_COVERAGE)
     # Texture rows are packed; by default OpenGL expects each to start at a multiple of 4 bytes,
     # which shears textures of odd width.
     GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
@@ -74,37 +88,62 @@ def _configure_context() -> None:
 class PyrenderRenderer:
     """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
 
-    def __init__(self, mesh: TexturedMesh, camera: CameraConfig) -> None:
-        self._offscreen = _offscreen()
+    def __init__(
+        self, mesh: TexturedMesh, camera: CameraConfig, supersampling: int = SUPERSAMPLING
+    ) -> None:
+        """Prepare the mesh, which is uploaded by the first render.
+
+        Args:
+            mesh: what is drawn.
+            camera: a camera without distortion.
+            supersampling: samples per pixel along each axis of the image.
+
+        Raises:
+            InputError: EGL does not work here.
+        """
+        self._supersampling = supersampling
+        self._context = _context()
         pyrender = _pyrender()
-        self._flags = pyrender.RenderFlags.FLAT | pyrender.RenderFlags.SKIP_CULL_FACES
+        flags = pyrender.RenderFlags
+        self._flags = flags.FLAT | flags.SKIP_CULL_FACES | flags.OFFSCREEN
         self._size = (camera.width, camera.height)
+        self._intrinsics = intrinsics_of(camera)
         self._scene = pyrender.Scene(bg_color=np.zeros(4))
         # Vertex buffers hold single precision: exact around the scene's own centre, wherever it is.
         self._centre_m = mesh.bounds_m.mean(axis=0)
         parts = [piece for part in mesh.parts if part.is_drawn for piece in pieces(part)]
         self._scene.add(pyrender.Mesh([_primitive(part, self._centre_m) for part in parts]))
         self._camera = self._scene.add(
-            pyrender.IntrinsicsCamera(
-                *intrinsics_of(camera), znear=camera.near_m, zfar=camera.far_m
-            )
+            pyrender.IntrinsicsCamera(*self._intrinsics, znear=camera.near_m, zfar=camera.far_m)
         )
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         """Colours (H, W, 3) seen from a pose (4, 4); black where nothing is."""
-        return self.render_rgbd(world_from_cam)[0]
-
-    def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
-        """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
         centred = np.array(world_from_cam, np.float64)
         centred[:3, 3] -= self._centre_m
         self._scene.set_pose(self._camera, centred @ CAM_FROM_GL)
-        self._offscreen.viewport_width, self._offscreen.viewport_height = self._size
-        rgb, depth = self._offscreen.render(self._scene, flags=self._flags)
-        return np.ascontiguousarray(rgb), np.where(depth > 0.0, depth, np.float32(np.inf))
+        samples = self._drawn(self._context.colour, self._supersampling)
+        return mean_of_samples(samples, self._supersampling)
+
+    def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
+        """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
+        rgb = self.render(world_from_cam)
+        depth_m = self._drawn(self._context.depth, 1)
+        return rgb, np.where(depth_m > 0.0, depth_m, np.float32(np.inf))
+
+    def _drawn(self, one_pass: Any, factor: int) -> Any:
+        """What a pass makes of the scene, ``factor`` times as large as the image."""
+        self._context.platform.make_current()
+        one_pass.viewport_width, one_pass.viewport_height = (factor * n for n in self._size)
+        intrinsics = zip(("fx", "fy", "cx", "cy"), self._intrinsics, strict=True)
+        for name, value in intrinsics:
+            setattr(self._camera.camera, name, factor * value)
+        return one_pass.render(self._scene, self._flags)
 
     def close(self) -> None:
-        """Drop the scene; its buffers are freed when another scene is rendered."""
+        """Free the scene's buffers and textures."""
+        self._context.platform.make_current()
+        self._context.colour.forget(self._scene)
         self._scene.clear()
 
     def __enter__(self) -> Self:
@@ -112,6 +151,15 @@ class PyrenderRenderer:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def mean_of_samples(samples: NDArray[np.uint8], factor: int) -> Rgb:
+    """The image (H, W, 3) whose pixels are means of ``factor`` x ``factor`` samples."""
+    total = np.zeros((samples.shape[0] // factor, samples.shape[1] // factor, 3), np.uint16)
+    for row in range(factor):
+        for column in range(factor):
+            total += samples[row::factor, column::factor]
+    return ((total + factor**2 // 2) // factor**2).astype(np.uint8)
 
 
 def pieces(part: MeshPart, most_vertices: int = MOST_VERTICES) -> Iterator[MeshPart]:
@@ -156,27 +204,13 @@ def _material(part: MeshPart) -> Any:
     pyrender = _pyrender()
     texture = None
     if part.texture is not None:
-        pixels = _thresholded(part)
+        pixels = thresholded(part)
         channels = "RGBA" if pixels.shape[2] == 4 else "RGB"
-        texture = pyrender.Texture(source=pixels, source_channels=channels)
+        # Trilinear filtering costs a fifth more and is no closer to the mean of many samples.
+        sampler = pyrender.Sampler(minFilter=pyrender.constants.GLTF.LINEAR_MIPMAP_NEAREST)
+        texture = pyrender.Texture(sampler=sampler, source=pixels, source_channels=channels)
     return pyrender.MetallicRoughnessMaterial(
         baseColorTexture=texture,
         baseColorFactor=np.append(part.base_color[:3] / 255.0, 1.0),
         doubleSided=True,
     )
-
-
-def _thresholded(part: MeshPart) -> NDArray[np.uint8]:
-    """The texture with alpha 0 or 255, or without alpha where the part is opaque.
-
-    Texels that are not drawn take the mean colour of those that are: filtering mixes them in at the
-    edges and in every mip level, and their own colour is arbitrary.
-    """
-    assert part.texture is not None
-    if part.texture.shape[2] == 3 or part.alpha_cutoff is None:
-        return np.ascontiguousarray(part.texture[..., :3])
-    alpha = part.texture[..., 3] / 255.0 * (part.base_color[3] / 255.0)
-    drawn = alpha >= part.alpha_cutoff
-    rgba = np.dstack([part.texture[..., :3], np.where(drawn, 255, 0).astype(np.uint8)])
-    rgba[~drawn, :3] = rgba[drawn, :3].mean(axis=0)
-    return rgba

@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from synfeal.report.figures import CAPTIONS
+from synfeal.report.hard_cases.latex import hard_cases_latex
+from synfeal.report.hard_cases.table import COLUMNS
+from synfeal.report.hard_cases.table import NAME as HARD_CASES
 from synfeal.report.latex import PACKAGES, document_latex, escape, table_bodies, write_text
 from synfeal.report.results import read_table
 
@@ -25,18 +28,20 @@ def write_report_document(root: Path, tables: Sequence[Path], out_tex: Path) -> 
     """Write the document into ``root``; its figures are taken from ``root/figures``.
 
     Args:
-        root: results directory of the profile, with ``claims.csv`` and ``figures``.
+        root: results directory of the profile, with ``claims.csv``, ``figures`` and ``tables``.
         tables: the LaTeX tables, in order.
         out_tex: the document; it compiles where it lies.
 
     Raises:
-        InputError: ``claims.csv`` is missing or unreadable.
+        InputError: ``claims.csv`` is missing, or it or ``hard_cases.csv`` is unreadable.
     """
     claims = read_table(root / "claims.csv", [*CLAIM_COLUMNS, "footnote"])
+    hard_cases = root / "tables" / f"{HARD_CASES}.csv"
     names = [name for name in CAPTIONS if (root / "figures" / f"{name}.png").is_file()]
     pages = [
         f"{title_latex(root.name)}\n{claims_latex(claims)}",
         *table_bodies(tables),
+        *([hard_cases_latex(read_table(hard_cases, COLUMNS))] if hard_cases.is_file() else []),
         *(figure_latex(name, CAPTIONS[name]) for name in names),
     ]
     write_text(out_tex, document_latex(pages, CLAIM_PACKAGES))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from synfeal.files import atomic_path
 from synfeal.report.grid import Entry, Grid, Group, Line, Value, footnotes
+from synfeal.report.results import read_text
 
 PACKAGES = ("booktabs", "graphicx", "xcolor")
 HEADER = f"% Needs \\usepackage{{{','.join(PACKAGES)}}}\n"
@@ -32,6 +33,14 @@ SPECIAL = {
     "×": r"$\times$",
     "·": r"$\cdot$",
     "τ": r"$\tau$",
+    "β": r"$\beta$",
+    "θ": r"$\theta$",
+    "π": r"$\pi$",
+    "Σ": r"$\Sigma$",
+    "|": r"\textbar{}",
+    "√": r"$\surd$",
+    "ᵀ": r"$^\top$",
+    "²": r"$^2$",
     "…": r"\ldots{}",
     "³": r"$^3$",
     "–": "--",
@@ -49,8 +58,12 @@ def write_document(tables: Sequence[Path], out_tex: Path) -> None:
 
 
 def table_bodies(tables: Sequence[Path]) -> list[str]:
-    """The table environments of files that :func:`write_latex` wrote."""
-    return [table.read_text(encoding="utf-8").removeprefix(HEADER).rstrip() for table in tables]
+    """The table environments of files that :func:`write_latex` wrote.
+
+    Raises:
+        InputError: one of them cannot be read.
+    """
+    return [read_text(table).removeprefix(HEADER).rstrip() for table in tables]
 
 
 def document_latex(pages: Sequence[str], packages: Sequence[str] = PACKAGES) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from baselines.groundtruth.methods import METHODS
 from synfeal.config import MODELS
 from synfeal.report.cells import FROM_SCRATCH, Cell
 from synfeal.report.grid import Entry, Grid, Group, Kind, Line, Value, with_bold
@@ -16,12 +17,7 @@ TITLES = {
     "posenet2resnet": "PoseNet2ResNet",
     "posenet2": "PoseNet2",
 }
-SOURCES = {
-    "sfm": "SfM",
-    "rgbd-toro": "RGB-D SLAM w/ TORO",
-    "rgbd-g2o": "RGB-D SLAM w/ g2o",
-    "synfeal": "Synfeal",
-}
+SOURCES = {**{name: method.title for name, method in METHODS.items()}, "synfeal": "Synfeal"}
 BLOCKS = {"": "", "orientation": "Ori.", "position": "Pos.", "both": "Pos.+Ori."}
 CAPTIONS = {
     "table2_ground_truth": "Median localization error with labels from different data collection "

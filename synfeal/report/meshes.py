@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
 from synfeal.report.grid import Entry, Grid, Group, Line, Value
 from synfeal.report.latex import write_latex
 from synfeal.report.layouts import scene_title
 from synfeal.report.published import MeshFacts, published_meshes
-from synfeal.report.results import read_result
+from synfeal.report.results import check_result, read_result
 from synfeal.report.tables import write_rows
 
 NAME = "table1_meshes"
+_SHAPE = TypeAdapter(MeshFacts)
 FACTS = ("vertices", "faces", "volume_m3")
 COLUMNS = ("scene", *FACTS, *(f"published_{fact}" for fact in FACTS))
 LABELS = {"vertices": "# Vertices", "faces": "# Faces", "volume_m3": "Volume [m³]"}
@@ -42,8 +45,11 @@ def write_meshes_table(scenes: Sequence[str], root: Path, out_csv: Path, out_tex
 def read_mesh_facts(root: Path, scene: str) -> MeshFacts:
     """Counts and volume from ``<root>/scenes/<scene>/properties.json``."""
     path = root / "scenes" / scene / "properties.json"
-    values = read_result(path, FACTS, "make the scene again")
-    return MeshFacts(**{fact: values[fact] for fact in FACTS})
+    remedy = "make the scene again"
+    values = read_result(path, FACTS, remedy)
+    facts = {fact: values[fact] for fact in FACTS}
+    check_result(path, facts, _SHAPE, remedy)
+    return MeshFacts(**facts)
 
 
 def meshes_grid(meshes: Mapping[str, MeshFacts]) -> Grid:

@@ -18,7 +18,7 @@ from synfeal.errors import InputError
 from synfeal.files import atomic_path
 from synfeal.report.claims.table import claims_markdown
 from synfeal.report.layouts import SOURCES, TITLES, scene_title
-from synfeal.report.results import read_table
+from synfeal.report.results import read_table, read_text
 
 README = Path("README.md")
 ROOT = Path("results/mini")
@@ -100,17 +100,6 @@ def rewritten(text: str, parts: Mapping[str, str]) -> str:
             raise InputError(f"{README}: has no '<!-- {name} -->' … '<!-- /{name} -->'")
         text = f"{text[: found.end(1)]}\n\n{part}\n\n{text[found.start(2) :]}"
     return text
-
-
-def read_text(path: Path) -> str:
-    """The text of a result file.
-
-    Raises:
-        InputError: there is no such file.
-    """
-    if not path.is_file():
-        raise InputError(f"{path}: missing; make the results first")
-    return path.read_text(encoding="utf-8")
 
 
 def _localizer_table(rows: Sequence[Row], heading: str, label: Callable[[Row], str]) -> str:

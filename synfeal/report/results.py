@@ -4,11 +4,29 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable
+import math
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+
 from synfeal.errors import InputError
+from synfeal.files import read_json
+
+
+def read_text(path: Path) -> str:
+    """The text of a result file.
+
+    Raises:
+        InputError: it is missing or cannot be read.
+    """
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{path}: missing; make the results first") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({error}); make it again") from None
 
 
 def read_result(path: Path, needed: Iterable[str], remedy: str) -> dict[str, Any]:
@@ -23,7 +41,7 @@ def read_result(path: Path, needed: Iterable[str], remedy: str) -> dict[str, Any
         InputError: the file is missing, is not JSON, is no mapping, or lacks a key.
     """
     try:
-        value = json.loads(path.read_text(encoding="utf-8"))
+        value = read_json(path)
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read as JSON ({error}); {remedy}") from None
     if not isinstance(value, dict):
@@ -34,21 +52,64 @@ def read_result(path: Path, needed: Iterable[str], remedy: str) -> dict[str, Any
     return value
 
 
-def read_table(path: Path, needed: Iterable[str] = ()) -> list[dict[str, str]]:
-    """Rows of a CSV file by column.
+def check_result(path: Path, value: Any, shape: TypeAdapter[Any], remedy: str) -> None:
+    """Check that what a result file holds, or a part of it, has the shape it is read as.
 
     Raises:
-        InputError: it cannot be read, or lacks a column of ``needed``.
+        InputError: naming the first key that is missing or of another type.
+    """
+    try:
+        shape.validate_json(json.dumps(value), strict=True)
+    except ValidationError as error:
+        first = error.errors(include_input=False)[0]
+        key = ".".join(map(str, first["loc"]))
+        raise InputError(f"{path}: {key}: {first['msg']}; {remedy}") from None
+
+
+def read_table(
+    path: Path,
+    needed: Iterable[str] = (),
+    numbers: Collection[str] = (),
+    optional: Collection[str] = (),
+) -> list[dict[str, str]]:
+    """Rows of a CSV file by column.
+
+    Args:
+        path: the file.
+        needed: columns it must have.
+        numbers: those of them whose cells hold finite numbers.
+        optional: those whose cells hold finite numbers or nothing.
+
+    Raises:
+        InputError: it cannot be read, lacks a column of ``needed``, has a row of another length, or
+            holds something else where a number belongs.
     """
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            reader = csv.DictReader(file, restval="")
+            reader = csv.DictReader(file, strict=True)
+            found = tuple(reader.fieldnames or ())
             rows = list(reader)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(
             f"{path}: cannot be read as CSV ({error}); make that table again"
         ) from None
-    absent = [column for column in needed if column not in (reader.fieldnames or ())]
+    absent = [column for column in needed if column not in found]
     if absent:
         raise InputError(f"{path}: column {', '.join(absent)} missing; make that table again")
+    for place, row in enumerate(rows, start=1):
+        where = f"{path}: row {place} below the header"
+        if None in row or None in row.values():
+            raise InputError(f"{where} has more or fewer cells than it; make that table again")
+        filled = [*numbers, *(column for column in optional if row[column])]
+        bad = [column for column in filled if not is_number(row[column])]
+        if bad:
+            raise InputError(f"{where}: {bad[0]} must be a number; make that table again")
     return rows
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell holds a finite number."""
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False

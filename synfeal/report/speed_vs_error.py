@@ -7,12 +7,20 @@ from pathlib import Path
 from statistics import median
 
 from synfeal.dataset.number_table import read_numbers
+from synfeal.errors import InputError
 from synfeal.mesh.collision import CURVE_HEADER, Rung
+from synfeal.report.assistance import TOTAL
+from synfeal.report.label_error import COLUMNS as LABEL_COLUMNS
+from synfeal.report.layouts import SOURCES
+from synfeal.report.render_speed import COLUMNS as RENDER_COLUMNS
+from synfeal.report.render_speed import render_rows
+from synfeal.report.results import read_table
 from synfeal.report.tables import Value, write_rows
 
+NAME = "speed_vs_error"
 COLUMNS = (
     *("stage", "scene", "variant", "faces", "seconds_per_item", "items_per_s"),
-    *("error", "error_unit", "chosen"),
+    *("error", "error_unit", "chosen", *RENDER_COLUMNS),
 )
 Row = dict[str, Value]
 
@@ -43,6 +51,8 @@ def collision_rows(root: Path, scene: str) -> list[Row]:
     path = root / "scenes" / scene / "collision_curve.csv"
     values = read_numbers(path, CURVE_HEADER, "curve of the collision mesh")
     curve = [Rung(*line) for line in values.tolist()]
+    if not curve or min(min(r.rays_per_s, r.full_rays_per_s) for r in curve) <= 0:
+        raise InputError(f"{path}: needs rows, and speeds above 0; make the scene again")
     full_rays_per_s = median(rung.full_rays_per_s for rung in curve)
     variants = ["full"] + ["decimated"] * (len(curve) - 1)
     return [
@@ -65,4 +75,29 @@ def _row(scene: str, variant: str, rung: Rung, rays_per_s: float) -> Row:
     }
 
 
-READERS: tuple[Callable[[Path, str], list[Row]], ...] = (collision_rows,)
+def label_rows(root: Path, scene: str) -> list[Row]:
+    """The methods that estimate labels; an item is a frame, an error that of its position.
+
+    The error is the median over both splits after assistance; times are of the processor. Nothing
+    is chosen: the paper compares the methods.
+    """
+    numbers = ("seconds_per_frame", "position_m_median")
+    rows = read_table(root / "tables" / "label_error.csv", LABEL_COLUMNS, numbers)
+    shown = {"scene": scene, "split": TOTAL, "assistance": "after"}
+    return [
+        {
+            "stage": "labels",
+            "scene": scene,
+            "variant": SOURCES[row["method"]],
+            "seconds_per_item": float(row["seconds_per_frame"]),
+            "items_per_s": 1.0 / float(row["seconds_per_frame"]),
+            "error": float(row["position_m_median"]),
+            "error_unit": "m",
+            "chosen": 0,
+        }
+        for row in rows
+        if shown.items() <= row.items()
+    ]
+
+
+READERS: tuple[Callable[[Path, str], list[Row]], ...] = (collision_rows, render_rows, label_rows)

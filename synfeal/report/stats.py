@@ -6,16 +6,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean, stdev
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import Field, FiniteFloat, NonNegativeInt, TypeAdapter
 from scipy.stats import binomtest, kendalltau
 
-from synfeal.report.results import read_result
+from synfeal.report.results import check_result, read_result
 
 MEASURES = ("position_m", "orientation_deg", "position_m_true", "orientation_deg_true")
 COUNTS = ("n_train", "n_test", "failed")
 BASELINE = "baseline_position_m_true"
 Metrics = Mapping[str, Any]
+REMEDY = "score that run again"
+_COUNTS = TypeAdapter(dict[str, NonNegativeInt])
+_SCORES = TypeAdapter(dict[str, Annotated[FiniteFloat, Field(ge=0)] | None])
 
 
 @dataclass(frozen=True)
@@ -65,12 +69,14 @@ def read_metrics(path: Path) -> Metrics:
     """The scores of one run.
 
     Raises:
-        InputError: the file is missing, is not JSON, or lacks a key.
+        InputError: the file is missing, is not JSON, lacks a key, or holds no numbers there.
     """
     limits = [f"{measure}_{end}" for measure in MEASURES for end in ("low", "high")]
-    return read_result(
-        path, (*COUNTS, *MEASURES, *limits, "position_rms_m"), "score that run again"
-    )
+    scores = (*MEASURES, *limits, "position_rms_m", BASELINE)
+    values = read_result(path, (*COUNTS, *scores), REMEDY)
+    check_result(path, {name: values[name] for name in COUNTS}, _COUNTS, REMEDY)
+    check_result(path, {name: values[name] for name in scores}, _SCORES, REMEDY)
+    return values
 
 
 def combine(runs: Sequence[Metrics]) -> CellScores:

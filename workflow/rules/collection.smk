@@ -29,6 +29,7 @@ rule scene:
 rule plan:
     input:
         collision=rules.scene.output.collision,
+        repeat=CONFIG.collection.repeat or [],
     output:
         plan=f"{ROOT}/plans/{{scene}}/{{split}}.csv",
     log:
@@ -47,6 +48,28 @@ rule plan:
         seed=lambda w: seed_of(CONFIG.seed, "plan", w.scene, w.split),
     script:
         "../scripts/plan.py"
+
+
+rule coverage:
+    input:
+        collision=rules.scene.output.collision,
+        plan=rules.plan.output.plan,
+    output:
+        coverage=f"{ROOT}/plans/{{scene}}/{{split}}.coverage.json",
+    log:
+        f"{ROOT}/logs/coverage/{{scene}}/{{split}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/coverage/{{scene}}/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
+        camera=dump(CONFIG.network_camera),
+    script:
+        "../scripts/plan_coverage.py"
 
 
 rule render:
@@ -69,8 +92,84 @@ rule render:
         start=lambda w: sequence_named(w).start,
         stop=lambda w: sequence_named(w).stop,
         with_depth=lambda w: w.camera == "groundtruth",
+        render=dump(CONFIG.render),
     script:
         "../scripts/render.py"
+
+
+rule render_speed:
+    input:
+        mesh=rules.scene.output.mesh,
+        plan=f"{ROOT}/plans/{{scene}}/test.csv",
+    output:
+        speed=f"{ROOT}/scenes/{{scene}}/render_speed.csv",
+    log:
+        f"{ROOT}/logs/render_speed/{{scene}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/render_speed/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+    params:
+        network_camera=dump(CONFIG.network_camera),
+        groundtruth_camera=dump(CONFIG.groundtruth_camera),
+        render_speed=dump(CONFIG.render_speed),
+        render=dump(CONFIG.render),
+    script:
+        "../scripts/render_speed.py"
+
+
+# What the localizers see goes from the renderer straight into an array, not through image files.
+rule render_packed:
+    input:
+        mesh=rules.scene.output.mesh,
+        plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w, 'network').split}.csv",
+    output:
+        frames=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.npy"),
+        record=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.json"),
+    log:
+        f"{ROOT}/logs/render_packed/{{scene}}/{{sequence}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/render_packed/{{scene}}/{{sequence}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+    params:
+        camera=dump(CONFIG.network_camera),
+        start=lambda w: sequence_named(w, "network").start,
+        stop=lambda w: sequence_named(w, "network").stop,
+        input_px=CONFIG.network.input_px,
+        render=dump(CONFIG.render),
+    script:
+        "../scripts/render_packed.py"
+
+
+rule pack:
+    input:
+        plan=rules.plan.output.plan,
+        shards=lambda w: packed_shards(w.scene, w.split, "npy"),
+        records=lambda w: packed_shards(w.scene, w.split, "json"),
+    output:
+        frames=f"{ROOT}/frames/{{scene}}/{{split}}.npy",
+        record=f"{ROOT}/frames/{{scene}}/{{split}}.json",
+    log:
+        f"{ROOT}/logs/pack/{{scene}}/{{split}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/pack/{{scene}}/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        camera=dump(CONFIG.network_camera),
+        render=dump(CONFIG.render),
+    script:
+        "../scripts/pack.py"
 
 
 rule dataset:
@@ -93,29 +192,10 @@ rule dataset:
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
         counts=lambda w: [n_frames(w.scene, w.camera, split) for split in SPLITS],
         shard_frames=CONFIG.shard_frames,
+        render=dump(CONFIG.render),
         seed=CONFIG.seed,
     script:
         "../scripts/dataset.py"
-
-
-rule pack:
-    input:
-        sequences=lambda w: sequence_dirs(w.scene, "network", w.split),
-    output:
-        frames=f"{ROOT}/frames/{{scene}}/{{split}}.npy",
-    log:
-        f"{ROOT}/logs/pack/{{scene}}/{{split}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/pack/{{scene}}/{{split}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=2000,
-    params:
-        input_px=CONFIG.network.input_px,
-    script:
-        "../scripts/pack.py"
 
 
 rule true_labels:

@@ -3,6 +3,13 @@ import sys
 
 from baselines.localizers.names import BACKBONE_OF
 from baselines.groundtruth.batches import batches_of
+from baselines.groundtruth.methods import (
+    METHODS,
+    check_sources,
+    frame_methods,
+    graph_methods,
+    stages_of,
+)
 from synfeal.config import check_mesh_files, parse_config, read_experiments, runs_of
 from synfeal.config.models import MODELS
 from synfeal.dataset.sequences import sequences_of
@@ -16,6 +23,7 @@ try:
     )
     check_mesh_files(CONFIG.scenes)
     EXPERIMENTS = read_experiments(CONFIG)
+    check_sources(EXPERIMENTS, CONFIG.experiments)
 except InputError as error:
     sys.exit(f"error: {error}")
 
@@ -23,7 +31,7 @@ ROOT = CONFIG.root.as_posix()
 SPLITS = ("train", "test")
 RUNS = runs_of(EXPERIMENTS, CONFIG.training.repetitions)
 TABLE_NAMES = ["table1_meshes", *sorted({e.table for e in EXPERIMENTS})]
-RECONSTRUCTED = ("sfm", "rgbd-toro", "rgbd-g2o")
+RECONSTRUCTED = tuple(METHODS)
 
 
 wildcard_constraints:
@@ -38,6 +46,8 @@ wildcard_constraints:
     repetition=r"\d+",
     size=r"\w+",
     reconstructed="|".join(RECONSTRUCTED),
+    frame_method="|".join(frame_methods()),
+    graph_method="|".join(graph_methods()),
 
 
 def dump(model, **kwargs):
@@ -60,10 +70,17 @@ def sequences(scene, camera):
     return sequences_of(*counts, CONFIG.shard_frames)
 
 
-def sequence_named(wildcards):
+def sequence_named(wildcards, camera=None):
     """The sequence of a wildcard: which split and which frames it holds."""
-    every = sequences(wildcards.scene, wildcards.camera)
+    every = sequences(wildcards.scene, camera or wildcards.camera)
     return next(s for s in every if s.name == wildcards.sequence)
+
+
+def packed_shards(scene, split, kind):
+    """Parts of a split's packed frames, in order (``npy``), or what they are (``json``)."""
+    stem = f"{ROOT}/frames/{scene}/shards"
+    every = sequences(scene, "network")
+    return [f"{stem}/{s.name}.{kind}" for s in every if s.split == split]
 
 
 def sequence_dirs(scene, camera, split=None, stop=None):
@@ -140,23 +157,50 @@ def errors_of(experiments):
     return [m.replace("metrics.json", "errors.csv") for m in metrics_of(experiments)]
 
 
-def shown_frames():
-    """Test sequences as the localizers see them, with the manifests that list them."""
+def packed_frames(kind, splits=SPLITS):
+    """Frames as the localizers see them (``npy``), or the records of what they are (``json``)."""
     scenes = sorted({e.scene for e in EXPERIMENTS})
-    manifests = [f"{ROOT}/datasets/{s}/network/manifest.json" for s in scenes]
-    return manifests + [d for s in scenes for d in sequence_dirs(s, "network", "test")]
+    return [f"{ROOT}/frames/{s}/{split}.{kind}" for s in scenes for split in splits]
 
 
-def all_manifests():
-    cameras = [("network", e.scene) for e in EXPERIMENTS]
-    cameras += [
-        ("groundtruth", e.scene) for e in EXPERIMENTS if e.labels in RECONSTRUCTED
-    ]
-    return [f"{ROOT}/datasets/{s}/{c}/manifest.json" for c, s in sorted(set(cameras))]
+def manifests(camera):
+    """Data sets of image files; those of the network camera are made on demand only."""
+    scenes = {
+        e.scene for e in EXPERIMENTS if camera == "network" or e.labels in RECONSTRUCTED
+    }
+    return [f"{ROOT}/datasets/{s}/{camera}/manifest.json" for s in sorted(scenes)]
+
+
+def estimated_sets():
+    """Scene, size and method of every label set that is re-estimated, each once."""
+    sets = {(e.scene, e.size, e.labels) for e in EXPERIMENTS}
+    return sorted(s for s in sets if s[2] in RECONSTRUCTED)
 
 
 def assistance_files():
-    sets = {
-        (e.scene, e.size, e.label_id) for e in EXPERIMENTS if e.labels in RECONSTRUCTED
-    }
-    return [f"{ROOT}/labels/{s}/{z}/{l}/assistance.json" for s, z, l in sorted(sets)]
+    return [
+        f"{ROOT}/labels/{s}/{z}/{l}/assistance.json" for s, z, l in estimated_sets()
+    ]
+
+
+def unassisted_labels():
+    return [
+        f"{ROOT}/labels/{s}/{z}/{l}/{split}-unassisted.csv"
+        for s, z, l in estimated_sets()
+        for split in SPLITS
+    ]
+
+
+def batch_facts():
+    """What every batch of the estimated label sets took, stage by stage."""
+    return sorted(
+        {
+            f"{ROOT}/groundtruth/{scene}/{size}/{stage}/{split}/batch-{b.index:03d}.json"
+            for scene, size, method in estimated_sets()
+            for stage in stages_of(method)
+            for split in SPLITS
+            for b in batches_of(
+                CONFIG.n_frames(scene, size, split), CONFIG.groundtruth.batch_frames
+            )
+        }
+    )

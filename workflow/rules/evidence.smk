@@ -62,6 +62,7 @@ rule assistance:
         records=assistance_files(),
     output:
         csv=f"{ROOT}/tables/assistance.csv",
+        tex=f"{ROOT}/tables/assistance.tex",
     log:
         f"{ROOT}/logs/tables/assistance.log",
     benchmark:
@@ -77,12 +78,41 @@ rule assistance:
         "../scripts/assistance.py"
 
 
+rule label_error:
+    input:
+        labels=pose_labels(),
+        unassisted=unassisted_labels(),
+        records=assistance_files(),
+        facts=batch_facts(),
+    output:
+        csv=f"{ROOT}/tables/label_error.csv",
+        tex=f"{ROOT}/tables/label_error.tex",
+    log:
+        f"{ROOT}/logs/tables/label_error.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/label_error.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        rows=[dump(e) for e in EXPERIMENTS if e.labels in RECONSTRUCTED],
+    script:
+        "../scripts/label_error.py"
+
+
 rule speed_vs_error:
     input:
         curves=expand(
             f"{ROOT}/scenes/{{scene}}/collision_curve.csv",
             scene=sorted({e.scene for e in EXPERIMENTS}),
         ),
+        rendering=expand(
+            f"{ROOT}/scenes/{{scene}}/render_speed.csv",
+            scene=sorted({e.scene for e in EXPERIMENTS}),
+        ),
+        labels=rules.label_error.output.csv,
     output:
         csv=f"{ROOT}/tables/speed_vs_error.csv",
     log:
@@ -98,6 +128,22 @@ rule speed_vs_error:
         scenes=sorted({e.scene for e in EXPERIMENTS}),
     script:
         "../scripts/speed_vs_error.py"
+
+
+rule hard_cases:
+    output:
+        csv=f"{ROOT}/tables/hard_cases.csv",
+    log:
+        f"{ROOT}/logs/tables/hard_cases.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/hard_cases.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    script:
+        "../scripts/hard_cases.py"
 
 
 rule document:
@@ -121,6 +167,11 @@ rule document:
 DRAWN_TABLES = ("table3_inconsistencies", "table4_size")
 
 
+def label_figures():
+    """The figures of a design that draws nothing of trainings."""
+    return [] if set(TABLE_NAMES) & set(DRAWN_TABLES) else [f"{ROOT}/figures"]
+
+
 rule figures:
     input:
         tables=expand(
@@ -135,7 +186,7 @@ rule figures:
             f"{ROOT}/scenes/{{scene}}/collision.ply",
             scene=sorted({e.scene for e in EXPERIMENTS}),
         ),
-        frames=shown_frames(),
+        frames=packed_frames("npy", ["test"]),
     output:
         figures=report(
             directory(f"{ROOT}/figures"),
@@ -187,7 +238,7 @@ rule claims:
     input:
         tables=expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
         assistance=rules.assistance.output.csv,
-        manifests=all_manifests(),
+        frames=packed_frames("json"),
     output:
         csv=report(
             f"{ROOT}/claims.csv",
@@ -214,12 +265,15 @@ rule provenance:
     input:
         tables=expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
         speed=rules.speed_vs_error.output.csv,
+        hard_cases=rules.hard_cases.output.csv,
         assistance=rules.assistance.output.csv,
+        label_error=rules.label_error.output.csv,
         figures=rules.figures.output.figures,
         summary=rules.summary.output.page,
         claims=rules.claims.output.csv,
     output:
         record=f"{ROOT}/provenance.json",
+        jobs=f"{ROOT}/benchmarks.csv",
     log:
         f"{ROOT}/logs/provenance.log",
     benchmark:
@@ -272,6 +326,7 @@ rule report:
 rule report_document:
     input:
         tex=rules.document.input.tex,
+        hard_cases=rules.hard_cases.output.csv,
         claims=rules.claims.output.csv,
         figures=rules.figures.output.figures,
     output:

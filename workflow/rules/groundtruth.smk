@@ -31,6 +31,7 @@ rule sfm:
         truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/{{split}}.csv",
     output:
         trajectory=f"{ROOT}/groundtruth/{{scene}}/{{size}}/sfm/{{split}}/batch-{{batch}}.csv",
+        facts=f"{ROOT}/groundtruth/{{scene}}/{{size}}/sfm/{{split}}/batch-{{batch}}.json",
     log:
         f"{ROOT}/logs/sfm/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
     benchmark:
@@ -57,6 +58,7 @@ rule rgbd:
         ),
     output:
         graph=f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd/{{split}}/batch-{{batch}}.g2o",
+        facts=f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd/{{split}}/batch-{{batch}}.json",
     log:
         f"{ROOT}/logs/rgbd/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
     benchmark:
@@ -71,21 +73,50 @@ rule rgbd:
         stop=lambda w: batch_of(w).stop,
         camera=dump(CONFIG.groundtruth_camera),
         rgbd=dump(CONFIG.groundtruth.rgbd),
+        seed=lambda w: seed_of(CONFIG.seed, "depth-sensor", w.scene),
     script:
         "../scripts/rgbd.py"
+
+
+rule estimate:
+    input:
+        sequences=lambda w: sequence_dirs(
+            w.scene, "groundtruth", w.split, batch_of(w).stop
+        ),
+    output:
+        trajectory=f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{frame_method}}/{{split}}/batch-{{batch}}.csv",
+        facts=f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{frame_method}}/{{split}}/batch-{{batch}}.json",
+    log:
+        f"{ROOT}/logs/{{frame_method}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/{{frame_method}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=4000,
+    params:
+        start=lambda w: batch_of(w).start,
+        stop=lambda w: batch_of(w).stop,
+        camera=dump(CONFIG.groundtruth_camera),
+        groundtruth=lambda w: dump(
+            CONFIG.groundtruth, include={METHODS[w.frame_method].settings}
+        ),
+        seed=lambda w: seed_of(CONFIG.seed, "depth-sensor", w.scene),
+    script:
+        "../scripts/estimate.py"
 
 
 rule posegraph:
     input:
         graph=f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd/{{split}}/batch-{{batch}}.g2o",
     output:
-        trajectory=f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd-{{optimiser}}/{{split}}/batch-{{batch}}.csv",
+        trajectory=f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{graph_method}}/{{split}}/batch-{{batch}}.csv",
+        facts=f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{graph_method}}/{{split}}/batch-{{batch}}.json",
     log:
-        f"{ROOT}/logs/rgbd-{{optimiser}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
+        f"{ROOT}/logs/{{graph_method}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
     benchmark:
-        f"{ROOT}/benchmarks/rgbd-{{optimiser}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
-    wildcard_constraints:
-        optimiser="toro|g2o",
+        f"{ROOT}/benchmarks/{{graph_method}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
     conda:
         "../envs/synfeal.yaml"
     threads: 1
@@ -106,6 +137,8 @@ rule chain:
     output:
         train=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/train.csv",
         test=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/test.csv",
+        train_unassisted=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/train-unassisted.csv",
+        test_unassisted=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/test-unassisted.csv",
         assistance=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/assistance.json",
     log:
         f"{ROOT}/logs/chain/{{scene}}/{{size}}/{{reconstructed}}.log",
@@ -117,6 +150,9 @@ rule chain:
     resources:
         mem_mb=1000,
     params:
-        groundtruth=dump(CONFIG.groundtruth, exclude={"sfm", "rgbd", "posegraph"}),
+        groundtruth=dump(
+            CONFIG.groundtruth,
+            include={"batch_frames", "assist_position_m", "assist_orientation_deg"},
+        ),
     script:
         "../scripts/chain.py"

@@ -6,4 +6,5 @@ from synfeal.report.assistance import write_assistance_table
 
 with job(snakemake.log[0]):
     rows = [Experiment(**row) for row in snakemake.params.rows]
-    write_assistance_table(rows, Path(snakemake.output.csv).parents[1], Path(snakemake.output.csv))
+    csv, tex = Path(snakemake.output.csv), Path(snakemake.output.tex)
+    write_assistance_table(rows, csv.parents[1], csv, tex)

@@ -11,6 +11,7 @@ with job(snakemake.log[0]):
             [Path(path) for path in snakemake.input[f"{split}_batches"]],
             Path(snakemake.input[f"{split}_truth"]),
             Path(snakemake.output[split]),
+            Path(snakemake.output[f"{split}_unassisted"]),
             config,
         )
         for split in ("train", "test")

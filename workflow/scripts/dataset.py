@@ -10,5 +10,6 @@ with job(snakemake.log[0]):
     directory = Path(snakemake.output.manifest).parent
     sequences = sequences_of(*snakemake.params.counts, snakemake.params.shard_frames)
     write_splits(directory, sequences)
-    origin = {"scene": snakemake.wildcards.scene, "seed": snakemake.params.seed}
+    params = snakemake.params
+    origin = {"scene": snakemake.wildcards.scene, "seed": params.seed, "render": params.render}
     write_manifest(directory, sequences, CameraConfig(**snakemake.params.camera), origin)

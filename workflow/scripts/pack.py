@@ -1,8 +1,17 @@
 from pathlib import Path
 
-from synfeal.dataset.packed import pack_frames
+from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.dataset.packed import join_packed
+from synfeal.dataset.packed_record import write_packed_record
 from synfeal.job import job
 
 with job(snakemake.log[0]):
-    sequences = [Path(path) for path in snakemake.input.sequences]
-    pack_frames(sequences, snakemake.params.input_px, Path(snakemake.output.frames))
+    frames = Path(snakemake.output.frames)
+    join_packed([Path(path) for path in snakemake.input.shards], frames)
+    write_packed_record(
+        frames,
+        [Path(path) for path in snakemake.input.records],
+        Path(snakemake.input.plan),
+        CameraConfig(**snakemake.params.camera),
+        RenderConfig(**snakemake.params.render),
+    )

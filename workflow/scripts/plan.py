@@ -14,5 +14,6 @@ with job(snakemake.log[0]):
         CollectionConfig(**snakemake.params.collection),
         snakemake.params.n_frames,
         np.random.default_rng(snakemake.params.seed),
+        snakemake.wildcards.split,
     )
     write_pose_table(Path(snakemake.output.plan), table)

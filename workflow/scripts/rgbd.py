@@ -1,9 +1,10 @@
 from pathlib import Path
 
 from baselines.groundtruth.posegraph.graph import write_g2o
-from baselines.groundtruth.rgbd import rgbd_graph
+from baselines.groundtruth.rgbd import rgbd_graph_with_facts
 from synfeal.config.models import CameraConfig, RgbdConfig
 from synfeal.dataset.sevenscenes import frame_paths
+from synfeal.files import write_json
 from synfeal.job import job
 
 params = snakemake.params
@@ -11,5 +12,8 @@ with job(snakemake.log[0]):
     sequences = [Path(path) for path in snakemake.input.sequences]
     color = frame_paths(sequences, "color.png")[params.start : params.stop]
     depth = frame_paths(sequences, "depth.png")[params.start : params.stop]
-    graph = rgbd_graph(color, depth, CameraConfig(**params.camera), RgbdConfig(**params.rgbd))
+    graph, facts = rgbd_graph_with_facts(
+        color, depth, CameraConfig(**params.camera), RgbdConfig(**params.rgbd), params.seed
+    )
     write_g2o(Path(snakemake.output.graph), graph)
+    write_json(Path(snakemake.output.facts), facts.as_dict())

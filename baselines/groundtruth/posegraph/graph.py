@@ -15,8 +15,11 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
+from synfeal.dataset.pose_table import check_unit, whole_numbers
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
 from synfeal.geometry.poses import inverse, pose_from_quat, quat_wxyz_of, relative
@@ -80,6 +83,20 @@ def chi2(graph: PoseGraph, first_from_cam: Array) -> float:
     return float(np.einsum("ei,eij,ej->", residuals, information, residuals))
 
 
+def check_connected(graph: PoseGraph) -> None:
+    """Refuse a graph with nodes that no chain of edges joins to node 0: their poses are unknown.
+
+    Raises:
+        ValueError: naming the first such node.
+    """
+    ends = np.array([(edge.i, edge.j) for edge in graph.edges], dtype=np.int64).reshape(-1, 2)
+    links = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(graph),) * 2)
+    _, group = connected_components(links, directed=False)
+    apart = np.flatnonzero(group != group[0])
+    if len(apart):
+        raise ValueError(f"node {apart[0]} is not connected to node 0 by edges")
+
+
 def swapped_blocks(information: Array) -> Array:
     """The (6, 6) matrix with translation and rotation exchanged; its own inverse."""
     order = [3, 4, 5, 0, 1, 2]
@@ -104,7 +121,8 @@ def read_g2o(path: Path) -> PoseGraph:
     """Read the vertices and edges of a g2o file; other records are refused.
 
     Raises:
-        InputError: the file cannot be read, holds another record, or its vertices are not 0..n-1.
+        InputError: the file cannot be read, holds another record, its vertices are not 0..n-1, or
+            edges do not join them all.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -117,6 +135,9 @@ def read_g2o(path: Path) -> PoseGraph:
         if kind not in _CELLS:
             raise InputError(f"{path}: line {number} is no {_VERTEX} or {_EDGE} record")
         values = _numbers(cells, _CELLS[kind], f"{path}: line {number}")
+        n_ids = 1 if kind == _VERTEX else 2
+        whole_numbers(values[None, :n_ids], path)
+        check_unit(values[None, n_ids + 3 : n_ids + 7], path, np.array([number]))
         if kind == _VERTEX:
             vertices[int(values[0])] = _pose(values[1:])
         else:
@@ -131,7 +152,12 @@ def _graph(vertices: dict[int, Array], edges: Sequence[Edge], path: Path) -> Pos
     for edge in edges:
         if not (edge.i in vertices and edge.j in vertices and edge.i != edge.j):
             raise InputError(f"{path}: edge {edge.i} {edge.j} must join two different vertices")
-    return PoseGraph(np.array([vertices[node] for node in range(len(vertices))]), tuple(edges))
+    graph = PoseGraph(np.array([vertices[node] for node in range(len(vertices))]), tuple(edges))
+    try:
+        check_connected(graph)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}; is the file cut short? Make it again") from None
+    return graph
 
 
 def _numbers(cells: Sequence[str], count: int, where: str) -> Array:

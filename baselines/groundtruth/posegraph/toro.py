@@ -41,10 +41,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from baselines.groundtruth.posegraph.graph import PoseGraph, chi2
-from synfeal.geometry.poses import inverse, pose_from_quat, quat_wxyz_of, relative
+from baselines.groundtruth.posegraph.sweep import sweep
+from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of, relative
 
 Array = NDArray[np.float64]
 
@@ -80,18 +80,26 @@ def optimise_toro(graph: PoseGraph, iterations: int, epsilon: float) -> Array:
     parents = spanning_tree(graph)
     edges = sorted(_path_edges(graph, parents), key=lambda edge: edge.top_depth)
     stiffness = _stiffness(edges, len(graph))
-    shares = [_shares(stiffness[edge.nodes - 1]) for edge in edges]
-    rates = [len(edge.nodes) * edge.weight / stiffness.min(axis=0) for edge in edges]
-    parent_from_node = relative(graph.first_from_cam[parents], graph.first_from_cam)
-    error = chi2(graph, _poses(parent_from_node, parents))
+    rates = np.array([len(e.nodes) * e.weight / stiffness.min(axis=0) for e in edges])
+    paths = (
+        np.cumsum([0, *(len(edge.nodes) for edge in edges)]),
+        np.concatenate([edge.nodes for edge in edges]),
+        np.concatenate([edge.upward for edge in edges]),
+        np.concatenate([_shares(stiffness[edge.nodes - 1]) for edge in edges]),
+    )
+    measured = np.array([edge.i_from_j for edge in edges])
+    motions = quat_wxyz_of(measured), measured[:, :3, 3].copy()
+    start = relative(graph.first_from_cam[parents], graph.first_from_cam)
+    quat_wxyz, position_m = quat_wxyz_of(start), start[:, :3, 3].copy()
+    error = chi2(graph, graph.first_from_cam)
     for iteration in range(1, iterations + 1):
-        gains = np.minimum(1.0, np.array(rates) * _DELAY / (_DELAY + iteration - 1))
-        for edge, share, gain in zip(edges, shares, gains, strict=True):
-            _correct(parent_from_node, edge, gain, share)
-        previous, error = error, chi2(graph, _poses(parent_from_node, parents))
+        gains = np.minimum(1.0, rates * _DELAY / (_DELAY + iteration - 1))
+        sweep(quat_wxyz, position_m, *paths, gains, *motions)
+        poses = _poses(pose_from_quat(position_m, quat_wxyz), parents)
+        previous, error = error, chi2(graph, poses)
         if gains.max() < 1 and abs(previous - error) <= epsilon * previous:
             break
-    return _poses(parent_from_node, parents)
+    return poses
 
 
 def spanning_tree(graph: PoseGraph) -> NDArray[np.int64]:
@@ -153,35 +161,6 @@ def _shares(stiffness: Array) -> Array:
     """Cumulative weights u and v (L, 2) along a path whose nodes have ``stiffness`` (L, 2)."""
     compliance = 1.0 / stiffness
     return np.asarray(np.cumsum(compliance, axis=0) / compliance.sum(axis=0), dtype=np.float64)
-
-
-def _correct(parent_from_node: Array, edge: _PathEdge, gain: Array, shares: Array) -> None:
-    """Move the parameters on the path of one edge, in place, towards agreement with it."""
-    steps = parent_from_node[edge.nodes]
-    before = _along(steps, edge.upward)
-    residual = Rotation.from_matrix(edge.i_from_j[:3, :3] @ before[-1, :3, :3].T).as_rotvec()
-    turn = Rotation.from_rotvec(gain[0] * shares[:, :1] * residual).as_matrix()
-    rotations = np.concatenate([np.eye(3)[None], turn @ before[1:, :3, :3]])
-    between = np.swapaxes(rotations[:-1], 1, 2) @ rotations[1:]
-    up = edge.upward
-    between[up] = np.swapaxes(between[up], 1, 2)
-    steps[:, :3, :3] = Rotation.from_matrix(between).as_matrix()  # orthonormal again
-    turned = _along(steps, up)
-    offset_m = edge.i_from_j[:3, 3] - turned[-1, :3, 3]
-    turned[1:, :3, 3] += gain[1] * shares[:, 1:] * offset_m
-    start, stop = np.where(up[:, None, None], turned[1:], turned[:-1]), turned[1:].copy()
-    stop[up] = turned[:-1][up]
-    parent_from_node[edge.nodes] = relative(start, stop)
-
-
-def _along(steps: Array, upward: NDArray[np.bool_]) -> Array:
-    """Poses (L + 1, 4, 4) of the nodes of a path in the frame of its first."""
-    moves = np.where(upward[:, None, None], inverse(steps), steps)
-    poses = np.empty((len(moves) + 1, 4, 4))
-    poses[0] = np.eye(4)
-    for k, move in enumerate(moves):
-        poses[k + 1] = poses[k] @ move
-    return poses
 
 
 def _poses(parent_from_node: Array, parents: NDArray[np.int64]) -> Array:

@@ -32,7 +32,7 @@ JUDGES: Mapping[str, Callable[[Claim, Evidence], Outcome]] = {
     "C12": scratch.best_of_all,
     "C13": scratch.longer,
     "C14": simulator.collection_rate,
-    "C15": simulator.kinectfusion,
+    "C15": label_sources.kinectfusion_fails,
     "C16": simulator.times_7_scenes,
 }
 

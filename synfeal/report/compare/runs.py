@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.dataset.number_table import read_numbers
-from synfeal.dataset.pose_table import HEADER
+from synfeal.dataset.pose_table import HEADER, whole_numbers
 from synfeal.errors import InputError
 from synfeal.report.stats import MEASURES, read_metrics
 
@@ -93,9 +93,9 @@ def _read_index(seed: Path) -> NDArray[np.int64]:
     """Frame and path (N, 2) of the predictions."""
     path = seed / "predictions.csv"
     values = read_numbers(path, HEADER, "table of predictions", finite=False)[:, :2]
-    if not len(values) or not np.isfinite(values).all():
-        raise InputError(f"{path}: every row needs frame and path; predict again")
-    return values.astype(np.int64)
+    if not len(values):
+        raise InputError(f"{path}: has no rows; predict again")
+    return whole_numbers(values, path)
 
 
 def _read_errors(seed: Path, frame: NDArray[np.int64]) -> NDArray[np.float64]:

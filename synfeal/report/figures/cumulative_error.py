@@ -11,8 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from synfeal.config import MODELS, Experiment, runs_of
+from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
-from synfeal.report.figures.sources import Array, Results, counted, read_csv
+from synfeal.report.compare.runs import ERRORS_HEADER
+from synfeal.report.figures.sources import Array, Results, counted
 from synfeal.report.figures.style import MODEL_STYLES
 from synfeal.report.layouts import TITLES, scene_title
 
@@ -56,16 +58,14 @@ def read_errors(results: Results, row: Experiment) -> SceneErrors:
     errors: dict[str, dict[str, Array]] = {}
     runs = runs_of((row,), results.repetitions)
     for model in MODELS:
-        rows = []
+        parts = []
         for run in (run for run in runs if run.model == model):
             path = results.root / "runs" / run.directory / "errors.csv"
-            found = read_csv(path, "score that run again")
-            if not found or not set(MEASURES) <= set(found[0]):
-                raise InputError(
-                    f"{path}: needs rows and columns {', '.join(MEASURES)}; score that run again"
-                )
-            rows += found
-        errors[model] = {m: np.array([float(line[m]) for line in rows]) for m in MEASURES}
+            parts.append(read_numbers(path, ERRORS_HEADER, "table of errors", finite=False))
+            if not len(parts[-1]):
+                raise InputError(f"{path}: needs rows; score that run again")
+        values = np.concatenate(parts)
+        errors[model] = {m: values[:, ERRORS_HEADER.split(",").index(m)] for m in MEASURES}
     counts = [len(results.labels(row.scene, row.size, "synfeal", s)) for s in ("train", "test")]
     return SceneErrors(f"{scene_title(row.scene)}, {row.size}\n{counted(*counts)}", errors)
 

@@ -31,7 +31,7 @@ def figure_of(rows: Sequence[Row]) -> Figure:
         chosen = [row for row in rows if row["scene"] == scene]
         for line, measure in enumerate(MEASURES):
             draw_localizers(panels[line, column], chosen, measure, published=True)
-        frames = {row["size"]: f"{int(row['n_train']):,} frames" for row in chosen}
+        frames = {row["size"]: f"{float(row['n_train']):,.0f} frames" for row in chosen}
         labels = [f"{size}\n{count}" for size, count in frames.items()]
         panels[1, column].set_xticks(range(len(labels)), labels)
         panels[1, column].set_xlabel(

@@ -14,8 +14,9 @@ from synfeal.report.figures.style import METHOD_STYLES, Style
 from synfeal.report.layouts import SOURCES, scene_title
 
 UNITS = ("position error\nof the label (m)", "orientation error\nof the label (°)")
-LINE_WIDTHS = {"sfm": 1.2, "rgbd-toro": 2.8, "rgbd-g2o": 1.1}  # the last two often coincide
+MARKS = 24  # along a line, the lines one after another: optimisers often coincide
 FLOORS = (0.01, 0.1)  # below these the axes are linear, so that an error of 0 can be shown
+STRIP = 0.3  # height of a method's bar, where a panel of errors has 3
 LOST: Style = {"facecolor": "white", "hatch": "xxxx"}
 
 
@@ -29,14 +30,14 @@ def figure_of(data: LabelledSet) -> Figure:
     """The figure of one data set; axes by row: position, orientation, batches."""
     splits = {s: {m: parts[s] for m, parts in data.methods.items()} for s in SPLITS}
     counts = [len(next(iter(methods.values())).labels) for methods in splits.values()]
-    figure = Figure(figsize=(11.0, 6.0), layout="constrained")
+    figure = Figure(figsize=(11.0, 5.6 + 0.25 * len(data.methods)), layout="constrained")
     figure.suptitle(f"{scene_title(data.scene)}, {data.size}: {counted(*counts)}")
     panels = figure.subplots(
         *(3, 2),
         sharex="col",
         sharey="row",
         width_ratios=[max(count, 0.3 * sum(counts)) for count in counts],
-        height_ratios=[3, 3, 0.35 * len(data.methods)],
+        height_ratios=[3, 3, STRIP * len(data.methods)],
     )
     for column, (split, methods) in enumerate(splits.items()):
         panels[0, column].set_title(split)
@@ -47,6 +48,7 @@ def figure_of(data: LabelledSet) -> Figure:
             _draw_borders(axes, next(iter(methods.values())))
     for axes, label in zip(panels[:2, 0], UNITS, strict=True):
         axes.set_ylabel(label)
+        axes.set_ylim(bottom=0)  # of both splits, once all lines are drawn
     _add_legend(figure, panels[0, 0])
     return figure
 
@@ -57,16 +59,21 @@ def _draw_errors(position: Axes, orientation: Axes, methods: Mapping[str, Labell
             axes.plot(
                 *(part.labels.frame, part.errors[which]),
                 label=SOURCES[method],
-                linewidth=LINE_WIDTHS[method],
+                linewidth=1.1,
                 markersize=4,
-                markevery=(5 * start, 15),
+                markevery=_marked(len(part.labels), start, len(methods)),
                 **METHOD_STYLES[method],
             )
         axes.set_yscale("symlog", linthresh=floor, linscale=0.4)
         axes.yaxis.set_major_formatter("{x:g}")
-        axes.set_ylim(bottom=0)
         axes.grid(axis="y", color="0.93")
         axes.set_axisbelow(True)
+
+
+def _marked(n_frames: int, place: int, n_lines: int) -> tuple[int, int]:
+    """First marked frame of a line and the step to the next, so that no two lines share one."""
+    step = max(n_lines, n_frames // MARKS)
+    return place * step // n_lines, step
 
 
 def _draw_batches(axes: Axes, methods: Mapping[str, LabelledSplit]) -> None:

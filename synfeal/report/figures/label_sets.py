@@ -8,9 +8,8 @@ import numpy as np
 
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import pose_error
-from synfeal.report.assistance import PUBLISHED_ASSISTED
+from synfeal.report.assistance import batch_records, estimated_sets
 from synfeal.report.figures.sources import SPLITS, Array, Results
-from synfeal.report.results import read_result
 
 
 @dataclass(frozen=True)
@@ -59,24 +58,22 @@ def read_labelled_set(results: Results) -> LabelledSet | None:
     Raises:
         InputError: labels or a record of assistance are missing or unreadable.
     """
-    rows = [row for row in results.rows if row.labels in PUBLISHED_ASSISTED]
-    if not rows:
+    sets = estimated_sets(results.rows)
+    if not sets:
         return None
-    scene, size = rows[0].scene, rows[0].size
-    methods = dict.fromkeys(r.labels for r in rows if (r.scene, r.size) == (scene, size))
+    _, scene, size = sets[0]
+    methods = [method for method, *data_set in sets if data_set == [scene, size]]
     return LabelledSet(scene, size, {m: _read(results, scene, size, m) for m in methods})
 
 
 def _read(results: Results, scene: str, size: str, method: str) -> dict[str, LabelledSplit]:
-    path = results.root / "labels" / scene / size / method / "assistance.json"
-    records = read_result(path, ["splits"], "chain these labels again")["splits"]
     return {
         split: LabelledSplit(
             results.labels(scene, size, method, split),
             results.labels(scene, size, "synfeal", split),
             tuple(
                 BatchMark(batch["start"], batch["stop"], batch["assisted"], batch["lost"])
-                for batch in records[split]["records"]
+                for batch in batch_records(results.root, method, scene, size, split)
             ),
         )
         for split in SPLITS

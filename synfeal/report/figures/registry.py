@@ -15,6 +15,7 @@ from synfeal.report.figures import (
     frames,
     label_error,
     poses,
+    render_speed,
     speed_vs_error,
     trajectories,
 )
@@ -51,7 +52,8 @@ FIGURES: dict[str, Entry] = {
     "trajectories": Entry(
         trajectories.draw,
         "Camera paths as each ground-truth method estimated them, over the true ones, from above; "
-        "rings are poses that assistance replaced by the true ones.",
+        "dots are the first frames of batches, wide stretches batches that needed assistance, and "
+        "rings the poses that assistance replaced by the true ones.",
     ),
     "label_error": Entry(
         label_error.draw,
@@ -81,6 +83,17 @@ FIGURES: dict[str, Entry] = {
         "How fast rays are answered against how many decisions of the planner differ from the full "
         "mesh's, for the face counts of the collision mesh that were tried; filled marks form the "
         "Pareto front, the ring is the mesh that is used.",
+    ),
+    "speed_vs_error_render": Entry(
+        render_speed.draw,
+        "How long a frame takes against its mean difference from 64 samples per pixel, by backend "
+        "and samples per pixel, and with smaller textures or fewer triangles than the scene has; "
+        "the ring is what frames are rendered with.",
+    ),
+    "speed_vs_error_labels": Entry(
+        partial(speed_vs_error.draw, stage="labels"),
+        "Frames that each ground-truth method labels per second of processor time against the "
+        "median position error of its labels after assistance; filled marks form the Pareto front.",
     ),
 }
 CAPTIONS: dict[str, str] = {name: entry.caption for name, entry in FIGURES.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,11 +10,28 @@ from numpy.typing import NDArray
 
 from synfeal.config import Experiment
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
-from synfeal.errors import InputError
+from synfeal.report import speed_vs_error
+from synfeal.report.results import read_table
+from synfeal.report.tables import columns_of
 
 Array = NDArray[np.float64]
 Row = dict[str, str]
 SPLITS = ("train", "test")
+# Columns of tables that hold no numbers.
+TEXTS = frozenset(
+    [
+        "scene",
+        "size",
+        "labels",
+        "block",
+        "model",
+        "published_flag",
+        "stage",
+        "variant",
+        "error_unit",
+        "backend",
+    ]
+)
 
 
 @dataclass(frozen=True)
@@ -47,7 +63,11 @@ class Results:
         Raises:
             InputError: the table is missing or unreadable.
         """
-        return read_csv(self.root / "tables" / f"{name}.csv", "make that table again")
+        speeds = name == speed_vs_error.NAME
+        columns = speed_vs_error.COLUMNS if speeds else columns_of(name, 1)
+        numbers = ("items_per_s", "error") if speeds else ("n_train", "n_test")
+        optional = [column for column in columns if column not in TEXTS]
+        return read_table(self.root / "tables" / f"{name}.csv", columns, numbers, optional)
 
     def labels(self, scene: str, size: str, labels: str, split: str) -> PoseTable:
         """The poses a data set carries; those of ``synfeal`` are the true ones.
@@ -67,19 +87,6 @@ class Results:
         return sorted(names, key=lambda size: len(self.labels(scene, size, "synfeal", "train")))
 
 
-def read_csv(path: Path, remedy: str) -> list[Row]:
-    """Rows of a CSV file with a header.
-
-    Raises:
-        InputError: the file is missing or unreadable; ``remedy`` says what to do.
-    """
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            return list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: cannot be read as CSV ({error}); {remedy}") from None
-
-
 def number(text: str) -> float:
     """A value of a table; an empty cell is not a number and leaves a gap."""
     return float(text) if text else float("nan")
@@ -87,4 +94,4 @@ def number(text: str) -> float:
 
 def counted(n_train: int | str, n_test: int | str) -> str:
     """Frames of a data set as figures say it."""
-    return f"{int(n_train):,} training, {int(n_test):,} test frames"
+    return f"{float(n_train):,.0f} training, {float(n_test):,.0f} test frames"

@@ -10,9 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from baselines.groundtruth.methods import METHODS
 from synfeal.report.figures.pareto import pareto_front
 from synfeal.report.figures.sources import Results, Row
-from synfeal.report.figures.style import SCENE_STYLES, Style
+from synfeal.report.figures.style import METHOD_STYLES, SCENE_STYLES, Style
 from synfeal.report.layouts import scene_title
 
 TABLE = "speed_vs_error"
@@ -29,6 +30,7 @@ class Stage:
         error: vertical axis.
         factor: from the table's unit of error to the axis's.
         linear_below: errors below this are drawn on a linear scale, so that 0 can be shown.
+        named: variants differ in more than a number; each has a mark and a name of its own.
     """
 
     title: str
@@ -37,6 +39,7 @@ class Stage:
     error: str
     factor: float
     linear_below: float
+    named: bool = False
 
 
 STAGES = {
@@ -47,6 +50,15 @@ STAGES = {
         error="decisions that differ from the full mesh (%)",
         factor=100.0,
         linear_below=0.01,
+    ),
+    "labels": Stage(
+        title="Methods that estimate labels",
+        speed="frames per second of processor time",
+        per=1.0,
+        error="median position error of the labels (cm)",
+        factor=100.0,
+        linear_below=1.0,
+        named=True,
     ),
 }
 
@@ -72,7 +84,7 @@ def figure_of(rows: Sequence[Row], stage: Stage) -> Figure:
     axes.grid(color="0.94")
     axes.set_axisbelow(True)
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center")
+    figure.legend(handles, labels, loc="outside lower center", ncols=3 if stage.named else 1)
     return figure
 
 
@@ -81,32 +93,52 @@ def draw_scene(axes: Axes, rows: Sequence[Row], stage: Stage, style: Style) -> N
 
     Args:
         axes: where to draw.
-        rows: the variants of one scene, of which one is chosen.
+        rows: the variants of one scene, of which at most one is chosen.
         stage: axes and their units.
         style: colour, marker and dashes of the scene.
     """
     speed = np.array([float(row["items_per_s"]) / stage.per for row in rows])
     error = np.array([float(row["error"]) * stage.factor for row in rows])
     front = pareto_front(1.0 / speed, error)
+    if stage.named:
+        for place, row in enumerate(rows):
+            _named_mark(axes, speed[place], error[place], row["variant"], bool(front[place]))
+        return
     order = np.argsort(speed[front], kind="stable")
-    (used,) = (index for index, row in enumerate(rows) if row["chosen"] == "1")
     colour = style["color"]
     open_marks = {"marker": style["marker"], "markerfacecolor": "none", "markeredgecolor": colour}
     axes.plot(speed[~front], error[~front], linestyle="", markersize=4, alpha=0.6, **open_marks)
-    title = scene_title(rows[0]["scene"])
     axes.plot(
         *(speed[front][order], error[front][order]),
-        label=f"{title}: Pareto front (open: dominated)",
+        label=f"{scene_title(rows[0]['scene'])}: Pareto front (open: dominated)",
         linewidth=1.2,
         markersize=5,
         **style,
     )
-    axes.plot(
-        *(speed[used], error[used]),
-        label=f"{title}: used, {int(rows[used]['faces']):,} of {int(rows[0]['faces']):,} faces",
-        linestyle="",
-        marker="o",
-        markerfacecolor="none",
-        markeredgecolor=colour,
-        markersize=13,
-    )
+    for place, row in enumerate(rows):
+        if row["chosen"] == "1":
+            _ring(axes, speed[place], error[place], _used(row, rows[0]), colour)
+
+
+def _named_mark(axes: Axes, speed: float, error: float, title: str, on_front: bool) -> None:
+    """The mark of a method, in the style it has in all figures; filled on the Pareto front."""
+    (name,) = (name for name, method in METHODS.items() if method.title == title)
+    style: Style = METHOD_STYLES[name] | {"linestyle": "", "markersize": 8}
+    face = style["color"] if on_front else "none"
+    edge: Style = {"markerfacecolor": face, "markeredgecolor": style["color"]}
+    axes.plot(speed, error, label=title, **style, **edge)
+
+
+def _used(row: Row, full: Row) -> str:
+    faces = f"{int(row['faces']):,} of {int(full['faces']):,} faces"
+    return f"{scene_title(row['scene'])}: used, {faces}"
+
+
+def _ring(axes: Axes, speed: float, error: float, label: str, colour: str) -> None:
+    ring: Style = {
+        "marker": "o",
+        "markerfacecolor": "none",
+        "markeredgecolor": colour,
+        "markersize": 13,
+    }
+    axes.plot(speed, error, label=label, linestyle="", **ring)

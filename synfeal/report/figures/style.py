@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from typing import Any
+
+from baselines.groundtruth.methods import METHODS
 
 # Okabe and Ito's colours; within each set no two lines share a marker or a dash pattern.
 BLACK, BLUE, VERMILION, GREEN = "#000000", "#0072B2", "#D55E00", "#009E73"
-PURPLE, ORANGE = "#CC79A7", "#E69F00"
+PURPLE, ORANGE, SKY = "#CC79A7", "#E69F00", "#56B4E9"
 Style = dict[str, Any]
 
 MODEL_STYLES: dict[str, Style] = {
@@ -16,11 +19,22 @@ MODEL_STYLES: dict[str, Style] = {
     "posenet2resnet": {"color": GREEN, "marker": "D", "linestyle": ":"},
     "posenet2": {"color": PURPLE, "marker": "v", "linestyle": (0, (5, 1, 1, 1, 1, 1))},
 }
-METHOD_STYLES: dict[str, Style] = {
-    "sfm": {"color": BLUE, "marker": "o", "linestyle": "-"},
-    "rgbd-toro": {"color": VERMILION, "marker": "^", "linestyle": "--"},
-    "rgbd-g2o": {"color": GREEN, "marker": "s", "linestyle": "-."},
-}
+METHOD_STYLES: dict[str, Style] = dict(
+    zip(
+        METHODS,
+        cycle(
+            (
+                {"color": BLUE, "marker": "o", "linestyle": "-"},
+                {"color": VERMILION, "marker": "^", "linestyle": "--"},
+                {"color": GREEN, "marker": "s", "linestyle": "-."},
+                {"color": PURPLE, "marker": "D", "linestyle": ":"},
+                {"color": ORANGE, "marker": "v", "linestyle": (0, (5, 1, 1, 1, 1, 1))},
+                {"color": BLACK, "marker": "P", "linestyle": (0, (1, 2))},
+                {"color": SKY, "marker": "X", "linestyle": (0, (8, 2))},
+            )
+        ),
+    )
+)
 SPLIT_STYLES: dict[str, Style] = {
     "train": {"color": ORANGE, "marker": "o"},
     "test": {"color": BLUE, "marker": "^"},  # the darker one: drawn on top, and fewer

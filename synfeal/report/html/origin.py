@@ -7,20 +7,41 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel, TypeAdapter
+
 from synfeal.report.html.markup import Column, number_cell, plain_table, text_cell
-from synfeal.report.results import read_result
+from synfeal.report.html.stages import Stage
+from synfeal.report.results import check_result, read_result
 
 NEEDED = ("commit", "config_sha256", "seed", "python", "packages", "platform", "time_utc")
 Record = Mapping[str, Any]
+
+
+class _Machine(BaseModel):
+    processor: str
+    usable_cores: int
+    memory_gib: float
+    gpu: str | None
+
+
+class _Origin(BaseModel):
+    machine: _Machine
+    stages: list[Stage]
+    packages: dict[str, str]
+
+
+_SHAPE = TypeAdapter(_Origin)
 
 
 def read_origin(path: Path) -> Record:
     """``provenance.json``.
 
     Raises:
-        InputError: it is unreadable or lacks a key.
+        InputError: it is unreadable, lacks a key, or holds something of another type.
     """
-    return read_result(path, (*NEEDED, "machine", "stages"), "make it again")
+    record = read_result(path, (*NEEDED, "machine", "stages"), "make it again")
+    check_result(path, record, _SHAPE, "make it again")
+    return record
 
 
 def origin_html(record: Record) -> str:

@@ -15,8 +15,10 @@ from synfeal.inspect.viewer_mesh import viewer_js
 from synfeal.report import meshes
 from synfeal.report.cells import Cell, read_cells
 from synfeal.report.figures import CAPTIONS
+from synfeal.report.hard_cases.table import NAME as HARD_CASES
 from synfeal.report.html.claims import Claims, claims_table, read_claims, verdict_counts
 from synfeal.report.html.figures import figure_files, figure_html
+from synfeal.report.html.hard_cases import hard_cases_table
 from synfeal.report.html.markup import bullets
 from synfeal.report.html.origin import Record, cost_sentence, origin_html, read_origin
 from synfeal.report.html.rooms import room_html
@@ -26,7 +28,7 @@ from synfeal.report.html.tables import score_table
 from synfeal.report.summary import alive_sentences, runs_sentence
 
 CLAIMS, PROVENANCE = "claims.csv", "provenance.json"
-SIDE_TABLES = (meshes.NAME, "assistance", "speed_vs_error")
+SIDE_TABLES = (meshes.NAME, "assistance", "speed_vs_error", HARD_CASES)
 
 
 @dataclass(frozen=True)
@@ -145,6 +147,7 @@ def _tables(found: Results) -> Section:
     bodies["assistance"] = ("Assistance", _side_table(found, "assistance", assistance_table))
     speed = _side_table(found, "speed_vs_error", speed_table)
     bodies["speed_vs_error"] = ("Speed against error", speed)
+    bodies[HARD_CASES] = ("Hard cases", _side_table(found, HARD_CASES, hard_cases_table))
     parts = {name: title for name, (title, _) in bodies.items()}
     return Section("tables", "Tables", "\n".join(body for _, body in bodies.values()), parts)
 

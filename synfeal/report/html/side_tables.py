@@ -13,11 +13,13 @@ from synfeal.report.results import read_table
 
 Row = Mapping[str, str]
 USED = ' class="used"'
+WHEN = ("before", "after")
 
 
 def meshes_table(path: Path) -> str:
     """Table 1: the meshes beside the paper's."""
-    rows = read_table(path, meshes.COLUMNS)
+    printed = [f"published_{fact}" for fact in meshes.FACTS]
+    rows = read_table(path, meshes.COLUMNS, meshes.FACTS, printed)
     columns = [Column("Scene"), *(Column(title, True) for title in meshes.LABELS.values())]
     body = [
         f"<tr>{text_cell(scene_title(row['scene']))}"
@@ -33,21 +35,22 @@ def meshes_table(path: Path) -> str:
 
 def assistance_table(path: Path) -> str:
     """How often the methods that re-estimate labels had to be helped, beside section 4.1."""
-    rows = read_table(path, assistance.COLUMNS)
-    titles = ("Batches", "Assisted", "Lost", "Frames registered", "Frames filled")
+    rows = read_table(path, assistance.COLUMNS, assistance.COUNTS, assistance.LAST_POSE)
+    titles = ("Batches", "Assisted", "Lost", "Frames", "Frames registered", "Frames filled")
     columns = [Column("Method"), Column("Data set"), *(Column(title, True) for title in titles)]
-    columns += [Column(f"Label error, {split}", True) for split in assistance.SPLITS]
+    columns += [Column(f"Last pose off by, {when} assistance", True) for when in WHEN]
     caption = (
         "<b>Assistance.</b> Batches of both splits together. Assisted: the last pose was replaced"
-        " by the true one; lost: no motion was found. Label error: median against the true poses,"
-        " of the labels that came out. In grey: what section 4.1 of the paper counts."
+        " by the true one; lost: no motion was found. Last pose: median over the batches. In grey:"
+        " what section 4.1 of the paper counts."
     )
-    return plain_table("assistance", caption, columns, [_assisted(row) for row in rows])
+    total = [_assisted(row) for row in rows if row["split"] == assistance.TOTAL]
+    return plain_table("assistance", caption, columns, total)
 
 
 def speed_table(path: Path) -> str:
     """What each stage could choose among, how fast and how wrong each is."""
-    rows = read_table(path, speed_vs_error.COLUMNS)
+    rows = read_table(path, speed_vs_error.COLUMNS, ("items_per_s", "error"), ("faces",))
     columns = [Column(title) for title in ("Stage", "Scene", "Variant")]
     columns += [Column(title, True) for title in ("Faces", "Items per second", "Error")]
     caption = (
@@ -70,15 +73,15 @@ def _count(text: str) -> str:
 
 def _assisted(row: Row) -> str:
     cells = [
-        text_cell(SOURCES[row["method"]]),
+        text_cell(SOURCES.get(row["method"], row["method"])),
         text_cell(f"{scene_title(row['scene'])}, {row['size']}"),
     ]
     for count in assistance.COUNTS:
         printed = row.get(f"published_{count}", "")
         beside = f'<div class="paper">{escape(printed)}</div>' if printed else ""
         cells.append(number_cell(float(row[count]), row[count], beside))
-    for split in assistance.SPLITS:
-        metres, degrees = (row[f"label_error_{unit}_{split}"] for unit in ("m", "deg"))
+    for when in WHEN:
+        metres, degrees = (row[f"last_{unit}_{when}_median"] for unit in ("m", "deg"))
         text = f"{float(metres):.2f} m, {float(degrees):.2f}°" if metres and degrees else "–"
         cells.append(number_cell(float(metres) if metres else None, text))
     return f"<tr>{''.join(cells)}</tr>"
@@ -91,7 +94,7 @@ def _speeds(rows: Sequence[Row]) -> list[str]:
         cells = [
             *(text_cell(row["stage"]), text_cell(scene_title(row["scene"]))),
             text_cell(row["variant"]),
-            number_cell(float(row["faces"]), f"{int(row['faces']):,}"),
+            _faces(row["faces"]),
             number_cell(items_per_s, f"{items_per_s:,.0f}"),
             number_cell(float(row["error"]), row["error"]),
             text_cell(row["error_unit"]),
@@ -99,3 +102,7 @@ def _speeds(rows: Sequence[Row]) -> list[str]:
         ]
         lines.append(f"<tr{USED if used else ''}>{''.join(cells)}</tr>")
     return lines
+
+
+def _faces(text: str) -> str:
+    return number_cell(float(text), f"{float(text):,.0f}") if text else text_cell("")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -54,11 +55,19 @@ def _read(path: Path) -> list[tuple[float, float | None]]:
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file, delimiter="\t"))
-        return [(float(row["s"]), _number(row["max_rss"])) for row in rows]
-    except (OSError, KeyError, ValueError, TypeError) as error:
+        if not rows:
+            raise ValueError("it has no rows")
+        return [(_finite(row["s"]), _number(row["max_rss"])) for row in rows]
+    except (OSError, KeyError, ValueError, TypeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as a measurement of a job ({error!r})") from None
 
 
 def _number(text: str) -> float | None:
     """Memory; a job that ends before the first look at it has none."""
-    return None if text in ("", "-", "NA") else float(text)
+    return None if text in ("", "-", "NA") else _finite(text)
+
+
+def _finite(text: str) -> float:
+    if not 0 <= float(text) < math.inf:
+        raise ValueError(f"{text} is no amount")
+    return float(text)

@@ -1,0 +1,145 @@
+"""The methods that re-estimate labels: the one list that rules, tables and figures are made from.
+
+A method works on one batch. It says so in one of three ways:
+
+- ``estimate``: a function ``(color_paths, depth_paths, camera, settings, seed)`` that returns a
+  :class:`~baselines.groundtruth.trajectory.BatchTrajectory`; the rule ``estimate`` calls it.
+- ``optimiser``: what is done to the pose graph of RGB-D odometry; the rule ``posegraph`` does it.
+- neither: a rule of its own, named like the method (``sfm``, which is given its scale).
+
+Functions are named by their place, so that a table of titles loads no estimator.
+"""
+
+from __future__ import annotations
+
+import resource
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from pkgutil import resolve_name
+
+import numpy as np
+
+from baselines.groundtruth.posegraph.graph import Edge, PoseGraph
+from baselines.groundtruth.trajectory import BatchTrajectory
+from synfeal.config import Experiment
+from synfeal.config.models import CameraConfig, GroundTruthConfig, PoseGraphConfig
+from synfeal.errors import InputError
+
+Facts = dict[str, float]
+ODOMETRY = "odometry"
+
+
+@dataclass(frozen=True)
+class Method:
+    """A source of labels.
+
+    Attributes:
+        title: as tables and figures call it.
+        estimate: place of its function, ``module:name``.
+        settings: key below ``groundtruth`` whose settings the function is given.
+        optimiser: a key of ``posegraph.optimise.OPTIMISERS``, or ``odometry``, which leaves the
+            graph as it is.
+        unused: times in the facts of its stages that it would not have spent.
+        published_assisted: batches that section 4.1 says it needed assistance in.
+    """
+
+    title: str
+    estimate: str = ""
+    settings: str = ""
+    optimiser: str = ""
+    unused: tuple[str, ...] = ()
+    published_assisted: int | None = None
+
+
+METHODS: dict[str, Method] = {
+    "sfm": Method("SfM", published_assisted=3),
+    "rgbd-toro": Method("RGB-D SLAM w/ TORO", optimiser="toro", published_assisted=6),
+    "rgbd-g2o": Method("RGB-D SLAM w/ g2o", optimiser="g2o", published_assisted=4),
+    "rgbd-open3d": Method("RGB-D SLAM w/ Open3D", optimiser="open3d"),
+    "rgbd-odometry": Method("RGB-D odometry alone", optimiser=ODOMETRY, unused=("loops_s",)),
+    "kinect-fusion": Method(
+        "KinectFusion",
+        estimate="baselines.groundtruth.kinect_fusion:kinect_fusion_batch",
+        settings="kinect_fusion",
+    ),
+}
+SIMULATOR, NOISE = "synfeal", "noise"
+_SMALLEST = PoseGraph(np.stack([np.eye(4)] * 2), (Edge(0, 1, np.eye(4), np.eye(6)),))
+
+
+def frame_methods() -> list[str]:
+    """Methods that the rule ``estimate`` runs."""
+    return [name for name, method in METHODS.items() if method.estimate]
+
+
+def graph_methods() -> list[str]:
+    """Methods that the rule ``posegraph`` runs."""
+    return [name for name, method in METHODS.items() if method.optimiser]
+
+
+def stages_of(name: str) -> tuple[str, ...]:
+    """Folders below ``groundtruth/<scene>/<size>`` with what the method took, in its order."""
+    return ("rgbd", name) if METHODS[name].optimiser else (name,)
+
+
+def check_sources(rows: Sequence[Experiment], path: Path) -> None:
+    """Refuse a design with labels that nothing makes.
+
+    Raises:
+        InputError: naming the design, the label source, and the sources there are.
+    """
+    known = (SIMULATOR, NOISE, *METHODS)
+    for row in rows:
+        if row.labels not in known:
+            raise InputError(f"{path}: labels '{row.labels}': not one of {', '.join(known)}")
+
+
+def estimate_batch(
+    name: str,
+    color_paths: Sequence[Path],
+    depth_paths: Sequence[Path],
+    camera: CameraConfig,
+    groundtruth: GroundTruthConfig,
+    seed: int,
+) -> tuple[BatchTrajectory, Facts]:
+    """Trajectory of a batch by a method with a function, and what it took.
+
+    Args:
+        name: a key of ``METHODS``.
+        color_paths: colour images in order.
+        depth_paths: 16-bit depth images in millimetres, 65535 where nothing was hit.
+        camera: camera of both.
+        groundtruth: of which the function is given what ``Method.settings`` names.
+        seed: of whatever is random.
+    """
+    method = METHODS[name]
+    function = resolve_name(method.estimate)
+    settings = getattr(groundtruth, method.settings) if method.settings else None
+    return _timed(lambda: function(color_paths, depth_paths, camera, settings, seed))
+
+
+def solve_graph(name: str, graph: PoseGraph, cfg: PoseGraphConfig) -> tuple[BatchTrajectory, Facts]:
+    """Trajectory of a batch by a method with an optimiser, and what the optimiser took.
+
+    Raises:
+        ValueError: the edges do not connect all nodes.
+    """
+    optimiser = METHODS[name].optimiser
+    if optimiser == ODOMETRY:
+        registered = np.ones(len(graph.first_from_cam), dtype=bool)
+        return _timed(lambda: BatchTrajectory(graph.first_from_cam, registered))
+    from baselines.groundtruth.posegraph.optimise import optimise  # gtsam takes a second to load
+
+    optimise(optimiser, _SMALLEST, cfg)  # loads and compiles what it needs: not timed
+    return _timed(lambda: optimise(optimiser, graph, cfg))
+
+
+def _timed(work: Callable[[], BatchTrajectory]) -> tuple[BatchTrajectory, Facts]:
+    """A result, the processor time it took, and the most memory this process has held."""
+    begin = time.process_time()
+    trajectory = work()
+    estimation_s = time.process_time() - begin
+    peak_memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return trajectory, {"estimation_s": estimation_s, "peak_memory_mb": peak_memory_mb}

@@ -1,0 +1,139 @@
+"""Registration of two frames by Open3D's dense odometry, and when to believe it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import open3d as o3d
+from numpy.typing import NDArray
+
+from baselines.groundtruth.rgbd.agreement import constraint, depth_agreement
+from baselines.groundtruth.rgbd.frames import RgbdFrame
+from synfeal.camera.intrinsics import intrinsics_of
+from synfeal.config.models import CameraConfig, KinectFusionConfig, RgbdConfig
+from synfeal.geometry.poses import pose_error
+
+Array = NDArray[np.float64]
+Pass = tuple[tuple[int, ...], float]
+
+_METHODS = {
+    "point-to-plane": o3d.t.pipelines.odometry.Method.PointToPlane,
+    "hybrid": o3d.t.pipelines.odometry.Method.Hybrid,
+    "intensity": o3d.t.pipelines.odometry.Method.Intensity,
+}
+# Passes: steps per scale, coarse to fine, and the depth difference beyond which a point counts by
+# its distance, not its square. The coarse pass finds a motion, but pulls those that depth hardly
+# tells by 0.1 degrees; fine passes come to rest where edges, and what only one image shows, weigh
+# little.
+COARSE, FINE = ((5, 3, 2), 0.05), ((5,), 0.002)
+# The result may not leave its starting point by more.
+MAX_CHANGE_M, MAX_CHANGE_DEG = 0.25, 10.0
+# After a fine pass that moves it by less (metres, degrees) a motion is at rest.
+_REST = (0.0002, 0.01)
+_MAX_FINE = 4
+# Motions are compared by the depth that agrees within this share of the accepted residual.
+_CLOSE = 0.2
+# A motion that agrees less is no longer sure: other starting points are tried.
+SURE_AGREEMENT = 0.8
+# Depth alone is trusted when the surfaces in view constrain the motion at least so well.
+MIN_CONSTRAINT = 1e-3
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion that was found.
+
+    Attributes:
+        i_from_j: (4, 4).
+        agreement: share of the points of j whose depth agrees closely with image i.
+    """
+
+    i_from_j: Array
+    agreement: float
+
+
+def near(a: Array, b: Array, max_m: float = MAX_CHANGE_M, max_deg: float = MAX_CHANGE_DEG) -> bool:
+    """Whether a refined motion (4, 4) stays near its starting point (4, 4)."""
+    change_m, change_rad = pose_error(a, b)
+    return bool(change_m <= max_m and np.degrees(change_rad) <= max_deg)
+
+
+def register(
+    i: o3d.t.geometry.RGBDImage,
+    j: o3d.t.geometry.RGBDImage,
+    start: Array,
+    camera: CameraConfig,
+    cfg: RgbdConfig | KinectFusionConfig,
+    method: str = "point-to-plane",
+    passes: Sequence[Pass] = (COARSE, FINE),
+) -> Array | None:
+    """Motion ``i_from_j`` (4, 4) near a starting point (4, 4), or None where there is none."""
+    odometry = o3d.t.pipelines.odometry
+    matrix = o3d.core.Tensor.from_numpy(intrinsics_of(camera).matrix(centre_shift_px=-0.5))
+    i_from_j = o3d.core.Tensor.from_numpy(np.ascontiguousarray(start))
+    try:
+        for steps, huber_m in passes:
+            i_from_j = odometry.rgbd_odometry_multi_scale(
+                j,
+                i,
+                matrix,
+                i_from_j,
+                1.0,
+                cfg.max_depth_m,
+                [odometry.OdometryConvergenceCriteria(count) for count in steps],
+                _METHODS[method],
+                odometry.OdometryLossParams(2 * cfg.max_rmse_m, huber_m),
+            ).transformation
+    except RuntimeError:  # a singular system: nothing in view constrains the motion
+        return None
+    found = np.asarray(i_from_j.numpy(), dtype=np.float64)
+    return found if np.isfinite(found).all() and near(start, found) else None
+
+
+@dataclass(frozen=True)
+class DenseOdometry:
+    """What registering two frames needs besides them."""
+
+    camera: CameraConfig
+    cfg: RgbdConfig
+
+    def constrained(self, frame: RgbdFrame) -> bool:
+        """Whether what is compared can tell every motion of the camera."""
+        if self.cfg.method != "point-to-plane":
+            return True
+        return constraint(frame.depth_m, self.camera) >= MIN_CONSTRAINT
+
+    def overlap(self, i: RgbdFrame, j: RgbdFrame, i_from_j: Array) -> float:
+        """Share of the points of j that agree with i under a motion (4, 4), 0 if rejected."""
+        max_rmse_m = self.cfg.max_rmse_m
+        fitness, rmse_m = depth_agreement(i.depth_m, j.depth_m, i_from_j, self.camera, max_rmse_m)
+        return fitness if fitness >= self.cfg.min_fitness and rmse_m <= max_rmse_m else 0.0
+
+    def refine(self, i: RgbdFrame, j: RgbdFrame, start: Array) -> Motion | None:
+        """Refined and accepted motion ``i_from_j`` from a starting point (4, 4), or None."""
+        found = self._register(i, j, start, COARSE)
+        if found is None:
+            return None
+        settled = self._settled(i, j, found)
+        if not near(start, settled) or not self.overlap(i, j, settled):
+            return None
+        close_m = _CLOSE * self.cfg.max_rmse_m
+        share, _ = depth_agreement(i.depth_m, j.depth_m, settled, self.camera, close_m)
+        return Motion(settled, share)
+
+    def _settled(self, i: RgbdFrame, j: RgbdFrame, i_from_j: Array) -> Array:
+        """A motion (4, 4) after fine passes until they hardly move it."""
+        for _ in range(_MAX_FINE):
+            found = self._register(i, j, i_from_j, FINE)
+            if found is None:
+                return i_from_j
+            at_rest = near(i_from_j, found, *_REST)
+            i_from_j = found
+            if at_rest:
+                break
+        return i_from_j
+
+    def _register(self, i: RgbdFrame, j: RgbdFrame, start: Array, one: Pass) -> Array | None:
+        return register(i.rgbd, j.rgbd, start, self.camera, self.cfg, self.cfg.method, (one,))

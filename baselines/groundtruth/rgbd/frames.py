@@ -1,0 +1,93 @@
+"""Frames as dense odometry takes them: read, checked, and cut to the range of the depth sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import open3d as o3d
+from numpy.typing import NDArray
+from PIL import Image
+
+from baselines.groundtruth.rgbd.sensor import frame_generator, kinect_depth
+from synfeal.config.models import CameraConfig, DepthConfig
+from synfeal.dataset.png import IMAGE_DAMAGE
+from synfeal.errors import InputError
+
+# Depth images hold millimetres; 0 and 65535 mean that nothing was hit.
+_INVALID_MM = (0, 65535)
+
+
+@dataclass(frozen=True)
+class RgbdFrame:
+    """One frame.
+
+    Attributes:
+        color: (H, W, 3) uint8.
+        depth_m: (H, W) along the optical axis, inf where nothing was measured.
+        rgbd: both as Open3D takes them, depth 0 where nothing was measured.
+    """
+
+    color: NDArray[np.uint8]
+    depth_m: NDArray[np.float32]
+    rgbd: o3d.t.geometry.RGBDImage
+
+
+def read_frame(
+    color_path: Path, depth_path: Path, camera: CameraConfig, cfg: DepthConfig, seed: int
+) -> RgbdFrame:
+    """Read a frame.
+
+    Raises:
+        InputError: an image cannot be read, has another size than the camera, or the depth is not
+            16-bit.
+    """
+    color = read_image(color_path, camera, "RGB")
+    depth_m = read_depth(depth_path, camera, cfg, seed)
+    rgbd = o3d.t.geometry.RGBDImage(open3d_image(color), open3d_depth(depth_m))
+    return RgbdFrame(color, depth_m, rgbd)
+
+
+def read_depth(
+    path: Path, camera: CameraConfig, cfg: DepthConfig, seed: int
+) -> NDArray[np.float32]:
+    """Depth (H, W) in metres as the sensor of the configuration measures it, inf where nothing."""
+    depth_mm = read_image(path, camera)
+    if depth_mm.ndim != 2 or depth_mm.dtype not in (np.uint16, np.int32):
+        raise InputError(f"{path}: is no 16-bit depth image; collect the data set again")
+    invalid = (depth_mm == _INVALID_MM[0]) | (depth_mm == _INVALID_MM[1])
+    depth_m = np.where(invalid, np.float32(np.inf), depth_mm.astype(np.float32) / np.float32(1000))
+    if cfg.sensor == "kinect":
+        depth_m = kinect_depth(depth_m, frame_generator(seed, path))
+    return np.where(depth_m > cfg.max_depth_m, np.float32(np.inf), depth_m)
+
+
+def open3d_depth(depth_m: NDArray[np.float32]) -> o3d.t.geometry.Image:
+    """Depth (H, W) for Open3D, which takes 0 where nothing was measured."""
+    return open3d_image(np.where(np.isfinite(depth_m), depth_m, np.float32(0)))
+
+
+def open3d_image(pixels: NDArray[Any]) -> o3d.t.geometry.Image:
+    """An array (H, W) or (H, W, C) as an Open3D image."""
+    return o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(np.ascontiguousarray(pixels)))
+
+
+def read_image(path: Path, camera: CameraConfig, mode: str | None = None) -> NDArray[Any]:
+    """An image of the camera's size as an array, converted to ``mode`` if one is given.
+
+    Raises:
+        InputError: it cannot be read, or has another size.
+    """
+    try:
+        with Image.open(path) as image:
+            pixels = np.asarray(image.convert(mode) if mode else image)
+    except IMAGE_DAMAGE as error:
+        raise InputError(f"{path}: cannot be read as an image ({error})") from None
+    if pixels.shape[:2] != (camera.height, camera.width):
+        raise InputError(
+            f"{path}: is {pixels.shape[1]}x{pixels.shape[0]}, the camera of the configuration"
+            f" {camera.width}x{camera.height}; collect the data set again"
+        )
+    return pixels

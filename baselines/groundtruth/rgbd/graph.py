@@ -1,0 +1,167 @@
+"""The pose graph of a batch, and the facts of how it was made."""
+
+from __future__ import annotations
+
+import resource
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import open3d as o3d
+from numpy.typing import NDArray
+
+from baselines.groundtruth.features import FeatureOdometry
+from baselines.groundtruth.posegraph.graph import Edge, PoseGraph
+from baselines.groundtruth.rgbd.dense import DenseOdometry
+from baselines.groundtruth.rgbd.frames import read_frame
+from baselines.groundtruth.rgbd.loops import loop_candidates, most_telling
+from baselines.groundtruth.rgbd.tracks import View, closure, neighbour
+from synfeal.config.models import CameraConfig, RgbdConfig
+from synfeal.geometry.poses import relative
+
+Array = NDArray[np.float64]
+
+# Standard deviations of edges (metres, degrees), of the size measured on rendered rooms: of
+# neighbours, whose errors add up, of loop closures, and of guesses, as large as the motion itself.
+_NEIGHBOUR, _LOOP, _GUESS = (0.001, 0.03), (0.001, 0.02), (0.1, 5.0)
+# Share of a keyframe that an earlier one has to show where odometry says how they lie.
+_LOOP_OVERLAP = 0.5
+
+
+@dataclass(frozen=True)
+class RgbdFacts:
+    """How a graph was made; seconds are of processor time."""
+
+    odometry_s: float
+    loops_s: float
+    pairs: int
+    pairs_accepted: int
+    loops_tried: int
+    loops: int
+    peak_memory_mb: float
+
+    def as_dict(self) -> dict[str, float | int]:
+        """For a JSON file."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class _Track:
+    """Chained odometry: poses (n, 4, 4), edges, guesses up to each frame, and the keyframes."""
+
+    first_from_cam: Array
+    edges: list[Edge]
+    guesses: NDArray[np.int64]
+    keyframes: dict[int, View]
+
+
+def rgbd_graph(
+    color_paths: Sequence[Path],
+    depth_paths: Sequence[Path],
+    camera: CameraConfig,
+    cfg: RgbdConfig,
+    seed: int = 0,
+) -> PoseGraph:
+    """The graph of :func:`rgbd_graph_with_facts`."""
+    return rgbd_graph_with_facts(color_paths, depth_paths, camera, cfg, seed)[0]
+
+
+def rgbd_graph_with_facts(
+    color_paths: Sequence[Path],
+    depth_paths: Sequence[Path],
+    camera: CameraConfig,
+    cfg: RgbdConfig,
+    seed: int = 0,
+) -> tuple[PoseGraph, RgbdFacts]:
+    """Pose graph of one batch: an edge per neighbouring pair and the accepted loop closures.
+
+    Args:
+        color_paths: colour images in order.
+        depth_paths: 16-bit depth images in millimetres, 65535 where nothing was hit.
+        camera: camera of both.
+        cfg: sensor, odometry, keyframes, and the gates of accepted motions.
+        seed: of the sensor's noise; unused by the ideal one.
+
+    Returns:
+        The graph with the chained odometry as initial poses, and what making it took.
+
+    Raises:
+        InputError: an image is missing or has another size than the camera.
+        ValueError: colour and depth images differ in number.
+    """
+    o3d.utility.set_max_threads(1)
+    o3d.utility.set_verbosity_level(o3d.utility.VerbosityLevel.Error)
+    start_s = time.process_time()
+    track = _odometry(color_paths, depth_paths, camera, cfg, seed)
+    odometry_s = time.process_time() - start_s
+    tried, loops = _loops(track, cfg)
+    accepted = len(track.edges) - int(track.guesses[-1])
+    facts = RgbdFacts(
+        odometry_s=odometry_s,
+        loops_s=time.process_time() - start_s - odometry_s,
+        pairs=len(track.edges),
+        pairs_accepted=accepted,
+        loops_tried=tried,
+        loops=len(loops),
+        peak_memory_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    )
+    return PoseGraph(track.first_from_cam, tuple(track.edges + loops)), facts
+
+
+def _odometry(
+    color_paths: Sequence[Path],
+    depth_paths: Sequence[Path],
+    camera: CameraConfig,
+    cfg: RgbdConfig,
+    seed: int,
+) -> _Track:
+    """Chain the motions of neighbours; only keyframes stay in memory."""
+    dense, by_features = DenseOdometry(camera, cfg), FeatureOdometry(camera)
+    poses, edges, guesses, motion = [np.eye(4)], [], [0], np.eye(4)
+    keyframes: dict[int, View] = {}
+    before: View | None = None
+    for j, paths in enumerate(zip(color_paths, depth_paths, strict=True)):
+        view = View(read_frame(*paths, camera, cfg, seed), dense, by_features)
+        if before is not None:
+            motion, accepted = neighbour(before, view, motion)
+            poses.append(poses[-1] @ motion)
+            edges.append(Edge(j - 1, j, motion, _information(_NEIGHBOUR if accepted else _GUESS)))
+            guesses.append(guesses[-1] + (not accepted))
+        if j % cfg.keyframe_every == 0:
+            keyframes[j] = view
+        before = view
+    return _Track(np.array(poses), edges, np.array(guesses), keyframes)
+
+
+def _loops(track: _Track, cfg: RgbdConfig) -> tuple[int, list[Edge]]:
+    """Closures tried and those accepted."""
+
+    def predicted(i: int, j: int) -> Array | None:
+        if track.guesses[i] != track.guesses[j]:
+            return None
+        return relative(track.first_from_cam[i], track.first_from_cam[j])
+
+    def overlap(i: int, j: int) -> float:
+        i_from_j = predicted(i, j)
+        if i_from_j is None:  # nothing is known of where they are: features will tell
+            return 1.0
+        view = track.keyframes[i]
+        share = view.dense.overlap(view.frame, track.keyframes[j].frame, i_from_j)
+        return share if share >= _LOOP_OVERLAP else 0.0
+
+    candidates = loop_candidates(track.first_from_cam, cfg.keyframe_every)
+    pairs = most_telling(candidates, overlap, cfg.loops_per_keyframe)
+    edges = []
+    for i, j in pairs:
+        i_from_j = closure(track.keyframes[i], track.keyframes[j], predicted(i, j))
+        if i_from_j is not None:
+            edges.append(Edge(i, j, i_from_j, _information(_LOOP)))
+    return len(pairs), edges
+
+
+def _information(sigma: tuple[float, float]) -> Array:
+    """Information (6, 6), translation first, from deviations in metres and degrees."""
+    sigma_m, sigma_deg = sigma
+    return np.diag([sigma_m**-2.0] * 3 + [np.radians(sigma_deg) ** -2.0] * 3)

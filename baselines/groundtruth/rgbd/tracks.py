@@ -1,0 +1,105 @@
+"""Motions between neighbouring frames, and between keyframes that view the same place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from baselines.groundtruth.features import FeatureOdometry, FrameFeatures
+from baselines.groundtruth.rgbd.dense import SURE_AGREEMENT, DenseOdometry, Motion
+from baselines.groundtruth.rgbd.frames import RgbdFrame
+
+Array = NDArray[np.float64]
+
+# Inliers below which features are no starting point for a neighbour, and for a loop closure.
+_MIN_INLIERS, _MIN_LOOP_INLIERS = 8, 12
+
+
+@dataclass(frozen=True)
+class View:
+    """A frame and what is found out about it once, when it is needed."""
+
+    frame: RgbdFrame
+    dense: DenseOdometry
+    by_features: FeatureOdometry
+
+    @cached_property
+    def features(self) -> FrameFeatures:
+        """Features of the colour image."""
+        grey = np.asarray(Image.fromarray(self.frame.color).convert("L"))
+        return self.by_features.features(grey, self.frame.depth_m)
+
+    @cached_property
+    def constrained(self) -> bool:
+        """Whether dense odometry can tell every motion from this view."""
+        return self.dense.constrained(self.frame)
+
+    def from_features(self, other: View, min_inliers: int) -> Array | None:
+        """Motion ``self_from_other`` (4, 4) by features alone, or None."""
+        found = self.by_features.motion(self.features, other.features)
+        return found[0] if found and found[1] >= min_inliers else None
+
+
+def neighbour(i: View, j: View, previous: Array) -> tuple[Array, bool]:
+    """Motion ``i_from_j`` (4, 4) between neighbours and whether it was accepted.
+
+    Args:
+        i: the frame before.
+        j: the frame.
+        previous: motion (4, 4) of the pair before.
+    """
+    if not (i.constrained and j.constrained):
+        return _by_features(i, j, previous)
+    by_start = i.dense.cfg.start
+    starts = [] if by_start == "features" else [previous if by_start == "motion" else np.eye(4)]
+    best: Motion | None = None
+    for start in starts:
+        best = i.dense.refine(i.frame, j.frame, start)
+    if best is not None and best.agreement >= SURE_AGREEMENT:
+        return best.i_from_j, True
+    return _with_features(i, j, previous, best)
+
+
+def _with_features(i: View, j: View, previous: Array, best: Motion | None) -> tuple[Array, bool]:
+    """The better of a motion found so far and of the one that features start."""
+    start = i.from_features(j, _MIN_INLIERS)
+    if start is None:
+        start = previous
+    found = i.dense.refine(i.frame, j.frame, start)
+    candidates = [motion for motion in (best, found) if motion is not None]
+    if not candidates:
+        return start, False
+    return max(candidates, key=lambda motion: motion.agreement).i_from_j, True
+
+
+def _by_features(i: View, j: View, previous: Array) -> tuple[Array, bool]:
+    """Before a surface that depth slides along, features alone give the motion.
+
+    Open3D compares colours at whole pixels and would move it away again.
+    """
+    found = i.from_features(j, _MIN_INLIERS)
+    if found is None:
+        return previous, False
+    return found, i.dense.overlap(i.frame, j.frame, found) > 0
+
+
+def closure(i: View, j: View, predicted: Array | None) -> Array | None:
+    """Motion ``i_from_j`` (4, 4) between keyframes, or None.
+
+    Args:
+        i: the earlier one.
+        j: the later one.
+        predicted: motion (4, 4) by odometry, None where it was interrupted between them.
+    """
+    if not (i.constrained and j.constrained):
+        found = i.from_features(j, _MIN_LOOP_INLIERS)
+        return found if found is not None and i.dense.overlap(i.frame, j.frame, found) else None
+    start = i.from_features(j, _MIN_LOOP_INLIERS) if predicted is None else predicted
+    if start is None:
+        return None
+    motion = i.dense.refine(i.frame, j.frame, start)
+    return None if motion is None else motion.i_from_j

@@ -1,0 +1,130 @@
+"""Models of a batch from its matches, and the one that is taken.
+
+A view of one plane has two reconstructions, and a mapper that starts from the wrong one still
+registers every image. In the wrong one points leave the reprojection threshold and are dropped. So
+a model is judged by the share of the matched image points that it explains, which images that are
+matched and not registered lower too. A model that explains too little is doubtful: the mapper
+starts again from another image, and the model that explains the most is taken. A long path that
+bends only near its end is not noticed: it still explains most points.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+from numpy.typing import NDArray
+
+from baselines.groundtruth.sfm.options import global_options, incremental_options
+from synfeal.config.models import SfmConfig
+from synfeal.geometry.poses import inverse, pose_matrix
+
+_LOG = logging.getLogger(__name__)
+
+# Where in the batch the mapper starts, as a share of its length; None leaves the choice to it.
+_STARTS = (None, 0.5, 0.25, 0.75)
+
+
+@dataclass(frozen=True)
+class Matches:
+    """What the mappers start from.
+
+    Attributes:
+        images: directory of the images.
+        database: their features and verified matches.
+        image_ids: in the order of the frames.
+        matched_points: image points with at least one verified match.
+    """
+
+    images: Path
+    database: Path
+    image_ids: tuple[int, ...]
+    matched_points: int
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """What the mapper made of a batch.
+
+    Attributes:
+        model: the one that explains the most; None when there is none.
+        models: how many models there are: the parts that the batch fell into.
+        starts: how often the mapper started.
+        explained: share of the matched image points that ``model`` explains.
+    """
+
+    model: pycolmap.Reconstruction | None
+    models: int
+    starts: int
+    explained: float
+
+
+def read_matches(images: Path, database: Path) -> Matches:
+    """Matches of the images in a directory, from their database."""
+    with pycolmap.Database.open(database) as opened:
+        ids = [image.image_id for image in sorted(opened.read_all_images(), key=lambda i: i.name)]
+        cache = pycolmap.DatabaseCache.create(opened, pycolmap.DatabaseCacheOptions())
+    graph = cache.correspondence_graph
+    points = sum(graph.num_observations_for_image(i) for i in ids if graph.exists_image(i))
+    return Matches(images, database, tuple(ids), points)
+
+
+def map_matches(matches: Matches, work_dir: Path, cfg: SfmConfig, seed: int) -> Mapping:
+    """The best model that the mapper ``cfg.mapper`` finds; ``work_dir`` is a new directory."""
+    work_dir.mkdir()
+    if not matches.matched_points:
+        return Mapping(None, 0, 0, 0.0)
+    if cfg.mapper == "global":
+        models = pycolmap.global_mapping(
+            matches.database, matches.images, work_dir, global_options(cfg, seed)
+        )
+        return _mapping(models.values(), matches)
+    return _best_start(matches, work_dir, cfg, seed)
+
+
+def camera_poses(
+    model: pycolmap.Reconstruction | None,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Registered frames (m,) in order and their ``model_from_cam`` (m, 4, 4); m = 0 without one."""
+    images = [] if model is None else [i for i in model.images.values() if i.has_pose]
+    images.sort(key=lambda image: str(image.name))
+    frames = np.array([int(Path(image.name).stem) for image in images], dtype=np.int64)
+    cam_from_model = [image.cam_from_world().matrix() for image in images]
+    matrices = np.array(cam_from_model, dtype=np.float64).reshape(-1, 3, 4)
+    return frames, inverse(pose_matrix(matrices[:, :, :3], matrices[:, :, 3]))
+
+
+def _best_start(matches: Matches, work_dir: Path, cfg: SfmConfig, seed: int) -> Mapping:
+    """The model of the first start that explains enough, or the best one of all starts."""
+    deadline = time.monotonic() + cfg.max_mapping_s
+    best = Mapping(None, 0, 0, 0.0)
+    for starts, start in enumerate(_STARTS, start=1):
+        left_s = math.floor(deadline - time.monotonic())
+        if left_s < 1:
+            _LOG.warning("mapping stopped after max_mapping_s = %d s", cfg.max_mapping_s)
+            break
+        options = incremental_options(cfg, seed, left_s)
+        if start is not None:
+            options.init_image_id1 = matches.image_ids[int(start * len(matches.image_ids))]
+        models = pycolmap.incremental_mapping(matches.database, matches.images, work_dir, options)
+        found = _mapping(models.values(), matches)
+        best = replace(max(best, found, key=lambda mapping: mapping.explained), starts=starts)
+        if best.explained >= cfg.min_explained:
+            break
+    return best
+
+
+def _mapping(models: Iterable[pycolmap.Reconstruction], matches: Matches) -> Mapping:
+    """The model with the most observations among those of one start."""
+    by_observations = sorted(models, key=lambda model: int(model.compute_num_observations()))
+    if not by_observations:
+        return Mapping(None, 0, 1, 0.0)
+    model = by_observations[-1]
+    explained = int(model.compute_num_observations()) / matches.matched_points
+    return Mapping(model, len(by_observations), 1, explained)

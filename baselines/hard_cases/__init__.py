@@ -1,0 +1,1 @@
+"""Hard cases of what the paper compares: losses and pose graphs."""

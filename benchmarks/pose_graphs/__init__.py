@@ -1,0 +1,1 @@
+"""How fast and how well pose-graph optimisers do on large graphs."""

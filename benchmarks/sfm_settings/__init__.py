@@ -1,0 +1,1 @@
+"""Settings of structure from motion: what each costs, and how far the poses are off."""

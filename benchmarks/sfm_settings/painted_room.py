@@ -1,0 +1,114 @@
+"""A room whose walls are full of detail, ray-cast in closed form: every pixel is known exactly.
+
+Nothing of the simulator is used, so what structure from motion makes of these images does not
+depend on meshes, scans or renderers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from synfeal.camera.intrinsics import intrinsics_of
+from synfeal.config.models import CameraConfig
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.geometry.rotations import quat_wxyz_from_matrix, rotation_from_rpy
+
+Array = NDArray[np.float64]
+
+SIZE_M = np.array([5.0, 6.0, 3.0])
+TEXELS_PER_M = 100
+SUPERSAMPLING = 2
+_GREY = 128.0
+_DETAIL = ((1.5, 25.0), (4.0, 30.0), (12.0, 30.0))  # texels, standard deviation of grey values
+
+
+@dataclass(frozen=True)
+class PaintedRoom:
+    """A box from the origin to ``SIZE_M``, seen from inside.
+
+    Attributes:
+        textures: grey values (H, W) of the walls x = 0, x = max, y = 0, y = max, z = 0, z = max;
+            a texture is repeated where the wall is larger.
+    """
+
+    textures: tuple[Array, ...]
+
+    def render(self, world_from_cam: Array, camera: CameraConfig) -> NDArray[np.uint8]:
+        """Antialiased colour image (H, W, 3) of a camera without distortion."""
+        direction = _directions(world_from_cam, camera)
+        origin = world_from_cam[:3, 3]
+        with np.errstate(divide="ignore"):
+            reach = (np.where(direction > 0, SIZE_M, 0.0) - origin) / direction
+        axis = np.argmin(np.where(np.isnan(reach), np.inf, reach), axis=-1)
+        distance = np.take_along_axis(reach, axis[..., None], axis=-1)
+        texel = (origin + distance * direction) * TEXELS_PER_M
+        far = np.take_along_axis(direction, axis[..., None], axis=-1)[..., 0] > 0
+        grey = np.zeros(axis.shape)
+        for wall, texture in enumerate(self.textures):
+            seen = (axis == wall // 2) & (far == wall % 2)
+            along = [texel[seen, k] for k in range(3) if k != wall // 2]
+            grey[seen] = map_coordinates(texture, along, order=1, mode="grid-wrap")
+        return _reduced(grey)
+
+
+def painted_room(rng: np.random.Generator, contrast: float = 1.0) -> PaintedRoom:
+    """A room with another random texture on every wall; without contrast all is grey."""
+    return PaintedRoom(tuple(random_texture(rng, contrast) for _ in range(6)))
+
+
+def random_texture(rng: np.random.Generator, contrast: float = 1.0) -> Array:
+    """Random grey values (700, 700) with detail at several scales."""
+    image = np.zeros((700, 700))
+    for sigma, weight in _DETAIL:
+        noise = gaussian_filter(rng.standard_normal(image.shape), sigma, mode="wrap")
+        image += weight * noise / noise.std()
+    return np.asarray(np.clip(_GREY + contrast * image, 0, 255), dtype=np.float64)
+
+
+def _directions(world_from_cam: Array, camera: CameraConfig) -> Array:
+    """Directions (H, W, 3) in the world of the rays through all subpixels, length 1 along z."""
+    fx, fy, cx, cy = intrinsics_of(camera)
+    step = 1.0 / SUPERSAMPLING
+    column = (np.arange(camera.width * SUPERSAMPLING) + 0.5) * step
+    row = (np.arange(camera.height * SUPERSAMPLING) + 0.5) * step
+    x, y = np.meshgrid((column - cx) / fx, (row - cy) / fy)
+    rays = np.stack([x, y, np.ones_like(x)], axis=-1)
+    return np.asarray(rays @ world_from_cam[:3, :3].T, dtype=np.float64)
+
+
+def _reduced(grey: Array) -> NDArray[np.uint8]:
+    """The mean of the subpixels of every pixel, three times."""
+    height, width = (side // SUPERSAMPLING for side in grey.shape)
+    fine = grey.reshape(height, SUPERSAMPLING, width, SUPERSAMPLING)
+    coarse = np.round(fine.mean(axis=(1, 3))).astype(np.uint8)
+    return np.repeat(coarse[..., None], 3, axis=2)
+
+
+def round_path(n_frames: int, step_m: float) -> PoseTable:
+    """A round through the room along an ellipse, looking half outwards and a little up and down."""
+    angle = np.linspace(0, 2 * np.pi, 3600)
+    centre_m, radii_m = SIZE_M / 2, np.array([1.2, 1.6, 0.3])
+    curve = centre_m + radii_m * np.stack([np.cos(angle), np.sin(angle), np.sin(3 * angle)], -1)
+    length_m = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    at = np.interp(step_m * np.arange(n_frames), length_m, angle)
+    position_m = centre_m + radii_m * np.stack([np.cos(at), np.sin(at), np.sin(3 * at)], -1)
+    rpy = np.column_stack([0.1 * np.sin(2 * at), 0.2 * np.cos(2 * at), at + np.pi / 4])
+    index = np.arange(n_frames)
+    return PoseTable(index, 0 * index, position_m, quat_wxyz_from_matrix(rotation_from_rpy(rpy)))
+
+
+def write_frames(
+    room: PaintedRoom, poses: PoseTable, camera: CameraConfig, directory: Path
+) -> list[Path]:
+    """Images and poses as 7-Scenes stores them, in an existing directory; returns the images."""
+    paths = [directory / f"frame-{index:06d}.color.png" for index in range(len(poses))]
+    for path, world_from_cam in zip(paths, poses.world_from_cam, strict=True):
+        Image.fromarray(room.render(world_from_cam, camera)).save(path)
+        np.savetxt(path.with_suffix("").with_suffix(".pose.txt"), world_from_cam, "%.10e")
+    return paths

@@ -1,0 +1,53 @@
+"""Where the pixels of a camera look, lens distortion removed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.camera.distortion import distort, undistort
+from synfeal.camera.intrinsics import intrinsics_of
+
+if TYPE_CHECKING:
+    from synfeal.config.collection import CameraConfig
+
+Array = NDArray[np.float64]
+
+_CHECKED = 33  # points along each side on which a lens is checked, corners of the image included
+
+
+def slopes_of_pixels(camera: CameraConfig, pixel: Array) -> Array:
+    """Slopes (..., 2), x / z and y / z, of the rays through ``pixel`` (..., 2): columns and rows.
+
+    NaN where the lens folds over before it reaches the pixel.
+    """
+    fx, fy, cx, cy = intrinsics_of(camera)
+    return undistort((pixel - [cx, cy]) / [fx, fy], camera.distortion)
+
+
+def pixels_of_slopes(camera: CameraConfig, slope: Array) -> Array:
+    """The inverse of :func:`slopes_of_pixels`."""
+    fx, fy, cx, cy = intrinsics_of(camera)
+    return distort(slope, camera.distortion) * [fx, fy] + [cx, cy]
+
+
+def refuse_fold(camera: CameraConfig) -> None:
+    """Check that every pixel looks somewhere.
+
+    Raises:
+        ValueError: the lens folds over within the image; names the pixel nearest to the centre.
+    """
+    column, row = np.meshgrid(
+        np.linspace(0.0, camera.width, _CHECKED), np.linspace(0.0, camera.height, _CHECKED)
+    )
+    pixel = np.stack([column, row], axis=-1)
+    folded = pixel[np.isnan(slopes_of_pixels(camera, pixel)).any(axis=-1)]
+    if len(folded):
+        _, _, cx, cy = intrinsics_of(camera)
+        x, y = folded[np.argmin(np.hypot(*(folded - [cx, cy]).T))]
+        raise ValueError(
+            f"distortion: folds over inside the image at pixel ({x:.0f}, {y:.0f}); the coefficients"
+            " hold for a narrower image or belong to another lens"
+        )

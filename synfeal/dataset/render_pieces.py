@@ -1,0 +1,165 @@
+"""Rendering the missing frames of a data set, in this process or in several."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from multiprocessing.connection import wait as wait_for_end
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.dataset.frame_writer import FrameWriter
+from synfeal.dataset.progress import Progress, Stopwatch
+from synfeal.dataset.render_sequence import render_frames
+from synfeal.dataset.shards import Piece
+from synfeal.errors import InputError
+from synfeal.mesh.model import TexturedMesh
+from synfeal.render import open_renderer
+from synfeal.render.base import Renderer
+
+POLL_S = 0.2
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is missing of a piece.
+
+    Attributes:
+        name: for progress.
+        piece: where the frames belong.
+        numbers: the missing frames, counted within the sequence.
+        world_from_cam: (len(numbers), 4, 4) their poses.
+    """
+
+    name: str
+    piece: Piece
+    numbers: list[int]
+    world_from_cam: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Studio:
+    """What every process needs: what is rendered, how, and where to."""
+
+    mesh: TexturedMesh
+    camera: CameraConfig
+    render: RenderConfig
+    with_depth: bool
+    data: Path
+    scratch: Path
+
+    def open(self) -> Renderer:
+        """A renderer."""
+        return open_renderer(self.mesh, self.camera, self.render)
+
+    def carry_out(self, renderer: Renderer, task: Task, on_frame: Callable[[], object]) -> float:
+        """Render a task; seconds it took."""
+        watch = Stopwatch()
+        directory = self.data / task.piece.sequence.name
+        directory.mkdir(exist_ok=True)
+        with FrameWriter(self.scratch, on_frame) as writer:
+            frames = zip(task.numbers, task.world_from_cam, strict=True)
+            render_frames(renderer, frames, directory, self.with_depth, writer)
+        return watch.seconds
+
+
+def render_tasks(studio: Studio, tasks: list[Task], workers: int, progress: Progress) -> None:
+    """Render all tasks.
+
+    Raises:
+        InputError: this machine cannot render, or a worker process was killed.
+        OSError: a file could not be written.
+    """
+    workers = min(workers, len(tasks))
+    if workers > 1:
+        _render_parallel(studio, tasks, workers, progress)
+    elif tasks:
+        with studio.open() as renderer:
+            for task in tasks:
+                seconds = studio.carry_out(renderer, task, progress.update)
+                progress.shard_done(task.name, len(task.numbers), seconds)
+
+
+def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: Progress) -> None:
+    context = multiprocessing.get_context("spawn")  # a forked OpenGL context does not work
+    n_done, stop = context.Value("q", 0), context.Event()
+    initial = (studio, workers, n_done, stop)
+    executor = ProcessPoolExecutor(workers, context, _start_worker, initial)
+    try:
+        running = {executor.submit(_carry_out, task): task for task in tasks}
+        n_shown = 0
+        while running:
+            ended, _ = wait(running, POLL_S, FIRST_COMPLETED)
+            n_seen = n_done.value
+            progress.update(n_seen - n_shown)
+            n_shown = n_seen
+            for future in ended:
+                task = running.pop(future)
+                progress.shard_done(task.name, len(task.numbers), future.result())
+    except BrokenProcessPool:
+        raise InputError(
+            "collect: a worker process was killed, perhaps for lack of memory; what is done is"
+            " kept: run the same command again, with fewer --workers"
+        ) from None
+    finally:
+        stop.set()
+        executor.shutdown(cancel_futures=True)
+
+
+class _Worker:
+    """What a worker process keeps between tasks."""
+
+    def __init__(self, studio: Studio, n_done: Any, stop: Any) -> None:
+        self.studio = studio
+        self.n_done = n_done
+        self.stop = stop
+        self.renderer: Renderer | None = None
+
+    def on_frame(self) -> None:
+        """Count a frame, or give up when another worker failed or the person interrupted."""
+        with self.n_done.get_lock():
+            self.n_done.value += 1
+        if self.stop.is_set():
+            raise InputError("collect: stopped")
+
+
+_worker: _Worker | None = None
+
+
+def _start_worker(studio: Studio, workers: int, n_done: Any, stop: Any) -> None:
+    """Set up a worker process: it ends with its parent, and leaves Ctrl-C to it."""
+    global _worker
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    # Read by Mesa's software renderer when it starts.
+    os.environ.setdefault("LP_NUM_THREADS", str(max(1, usable_cpus() // workers)))
+    _worker = _Worker(studio, n_done, stop)
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    wait_for_end([parent.sentinel])
+    os._exit(1)
+
+
+def _carry_out(task: Task) -> float:
+    assert _worker is not None
+    if _worker.renderer is None:
+        _worker.renderer = _worker.studio.open()
+    return _worker.studio.carry_out(_worker.renderer, task, _worker.on_frame)
+
+
+def usable_cpus() -> int:
+    """Processors this process may use."""
+    return len(os.sched_getaffinity(0))

@@ -1,0 +1,116 @@
+"""Rendering what one job of the workflow makes: a sequence of files, or packed frames."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.dataset.directories import atomic_directory, writing_to
+from synfeal.dataset.frame_writer import FrameWriter
+from synfeal.dataset.packed import fit_frame, new_packed
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.progress import Progress, Stopwatch
+from synfeal.files import write_json
+from synfeal.mesh.load import load_mesh
+from synfeal.render import open_renderer
+from synfeal.render.base import Renderer
+from synfeal.render.choose import fastest_working
+
+REMEDY = "nothing was kept; mend that and render again"
+
+
+def render_sequence(
+    mesh_path: Path,
+    camera: CameraConfig,
+    poses: PoseTable,
+    out_dir: Path,
+    with_depth: bool,
+    render: RenderConfig | None = None,
+) -> None:
+    """Render every pose of the table into a new directory, which appears when it is complete.
+
+    Frames are numbered from 0 inside the sequence. ``mesh_path`` is a mesh in the world frame, as
+    :func:`synfeal.mesh.save.save_glb` writes it.
+
+    Raises:
+        InputError: the mesh cannot be read, or ``out_dir`` is not empty.
+    """
+    with open_renderer(load_mesh(mesh_path), camera, render) as renderer:
+        write_sequence(renderer, poses, out_dir, with_depth)
+
+
+def write_sequence(renderer: Renderer, poses: PoseTable, out_dir: Path, with_depth: bool) -> None:
+    """Render every pose of the table; files are written while the next frames are rendered."""
+    watch = Stopwatch()
+    with (
+        writing_to(out_dir, lambda: REMEDY),
+        Progress(len(poses), out_dir.name) as progress,
+        atomic_directory(out_dir) as directory,
+        tempfile.TemporaryDirectory(prefix=".frames-", dir=out_dir.parent) as scratch,
+        FrameWriter(Path(scratch), progress.update) as writer,
+    ):
+        render_frames(renderer, enumerate(poses.world_from_cam), directory, with_depth, writer)
+    progress.shard_done(out_dir.name, len(poses), watch.seconds)
+
+
+def resolved(render: RenderConfig) -> RenderConfig:
+    """With ``auto`` replaced by the backend it stands for on this machine.
+
+    Raises:
+        InputError: no backend works here.
+    """
+    if render.backend != "auto":
+        return render
+    return render.model_copy(update={"backend": fastest_working()})
+
+
+def render_frames(
+    renderer: Renderer,
+    frames: Iterable[tuple[int, NDArray[np.float64]]],
+    directory: Path,
+    with_depth: bool,
+    writer: FrameWriter,
+) -> None:
+    """Render numbered poses (4, 4) of one sequence and hand them to ``writer``."""
+    for number, world_from_cam in frames:
+        stem = directory / f"frame-{number:06d}"
+        if with_depth:
+            writer.add(stem, world_from_cam, *renderer.render_rgbd(world_from_cam))
+        else:
+            writer.add(stem, world_from_cam, renderer.render(world_from_cam), None)
+
+
+def render_packed(
+    mesh_path: Path,
+    camera: CameraConfig,
+    poses: PoseTable,
+    input_px: int,
+    out: Path,
+    render: RenderConfig | None = None,
+) -> None:
+    """Render every pose of the table into one array, as :func:`pack_frames` makes it of files.
+
+    ``<out>.json``, in place of ``.npy``, says how many frames it holds and which backend drew them.
+
+    Raises:
+        InputError: the mesh cannot be read, or the file cannot be written.
+    """
+    chosen = resolved(render or RenderConfig())
+    with (
+        writing_to(out, lambda: REMEDY),
+        open_renderer(load_mesh(mesh_path), camera, chosen) as renderer,
+        new_packed(out, len(poses), input_px) as packed,
+        Progress(len(poses), out.stem) as progress,
+    ):
+        watch = Stopwatch()
+        for index, world_from_cam in enumerate(poses.world_from_cam):
+            packed[index] = fit_frame(Image.fromarray(renderer.render(world_from_cam)), input_px)
+            progress.update()
+        write_json(out.with_suffix(".json"), {"frames": len(poses), "backend": chosen.backend})
+    progress.shard_done(out.stem, len(poses), watch.seconds)

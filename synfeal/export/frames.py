@@ -1,0 +1,119 @@
+"""What every exporter starts from: the frames of a data set, with poses, splits and camera."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.config.collection import CameraConfig
+from synfeal.dataset.sevenscenes import SPLIT_FILES
+from synfeal.errors import InputError
+from synfeal.validate.camera import camera_of_dataset
+from synfeal.validate.frames import check_names, kinds_of, read_poses
+from synfeal.validate.images import read_color
+from synfeal.validate.listing import COLOR, DEPTH, Frame, list_sequences
+from synfeal.validate.poses import check_rigid
+from synfeal.validate.splits import check_splits, read_splits
+
+
+@dataclass(frozen=True)
+class ExportFrame:
+    """One frame of a data set.
+
+    Attributes:
+        frame: its files.
+        world_from_cam: (4, 4).
+        split: ``train`` or ``test``; None where the data set has no splits.
+    """
+
+    frame: Frame
+    world_from_cam: NDArray[np.float64]
+    split: str | None
+
+    @property
+    def sequence(self) -> str:
+        """Name of the sequence."""
+        return self.frame.directory.name
+
+    @property
+    def color(self) -> Path:
+        """The colour image."""
+        return self.frame.path(COLOR)
+
+    @property
+    def depth(self) -> Path:
+        """The depth image, which need not exist."""
+        return self.frame.path(DEPTH)
+
+
+@dataclass(frozen=True)
+class ExportSet:
+    """A data set as exporters take it."""
+
+    path: Path
+    camera: CameraConfig
+    frames: tuple[ExportFrame, ...]
+    has_depth: bool
+    has_splits: bool
+
+    def of_split(self, split: str) -> Iterator[ExportFrame]:
+        """The frames of a split, in order."""
+        return (frame for frame in self.frames if frame.split == split)
+
+
+def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
+    """The frames of a data set, all of which must be there with rigid poses.
+
+    Args:
+        dataset: directory with ``seq-01``.
+        camera_file: calibration file; without it the manifest says which camera.
+
+    Raises:
+        InputError: frames or poses are missing or damaged, splits contradict each other, or the
+            camera is not known.
+    """
+    sequences = list_sequences(dataset)
+    camera = camera_of_dataset(dataset, camera_file)
+    if camera.assumed:
+        raise InputError(
+            f"{dataset / 'manifest.json'}: missing, so the camera is not known; give --camera FILE"
+        )
+    splits, split_failures = read_splits(dataset, sequences)
+    poses, unreadable = read_poses(sequences)
+    problems = check_names(sequences).failures + check_rigid(poses, unreadable).failures
+    if any((dataset / name).exists() for name in SPLIT_FILES.values()):
+        problems += check_splits(dataset, sequences, splits, split_failures).failures
+    split_of = {s.directory: split for split, listed in splits.items() for s in listed}
+    if problems:
+        raise InputError(f"{problems[0]}; synfeal validate says more")
+    frames = tuple(
+        ExportFrame(frame, poses[frame], split_of.get(frame.directory))
+        for sequence in sequences
+        for frame in sequence.frames
+    )
+    _check_size(frames[0].color, camera.config)
+    has_depth = DEPTH in kinds_of(sequences)
+    return ExportSet(dataset, camera.config, frames, has_depth, bool(splits))
+
+
+def _check_size(path: Path, camera: CameraConfig) -> None:
+    height, width = read_color(path).shape[:2]
+    if (width, height) != (camera.width, camera.height):
+        raise InputError(
+            f"{path}: is {width} x {height}, the camera is {camera.width} x {camera.height};"
+            " give the camera of these images with --camera"
+        )
+
+
+def place(source: Path, target: Path, copy: bool) -> None:
+    """Link ``target`` to ``source``, by its absolute path, or copy it."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if copy:
+        shutil.copyfile(source, target)
+    else:
+        target.symlink_to(source.resolve())

@@ -1,0 +1,47 @@
+"""Export of a data set into a directory that appears complete or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from tqdm import tqdm
+
+from synfeal.dataset.directories import atomic_directory, refuse_existing
+from synfeal.export.colmap import export_colmap
+from synfeal.export.frames import ExportSet, read_export_set
+from synfeal.export.nerfstudio import export_nerfstudio
+from synfeal.export.tum import export_tum
+
+Exporter = Callable[[ExportSet, Path, bool, Callable[[], object]], list[str]]
+
+FORMATS: dict[str, Exporter] = {
+    "colmap": export_colmap,
+    "nerfstudio": export_nerfstudio,
+    "tum": export_tum,
+}
+
+
+def export(
+    dataset: Path, to: str, out: Path, copy: bool, camera_file: Path | None
+) -> tuple[int, list[str]]:
+    """Write a data set in another format; returns the number of frames, and warnings.
+
+    Args:
+        dataset: directory with ``seq-01``.
+        to: one of ``FORMATS``.
+        out: directory to create.
+        copy: copy the colour images instead of linking to them.
+        camera_file: calibration file, where the data set has no manifest.
+
+    Raises:
+        InputError: ``out`` holds something, or the data set is damaged or its camera not known.
+    """
+    refuse_existing(out)
+    data = read_export_set(dataset, camera_file)
+    with (
+        atomic_directory(out) as directory,
+        tqdm(total=len(data.frames), unit="frame", desc="export", leave=False) as progress,
+    ):
+        warnings = FORMATS[to](data, directory, copy, progress.update)
+    return len(data.frames), warnings

@@ -1,0 +1,1 @@
+"""Where textbook formulas lose their digits: ours beside them, both against exact answers."""

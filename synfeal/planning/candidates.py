@@ -1,0 +1,76 @@
+"""The stream of candidates that paths take their targets from: sections 3.1 and 3.2 of the paper.
+
+Candidates are independent of the path they are drawn for. So they are drawn and their free views
+tested a block at a time, and paths are served in turn from one stream: a path tests several of the
+next rounds at once and takes the first with an admissible candidate; the next path goes on with the
+round after it. The numbers drawn, their order and what they are used for are those of drawing and
+testing one round at a time; the sizes of blocks and windows change the speed alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.mesh.rays import RayCaster
+from synfeal.planning.sampling import PoseVectors, sample_poses
+from synfeal.planning.target import farthest_admissible, has_free_view
+
+BLOCK = 4096  # candidates drawn at once; more gain nothing
+FIRST_WINDOW = 8  # candidates tested at once for a path; doubled while none is admissible
+
+
+class CandidateStream:
+    """Rounds of candidates in the order they are drawn."""
+
+    def __init__(
+        self,
+        caster: RayCaster,
+        bounds: NDArray[np.float64],
+        candidates: int,
+        min_view_distance_m: float,
+        rng: np.random.Generator,
+    ) -> None:
+        """Draw rounds of ``candidates`` poses within ``bounds`` (2, 6)."""
+        self._caster, self._bounds, self._rng = caster, bounds, rng
+        self._candidates, self._view_m = candidates, min_view_distance_m
+        self._poses = np.empty((0, candidates, 6))
+        self._has_view = np.empty((0, candidates), np.bool_)
+        self._at = 0
+
+    def next_target(
+        self, start: NDArray[np.float64], min_path_m: float, max_rounds: int
+    ) -> NDArray[np.float64] | None:
+        """The target (6,) of a path from ``start`` (6,): the first admissible round's farthest.
+
+        None if none of the next ``max_rounds`` rounds has an admissible candidate that is
+        ``min_path_m`` away.
+        """
+        tried, window = 0, max(1, FIRST_WINDOW // self._candidates)
+        while tried < max_rounds:
+            poses, has_view = self._ahead(min(window, max_rounds - tried))
+            found = farthest_admissible(self._caster, start, poses, has_view, min_path_m)
+            if found is not None:
+                self._at += found[0] + 1
+                target: NDArray[np.float64] = poses[found]
+                return target
+            self._at += len(poses)
+            tried += len(poses)
+            window *= 2
+        return None
+
+    def _ahead(self, count: int) -> tuple[PoseVectors, NDArray[np.bool_]]:
+        """The next rounds (R, k, 6), 1 to ``count``, and which have a free view (R, k)."""
+        if self._at == len(self._poses):
+            self._draw()
+        part = slice(self._at, self._at + count)
+        return self._poses[part], self._has_view[part]
+
+    def _draw(self) -> None:
+        """Replace the block, which is used up, by the next."""
+        rounds = max(1, BLOCK // self._candidates)
+        poses = sample_poses(self._bounds, rounds * self._candidates, self._rng)
+        has_view = has_free_view(self._caster, poses, self._view_m)
+        self._poses = poses.reshape(rounds, self._candidates, 6)
+        self._has_view = has_view.reshape(rounds, self._candidates)
+        self._at = 0

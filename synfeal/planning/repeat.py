@@ -1,0 +1,128 @@
+"""The poses of an earlier data set once more: the simulator's mode ``repeat``."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.dataset.pose_table import PoseTable, check_unit, read_pose_table
+from synfeal.dataset.sevenscenes import SPLIT_FILES, frame_paths, read_pose, read_split
+from synfeal.errors import InputError
+from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.geometry.rotations import canonical_quat_wxyz
+
+# Rotations are accepted within this: files of other programs hold few digits.
+TOLERANCE = 1e-2
+TUM_ROW = "timestamp tx ty tz qx qy qz qw"
+
+log = logging.getLogger("synfeal")
+
+
+def repeated_poses(
+    source: Path, split: str, n_frames: int, mesh_bounds_m: NDArray[np.float64]
+) -> PoseTable:
+    """The first ``n_frames`` poses of ``source``; see :func:`read_poses`.
+
+    Logs a warning if some lie outside the mesh's bounds (2, 3).
+
+    Raises:
+        InputError: the source cannot be read, or holds fewer poses.
+    """
+    table = read_poses(source, split)
+    if len(table) < n_frames:
+        raise InputError(f"{source}: holds {len(table)} {split} poses; {n_frames} are asked for")
+    table = table.first(n_frames)
+    lower, upper = mesh_bounds_m
+    inside = ((table.position_m >= lower) & (table.position_m <= upper)).all(axis=1)
+    if not inside.all():
+        where = ", ".join(f"{value:.2f}" for value in table.position_m[np.argmin(inside)])
+        log.warning(
+            "%s: %d of %d poses lie outside the mesh, the first at (%s) m; check unit_m, up_axis",
+            *(source, np.sum(~inside), n_frames, where),
+        )
+    return table
+
+
+def read_poses(source: Path, split: str) -> PoseTable:
+    """Poses ``world_from_cam`` of a split (``train`` or ``test``), numbered from 0.
+
+    ``source`` is a data set of :mod:`synfeal.dataset.collect`, a 7-Scenes data set, a directory
+    of its frames (``frame-XXXXXX.pose.txt``), a pose table (``.csv``) or a trajectory in the
+    format of the TUM benchmark (``.txt``). The last three hold one list of poses, which is the
+    training split. Each sequence and each trajectory is one path, where no table says otherwise.
+
+    Raises:
+        InputError: a file is missing, or holds what is no pose.
+    """
+    if (source / f"{split}.csv").is_file():
+        return _read_table(source / f"{split}.csv")
+    if (source / SPLIT_FILES[split]).is_file():
+        return _read_frames(read_split(source, split), source)
+    if split != "train":
+        raise InputError(
+            f"{source}: holds one list of poses, which is for training frames; for others name a"
+            " directory with train.csv and test.csv, or with TrainSplit.txt and TestSplit.txt"
+        )
+    if source.is_dir():
+        return _read_frames([source], source)
+    if source.suffix == ".csv":
+        return _read_table(source)
+    if source.suffix == ".txt":
+        return _read_tum(source)
+    raise InputError(f"{source}: must be a directory, a .csv pose table or a .txt TUM trajectory")
+
+
+def _read_table(path: Path) -> PoseTable:
+    """A pose table, its values as they are."""
+    table = read_pose_table(path)
+    return PoseTable(np.arange(len(table)), table.path, table.position_m, table.quat_wxyz)
+
+
+def _read_frames(directories: list[Path], source: Path) -> PoseTable:
+    """The poses of 7-Scenes sequences, each a path."""
+    if not directories:
+        raise InputError(f"{source}: the list of its sequences is empty")
+    files = [frame_paths([directory], "pose.txt") for directory in directories]
+    poses = np.array([_rigid(path) for sequence in files for path in sequence])
+    path = np.repeat(np.arange(len(files)), [len(sequence) for sequence in files])
+    return PoseTable(np.arange(len(poses)), path, poses[:, :3, 3].copy(), quat_wxyz_of(poses))
+
+
+def _rigid(path: Path) -> NDArray[np.float64]:
+    """A pose (4, 4) that is a rotation and a translation."""
+    pose = read_pose(path)
+    rotation = pose[:3, :3].clip(-2.0, 2.0)  # anything beyond 1 is none, and must not overflow
+    orthonormal = np.allclose(rotation @ rotation.T, np.eye(3), rtol=0.0, atol=TOLERANCE)
+    last_row = np.allclose(pose[3], [0.0, 0.0, 0.0, 1.0], rtol=0.0, atol=TOLERANCE)
+    if not (orthonormal and last_row and np.linalg.det(rotation) > 0.0):
+        raise InputError(f"{path}: is no rigid pose; its upper left 3x3 must be a rotation")
+    return pose
+
+
+def _read_tum(path: Path) -> PoseTable:
+    """A trajectory of lines ``timestamp tx ty tz qx qy qz qw``; ``#`` starts a comment."""
+    try:
+        lines = [line.partition("#")[0].split() for line in path.read_text("utf-8").splitlines()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as a trajectory ({error})") from None
+    rows = {number: line for number, line in enumerate(lines, 1) if line}
+    values = np.array([_tum_row(path, number, line) for number, line in rows.items()])
+    values = values.reshape(-1, 8)
+    quat = values[:, [7, 4, 5, 6]]
+    check_unit(quat, path, np.array(list(rows)))
+    index = np.arange(len(values))
+    return PoseTable(index, np.zeros_like(index), values[:, 1:4], canonical_quat_wxyz(quat))
+
+
+def _tum_row(path: Path, number: int, line: list[str]) -> list[float]:
+    """The eight finite numbers of a line."""
+    try:
+        values = [float(cell) for cell in line]
+    except ValueError:
+        values = []
+    if len(values) != 8 or not np.isfinite(values).all():
+        raise InputError(f"{path}: line {number} must hold eight finite numbers: {TUM_ROW}")
+    return values

@@ -1,0 +1,100 @@
+"""How much of a scene's surface a plan's frames see."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from synfeal.camera.distortion import fold_radius
+from synfeal.camera.rays import pixels_of_slopes
+from synfeal.config.models import CameraConfig
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.mesh.rays import RayCaster
+from synfeal.mesh.triangles import Triangles
+
+Array = NDArray[np.float64]
+
+N_POINTS = 20_000  # a share of one half is then known to 0.4 % (standard error)
+MAX_FRAMES = 1_000
+OFTEN = 3  # frames
+FARTHEST_M = 5.0
+LIFT_M = 0.01  # rays stop this far before the surface they are to reach
+
+
+class SeenSurface(NamedTuple):
+    """Counts of surface points.
+
+    Attributes:
+        visible: those that can be seen from the free space at all.
+        seen: of these, those in at least one frame.
+        seen_often: of these, those in at least ``OFTEN`` frames.
+    """
+
+    visible: int
+    seen: int
+    seen_often: int
+
+
+def seen_surface(
+    mesh: Triangles, caster: RayCaster, hubs_m: Array, plan: PoseTable, camera: CameraConfig
+) -> SeenSurface:
+    """Look at ``N_POINTS`` points, uniform over the surface, from up to ``MAX_FRAMES`` frames.
+
+    A point is in a frame if it is projected into the image, no farther than ``FARTHEST_M``, and
+    nothing is before it. From either side: scans have holes, and walls without thickness.
+
+    Args:
+        mesh: the surface.
+        caster: rays against it.
+        hubs_m: (H, 3) places in the free space: what none of them sees cannot be seen.
+        plan: the poses; frames spread evenly over them are looked at.
+        camera: size, intrinsics and distortion.
+    """
+    surface = trimesh.Trimesh(mesh.vertices_m, mesh.faces, process=False)
+    points, _ = trimesh.sample.sample_surface(surface, N_POINTS, seed=0)
+    points = visible_points(caster, hubs_m, np.asarray(points, dtype=np.float64))
+    times = np.zeros(len(points), dtype=np.int64)
+    for world_from_cam in plan.world_from_cam[shown_frames(len(plan))]:
+        left = np.flatnonzero(times < OFTEN)
+        left = left[in_image(camera, world_from_cam, points[left])]
+        times[left] += has_line(caster, world_from_cam[:3, 3], points[left])
+    return SeenSurface(len(points), int(np.sum(times > 0)), int(np.sum(times >= OFTEN)))
+
+
+def shown_frames(n_frames: int) -> NDArray[np.int64]:
+    """Indices of at most ``MAX_FRAMES`` frames, spread evenly over all."""
+    return np.linspace(0, n_frames - 1, min(n_frames, MAX_FRAMES)).round().astype(np.int64)
+
+
+def visible_points(caster: RayCaster, places_m: Array, points_m: Array) -> Array:
+    """Those of the surface points (N, 3) that at least one place (P, 3) sees."""
+    found = np.zeros(len(points_m), dtype=np.bool_)
+    for place in places_m:
+        left = np.flatnonzero(~found)
+        found[left] = has_line(caster, place, points_m[left])
+    return points_m[found]
+
+
+def has_line(caster: RayCaster, place_m: Array, points_m: Array) -> NDArray[np.bool_]:
+    """Whether nothing is between a place (3,) and surface points (N, 3), (N,)."""
+    towards = place_m - points_m
+    length_m = np.linalg.norm(towards, axis=1, keepdims=True)
+    lifted = points_m + towards * np.minimum(LIFT_M / np.maximum(length_m, LIFT_M), 1.0)
+    return caster.sees(np.broadcast_to(place_m, lifted.shape), lifted)
+
+
+def in_image(camera: CameraConfig, world_from_cam: Array, points_m: Array) -> NDArray[np.bool_]:
+    """Whether points (N, 3) are projected into the image of a pose (4, 4), within reach, (N,)."""
+    offset = points_m - world_from_cam[:3, 3]
+    at = offset @ world_from_cam[:3, :3]
+    reached = np.einsum("ni,ni->n", at, at) <= FARTHEST_M**2
+    inside: NDArray[np.bool_] = reached & (at[:, 2] > camera.near_m)
+    slope = at[inside, :2] / at[inside, 2:]
+    pixel = pixels_of_slopes(camera, slope)
+    within = ((pixel >= 0.0) & (pixel <= [camera.width, camera.height])).all(axis=1)
+    # Beyond its fold a lens model maps what is far outside back into the image.
+    inside[inside] = within & (np.linalg.norm(slope, axis=1) < fold_radius(camera.distortion))
+    return inside

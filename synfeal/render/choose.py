@@ -1,0 +1,113 @@
+"""Which backend draws: the one named, or the fastest that works on this machine.
+
+A backend works when it draws a red square red; libraries that load and draw nothing do not count.
+"""
+
+from __future__ import annotations
+
+import functools
+import logging
+from collections.abc import Callable
+
+import numpy as np
+
+from synfeal.config.collection import CameraConfig, RenderConfig
+from synfeal.errors import InputError
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.render.base import Renderer
+
+log = logging.getLogger("synfeal")
+Opener = Callable[[TexturedMesh, CameraConfig, RenderConfig], Renderer]
+EGL_PACKAGES = "on Debian and Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri"
+
+
+def _open_opengl(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) -> Renderer:
+    from synfeal.render.opengl.backend import OpenglRenderer
+
+    return OpenglRenderer(mesh, camera, render.supersampling)
+
+
+def _open_pyrender(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) -> Renderer:
+    from synfeal.render.pyrender_backend import PyrenderRenderer  # takes a second: only when needed
+
+    return PyrenderRenderer(mesh, camera, render.supersampling)
+
+
+def _open_raycast(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) -> Renderer:
+    from synfeal.render.raycast_backend import RaycastRenderer
+
+    return RaycastRenderer(mesh, camera, render.supersampling)
+
+
+# Fastest first; benchmarks/rendering says by how much.
+BACKENDS: dict[str, Opener] = {
+    "opengl": _open_opengl,
+    "pyrender": _open_pyrender,
+    "raycast": _open_raycast,
+}
+INSTALL = {
+    "opengl": f"pip install moderngl; {EGL_PACKAGES}",
+    "pyrender": f"pip install pyrender; {EGL_PACKAGES}",
+    "raycast": "pip install embreex",
+}
+
+
+def open_chosen(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) -> Renderer:
+    """A renderer of the configured backend.
+
+    Raises:
+        InputError: the backend named does not work on this machine, or with ``auto`` none does.
+    """
+    if render.backend == "auto":
+        return BACKENDS[fastest_working()](mesh, camera, render)
+    failure = why_not(render.backend)
+    if failure is not None:
+        raise InputError(
+            f"render.backend: {render.backend} does not work here: {failure}; or set auto"
+        )
+    return BACKENDS[render.backend](mesh, camera, render)
+
+
+@functools.cache
+def fastest_working() -> str:
+    """Name of the fastest backend that works here; says so once, and warns of each that does not.
+
+    Raises:
+        InputError: none works.
+    """
+    failures = []
+    for name in BACKENDS:
+        failure = why_not(name)
+        if failure is None:
+            log.info("rendering with %s, the fastest backend that works here", name)
+            return name
+        log.warning("render.backend: %s does not work here: %s", name, failure)
+        failures.append(f"{name}: {failure}")
+    raise InputError(f"render.backend: nothing here can draw: {'; '.join(failures)}")
+
+
+@functools.cache
+def why_not(name: str) -> str | None:
+    """Why a backend does not draw on this machine and what to install, or None if it does."""
+    try:
+        with BACKENDS[name](_red_square(), CameraConfig(width=16, height=16), RenderConfig()) as r:
+            rgb, depth_m = r.render_rgbd(_FACING)
+    except InputError as error:
+        return str(error)
+    except Exception as error:  # a missing library, driver or device each raises its own
+        return " ".join(f"{type(error).__name__}: {error}; {INSTALL[name]}".split())
+    if (rgb != [255, 0, 0]).any() or not np.allclose(depth_m, 1.0, atol=1e-3):
+        return "it draws a red square wrongly"
+    return None
+
+
+# Looks along world x, upright.
+_FACING = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+
+
+def _red_square() -> TexturedMesh:
+    """A square 1 m before a camera at the origin that looks along x; it fills the image."""
+    corners = np.array([[1.0, 9, -9], [1, -9, -9], [1, -9, 9], [1, 9, 9]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    red = np.array([255, 0, 0, 255], np.uint8)
+    return TexturedMesh((MeshPart("square", corners, faces, base_color=red),))

@@ -1,0 +1,177 @@
+"""Images through a lens: a larger pinhole image, resampled.
+
+Colours: the pinhole image has twice the resolution of the distorted image's centre, and each pixel
+is the mean of 2x2 points, read bilinearly: within 3 % of the contrast (RMS) of a mean of 64 rays.
+Depth: along the optical axis it is the same in both images. Its inverse is linear in the pixels of
+a plane, so it is interpolated there and exact; elsewhere the nearest pixel's is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from synfeal.camera.intrinsics import intrinsics_of
+from synfeal.camera.rays import slopes_of_pixels
+from synfeal.config.models import CameraConfig
+from synfeal.errors import InputError
+from synfeal.render.base import Depth, Renderer, Rgb
+
+Array = NDArray[np.float64]
+
+_OVERSAMPLING = 2.0
+_MARGIN_PX = 3  # around the pixels that are read: neighbours, and differences between them
+_LONGEST_SIDE_PX = 8192  # what CameraConfig and OpenGL allow
+# Points within a pixel whose mean is its colour, pixels from its centre.
+_POINTS = [(x, y) for y in (-0.25, 0.25) for x in (-0.25, 0.25)]
+_BAND = 64  # rows of the image that are mapped at a time
+# Second difference of inverse depth, relative, from which neighbours lie on different surfaces.
+_BENT = 0.01
+
+
+class DistortedRenderer:
+    """Implements :class:`synfeal.render.base.Renderer` around one without distortion."""
+
+    def __init__(self, open_pinhole: Callable[[CameraConfig], Renderer], camera: CameraConfig):
+        """Open the inner renderer with the camera that :func:`covering_camera` gives."""
+        self._shape = (camera.height, camera.width)
+        pinhole = covering_camera(camera)
+        self._colour = _colour_matrix(camera, pinhole)
+        self._depth_taps = _taps(_seen_at(camera, pinhole, 0, camera.height), pinhole.width)
+        self._inner = open_pinhole(pinhole)
+
+    def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
+        """Colours (H, W, 3) seen from a pose (4, 4)."""
+        return self._resampled(self._inner.render(world_from_cam))
+
+    def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
+        """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
+        rgb, depth_m = self._inner.render_rgbd(world_from_cam)
+        return self._resampled(rgb), resampled_depth(depth_m, *self._depth_taps)
+
+    def close(self) -> None:
+        """Close the inner renderer."""
+        self._inner.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _resampled(self, rgb: Rgb) -> Rgb:
+        mean = self._colour @ rgb.reshape(-1, 3).astype(np.float32)
+        pixels: Rgb = np.rint(mean).astype(np.uint8).reshape(*self._shape, 3)
+        return pixels
+
+
+def covering_camera(camera: CameraConfig) -> CameraConfig:
+    """The pinhole that sees all that a lens sees, at least at the resolution of its centre.
+
+    Raises:
+        InputError: the view is so wide that the pinhole image would exceed 8192 pixels.
+    """
+    edge = _edge_slopes(camera)
+    fx, fy, _, _ = intrinsics_of(camera)
+    extent = np.ptp(edge, axis=0) * [fx, fy]
+    scale = min(_OVERSAMPLING, (_LONGEST_SIDE_PX - 2 * _MARGIN_PX - 2) / extent.max())
+    if scale < 1.0:
+        raise InputError(
+            f"distortion: the lens sees so much that a pinhole needs {extent.max():.0f} pixels for"
+            f" it, more than {_LONGEST_SIDE_PX}; give a smaller width"
+        )
+    focal = np.array([fx, fy]) * scale
+    low = np.floor(edge.min(axis=0) * focal) - _MARGIN_PX
+    width, height = np.ceil(edge.max(axis=0) * focal - low) + _MARGIN_PX
+    return CameraConfig(
+        width=max(16, int(width)),
+        height=max(16, int(height)),
+        fx=focal[0],
+        fy=focal[1],
+        cx=-low[0],
+        cy=-low[1],
+        near_m=camera.near_m,
+        far_m=camera.far_m,
+    )
+
+
+def resampled_depth(
+    depth_m: Depth, index: NDArray[np.int32], weight: NDArray[np.floating]
+) -> Depth:
+    """Depth at points between the pixels of a pinhole image; metres, inf for nothing.
+
+    Args:
+        depth_m: (h, w), along the optical axis.
+        index: (..., 4), the neighbours of each point in the flat image.
+        weight: (..., 4), of each neighbour.
+    """
+    inverse = 1.0 / depth_m
+    values = inverse.reshape(-1)[index]
+    linear = (values * weight).sum(axis=-1)
+    nearest = np.take_along_axis(values, weight.argmax(axis=-1)[..., None], axis=-1)[..., 0]
+    bent = _bent(inverse).reshape(-1)[index].any(axis=-1)
+    with np.errstate(divide="ignore"):
+        return (1.0 / np.where(bent, nearest, linear)).astype(np.float32)
+
+
+def _bent(inverse: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Where (h, w) inverse depth is not that of a plane: at edges, creases and beside nothing."""
+    bent = np.zeros(inverse.shape, bool)
+    for axis in (0, 1):
+        values, into = np.moveaxis(inverse, axis, 0), np.moveaxis(bent, axis, 0)
+        second = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
+        into[1:-1] |= second > _BENT * values[1:-1]
+    return bent
+
+
+def _edge_slopes(camera: CameraConfig) -> Array:
+    """Slopes (n, 2) along the edge of the image."""
+    x, y = np.arange(camera.width + 1.0), np.arange(camera.height + 1.0)
+    sides = [np.column_stack([x, 0.0 * x + edge]) for edge in (0.0, camera.height)]
+    sides += [np.column_stack([0.0 * y + edge, y]) for edge in (0.0, camera.width)]
+    return slopes_of_pixels(camera, np.concatenate(sides))
+
+
+def _seen_at(
+    camera: CameraConfig,
+    pinhole: CameraConfig,
+    start: int,
+    stop: int,
+    offset: tuple[float, float] = (0.0, 0.0),
+) -> Array:
+    """Where rows ``start`` to ``stop`` of the image lie in the pinhole image: (rows, W, 2)."""
+    column, row = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(start, stop) + 0.5)
+    slope = slopes_of_pixels(camera, np.stack([column, row], axis=-1) + offset)
+    fx, fy, cx, cy = intrinsics_of(pinhole)
+    return slope * [fx, fy] + [cx, cy]
+
+
+def _taps(pixel: Array, width: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Neighbours (..., 4) of points (..., 2) in a flat image of ``width``, and their weights."""
+    corner = np.floor(pixel - 0.5)
+    x, y = np.moveaxis(pixel - 0.5 - corner, -1, 0)
+    first = corner[..., 1] * width + corner[..., 0]
+    index = np.stack([first, first + 1, first + width, first + width + 1], axis=-1)
+    weight = np.stack([(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y], axis=-1)
+    return index.astype(np.int32), weight.astype(np.float32)
+
+
+def _colour_matrix(camera: CameraConfig, pinhole: CameraConfig) -> Any:
+    """The sparse matrix that makes the pixels of the image from those of the pinhole image."""
+    per_row = 4 * len(_POINTS)
+    shape = (camera.height, camera.width, per_row)
+    index, weight = np.empty(shape, np.int32), np.empty(shape, np.float32)
+    for start in range(0, camera.height, _BAND):
+        stop = min(start + _BAND, camera.height)
+        for number, point in enumerate(_POINTS):
+            seen = _seen_at(camera, pinhole, start, stop, point)
+            at = np.s_[start:stop, :, 4 * number : 4 * number + 4]
+            index[at], weight[at] = _taps(seen, pinhole.width)
+    ends = np.arange(0, index.size + 1, per_row)
+    size = (camera.height * camera.width, pinhole.height * pinhole.width)
+    values = weight.reshape(-1) / len(_POINTS)
+    return sparse.csr_matrix((values, index.reshape(-1), ends), shape=size)

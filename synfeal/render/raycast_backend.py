@@ -1,0 +1,117 @@
+"""Rendering by casting rays with Embree, on any machine: no OpenGL, no display, no driver.
+
+Slower than OpenGL, and independent of it: samples, texture filtering and alpha tests are those of
+the other backends, so the images are the same up to rounding; depth is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.camera.intrinsics import intrinsics_of
+from synfeal.config.models import CameraConfig
+from synfeal.mesh.model import TexturedMesh
+from synfeal.render.base import Depth, Rgb
+from synfeal.render.raycast.triangles import Floats, Points, TexturedTriangles, View
+
+SUPERSAMPLING = 2
+RAYS_AT_ONCE = 1 << 15  # 30 MB
+
+
+class RaycastRenderer:
+    """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
+
+    def __init__(
+        self, mesh: TexturedMesh, camera: CameraConfig, supersampling: int = SUPERSAMPLING
+    ) -> None:
+        """Prepare triangles and textures.
+
+        Args:
+            mesh: what is drawn.
+            camera: a camera without distortion.
+            supersampling: samples per pixel along each axis of the image.
+        """
+        self._triangles = TexturedTriangles(mesh)
+        self._camera = camera
+        self._intrinsics = intrinsics_of(camera)
+        steps = (np.arange(supersampling) + 0.5) / supersampling
+        self._samples_px: Floats = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        self._sample_size = 1.0 / supersampling
+
+    def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
+        """Colours (H, W, 3) seen from a pose (4, 4); black where nothing is."""
+        view = self._view(world_from_cam, self._sample_size)
+        return self._image(self._colours, view, world_from_cam, self._samples_px)
+
+    def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
+        """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
+        rgb = self.render(world_from_cam)
+        view = self._view(world_from_cam, 0.0)  # whether the very centre is cut out
+        return rgb, self._image(self._depth, view, world_from_cam, np.full((1, 2), 0.5))
+
+    def close(self) -> None:
+        """Drop triangles and textures."""
+        del self._triangles
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _view(self, pose: Floats, sample_size: float) -> View:
+        fx, fy, _, _ = self._intrinsics
+        per_sample = sample_size * pose[:3, :2].T / np.array([[fx], [fy]])
+        origin_m = pose[:3, 3] - self._triangles.centre_m
+        return View(origin_m, per_sample, self._camera.near_m, self._camera.far_m)
+
+    def _image(
+        self,
+        look: Callable[[View, Floats], NDArray[Any]],
+        view: View,
+        pose: Floats,
+        samples_px: Floats,
+    ) -> NDArray[Any]:
+        """What ``look`` sees along the rays through ``samples_px`` (S, 2) of each pixel.
+
+        Rays are (S * P, 3): in the world, of unit length along the optical axis, the first sample
+        of all pixels before the second.
+        """
+        width, height = self._camera.width, self._camera.height
+        fx, fy, cx, cy = self._intrinsics
+        tiles = []
+        for corners_px in _tiles(width, height, RAYS_AT_ONCE // len(samples_px)):
+            x, y = (corners_px + samples_px[:, None]).reshape(-1, 2).T[:, :, None]
+            rays = (x - cx) / fx * pose[:3, 0] + (y - cy) / fy * pose[:3, 1] + pose[:3, 2]
+            tiles.append(look(view, rays))
+        return np.concatenate(tiles).reshape(height, width, *tiles[0].shape[1:])
+
+    def _points(self, view: View, rays: Floats) -> tuple[NDArray[np.intp], Points]:
+        """Which rays hit something, and what."""
+        face, about_m = self._triangles.first_drawn(view, rays)
+        hit = np.flatnonzero(face >= 0)
+        return hit, self._triangles.points(view, rays[hit], face[hit], about_m[hit])
+
+    def _depth(self, view: View, rays: Floats) -> Depth:
+        hit, points = self._points(view, rays)
+        depth_m = np.full(len(rays), np.inf, np.float32)
+        depth_m[hit] = points.depth_m
+        return depth_m
+
+    def _colours(self, view: View, rays: Floats) -> Rgb:
+        hit, points = self._points(view, rays)
+        rgb = np.zeros((len(rays), 3), np.float32)
+        rgb[hit] = self._triangles.rgb(view, points)
+        samples = rgb.reshape(len(self._samples_px), -1, 3)
+        return np.asarray(np.round(samples.mean(axis=0)), np.uint8)
+
+
+def _tiles(width: int, height: int, count: int) -> Iterator[Floats]:
+    """Corners (P, 2) of the pixels of an image, row by row, at most ``count`` at once."""
+    for start in range(0, width * height, count):
+        index = np.arange(start, min(start + count, width * height))
+        yield np.stack([index % width, index // width], axis=1).astype(np.float64)

@@ -1,0 +1,33 @@
+#version 330 core
+// Colour, or depth along the optical axis in metres: whichever is drawn to.
+struct Material {
+    vec4 base_color_factor;
+#ifdef HAS_BASE_COLOR_TEX
+    sampler2D base_color_texture;
+#endif
+};
+uniform Material material;
+uniform float level_bias;  // added to the mip level
+#ifdef TEXCOORD_0_LOC
+in vec2 uv_0;
+#endif
+#ifdef COLOR_0_LOC
+in vec4 color_multiplier;
+#endif
+layout(location = 0) out vec4 colour;
+layout(location = 1) out vec4 depth_m;
+
+void main()
+{
+    colour = material.base_color_factor;
+#ifdef HAS_BASE_COLOR_TEX
+    vec4 texel = texture(material.base_color_texture, uv_0, level_bias);
+    if (texel.a < 0.5)
+        discard;
+    colour.rgb *= texel.rgb;
+#endif
+#ifdef COLOR_0_LOC
+    colour.rgb *= color_multiplier.rgb;
+#endif
+    depth_m = vec4(1.0 / gl_FragCoord.w);
+}

@@ -1,0 +1,237 @@
+"""How fast frames are drawn and how wrong they are: by backend, samples, and detail of the mesh."""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.config.collection import CameraConfig, RenderConfig
+from synfeal.dataset.pose_table import read_pose_table
+from synfeal.dataset.render_sequence import resolved
+from synfeal.mesh.detail import with_fewer_faces, with_smaller_textures
+from synfeal.mesh.load import load_mesh
+from synfeal.mesh.model import TexturedMesh
+from synfeal.render import choose, open_renderer
+from synfeal.render.base import Depth, Renderer, Rgb
+from synfeal.render.reference import SAMPLES_PER_AXIS, reference_images
+from synfeal.render.speed_table import Measured, write_speed
+
+PAPER_CAMERA = CameraConfig(width=640, height=480)
+LARGEST_PX = 8192 // SAMPLES_PER_AXIS  # of a side, so that the reference is an image in OpenGL
+SUPERSAMPLING = {"opengl": (1, 2, 3), "pyrender": (1, 2, 3), "raycast": (1, 2)}
+FACTORS = (2, 4)  # that textures are made smaller by, and triangles fewer
+ROUNDS = 2
+DEPTH_OFF_MM = 10.0
+
+log = logging.getLogger("synfeal")
+Poses = NDArray[np.float64]
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A way to draw: the mesh, perhaps with less detail, and how."""
+
+    mesh: TexturedMesh
+    render: RenderConfig
+    texture_scale: float = 1.0
+
+    def opened(self, camera: CameraConfig) -> Renderer:
+        """A renderer through ``camera``."""
+        return open_renderer(self.mesh, camera, self.render)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What P views should show: colours (P, H, W, 3) in 0 to 255, and depth (P, H, W), metres."""
+
+    rgb: NDArray[np.float32]
+    depth_m: Depth
+
+
+def write_render_speed(
+    mesh_path: Path,
+    plan_path: Path,
+    cameras: Sequence[CameraConfig],
+    n_poses: int,
+    render: RenderConfig,
+    out_csv: Path,
+) -> None:
+    """Measure on poses spread evenly over a plan, and write one line per camera and variant.
+
+    Args:
+        mesh_path: a mesh in the world frame.
+        plan_path: table of poses.
+        cameras: as :func:`measured_cameras` gives them, smallest first.
+        n_poses: views through the smallest; half as many through the others.
+        render: what the profile renders with.
+        out_csv: the lines of :class:`synfeal.render.speed_table.Measured`.
+
+    Raises:
+        InputError: the mesh or the plan cannot be read, or no backend works here.
+    """
+    plan = read_pose_table(plan_path).world_from_cam
+    poses = plan[np.linspace(0, len(plan) - 1, min(n_poses, len(plan))).astype(int)]
+    write_speed(out_csv, measure_speed(load_mesh(mesh_path), cameras, poses, resolved(render)))
+
+
+def measured_cameras(
+    network: CameraConfig, groundtruth: CameraConfig, count: int
+) -> list[CameraConfig]:
+    """The first ``count`` sizes of the profile's two cameras and the paper's, smallest first.
+
+    Images with more than 1024 pixels along a side are too large for the reference and left out.
+    """
+    by_size = {(c.width, c.height): c for c in (PAPER_CAMERA, groundtruth, network)}
+    fitting = [size for size in by_size if max(size) <= LARGEST_PX]
+    return [by_size[size] for size in sorted(fitting, key=np.prod)[:count]]
+
+
+def measure_speed(
+    mesh: TexturedMesh, cameras: Sequence[CameraConfig], poses: Poses, render: RenderConfig
+) -> list[Measured]:
+    """Every variant through every camera, the chosen one of each camera first.
+
+    Args:
+        mesh: the scene.
+        cameras: smallest first; backends that take seconds per frame draw through that one alone.
+        poses: (P, 4, 4) ``world_from_cam``; every other one is used with the larger cameras.
+        render: what the profile renders with; names its backend.
+    """
+    chosen = Variant(mesh, render)
+    details = less_detailed(chosen)
+    lines = []
+    for index, camera in enumerate(cameras):
+        others = [*other_settings(chosen, with_slow=index == 0), *details]
+        lines += measure_camera(chosen, others, camera, poses if index == 0 else poses[::2])
+        log.info("%dx%d: %d variants measured", camera.width, camera.height, len(others) + 1)
+    return lines
+
+
+def other_settings(chosen: Variant, with_slow: bool) -> list[Variant]:
+    """The full mesh with all backends that work here and numbers of samples but the chosen."""
+    settings = [
+        RenderConfig(backend=name, supersampling=samples)
+        for name in choose.BACKENDS
+        for samples in SUPERSAMPLING[name]
+        if choose.why_not(name) is None
+        and (with_slow or name in ("opengl", "pyrender", chosen.render.backend))
+    ]
+    return [Variant(chosen.mesh, render) for render in settings if render != chosen.render]
+
+
+def less_detailed(chosen: Variant) -> list[Variant]:
+    """The chosen settings with smaller textures, and with fewer triangles."""
+    mesh, render = chosen.mesh, chosen.render
+    variants = [Variant(with_smaller_textures(mesh, k), render, 1.0 / k) for k in FACTORS]
+    if importlib.util.find_spec("meshoptimizer") is None:
+        log.warning(
+            "meshoptimizer is not installed: meshes of fewer triangles are not measured;"
+            " pip install meshoptimizer, which needs a C++ compiler"
+        )
+        return variants
+    return variants + [Variant(with_fewer_faces(mesh, mesh.n_faces // k), render) for k in FACTORS]
+
+
+def measure_camera(
+    chosen: Variant, others: Sequence[Variant], camera: CameraConfig, poses: Poses
+) -> list[Measured]:
+    """Each variant beside the chosen one, in turns with it.
+
+    What else the machine does slows both: their ratio is free of that, and is applied to the median
+    of all times of the chosen one.
+    """
+    truth = truth_of(chosen, camera, poses)
+    beside, lines = [], []
+    with chosen.opened(camera) as yardstick:
+        errors = [errors_of(yardstick, poses, truth)]
+        for variant in others:
+            with variant.opened(camera) as renderer:
+                errors.append(errors_of(renderer, poses, truth))
+                beside.append(seconds_of([yardstick, renderer], poses))
+    chosen_ms = 1e3 * float(np.median([seconds[:, 0] for seconds in beside]))
+    ratios = [1.0, *(float(np.median(seconds[:, 1] / seconds[:, 0])) for seconds in beside)]
+    for variant, ratio, wrong in zip([chosen, *others], ratios, errors, strict=True):
+        lines.append(
+            Measured(
+                backend=variant.render.backend,
+                width=camera.width,
+                height=camera.height,
+                supersampling=variant.render.supersampling,
+                texture_scale=variant.texture_scale,
+                faces=variant.mesh.n_faces,
+                ms_per_frame=round(chosen_ms * ratio, 4),
+                **wrong,
+                chosen=int(variant is chosen),
+            )
+        )
+    return lines
+
+
+def truth_of(chosen: Variant, camera: CameraConfig, poses: Poses) -> Truth:
+    """Colours by 64 samples of the chosen backend, and depth by rays against the full mesh."""
+    mesh = chosen.mesh
+    plain = chosen.render.model_copy(update={"supersampling": 1})
+    rgb = np.stack(
+        list(reference_images(lambda large: open_renderer(mesh, large, plain), camera, poses))
+    )
+    rays = RenderConfig(backend="raycast", supersampling=1)
+    with open_renderer(_without_paint(mesh), camera, rays) as renderer:
+        depth_m = np.stack([renderer.render_rgbd(pose)[1] for pose in poses])
+    return Truth(rgb, depth_m)
+
+
+def _without_paint(mesh: TexturedMesh) -> TexturedMesh:
+    """The mesh without the textures that cut nothing out: depth does not need them."""
+    parts = (
+        part if part.alpha_cutoff is not None else replace(part, texture=None)
+        for part in mesh.parts
+    )
+    return replace(mesh, parts=tuple(parts))
+
+
+def errors_of(renderer: Renderer, poses: Poses, truth: Truth) -> dict[str, float]:
+    """How far the views of a renderer are from the truth; it has drawn each once afterwards."""
+    views = [renderer.render_rgbd(pose) for pose in poses]
+    rgb, depth_m = (np.stack(images) for images in zip(*views, strict=True))
+    return colour_errors(rgb, truth.rgb) | depth_errors(depth_m, truth.depth_m)
+
+
+def colour_errors(rgb: Rgb, expected: NDArray[np.float32]) -> dict[str, float]:
+    """Mean absolute difference in levels of 0 to 255, and peak signal-to-noise ratio in dB."""
+    difference = rgb - expected
+    mean_square = float(np.mean(difference**2, dtype=np.float64))
+    return {
+        "mean_abs_error": round(float(np.abs(difference).mean(dtype=np.float64)), 5),
+        "psnr_db": round(10.0 * float(np.log10(255.0**2 / mean_square)), 4),
+    }
+
+
+def depth_errors(depth_m: Depth, expected_m: Depth) -> dict[str, float]:
+    """Median difference in millimetres, and the share of more than 10 mm, where both hit."""
+    hit = np.isfinite(depth_m) & np.isfinite(expected_m)
+    off_mm = 1e3 * np.abs(depth_m[hit].astype(np.float64) - expected_m[hit])
+    return {
+        "depth_error_mm": round(float(np.median(off_mm)), 5),
+        "depth_off_share": round(float(np.mean(off_mm > DEPTH_OFF_MM)), 6),
+    }
+
+
+def seconds_of(renderers: Sequence[Renderer], poses: Poses) -> Floats:
+    """Times (rounds * P, R) of R renderers, which draw each colour image in turns."""
+    return np.array(
+        [[_seconds(r, pose) for r in renderers] for _ in range(ROUNDS) for pose in poses]
+    )
+
+
+def _seconds(renderer: Renderer, world_from_cam: Poses) -> float:
+    begin = time.perf_counter()
+    renderer.render(world_from_cam)
+    return time.perf_counter() - begin

@@ -1,0 +1,280 @@
+"""The jobs of a run and how large each is, from its configuration alone.
+
+Names and counts come from the functions that ``workflow/rules/common.smk`` asks too; a job is named
+like the file below ``<root>/benchmarks`` that its measurement is written to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from baselines.groundtruth.batches import batches_of
+from baselines.groundtruth.methods import METHODS, NOISE, frame_methods, graph_methods, stages_of
+from baselines.localizers.names import BACKBONE_OF
+from synfeal.config import Config, Experiment, runs_of
+from synfeal.config.models import CameraConfig
+from synfeal.dataset.sequences import sequences_of
+from synfeal.report.cost.disk import (
+    packed_bytes,
+    picture_bytes,
+    pose_bytes,
+    scene_bytes,
+    score_bytes,
+)
+from synfeal.report.cost.networks import pretext_work, training_work
+
+SPLITS = ("train", "test")
+# What the size of a job counts; stages under one law cost the same per unit.
+RENDERING, TRAINING = "rendering", "training"
+UNITS: dict[str, tuple[str, ...]] = {
+    RENDERING: ("frames", "Msamples"),
+    TRAINING: ("layer steps", "TFLOP"),
+    "render_speed": ("Mpx",),
+    "plan": ("frames",),
+    "pack": ("MB",),
+    "dataset": ("frames",),
+    "labels": ("frames",),
+    "sfm": ("Mpx",),
+    "rgbd": ("Mpx",),
+    **dict.fromkeys(frame_methods(), ("Mpx",)),
+    **dict.fromkeys(graph_methods(), ("frames",)),
+    "chain": ("frames",),
+    "score": ("frames",),
+    "claims": ("frames",),
+}
+# Stages from the meshes to the report.
+STAGES = (
+    *("scene", "plan", "render_packed", "pack", "render", "dataset", "labels", "sfm"),
+    *("rgbd", *frame_methods(), *graph_methods(), "chain", "pretrain", "train", "score"),
+    *(
+        "render_speed",
+        "tables",
+        "claims",
+        "figures",
+        "summary",
+        "provenance",
+        "report",
+        "report_document",
+    ),
+)
+SIDE_TABLES = ("assistance", "label_error", "speed_vs_error", "hard_cases", "document")
+LAW_OF = {
+    "render": RENDERING,
+    "render_packed": RENDERING,
+    "pretrain": TRAINING,
+    "train": TRAINING,
+}
+# Bytes of memory per pixel of a batch: what peaks differ by between profiles (docs/cost.md).
+HELD_PER_PX = {"sfm": 10, "rgbd": 26, **dict.fromkeys(frame_methods(), 26)}
+# Images per step of the pretext: baselines.training.pretrain.BATCH_SIZE, which would load torch.
+PRETEXT_BATCH = 32
+
+
+@dataclass(frozen=True)
+class Job:
+    """One job.
+
+    Attributes:
+        stage: folder or file of ``<root>/benchmarks`` that measures it.
+        name: path below that, without ``.tsv``; empty where the stage is a file.
+        size: in the units of its law, the main one last; empty where all jobs are alike.
+        disk_bytes: what it leaves behind.
+        held_bytes: data it holds in memory at once.
+    """
+
+    stage: str
+    name: str
+    size: tuple[float, ...] = ()
+    disk_bytes: float = 0.0
+    held_bytes: float = 0.0
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Stage and name."""
+        return self.stage, self.name
+
+    @property
+    def law(self) -> str:
+        """The law that its cost follows."""
+        return LAW_OF.get(self.stage, self.stage)
+
+
+def run_jobs(config: Config, experiments: tuple[Experiment, ...]) -> list[Job]:
+    """Every job of the target ``all``, in the order of the stages."""
+    jobs = [*experiment_jobs(config, experiments), *_evidence(config, experiments)]
+    return sorted(jobs, key=lambda job: STAGES.index(job.stage))
+
+
+def known_jobs(config: Config, experiments: tuple[Experiment, ...]) -> list[Job]:
+    """The same, and those that only the target ``datasets`` adds: network frames as image files."""
+    counts = _largest(config, _scenes(config, experiments))
+    extra = [job for scene in counts for job in _image_files(config, scene, "network", counts)]
+    return [*run_jobs(config, experiments), *extra]
+
+
+def table_keys(
+    config: Config, experiments: tuple[Experiment, ...]
+) -> dict[str, frozenset[tuple[str, str]]]:
+    """The jobs each table needs; table 5 is read against the pretrained runs of the same sizes."""
+    scenes = sorted({e.scene for e in experiments})
+    needed = {"table1_meshes": {("scene", scene) for scene in scenes}}
+    for table in sorted({e.table for e in experiments}):
+        rows = [e for e in experiments if e.table == table]
+        if table == "table5_from_scratch":
+            rows += [row.model_copy(update={"init": "pretrained"}) for row in rows]
+        needed[table] = {job.key for job in experiment_jobs(config, tuple(rows))}
+    return {table: frozenset(keys | {("tables", table)}) for table, keys in needed.items()}
+
+
+def experiment_jobs(config: Config, experiments: tuple[Experiment, ...]) -> list[Job]:
+    """Every job from the meshes to the scores of some table rows, each once."""
+    jobs = [
+        *_collection(config, experiments),
+        *_label_sets(config, experiments),
+        *_trainings(config, experiments),
+    ]
+    return list({job.key: job for job in jobs}.values())
+
+
+def _scenes(config: Config, experiments: Iterable[Experiment]) -> dict[str, tuple[str, ...]]:
+    """Scenes and the splits of them that are needed: of the pretext's scene just the training."""
+    experiments = tuple(experiments)
+    scenes: dict[str, tuple[str, ...]] = {e.scene: SPLITS for e in experiments}
+    if _pretext(config) and any(e.init == "pretrained" for e in experiments):
+        scenes[config.pretraining.scene] = ("train",)
+    return dict(sorted(scenes.items()))
+
+
+def _pretext(config: Config) -> bool:
+    return config.pretraining.source == "pretext"
+
+
+def _largest(config: Config, scenes: Iterable[str]) -> dict[str, dict[str, int]]:
+    """Frames that are rendered for the localizers, by scene and split."""
+    return {s: {split: config.n_largest(s, split) for split in SPLITS} for s in scenes}
+
+
+def _collection(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[Job]:
+    scenes = _scenes(config, experiments)
+    largest = _largest(config, scenes)
+    for scene, splits in scenes.items():
+        yield Job("scene", scene, (), scene_bytes(config.scenes[scene].path))
+        for split in splits:
+            frames = largest[scene][split]
+            yield Job("plan", f"{scene}/{split}", (frames,), pose_bytes(frames))
+            frame_bytes = packed_bytes(frames, config.network.input_px)
+            yield Job("pack", f"{scene}/{split}", (frame_bytes / 1e6,), frame_bytes)
+        yield from _packed_shards(config, scene, splits, largest[scene])
+    counts = _groundtruth_frames(config, experiments)
+    for scene in counts:
+        yield from _image_files(config, scene, "groundtruth", counts)
+
+
+def _packed_shards(
+    config: Config, scene: str, splits: tuple[str, ...], counts: dict[str, int]
+) -> Iterator[Job]:
+    """Rendering straight into arrays; the parts are removed once they are joined."""
+    for s in sequences_of(counts["train"], counts["test"], config.shard_frames):
+        if s.split in splits:
+            size = _rendering(config, config.network_camera, len(s))
+            yield Job("render_packed", f"{scene}/{s.name}", size)
+
+
+def _groundtruth_frames(
+    config: Config, experiments: Iterable[Experiment]
+) -> dict[str, dict[str, int]]:
+    """Frames of the ground-truth camera by scene and split: those of the largest set estimated."""
+    counts: dict[str, dict[str, int]] = {}
+    for e in experiments:
+        if e.labels in METHODS:
+            frames = counts.setdefault(e.scene, dict.fromkeys(SPLITS, 0))
+            for split in SPLITS:
+                frames[split] = max(frames[split], config.n_frames(e.scene, e.size, split))
+    return counts
+
+
+def _image_files(
+    config: Config, scene: str, camera_name: str, counts: dict[str, dict[str, int]]
+) -> Iterator[Job]:
+    """A data set as image files, with depth from the ground-truth camera."""
+    depth = camera_name == "groundtruth"
+    camera = config.groundtruth_camera if depth else config.network_camera
+    train, test = (counts[scene][split] for split in SPLITS)
+    for s in sequences_of(train, test, config.shard_frames):
+        size = _rendering(config, camera, len(s))
+        disk = picture_bytes(camera, len(s), depth)
+        yield Job("render", f"{scene}/{camera_name}/{s.name}", size, disk)
+    yield Job("dataset", f"{scene}/{camera_name}", (float(train + test),))
+
+
+def _rendering(config: Config, camera: CameraConfig, frames: int) -> tuple[float, float]:
+    samples = camera.width * camera.height * config.render.supersampling**2
+    return frames, frames * samples / 1e6
+
+
+def _label_sets(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[Job]:
+    for e in experiments:
+        counts = {split: config.n_frames(e.scene, e.size, split) for split in SPLITS}
+        names = ("synfeal", e.label_id) if e.labels == NOISE else ("synfeal",)
+        for split, frames in counts.items():
+            for name in names:
+                path = f"{e.scene}/{e.size}/{name}/{split}"
+                yield Job("labels", path, (frames,), pose_bytes(frames))
+        if e.labels in METHODS:
+            yield from _estimated(config, e, counts)
+
+
+def _estimated(config: Config, e: Experiment, counts: dict[str, int]) -> Iterator[Job]:
+    camera = config.groundtruth_camera
+    for split, n_frames in counts.items():
+        for batch in batches_of(n_frames, config.groundtruth.batch_frames):
+            name = f"{e.scene}/{e.size}/{split}/batch-{batch.index:03d}"
+            pixels = len(batch) * camera.width * camera.height
+            for stage in stages_of(e.labels):
+                size = len(batch) if UNITS[stage] == ("frames",) else pixels / 1e6
+                held = pixels * HELD_PER_PX.get(stage, 0)
+                yield Job(stage, name, (size,), pose_bytes(len(batch)), held)
+    frames = sum(counts.values())
+    # Assisted and unassisted labels.
+    yield Job("chain", f"{e.scene}/{e.size}/{e.labels}", (frames,), 2 * pose_bytes(frames))
+
+
+def _trainings(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[Job]:
+    runs = runs_of(experiments, config.training.repetitions)
+    hypers = {str(name): hyper for name, hyper in config.localizers.items()}
+    for backbone in sorted({BACKBONE_OF[r.model] for r in runs if r.init == "pretrained"}):
+        work = pretext_work(backbone, config.network)
+        samples = config.pretraining.samples_seen if _pretext(config) else 0
+        held = config.pretraining.frames if _pretext(config) else 0
+        size = work.size(samples, PRETEXT_BATCH, 0)
+        memory = packed_bytes(held, config.network.input_px) + work.held_bytes(PRETEXT_BATCH)
+        yield Job("pretrain", backbone, size, work.parameter_bytes, memory)
+    for run in runs:
+        train, test = (config.n_frames(run.scene, run.size, split) for split in SPLITS)
+        work = training_work(run.model, config.network, hypers[run.model])
+        batch = config.training.batch_size
+        size = work.size(config.training.samples_seen[run.size], batch, test)
+        memory = packed_bytes(train, config.network.input_px) + work.held_bytes(batch)
+        yield Job("train", run.directory, size, work.parameter_bytes, memory)
+        yield Job("score", run.directory, (test,), score_bytes(test))
+
+
+def _evidence(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[Job]:
+    tables = ["table1_meshes", *sorted({e.table for e in experiments})]
+    for name in (*tables, *SIDE_TABLES):
+        yield Job("tables", name)
+    for scene in sorted({e.scene for e in experiments}):
+        yield Job("render_speed", scene, (_speed_size(config),))
+    runs = runs_of(experiments, config.training.repetitions)
+    scored = sum(config.n_frames(run.scene, run.size, "test") for run in runs)
+    yield Job("claims", "", (scored,))
+    for stage in ("figures", "summary", "provenance", "report", "report_document"):
+        yield Job(stage, "")
+
+
+def _speed_size(config: Config) -> float:
+    """Pixels of the views that rendering is timed on, in millions, each size with all poses."""
+    cameras = (config.network_camera, config.groundtruth_camera, CameraConfig())
+    pixels = sum(c.width * c.height for c in cameras[: config.render_speed.sizes])
+    return config.render_speed.poses * pixels / 1e6

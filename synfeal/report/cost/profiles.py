@@ -1,0 +1,70 @@
+"""Profiles by name or file, and the runs that were made with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from baselines.groundtruth.methods import check_sources
+from synfeal.config import Config, Experiment, load_config, read_experiments
+from synfeal.config.load import read_yaml
+from synfeal.errors import InputError
+from synfeal.report.cost.jobs import known_jobs
+from synfeal.report.cost.laws import Pairs, matched
+from synfeal.report.cost.measured import read_measured
+
+FOLDER = Path("config")
+DEFAULT = FOLDER / "config.yaml"
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A configuration and its design."""
+
+    config: Config
+    experiments: tuple[Experiment, ...]
+
+
+def read_profile(name: str) -> Profile:
+    """A profile by its name in a file of ``config/``, or by the path of its file.
+
+    Raises:
+        InputError: there is none, or it cannot be read.
+    """
+    path = Path(name) if name.endswith((".yaml", ".yml")) else _named(name)
+    paths = [path] if path.resolve() == DEFAULT.resolve() else [DEFAULT, path]
+    config = load_config(*paths)
+    experiments = read_experiments(config)
+    check_sources(experiments, config.experiments)
+    return Profile(config, experiments)
+
+
+def _named(name: str) -> Path:
+    found = {str(read_yaml(p).get("profile")): p for p in sorted(FOLDER.glob("*.yaml"))}
+    if name not in found:
+        known = ", ".join(sorted(found)) or "none"
+        raise InputError(f"profile '{name}': no file of {FOLDER}/ is called so; known: {known}")
+    return found[name]
+
+
+def read_run(root: Path) -> tuple[Pairs, int]:
+    """Measured jobs of a run beside their sizes, and how many the workflow no longer knows.
+
+    The run's directory is called like its profile, as the workflow calls it.
+
+    Raises:
+        InputError: it was not measured, or the profile is not known.
+    """
+    measured = read_measured(root)
+    profile = read_profile(root.resolve().name)
+    pairs = matched(known_jobs(profile.config, profile.experiments), measured)
+    if not pairs:
+        raise InputError(f"{root}: none of its measured jobs is one of the profile's")
+    return pairs, len(measured) - len(pairs)
+
+
+def read_runs(roots: Sequence[Path]) -> tuple[Pairs, int]:
+    """The same of several runs together."""
+    runs = [read_run(root) for root in roots]
+    return [pair for pairs, _ in runs for pair in pairs], sum(left for _, left in runs)

@@ -1,0 +1,226 @@
+"""Pairs of frames of one sequence compared by reprojection, and what the worst of them show.
+
+Bounds hold for rendered frames and were measured on collections in two rooms, 64 x 48 to 640 x 480
+at 60 degrees, 3 and 25 cm between frames, depth ray-cast through the centres of the pixels:
+docs/datasets.md has the figures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.config.collection import CameraConfig
+from synfeal.errors import InputError
+from synfeal.validate.camera import KnownCamera
+from synfeal.validate.check import Check
+from synfeal.validate.frames import Poses
+from synfeal.validate.images import read_color, read_depth_mm
+from synfeal.validate.lens import Lens
+from synfeal.validate.listing import COLOR, DEPTH, Frame, SequenceListing
+from synfeal.validate.reprojection import Residual, View, camera_normal, compare
+
+GAPS = (1, 5, 20)  # frames apart: neighbours see the most, distant ones tell angles and lengths
+PAIRS_PER_GAP = 200  # evenly spread over larger sets
+GRID_PIXELS = 5000  # of each frame are moved to the other one
+MIN_OVERLAP = 0.2
+# Seen from much nearer or farther, a texture is drawn at another level of detail.
+MIN_OVERLAP_OF_COLOURS = 0.6
+
+LUMA = np.array([0.299, 0.587, 0.114], np.float32)
+# What is moved to see how the depths follow: principal point, pixels, and log of the focal length.
+DELTA = np.array([0.25, 0.25, 0.002])
+CAMERA_BOUNDS = np.array([0.25, 0.25, 0.005])
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One residual with its bound: what it tells apart, and how it is printed."""
+
+    name: str
+    field: str
+    bound: float
+    unit: str
+    what: str
+    min_overlap: float = MIN_OVERLAP
+
+
+MEASURES = (
+    Measure("depth", "depth_mm", 1.0, " mm", "median difference in depth"),
+    Measure("surfaces", "in_front", 0.05, "", "share of points before what is seen"),
+    Measure(
+        "colours",
+        "grey",
+        15.0,
+        " grey levels",
+        "median difference in grey",
+        MIN_OVERLAP_OF_COLOURS,
+    ),
+    Measure(
+        "alignment",
+        "shift_px",
+        0.12,
+        " px",
+        "shift that explains the grey",
+        MIN_OVERLAP_OF_COLOURS,
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two frames of a sequence and their residual, None where they share too little."""
+
+    a: Frame
+    b: Frame
+    residual: Residual | None
+
+
+def choose_pairs(
+    sequences: Iterable[SequenceListing], usable: Poses, every: bool
+) -> list[tuple[Frame, Frame]]:
+    """Pairs ``GAPS`` frames apart, at most ``PAIRS_PER_GAP`` of each unless ``every``."""
+    chosen: list[tuple[Frame, Frame]] = []
+    sequences = list(sequences)
+    for gap in GAPS:
+        pairs = [
+            (frame, Frame(frame.directory, frame.number + gap))
+            for sequence in sequences
+            for frame in sequence.frames
+            if frame in usable and Frame(frame.directory, frame.number + gap) in usable
+        ]
+        if not every and len(pairs) > PAIRS_PER_GAP:
+            index = np.linspace(0, len(pairs) - 1, PAIRS_PER_GAP).round().astype(int)
+            pairs = [pairs[i] for i in index]
+        chosen += pairs
+    order = {sequence.directory: index for index, sequence in enumerate(sequences)}
+    return sorted(chosen, key=lambda p: (order[p[0].directory], p[0].number, p[1].number))
+
+
+def check_consistency(
+    pairs: Iterable[tuple[Frame, Frame]],
+    poses: Poses,
+    camera: KnownCamera,
+    on_pair: Callable[[], object],
+) -> list[Check]:
+    """Compare every pair; one check for each measure and one for the camera."""
+    compared: list[Pair] = []
+    system = np.zeros((len(DELTA), len(DELTA) + 1))
+    for pair, normal in _compare_all(pairs, poses, camera.config):
+        compared.append(pair)
+        system += normal
+        on_pair()
+    checks = [_overlap_check(compared)]
+    checks += [_measure_check(measure, compared) for measure in MEASURES]
+    checks.append(_camera_check(system, camera))
+    return [_unjudged(check) for check in checks] if camera.assumed else checks
+
+
+def _compare_all(
+    pairs: Iterable[tuple[Frame, Frame]], poses: Poses, camera: CameraConfig
+) -> Iterator[tuple[Pair, NDArray[np.float64]]]:
+    step = max(1, round(math.sqrt(camera.width * camera.height / GRID_PIXELS)))
+    lens = Lens(camera, step)
+    moved = [Lens(camera, step, tuple(row)) for row in np.diag(DELTA).tolist()]
+
+    @lru_cache(maxsize=GAPS[-1] + 2)
+    def view(frame: Frame) -> View | None:
+        return _view(frame, poses[frame], camera)
+
+    for a, b in pairs:
+        view_a, view_b = view(a), view(b)
+        normal = np.zeros((len(DELTA), len(DELTA) + 1))
+        residual = None
+        if view_a and view_b:
+            residual = compare(view_a, view_b, lens)
+        if view_a and view_b and residual and residual.overlap >= MIN_OVERLAP:
+            normal = camera_normal(view_a, view_b, lens, moved, DELTA)
+        else:
+            residual = None
+        yield Pair(a, b, residual), normal
+
+
+def _view(frame: Frame, world_from_cam: NDArray[np.float64], camera: CameraConfig) -> View | None:
+    """The frame, None if it cannot be read or has another size: other checks say so."""
+    try:
+        depth_mm = read_depth_mm(frame.path(DEPTH))
+        grey = read_color(frame.path(COLOR)).astype(np.float32) @ LUMA
+    except InputError:
+        return None
+    if not depth_mm.shape == grey.shape == (camera.height, camera.width):
+        return None
+    known = (depth_mm > 0) & (depth_mm < 65535)
+    depth_m = np.where(known, depth_mm.astype(np.float32) / 1000.0, np.float32(np.inf))
+    return View(world_from_cam, depth_m, grey)
+
+
+def _overlap_check(pairs: list[Pair]) -> Check:
+    """Most neighbours must see the same surfaces, or nothing below means anything."""
+    seen = sum(pair.residual is not None for pair in pairs)
+    apart = ", ".join(map(str, GAPS[:-1])) + f" and {GAPS[-1]}"
+    text = f"{seen} of {len(pairs)} pairs {apart} frames apart share {MIN_OVERLAP:.0%} of the view"
+    near = [pair for pair in pairs if pair.b.number - pair.a.number == GAPS[0]]
+    lost = [pair for pair in near if pair.residual is None]
+    if 2 * len(lost) <= len(near):
+        return Check("pairs", text)
+    failure = f"{lost[0].a.path(DEPTH)}: puts next to nothing into the view of the next frame"
+    return Check("pairs", text, (f"{failure}, and so do {len(lost) - 1} others of {len(near)}",))
+
+
+def _measure_check(measure: Measure, pairs: list[Pair]) -> Check:
+    values = [
+        (pair, getattr(pair.residual, measure.field))
+        for pair in pairs
+        if pair.residual and pair.residual.overlap >= measure.min_overlap
+    ]
+    values = [(pair, value) for pair, value in values if math.isfinite(value)]
+    if not values:
+        return Check(measure.name, "no pair of frames shows it", skipped=True)
+    worst = max(value for _, value in values)
+    bound = f"(bound {measure.bound:g}{measure.unit})"
+    text = f"{measure.what}, worst of {len(values)} pairs {worst:.2g}{measure.unit} {bound}"
+    wrong = [(pair, value) for pair, value in values if value > measure.bound]
+    if not wrong:
+        return Check(measure.name, text)
+    return Check(measure.name, text, (_blame(measure, wrong, len(values)),))
+
+
+def _blame(measure: Measure, wrong: list[tuple[Pair, float]], total: int) -> str:
+    """The frame in the most pairs that are wrong, the earliest of several."""
+    counts = Counter(frame for pair, _ in wrong for frame in (pair.a, pair.b))
+    frame = min(counts, key=lambda f: (-counts[f], f.directory.name, f.number))
+    pair, value = max((p for p in wrong if frame in (p[0].a, p[0].b)), key=lambda p: p[1])
+    other = pair.b if frame == pair.a else pair.a
+    kind = DEPTH if measure.field in ("depth_mm", "in_front") else COLOR
+    return (
+        f"{frame.path(kind)}: {measure.what} from frame {other.number} is {value:.2g}{measure.unit}"
+        f", bound {measure.bound:g}; {len(wrong)} of {total} pairs are beyond it,"
+        f" {counts[frame]} of them with this frame"
+    )
+
+
+def _camera_check(system: NDArray[np.float64], camera: KnownCamera) -> Check:
+    """Which change of the camera would make depths agree best; for the right camera none."""
+    normal = system[:, :-1]
+    # A bound's worth of change must move the depths noticeably, against half a millimetre of noise.
+    weakest = np.linalg.eigvalsh(normal * np.outer(CAMERA_BOUNDS, CAMERA_BOUNDS))[0]
+    if weakest < 1e-4:
+        return Check("camera", "these pairs do not show it: they hardly turn", skipped=True)
+    change = np.linalg.solve(normal, system[:, -1])
+    said = f"principal point ({change[0]:+.2f}, {change[1]:+.2f}) px, focal length {change[2]:+.2%}"
+    bounds = f"{CAMERA_BOUNDS[0]:g} px, {CAMERA_BOUNDS[2]:.1%}"
+    text = f"correction that fits depth best: {said} (bounds {bounds})"
+    if (np.abs(change) <= CAMERA_BOUNDS).all():
+        return Check("camera", text)
+    failure = f"{camera.source}: camera: depth fits best with {said}; bounds {bounds}"
+    return Check("camera", text, (failure,))
+
+
+def _unjudged(check: Check) -> Check:
+    return Check(check.name, f"{check.text}; not judged, the camera is assumed", skipped=True)

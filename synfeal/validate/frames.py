@@ -1,0 +1,92 @@
+"""Every file of every frame: there, numbered without gaps, readable to its end, of one size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.config.collection import CameraConfig
+from synfeal.dataset.sevenscenes import read_pose
+from synfeal.errors import InputError
+from synfeal.validate.check import Check
+from synfeal.validate.images import Pixels, read_color, read_depth_mm
+from synfeal.validate.listing import COLOR, DEPTH, POSE, Frame, SequenceListing
+
+Poses = dict[Frame, NDArray[np.float64]]
+
+
+def kinds_of(sequences: Iterable[SequenceListing]) -> tuple[str, ...]:
+    """The kinds of file every frame must have: depth only if any frame has it."""
+    with_depth = any(sequence.numbers[DEPTH] for sequence in sequences)
+    return (COLOR, DEPTH, POSE) if with_depth else (COLOR, POSE)
+
+
+def check_names(sequences: Sequence[SequenceListing]) -> Check:
+    """Frames are numbered 0, 1, 2, ... and have a file of each kind."""
+    kinds = kinds_of(sequences)
+    failures = [failure for sequence in sequences for failure in _gaps(sequence, kinds)]
+    n_frames = sum(len(sequence.frames) for sequence in sequences)
+    text = f"{n_frames} frames in {len(sequences)} sequences, each with {', '.join(kinds)}"
+    return Check("names", text, tuple(failures))
+
+
+def _gaps(sequence: SequenceListing, kinds: Iterable[str]) -> Iterable[str]:
+    if not sequence.frames:
+        yield f"{sequence.directory}: holds no frame"
+        return
+    for number in range(sequence.frames[-1].number + 1):
+        frame = Frame(sequence.directory, number)
+        for kind in kinds:
+            if number not in sequence.numbers[kind]:
+                yield f"{frame.path(kind)}: missing"
+
+
+def check_images(
+    sequences: Sequence[SequenceListing],
+    camera: CameraConfig | None,
+    on_frame: Callable[[], object],
+) -> Check:
+    """Every image decodes to its last row and has the size of the camera, or of the first one."""
+    size = (camera.height, camera.width) if camera else None
+    readers: dict[str, Callable[[Path], Pixels]] = {COLOR: read_color, DEPTH: read_depth_mm}
+    failures: list[str] = []
+    n_images = 0
+    for sequence in sequences:
+        for frame in sequence.frames:
+            for kind, read in readers.items():
+                if frame.number not in sequence.numbers[kind]:
+                    continue  # the check of the names says so
+                n_images += 1
+                try:
+                    shape = read(frame.path(kind)).shape[:2]
+                except InputError as error:
+                    failures.append(str(error))
+                    continue
+                size = size or shape
+                if shape != size:
+                    found, wanted = _size(shape), _size(size)
+                    failures.append(f"{frame.path(kind)}: is {found}, must be {wanted}")
+            on_frame()
+    text = f"{n_images} images decoded" + (f", {_size(size)}" if size else "")
+    return Check("images", text, tuple(failures))
+
+
+def _size(shape: tuple[int, ...]) -> str:
+    return f"{shape[1]} x {shape[0]}"
+
+
+def read_poses(sequences: Iterable[SequenceListing]) -> tuple[Poses, tuple[str, ...]]:
+    """The poses (4, 4) of all frames that can be read, and what is wrong with the others."""
+    poses: Poses = {}
+    failures: list[str] = []
+    for sequence in sequences:
+        for frame in sequence.frames:
+            if frame.number in sequence.numbers[POSE]:
+                try:
+                    poses[frame] = read_pose(frame.path(POSE))
+                except InputError as error:
+                    failures.append(str(error))
+    return poses, tuple(failures)

@@ -1,0 +1,79 @@
+"""The manifest: hashes of the sequences, their frames and splits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from synfeal.dataset.manifest import MANIFEST, sequence_sha256
+from synfeal.errors import InputError
+from synfeal.validate.camera import read_manifest
+from synfeal.validate.check import Check
+from synfeal.validate.listing import SequenceListing
+
+
+def check_manifest(
+    dataset: Path,
+    sequences: Iterable[SequenceListing],
+    splits: Mapping[str, list[SequenceListing]],
+    on_frame: Callable[[], object],
+) -> Check:
+    """What the manifest says of each sequence is so."""
+    path = dataset / MANIFEST
+    if not path.exists():
+        return Check("manifest", f"no {MANIFEST}: nothing says what was written", skipped=True)
+    listings = {sequence.name: sequence for sequence in sequences}
+    split_of = {s.name: split for split, listed in splits.items() for s in listed}
+    try:
+        manifest = read_manifest(dataset)
+        entries = _entries(manifest)
+    except InputError as error:
+        return Check("manifest", "unreadable", (str(error),))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        problem = f"{path}: sequences: each needs name, split, frames and sha256 ({error!r})"
+        return Check("manifest", "unreadable", (problem,))
+    failures = [f"{path}: does not list {name}" for name in listings if name not in entries]
+    for name, entry in entries.items():
+        if name not in listings:
+            failures.append(f"{path}: lists {name}, which is not there")
+        else:
+            failures += _differences(path, listings[name], entry, split_of.get(name))
+            for _ in listings[name].frames:
+                on_frame()
+    failures += _wrong_counts(path, manifest, entries)
+    text = f"{len(entries)} sequences: frames, splits and SHA-256 of the files"
+    return Check("manifest", text, tuple(failures))
+
+
+def _entries(manifest: Mapping[str, Any]) -> dict[str, tuple[str, int, str]]:
+    """Split, number of frames and hash of each sequence by name."""
+    return {
+        str(entry["name"]): (str(entry["split"]), int(entry["frames"]), str(entry["sha256"]))
+        for entry in manifest["sequences"]
+    }
+
+
+def _differences(
+    path: Path, listing: SequenceListing, entry: tuple[str, int, str], split: str | None
+) -> Iterator[str]:
+    said_split, frames, sha256 = entry
+    if len(listing.frames) != frames:
+        yield f"{listing.directory}: {len(listing.frames)} frames, {path.name} says {frames}"
+    if split is not None and split != said_split:
+        yield f"{listing.directory}: is in {split}, {path.name} says {said_split}"
+    try:
+        if sequence_sha256(listing.directory) != sha256:
+            yield f"{listing.directory}: differs from what was written ({path.name}: sha256)"
+    except OSError as error:
+        yield f"{listing.directory}: cannot be read ({error})"
+
+
+def _wrong_counts(
+    path: Path, manifest: Mapping[str, Any], entries: Mapping[str, tuple[str, int, str]]
+) -> Iterator[str]:
+    said = manifest.get("frames")
+    for split in ("train", "test"):
+        count = sum(frames for name, frames, _ in entries.values() if name == split)
+        if not isinstance(said, dict) or said.get(split) != count:
+            yield f"{path}: frames: {split} must be {count}, the sum over its sequences"

@@ -1,0 +1,180 @@
+"""Does what one frame sees lie where another frame sees it?
+
+The depth of frame a, lifted and moved by the two poses, predicts for each of its pixels a pixel and
+a depth in frame b. Depth in b is interpolated as 1/z, which is exact on planes, and only where its
+four neighbours lie on one surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.geometry.poses import relative
+from synfeal.validate.lens import Lens
+
+Array = NDArray[np.float64]
+
+SURFACE_RATIO = 1.05  # four neighbouring depths within 5 % are one surface
+OCCLUSION_RATIO = 1.05  # a point more than 5 % behind the surface is hidden by it
+MIN_PIXELS = 100
+GREY_NOISE = 5.0  # of rendered frames, as resampled here: grey levels
+MAX_SHIFT_ERROR_PX = 0.05
+
+
+@dataclass(frozen=True)
+class View:
+    """One frame.
+
+    Attributes:
+        world_from_cam: (4, 4).
+        depth_m: (H, W), inf where there is none.
+        grey: (H, W), 0 to 255.
+    """
+
+    world_from_cam: Array
+    depth_m: NDArray[Any]
+    grey: NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Residual:
+    """How far a pair of frames is from agreement; medians over the pixels both see.
+
+    Attributes:
+        overlap: share of the pixels of a with depth that b sees, hidden ones included.
+        depth_mm: median distance in depth.
+        in_front: share of points that lie in front of what b sees, which cannot be.
+        grey: median difference of grey levels.
+        shift_px: by how much b's image must be moved, turned and zoomed to explain the differences
+            of grey best; NaN where there is too little texture to tell to 0.05 pixels.
+    """
+
+    overlap: float
+    depth_mm: float
+    in_front: float
+    grey: float
+    shift_px: float
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """The pixels of a that b sees: predicted depth, depth and grey of b there, its gradient."""
+
+    mask: NDArray[np.bool_]
+    predicted_m: Array
+    depth_m: Array
+    grey: Array
+    gradient: Array
+
+
+def compare(a: View, b: View, lens: Lens) -> Residual | None:
+    """The residuals of a pair, None if they share fewer than ``MIN_PIXELS`` of the lens's grid."""
+    lifted = a.depth_m[lens.rows, lens.columns]
+    seen = _look(a, b, lens)
+    on_surface = np.isfinite(seen.depth_m)
+    ratio = seen.predicted_m / seen.depth_m
+    visible = on_surface & (ratio < OCCLUSION_RATIO)
+    if np.count_nonzero(visible) < MIN_PIXELS:
+        return None
+    difference_m = np.abs(seen.predicted_m - seen.depth_m)[visible]
+    grey_a = a.grey[lens.rows, lens.columns].astype(np.float64)[visible]
+    grey_error = seen.grey[visible] - grey_a
+    return Residual(
+        overlap=float(np.sum(seen.mask) / np.sum(np.isfinite(lifted))),
+        depth_mm=1000.0 * float(np.median(difference_m)),
+        in_front=float(np.mean(ratio[visible] * OCCLUSION_RATIO < 1.0)),
+        grey=float(np.median(np.abs(grey_error))),
+        shift_px=_shift_px(grey_error, seen.gradient[visible], lens.places[visible]),
+    )
+
+
+def _look(a: View, b: View, lens: Lens) -> _Seen:
+    """Move the grid of a into b and read b there."""
+    depth = a.depth_m[lens.rows, lens.columns].astype(np.float64)
+    b_from_a = relative(b.world_from_cam, a.world_from_cam)
+    known = np.isfinite(depth)
+    points = np.where(known, depth, 0.0)[:, None] * lens.rays
+    points = points @ b_from_a[:3, :3].T + b_from_a[:3, 3]
+    pixels = np.where(known[:, None], lens.project(points), np.nan) - 0.5
+    height, width = b.depth_m.shape
+    with np.errstate(invalid="ignore"):
+        mask = np.all((pixels >= 0.0) & (pixels < [width - 1, height - 1]), axis=1)
+    corner = np.floor(np.where(mask[:, None], pixels, 0.0)).astype(int)
+    fraction = np.where(mask[:, None], pixels - corner, 0.0)
+    near, far = _range(b.depth_m, corner)
+    with np.errstate(divide="ignore"):
+        inverse = _interpolate(1.0 / b.depth_m, corner, fraction)[0]
+        seen = np.where(mask & (far < SURFACE_RATIO * near), 1.0 / inverse, np.nan)
+    grey, gradient = _interpolate(b.grey, corner, fraction)
+    return _Seen(mask, points[:, 2], seen, grey, gradient)
+
+
+def _corners(image: NDArray[Any], corner: NDArray[np.int_]) -> Array:
+    """Values (4, N) at the pixel, its right, lower and lower right neighbour."""
+    x, y = corner.T
+    return np.stack([image[y, x], image[y, x + 1], image[y + 1, x], image[y + 1, x + 1]])
+
+
+def _range(depth_m: NDArray[Any], corner: NDArray[np.int_]) -> tuple[Array, Array]:
+    values = _corners(depth_m, corner)
+    return values.min(axis=0), np.where(np.isinf(values).any(axis=0), np.inf, values.max(axis=0))
+
+
+def _interpolate(
+    image: NDArray[Any], corner: NDArray[np.int_], fraction: Array
+) -> tuple[Array, Array]:
+    """Bilinear values (N,) and gradients (N, 2) per pixel."""
+    v00, v01, v10, v11 = _corners(image, corner)
+    x, y = fraction.T
+    upper, lower = v00 + x * (v01 - v00), v10 + x * (v11 - v10)
+    along_x = (1 - y) * (v01 - v00) + y * (v11 - v10)
+    return upper + y * (lower - upper), np.stack([along_x, lower - upper], axis=1)
+
+
+def _shift_px(grey_error: Array, gradient: Array, place: Array) -> float:
+    """Root mean square of the shifts ``d`` that solve ``error + gradient @ d = 0``.
+
+    A shift is that of an image moved, turned and zoomed, so a camera that goes forward shows too.
+
+    Args:
+        grey_error: (N,) grey levels.
+        gradient: (N, 2) grey levels per pixel.
+        place: (N, 2) places in the image, -1 to 1 across its width.
+    """
+    x, y = place.T
+    shifts = np.stack([[1 + 0 * x, 0 * x, x, -y], [0 * x, 1 + 0 * x, y, x]])  # (2, 4, N)
+    columns = np.einsum("nk,kpn->np", gradient, shifts)
+    scale = 1.0 + 1.4826 * np.median(np.abs(grey_error))
+    weight = 1.0 / (1.0 + (grey_error / scale) ** 2)
+    normal = (columns * weight[:, None]).T @ columns
+    if np.linalg.eigvalsh(normal)[0] * MAX_SHIFT_ERROR_PX**2 < GREY_NOISE**2:
+        return float("nan")
+    solution = np.linalg.solve(normal, columns.T @ (weight * grey_error))
+    moved = np.einsum("kpn,p->kn", shifts, solution)
+    return float(np.sqrt(np.mean(np.sum(moved**2, axis=0))))
+
+
+def camera_normal(a: View, b: View, lens: Lens, moved: Sequence[Lens], delta: Array) -> Array:
+    """Normal equations (P, P + 1) of what moving the camera's parameters does to the depths.
+
+    Args:
+        a: frame whose depth is lifted.
+        b: frame it is compared with.
+        lens: the camera as it is said to be.
+        moved: the camera with one parameter moved, for each of P parameters.
+        delta: (P,) by how much each is moved.
+    """
+    here, *there = (_look(a, b, each) for each in (lens, *moved))
+    residual = here.predicted_m - here.depth_m
+    derivative = np.stack([t.predicted_m - t.depth_m - residual for t in there], axis=1) / delta
+    system = np.column_stack([derivative, -residual])
+    with np.errstate(invalid="ignore"):
+        good = np.isfinite(system).all(axis=1) & (np.abs(residual) < 0.02 * here.depth_m)
+        good &= np.all(np.abs(derivative * delta) < 0.02 * here.depth_m[:, None], axis=1)
+    system = system[good]
+    return system[:, :-1].T @ system

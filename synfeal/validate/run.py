@@ -1,0 +1,106 @@
+"""All checks of a data set, in the order in which they make sense, and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from synfeal.errors import InputError
+from synfeal.validate.camera import KnownCamera, camera_of_dataset
+from synfeal.validate.check import Check
+from synfeal.validate.consistency import check_consistency, choose_pairs
+from synfeal.validate.frames import Poses, check_images, check_names, kinds_of, read_poses
+from synfeal.validate.listing import DEPTH, SequenceListing, list_sequences
+from synfeal.validate.manifest import check_manifest
+from synfeal.validate.poses import ORTHONORMAL_BOUND, check_rigid, check_tables, rigid_defects
+from synfeal.validate.splits import check_leaks, check_splits, read_splits
+
+
+def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[Check]:
+    """Check a data set; what is wrong with it is in the checks.
+
+    Args:
+        dataset: directory with ``seq-01``.
+        camera_file: calibration file, where the data set has no manifest or another camera.
+        every_pair: compare all pairs, not a sample of a large set.
+
+    Raises:
+        InputError: there is no data set, or ``camera_file`` cannot be read.
+    """
+    sequences = list_sequences(dataset)
+    camera, camera_failures = _camera(dataset, camera_file)
+    splits, split_failures = read_splits(dataset, sequences)
+    n_frames = sum(len(sequence.frames) for sequence in sequences)
+    size = None if camera is None or camera.assumed else camera.config
+    poses, pose_failures = read_poses(sequences)
+    with tqdm(total=2 * n_frames, unit="frame", desc="validate", leave=False) as progress:
+        checks = [
+            check_names(sequences),
+            check_images(sequences, size, progress.update),
+            check_rigid(poses, pose_failures),
+            check_tables(dataset, poses, splits),
+            check_splits(dataset, sequences, splits, split_failures),
+            check_leaks(poses, splits),
+            check_manifest(dataset, sequences, splits, progress.update),
+        ]
+    if camera is None:
+        return [*checks, Check("camera", "unknown", camera_failures)]
+    return checks + _geometry(sequences, poses, camera, every_pair)
+
+
+def _camera(dataset: Path, camera_file: Path | None) -> tuple[KnownCamera | None, tuple[str, ...]]:
+    """A manifest that is damaged is a finding, an option that is wrong is not."""
+    try:
+        return camera_of_dataset(dataset, camera_file), ()
+    except InputError as error:
+        if camera_file is not None:
+            raise
+        return None, (str(error),)
+
+
+def _geometry(
+    sequences: Sequence[SequenceListing], poses: Poses, camera: KnownCamera, every_pair: bool
+) -> list[Check]:
+    """The checks that need depth, the camera and rigid poses."""
+    if DEPTH not in kinds_of(sequences):
+        return [Check("pairs", "no depth images: frames cannot be compared", skipped=True)]
+    rigid = _rigid(poses)
+    pairs = choose_pairs(sequences, rigid, every_pair)
+    if not pairs:
+        return [Check("pairs", "no two frames of a sequence to compare", skipped=True)]
+    with tqdm(total=len(pairs), unit="pair", desc="compare", leave=False) as progress:
+        return check_consistency(pairs, rigid, camera, progress.update)
+
+
+def _rigid(poses: Poses) -> Poses:
+    """The poses that can be used; the check of the poses names the others."""
+    if not poses:
+        return {}
+    defects = rigid_defects(np.array(list(poses.values()))).max(axis=1)
+    return {
+        frame: pose
+        for (frame, pose), defect in zip(poses.items(), defects, strict=True)
+        if defect <= ORTHONORMAL_BOUND
+    }
+
+
+def report(dataset: Path, checks: Sequence[Check]) -> str:
+    """One line for each check: name, verdict, what was checked."""
+    width = max(len(check.name) for check in checks)
+    lines = [f"{check.name:<{width}}  {check.verdict:<11}  {check.text}" for check in checks]
+    return "\n".join([f"{dataset}", *lines]) + "\n"
+
+
+def error_lines(checks: Sequence[Check]) -> list[str]:
+    """One line for each check that failed: its first failure, and how many more there are."""
+    lines = []
+    for check in checks:
+        if check.failures:
+            more = len(check.failures) - 1
+            lines.append(
+                f"{check.name}: {check.failures[0]}" + (f" (and {more} more)" * bool(more))
+            )
+    return lines

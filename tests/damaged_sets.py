@@ -1,0 +1,191 @@
+"""A data set in closed form, and the errors a data set can hide: each changes a copy of it."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from synfeal.config.models import CameraConfig
+from synfeal.dataset.manifest import write_manifest
+from synfeal.dataset.pose_table import write_pose_table
+from synfeal.dataset.sequences import Sequence
+from synfeal.dataset.sevenscenes import write_splits
+from tests.planar_scene import straight_path, write_frames
+
+CAMERA = CameraConfig(width=96, height=72, horizontal_fov_deg=60.0)
+
+
+def write_planar_set(folder: Path, camera: CameraConfig = CAMERA) -> None:
+    """24 training and 8 test frames of two planes, as ``synfeal collect`` lays them out."""
+    sequences = [Sequence("seq-01", "train", 0, 24), Sequence("seq-02", "test", 0, 8)]
+    for sequence, step_m, turn_deg in zip(sequences, (0.04, 0.05), (1.5, 2.0), strict=True):
+        directory = folder / sequence.name
+        directory.mkdir(parents=True)
+        truth = straight_path(len(sequence), step_m, turn_deg)
+        write_frames(directory, truth, camera)
+        for number, pose in enumerate(truth.world_from_cam):
+            write_pose(directory / f"frame-{number:06d}.pose.txt", pose)
+        write_pose_table(folder / f"{sequence.split}.csv", truth)
+    write_splits(folder, sequences)
+    write_manifest(folder, sequences, camera, {})
+
+
+def write_pose(path: Path, world_from_cam: np.ndarray) -> None:
+    np.savetxt(path, world_from_cam, fmt="%.10e", delimiter="\t")
+
+
+def copy_of_first_frames(folder: Path, out: Path, kept: tuple[int, int] = (5, 3)) -> Path:
+    """A data set of few frames, which can be damaged and checked quickly."""
+    shutil.copytree(folder, out)
+    for sequence, count in zip(("seq-01", "seq-02"), kept, strict=True):
+        for path in (out / sequence).iterdir():
+            if int(path.name[6:12]) >= count:
+                path.unlink()
+    return out
+
+
+def without_manifest_hashes(folder: Path) -> None:
+    """Leave the camera, so that only geometry can tell what was changed."""
+    path = folder / "manifest.json"
+    path.write_text(json.dumps({"camera": json.loads(path.read_text())["camera"]}))
+    for name in ("train.csv", "test.csv"):
+        (folder / name).unlink(missing_ok=True)
+
+
+def frame_files(folder: Path, kind: str, sequence: str = "seq-01") -> list[Path]:
+    return sorted((folder / sequence).glob(f"frame-*.{kind}"))
+
+
+def pose_of_the_neighbour(folder: Path) -> None:
+    poses = frame_files(folder, "pose.txt")
+    middle = len(poses) // 2
+    shutil.copy(poses[middle + 1], poses[middle])
+
+
+def poses_shifted_by_one(folder: Path) -> None:
+    """Each frame has the pose of the next one; the last frame goes."""
+    poses = frame_files(folder, "pose.txt")
+    for pose, following in itertools.pairwise(poses):
+        shutil.copy(following, pose)
+    for kind in ("color.png", "depth.png", "pose.txt"):
+        frame_files(folder, kind)[-1].unlink()
+
+
+def transposed_rotations(folder: Path) -> None:
+    for path in folder.glob("seq-*/*.pose.txt"):
+        pose = np.loadtxt(path)
+        pose[:3, :3] = pose[:3, :3].T
+        write_pose(path, pose)
+
+
+def half_pixel(folder: Path) -> None:
+    """The camera of OpenCV's convention, whose first pixel is centred at (0, 0)."""
+    path = folder / "manifest.json"
+    manifest = json.loads(path.read_text())
+    manifest["camera"]["cx"] -= 0.5
+    manifest["camera"]["cy"] -= 0.5
+    path.write_text(json.dumps(manifest))
+
+
+def _change_depth(folder: Path, change: Callable[[np.ndarray], np.ndarray]) -> None:
+    for path in folder.glob("seq-*/*.depth.png"):
+        depth = np.asarray(Image.open(path)).astype(np.float64)
+        changed = np.where(depth == 65535, 65535, change(depth).round().clip(0, 65535))
+        Image.fromarray(changed.astype(np.uint16)).save(path)
+
+
+def depth_of_tum(folder: Path) -> None:
+    """5,000 units to the metre."""
+    _change_depth(folder, lambda depth: 5.0 * depth)
+
+
+def depth_in_centimetres(folder: Path) -> None:
+    _change_depth(folder, lambda depth: depth / 10.0)
+
+
+def depth_in_metres(folder: Path) -> None:
+    _change_depth(folder, lambda depth: depth / 1000.0)
+
+
+def depth_along_the_ray(folder: Path) -> None:
+    camera = json.loads((folder / "manifest.json").read_text())["camera"]
+    row, column = np.mgrid[: camera["height"], : camera["width"]] + 0.5
+    x = (column - camera["cx"]) / camera["fx"]
+    y = (row - camera["cy"]) / camera["fy"]
+    _change_depth(folder, lambda depth: depth * np.sqrt(1.0 + x**2 + y**2))
+
+
+def swapped_colours(folder: Path) -> None:
+    colours = frame_files(folder, "color.png")
+    middle = len(colours) // 2
+    first, second = colours[middle].read_bytes(), colours[middle + 1].read_bytes()
+    colours[middle].write_bytes(second)
+    colours[middle + 1].write_bytes(first)
+
+
+def swapped_depths(folder: Path) -> None:
+    depths = frame_files(folder, "depth.png")
+    middle = len(depths) // 2
+    first, second = depths[middle].read_bytes(), depths[middle + 1].read_bytes()
+    depths[middle].write_bytes(second)
+    depths[middle + 1].write_bytes(first)
+
+
+HIDDEN_ERRORS = (
+    pose_of_the_neighbour,
+    poses_shifted_by_one,
+    transposed_rotations,
+    half_pixel,
+    depth_of_tum,
+    depth_in_centimetres,
+    depth_in_metres,
+    depth_along_the_ray,
+    swapped_colours,
+    swapped_depths,
+)
+
+
+def damages() -> dict[str, Callable[[Path], object]]:
+    """What can happen to any file."""
+    return {
+        "empty": lambda path: path.write_bytes(b""),
+        "truncated": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
+        "cut": lambda path: path.write_bytes(path.read_bytes()[:-9]),
+        "bytes": lambda path: path.write_bytes(b"\xff\xfe\x00\x80 no text"),
+        "nul": lambda path: path.write_bytes(bytes(200)),
+        "nan": lambda path: path.write_text("nan nan nan nan\n" * 4),
+        "nulls": lambda path: path.write_text('{"camera": null, "sequences": [null], "frames": 1}'),
+        "list": lambda path: path.write_text("[[[1]]]"),
+        "image": lambda path: Image.new("L", (3, 2)).save(path, format="PNG"),
+        "bits": flip_bits,
+        "folder": as_folder,
+        "deleted": lambda path: path.unlink(),
+    }
+
+
+def flip_bits(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0x10
+    path.write_bytes(bytes(content))
+
+
+def as_folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+FILES = (
+    "seq-01/frame-000003.color.png",
+    "seq-01/frame-000003.depth.png",
+    "seq-01/frame-000003.pose.txt",
+    "TrainSplit.txt",
+    "TestSplit.txt",
+    "manifest.json",
+    "train.csv",
+)

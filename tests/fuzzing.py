@@ -1,0 +1,282 @@
+"""Damaged inputs, made systematically, and what a reader may answer: a value that keeps its
+promise, or one line that names the file."""
+
+from __future__ import annotations
+
+import copy
+import json
+import resource
+import shutil
+import signal
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from synfeal.errors import InputError
+
+SECONDS = 5.0
+MEMORY_BYTES = 4 * 2**30  # beyond what the process has already
+LONGEST_MESSAGE = 1000
+
+# Cells of a table of numbers, none of which the column it is put into may be taken for silently.
+WORDS = (
+    *("", "x", "nan", "inf", "-inf", "1e400", "1e30", "-1e300", "-1", "0.5", "0", "0x10", "true"),
+    *("9" * 400, "9" * 5000, "..", "1;2", "a\0b", "\ufeff1", "'1'", "1 2"),
+)
+JUNK: tuple[Any, ...] = (
+    *(None, True, -1, 0.5, 1e30, 10**400, float("nan"), float("inf"), "", "x", "..", [], {}),
+    *([[]], {"x": 1}, "9" * 5000),
+)
+DEEP = 100_000  # levels of nesting, beyond any parser's stack
+
+
+class TooSlow(BaseException):
+    """No ``Exception``, so that no reader takes it for a damaged file."""
+
+
+@dataclass(frozen=True)
+class Damage:
+    """What stands in place of a file.
+
+    Attributes:
+        label: how it was made.
+        content: bytes; None for nothing at all.
+        special: ``directory`` or ``loop`` (a link to itself, which nobody can open).
+    """
+
+    label: str
+    content: bytes | None = None
+    special: str = ""
+
+
+def damages(
+    data: bytes, others: Mapping[str, bytes], seed: int, n_flips: int = 40
+) -> Iterator[Damage]:
+    """What can happen to any file."""
+    yield Damage("missing")
+    yield Damage("a directory", special="directory")
+    yield Damage("a link to itself", special="loop")
+    yield Damage("empty", b"")
+    for length in sorted({1, 4, 11, len(data) // 3, len(data) // 2, len(data) - 9, len(data) - 1}):
+        if 0 < length < len(data):
+            yield Damage(f"cut at {length} of {len(data)}", data[:length])
+    for name, content in others.items():
+        if content != data:
+            yield Damage(f"swapped with {name}", content)
+    yield Damage("twice", data + data)
+    yield Damage("zeros", bytes(len(data)))
+    middle = len(data) // 2
+    yield Damage("zeros inside", data[:middle] + bytes(64) + data[middle + 64 :])
+    yield Damage("latin-1", b"caf\xe9\n" + data)
+    yield Damage("latin-1 inside", data[:middle] + b"\xe9\xff" + data[middle:])
+    yield Damage("byte order mark", b"\xef\xbb\xbf" + data)
+    yield Damage("UTF-16", b"\xff\xfe" + data.decode("latin-1").encode("utf-16-le"))
+    rng = np.random.default_rng(seed)
+    for place in rng.integers(0, min(len(data), 400), n_flips):  # headers, where most is decided
+        yield _flipped(data, int(place), int(rng.integers(1, 256)))
+    for place in rng.integers(0, len(data), n_flips):
+        yield _flipped(data, int(place), int(rng.integers(1, 256)))
+
+
+def _flipped(data: bytes, place: int, bits: int) -> Damage:
+    changed = bytearray(data)
+    changed[place] ^= bits
+    return Damage(f"byte {place} xor {bits:#x}", bytes(changed))
+
+
+def text_damages(data: bytes, separator: str) -> Iterator[Damage]:
+    """What can happen to a table: its lines, its columns, and the cells of its second line."""
+    lines = data.decode().splitlines()
+    middle = len(lines) // 2
+    changed = {
+        "CRLF": "\r\n".join(lines),
+        "blank lines": "\n\n".join(lines),
+        "one line": " ".join(lines),
+        "backwards": "\n".join(lines[::-1]),
+        "without its first line": "\n".join(lines[1:]),
+        "without a line": "\n".join(lines[:middle] + lines[middle + 1 :]),
+        "without its last line": "\n".join(lines[:-1]),
+        "first line only": lines[0],
+        "a line twice": "\n".join([*lines[: middle + 1], *lines[middle:]]),
+        "a line of noise": "\n".join([*lines, "\x1b[31m" + "x" * 100_000]),
+        "quotes": "\n".join([*lines, '"open quote']),
+        "NUL": "\n".join([*lines, "\0"]),
+    }
+    for label, text in changed.items():
+        yield Damage(label, text.encode())
+    rows = [line.split(separator) for line in lines]
+    for column in range(len(rows[1])):
+        without = [row[:column] + row[column + 1 :] for row in rows]
+        yield Damage(f"without column {column}", _joined(without, separator))
+        doubled = [row[: column + 1] + row[column:] for row in rows]
+        yield Damage(f"column {column} twice", _joined(doubled, separator))
+        if column:
+            order = [*range(column - 1), column, column - 1]
+            swapped = [
+                [*(row[i] for i in order if i < len(row)), *row[column + 1 :]] for row in rows
+            ]
+            yield Damage(f"columns {column - 1} and {column} swapped", _joined(swapped, separator))
+        for word in WORDS:
+            cells = [*rows[1][:column], word, *rows[1][column + 1 :]]
+            table = [rows[0], cells, *rows[2:]]
+            yield Damage(f"column {column} is {word[:20]!r}", _joined(table, separator))
+
+
+def _joined(rows: list[list[str]], separator: str) -> bytes:
+    return "\n".join(separator.join(row) for row in rows).encode() + b"\n"
+
+
+def json_damages(data: bytes) -> Iterator[Damage]:
+    """Each value of a JSON file replaced and removed, and what is no mapping at all."""
+    value = json.loads(data)
+    for junk in JUNK:
+        yield Damage(f"only {str(junk)[:20]!r}", json.dumps(junk).encode())
+    yield Damage("deep lists", b"[" * DEEP)
+    yield Damage("deep mappings", b'{"a":' * DEEP)
+    yield Damage("a number of 5000 digits", b'{"a": ' + b"9" * 5000 + b"}")
+    yield Damage("a lone surrogate", b'{"\\ud800": "\\ud800"}')
+    for place in _places(value):
+        name = "/".join(map(str, place))
+        for junk in JUNK:
+            text = json.dumps(replaced(value, place, junk))
+            yield Damage(f"{name} is {str(junk)[:20]!r}", text.encode())
+        yield Damage(f"without {name}", json.dumps(removed(value, place)).encode())
+        beside = replaced(value, (*place, "surplus"), 1) if is_mapping(value, place) else value
+        yield Damage(f"more in {name}", json.dumps(beside).encode())
+
+
+def _places(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Keys that lead to every value; of a list, its first and its last."""
+    entries: list[tuple[Any, Any]] = []
+    if isinstance(value, dict):
+        entries = list(value.items())
+    elif isinstance(value, list):
+        entries = [(i, value[i]) for i in sorted({0, len(value) - 1}) if value]
+    for key, inner in entries:
+        yield (*place, key)
+        yield from _places(inner, (*place, key))
+
+
+def replaced(value: Any, place: tuple[Any, ...], new: Any) -> Any:
+    """A copy in which another value stands at ``place``."""
+    if not place:
+        return new
+    changed = copy.copy(value)
+    changed[place[0]] = replaced(value[place[0]], place[1:], new) if place[1:] else new
+    return changed
+
+
+def is_mapping(value: Any, place: tuple[Any, ...]) -> bool:
+    """Whether a mapping stands at ``place``."""
+    for key in place:
+        value = value[key]
+    return isinstance(value, dict)
+
+
+def removed(value: Any, place: tuple[Any, ...]) -> Any:
+    """A copy without what stands at ``place``."""
+    changed = copy.copy(value)
+    if len(place) == 1:
+        del changed[place[0]]
+    else:
+        changed[place[0]] = removed(value[place[0]], place[1:])
+    return changed
+
+
+def put(path: Path, damage: Damage) -> None:
+    """Put a damage in the place of a file."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    path.unlink(missing_ok=True)
+    if damage.special == "directory":
+        path.mkdir()
+    elif damage.special == "loop":
+        path.symlink_to(path.name)
+    elif damage.content is not None:
+        path.write_bytes(damage.content)
+
+
+@contextmanager
+def at_most(seconds: float) -> Iterator[None]:
+    """End what takes longer; with :class:`TooSlow`."""
+
+    def late(*_: object) -> None:
+        raise TooSlow
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+@contextmanager
+def little_memory() -> Iterator[None]:
+    """No more than 4 GiB beyond what is there: a header that asks for more must not get it."""
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    limit = pages * resource.getpagesize() + MEMORY_BYTES
+    resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def problem_with(
+    read: Callable[[], object],
+    is_valid: Callable[[Any], bool],
+    names: tuple[str, ...],
+    folder: Path | None = None,
+) -> str | None:
+    """What is wrong with how a reader took an input; None if nothing is.
+
+    Args:
+        read: reads it.
+        is_valid: whether a value keeps what the reader promises.
+        names: of which a refusal has to say one.
+        folder: in which a refusal may leave nothing.
+    """
+    before = _tree(folder)
+    try:
+        with at_most(SECONDS):
+            value = read()
+    except InputError as refusal:
+        if _tree(folder) != before:
+            return "refused, but something was written"
+        return _problem_with_message(str(refusal), names)
+    except TooSlow:
+        return f"took more than {SECONDS:g} s"
+    except Exception as error:
+        at = traceback.extract_tb(error.__traceback__)[-1]
+        ours = [f for f in traceback.extract_tb(error.__traceback__) if "site-p" not in f.filename]
+        mine = f"{Path(ours[-1].filename).name}:{ours[-1].lineno} " if ours else ""
+        return f"{mine}{type(error).__name__}: {str(error)[:90]} ({Path(at.filename).name})"
+    try:
+        return None if is_valid(value) else f"accepted: {str(value)[:90]!r}"
+    except Exception as error:
+        return f"accepted what cannot be used: {type(error).__name__} {str(error)[:90]}"
+
+
+def _problem_with_message(message: str, names: tuple[str, ...]) -> str | None:
+    if "\n" in message or len(message.splitlines()) > 1:
+        return f"more than one line: {message[:90]!r}"
+    if len(message) > LONGEST_MESSAGE:
+        return f"a line of {len(message)} characters: {message[:90]!r}"
+    if not any(name in message for name in names):
+        return f"names none of {names}: {message[:90]!r}"
+    return None
+
+
+def _tree(folder: Path | None) -> dict[str, tuple[int, int]]:
+    if folder is None:
+        return {}
+    found = ((path, path.lstat()) for path in folder.rglob("*"))
+    return {str(path): (at.st_size, at.st_mtime_ns) for path, at in found}

@@ -1,0 +1,287 @@
+"""What a run costs: counts, laws with a closed form, scaling, and how bad input ends."""
+
+import csv
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.training.pretrain import BATCH_SIZE
+from synfeal.cli import main
+from synfeal.config import load_config, read_experiments
+from synfeal.report.cost.estimate import Machine, by_table, job_costs, stage_costs, wall_seconds
+from synfeal.report.cost.jobs import (
+    PRETEXT_BATCH,
+    Job,
+    experiment_jobs,
+    known_jobs,
+    run_jobs,
+    table_keys,
+)
+from synfeal.report.cost.laws import Law, fit_laws, fit_seconds
+from synfeal.report.cost.measured import last_look_s, read_measured, write_measured
+from synfeal.report.cost.networks import training_work
+from synfeal.report.cost.run import comparison_text
+
+ROOT = Path(__file__).parent.parent
+HEADER = "s\tmax_rss\tcpu_time\n"
+# What the made-up run takes: seconds to start, and per unit of each law.
+START_S = 2.0
+RATES = {"rendering": (0.004, 0.05), "training": (3e-4, 7.0), "sfm": (3.0,), "rgbd": (2.0,)}
+
+
+@pytest.fixture(autouse=True)
+def _at_the_root(monkeypatch):
+    monkeypatch.chdir(ROOT)
+
+
+def design(name):
+    config = load_config(Path("config/config.yaml"), Path(f"config/{name}.yaml"))
+    return config, read_experiments(config)
+
+
+@pytest.fixture(scope="module")
+def smoke():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        return design("smoke")
+
+
+def write_job(benchmarks, job, seconds):
+    path = benchmarks / job.stage / f"{job.name}.tsv"
+    path = path if job.name else benchmarks / f"{job.stage}.tsv"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # Busy all the time; what Snakemake knows of it is where it looked last.
+    peak_mb = 200 + job.held_bytes / 1e6
+    path.write_text(f"{HEADER}{seconds}\t{peak_mb}\t{last_look_s(seconds)}\n")
+
+
+def true_seconds(job):
+    return START_S + sum(r * x for r, x in zip(RATES.get(job.law, ()), job.size, strict=False))
+
+
+@pytest.fixture(scope="module")
+def made_up_run(smoke, tmp_path_factory):
+    root = tmp_path_factory.mktemp("results") / "smoke"
+    for job in known_jobs(*smoke):
+        write_job(root / "benchmarks", job, true_seconds(job))
+    return root
+
+
+def test_jobs_are_those_of_snakemake(tmp_path, smoke):
+    command = [sys.executable, "-m", "snakemake", "--dry-run", "--quiet", "rules", "--cores", "1"]
+    profile = ["--configfile", "config/smoke.yaml", "--config", f"results={tmp_path}", "--", "all"]
+    run = subprocess.run([*command, *profile], capture_output=True, text=True, check=True)
+    rules = {name: int(n) for name, n in re.findall(r"^(\w+) +(\d+)$", run.stdout, re.MULTILINE)}
+    stages = {"labels": 0, "posegraph": 0, "estimate": 0, "tables": 0}
+    merged = {
+        **dict.fromkeys(("true_labels", "noisy_labels"), "labels"),
+        **dict.fromkeys(("table1_meshes", "table", "assistance"), "tables"),
+        **dict.fromkeys(("label_error", "speed_vs_error", "hard_cases", "document"), "tables"),
+        **dict.fromkeys(("rgbd-toro", "rgbd-g2o"), "posegraph"),
+    }
+    for name, count in rules.items():
+        if name not in ("all", "total"):
+            stage = merged.get(name, name)
+            stages[stage] = stages.get(stage, 0) + count
+    ours = dict.fromkeys(stages, 0)
+    for job in run_jobs(*smoke):
+        stage = merged.get(job.stage, "estimate" if job.stage == "kinect-fusion" else job.stage)
+        ours[stage] = ours.get(stage, 0) + 1
+    assert ours == stages
+    assert rules["total"] - 1 == len(run_jobs(*smoke))
+
+
+def test_every_job_has_a_name_of_its_own(smoke):
+    keys = [job.key for job in known_jobs(*smoke)]
+    assert len(keys) == len(set(keys))
+
+
+def test_sizes_at_the_papers_scale():
+    jobs = run_jobs(*design("paper"))
+
+    def sums(stage):
+        return np.sum([job.size for job in jobs if job.stage == stage], axis=0)
+
+    # 80,000 + 20,000 and 95,000 + 20,000 frames; 640 x 480 pixels with 2 x 2 samples.
+    frames = 100_000 + 115_000
+    assert sums("render_packed") == pytest.approx([frames, frames * 640 * 480 * 4 / 1e6])
+    assert sums("pack") == pytest.approx(frames * 224 * 224 * 3 / 1e6)
+    # 6,000 and 2,500 frames in batches of 250; each shares its first frame with the one before.
+    batches = 24 + 10
+    assert len([job for job in jobs if job.stage == "sfm"]) == batches
+    assert sums("sfm") == pytest.approx((8500 - 2 + batches) * 640 * 480 / 1e6)
+
+
+def test_multiply_adds_are_the_published_ones():
+    config, _ = design("paper")
+    work = {m: training_work(m, config.network, h) for m, h in config.localizers.items()}
+    # He et al. (CVPR 2016, table 1): ResNet-34 takes 3.6e9, its 1000-way classifier included.
+    # Szegedy et al. (CVPR 2015, table 1): GoogLeNet takes 1.5e9 with its printed rounding.
+    assert work["posenet2resnet"].flop / 2 == pytest.approx(3.6e9, rel=0.05)
+    assert work["posenet2"].flop / 2 == pytest.approx(1.5e9, rel=0.07)
+    # The weights of ResNet-34 without its classifier are 21.28 million (torchvision).
+    assert work["posenet2resnet"].parameter_bytes >= 4 * 21.28e6
+
+
+def test_looks_follow_snakemakes_schedule():
+    assert [last_look_s(s) for s in (0.4, 0.6, 14.9, 15.2, 44.9, 45.1, 100)] == [
+        *(0, 0.5, 14.5, 15, 15, 45, 75)
+    ]
+
+
+def test_processor_time_is_completed(tmp_path):
+    root = tmp_path / "smoke"
+    write = {"a": (40, 7.5), "b": (4.4, 2.0), "c": (0.4, 0.0)}
+    for name, (wall_s, cpu_s) in write.items():
+        path = root / "benchmarks" / "train" / f"{name}.tsv"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"{HEADER}{wall_s}\t100\t{cpu_s}\n")
+    # Half a core when last seen, after 15 s and 4 s; the shortest is taken to have had that too.
+    assert [job.cpu_s for job in read_measured(root)] == pytest.approx([20, 2.2, 0.2])
+
+
+def test_one_file_keeps_the_measurements(made_up_run, tmp_path):
+    before = read_measured(made_up_run)
+    write_measured(made_up_run)
+    kept = made_up_run / "benchmarks.csv"
+    (tmp_path / "benchmarks.csv").write_bytes(kept.read_bytes())
+    kept.unlink()
+    after = read_measured(tmp_path)
+    assert [job.key for job in after] == [job.key for job in before]
+    assert [j.cpu_s for j in after] == pytest.approx([j.cpu_s for j in before], abs=0.006)
+
+
+def test_a_law_is_found_and_outliers_are_not_followed():
+    rng = np.random.default_rng(0)
+    sizes = rng.uniform(1, 10, (40, 2))
+    seconds = 2 + sizes @ [0.5, 3]
+    assert fit_seconds(sizes, seconds, 0.3) == (
+        pytest.approx(2, rel=1e-3),
+        pytest.approx((0.5, 3), rel=1e-3),
+    )
+    seconds[:3] *= 4
+    fixed_s, rates = fit_seconds(sizes, seconds, 0.3)
+    assert fixed_s + np.dot(rates, (5, 5)) == pytest.approx(19.5, rel=0.05)
+
+
+def test_the_pretext_is_trained_in_the_batches_that_are_counted():
+    assert PRETEXT_BATCH == BATCH_SIZE
+
+
+def test_jobs_of_one_size_tell_only_the_rate():
+    sizes, seconds = np.full((10, 1), 4.0), np.full(10, 9.0)
+    assert fit_seconds(sizes, seconds, 1.0) == (1.0, (2.0,))
+    assert fit_seconds(np.empty((3, 0)), np.array([1.0, 2.0, 6.0]), 1.0) == (3.0, ())
+
+
+def test_no_part_is_negative():
+    sizes = np.linspace(1, 10, 20)[:, None]
+    fixed_s, rates = fit_seconds(sizes, 5 * sizes[:, 0] ** 1.5, 0.1)
+    assert fixed_s >= 0
+    assert rates[0] > 0
+
+
+def test_the_made_up_runs_costs_are_predicted(made_up_run, smoke):
+    text = comparison_text([made_up_run], made_up_run)
+    factors = re.findall(r"^(\S+) .* ([\d.]+)$", text, re.MULTILINE)
+    assert {stage for stage, _ in factors} >= {"train", "render_packed", "sfm", "total"}
+    assert [float(factor) for _, factor in factors] == pytest.approx([1.0] * len(factors), abs=0.05)
+
+
+def test_rendering_scales_with_samples():
+    law = {"rendering": Law(5.0, (0.01, 0.1), (0.5, 2.0), 9, 100.0, 700.0)}
+    jobs = [Job("render_packed", str(i), (1000.0, 1228.8), 0, 5e6) for i in range(3)]
+    machine = Machine(cores=2, gpus=0, gpu_tflops=1.0)
+    costs = job_costs(jobs, law, machine)
+    [stage] = stage_costs(costs, law, machine)
+    seconds = 5 + 10 + 122.88
+    assert stage.cpu_s == pytest.approx((1.5 * seconds, 3 * seconds, 6 * seconds))
+    assert stage.wall_s == pytest.approx(2 * seconds)  # three equal jobs on two cores
+    assert stage.beyond == pytest.approx(12.288)
+    assert stage.peak_mb == pytest.approx(705)
+
+
+def test_trainings_on_a_gpu_take_the_assumed_throughput():
+    law = {"training": Law(3.0, (1e-4, 8.0), (0.9, 1.1), 9, 1.0, 400.0)}
+    jobs = [Job("train", str(i), (1e6, 7200.0)) for i in range(4)]
+    [on_gpu] = stage_costs(job_costs(jobs, law, Machine(8, 2, 10.0)), law, Machine(8, 2, 10.0))
+    # 4 x 7200 TFLOP at 20, 10 and 5 TFLOP/s; a core drives each, and starts it.
+    assert on_gpu.gpu_s == pytest.approx((1440, 2880, 5760))
+    assert on_gpu.cpu_s.mid == pytest.approx(2880 + 4 * 3)
+    assert on_gpu.wall_s == pytest.approx(2 * (720 + 3))
+    [on_cpu] = stage_costs(job_costs(jobs, law, Machine(4, 0, 10.0)), law, Machine(4, 0, 10.0))
+    assert on_cpu.gpu_s.mid == 0
+    assert on_cpu.cpu_s.mid == pytest.approx(4 * (3 + 100 + 57_600))
+
+
+def test_unmeasured_stages_are_said_to_be():
+    jobs = [Job("sfm", "a", (1.0,), 10)]
+    [stage] = stage_costs(job_costs(jobs, {}, Machine(1, 0, 1.0)), {}, Machine(1, 0, 1.0))
+    assert not stage.known
+    assert (stage.cpu_s.mid, stage.disk_bytes) == (0, 10)
+
+
+def test_longest_jobs_start_first():
+    assert wall_seconds([1, 1, 1, 3], 2) == 3
+    assert wall_seconds([2, 2, 2], 2) == 4
+    assert wall_seconds([5, 1], 8) == 5
+
+
+def test_tables_add_up_to_the_run(smoke):
+    config, experiments = smoke
+    jobs = run_jobs(config, experiments)
+    laws = fit_laws([])
+    laws |= {job.law: Law(1.0, (0.0,) * len(job.size), (1.0, 1.0), 1, None, None) for job in jobs}
+    costs = job_costs(jobs, laws, Machine(1, 0, 1.0))
+    rows = by_table(costs, table_keys(config, experiments))
+    assert sum(row.jobs for row in rows) == len(jobs)
+    assert sum(row.cpu_s.mid for row in rows) == pytest.approx(len(jobs))
+    alone = {row.name: row.alone[0].mid for row in rows if row.alone}
+    # By itself a table needs the jobs of its rows and the one that makes it.
+    rows4 = tuple(e for e in experiments if e.table == "table4_size")
+    assert alone["table4_size"] == pytest.approx(len(experiment_jobs(config, rows4)) + 1)
+
+
+def test_the_command_prints_and_writes_the_plan(made_up_run, tmp_path, capsys):
+    out = tmp_path / "plan.csv"
+    options = ["--profile", "smoke", "--measured", str(made_up_run), "--cores", "2"]
+    assert main(["plan", *options, "--csv", str(out), "--compare", str(made_up_run)]) == 0
+    text = capsys.readouterr().out
+    assert "table5_from_scratch" in text
+    assert "predicted from" in text
+    with out.open() as file:
+        rows = {row["stage"]: row for row in csv.DictReader(file)}
+    expected_s = sum(true_seconds(j) for j in run_jobs(*design("smoke")) if j.stage == "train")
+    assert float(rows["train"]["cpu_h"]) * 3600 == pytest.approx(expected_s, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["--profile", "large"],
+            r"profile 'large': no file of config/ is called so; known: .*mini",
+        ),
+        (["--profile", "absent.yaml"], r"absent\.yaml: cannot be read as YAML"),
+        (["--measured", "{tmp}"], r"holds no benchmarks/\*\*/\*\.tsv and no benchmarks\.csv"),
+        (["--cores", "0"], r"--cores: must be at least 1, found 0"),
+        (["--gpus", "-1"], r"--gpus: must be at least 0, found -1"),
+        (["--gpu-tflops", "nan"], r"--gpu-tflops: must be above 0, found nan"),
+    ],
+)
+def test_bad_input_ends_in_one_line(arguments, message, tmp_path, capsys):
+    assert main(["plan", *(a.replace("{tmp}", str(tmp_path)) for a in arguments)]) == 1
+    error = capsys.readouterr().err
+    assert re.search(message, error)
+    assert error.count("\n") == 1
+
+
+def test_a_broken_measurement_is_named(made_up_run, tmp_path):
+    path = tmp_path / "smoke" / "benchmarks" / "sfm" / "a.tsv"
+    path.parent.mkdir(parents=True)
+    path.write_text(f"{HEADER}fast\t1\t1\n")
+    assert main(["plan", "--measured", str(tmp_path / "smoke")]) == 1

@@ -1,0 +1,203 @@
+"""Images through a lens: where points appear, how lines bend, exact depth, no border."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+import trimesh
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from synfeal.camera.intrinsics import intrinsics_of
+from synfeal.camera.rays import slopes_of_pixels
+from synfeal.config.models import CameraConfig
+from synfeal.errors import InputError
+from synfeal.geometry.poses import pose_matrix
+from synfeal.geometry.rotations import rotation_from_rpy
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.render import open_renderer
+from synfeal.render.distorted import DistortedRenderer, covering_camera
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
+
+AHEAD = pose_matrix(rotation_from_rpy([0.0, 0.0, 0.0]), [0.0, 0.0, 0.0])
+LENSES = {
+    "barrel": (-0.28, 0.09, 0.001, -0.0007, -0.01),
+    "pincushion": (0.25, 0.05, 0.0, 0.0, 0.0),
+    "tangential": (-0.05, 0.0, 0.02, -0.01, 0.0),
+}
+SLANT = np.array([0.3, -0.2, 1.0]) / 2.5  # the plane of points with SLANT @ point = 1
+each_lens = pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
+
+
+def camera_of(lens: tuple[float, ...], width: int = 160, height: int = 120) -> CameraConfig:
+    focal = 0.75 * width
+    values = {"fx": focal, "fy": 0.99 * focal, "cx": 0.52 * width, "cy": 0.49 * height}
+    return CameraConfig.model_validate(
+        {"width": width, "height": height, "distortion": lens, **values}
+    )
+
+
+def expected_pixels(points_cam: np.ndarray, camera: CameraConfig) -> np.ndarray:
+    """OpenCV's, whose first pixel has its centre at (0, 0)."""
+    matrix = intrinsics_of(camera).matrix(centre_shift_px=-0.5)
+    lens = np.array(camera.distortion)
+    return cv2.projectPoints(points_cam, np.zeros(3), np.zeros(3), matrix, lens)[0][:, 0] + 0.5
+
+
+def pixel_centres(camera: CameraConfig) -> np.ndarray:
+    row, column = np.mgrid[: camera.height, : camera.width] + 0.5
+    return np.stack([column, row], axis=-1)
+
+
+class Analytic:
+    """A scene in closed form: colour and depth as functions of the slopes of a ray."""
+
+    def __init__(self, camera, colour=None, depth=None, samples=4):
+        self.camera, self.colour, self.depth, self.samples = camera, colour, depth, samples
+
+    def render(self, world_from_cam):
+        steps = (np.arange(self.samples) + 0.5) / self.samples - 0.5
+        centre, total = pixel_centres(self.camera), 0.0
+        for offset in np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2):
+            total = total + self.colour(slopes_of_pixels(self.camera, centre + offset))
+        grey = np.rint(total / self.samples**2).astype(np.uint8)
+        return np.repeat(grey[..., None], 3, axis=2)
+
+    def render_rgbd(self, world_from_cam):
+        slope = slopes_of_pixels(self.camera, pixel_centres(self.camera))
+        return np.zeros((*slope.shape[:2], 3), np.uint8), self.depth(slope).astype(np.float32)
+
+
+def noise_colour(slope: np.ndarray) -> np.ndarray:
+    return map_coordinates(NOISE, [slope[..., 1] * 240, slope[..., 0] * 240], order=1, mode="wrap")
+
+
+def _noise() -> np.ndarray:
+    rng, image = np.random.default_rng(0), np.zeros((700, 700))
+    for sigma, weight in ((1.5, 25), (4, 30), (12, 30)):
+        octave = gaussian_filter(rng.standard_normal(image.shape), sigma, mode="wrap")
+        image += weight * octave / octave.std()
+    return np.clip(128 + image, 0, 255)
+
+
+NOISE = _noise()
+
+
+def disc(centre_cam: np.ndarray, radius: float) -> MeshPart:
+    """A white disc that faces the camera; its round edge averages over where samples lie."""
+    angle = np.linspace(0.0, 2 * np.pi, 61)[:-1]
+    rim = centre_cam + radius * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    vertices = np.vstack([centre_cam, rim]) @ AHEAD[:3, :3].T
+    following = np.roll(np.arange(1, 61), -1)
+    faces = np.column_stack([np.zeros(60, int), np.arange(1, 61), following])
+    return MeshPart("disc", vertices, faces, base_color=np.full(4, 255, np.uint8))
+
+
+@each_lens
+def test_points_appear_where_opencv_projects_them(lens) -> None:
+    camera = camera_of(lens, 320, 240)
+    rng = np.random.default_rng(1)
+    points = np.column_stack([rng.uniform([-0.5, -0.35], [0.5, 0.35], (6, 2)), np.ones(6)]) * 2.0
+    for (column, row), point in zip(expected_pixels(points, camera), points, strict=True):
+        dot = disc(point, 0.02)
+        with open_renderer(TexturedMesh((dot,)), camera) as renderer:
+            weight = renderer.render(AHEAD)[..., :1].astype(float)
+        seen = (pixel_centres(camera) * weight).sum(axis=(0, 1)) / weight.sum()
+        np.testing.assert_allclose(seen, [column, row], atol=0.05)
+
+
+@each_lens
+def test_a_straight_line_bends_as_it_must(lens) -> None:
+    camera = camera_of(lens)
+
+    def line(slope):
+        return 255.0 * (np.abs(slope[..., 0] - 0.45) < 0.02)
+
+    grey = DistortedRenderer(lambda pinhole: Analytic(pinhole, line), camera).render(AHEAD)[..., 0]
+    y = np.linspace(-0.8, 0.8, 400)
+    curve = expected_pixels(np.column_stack([0 * y + 0.45, y, 0 * y + 1]), camera)
+    row = np.arange(5, 115)
+    columns = pixel_centres(camera)[row, :, 0]
+    seen = (columns * grey[row]).sum(axis=1) / grey[row].sum(axis=1, dtype=float)
+    expected = np.interp(row + 0.5, curve[:, 1], curve[:, 0])
+    np.testing.assert_allclose(seen, expected, atol=0.1)
+    assert np.ptp(expected) > 1.0
+
+
+@each_lens
+def test_colours_are_nearly_those_of_64_rays(lens) -> None:
+    camera = camera_of(lens)
+    expected = Analytic(camera, noise_colour, samples=8).render(AHEAD).astype(float)
+    found = DistortedRenderer(lambda pinhole: Analytic(pinhole, noise_colour), camera).render(AHEAD)
+    error = found - expected
+    assert np.sqrt((error**2).mean()) < 0.03 * expected.std()
+    assert abs(error.mean()) < 0.1
+
+
+@each_lens
+def test_depth_of_a_plane_is_exact(lens) -> None:
+    camera = camera_of(lens)
+
+    def depth(slope):
+        return 1.0 / (slope @ SLANT[:2] + SLANT[2])
+
+    renderer = DistortedRenderer(lambda pinhole: Analytic(pinhole, depth=depth), camera)
+    found = renderer.render_rgbd(AHEAD)[1]
+    assert found.dtype == np.float32
+    expected = depth(slopes_of_pixels(camera, pixel_centres(camera)))
+    assert np.ptp(expected) > 0.5
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+@each_lens
+def test_depth_is_never_between_two_surfaces(lens) -> None:
+    """A wall at 4 m before nothing, and before it a board at 2 m."""
+    camera = camera_of(lens)
+
+    def depth(slope):
+        wall = np.where(slope[..., 0] < 0.3, 4.0, np.inf)
+        return np.where(np.abs(slope).max(axis=-1) < 0.2, 2.0, wall)
+
+    renderer = DistortedRenderer(lambda pinhole: Analytic(pinhole, depth=depth), camera)
+    found = renderer.render_rgbd(AHEAD)[1].round(5)
+    assert set(np.unique(found)) == {2.0, 4.0, np.inf}
+    expected = depth(slopes_of_pixels(camera, pixel_centres(camera)))
+    differs = found != expected
+    assert differs.mean() < 0.01
+    near = slopes_of_pixels(camera, pixel_centres(camera))[differs]
+    edges = np.abs(np.abs(near).max(axis=-1) - 0.2), np.abs(near[:, 0] - 0.3)
+    assert (np.minimum(*edges) < 0.5 / 120).all()  # half a pixel
+
+
+@each_lens
+def test_a_closed_room_fills_the_image(lens) -> None:
+    box = trimesh.creation.box((4.0, 4.0, 4.0))
+    rgb = np.full((8, 3), 200, np.uint8)
+    room = MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces), vertex_rgb=rgb)
+    with open_renderer(TexturedMesh((room,)), camera_of(lens)) as renderer:
+        seen, depth = renderer.render_rgbd(AHEAD)
+        np.testing.assert_array_equal(renderer.render(AHEAD), seen)
+    assert (seen.shape, seen.dtype) == ((120, 160, 3), np.uint8)
+    assert (np.abs(seen.astype(int) - 200) <= 1).all()
+    ahead = np.abs(slopes_of_pixels(camera_of(lens), pixel_centres(camera_of(lens)))).max(-1) < 0.95
+    np.testing.assert_allclose(depth[ahead], 2.0, atol=1e-3)  # the wall that faces the camera
+
+
+def test_without_distortion_nothing_is_resampled() -> None:
+    mesh = TexturedMesh((MeshPart("t", np.eye(3), np.array([[0, 1, 2]])),))
+    with open_renderer(mesh, camera_of((0.0,) * 5)) as renderer:
+        assert not isinstance(renderer, DistortedRenderer)
+
+
+def test_the_pinhole_keeps_the_resolution_and_the_clip_planes() -> None:
+    camera = camera_of(LENSES["barrel"]).model_copy(update={"near_m": 0.2, "far_m": 30.0})
+    pinhole = covering_camera(camera)
+    assert (pinhole.fx, pinhole.fy) == (2 * camera.fx, 2 * camera.fy)
+    assert (pinhole.near_m, pinhole.far_m) == (0.2, 30.0)
+    assert not any(pinhole.distortion)
+
+
+def test_a_lens_too_wide_for_any_pinhole_image_is_refused() -> None:
+    with pytest.raises(InputError, match="give a smaller width"):
+        covering_camera(camera_of((-0.2, 0.0, 0.0, 0.0, 0.0), 8192, 4096))

@@ -1,0 +1,275 @@
+"""Exports read back by other programs' readers, or by hand: a point lands where it was drawn."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+import pytest
+from PIL import Image
+
+from synfeal.cli import main
+from synfeal.config.models import CameraConfig
+from synfeal.export.colmap import _camera as colmap_camera
+from tests.damaged_sets import (
+    FILES,
+    copy_of_first_frames,
+    damages,
+    frame_files,
+    write_planar_set,
+)
+
+FORMATS = ("colmap", "nerfstudio", "tum")
+LENS = (0.1, -0.05, 0.001, -0.002, 0.01)
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What a reader of a format finds: pinhole, poses, colour and depth images by frame."""
+
+    project: Callable[[np.ndarray], np.ndarray]  # points in the camera (x, y, z) to pixels
+    cam_from_world: list[np.ndarray]
+    colors: list[Path]
+    depth_m: list[np.ndarray] | None
+
+
+@pytest.fixture(scope="module")
+def planar(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("planar") / "set"
+    write_planar_set(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def small(planar: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return copy_of_first_frames(planar, tmp_path_factory.mktemp("small") / "set")
+
+
+@pytest.fixture
+def damaged(planar: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(planar, tmp_path / "set"))
+
+
+def run(dataset: Path, to: str, out: Path, *more: str) -> int:
+    return main(["export", str(dataset), "--to", to, "--out", str(out), *more])
+
+
+def read_colmap(out: Path) -> Exported:
+    model = pycolmap.Reconstruction(str(out / "sparse" / "0"))
+    images = [model.images[key] for key in sorted(model.images)]
+    camera = model.cameras[1]
+    poses = [np.vstack([image.cam_from_world().matrix(), [0, 0, 0, 1]]) for image in images]
+    return Exported(
+        lambda points: np.asarray(camera.img_from_cam(points)),
+        poses,
+        [out / "images" / image.name for image in images],
+        None,
+    )
+
+
+def read_nerfstudio(out: Path) -> Exported:
+    """Cameras look along -z with y up; depth is scaled by 1e-3."""
+    meta = json.loads((out / "transforms.json").read_text())
+
+    def project(points: np.ndarray) -> np.ndarray:
+        x, y, z = (points * [1, -1, -1]).T  # to the axes of the format
+        column = meta["fl_x"] * x / -z + meta["cx"]
+        return np.stack([column, meta["cy"] - meta["fl_y"] * y / -z], axis=1)
+
+    gl_from_cam = np.diag([1, -1, -1, 1])
+    frames = meta["frames"]
+    return Exported(
+        project,
+        [gl_from_cam @ np.linalg.inv(np.array(f["transform_matrix"])) for f in frames],
+        [out / frame["file_path"] for frame in frames],
+        [np.asarray(Image.open(out / f["depth_file_path"])) * 1e-3 for f in frames],
+    )
+
+
+def read_tum(out: Path) -> Exported:
+    """As TUM's tools do: lists after three lines of comment, quaternions with w last."""
+    poses, colors, depths = [], [], []
+    values: list[str] = []
+    for name in ("seq-01", "seq-02"):
+        lists = {
+            kind: (out / name / f"{kind}.txt").read_text().splitlines()
+            for kind in ("rgb", "depth", "groundtruth")
+        }
+        assert all(line[0] == "#" for lines in lists.values() for line in lines[:3])
+        values = lists["rgb"][1].split(": ")[1].replace(";", "").split()
+        for rgb, depth, truth in zip(*(lines[3:] for lines in lists.values()), strict=True):
+            time, *pose = map(float, truth.split())
+            assert float(rgb.split()[0]) == float(depth.split()[0]) == time
+            x, y, z, w = pose[3:]
+            rotation = np.array(
+                [
+                    [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                    [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                    [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+                ]
+            )
+            world_from_cam = np.eye(4)
+            world_from_cam[:3, :3], world_from_cam[:3, 3] = rotation, pose[:3]
+            poses.append(np.linalg.inv(world_from_cam))
+            colors.append(out / name / rgb.split()[1])
+            depths.append(np.asarray(Image.open(out / name / depth.split()[1])) / 5000)
+    fx, fy, cx, cy = (float(values[values.index(key) + 1]) for key in ("fx", "fy", "cx", "cy"))
+    scale, offset = np.array([fx, fy]), np.array([cx + 0.5, cy + 0.5])
+    return Exported(lambda p: p[:, :2] / p[:, 2:] * scale + offset, poses, colors, depths)
+
+
+READERS = {"colmap": read_colmap, "nerfstudio": read_nerfstudio, "tum": read_tum}
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_poses_images_and_depth_come_back(to: str, planar: Path, tmp_path: Path) -> None:
+    assert run(planar, to, tmp_path / "out") == 0
+    exported = READERS[to](tmp_path / "out")
+    names = [path for s in ("seq-01", "seq-02") for path in frame_files(planar, "pose.txt", s)]
+    assert len(exported.cam_from_world) == len(names) == 32
+    for index, path in enumerate(names):
+        product = exported.cam_from_world[index] @ np.loadtxt(path)
+        np.testing.assert_allclose(product, np.eye(4), atol=1e-9)
+        color = path.with_name(path.name.replace("pose.txt", "color.png"))
+        assert exported.colors[index].read_bytes() == color.read_bytes()
+        if exported.depth_m is not None:
+            depth_mm = np.asarray(Image.open(str(color).replace("color", "depth")))
+            expected = np.where(depth_mm == 65535, 0, depth_mm / 1000)
+            np.testing.assert_allclose(exported.depth_m[index], expected, atol=1e-4)
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_a_point_lands_at_the_pixel_where_it_was_drawn(
+    to: str, planar: Path, tmp_path: Path
+) -> None:
+    """The wall of the scene is the plane x = 3: its corner pixels are known in the world."""
+    assert run(planar, to, tmp_path / "out") == 0
+    exported = READERS[to](tmp_path / "out")
+    pose = np.loadtxt(frame_files(planar, "pose.txt")[3])
+    focal = 48 / np.tan(np.radians(30))
+    pixels = np.array([[0.5, 0.5], [95.5, 0.5], [40.5, 10.5]])
+    rays = np.column_stack([(pixels - [48, 36]) / focal, np.ones(3)]) @ pose[:3, :3].T
+    on_wall = pose[:3, 3] + rays * ((3.0 - pose[0, 3]) / rays[:, :1])
+    cam_from_world = exported.cam_from_world[3]
+    points = on_wall @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
+    np.testing.assert_allclose(exported.project(points), pixels, atol=1e-6)
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_images_are_links_or_copies(to: str, planar: Path, tmp_path: Path) -> None:
+    for options, linked in (((), True), (("--copy",), False)):
+        out = tmp_path / f"out-{linked}"
+        assert run(planar, to, out, *options) == 0
+        assert {path.is_symlink() for path in READERS[to](out).colors} == {linked}
+
+
+def test_splits_are_kept(planar: Path, tmp_path: Path) -> None:
+    for to in FORMATS:
+        assert run(planar, to, tmp_path / to) == 0
+    for split, count, sequence in (("train", 24, "seq-01"), ("test", 8, "seq-02")):
+        names = (tmp_path / "colmap" / f"{split}.txt").read_text().split()
+        assert len(names) == count
+        assert {name.split("/")[0] for name in names} == {sequence}
+        assert all((tmp_path / "colmap" / "images" / name).exists() for name in names)
+        meta = json.loads((tmp_path / "nerfstudio" / "transforms.json").read_text())
+        assert meta[f"{split}_filenames"] == [f"images/{name}" for name in names]
+        assert meta["val_filenames"] == meta["test_filenames"]
+    assert (tmp_path / "tum" / "TestSplit.txt").read_text() == "sequence2\n"
+
+
+@pytest.mark.parametrize("k3", [0.0, 0.01])
+def test_colmap_distorts_by_the_formula_of_brown_and_conrady(k3: float) -> None:
+    k1, k2, p1, p2, _ = LENS
+    camera = CameraConfig(
+        width=96, height=72, fx=80, fy=81, cx=47, cy=37, distortion=(*LENS[:4], k3)
+    )
+    _, model, width, height, *parameters = colmap_camera(camera).split()
+    assert model == ("FULL_OPENCV" if k3 else "OPENCV")
+    read = pycolmap.Camera(
+        model=model, width=int(width), height=int(height), params=list(map(float, parameters))
+    )
+    x, y = 0.3, -0.2
+    t = x * x + y * y
+    radial = 1 + k1 * t + k2 * t**2 + k3 * t**3
+    expected = [
+        80 * (x * radial + 2 * p1 * x * y + p2 * (t + 2 * x * x)) + 47,
+        81 * (y * radial + p1 * (t + 2 * y * y) + 2 * p2 * x * y) + 37,
+    ]
+    projected = np.asarray(read.img_from_cam(np.array([[x, y, 1.0]])))[0]
+    np.testing.assert_allclose(projected, expected, atol=1e-9)
+
+
+def test_nerfstudio_gets_the_lens(planar: Path, tmp_path: Path) -> None:
+    lens = tmp_path / "cameras.txt"
+    lens.write_text("1 FULL_OPENCV 96 72 80 81 47 37 0.1 -0.05 0.001 -0.002 0.01 0 0 0\n")
+    assert run(planar, "nerfstudio", tmp_path / "out", "--camera", str(lens)) == 0
+    meta = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    assert tuple(meta[key] for key in ("k1", "k2", "p1", "p2", "k3")) == LENS
+    assert tuple(meta[key] for key in ("fl_x", "fl_y", "cx", "cy")) == (80, 81, 47, 37)
+
+
+def test_tum_loses_what_is_beyond_its_range_and_says_so(
+    damaged: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = frame_files(damaged, "depth.png")[0]
+    depth = np.asarray(Image.open(path)).copy()
+    depth[0, :4] = 13107, 13108, 65535, 0
+    Image.fromarray(depth).save(path)
+    assert run(damaged, "tum", tmp_path / "out") == 0
+    assert "beyond 13.1 m" in caplog.text
+    written = np.asarray(Image.open(tmp_path / "out/seq-01/depth/0.000000.png"))
+    assert written[0, :4].tolist() == [65535, 0, 0, 0]
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_a_directory_that_holds_something_is_refused(
+    to: str, planar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "mine").write_text("")
+    assert run(planar, to, tmp_path / "out") == 1
+    assert "exists and is not empty" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.rglob("*")] == ["out", "mine"]
+
+
+@pytest.mark.parametrize("to", FORMATS)
+@pytest.mark.parametrize("file", ["frame-000003.pose.txt", "frame-000003.color.png"])
+def test_damaged_data_leaves_nothing(
+    to: str, file: str, damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (damaged / "seq-01" / file).unlink()
+    assert run(damaged, to, tmp_path / "out") == 1
+    assert file in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]
+
+
+def test_an_unknown_camera_is_not_guessed(
+    damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (damaged / "manifest.json").unlink()
+    assert run(damaged, "colmap", tmp_path / "out") == 1
+    assert "give --camera FILE" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize("damage", damages())
+def test_any_damage_ends_in_one_line_or_does_not_matter(
+    file: str, damage: str, small: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is only linked to is not read; what is read must be whole."""
+    damaged = Path(shutil.copytree(small, tmp_path / "set"))
+    damages()[damage](damaged / file)
+    status = run(damaged, "nerfstudio", tmp_path / "out")
+    assert status in (0, 1)
+    assert (tmp_path / "out").exists() == (status == 0)
+    assert capsys.readouterr().err.count("error: ") == status
+    if file.endswith(("depth.png", "pose.txt", "Split.txt")) and damage not in (
+        "bits",  # may leave another number
+        "cut",  # leaves the last number with fewer zeros
+    ):
+        assert status == 1

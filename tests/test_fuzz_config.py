@@ -1,0 +1,295 @@
+"""No wrong configuration ends in a traceback, a hang or a silently different run."""
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+
+from baselines.groundtruth.methods import check_sources
+from synfeal.cli import main
+from synfeal.config import Config, load_config, parse_config, read_experiments, runs_of
+from tests.fuzzing import Damage, damages, problem_with, put, removed, replaced, text_damages
+from tests.mesh_samples import write_obj
+from tests.test_workflow import snakemake
+
+REPOSITORY = Path(__file__).parent.parent
+CONFIG = REPOSITORY / "config"
+PROFILES = (("config.yaml",), ("config.yaml", "smoke.yaml"), ("config.yaml", "paper.yaml"))
+LEAST = 2500  # inputs of all kinds together
+VALUES: tuple[Any, ...] = (
+    *(None, True, False, 0, -1, 0.5, 1e30, -1e30, 10**30, 10**400, 1e-320),
+    *(float("nan"), float("inf"), float("-inf"), "", "x", "..", "../../x", "/", "a/b", "a\0b"),
+    *("x" * 300, "x" * 100_000, "0x10", "1e400", [], [1], [[]], [None], {}, {"x": 1}, {1: 2}),
+)
+
+
+@pytest.fixture(autouse=True)
+def _in_the_repository(monkeypatch):
+    monkeypatch.chdir(REPOSITORY)
+
+
+def full(profile: tuple[str, ...]) -> dict[str, Any]:
+    """Every key of a profile with its value, defaults included."""
+    config = load_config(*(CONFIG / name for name in profile))
+    return config.model_dump(mode="json")
+
+
+def places(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    entries = value.items() if isinstance(value, dict) else ()
+    if isinstance(value, list):
+        entries = enumerate(value)
+    for key, inner in entries:
+        yield (*place, key)
+        yield from places(inner, (*place, key))
+
+
+def at(value: Any, place: tuple[Any, ...]) -> Any:
+    for key in place:
+        value = value[key]
+    return value
+
+
+def wrong_values(profile: tuple[str, ...]) -> Iterator[tuple[str, tuple[Any, ...], Any, Any]]:
+    """Label, changed key, what it was changed to, and the whole mapping."""
+    raw = full(profile)
+    for place in places(raw):
+        name = ".".join(map(str, place))
+        for value in VALUES:
+            yield f"{name} = {str(value)[:20]!r}", place, value, replaced(raw, place, value)
+        yield f"without {name}", place, None, removed(raw, place)
+        if isinstance(at(raw, place), dict):
+            for key in ("surplus", "", "x" * 5000, "../x", 5, None):
+                inner = {**at(raw, place), key: next(iter(at(raw, place).values()), 1)}
+                yield f"{name} with {str(key)[:9]!r}", place, inner, replaced(raw, place, inner)
+
+
+def is_config(config: Config, place: tuple[Any, ...], value: Any) -> bool:
+    """Whether what was accepted is what was given, can be run, and stays in its directory."""
+    dump = config.model_dump(mode="json")
+    assert parse_config(dump) == config
+    for found in (at(dump, p) for p in places(dump)):
+        assert not isinstance(found, float) or math.isfinite(found)
+        assert not isinstance(found, str) or "\0" not in found
+        assert not isinstance(found, int) or abs(found) < 2**63
+    assert config.root.resolve().parent == config.results.resolve()
+    names = [*config.scenes, *(size for scene in config.scenes.values() for size in scene.sizes)]
+    assert all(len(name) <= 64 and name.replace("_", "").isalnum() for name in names)
+    if value is not None and not isinstance(value, dict | list):
+        kept = at(dump, place)
+        if isinstance(kept, bool):
+            assert kept is bool(value)
+        else:
+            assert not isinstance(value, bool)
+            is_path = isinstance(value, str) and str(Path(value)) == kept
+            assert is_path or kept == value or float(value) == kept
+    return True
+
+
+@pytest.mark.parametrize("profile", PROFILES, ids=lambda files: Path(files[-1]).stem)
+def test_every_key_takes_a_right_value_or_none(profile):
+    fields = tuple(f"my.yaml: {name}" for name in Config.model_fields)
+    failures, count = [], 0
+    for label, place, value, raw in wrong_values(profile):
+        count += 1
+        problem = problem_with(
+            lambda raw=raw: parse_config(raw, "my.yaml"),
+            lambda config, place=place, value=value: is_config(config, place, value),
+            (*fields, "my.yaml: surplus"),
+        )
+        failures += [f"{label}: {problem}"] if problem else []
+    assert count >= LEAST
+    assert not failures, f"{len(failures)} of {profile}:\n" + "\n".join(failures)
+
+
+def models(model: type[BaseModel]) -> set[type[BaseModel]]:
+    """A model and all below it, by their annotations."""
+    found, pending = {model}, [model]
+    while pending:
+        annotations = [field.annotation for field in pending.pop().model_fields.values()]
+        while annotations:
+            annotation = annotations.pop()
+            if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+                if annotation not in found:
+                    found.add(annotation)
+                    pending.append(annotation)
+            else:
+                annotations += getattr(annotation, "__args__", ())
+    return found
+
+
+def test_no_model_was_left_out():
+    """Every key of every model stands in the mapping whose values are changed."""
+    keys = {place[-1] for place in places(full(PROFILES[0]))}
+    for model in models(Config):
+        missing = set(model.model_fields) - keys
+        assert missing <= {"calibration"}, model
+
+
+BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{after}: &{after} [{', '.join(9 * [f'*{before}'])}]\n"
+    for before, after in zip("abcdefgh", "bcdefghi", strict=True)
+)
+YAML = {
+    "an alias": b"profile: &a mini\nseed: *a\n",
+    "itself": b"scenes: &a {x: *a}\n",
+    "a bomb": BOMB.encode(),
+    "merged": b"a: &a {x: 1}\nb: {<<: *a}\n",
+    "a call": b"profile: !!python/object/apply:os.system ['touch made']\n",
+    "an object": b"profile: !!python/object:pathlib.Path {}\n",
+    "a name": b"profile: !!python/name:os.system\n",
+    "a tag": b"profile: !mine x\n",
+    "bytes": b"profile: !!binary aGVsbG8=\n",
+    "a set": b"scenes: !!set {a, b}\n",
+    "an impossible date": b"profile: 2026-13-45\n",
+    "no whole number": b"seed: !!int x\n",
+    "a key twice": b"profile: a\nprofile: b\n",
+    "deep lists": b"[" * 5000,
+    "deep mappings": b"{a: " * 5000,
+    "two documents": b"profile: a\n---\nprofile: b\n",
+    "a list": b"- 1\n",
+    "text": b"profile\n",
+    "a tab": b"profile:\n\tx: 1\n",
+    "unhashable": b"? [a, b]\n: 1\n",
+    "huge": b"profile: " + b"x" * 1_000_000 + b"\n",
+    "5000 digits": b"seed: " + b"9" * 5000 + b"\n",
+}
+
+
+def yaml_inputs() -> Iterator[Damage]:
+    data = (CONFIG / "config.yaml").read_bytes()
+    others = {path.name: path.read_bytes() for path in CONFIG.iterdir() if path.is_file()}
+    yield from damages(data, others, seed=5, n_flips=60)
+    yield from (Damage(label, content) for label, content in YAML.items())
+
+
+def test_every_file_is_a_profile_or_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # where a call would leave its file
+    path = tmp_path / "mine.yaml"
+    failures = []
+    for damage in yaml_inputs():
+        put(path, damage)
+        problem = problem_with(
+            lambda: load_config(path), lambda c: isinstance(c, Config), (str(path),), tmp_path
+        )
+        failures += [f"{damage.label}: {problem}"] if problem else []
+    assert not failures, "\n".join(failures)
+
+
+@pytest.mark.parametrize("label", YAML)
+def test_yaml_that_is_more_than_plain_values_is_refused(label, tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_bytes(YAML[label])
+    assert problem_with(lambda: load_config(path), lambda config: False, (str(path),)) is None
+
+
+def is_design(rows: Any) -> bool:
+    """Whether every run and label set has a directory of its own below the results."""
+    for run in runs_of(rows, 1):
+        assert all(part.strip(".") and "\0" not in part for part in Path(run.directory).parts)
+        assert len(Path(run.directory).parts) == 6
+    label_sets = {(row.scene, row.size, row.label_id): row for row in rows}
+    noise = {(row.scene, row.size, row.labels, row.noise_m, row.noise_deg) for row in rows}
+    assert len(label_sets) == len(noise)
+    return True
+
+
+def design_inputs() -> list[Damage]:
+    data = (CONFIG / "experiments-smoke.csv").read_bytes()
+    others = {"profile": (CONFIG / "config.yaml").read_bytes(), "other": b"a,b\n1,2\n"}
+    header, *rows = data.decode().splitlines()
+    yield_rows = {
+        "row twice": [*rows, rows[0]],
+        "noise that prints alike": [
+            *(f"table3_inconsistencies,both,large_room,6k,noise,{m},0,pretrained" for m in NOISE),
+        ],
+        "semicolons": [row.replace(",", ";") for row in rows],
+        "spaces": [row.replace(",", ", ") for row in rows],
+    }
+    every = [*damages(data, others, seed=7), *text_damages(data, ",")]
+    every += [Damage(k, "\n".join([header, *v]).encode()) for k, v in yield_rows.items()]
+    return every
+
+
+NOISE = ("0.1000001", "0.1000002")
+
+
+def test_every_table_of_experiments_is_a_design_or_is_refused(tmp_path):
+    path = tmp_path / "mine.csv"
+    config = load_config(CONFIG / "config.yaml", CONFIG / "smoke.yaml")
+    config = config.model_copy(update={"experiments": path})
+    failures = []
+
+    def read() -> object:
+        rows = read_experiments(config)
+        check_sources(rows, path)
+        return rows
+
+    for damage in design_inputs():
+        put(path, damage)
+        problem = problem_with(read, is_design, (str(path),), tmp_path)
+        failures += [f"{damage.label}: {problem}"] if problem else []
+    assert not failures, "\n".join(failures)
+
+
+def test_there_are_thousands_of_inputs():
+    values = sum(1 for profile in PROFILES for _ in wrong_values(profile))
+    assert values + len(list(yaml_inputs())) + len(design_inputs()) >= LEAST
+
+
+OPTIONS: Mapping[str, tuple[str, ...]] = {
+    "--mesh": ("", "absent.glb", ".", "x" * 5000, "plan.txt", "loop"),
+    "--frames": ("0", "-1"),
+    "--test-frames": ("-1",),
+    "--spacing": ("nan", "inf", "0", "-1"),
+    "--packed": ("0", "-5", "100000"),
+    "--workers": ("0", "-3"),
+    "--shard": ("", "0/2", "3/2", "1/0", "x", "1/2/3", "9" * 5000 + "/1"),
+    "--poses": ("absent.csv", ".", "plan.txt"),
+    "--min-view-distance": ("nan", "-1", "inf"),
+    "--min-path": ("nan", "-1", "inf"),
+    "--camera": ("absent.yaml", ".", "plan.txt", "", "x" * 5000),
+    "--width": ("0", "-1", "100000", "9" * 400),
+    "--height": ("0", "8193"),
+    "--fov": ("nan", "0", "180", "-1", "inf"),
+    "--unit-m": ("nan", "0", "-1", "inf"),
+    "--out": ("plan.txt", "plan.txt/x", "x" * 300),
+}
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_a_wrong_option_ends_in_one_line_and_nothing_is_written(
+    option, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    mesh = write_obj(tmp_path, "Kd 0.2 0.4 0.6\n")
+    Path("plan.txt").write_text("caf\u00e9 0 0\n", encoding="latin-1")
+    Path("loop").symlink_to("loop")
+    before = sorted(tmp_path.rglob("*"))
+    failures = []
+    for value in OPTIONS[option]:
+        options = {"--mesh": str(mesh), "--frames": "2", "--out": "set", option: value}
+        options |= {"--mode": "repeat"} if option == "--poses" else {}
+        try:
+            status = main(["collect", *(f"{name}={text}" for name, text in options.items())])
+        except Exception as error:
+            failures.append(f"{value[:20]!r}: {type(error).__name__} {str(error)[:80]}")
+            continue
+        printed = capsys.readouterr()
+        lines = printed.err.splitlines()
+        if status != 1 or printed.out or len(lines) != 1 or not lines[0].startswith("error: "):
+            failures.append(f"{value[:20]!r}: status {status}, {printed.out!r}, {lines}")
+        if sorted(tmp_path.rglob("*")) != before:
+            failures.append(f"{value[:20]!r}: something was written")
+    assert not failures, "\n".join(failures)
+
+
+@pytest.mark.parametrize("override", ["scale=nan", "profile=../x"])
+def test_the_workflow_refuses_in_one_line(override):
+    run = snakemake("--dry-run", "--config", override)
+    assert run.returncode == 1
+    errors = [line for line in (run.stdout + run.stderr).splitlines() if "error: " in line]
+    assert len(errors) == 1
+    assert "Traceback" not in run.stderr

@@ -1,0 +1,219 @@
+"""Errors of labels against the true poses, where the errors are known."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from baselines.groundtruth.batches import batches_of
+from baselines.groundtruth.chain import chain_batches, chain_unassisted
+from baselines.groundtruth.label_error import absolute_errors, relative_error, share_within, spread
+from baselines.groundtruth.label_set import chain_split, write_assistance
+from baselines.groundtruth.methods import METHODS, check_sources, stages_of
+from baselines.groundtruth.trajectory import BatchTrajectory, failed_trajectory, write_trajectory
+from synfeal.config.models import GroundTruthConfig
+from synfeal.dataset.pose_table import PoseTable, write_pose_table
+from synfeal.errors import InputError
+from synfeal.files import write_json
+from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
+from synfeal.report.label_error import COLUMNS, label_records, write_label_error_table
+from synfeal.report.results import read_table
+from synfeal.report.speed_vs_error import label_rows
+from tests.report_results import experiment
+
+STEP_M, BATCH = 0.1, 10
+CFG = GroundTruthConfig(batch_frames=BATCH)
+
+
+def table_of(poses):
+    index = np.arange(len(poses))
+    return PoseTable(index, index, poses[:, :3, 3], quat_wxyz_of(poses))
+
+
+def straight(n_frames, step_m=STEP_M, turn_deg=0.0):
+    """Poses on a straight line along the world's x, turning about it."""
+    k = np.arange(n_frames)
+    rotation = Rotation.from_euler("x", (turn_deg * k)[:, None], degrees=True).as_matrix()
+    return pose_matrix(rotation, np.column_stack([step_m * k, 0 * k, 0 * k]))
+
+
+def drifting(batches, drift_m):
+    """Every batch moves on as the truth does and aside by ``drift_m``, evenly over its frames."""
+    trajectories = []
+    for batch in batches:
+        poses = straight(len(batch))
+        poses[:, 1, 3] = np.linspace(0, drift_m, len(batch))
+        trajectories.append(BatchTrajectory(poses, np.ones(len(batch), dtype=bool)))
+    return trajectories
+
+
+@pytest.mark.parametrize(
+    ("drift_m", "ends_after_m", "assisted"),
+    [
+        # 15 cm a batch: the second batch ends 30 cm off and is put right, the fourth again.
+        (0.15, [0.15, 0.0, 0.15, 0.0], [False, True, False, True]),
+        (0.25, [0.0, 0.0, 0.0, 0.0], [True, True, True, True]),
+        (0.05, [0.05, 0.10, 0.15, 0.20], [False, False, False, False]),
+    ],
+)
+def test_a_known_drift_gives_the_known_errors_before_and_after(drift_m, ends_after_m, assisted):
+    truth = table_of(straight(4 * BATCH + 1))
+    batches = batches_of(len(truth), BATCH)
+    trajectories = drifting(batches, drift_m)
+    labels, record = chain_batches(batches, trajectories, truth, CFG)
+    assert [batch.assisted for batch in record.records] == assisted
+    ends = [batch.stop - 1 for batch in batches]
+    np.testing.assert_allclose(absolute_errors(labels, truth)[0][ends], ends_after_m, atol=1e-12)
+    before_m, before_deg = absolute_errors(chain_unassisted(batches, trajectories, truth), truth)
+    # Without assistance the drift grows evenly to four times that of a batch.
+    np.testing.assert_allclose(before_m, np.linspace(0, 4 * drift_m, len(truth)), atol=1e-12)
+    np.testing.assert_allclose(before_deg, 0, atol=1e-6)
+    assert spread(before_m).median == pytest.approx(2 * drift_m)
+    assert spread(before_m).max == pytest.approx(4 * drift_m)
+    n = 4 * BATCH
+    mean_square = (4 * drift_m) ** 2 * (2 * n + 1) / (6 * n)  # of 0, 1/n, ..., 1
+    assert spread(before_m).rmse == pytest.approx(np.sqrt(mean_square))
+
+
+def test_a_lost_batch_stands_still_before_and_is_assisted_after():
+    truth = table_of(straight(2 * BATCH + 1))
+    batches = batches_of(len(truth), BATCH)
+    trajectories = [failed_trajectory(BATCH + 1), drifting(batches, 0.0)[1]]
+    before = chain_unassisted(batches, trajectories, truth)
+    expected = [0.0] * BATCH + [STEP_M * k for k in range(BATCH + 1)]
+    np.testing.assert_allclose(before.position_m[:, 0], expected, atol=1e-12)
+    after, record = chain_batches(batches, trajectories, truth, CFG)
+    assert [(b.lost, b.assisted) for b in record.records] == [(True, True), (False, False)]
+    np.testing.assert_allclose(after.position_m, truth.position_m, atol=1e-12)
+
+
+@pytest.mark.parametrize("frames", [1, 25])
+def test_relative_error_of_a_known_drift(frames):
+    truth = table_of(straight(60))
+    labels = table_of(straight(60, step_m=1.02 * STEP_M, turn_deg=0.2))
+    error = relative_error([(labels, truth)], frames)
+    assert error.rmse_m == pytest.approx(0.02 * STEP_M * frames)
+    assert error.rmse_deg == pytest.approx(0.2 * frames)
+    assert error.per_metre_m == pytest.approx(0.02)
+    assert error.per_metre_deg == pytest.approx(0.2 / STEP_M)
+
+
+def test_relative_error_does_not_see_where_a_sequence_starts_or_ends():
+    truth = table_of(straight(30, turn_deg=3.0))
+    moved = Rotation.from_euler("xyz", (10, 20, 30), degrees=True).as_matrix()
+    labels = table_of(pose_matrix(moved, (5.0, 6.0, 7.0)) @ straight(30, turn_deg=3.0))
+    error = relative_error([(labels, truth), (truth, truth)], 25)
+    assert error.rmse_m == pytest.approx(0, abs=1e-12)
+    assert error.rmse_deg == pytest.approx(0, abs=1e-5)
+    assert absolute_errors(labels, truth)[0].min() > 1
+
+
+def test_relative_error_needs_enough_frames_and_some_way():
+    truth = table_of(straight(25))
+    assert relative_error([(truth, truth)], 25) is None
+    standing = table_of(straight(26, step_m=0.0))
+    assert np.isnan(relative_error([(standing, standing)], 25).per_metre_m)
+
+
+def test_the_share_within_limits_includes_the_limits():
+    errors = np.array([0.05, 0.05, 0.051, 0.0]), np.array([5.0, 5.1, 0.0, 0.0])
+    assert share_within(errors, 0.05, 5.0) == 0.5
+
+
+@pytest.fixture
+def results(tmp_path):
+    """Two methods, two batches of the training split and one of the test split, 15 cm drift."""
+    root, rows = tmp_path / "toy", []
+    folder = root / "labels" / "large_room" / "6k"
+    for method in ("sfm", "rgbd-odometry"):
+        records = {}
+        for split, count in (("train", 21), ("test", 6)):
+            write_pose_table(folder / "synfeal" / f"{split}.csv", table_of(straight(count)))
+            batches = batches_of(count, BATCH)
+            paths = [root / "batches" / f"{method}-{split}-{b.index}.csv" for b in batches]
+            for path, estimate in zip(paths, drifting(batches, 0.15), strict=True):
+                write_trajectory(path, estimate)
+            out = folder / method
+            records[split] = chain_split(
+                paths,
+                folder / "synfeal" / f"{split}.csv",
+                out / f"{split}.csv",
+                out / f"{split}-unassisted.csv",
+                CFG,
+            )
+            for batch in batches:
+                for stage in stages_of(method):
+                    facts = {"odometry_s": 2.0, "loops_s": 5.0, "pairs": 9, "peak_memory_mb": 7.0}
+                    at = root / "groundtruth/large_room/6k" / stage / split
+                    write_json(at / f"batch-{batch.index:03d}.json", facts)
+        write_assistance(folder / method / "assistance.json", method, records)
+        rows.append(experiment("table2_ground_truth", labels=method))
+    return root, rows
+
+
+def test_the_table_holds_what_was_put_into_the_labels(results):
+    root, rows = results
+    write_label_error_table(rows, root, root / "tables/label_error.csv", root / "t.tex")
+    table = read_table(root / "tables/label_error.csv", COLUMNS)
+    keys = [(row["method"], row["split"], row["assistance"]) for row in table]
+    states = [(s, a) for s in ("train", "test", "total") for a in ("before", "after")]
+    assert keys == [(m, *state) for m in ("sfm", "rgbd-odometry") for state in states]
+    before, after = table[:2]
+    assert (before["frames"], table[4]["frames"]) == ("21", "27")
+    assert (before["position_m_max"], before["position_m_median"]) == ("0.3", "0.15")
+    # The last pose, 30 cm off, is replaced; the one before it stays 28.5 cm off.
+    assert after["position_m_max"] == "0.285"
+    assert before["relative_1_m_rmse"] == before["relative_1_m_rmse"] == "0.015"
+    assert float(before["relative_1_m_per_m"]) == pytest.approx(0.15)
+    assert before["relative_25_m_rmse"] == ""  # 21 frames
+    # 0, 1.5, 3 and 4.5 cm of 21 frames; after assistance also the last one.
+    assert float(before["share_within_5cm_5deg"]) == pytest.approx(4 / 21, rel=1e-5)
+    assert float(after["share_within_5cm_5deg"]) == pytest.approx(5 / 21, rel=1e-5)
+    assert "Drift" in (root / "t.tex").read_text()
+
+
+def test_a_frame_costs_what_its_stages_took_without_what_the_method_does_not_need(results):
+    root, _ = results
+    by_method = {m: label_records(root, m, "large_room", "6k", "total")[0] for m in ("sfm",)}
+    assert by_method["sfm"]["seconds_per_frame"] == pytest.approx(3 * 7.0 / 27)
+    alone = label_records(root, "rgbd-odometry", "large_room", "6k", "train")[0]
+    # Two batches, the times of odometry and of the method itself, no loop closures.
+    assert alone["seconds_per_frame"] == pytest.approx(2 * 2 * 2.0 / 21)
+    assert alone["peak_memory_mb"] == 7.0
+
+
+def test_speed_vs_error_has_a_row_per_method(results):
+    root, rows = results
+    write_label_error_table(rows, root, root / "tables/label_error.csv", root / "t.tex")
+    found = label_rows(root, "large_room")
+    assert [row["variant"] for row in found] == ["SfM", "RGB-D odometry alone"]
+    assert found[0]["items_per_s"] == pytest.approx(27 / 21, rel=1e-5)
+    assert label_rows(root, "sanctuary") == []
+
+
+@pytest.mark.parametrize("content", [None, "{}", "[]", '{"peak_memory_mb": "much"}', "{"])
+def test_facts_that_cannot_be_read_are_named(results, content):
+    root, rows = results
+    path = root / "groundtruth/large_room/6k/sfm/test/batch-000.json"
+    path.unlink()
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(InputError, match=r"batch-000\.json: cannot be read") as refusal:
+        write_label_error_table(rows, root, root / "t.csv", root / "t.tex")
+    assert "\n" not in str(refusal.value)
+    assert not (root / "t.csv").exists()
+
+
+def test_records_are_plain_json(results):
+    root, _ = results
+    path = root / "labels/large_room/6k/sfm/assistance.json"
+    assert json.loads(path.read_text())["splits"]["train"]["assisted"] == 1
+
+
+def test_labels_that_nothing_makes_are_refused(tmp_path):
+    rows = [experiment("table2_ground_truth", labels=name) for name in ("synfeal", *METHODS)]
+    check_sources(rows, tmp_path / "design.csv")
+    wrong = rows[0].model_copy(update={"labels": "orb"})
+    with pytest.raises(InputError, match=r"design\.csv: labels 'orb': not one of .*rgbd-toro"):
+        check_sources([*rows, wrong], tmp_path / "design.csv")

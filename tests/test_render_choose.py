@@ -1,0 +1,191 @@
+"""Which backend draws: failures are injected, and one process really cannot load EGL."""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from synfeal.config.models import RenderConfig
+from synfeal.errors import InputError
+from synfeal.mesh.model import TexturedMesh
+from synfeal.render import choose, open_renderer
+from synfeal.render.opengl import backend as opengl
+from synfeal.render.opengl import context
+from tests.render_backends import (
+    BACKENDS,
+    LOOK_ALONG_X,
+    PYOPENGL_WARNS,
+    camera_of,
+    colored,
+    facing_quad,
+)
+
+pytestmark = pytest.mark.filterwarnings(PYOPENGL_WARNS)
+
+GREEN = TexturedMesh((facing_quad(2.0, 9.0, base_color=colored((0, 255, 0))),))
+
+
+@pytest.fixture(autouse=True)
+def forget() -> Iterator[None]:
+    """What worked is remembered for the process; not from one test to the next."""
+    yield
+    choose.why_not.cache_clear()
+    choose.fastest_working.cache_clear()
+
+
+@pytest.fixture
+def fresh(forget: None) -> None:
+    choose.why_not.cache_clear()
+    choose.fastest_working.cache_clear()
+
+
+def seen(backend: str = "auto") -> Any:
+    with open_renderer(GREEN, camera_of(), RenderConfig(backend=backend)) as renderer:  # type: ignore[arg-type]
+        assert (renderer.render(LOOK_ALONG_X) == [0, 255, 0]).all()
+        return type(renderer).__name__
+
+
+@pytest.mark.parametrize("name", BACKENDS)
+def test_a_backend_may_be_named(name: str) -> None:
+    assert seen(name).lower() == f"{name}renderer"
+
+
+@pytest.mark.usefixtures("fresh")
+def test_auto_takes_the_first_and_says_so_once(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO, "synfeal")
+    assert seen().lower() == f"{BACKENDS[0]}renderer"
+    seen()
+    told = [record for record in caplog.records if record.levelno == logging.INFO]
+    assert len(told) == 1
+    assert BACKENDS[0] in told[0].getMessage()
+    if BACKENDS[0] == "opengl":
+        assert len(caplog.records) == 1
+
+
+def no_library(*_: object, **__: object) -> Any:
+    raise ImportError("libEGL.so.1 not loaded")
+
+
+def no_device(*_: object, **__: object) -> Any:
+    raise RuntimeError("requested device index 0,\nbut found 0 devices")
+
+
+def black(*_: object, **__: object) -> Any:
+    class Black:
+        def render_rgbd(self, _: object) -> Any:
+            return np.zeros((16, 16, 3), np.uint8), np.ones((16, 16), np.float32)
+
+        def __enter__(self) -> Any:
+            return self
+
+        def __exit__(self, *_: object) -> None: ...
+
+    return Black()
+
+
+@pytest.mark.usefixtures("fresh")
+@pytest.mark.parametrize(
+    ("broken", "said"),
+    [
+        (no_library, "ImportError: libEGL.so.1 not loaded; pip install moderngl"),
+        (no_device, "RuntimeError: requested device index 0, but found 0 devices; pip"),
+        (black, "it draws a red square wrongly"),
+    ],
+)
+def test_auto_falls_back_with_one_warning(
+    broken: Any, said: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setitem(choose.BACKENDS, "opengl", broken)
+    assert seen() != "OpenglRenderer"
+    seen()
+    warnings = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
+    opengl_warnings = [line for line in warnings if "opengl does not work here" in line]
+    assert len(opengl_warnings) == 1
+    assert said in opengl_warnings[0]
+    assert "\n" not in opengl_warnings[0]
+
+
+@pytest.mark.usefixtures("fresh")
+def test_without_moderngl_auto_falls_back(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    for name in [name for name in sys.modules if name.startswith("synfeal.render.opengl")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "moderngl", None)  # makes the import fail
+    assert seen() != "OpenglRenderer"
+    assert "pip install moderngl" in caplog.text
+
+
+@pytest.mark.usefixtures("fresh")
+def test_a_context_that_cannot_be_made_names_the_packages(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(context, "_attempts", lambda: [no_device, no_library])
+    with pytest.raises(InputError, match=r"found 0 devices.*libegl1 libgl1 libgl1-mesa-dri"):
+        context.shared_context.__wrapped__()
+    monkeypatch.setattr(opengl, "shared_context", context.shared_context.__wrapped__)
+    assert seen() != "OpenglRenderer"
+    assert "opengl does not work here" in caplog.text
+    with pytest.raises(InputError, match=r"render\.backend: opengl does not work here: .*libegl1"):
+        seen("opengl")
+
+
+def test_the_next_device_is_tried_when_one_fails() -> None:
+    assert context._first_that_opens([no_device, no_library, lambda: "second device"]) == (
+        "second device"
+    )
+
+
+@pytest.mark.usefixtures("fresh")
+def test_when_nothing_works_all_of_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in choose.BACKENDS:
+        monkeypatch.setitem(choose.BACKENDS, name, no_device)
+    with pytest.raises(InputError) as raised:
+        seen()
+    for name in choose.BACKENDS:
+        assert f"{name}: RuntimeError: requested device" in str(raised.value)
+
+
+DRAW = """
+import logging
+logging.basicConfig(format="%(levelname)s %(message)s")
+from tests.test_render_choose import seen, InputError
+print(seen())
+for name in ("opengl", "pyrender"):
+    try:
+        seen(name)
+    except InputError as error:
+        print(error)
+"""
+
+
+@pytest.mark.parametrize("lacking", ["library", "driver"])
+def test_a_process_without_egl_still_draws(lacking: str, tmp_path: Path) -> None:
+    """Once libEGL cannot be loaded, once it finds no driver."""
+    (tmp_path / "libEGL.so.1").write_bytes(b"no library")
+    places = {
+        "library": {"LD_LIBRARY_PATH": str(tmp_path)},
+        "driver": {"__EGL_VENDOR_LIBRARY_DIRS": str(tmp_path)},
+    }
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", DRAW],
+        env={**os.environ, **places[lacking]},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    name, opengl_error, pyrender_error = done.stdout.splitlines()
+    assert name == "RaycastRenderer"
+    for backend, error in (("opengl", opengl_error), ("pyrender", pyrender_error)):
+        assert f"render.backend: {backend} does not work here" in error
+        assert "libegl1" in error
+        assert f"WARNING render.backend: {backend} does not work here" in done.stderr

@@ -1,0 +1,313 @@
+"""The OpenGL backend: culling, sampling and company in one process never change a pixel."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from synfeal.camera.intrinsics import intrinsics_of
+from synfeal.config.models import CameraConfig
+from synfeal.errors import InputError
+from synfeal.mesh.model import TexturedMesh
+from synfeal.render import choose
+from synfeal.render.opengl import backend as opengl
+from synfeal.render.opengl import part as opengl_part
+from synfeal.render.opengl.backend import OpenglRenderer, clip_from_cam
+from synfeal.render.opengl.chunks import FACES_PER_CHUNK, chunks_of, visible_runs
+from synfeal.render.opengl.context import shared_context
+from synfeal.render.reference import box_means, magnified, reference_images
+from tests.render_backends import (
+    BACKENDS,
+    LOOK_ALONG_X,
+    PYOPENGL_WARNS,
+    camera_of,
+    facing_quad,
+    opener_of,
+)
+from tests.triangle_soup import CAMERA, digest, poses, soup
+
+
+def has_context() -> bool:
+    """Whether this machine has OpenGL at all; asked without drawing, or defects would skip."""
+    try:
+        shared_context()
+    except InputError:
+        return False
+    return True
+
+
+pytestmark = [
+    pytest.mark.filterwarnings(PYOPENGL_WARNS),
+    pytest.mark.skipif(not has_context(), reason="OpenGL does not work here"),
+]
+
+
+def test_where_there_is_a_context_the_backend_works() -> None:
+    assert choose.why_not("opengl") is None
+
+
+def test_chunks_hold_every_triangle_once_with_its_corners_in_order() -> None:
+    part = soup(3000).parts[1]
+    chunks = chunks_of(part.vertices_m, part.faces)
+    found = chunks.vertices[chunks.faces]
+    assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, part.faces.tolist()))
+    corners = part.vertices_m[found].reshape(len(found), -1, 3)
+    for index, start in enumerate(range(0, len(found), FACES_PER_CHUNK)):
+        inside = corners[start : start + FACES_PER_CHUNK]
+        assert (inside >= chunks.lower_m[index]).all()
+        assert (inside <= chunks.upper_m[index]).all()
+
+
+def test_every_triangle_with_a_corner_in_view_is_in_a_visible_run() -> None:
+    part = soup(20_000).parts[0]
+    chunks = chunks_of(part.vertices_m, part.faces)
+    n_drawn = 0
+    for pose in poses(20):
+        clip_from_mesh = clip_from_cam(CAMERA) @ np.linalg.inv(pose)
+        drawn = np.zeros(len(part.faces), bool)
+        for first, count in visible_runs(chunks, clip_from_mesh):
+            drawn[first // 3 : (first + count) // 3] = True
+        corners = part.vertices_m[chunks.vertices[chunks.faces]]
+        clip = np.concatenate([corners, np.ones((*corners.shape[:2], 1))], axis=2)
+        clip = clip @ clip_from_mesh.T
+        in_view = (np.abs(clip[..., :3]) <= clip[..., 3:]).all(axis=2).any(axis=1)
+        assert drawn[in_view].all()
+        n_drawn += drawn.sum()
+    assert n_drawn < 0.75 * 20 * len(part.faces)  # or nothing is culled
+
+
+def test_culling_changes_no_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, views = soup(6000), poses(8)
+    with OpenglRenderer(mesh, CAMERA) as renderer:
+        culled = digest(renderer, views)
+
+        def all_of(chunks: Any, clip_from_mesh: Any) -> list[tuple[int, int]]:
+            return [(0, 3 * len(chunks.faces))]
+
+        monkeypatch.setattr(opengl_part, "visible_runs", all_of)
+        assert digest(renderer, views) == culled
+
+
+def test_images_do_not_depend_on_what_was_drawn_before() -> None:
+    mesh, views = soup(3000), poses(6)
+    with OpenglRenderer(mesh, CAMERA) as renderer:
+        forth = digest(renderer, views)
+        assert digest(renderer, views[::-1])[::-1] == forth
+        with OpenglRenderer(soup(500, seed=5), camera_of(width=100, height=30)) as other:
+            other.render_rgbd(views[0])
+            assert digest(renderer, views) == forth
+        assert digest(renderer, views) == forth
+    with OpenglRenderer(mesh, CAMERA) as renderer:
+        assert digest(renderer, views) == forth
+    assert len(set(forth)) == len(views)
+
+
+DRAW = """
+from synfeal.render.opengl.backend import OpenglRenderer
+from tests.triangle_soup import CAMERA, digest, poses, soup
+with OpenglRenderer(soup(3000), CAMERA) as renderer:
+    print(*digest(renderer, poses(6)))
+"""
+OPEN3D = """
+import open3d
+assert len(open3d.geometry.TriangleMesh.create_box().triangles) == 12
+"""
+
+
+@pytest.mark.parametrize(("code", "threads"), [(OPEN3D + DRAW, "1"), (DRAW + OPEN3D + DRAW, "3")])
+def test_images_are_the_same_in_another_process(code: str, threads: str) -> None:
+    """With other numbers of threads, and Open3D imported before or after."""
+    with OpenglRenderer(soup(3000), CAMERA) as renderer:
+        here = digest(renderer, poses(6))
+    there = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code],
+        env={**os.environ, "LP_NUM_THREADS": threads},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert {tuple(line.split()) for line in there.stdout.splitlines()} == {tuple(here)}
+
+
+@pytest.mark.skipif("pyrender" not in BACKENDS, reason="pyrender does not work here")
+def test_pyrender_and_opengl_live_side_by_side() -> None:
+    mesh, views = soup(500), poses(3)
+    with OpenglRenderer(mesh, CAMERA) as ours:
+        alone = digest(ours, views)
+        with opener_of("pyrender")(mesh, CAMERA) as theirs:
+            first = [theirs.render(view).tobytes() for view in views]
+            for view, image, known in zip(views, first, alone, strict=True):
+                assert digest(ours, [view]) == [known]
+                assert theirs.render(view).tobytes() == image
+            with OpenglRenderer(mesh, CAMERA) as late:
+                assert digest(late, views) == alone
+            assert [theirs.render(view).tobytes() for view in views] == first
+        assert digest(ours, views) == alone
+
+
+def test_any_thread_may_draw() -> None:
+    views = poses(4)
+    with OpenglRenderer(soup(500), CAMERA) as renderer, ThreadPoolExecutor(1) as pool:
+        here = digest(renderer, views)
+        assert pool.submit(digest, renderer, views).result() == here
+        assert digest(renderer, views) == here
+
+
+def test_colours_alone_draw_no_depth(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise AssertionError("depth was drawn")
+
+    monkeypatch.setattr(opengl_part.DevicePart, "draw_depth", fail)
+    with OpenglRenderer(soup(100), CAMERA) as renderer:
+        renderer.render(LOOK_ALONG_X)
+        with pytest.raises(AssertionError, match="depth was drawn"):
+            renderer.render_rgbd(LOOK_ALONG_X)
+
+
+def test_images_belong_to_the_caller() -> None:
+    with OpenglRenderer(soup(500), CAMERA) as renderer:
+        first, depth = renderer.render_rgbd(LOOK_ALONG_X)
+        kept = first.copy()
+        renderer.render(poses(1)[0])
+        np.testing.assert_array_equal(first, kept)
+        for image in (first, depth):
+            assert image.flags.c_contiguous
+            image[:] = 0  # writable
+
+
+def hit_depth_m(mesh: TexturedMesh, camera: CameraConfig) -> NDArray[np.float64]:
+    """Depth (H, W) of the nearest of few triangles through each pixel's centre, in closed form.
+
+    The camera stands at the origin and looks along world x.
+    """
+    fx, fy, cx, cy = intrinsics_of(camera)
+    row, column = np.indices((camera.height, camera.width)) + 0.5
+    rays = np.stack([np.ones_like(row), -(column - cx) / fx, -(row - cy) / fy], axis=-1)
+    depth = np.full(row.shape, np.inf)
+    vertices, faces = mesh.merged()
+    for a, b, c in vertices[faces]:
+        columns = np.stack([a, b, c], axis=1)
+        if abs(np.linalg.det(columns)) < 1e-9:
+            continue  # seen edge-on
+        weights = rays @ np.linalg.inv(columns).T  # of the corners, for a ray of length 1 / depth
+        inside = (weights > 0).all(axis=-1)
+        hit = np.where(inside, 1.0 / weights.sum(axis=-1), np.inf)
+        hit[(hit < camera.near_m) | (hit > camera.far_m)] = np.inf
+        depth = np.minimum(depth, hit)
+    return depth
+
+
+def test_depth_is_that_of_the_nearest_triangle_at_the_pixels_centre() -> None:
+    mesh = soup(2000)
+    with OpenglRenderer(mesh, CAMERA) as renderer:
+        depth = renderer.render_rgbd(LOOK_ALONG_X)[1]
+    expected = hit_depth_m(mesh, CAMERA)
+    same = np.isclose(depth, expected, rtol=1e-5)
+    assert same.mean() > 0.999  # a centre may lie on an edge to within rounding
+    assert np.isfinite(expected).mean() > 0.5
+
+
+def mean_error(images: list[Any], references: list[Any]) -> float:
+    return float(np.mean([np.abs(a - b) for a, b in zip(images, references, strict=True)]))
+
+
+@pytest.mark.skipif("pyrender" not in BACKENDS, reason="pyrender does not work here")
+def test_more_samples_come_closer_to_what_another_backend_draws_in_64() -> None:
+    mesh, views = soup(300), poses(4)
+
+    def pyrender(camera: CameraConfig) -> Any:
+        return opener_of("pyrender")(mesh, camera)
+
+    references = list(reference_images(pyrender, CAMERA, views))
+    errors = []
+    for supersampling in (1, 2, 4):
+        with OpenglRenderer(mesh, CAMERA, supersampling) as renderer:
+            errors.append(mean_error([renderer.render(view) for view in views], references))
+    assert errors[1] < 0.6 * errors[0]
+    assert errors[2] < 0.6 * errors[1]
+    with pyrender(CAMERA) as renderer:
+        assert errors[1] < mean_error([renderer.render(view) for view in views], references)
+
+
+@pytest.mark.parametrize("distance", [0.7, 0.75, 0.8, 0.95, 1.1, 1.4, 2.0])
+def test_fine_checkerboards_are_grey_at_every_distance(distance: float) -> None:
+    """From four texels a pixel on, two a sample, there is nothing to resolve."""
+    checker = np.indices((1024, 1024)).sum(axis=0) % 2 * 255
+    image = np.repeat(checker[..., None], 3, axis=2).astype(np.uint8)
+    mesh = TexturedMesh((facing_quad(distance, 2.0, image),))
+    with OpenglRenderer(mesh, camera_of(width=48, height=48)) as renderer:
+        rgb = renderer.render(LOOK_ALONG_X)
+    np.testing.assert_allclose(rgb.astype(int), 127, atol=4)
+
+
+def test_textures_larger_than_the_device_takes_are_reduced(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    image = np.zeros((300, 100, 3), np.uint8)
+    image[:150] = 200
+    with OpenglRenderer(TexturedMesh((facing_quad(2.0, 0.9, image),)), CAMERA) as renderer:
+        full = renderer.render(LOOK_ALONG_X).astype(int)
+    context = shared_context()
+    monkeypatch.setitem(context.info, "GL_MAX_TEXTURE_SIZE", 150)
+    with OpenglRenderer(TexturedMesh((facing_quad(2.0, 0.9, image),)), CAMERA) as renderer:
+        assert renderer._parts[0]._texture.size == (50, 150)
+        reduced = renderer.render(LOOK_ALONG_X).astype(int)
+    assert np.abs(reduced - full).mean() < 2.0
+
+
+def test_images_beyond_the_devices_limit_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(shared_context().info, "GL_MAX_TEXTURE_SIZE", 128)
+    with pytest.raises(InputError, match=r"camera: 64x48 pixels at 3 .* lower render\.supersamp"):
+        OpenglRenderer(soup(10), camera_of(), supersampling=3)
+
+
+def test_closing_frees_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every object the renderer asked the context for is released by its end."""
+    context = shared_context()
+    made: list[Any] = []
+
+    class Recorder:
+        def __getattr__(self, name: str) -> Any:
+            value = getattr(context, name)
+            if name in ("buffer", "texture", "program", "vertex_array", "renderbuffer") or (
+                "framebuffer" in name or name == "depth_renderbuffer"
+            ):
+                return lambda *args, **kwargs: made.append(value(*args, **kwargs)) or made[-1]
+            return value
+
+        def __enter__(self) -> Any:
+            return context.__enter__()
+
+        def __exit__(self, *error: Any) -> Any:
+            return context.__exit__(*error)
+
+    monkeypatch.setattr(opengl, "shared_context", Recorder)
+    with OpenglRenderer(soup(50), CAMERA) as renderer:
+        renderer.render_rgbd(LOOK_ALONG_X)
+    assert len(made) > 15
+    assert [type(item).__name__ for item in made if "Invalid" not in type(item.mglo).__name__] == []
+
+
+def test_a_magnified_camera_sees_the_same_in_more_pixels() -> None:
+    large = magnified(CAMERA, 4)
+    assert (large.width, large.height) == (256, 192)
+    point = np.array([0.3, -0.2, 1.7])
+    for k, camera in ((1, CAMERA), (4, large)):
+        fx, fy, cx, cy = intrinsics_of(camera)
+        seen = [fx * point[0] / point[2] + cx, fy * point[1] / point[2] + cy]
+        np.testing.assert_allclose(seen, np.multiply(k, [45 * 0.3 / 1.7 + 20.5, 33 - 11 / 1.7]))
+
+
+def test_box_means_are_means_of_blocks() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (6, 9, 3), np.uint8)
+    means = box_means(image, 3)
+    for i, j in np.ndindex(2, 3):
+        block = image[3 * i : 3 * i + 3, 3 * j : 3 * j + 3]
+        np.testing.assert_allclose(means[i, j], block.mean(axis=(0, 1)), rtol=1e-6)

@@ -1,0 +1,253 @@
+"""What rendering costs and is worth: errors in closed form, which variants, files, rows, figure."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.dataset.pose_table import PoseTable, write_pose_table
+from synfeal.errors import InputError
+from synfeal.geometry.rotations import quat_wxyz_from_matrix
+from synfeal.mesh.model import TexturedMesh
+from synfeal.mesh.save import save_glb
+from synfeal.render import choose, speed
+from synfeal.render.speed_table import COLUMNS, Measured, read_speed, write_speed
+from synfeal.report.figures import render_speed
+from synfeal.report.figures.sources import Results
+from synfeal.report.figures.write import write_figures
+from synfeal.report.render_speed import render_rows
+from synfeal.report.speed_vs_error import COLUMNS as TABLE_COLUMNS
+from synfeal.report.tables import write_rows
+from tests.render_backends import BACKENDS, PYOPENGL_WARNS, camera_of
+from tests.report_results import read
+from tests.small_room import furnished_room, room_poses
+
+pytestmark = pytest.mark.filterwarnings(PYOPENGL_WARNS)
+SMALL, LARGE = camera_of(width=48, height=36), camera_of(width=80, height=60)
+SIMPLIFIES = importlib.util.find_spec("meshoptimizer") is not None
+LINE = Measured("opengl", 128, 96, 2, 1.0, 1000, 8.0, 2.0, 35.0, 0.0, 0.0, 1)
+
+
+def room() -> TexturedMesh:
+    """Six painted walls, and a ball that has nearly all of the triangles."""
+    parts = furnished_room((2.0, 8.0)).parts
+    return TexturedMesh((*parts[:6], *(part for part in parts if part.name == "ball")))
+
+
+def sizes(cameras: Sequence[CameraConfig]) -> list[tuple[int, int]]:
+    return [(camera.width, camera.height) for camera in cameras]
+
+
+def test_the_profiles_sizes_and_the_papers_are_measured_smallest_first_and_once() -> None:
+    small, paper = camera_of(width=128, height=96), camera_of(width=640, height=480, far_m=9.0)
+    assert sizes(speed.measured_cameras(small, LARGE, 3)) == [(80, 60), (128, 96), (640, 480)]
+    assert sizes(speed.measured_cameras(small, LARGE, 1)) == [(80, 60)]
+    assert speed.measured_cameras(paper, paper, 3) == [paper]  # the profile's own lens
+    wide = camera_of(width=1025, height=16)
+    assert sizes(speed.measured_cameras(small, wide, 3)) == [(128, 96), (640, 480)]
+
+
+def test_colour_errors_in_closed_form() -> None:
+    expected = np.full((2, 4, 4, 3), 100.0, np.float32)
+    rgb = np.full(expected.shape, 100, np.uint8)
+    rgb[0, :2], rgb[1, :2] = 104, 96  # half the pixels are 4 levels off
+    found = speed.colour_errors(rgb, expected)
+    assert found["mean_abs_error"] == pytest.approx(2.0)
+    assert found["psnr_db"] == pytest.approx(20 * np.log10(255) - 10 * np.log10(8.0), abs=1e-3)
+
+
+def test_depth_errors_look_where_both_hit() -> None:
+    expected = np.array([[1.0, 1.0, 1.0, 1.0, np.inf, 2.0]], np.float32)
+    depth = np.array([[1.001, 0.998, 1.003, 1.05, 1.0, np.inf]], np.float32)
+    found = speed.depth_errors(depth, expected)
+    assert found["depth_error_mm"] == pytest.approx(2.5, abs=1e-3)  # of 1, 2, 3 and 50 mm
+    assert found["depth_off_share"] == 0.25
+
+
+@pytest.fixture(scope="module")
+def lines() -> list[Measured]:
+    render = RenderConfig.model_validate({"backend": BACKENDS[0], "supersampling": 2})
+    return speed.measure_speed(room(), [SMALL, LARGE], room_poses(3, seed=1), render)
+
+
+def drawn_by(lines: list[Measured], camera: CameraConfig, name: str) -> list[Measured]:
+    """The full mesh through one camera by one backend, by number of samples."""
+    full = max(line.faces for line in lines)
+    found = [
+        line
+        for line in lines
+        if (line.backend, line.width, line.faces, line.texture_scale)
+        == (name, camera.width, full, 1.0)
+    ]
+    return sorted(found, key=lambda line: line.supersampling)
+
+
+def test_every_working_backend_is_measured_and_one_variant_is_chosen(lines: list[Measured]) -> None:
+    for camera in (SMALL, LARGE):
+        (used,) = (row for row in lines if row.chosen and row.width == camera.width)
+        assert (used.backend, used.supersampling, used.texture_scale) == (BACKENDS[0], 2, 1.0)
+        for name in BACKENDS:
+            counts = [line.supersampling for line in drawn_by(lines, camera, name)]
+            slow = name == "raycast" and name != BACKENDS[0]
+            assert counts == ([] if slow and camera is LARGE else list(speed.SUPERSAMPLING[name]))
+
+
+def test_more_samples_are_closer_and_backends_agree(lines: list[Measured]) -> None:
+    for name in BACKENDS:
+        found = drawn_by(lines, SMALL, name)
+        errors = [line.mean_abs_error for line in found]
+        assert errors == sorted(errors, reverse=True)
+        assert [line.psnr_db for line in found] == sorted(line.psnr_db for line in found)
+        own = drawn_by(lines, SMALL, BACKENDS[0])
+        for line, other in zip(found, own, strict=False):
+            assert line.mean_abs_error == pytest.approx(other.mean_abs_error, rel=0.2)
+            assert line.depth_error_mm < 0.1
+    assert all(line.ms_per_frame > 0 for line in lines)
+
+
+def test_less_detail_is_further_off(lines: list[Measured]) -> None:
+    for camera in (SMALL, LARGE):
+        used, *others = [line for line in lines if line.width == camera.width]
+        textures = [line for line in others if line.texture_scale < 1.0]
+        assert [line.texture_scale for line in textures] == [0.5, 0.25]
+        assert textures[1].mean_abs_error > textures[0].mean_abs_error
+        assert textures[1].mean_abs_error > used.mean_abs_error
+        assert textures[1].depth_error_mm == used.depth_error_mm
+        fewer = [line for line in others if line.faces < used.faces]
+        assert len(fewer) == (2 if SIMPLIFIES else 0)
+        for line, share in zip(fewer, (0.5, 0.25), strict=False):
+            assert line.faces == pytest.approx(share * used.faces, rel=0.1)
+
+
+def test_without_the_simplifier_the_rest_is_measured_and_it_says_so(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    mesh = room()
+    found = speed.less_detailed(speed.Variant(mesh, RenderConfig()))
+    assert [variant.texture_scale for variant in found] == [0.5, 0.25]
+    assert "pip install meshoptimizer" in caplog.text
+
+
+def test_speeds_are_told_in_turns_with_the_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine that grows slower while it measures changes no ratio."""
+
+    class Drawing:
+        def __init__(self, cost: float) -> None:
+            self.cost = cost
+
+        def render(self, _: object) -> None:
+            nonlocal now, load
+            load *= 1.0001
+            now += self.cost * load
+
+    now, load = 0.0, 1.0
+    monkeypatch.setattr(speed.time, "perf_counter", lambda: now)
+    seconds = speed.seconds_of([Drawing(1.0), Drawing(3.0)], np.zeros((5, 4, 4)))  # type: ignore[list-item]
+    assert seconds.shape == (5 * speed.ROUNDS, 2)
+    np.testing.assert_allclose(seconds[:, 1] / seconds[:, 0], 3.0, rtol=1e-3)
+
+
+def test_a_scene_is_measured_from_its_files(tmp_path: Path) -> None:
+    save_glb(tmp_path / "mesh.glb", room())
+    poses = room_poses(4, seed=2)
+    index = np.arange(len(poses))
+    plan = PoseTable(index, index, poses[:, :3, 3], quat_wxyz_from_matrix(poses[:, :3, :3]))
+    write_pose_table(tmp_path / "test.csv", plan)
+    out = tmp_path / "render_speed.csv"
+    speed.write_render_speed(
+        tmp_path / "mesh.glb", tmp_path / "test.csv", [SMALL], 2, RenderConfig(), out
+    )
+    found = read_speed(out)
+    assert found[0].backend == choose.fastest_working()
+    assert [line.chosen for line in found] == [1] + [0] * (len(found) - 1)
+    write_speed(tmp_path / "again.csv", found)
+    assert (tmp_path / "again.csv").read_bytes() == out.read_bytes()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        None,
+        "a,b\n1,2\n",
+        ",".join(COLUMNS) + "\nopengl,wide,96,2,1.0,9,1,1,1,0,0,1\n",
+        ",".join(COLUMNS) + "\nopengl,128\n",
+    ],
+)
+def test_a_file_that_is_no_measurement_is_named_in_one_line(
+    tmp_path: Path, text: str | None
+) -> None:
+    path = tmp_path / "scenes" / "large_room" / "render_speed.csv"
+    if text is not None:
+        path.parent.mkdir(parents=True)
+        path.write_text(text)
+    with pytest.raises(InputError, match=r"large_room/render_speed\.csv") as refusal:
+        render_rows(tmp_path, "large_room")
+    assert "\n" not in str(refusal.value)
+
+
+MADE_UP = [
+    LINE,
+    replace(LINE, supersampling=1, ms_per_frame=4.0, mean_abs_error=5.0, chosen=0),
+    replace(LINE, backend="raycast", ms_per_frame=32.0, chosen=0),
+    replace(LINE, texture_scale=0.25, ms_per_frame=7.0, mean_abs_error=3.0, chosen=0),
+    replace(LINE, faces=250, ms_per_frame=6.0, mean_abs_error=2.5, depth_error_mm=0.5, chosen=0),
+    replace(LINE, width=640, height=480, ms_per_frame=40.0, mean_abs_error=0.5),
+]
+
+
+@pytest.fixture
+def made_up(tmp_path: Path) -> Path:
+    write_speed(tmp_path / "scenes" / "large_room" / "render_speed.csv", MADE_UP)
+    rows = render_rows(tmp_path, "large_room")
+    write_rows(tmp_path / "tables" / "speed_vs_error.csv", TABLE_COLUMNS, rows)
+    return tmp_path
+
+
+def test_rows_say_what_each_variant_is(made_up: Path) -> None:
+    rows = read(made_up / "tables" / "speed_vs_error.csv")
+    assert [row["variant"] for row in rows] == [
+        "128x96, opengl 2x2",
+        "128x96, opengl 1x1",
+        "128x96, raycast 2x2",
+        "128x96, opengl 2x2, textures 1/4",
+        "128x96, opengl 2x2, 25% of faces",
+        "640x480, opengl 2x2",
+    ]
+    assert {(row["stage"], row["scene"]) for row in rows} == {("render", "large_room")}
+    assert [float(row["seconds_per_item"]) for row in rows[:3]] == [0.008, 0.004, 0.032]
+    assert [float(row["items_per_s"]) for row in rows[:3]] == [125.0, 250.0, 31.25]
+    assert [float(row["error"]) for row in rows[:2]] == [2.0, 5.0]
+    assert rows[4]["depth_error_mm"] == "0.5"
+    assert [row["chosen"] for row in rows] == ["1", "0", "0", "0", "0", "1"]
+
+
+def test_the_figure_has_a_panel_per_size_with_the_choice_ringed(made_up: Path) -> None:
+    figure = render_speed.draw(Results(made_up, (), 1))
+    assert figure is not None
+    small, large = figure.axes
+    assert (small.get_xscale(), small.get_yscale()) == ("log", "log")
+    assert small.get_title() == "Large Room, 128 × 96"
+    assert large.get_title() == "Large Room, 640 × 480"
+    for axes, point in ((small, (8.0, 2.0)), (large, (40.0, 0.5))):
+        (ring,) = (line for line in axes.lines if line.get_markersize() > 10)
+        np.testing.assert_allclose(ring.get_xydata(), [point])
+    curves = {line.get_color(): line for line in small.lines if line.get_linestyle() != "None"}
+    opengl, textures = curves[render_speed.COLOURS["opengl"]], curves[render_speed.ORANGE]
+    np.testing.assert_allclose(opengl.get_xydata(), [[4.0, 5.0], [8.0, 2.0]])
+    np.testing.assert_allclose(textures.get_xydata(), [[8.0, 2.0], [7.0, 3.0]])
+    assert {text.get_text() for text in small.texts} == {"1/4", "25%"}
+
+
+def test_the_figure_is_written_under_its_name(made_up: Path) -> None:
+    write_figures(Results(made_up, (), 1), made_up / "figures")
+    assert {path.name for path in (made_up / "figures").iterdir()} == {
+        "speed_vs_error_render.png",
+        "speed_vs_error_render.svg",
+    }

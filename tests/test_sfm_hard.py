@@ -1,0 +1,243 @@
+"""Batches that structure from motion finds hard: each ends with a stated result, in bounded time.
+
+Frames are ray-cast in closed form (``benchmarks/sfm_settings/painted_room.py``).
+"""
+
+import itertools
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from baselines.groundtruth.chain import fill_gaps
+from baselines.groundtruth.sfm import mapping, sfm_batch
+from benchmarks.sfm_settings.painted_room import PaintedRoom, painted_room, random_texture
+from synfeal.camera.intrinsics import intrinsics_of
+from synfeal.config.models import CameraConfig, SfmConfig
+from synfeal.errors import InputError
+from synfeal.geometry.poses import pose_error, pose_matrix, relative
+from synfeal.geometry.rotations import rotation_from_rpy
+
+CAMERA = CameraConfig(width=160, height=120, horizontal_fov_deg=70.0)
+CFG = SfmConfig(max_features=300, overlap=3)
+ROOM = painted_room(np.random.default_rng(0))
+
+
+def poses_at(position_m, yaw_deg):
+    """World poses of a camera at positions (n, 3) that looks along yaw (n,), slightly down."""
+    yaw = np.radians(np.broadcast_to(yaw_deg, len(position_m)))
+    rpy = np.column_stack([0 * yaw, 0 * yaw + 0.1, yaw])
+    return pose_matrix(rotation_from_rpy(rpy), np.asarray(position_m, float))
+
+
+def sideways(n_frames, step_m=0.1, turn_deg=0.0):
+    """Poses that move along y before the wall x = 5 m."""
+    centre = np.arange(n_frames) - (n_frames - 1) / 2
+    position_m = np.column_stack([2.2 + 0.02 * centre, 3 + step_m * centre, 1.5 + 0.01 * centre])
+    return poses_at(position_m, turn_deg * centre)
+
+
+def write(folder, poses, room=ROOM, camera=CAMERA):
+    """Images of a room from poses."""
+    paths = [folder / f"frame-{k:06d}.color.png" for k in range(len(poses))]
+    for path, pose in zip(paths, poses, strict=True):
+        Image.fromarray(room.render(pose, camera)).save(path)
+    return paths
+
+
+def estimate(folder, poses, room=ROOM, camera=CAMERA, told=None, cfg=CFG):
+    """What structure from motion makes of a room; ``told`` is the camera it is told."""
+    paths = write(folder, poses, room, camera)
+    return sfm_batch(paths, told or camera, poses, cfg, 0, folder)
+
+
+def errors(result, poses):
+    """Position (m) and orientation (degrees) errors of all frames, gaps filled."""
+    found = fill_gaps(result.trajectory)
+    position_m, orientation_rad = pose_error(found, relative(poses[0], poses))
+    return position_m, np.degrees(orientation_rad)
+
+
+def test_texture_rich_room_is_exact_to_5_mm_and_a_tenth_of_a_degree(tmp_path):
+    poses = sideways(7, turn_deg=2.0)
+    result = estimate(tmp_path, poses)
+    position_m, orientation_deg = errors(result, poses)
+    assert result.trajectory.registered.all()
+    assert (result.facts.models, result.facts.starts) == (1, 1)
+    assert np.median(position_m) < 0.005
+    assert np.median(orientation_deg) < 0.1
+
+
+@pytest.mark.parametrize("grey", [0, 255])
+def test_frames_without_texture_are_lost(tmp_path, grey):
+    poses = sideways(20)
+    Image.new("RGB", (CAMERA.width, CAMERA.height), (grey,) * 3).save(tmp_path / "wall.png")
+    result = sfm_batch([tmp_path / "wall.png"] * 20, CAMERA, poses, CFG, 0, tmp_path)
+    assert not result.trajectory.registered.any()
+    assert (result.facts.models, result.facts.starts, result.facts.points) == (0, 0, 0)
+
+
+def test_a_white_wall_in_between_loses_its_frames_and_the_smaller_part(tmp_path):
+    poses = sideways(13)
+    paths = write(tmp_path, poses)
+    for path in paths[7:10]:
+        Image.new("RGB", (CAMERA.width, CAMERA.height), (255,) * 3).save(path)
+    linear = CFG.model_copy(update={"quadratic_overlap": False})
+    result = sfm_batch(paths, CAMERA, poses, linear, 0, tmp_path)
+    np.testing.assert_array_equal(np.flatnonzero(result.trajectory.registered), np.arange(7))
+    assert errors(result, poses)[0][:7].max() < 0.02
+
+
+def test_no_motion_has_no_scale_and_is_lost(tmp_path):
+    poses = np.repeat(sideways(1), 3, axis=0)
+    assert not estimate(tmp_path, poses).trajectory.registered.any()
+
+
+def test_pure_rotation_has_no_scale_and_is_lost(tmp_path):
+    poses = poses_at(np.tile([2.2, 3.0, 1.5], (4, 1)), 4.0 * np.arange(4))
+    assert not estimate(tmp_path, poses).trajectory.registered.any()
+
+
+def before_a_corner(n_frames):
+    """Poses that look into a corner of the room and move across."""
+    step = 0.25 * np.arange(n_frames)[:, None]
+    return poses_at([2.6, 3.4, 1.5] + step * [-0.6, 0.8, 0.05], 45.0)
+
+
+def test_three_frames_are_found(tmp_path):
+    poses = before_a_corner(3)
+    result = estimate(tmp_path, poses)
+    position_m, orientation_deg = errors(result, poses)
+    assert result.trajectory.registered.all()
+    assert position_m.max() < 0.03
+    assert orientation_deg.max() < 0.5
+
+
+def test_two_frames_are_lost_because_points_must_be_seen_three_times(tmp_path):
+    assert not estimate(tmp_path, before_a_corner(2)).trajectory.registered.any()
+
+
+def test_one_frame_is_lost(tmp_path):
+    assert not estimate(tmp_path, sideways(1)).trajectory.registered.any()
+
+
+def test_a_turn_of_90_degrees_in_5_frames_loses_one_side_and_the_other_is_right(tmp_path):
+    turn_deg = np.concatenate([np.zeros(3), np.linspace(0, 90, 6), np.full(3, 90.0)])
+    poses = poses_at([1.2, 2.0, 1.5] + np.arange(12)[:, None] * [0.08, 0.05, 0.0], turn_deg)
+    result = estimate(tmp_path, poses)
+    found = np.flatnonzero(result.trajectory.registered)
+    assert len(found) >= 5
+    np.testing.assert_array_equal(found, np.arange(found[0], found[-1] + 1))
+    true = relative(poses[0], poses)[found]
+    position_m, _ = pose_error(result.trajectory.first_from_cam[found], true)
+    assert position_m.max() < 0.05
+
+
+def test_walls_that_look_alike_are_not_confused_because_only_neighbours_are_matched(tmp_path):
+    room = PaintedRoom((random_texture(np.random.default_rng(1)),) * 6)
+    poses = poses_at([2.2, 2.6, 1.5] + np.arange(8)[:, None] * [0.0, 0.1, 0.01], 5.0 * np.arange(8))
+    result = estimate(tmp_path, poses, room)
+    assert result.trajectory.registered.all()
+    assert errors(result, poses)[0].max() < 0.03
+
+
+def test_a_pattern_that_repeats_within_a_view_misleads_and_the_mapper_starts_again(tmp_path):
+    tile = random_texture(np.random.default_rng(1))[:100, :100]
+    room = PaintedRoom((np.tile(tile, (7, 7)),) * 6)
+    poses = sideways(7, turn_deg=2.0)
+    result = estimate(tmp_path, poses, room)
+    assert np.isfinite(result.trajectory.first_from_cam).all()
+    assert result.facts.explained < CFG.min_explained
+    assert result.facts.starts == 4
+
+
+def test_principal_point_off_the_centre_is_as_good_when_it_is_known(tmp_path):
+    poses = sideways(7, turn_deg=2.0)
+    result = estimate(tmp_path, poses, camera=shifted(20))
+    assert np.median(errors(result, poses)[0]) < 0.005
+
+
+def test_principal_point_wrong_by_20_px_is_not_noticed_but_bends_the_path(tmp_path):
+    poses = sideways(7, turn_deg=2.0)
+    result = estimate(tmp_path, poses, told=shifted(20))
+    position_m, _ = errors(result, poses)
+    assert result.trajectory.registered.any()
+    assert np.median(position_m) > 0.005
+
+
+def shifted(px):
+    """The camera with its principal point moved to the right."""
+    fx, fy, cx, cy = intrinsics_of(CAMERA)
+    return CAMERA.model_copy(update={"fx": fx, "fy": fy, "cx": cx + px, "cy": cy})
+
+
+def test_damaged_image_is_named(tmp_path):
+    poses = sideways(3)
+    paths = write(tmp_path, poses)
+    paths[1].write_bytes(paths[1].read_bytes()[:500])
+    with pytest.raises(InputError, match=r"frame-000001\.color\.png: cannot be read as an image"):
+        sfm_batch(paths, CAMERA, poses, CFG, 0, tmp_path)
+
+
+def test_image_of_another_size_is_named(tmp_path):
+    poses = sideways(3)
+    paths = write(tmp_path, poses)
+    told = CAMERA.model_copy(update={"width": 320, "height": 240})
+    with pytest.raises(InputError, match=r"000000\.color\.png: is 160x120, the camera has 320x240"):
+        sfm_batch(paths, told, poses, CFG, 0, tmp_path)
+
+
+def test_a_model_that_explains_enough_is_taken_at_once_else_four_starts_are_compared(tmp_path):
+    poses = sideways(4)
+    paths = write(tmp_path, poses)
+    by_share = {
+        share: sfm_batch(
+            paths, CAMERA, poses, CFG.model_copy(update={"min_explained": share}), 0, tmp_path
+        ).facts
+        for share in (0.0, 1.0)
+    }
+    assert (by_share[0.0].starts, by_share[1.0].starts) == (1, 4)
+    assert by_share[1.0].explained >= by_share[0.0].explained > 0.5
+
+
+def test_mapping_ends_when_its_time_is_over(tmp_path, monkeypatch, caplog):
+    clock = itertools.count(0, 3600)
+    monkeypatch.setattr(mapping.time, "monotonic", lambda: float(next(clock)))
+    result = estimate(tmp_path, sideways(3))
+    assert not result.trajectory.registered.any()
+    assert "mapping stopped after max_mapping_s" in caplog.text
+
+
+def test_labels_are_the_same_bytes_whatever_threads_are_allowed(tmp_path):
+    poses = sideways(5, turn_deg=2.0)
+    np.save(tmp_path / "poses.npy", poses)
+    write(tmp_path, poses)
+    found = []
+    for threads in ("1", "4"):
+        environment = os.environ | {"OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": threads}
+        command = [sys.executable, "-c", LABELS, str(tmp_path), CFG.model_dump_json()]
+        subprocess.run(command, env=environment, check=True)
+        found.append([path.read_bytes() for path in sorted(tmp_path.glob("*.csv"))])
+    assert found[0] == found[1]
+    assert len(found[0]) == 2
+    assert all(b",1," in labels for labels in found[0])
+
+
+LABELS = """
+import sys
+from pathlib import Path
+import numpy as np
+from baselines.groundtruth.sfm import sfm_batch
+from baselines.groundtruth.trajectory import write_trajectory
+from synfeal.config.models import CameraConfig, SfmConfig
+folder, cfg = Path(sys.argv[1]), SfmConfig.model_validate_json(sys.argv[2])
+camera = CameraConfig(width=160, height=120, horizontal_fov_deg=70.0)
+paths, poses = sorted(folder.glob("*.png")), np.load(folder / "poses.npy")
+for mapper in ("incremental", "global"):
+    told = cfg.model_copy(update={"mapper": mapper})
+    result = sfm_batch(paths, camera, poses, told, 7, folder)
+    write_trajectory(folder / f"{mapper}.csv", result.trajectory)
+"""

@@ -1,0 +1,232 @@
+"""``synfeal validate`` passes a data set in closed form and finds every error put into it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from synfeal.cli import main
+from tests import damaged_sets
+from tests.damaged_sets import (
+    FILES,
+    HIDDEN_ERRORS,
+    copy_of_first_frames,
+    damages,
+    frame_files,
+    without_manifest_hashes,
+    write_planar_set,
+)
+
+# What each error must be found by; other checks may fail too.
+FOUND_BY = {
+    "pose_of_the_neighbour": "depth",
+    "poses_shifted_by_one": "depth",
+    "transposed_rotations": "depth",
+    "half_pixel": "camera",
+    "depth_of_tum": "depth",
+    "depth_in_centimetres": "depth",
+    "depth_in_metres": "pairs",
+    "depth_along_the_ray": "depth",
+    "swapped_colours": "colours",
+    "swapped_depths": "depth",
+}
+
+
+@pytest.fixture(scope="module")
+def planar(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("planar") / "set"
+    write_planar_set(folder)
+    return folder
+
+
+@pytest.fixture
+def damaged(planar: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(planar, tmp_path / "set"))
+
+
+def errors(capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """The ``error:`` lines; nothing else may be on stderr but progress bars."""
+    text = capsys.readouterr().err
+    assert "Traceback" not in text
+    return [line[7:] for line in text.replace("\r", "\n").splitlines() if line[:7] == "error: "]
+
+
+def check_fails(folder: Path, capsys: pytest.CaptureFixture[str], *words: str) -> None:
+    """Exit status 1 and an error line with all of the words."""
+    assert main(["validate", str(folder)]) == 1
+    lines = errors(capsys)
+    assert any(all(word in line for word in words) for line in lines), lines
+
+
+def test_a_sound_data_set_passes(planar: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validate", str(planar)]) == 0
+    captured = capsys.readouterr()
+    verdicts = [line.split()[1] for line in captured.out.splitlines()[1:]]
+    assert verdicts == ["ok"] * 13, captured.out
+    assert "error" not in captured.err
+
+
+@pytest.mark.parametrize("error", HIDDEN_ERRORS, ids=lambda error: str(error.__name__))
+def test_geometry_alone_finds(
+    error: Callable[[Path], None], damaged: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    without_manifest_hashes(damaged)
+    error(damaged)
+    check_fails(damaged, capsys, f"{FOUND_BY[error.__name__]}: ")
+
+
+@pytest.mark.parametrize(
+    "error", [damaged_sets.swapped_colours, damaged_sets.pose_of_the_neighbour]
+)
+def test_one_wrong_frame_is_named(
+    error: Callable[[Path], None], damaged: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    without_manifest_hashes(damaged)
+    error(damaged)
+    assert main(["validate", str(damaged)]) == 1
+    named = [line for line in errors(capsys) if line.startswith("colours: ")]
+    assert "frame-000012" in named[0] or "frame-000013" in named[0]
+
+
+def test_the_manifest_and_the_tables_find_a_changed_pose(
+    damaged: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    damaged_sets.pose_of_the_neighbour(damaged)
+    assert main(["validate", str(damaged)]) == 1
+    found = {line.split(": ")[0]: line for line in errors(capsys)}
+    assert "seq-01: differs from what was written" in found["manifest"]
+    assert "seq-01/frame-000012.pose.txt: differs from train.csv" in found["tables"]
+
+
+def write_rows(path: Path, change: Callable[[np.ndarray], None]) -> None:
+    pose = np.loadtxt(path)
+    change(pose)
+    np.savetxt(path, pose, fmt="%.10e")
+
+
+def mirror(pose: np.ndarray) -> None:
+    pose[:3, 0] *= -1
+
+
+def stretch(pose: np.ndarray) -> None:
+    pose[:3, :3] *= 1 + 1e-5
+
+
+def slant(pose: np.ndarray) -> None:
+    pose[3, 0] = 0.1
+
+
+@pytest.mark.parametrize("change", [mirror, stretch, slant])
+def test_poses_that_are_not_rigid(
+    change: Callable[[np.ndarray], None], damaged: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = frame_files(damaged, "pose.txt")[5]
+    write_rows(path, change)
+    check_fails(damaged, capsys, f"poses: {path}: no rigid pose")
+
+
+def test_a_test_frame_from_the_training_set(
+    damaged: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copied = frame_files(damaged, "pose.txt", "seq-02")[3]
+    shutil.copy(frame_files(damaged, "pose.txt")[7], copied)
+    check_fails(damaged, capsys, f"overlap: {copied}", "frame-000007")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("sequence1\nsequence2\n", ("seq-02: is listed 2 times",)),
+        ("", ("seq-01: is listed 0 times",)),
+        ("sequence1\nsequence7\n", ("TrainSplit.txt: lists seq-07",)),
+        ("one\n", ("'one' names no sequence",)),
+    ],
+)
+def test_splits(
+    text: str, words: tuple[str, ...], damaged: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (damaged / "TrainSplit.txt").write_text(text)
+    check_fails(damaged, capsys, "splits: ", *words)
+
+
+def test_the_manifest_must_count_the_frames(
+    damaged: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = damaged / "manifest.json"
+    manifest = json.loads(path.read_text())
+    manifest["frames"]["train"] = 23
+    path.write_text(json.dumps(manifest))
+    check_fails(damaged, capsys, "manifest: ", "frames: train must be 24")
+
+
+def test_an_image_of_another_size(damaged: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = frame_files(damaged, "color.png")[0]
+    Image.new("RGB", (80, 60)).save(path)
+    check_fails(damaged, capsys, f"images: {path}: is 80 x 60, must be 96 x 72")
+
+
+def test_without_a_manifest_geometry_is_reported_and_not_judged(
+    damaged: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (damaged / "manifest.json").unlink()
+    assert main(["validate", str(damaged)]) == 0
+    lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()[1:]}
+    assert "not checked" in lines["manifest"]
+    assert "not checked" in lines["depth"]
+    assert "ok" in lines["images"]
+
+
+def test_a_calibration_file_stands_in_for_the_manifest(
+    damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (damaged / "manifest.json").unlink()
+    focal = 48 / np.tan(np.radians(30))
+    for shift, status in ((0.0, 0), (0.5, 1)):
+        camera = tmp_path / "cameras.txt"
+        camera.write_text(f"1 PINHOLE 96 72 {focal} {focal} {48 + shift} {36 + shift}\n")
+        assert main(["validate", str(damaged), "--camera", str(camera)]) == status
+    assert any(line.startswith("camera: ") for line in errors(capsys))
+
+
+def test_without_depth_frames_are_not_compared(
+    damaged: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    without_manifest_hashes(damaged)
+    (damaged / "manifest.json").unlink()
+    for path in damaged.glob("seq-*/*.depth.png"):
+        path.unlink()
+    assert main(["validate", str(damaged)]) == 0
+    assert "no depth images" in capsys.readouterr().out
+
+
+@pytest.fixture(scope="module")
+def small(planar: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return copy_of_first_frames(planar, tmp_path_factory.mktemp("small") / "set")
+
+
+@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize("damage", damages())
+def test_any_damage_ends_in_error_lines(
+    file: str, damage: str, small: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = Path(shutil.copytree(small, tmp_path / "set"))
+    damages()[damage](folder / file)
+    assert main(["validate", str(folder)]) == 1
+    assert errors(capsys)
+
+
+@pytest.mark.parametrize("what", ["nothing", "a file", "an empty directory"])
+def test_no_data_set(what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "set"
+    if what == "a file":
+        path.write_text("")
+    elif what == "an empty directory":
+        path.mkdir()
+    assert main(["validate", str(path)]) == 1
+    assert len(errors(capsys)) == 1
