@@ -183,10 +183,10 @@ def test_the_design_is_the_papers(name):
         "table4_size": 8,
         "table5_from_scratch": 4,
     }
-    assert sum(rows.values()) == 28
+    assert sum(rows.values()) == 29
     runs = runs_of(experiments, 1)
-    assert len(runs) == len({run.directory for run in runs}) == 120
-    assert len(runs_of(experiments, 3)) == 360
+    assert len(runs) == len({run.directory for run in runs}) == 125
+    assert len(runs_of(experiments, 3)) == 375
     assert "large_room/6k/noise-p0.1-r5/pretrained/posenet/seed0" in {r.directory for r in runs}
     noise = {
         (row.noise_m, row.noise_deg)

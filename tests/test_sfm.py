@@ -8,7 +8,7 @@ from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error, pose_from_quat, relative
 from tests.planar_scene import CAMERA, straight_path, write_frames
 
-CFG = SfmConfig(max_features=400)
+CFG = SfmConfig(max_features=400, peak_threshold=0.002)
 
 
 @pytest.fixture(scope="module")

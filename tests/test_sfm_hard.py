@@ -22,7 +22,7 @@ from synfeal.geometry.poses import pose_error, pose_matrix, relative
 from synfeal.geometry.rotations import rotation_from_rpy
 
 CAMERA = CameraConfig(width=160, height=120, horizontal_fov_deg=70.0)
-CFG = SfmConfig(max_features=300, overlap=3)
+CFG = SfmConfig(max_features=300, peak_threshold=0.002, overlap=3)
 ROOM = painted_room(np.random.default_rng(0))
 
 

@@ -73,6 +73,8 @@ def _panel(axes: Axes, rows: Sequence[Row]) -> None:
     )
     axes.set_xlim(0, 1.1 * max(row["seconds"] for row in rows))
     axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter("{x:g}")
+    axes.tick_params(axis="y", which="minor", labelsize=6)
     axes.grid(color="0.92", which="both")
 
 

@@ -14,8 +14,8 @@ from synfeal.config.models import SfmConfig
 
 CHOSEN = "chosen"
 
-# For images of 320x240, as the default profile has them.
-_CHOSEN = SfmConfig(max_features=600)
+# As config/config.yaml has them for 320x240 and frames 25 cm apart.
+_CHOSEN = SfmConfig(max_features=600, peak_threshold=0.002)
 
 COLMAP_PEAK_THRESHOLD = 0.02 / 3
 

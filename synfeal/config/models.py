@@ -60,7 +60,7 @@ class SfmConfig(Strict):
 
     max_features: Count = Field(2000, description="SIFT features per image")
     peak_threshold: Positive = Field(
-        0.002, description="SIFT features: least contrast, on a scale where white is 1"
+        0.0067, description="SIFT features: least contrast, on a scale where white is 1"
     )
     overlap: Count = Field(
         5, description="sequential matching: images further on that each image is matched with"

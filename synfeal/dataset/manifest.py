@@ -18,7 +18,7 @@ from synfeal.files import read_json, write_json
 
 MANIFEST = "manifest.json"
 NAME = re.compile(r"seq-[0-9]{2,9}")
-LIBRARIES = ("isal", "numpy", "pillow", "pyrender", "trimesh")
+LIBRARIES = ("deflate", "numpy", "pillow", "pyrender", "trimesh")
 
 
 def write_manifest(
