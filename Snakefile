@@ -39,6 +39,7 @@ rule all:
         f"{ROOT}/tables/speed_vs_error.csv",
         f"{ROOT}/tables/hard_cases.csv",
         f"{ROOT}/figures",
+        coverages(),
         manifests("groundtruth"),
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from pydantic import ValidationError
 
@@ -13,6 +14,7 @@ from synfeal.cli.options import MESH_OPTIONS, Command, Options, scene_values
 from synfeal.config.load import describe
 from synfeal.config.models import CameraConfig, CollectionConfig, RenderConfig, SceneConfig
 from synfeal.errors import InputError
+from synfeal.files import read_json
 
 BACKENDS = get_args(RenderConfig.model_fields["backend"].annotation)
 MODES = get_args(CollectionConfig.model_fields["mode"].annotation)
@@ -75,6 +77,21 @@ def run(arguments: argparse.Namespace) -> None:
     collect(job, arguments.workers, shard)
     frames = f"{job.n_train} training and {job.n_test} test frames"
     print(f"{arguments.out}: {f'shard {arguments.shard} of ' if shard else ''}{frames}")
+    if arguments.out.is_dir():
+        print(coverage_text(read_json(arguments.out / "coverage.json")["train"]))
+
+
+def coverage_text(coverage: Mapping[str, Any]) -> str:
+    """What the training frames cover, in a line, from ``coverage.json``."""
+    space, surface = coverage["free_space"], coverage["surface"]
+    if space["positions_share"] is None:
+        return "coverage: no free space found in the sampling box"
+    return (
+        f"coverage: {space['positions_share']:.0%} of the free space,"
+        f" {space['headings_share']:.0%} of its headings;"
+        f" {surface['seen_share']:.0%} of the visible surface,"
+        f" {surface['seen_often_share']:.0%} three times or more"
+    )
 
 
 def collect_configs(

@@ -9,7 +9,7 @@ a plane, so it is interpolated there and exact; elsewhere the nearest pixel's is
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ _BAND = 64  # rows of the image that are mapped at a time
 _BENT = 0.01
 
 
-class DistortedRenderer:
+class DistortedRenderer(Renderer):
     """Implements :class:`synfeal.render.base.Renderer` around one without distortion."""
 
     def __init__(self, open_pinhole: Callable[[CameraConfig], Renderer], camera: CameraConfig):
@@ -56,12 +56,6 @@ class DistortedRenderer:
     def close(self) -> None:
         """Close the inner renderer."""
         self._inner.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _resampled(self, rgb: Rgb) -> Rgb:
         mean = self._colour @ rgb.reshape(-1, 3).astype(np.float32)

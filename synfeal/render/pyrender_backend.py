@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Iterator
-from dataclasses import replace
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +18,10 @@ from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.render.base import Depth, Rgb
+from synfeal.render.base import Depth, Renderer, Rgb
 from synfeal.render.cutouts import thresholded
+from synfeal.render.pieces import pieces
 
-# Mesa's software renderer silently draws nonsense from a buffer of 2^24 vertices on.
-MOST_VERTICES = 1 << 23
 SUPERSAMPLING = 2
 # OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
 CAM_FROM_GL: NDArray[np.float64] = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -85,7 +82,7 @@ def _configure_context() -> None:
     GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
 
 
-class PyrenderRenderer:
+class PyrenderRenderer(Renderer):
     """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
 
     def __init__(
@@ -146,12 +143,6 @@ class PyrenderRenderer:
         self._context.colour.forget(self._scene)
         self._scene.clear()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
 
 def mean_of_samples(samples: NDArray[np.uint8], factor: int) -> Rgb:
     """The image (H, W, 3) whose pixels are means of ``factor`` x ``factor`` samples."""
@@ -160,23 +151,6 @@ def mean_of_samples(samples: NDArray[np.uint8], factor: int) -> Rgb:
         for column in range(factor):
             total += samples[row::factor, column::factor]
     return ((total + factor**2 // 2) // factor**2).astype(np.uint8)
-
-
-def pieces(part: MeshPart, most_vertices: int = MOST_VERTICES) -> Iterator[MeshPart]:
-    """The part in pieces of at most ``most_vertices``, each with the vertices of its own faces."""
-    if len(part.vertices_m) <= most_vertices:
-        yield part
-        return
-    step = max(1, most_vertices // 3)
-    for start in range(0, len(part.faces), step):
-        used, faces = np.unique(part.faces[start : start + step], return_inverse=True)
-        yield replace(
-            part,
-            vertices_m=part.vertices_m[used],
-            faces=faces.reshape(-1, 3),
-            uv=None if part.uv is None else part.uv[used],
-            vertex_rgb=None if part.vertex_rgb is None else part.vertex_rgb[used],
-        )
 
 
 def _primitive(part: MeshPart, centre_m: NDArray[np.float64]) -> Any:

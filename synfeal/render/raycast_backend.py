@@ -7,7 +7,7 @@ the other backends, so the images are the same up to rounding; depth is exact.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.mesh.model import TexturedMesh
-from synfeal.render.base import Depth, Rgb
+from synfeal.render.base import Depth, Renderer, Rgb
 from synfeal.render.raycast.triangles import Floats, Points, TexturedTriangles, View
 
 SUPERSAMPLING = 2
 RAYS_AT_ONCE = 1 << 15  # 30 MB
 
 
-class RaycastRenderer:
+class RaycastRenderer(Renderer):
     """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
 
     def __init__(
@@ -56,12 +56,6 @@ class RaycastRenderer:
     def close(self) -> None:
         """Drop triangles and textures."""
         del self._triangles
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _view(self, pose: Floats, sample_size: float) -> View:
         fx, fy, _, _ = self._intrinsics

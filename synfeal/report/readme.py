@@ -16,6 +16,7 @@ from pathlib import Path
 from synfeal.config import MODELS
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
+from synfeal.report.assistance import TOTAL
 from synfeal.report.claims.table import claims_markdown
 from synfeal.report.layouts import SOURCES, TITLES, scene_title
 from synfeal.report.results import read_table, read_text
@@ -55,14 +56,24 @@ def findings(root: Path) -> str:
 def assistance(root: Path) -> str:
     """Batches that needed assistance, and how good the labels are."""
     head = "| labels from | batches | assisted | median error, training | median error, test |"
+    errors = {
+        (row["method"], row["split"]): row
+        for row in read_table(root / "tables" / "label_error.csv")
+        if row["assistance"] == "after"
+    }
     rows = [
-        f"| {SOURCES[row['method']]} | {row['batches']} | {row['assisted']}"
-        f" *({row['published_assisted']} of {row['published_batches']})*"
-        f" | {_pair(row, 'label_error_m_train', 'label_error_deg_train')}"
-        f" | {_pair(row, 'label_error_m_test', 'label_error_deg_test')} |"
+        f"| {SOURCES[row['method']]} | {row['batches']} | {row['assisted']}{_published(row)}"
+        f" | {_median(errors[row['method'], 'train'])} | {_median(errors[row['method'], 'test'])} |"
         for row in read_table(root / "tables" / "assistance.csv")
+        if row["split"] == TOTAL
     ]
     return "\n".join([head, "|---|---|---|---|---|", *rows])
+
+
+def _published(row: Row) -> str:
+    if not row["published_assisted"]:
+        return ""
+    return f" *({row['published_assisted']} of {row['published_batches']})*"
 
 
 def claims(root: Path) -> str:
@@ -121,8 +132,9 @@ def _cell(row: Row) -> str:
     return f"{own} *({printed[0]:.2f} m, {printed[1]:.2f}°)*"
 
 
-def _pair(row: Row, position: str, orientation: str) -> str:
-    return f"{100 * float(row[position]):.1f} cm, {float(row[orientation]):.2f}°"
+def _median(row: Row) -> str:
+    position_m, orientation_deg = row["position_m_median"], row["orientation_deg_median"]
+    return f"{100 * float(position_m):.1f} cm, {float(orientation_deg):.2f}°"
 
 
 def _difficulty(folder: Path, name: str) -> str:

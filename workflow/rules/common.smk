@@ -177,6 +177,12 @@ def estimated_sets():
     return sorted(s for s in sets if s[2] in RECONSTRUCTED)
 
 
+def coverages():
+    """How much of its scene every plan covers: kept on record, read by people alone."""
+    scenes = sorted({e.scene for e in EXPERIMENTS})
+    return [f"{ROOT}/plans/{s}/{p}.coverage.json" for s in scenes for p in SPLITS]
+
+
 def assistance_files():
     return [
         f"{ROOT}/labels/{s}/{z}/{l}/assistance.json" for s, z, l in estimated_sets()

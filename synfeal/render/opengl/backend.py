@@ -9,8 +9,7 @@ in Mesa 22.3 and is further off. Depth is a pass of its own, 9 ms, drawn only wh
 
 from __future__ import annotations
 
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -21,16 +20,16 @@ from synfeal.config.collection import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import TexturedMesh
-from synfeal.render.base import Depth, Rgb
+from synfeal.render.base import Depth, Renderer, Rgb
 from synfeal.render.opengl import shaders
 from synfeal.render.opengl.context import finish, shared_context
 from synfeal.render.opengl.part import DevicePart
-from synfeal.render.pyrender_backend import pieces
+from synfeal.render.pieces import pieces
 
 SUPERSAMPLING = 2
 
 
-class OpenglRenderer:
+class OpenglRenderer(Renderer):
     """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
 
     def __init__(
@@ -144,17 +143,6 @@ class OpenglRenderer:
                     if image is not None:
                         image.release()
                 target.release()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def clip_from_cam(camera: CameraConfig) -> NDArray[np.float64]:

@@ -48,6 +48,7 @@ STAGES = (
     *("scene", "plan", "render_packed", "pack", "render", "dataset", "labels", "sfm"),
     *("rgbd", *frame_methods(), *graph_methods(), "chain", "pretrain", "train", "score"),
     *(
+        "coverage",
         "render_speed",
         "tables",
         "claims",
@@ -266,6 +267,8 @@ def _evidence(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[J
         yield Job("tables", name)
     for scene in sorted({e.scene for e in experiments}):
         yield Job("render_speed", scene, (_speed_size(config),))
+        for split in SPLITS:
+            yield Job("coverage", f"{scene}/{split}")
     runs = runs_of(experiments, config.training.repetitions)
     scored = sum(config.n_frames(run.scene, run.size, "test") for run in runs)
     yield Job("claims", "", (scored,))
