@@ -128,6 +128,8 @@ def _cell(row: Row) -> str:
     own = "failed"
     if row["position_m_true"]:
         own = f"{float(row['position_m_true']):.2f} m, {float(row['orientation_deg_true']):.1f}°"
+    if not row["published_position_m"]:  # a row the paper has not
+        return own
     printed = float(row["published_position_m"]), float(row["published_orientation_deg"])
     return f"{own} *({printed[0]:.2f} m, {printed[1]:.2f}°)*"
 
