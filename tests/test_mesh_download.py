@@ -23,8 +23,8 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*"),
 ]
 VIEWS = ((0.3, -1.5, -0.5), (2.4, 1.3, -1.3), (4.3, 0.5, 1.5))  # yaw, x, y
-# Mean difference of two renders of one scene, of 255; the sharper the renderer, the more it shows of
-# what one colour every 4 cm loses.
+# Mean difference of two renders of one scene, of 255; the sharper the renderer, the more it shows
+# of what one colour every 4 cm loses.
 LIMIT = 2.5
 
 
