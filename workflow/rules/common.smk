@@ -177,6 +177,11 @@ def estimated_sets():
     return sorted(s for s in sets if s[2] in RECONSTRUCTED)
 
 
+def label_figures():
+    """The figures of a design that draws nothing of trainings."""
+    return [] if set(TABLE_NAMES) & set(DRAWN_TABLES) else [f"{ROOT}/figures"]
+
+
 def coverages():
     """How much of its scene every plan covers: kept on record, read by people alone."""
     scenes = sorted({e.scene for e in EXPERIMENTS})

@@ -167,11 +167,6 @@ rule document:
 DRAWN_TABLES = ("table3_inconsistencies", "table4_size")
 
 
-def label_figures():
-    """The figures of a design that draws nothing of trainings."""
-    return [] if set(TABLE_NAMES) & set(DRAWN_TABLES) else [f"{ROOT}/figures"]
-
-
 rule figures:
     input:
         tables=expand(
