@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
+import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from benchmarks.collect_faults import command, kill_after, save_room, tree_of
+from benchmarks.collect_faults import check_whole, command, save_room, tree_of
 from synfeal.cli import main
 from synfeal.dataset import collect as collect_module
 from synfeal.dataset import render_pieces
@@ -312,14 +315,24 @@ def test_packed_frames_are_those_of_the_files(mesh: Path, tmp_path: Path) -> Non
         assert np.load(out / f"{split}.npy").shape == (count, 24, 24, 3)
 
 
+def kill_at(arguments: list[str], part: Path, n_files: int) -> bool:
+    """Start a collection and kill it once so many files of frames are there; whether it was."""
+    with subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
+        while run.poll() is None and sum(1 for _ in part.rglob("frame-*")) < n_files:
+            time.sleep(0.01)
+        run.kill()
+    return run.returncode == -signal.SIGKILL
+
+
 def test_a_collection_survives_being_killed(mesh: Path, tmp_path: Path) -> None:
     """``benchmarks/collect_faults.py`` does this more often."""
     calm, killed = tmp_path / "calm", tmp_path / "killed"
+    part = tmp_path / "killed.part" / "data"
     assert main(command(mesh, calm, 160)[3:]) == 0
-    results = [
-        kill_after(command(mesh, killed, 160), killed, seconds) for seconds in (1.4, 1.8, 2.2)
-    ]
-    assert any(result.killed for result in results)
+    assert kill_at(command(mesh, killed, 160), part, 1)
+    check_whole(part)
+    if kill_at(command(mesh, killed, 160), part, 200):
+        check_whole(part)
     if not killed.exists():
         assert main(command(mesh, killed, 160)[3:]) == 0
     assert tree_of(killed) == tree_of(calm)
