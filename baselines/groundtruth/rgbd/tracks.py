@@ -54,10 +54,9 @@ def neighbour(i: View, j: View, previous: Array) -> tuple[Array, bool]:
     """
     if not (i.constrained and j.constrained):
         return _by_features(i, j, previous)
-    by_start = i.dense.cfg.start
-    starts = [] if by_start == "features" else [previous if by_start == "motion" else np.eye(4)]
     best: Motion | None = None
-    for start in starts:
+    if i.dense.cfg.start != "features":
+        start = previous if i.dense.cfg.start == "motion" else np.eye(4)
         best = i.dense.refine(i.frame, j.frame, start)
     if best is not None and best.agreement >= SURE_AGREEMENT:
         return best.i_from_j, True
