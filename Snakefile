@@ -59,7 +59,6 @@ rule labels:
         all_labels(),
         f"{ROOT}/tables/assistance.csv",
         f"{ROOT}/tables/label_error.csv",
-        f"{ROOT}/tables/speed_vs_error.csv",
         label_figures(),
 
 

@@ -26,11 +26,13 @@ from baselines.groundtruth.posegraph.graph import (
 from baselines.groundtruth.sfm.images import link_images
 from baselines.groundtruth.trajectory import BatchTrajectory, read_trajectory, write_trajectory
 from baselines.localizers.backbones.weights import load_backbone_weights
-from baselines.training.checkpoint import load_checkpoint
+from baselines.localizers.registry import build_localizer
+from baselines.training.checkpoint import read_checkpoint, save_checkpoint
 from baselines.training.data import ImageStatistics, read_images
+from baselines.training.description import ModelDescription
 from baselines.training.score import score_run
 from synfeal.camera.calibration_files import read_calibration
-from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.config.models import CameraConfig, LocalizerConfig, NetworkConfig, RenderConfig
 from synfeal.dataset.manifest import verify_manifest, write_manifest
 from synfeal.dataset.packed import join_packed, pack_frames, read_packed
 from synfeal.dataset.packed_record import write_packed_record
@@ -54,6 +56,7 @@ from synfeal.report.compare.runs import read_run
 from synfeal.report.figures.cumulative_error import read_errors
 from synfeal.report.figures.sources import TEXTS, Results, number
 from synfeal.report.html.claims import claims_table, read_claims
+from synfeal.report.html.labels import label_error_table
 from synfeal.report.html.origin import cost_sentence, origin_html, read_origin
 from synfeal.report.html.side_tables import assistance_table, meshes_table, speed_table
 from synfeal.report.html.stages import read_stages
@@ -317,13 +320,16 @@ def _network() -> torch.nn.Module:
 
 
 def _checkpoint(folder: Path) -> Path:
-    images = {"mean": torch.zeros(1, 3, 1, 1), "deviation": torch.ones(1, 3, 1, 1)}
-    torch.save({"localizer": _network().state_dict(), "images": images}, folder / "model.pt")
+    statistics = ImageStatistics(torch.zeros(1, 3, 1, 1), torch.ones(1, 3, 1, 1))
+    network, hyper = NetworkConfig(input_px=32, width=0.01), LocalizerConfig()
+    localizer = build_localizer("posenet2", network, hyper)
+    description = ModelDescription(localizer="posenet2", network=network, hyper=hyper)
+    save_checkpoint(folder / "model.pt", localizer, statistics, description)
     return folder / "model.pt"
 
 
-def _load_checkpoint(path: Path) -> ImageStatistics:
-    return load_checkpoint(path, _network(), torch.device("cpu"))  # type: ignore[arg-type]
+def _read_checkpoint(path: Path) -> ImageStatistics:
+    return read_checkpoint(path, torch.device("cpu")).statistics
 
 
 def is_statistics(found: ImageStatistics) -> bool:
@@ -565,7 +571,7 @@ KINDS: tuple[Kind, ...] = (
     Kind("material", _material, lambda p: load_mesh(p.with_suffix(".obj")), is_mesh, " "),
     Kind("texture", _texture, lambda p: load_mesh(p.with_name("scene.obj")), is_mesh),
     Kind("collision mesh", _collision, load_collision_mesh, is_triangles, n_flips=60),
-    Kind("checkpoint", _checkpoint, _load_checkpoint, is_statistics, n_flips=40),
+    Kind("checkpoint", _checkpoint, _read_checkpoint, is_statistics, n_flips=40),
     Kind("backbone", _weights, lambda p: load_backbone_weights(_network(), p), n_flips=40),
     Kind("predictions", of_run("predictions.csv"), _score, finite_numbers, ","),
     Kind(
@@ -618,6 +624,7 @@ KINDS: tuple[Kind, ...] = (
         "table of meshes", table_of(meshes.NAME, meshes.COLUMNS, scene="a"), meshes_table, form=","
     ),
     Kind("table of assistance", _assistance_table, assistance_table, form=","),
+    Kind("table of label errors", _label_errors, label_error_table, form=","),
     Kind("speeds", _speeds, speed_table, form=","),
     Kind(
         "label errors",

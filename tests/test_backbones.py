@@ -11,16 +11,22 @@ import torch
 from baselines.localizers.backbones import weights
 from baselines.localizers.backbones.channels import scaled_channels
 from baselines.localizers.backbones.googlenet import GoogLeNet
+from baselines.localizers.backbones.inception_v3 import InceptionV3
 from baselines.localizers.backbones.resnet import ResNet34
 from baselines.localizers.backbones.weights import (
     build_backbone,
     imagenet_weights_path,
     load_backbone_weights,
 )
-from baselines.localizers.names import BACKBONE_OF
+from baselines.localizers.names import backbone_of
+from baselines.training.pretrain import PretextLocalizer
+from synfeal.config.learning import INCEPTION_V3_MIN_PX
+from synfeal.config.models import MODELS, NetworkConfig
 from synfeal.errors import InputError
 
 Shapes = dict[str, tuple[int, ...]]
+
+all_backbones = pytest.mark.parametrize("name", weights.IMAGENET_FILES)
 
 
 def batch_norm(name: str, channels: int) -> Shapes:
@@ -90,12 +96,16 @@ def test_names_and_shapes_are_those_of_the_official_weights(backbone, official):
 
 
 @pytest.mark.parametrize(
-    ("backbone", "n_features", "total"),
-    [(GoogLeNet, 1024, 6_624_904), (ResNet34, 512, 21_797_672)],
+    ("name", "n_features", "total"),
+    [
+        ("googlenet", 1024, 6_624_904),
+        ("inception_v3", 2048, 27_161_264 - 3_326_696),  # less its auxiliary classifier
+        ("resnet34", 512, 21_797_672),
+    ],
 )
-def test_parameter_count_is_the_published_one(backbone, n_features, total):
+def test_parameter_count_is_the_published_one(name, n_features, total):
     classifier = n_features * 1000 + 1000
-    assert sum(p.numel() for p in backbone().parameters()) + classifier == total
+    assert sum(p.numel() for p in build_backbone(name, 1.0).parameters()) + classifier == total
 
 
 def test_googlenet_maps_have_the_papers_strides_and_channels():
@@ -105,6 +115,22 @@ def test_googlenet_maps_have_the_papers_strides_and_channels():
         (1, 528, 14, 14),
         (1, 1024, 7, 7),
     ]
+
+
+def test_inception_v3_maps_have_the_papers_sides_and_channels():
+    """Table 1 of the paper."""
+    with torch.device("meta"):
+        maps = InceptionV3().eval()(torch.zeros(1, 3, 299, 299))
+    assert [tuple(m.shape)[1:] for m in maps] == [(288, 35, 35), (768, 17, 17), (2048, 8, 8)]
+
+
+@torch.no_grad()
+def test_the_least_image_of_inception_v3_leaves_one_pixel():
+    backbone = InceptionV3(0.125).eval()
+    px = INCEPTION_V3_MIN_PX
+    assert backbone(torch.zeros(1, 3, px, px)).last.shape[2:] == (1, 1)
+    with pytest.raises(RuntimeError, match=r"too small|greater than"):
+        backbone(torch.zeros(1, 3, px - 1, px - 1))
 
 
 def test_resnet_maps_have_the_papers_strides_and_channels():
@@ -117,9 +143,10 @@ def test_resnet_maps_have_the_papers_strides_and_channels():
     ]
 
 
-def test_googlenet_sees_images_scaled_to_minus_one_to_one():
-    """Its official weights were trained so, and callers normalise with mean and deviation."""
-    backbone = GoogLeNet(0.125)
+@pytest.mark.parametrize("name", ["googlenet", "inception_v3"])
+def test_inception_networks_see_images_scaled_to_minus_one_to_one(name):
+    """Their official weights were trained so, and callers normalise with mean and deviation."""
+    backbone = build_backbone(name, 0.125)
     grey = torch.rand(1, 3, 8, 8)
     mean = torch.tensor([0.485, 0.456, 0.406]).view(1, 3, 1, 1)
     deviation = torch.tensor([0.229, 0.224, 0.225]).view(1, 3, 1, 1)
@@ -135,20 +162,34 @@ def test_scaled_channels(channels):
     assert abs(quarter - channels / 4) <= 4
 
 
-@pytest.mark.parametrize("name", ["googlenet", "resnet34"])
-@pytest.mark.parametrize(("input_px", "side"), [(33, None), (64, 2), (96, 3)])
+@pytest.mark.parametrize(
+    ("name", "input_px", "side"),
+    [
+        *[(name, *size) for name in ("googlenet", "resnet34") for size in ((64, 2), (96, 3))],
+        ("googlenet", 33, 1),
+        ("resnet34", 33, 2),
+        ("inception_v3", 96, 1),
+        ("inception_v3", 128, 2),
+    ],
+)
 def test_narrow_backbones_run_at_any_size(name, input_px, side):
     backbone = build_backbone(name, 0.125).eval()
     last = backbone(torch.zeros(2, 3, input_px, input_px))[-1]
-    assert last.shape[:2] == (2, backbone.n_out)
-    assert side is None or last.shape[2:] == (side, side)
+    assert last.shape == (2, backbone.n_out, side, side)
 
 
-@pytest.mark.parametrize("name", ["googlenet", "resnet34"])
+@pytest.mark.parametrize("name", ["googlenet", "inception_v3"])
+def test_auxiliary_maps_have_the_channels_named(name):
+    backbone = build_backbone(name, 0.125).eval()
+    maps = backbone(torch.zeros(1, 3, 80, 80))
+    assert (maps.auxiliary1.shape[1], maps.auxiliary2.shape[1]) == backbone.n_aux
+
+
+@all_backbones
 def test_weights_with_classifiers_load_and_are_equal(name, tmp_path):
     source, target = build_backbone(name, 0.125), build_backbone(name, 0.125)
     state = dict(source.state_dict())
-    state |= {"fc.weight": torch.zeros(1), "aux1.fc1.weight": torch.zeros(1)}
+    state |= {k: torch.zeros(1) for k in ("fc.weight", "aux1.fc1.weight", "AuxLogits.fc.weight")}
     torch.save(state, tmp_path / "weights.pth")
     load_backbone_weights(target, tmp_path / "weights.pth")
     for loaded, expected in zip(
@@ -169,17 +210,18 @@ def test_a_file_that_is_no_weights_is_refused(tmp_path):
         load_backbone_weights(build_backbone("resnet34", 0.125), tmp_path / "broken.pt")
 
 
-def test_without_a_network_the_message_says_where_to_put_the_file(tmp_path, monkeypatch):
+@all_backbones
+def test_without_a_network_the_message_says_where_to_put_the_file(name, tmp_path, monkeypatch):
     def refuse(url: str, timeout: float) -> None:
         raise urllib.error.URLError("no route to host")
 
     monkeypatch.setattr(weights.urllib.request, "urlopen", refuse)
     with pytest.raises(InputError) as caught:
-        imagenet_weights_path("googlenet", tmp_path)
-    message = str(caught.value)
+        imagenet_weights_path(name, tmp_path)
+    message, file = str(caught.value), weights.IMAGENET_FILES[name]
     assert "no route to host" in message
-    assert str(tmp_path / "googlenet-1378be20.pth") in message
-    assert "https://download.pytorch.org/models/googlenet-1378be20.pth" in message
+    assert f"put it at {tmp_path / file}" in message
+    assert f"https://download.pytorch.org/models/{file}" in message
     assert "\n" not in message
     assert list(tmp_path.iterdir()) == []
 
@@ -200,5 +242,15 @@ def test_weights_that_are_there_are_not_downloaded(tmp_path, monkeypatch):
     assert imagenet_weights_path("resnet34", tmp_path) == path
 
 
-def test_every_localizer_names_a_backbone():
-    assert set(BACKBONE_OF.values()) == set(weights.IMAGENET_FILES)
+@all_backbones
+def test_every_backbone_can_learn_the_pretext(name):
+    localizer = PretextLocalizer(name, 0.125)
+    (prediction,) = localizer(torch.randn(2, 3, 80, 80))
+    (prediction.position_m.sum() + prediction.quat_wxyz.sum()).backward()
+    assert all(p.grad is not None for p in localizer.backbone.parameters())
+
+
+def test_every_backbone_is_one_of_a_localizer():
+    networks = [NetworkConfig(backbone=name) for name in ("googlenet", "inception_v3")]
+    named = {backbone_of(model, network) for model in MODELS for network in networks}
+    assert named == set(weights.IMAGENET_FILES)

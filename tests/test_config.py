@@ -73,6 +73,7 @@ REFUSED = [
     ("scenes/sanctuary/source", "mesh", ["scenes.sanctuary.path", "mesh file"]),
     ("network_camera/near_m", 200, ["network_camera.near_m", "below far_m"]),
     ("network/input_px", 96, ["network_camera", "exceed network.input_px (96)"]),
+    ("network/backbone", "inception_v3", ["network.input_px", "at least 75", "found 64"]),
     ("pretraining/scene", "attic", ["pretraining.scene", "'attic'", "pretext_room"]),
     ("pretraining/source", "imagenet", ["network.width", "must be 1"]),
 ]

@@ -9,12 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.training.pretrain import BATCH_SIZE
 from synfeal.cli import main
 from synfeal.config import load_config, read_experiments
 from synfeal.report.cost.estimate import Machine, by_table, job_costs, stage_costs, wall_seconds
 from synfeal.report.cost.jobs import (
-    PRETEXT_BATCH,
     Job,
     experiment_jobs,
     known_jobs,
@@ -166,10 +164,6 @@ def test_a_law_is_found_and_outliers_are_not_followed():
     seconds[:3] *= 4
     fixed_s, rates = fit_seconds(sizes, seconds, 0.3)
     assert fixed_s + np.dot(rates, (5, 5)) == pytest.approx(19.5, rel=0.05)
-
-
-def test_the_pretext_is_trained_in_the_batches_that_are_counted():
-    assert PRETEXT_BATCH == BATCH_SIZE
 
 
 def test_jobs_of_one_size_tell_only_the_rate():

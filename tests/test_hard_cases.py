@@ -136,6 +136,9 @@ def no_antipode(predicted: torch.Tensor, true: torch.Tensor) -> torch.Tensor:
     return torch.linalg.vector_norm(predicted - true, dim=1).mean()
 
 
+WITHOUT_ANTIPODE = losses.Distances(losses.position_distance, no_antipode)
+
+
 def smallest(rungs: Any, min_agreement: float) -> int:
     return len(rungs) - 1
 
@@ -189,7 +192,7 @@ BROKEN: dict[str, tuple[str, Any, str, Any]] = {
         "_medians",
         lambda ranked, counts: ranked[[len(ranked) // 2]],
     ),
-    "losses": ("predicted −q", losses, "quat_distance", no_antipode),
+    "losses": ("predicted −q", losses, "DISTANCES", {"norm": WITHOUT_ANTIPODE}),
     "pose graphs": ("LM: a third 170° off", lm, "optimise_lm", start_of),
     "shares": ("0 of 20", stats, "share_limits", shares._wald),
 }

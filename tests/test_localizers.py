@@ -1,16 +1,22 @@
-"""One contract for all five localizers, and losses with closed forms."""
+"""One contract for all five localizers in all their shapes, and losses with closed forms."""
 
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
-from baselines.localizers.backbones.googlenet import GoogLeNet
+from baselines.localizers.backbones.weights import IMAGENET_FILES, build_backbone
+from baselines.localizers.base import Localizer
 from baselines.localizers.heads import PoseRegressor
+from baselines.localizers.hourglass import UpBlock
 from baselines.localizers.losses import (
     BetaLoss,
     LearnedWeightLoss,
@@ -18,17 +24,57 @@ from baselines.localizers.losses import (
     position_distance,
     quat_distance,
 )
-from baselines.localizers.names import BACKBONE_OF
+from baselines.localizers.names import RESNET_LOCALIZERS, backbone_of
 from baselines.localizers.poselstm import FourDirectionLstm
 from baselines.localizers.registry import LOCALIZERS, build_localizer
 from synfeal.config.models import MODELS, LocalizerConfig, NetworkConfig
 from synfeal.errors import InputError
 
+ROOT = Path(__file__).parent.parent
+PAGE = ROOT / "docs" / "localizers.md"
 NETWORK = NetworkConfig(input_px=32, width=0.125)
 HYPER = LocalizerConfig(learning_rate=3e-3, dropout=0.0, beta=1.0, s_orientation=-1.0)
+INCEPTION_V3 = NetworkConfig(backbone="inception_v3", input_px=75, width=0.125)
+CONCATENATION = HYPER.model_copy(update={"skip": "concatenation"})
 AUXILIARY = {"posenet": 2}
 
-all_localizers = pytest.mark.parametrize("name", MODELS)
+
+class Case(NamedTuple):
+    """A localizer in one of its shapes."""
+
+    name: str
+    network: NetworkConfig = NETWORK
+    hyper: LocalizerConfig = HYPER
+
+    def build(self) -> Localizer:
+        return build_localizer(*self)
+
+    def batch(self, count: int = 6) -> tuple[Tensor, Tensor, Tensor]:
+        return batch(count, self.network.input_px)
+
+    def resized(self, input_px: int, width: float = 0.125) -> Case:
+        update = {"input_px": input_px, "width": width}
+        return self._replace(network=self.network.model_copy(update=update))
+
+
+CASES = {
+    **{name: Case(name) for name in MODELS},
+    **{
+        f"{name}-inception_v3": Case(name, INCEPTION_V3)
+        for name in MODELS
+        if name not in RESNET_LOCALIZERS
+    },
+    "hourglass-concatenation": Case("hourglass", hyper=CONCATENATION),
+}
+
+
+def over(names: Iterable[str]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("case", [CASES[n] for n in names], ids=list(names))
+
+
+all_localizers = over(CASES)
+# Where every case would take long: every localizer, every backbone, every shape once.
+once = over([*MODELS, "posenet-inception_v3", "hourglass-concatenation"])
 
 
 @pytest.fixture(autouse=True)
@@ -44,15 +90,15 @@ def batch(count: int = 6, px: int = 32) -> tuple[Tensor, Tensor, Tensor]:
 
 
 def test_the_registry_is_complete():
-    assert set(LOCALIZERS) == set(BACKBONE_OF) == set(MODELS)
+    assert set(LOCALIZERS) == set(MODELS) > RESNET_LOCALIZERS
 
 
 @all_localizers
-def test_predictions_have_the_contracts_shapes(name):
-    images, position_m, quat_wxyz = batch()
-    localizer = build_localizer(name, NETWORK, HYPER)
+def test_predictions_have_the_contracts_shapes(case):
+    images, position_m, quat_wxyz = case.batch()
+    localizer = case.build()
     predictions = localizer(images)
-    assert len(predictions) == 1 + AUXILIARY.get(name, 0)
+    assert len(predictions) == 1 + AUXILIARY.get(case.name, 0)
     for prediction in predictions:
         assert prediction.position_m.shape == (6, 3)
         assert prediction.quat_wxyz.shape == (6, 4)
@@ -62,29 +108,31 @@ def test_predictions_have_the_contracts_shapes(name):
 
 
 @all_localizers
-def test_the_gradient_reaches_every_parameter(name):
-    images, position_m, quat_wxyz = batch()
-    localizer = build_localizer(name, NETWORK, HYPER)
+def test_the_gradient_reaches_every_parameter(case):
+    images, position_m, quat_wxyz = case.batch()
+    localizer = case.build()
     localizer.loss(localizer(images), position_m, quat_wxyz).backward()
     idle = [n for n, p in localizer.named_parameters() if p.grad is None or not p.grad.any()]
     assert idle == []
 
 
 @all_localizers
-def test_the_backbone_is_the_one_named(name):
-    backbone = build_localizer(name, NETWORK, HYPER).backbone
-    assert isinstance(backbone, GoogLeNet) == (BACKBONE_OF[name] == "googlenet")
+def test_the_backbone_is_the_one_named(case):
+    found, named = case.build().backbone, backbone_of(case.name, case.network)
+    expected = build_backbone(named, case.network.width)
+    assert type(found) is type(expected)
+    assert found.state_dict().keys() == expected.state_dict().keys()
 
 
-@all_localizers
-def test_a_batch_can_be_learned_by_heart(name):
-    images, position_m, quat_wxyz = batch()
-    localizer = build_localizer(name, NETWORK, HYPER)
+@once
+def test_a_batch_can_be_learned_by_heart(case):
+    images, position_m, quat_wxyz = case.batch(4)
+    localizer = case.build()
     localizer.set_pose_prior(position_m.mean(0))
-    optimizer = torch.optim.AdamW(localizer.parameters(), 2e-3)
-    for step in range(100):
-        if step == 70:
-            optimizer.param_groups[0]["lr"] = 2e-4
+    optimizer = torch.optim.AdamW(localizer.parameters(), 3e-3)
+    for step in range(40):
+        if step == 28:
+            optimizer.param_groups[0]["lr"] = 3e-4
         optimizer.zero_grad()
         localizer.loss(localizer(images), position_m, quat_wxyz).backward()
         optimizer.step()
@@ -94,10 +142,10 @@ def test_a_batch_can_be_learned_by_heart(name):
 
 
 @all_localizers
-def test_images_are_judged_one_by_one(name):
+def test_images_are_judged_one_by_one(case):
     """In evaluation, the company of other images in a batch changes nothing."""
-    images, _, _ = batch()
-    localizer = build_localizer(name, NETWORK, HYPER).eval()
+    images, _, _ = case.batch()
+    localizer = case.build().eval()
     with torch.inference_mode():
         together, alone = localizer(images)[0], localizer(images[2:3])[0]
     torch.testing.assert_close(together.position_m[2:3], alone.position_m, atol=1e-5, rtol=1e-4)
@@ -105,19 +153,29 @@ def test_images_are_judged_one_by_one(name):
 
 
 @all_localizers
-def test_odd_input_sizes_work(name):
-    network = NetworkConfig(input_px=37, width=0.125)
-    localizer = build_localizer(name, network, HYPER)
-    assert localizer(torch.randn(2, 3, 37, 37))[0].position_m.shape == (2, 3)
+def test_odd_input_sizes_work(case):
+    case = case.resized(case.network.input_px + 5)
+    images, _, _ = case.batch(2)
+    assert case.build()(images)[0].position_m.shape == (2, 3)
+
+
+@once
+def test_full_networks_fit_together(case):
+    """At the papers' width, on images of 224 pixels, or 299 for Inception v3."""
+    case = case.resized(299 if case.network.backbone == "inception_v3" else 224, width=1.0)
+    with torch.device("meta"):
+        images, _, _ = case.batch()
+        main = case.build()(images)[0]
+    assert (main.position_m.shape, main.quat_wxyz.shape) == ((6, 3), (6, 4))
 
 
 @all_localizers
-def test_the_pose_prior_moves_every_regressor(name):
-    localizer = build_localizer(name, NETWORK, HYPER)
+def test_the_pose_prior_moves_every_regressor(case):
+    localizer = case.build()
     mean = torch.tensor([10.0, -20.0, 30.0])
     localizer.set_pose_prior(mean)
     biases = [m.position.bias for m in localizer.modules() if isinstance(m, PoseRegressor)]
-    assert len(biases) == 1 + AUXILIARY.get(name, 0)
+    assert len(biases) == 1 + AUXILIARY.get(case.name, 0)
     assert all(torch.equal(bias, mean) for bias in biases)
 
 
@@ -127,6 +185,65 @@ def test_auxiliary_predictions_count_three_tenths():
     off = [PosePrediction(torch.tensor([[d, 0.0, 0.0]]), quat_wxyz) for d in (1.0, 10.0, 100.0)]
     loss = localizer.loss(off, position_m, quat_wxyz)
     assert loss.item() == pytest.approx(1.0 + 0.3 * 10.0 + 0.3 * 100.0)
+
+
+@pytest.mark.parametrize(
+    ("case", "prediction", "last", "next_one"),
+    [
+        ("posenet", 1, "inception4a", "inception4b"),
+        ("posenet", 2, "inception4d", "inception4e"),
+        ("posenet-inception_v3", 1, "Mixed_5d", "Mixed_6a"),
+        ("posenet-inception_v3", 2, "Mixed_6e", "Mixed_7a"),
+    ],
+)
+def test_auxiliary_regressors_branch_off_after_the_block_named(case, prediction, last, next_one):
+    """A gradient tells which blocks a prediction is made of."""
+    localizer = CASES[case].build()
+    images, _, _ = CASES[case].batch()
+    localizer(images)[prediction].position_m.sum().backward()
+    for block, reached in ((last, True), (next_one, False)):
+        parameters = localizer.backbone.get_submodule(block).parameters()
+        assert all((p.grad is not None) == reached for p in parameters), block
+
+
+@pytest.mark.parametrize(("hyper", "channels"), [(HYPER, 64), (CONCATENATION, 128)])
+def test_concatenation_doubles_what_the_hourglass_hands_on(hyper, channels):
+    with torch.device("meta"):
+        hourglass = build_localizer("hourglass", NetworkConfig(), hyper)
+    assert hourglass.regressor[0].in_channels == channels
+
+
+def test_an_up_block_adds_or_appends_the_encoders_maps():
+    added, appended = UpBlock(8, 4, concatenate=False), UpBlock(8, 4, concatenate=True)
+    appended.load_state_dict(added.state_dict())
+    maps, encoder = torch.randn(2, 8, 5, 5), torch.randn(2, 4, 9, 10)
+    upsampled, passed_on = appended(maps, encoder).split(4, dim=1)
+    assert torch.equal(passed_on, encoder)
+    assert (upsampled >= 0).all()
+    torch.testing.assert_close(added(maps, encoder), upsampled + encoder)
+
+
+def test_the_example_of_the_page_is_a_localizer(monkeypatch):
+    """It keeps the contract with either backbone, once it is added as the page says."""
+    module, line = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+    namespace = {"__name__": "direct"}
+    exec(module, namespace)
+    ((name, localizer),) = eval(f"{{{line}}}", namespace).items()
+    monkeypatch.setitem(LOCALIZERS, name, localizer)
+    for network in (NETWORK, INCEPTION_V3):
+        case = Case(name, network)
+        test_predictions_have_the_contracts_shapes(case)
+        test_the_gradient_reaches_every_parameter(case)
+        test_the_backbone_is_the_one_named(case)
+        test_the_pose_prior_moves_every_regressor(case)
+
+
+def test_the_page_names_what_there_is():
+    text = PAGE.read_text("utf-8")
+    assert [n for n in (*MODELS, *IMAGENET_FILES.values()) if f"`{n}`" not in text] == []
+    tables = re.findall(r"`([A-Z_]+)`\s+\(`([\w/]+\.py)`\)", text)
+    assert len(tables) >= 4
+    assert [name for name, path in tables if name not in (ROOT / path).read_text("utf-8")] == []
 
 
 @pytest.mark.parametrize("name", ["posenet", "poselstm", "hourglass"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from synfeal.config import MODELS
-from synfeal.report.figures import error_by_noise, error_by_size, speed_vs_error
+from synfeal.report.figures import error_by_noise, error_by_size, speed_vs_error, training_speed
 from synfeal.report.figures.cumulative_error import SceneErrors, cumulative
 from synfeal.report.figures.cumulative_error import figure_of as cumulative_figure
 from synfeal.report.figures.localizer_lines import ASIDE, published_value
@@ -165,6 +165,22 @@ def test_speed_vs_error_joins_the_front_and_rings_the_choice():
     np.testing.assert_allclose(front.get_xydata(), [[1.0, 0.0], [1.5, 0.4], [3.0, 20.0]])
     np.testing.assert_allclose(ring.get_xydata(), [[1.2, 0.5]])
     assert ring.get_label() == "Large Room: used, 980 of 1,000 faces"
+
+
+def test_trainings_are_filled_where_no_other_is_faster_and_better():
+    measured = (("PoseNet", 500, 0.5), ("Hourglass", 200, 0.6), ("PoseNet2", 400, 0.4))
+    keys = ("scene", "variant", "items_per_s", "error")
+    rows = [
+        dict(zip(keys, ("sanctuary", name, str(speed), str(error)), strict=True))
+        for name, speed, error in measured
+    ]
+    (axes,) = training_speed.figure_of(rows).axes
+    assert axes.get_title() == "Sanctuary"
+    drawn = {line.get_label(): line for line in axes.lines}
+    for name, speed, error in measured:
+        np.testing.assert_array_equal(drawn[name].get_xydata(), [[speed, error]])
+    hollow = {name for name, line in drawn.items() if line.get_markerfacecolor() == "none"}
+    assert hollow == {"Hourglass"}
 
 
 @pytest.mark.parametrize("styles", [MODEL_STYLES, METHOD_STYLES, SPLIT_STYLES])

@@ -47,6 +47,7 @@ SPEEDS = (
     ("collision", "large_room", "decimated", 9, 20, 0.1, 1),
     ("labels", "large_room", "SfM", None, 2, 0.02, 0),
     ("labels", "large_room", "KinectFusion", None, 9, 0.1, 0),
+    ("training", "large_room", "PoseNet2", None, 400, 0.3, 0),
     ("render", "large_room", "64x48, opengl 2x2", 90, 100, 1.5, 1),
 )
 RENDERED = {"seconds_per_item": 0.01, "backend": "opengl", "supersampling": 2, "texture_scale": 1.0}
@@ -232,7 +233,7 @@ def test_captions_are_single_sentences_in_reading_order():
 def test_every_drawing_is_a_figure_or_left_out(results):
     nothing = Results(results.root, (), 1)
     drawn = {name for name, entry in FIGURES.items() if entry.draw(nothing) is not None}
-    stages = ("collision", "labels", "render")
+    stages = ("collision", "labels", "render", "training")
     assert drawn == {f"speed_vs_error_{stage}" for stage in stages}
     assert isinstance(FIGURES["error_by_size"].draw(results), Figure)
 

@@ -3,86 +3,37 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 
 import numpy as np
 import pytest
 import torch
-from scipy.spatial.transform import Rotation
 
 from baselines.localizers.backbones.weights import build_backbone
-from baselines.localizers.registry import build_localizer
 from baselines.training.data import image_statistics, read_images, read_labelled_frames
-from baselines.training.device import open_device
-from baselines.training.fit import Schedule, fit, shuffled_batches
-from baselines.training.loop import train_localizer
 from baselines.training.predict import predict_poses
 from baselines.training.pretrain import pretrain_backbone
-from synfeal.config.models import (
-    LocalizerConfig,
-    NetworkConfig,
-    PretrainingConfig,
-    TrainingConfig,
-)
-from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
+from baselines.training.score import score_run
+from synfeal.config.models import PretrainingConfig
+from synfeal.dataset.pose_table import write_pose_table
 from synfeal.errors import InputError
-
-NETWORK = NetworkConfig(input_px=32, width=0.125)
-HYPER = LocalizerConfig(learning_rate=4e-3, dropout=0.0, beta=1.0, s_orientation=-1.0)
-TRAINING = TrainingConfig(batch_size=16, samples_seen={}, device="cpu")
-PX = NETWORK.input_px
-
-
-def coloured_frames(count: int, rng: np.random.Generator) -> tuple[np.ndarray, PoseTable]:
-    """Frames whose colour is the position and whose gradient is the yaw, with a little noise."""
-    position_m = rng.uniform(-1, 1, (count, 3))
-    yaw = rng.uniform(-0.5, 0.5, count)
-    ramp = np.linspace(-1, 1, PX)[None, None, :, None]
-    images = 128 + 60 * position_m[:, None, None, :] + 80 * yaw[:, None, None, None] * ramp
-    images = images + rng.normal(scale=2.0, size=(count, PX, PX, 3))
-    quat = Rotation.from_euler("z", yaw[:, None]).as_quat(canonical=True, scalar_first=True)
-    frame = np.arange(count)
-    table = PoseTable(frame, frame // 10, position_m, quat)
-    return images.clip(0, 255).astype(np.uint8), table
+from tests.coloured_frames import (
+    CPU,
+    HYPER,
+    NETWORK,
+    PX,
+    Jitter,
+    coloured_frames,
+    train,
+    write_split,
+)
 
 
 @pytest.fixture(scope="module")
 def split(tmp_path_factory):
     """Packed frames with more images than labels, and the labels."""
-    folder = tmp_path_factory.mktemp("split")
-    images, table = coloured_frames(140, np.random.default_rng(0))
-    np.save(folder / "frames.npy", images)
-    write_pose_table(folder / "labels.csv", table.first(120))
-    return folder / "frames.npy", folder / "labels.csv"
-
-
-def train(split, folder, *, samples=96, seed=1, weights=None, name="posenet2"):
-    """A short training; returns the paths of checkpoint and history."""
-    model, history = folder / "model.pt", folder / "history.csv"
-    train_localizer(name, *split, NETWORK, HYPER, TRAINING, samples, weights, seed, model, history)
-    return model, history
-
-
-def test_training_learns_what_the_images_show(split, tmp_path):
-    model, history = train(split, tmp_path, samples=2400)
-    images, table = coloured_frames(60, np.random.default_rng(1))
-    np.save(tmp_path / "test.npy", images)
-    write_pose_table(tmp_path / "test.csv", table)
-    out = tmp_path / "predictions.csv"
-    predict_poses(
-        "posenet2", model, tmp_path / "test.npy", tmp_path / "test.csv", NETWORK, HYPER, out
-    )
-    predicted = read_pose_table(out)
-    error = np.linalg.norm(predicted.position_m - table.position_m, axis=1)
-    baseline = np.linalg.norm(table.position_m.mean(0) - table.position_m, axis=1)
-    assert np.median(error) < 0.5 * np.median(baseline)
-    np.testing.assert_allclose(np.linalg.norm(predicted.quat_wxyz, axis=1), 1.0, atol=1e-12)
-    assert (predicted.quat_wxyz[:, 0] >= 0).all()
-    assert np.array_equal(predicted.path, table.path)
-    with history.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert int(rows[-1]["samples_seen"]) == 2400
-    assert float(rows[-1]["loss"]) < float(rows[0]["loss"]) - 0.5
+    return write_split(tmp_path_factory.mktemp("split"), "train", 120, 0, spare=20)
 
 
 def test_the_same_seed_gives_the_same_network_and_another_seed_another(split, tmp_path):
@@ -102,19 +53,7 @@ def test_pretrained_weights_are_where_training_starts(split, tmp_path):
     backbone = build_backbone("googlenet", NETWORK.width)
     torch.save(backbone.state_dict(), tmp_path / "weights.pt")
     hyper = HYPER.model_copy(update={"learning_rate": 1e-30})
-    model = tmp_path / "model.pt"
-    train_localizer(
-        "posenet2",
-        *split,
-        NETWORK,
-        hyper,
-        TRAINING,
-        32,
-        tmp_path / "weights.pt",
-        1,
-        model,
-        tmp_path / "history.csv",
-    )
+    model, _ = train(split, tmp_path, samples=32, weights=tmp_path / "weights.pt", hyper=hyper)
     state = torch.load(model, weights_only=True)["localizer"]
     for key, parameter in backbone.named_parameters():
         torch.testing.assert_close(state[f"backbone.{key}"], parameter.data, atol=1e-20, rtol=0)
@@ -145,29 +84,33 @@ def test_imagenet_weights_are_passed_on(tmp_path, monkeypatch):
     assert all(torch.equal(passed_on[k], v) for k, v in backbone.state_dict().items())
 
 
-def test_a_diverged_training_stops(split):
-    device = open_device("cpu")
-    data = read_labelled_frames(*split, PX, device)
-    localizer = build_localizer("posenet2", NETWORK, HYPER)
-    with torch.no_grad():
-        localizer.regressor[-1].position.bias.fill_(math.nan)
-    rows = fit(localizer, data, image_statistics(data.images), Schedule(10_000, 16, 1e-3, 0.0), 0)
-    assert rows[-1].samples_seen < 1000
-    assert math.isnan(rows[-1].loss)
+class Poison(Jitter):
+    """Images that are no numbers, from one call on."""
+
+    def __call__(self, images, quat_wxyz):
+        images, quat_wxyz = super().__call__(images, quat_wxyz)
+        return (images if self.calls < 40 else images * math.nan), quat_wxyz
 
 
-@pytest.mark.parametrize(("n_frames", "batch_size"), [(10, 4), (3, 8)])
-def test_every_frame_is_shown_equally_often(n_frames, batch_size):
-    steps = 15
-    batches = list(shuffled_batches(n_frames, batch_size, steps, seed=0))
-    assert [len(batch) for batch in batches] == [batch_size] * steps
-    shown = torch.bincount(torch.cat(batches), minlength=n_frames)
-    assert shown.max() - shown.min() <= 1
-    assert not torch.equal(torch.cat(batches)[:n_frames], torch.arange(n_frames))
+def test_a_diverged_training_stops_and_has_failed(split, tmp_path):
+    """Although it had good weights before, which had been looked at twice and kept."""
+    model, history = train(split, tmp_path, samples=1600, augment=Poison())
+    with history.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert math.isnan(float(rows[-1]["loss"]))
+    assert len([row for row in rows if row["held_out_position_m"] not in ("", "nan")]) >= 2
+    assert 40 * 16 <= int(rows[-1]["samples_seen"]) < 1600
+    out = tmp_path / "predictions.csv"
+    predict_poses(model, *split, out)
+    metrics = tmp_path / "metrics.json"
+    score_run(out, split[1], split[1], split[1], tmp_path / "errors.csv", metrics, {})
+    found = json.loads(metrics.read_text())
+    assert found["failed"] == found["n_test"] == 120
+    assert found["position_m"] is None
 
 
 def test_normalised_images_have_zero_mean_and_unit_deviation(split):
-    images = read_images(split[0], 120, PX, torch.device("cpu"))
+    images = read_images(split[0], 120, PX, CPU)
     expected = np.load(split[0])[:120].astype(np.float64)
     statistics = image_statistics(images)
     np.testing.assert_allclose(statistics.mean.ravel(), expected.mean((0, 1, 2)), rtol=1e-5)
@@ -179,27 +122,21 @@ def test_normalised_images_have_zero_mean_and_unit_deviation(split):
 
 
 def test_frames_keep_their_pixels_and_their_order(split):
-    images = read_images(split[0], 5, PX, torch.device("cpu"))
+    images = read_images(split[0], 5, PX, CPU)
     assert np.array_equal(images.permute(0, 2, 3, 1).numpy(), np.load(split[0])[:5])
 
 
 def test_too_few_frames_or_another_size_are_refused(split, tmp_path):
     with pytest.raises(InputError, match="holds 140 frames, but 141 are labelled"):
-        read_images(split[0], 141, PX, torch.device("cpu"))
+        read_images(split[0], 141, PX, CPU)
     with pytest.raises(InputError, match=r"network\.input_px"):
-        read_images(split[0], 5, 64, torch.device("cpu"))
+        read_images(split[0], 5, 64, CPU)
     with pytest.raises(InputError, match="packed frames"):
-        read_images(tmp_path / "absent.npy", 5, PX, torch.device("cpu"))
+        read_images(tmp_path / "absent.npy", 5, PX, CPU)
 
 
 def test_an_empty_label_table_is_refused(split, tmp_path):
     _, table = coloured_frames(1, np.random.default_rng(0))
     write_pose_table(tmp_path / "empty.csv", table.first(0))
     with pytest.raises(InputError, match="no rows"):
-        read_labelled_frames(split[0], tmp_path / "empty.csv", PX, torch.device("cpu"))
-
-
-def test_a_checkpoint_of_another_localizer_is_refused(split, tmp_path):
-    model, _ = train(split, tmp_path, samples=16)
-    with pytest.raises(InputError, match=r"model\.pt: is no checkpoint of Hourglass"):
-        predict_poses("hourglass", model, *split, NETWORK, HYPER, tmp_path / "out.csv")
+        read_labelled_frames(split[0], tmp_path / "empty.csv", PX, CPU)

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from baselines.localizers.heads import PoseRegressor
-from baselines.localizers.losses import BetaLoss, LearnedWeightLoss, PosePrediction
+from baselines.localizers.losses import BetaLoss, LearnedWeightLoss, PoseLoss, PosePrediction
 from synfeal.config.models import LocalizerConfig
 from synfeal.errors import InputError
 
@@ -23,7 +23,7 @@ class Localizer(nn.Module):
     """
 
     backbone: nn.Module
-    criterion: nn.Module
+    criterion: PoseLoss
 
     def forward(self, images: Tensor) -> list[PosePrediction]:
         """Predictions for normalised images (B, 3, H, W): the main one, then auxiliary ones."""

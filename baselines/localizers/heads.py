@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import torch
 from torch import Tensor, nn
 
@@ -21,8 +23,11 @@ class PoseRegressor(nn.Module):
         self.quat = nn.Linear(n_in, 4)
 
     def forward(self, features: Tensor) -> PosePrediction:
-        """Poses of features (B, n_in)."""
-        return PosePrediction(self.position(features), self.quat(features))
+        """Poses of features (B, n_in), in float32: bfloat16 rounds positions to centimetres."""
+        device = features.device.type
+        mixed = torch.amp.is_autocast_available(device)  # not on "meta", where shapes are planned
+        with torch.autocast(device, enabled=False) if mixed else nullcontext():
+            return PosePrediction(self.position(features.float()), self.quat(features.float()))
 
     @torch.no_grad()
     def set_mean_position(self, position_m: Tensor) -> None:

@@ -7,9 +7,11 @@
   year      = {2017}
 }
 
-Differences from the paper: of its two variants this is the one that sums encoder and decoder maps
-(the Synfeal authors' code concatenates them); batch normalisation in the decoder; q and -q count as
-the same rotation.
+The paper has two variants: decoder and encoder maps are summed (``skip: sum``, our default) or
+concatenated (``skip: concatenation``, as in the Synfeal authors' code). Differences: batch
+normalisation after the decoder's convolutions; q and -q count as the same rotation, except with
+``protocol: published``. The Synfeal authors' code normalises there too, but after the rectifier,
+and once more before the regressors.
 """
 
 from __future__ import annotations
@@ -26,17 +28,19 @@ from synfeal.config.models import LocalizerConfig, NetworkConfig
 
 
 class UpBlock(nn.Module):
-    """Transposed convolution to the size of an encoder map, which is then added."""
+    """Transposed convolution to the shape of an encoder map, which is then added or appended."""
 
-    def __init__(self, n_in: int, n_out: int) -> None:
+    def __init__(self, n_in: int, n_encoder: int, concatenate: bool) -> None:
         super().__init__()
-        self.up = nn.ConvTranspose2d(n_in, n_out, 3, 2, padding=1, bias=False)
-        self.bn = nn.BatchNorm2d(n_out)
+        self.concatenate = concatenate
+        self.up = nn.ConvTranspose2d(n_in, n_encoder, 3, 2, padding=1, bias=False)
+        self.bn = nn.BatchNorm2d(n_encoder)
+        self.n_out = 2 * n_encoder if concatenate else n_encoder
 
-    def forward(self, maps: Tensor, skip: Tensor) -> Tensor:
-        """(B, n_in, h, w) and (B, n_out, H, W), with h = ceil(H / 2), to (B, n_out, H, W)."""
-        upsampled = self.up(maps, output_size=list(skip.shape[-2:]))
-        return torch.relu_(self.bn(upsampled)) + skip
+    def forward(self, maps: Tensor, encoder: Tensor) -> Tensor:
+        """(B, n_in, h, w) and (B, n_encoder, H, W), h = ceil(H / 2), to (B, n_out, H, W)."""
+        upsampled = torch.relu_(self.bn(self.up(maps, output_size=list(encoder.shape[-2:]))))
+        return torch.cat([upsampled, encoder], 1) if self.concatenate else upsampled + encoder
 
 
 class Hourglass(Localizer):
@@ -46,12 +50,15 @@ class Hourglass(Localizer):
         super().__init__()
         self.backbone = ResNet34(network.width)
         one, two, three, four = self.backbone.n_stages
-        self.up3, self.up2, self.up1 = UpBlock(four, three), UpBlock(three, two), UpBlock(two, one)
+        concatenate = hyper.skip == "concatenation"
+        self.up3 = UpBlock(four, three, concatenate)
+        self.up2 = UpBlock(self.up3.n_out, two, concatenate)
+        self.up1 = UpBlock(self.up2.n_out, one, concatenate)
         n_maps = scaled_channels(32, network.width)
         n_features = scaled_channels(1024, network.width)
         side = -(-network.input_px // 4)  # layer1 has stride 4, rounded up
         self.regressor = nn.Sequential(
-            nn.Conv2d(one, n_maps, 3, padding=1, bias=False),
+            nn.Conv2d(self.up1.n_out, n_maps, 3, padding=1, bias=False),
             nn.BatchNorm2d(n_maps),
             nn.ReLU(),
             nn.Flatten(),

@@ -1,8 +1,9 @@
-"""Losses on poses: Euclidean norms, combined with a fixed or with learned weights."""
+"""Losses on poses: distances, combined with a fixed or with learned weights."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Literal, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -33,7 +34,54 @@ def quat_distance(predicted_wxyz: Tensor, true_wxyz: Tensor) -> Tensor:
     return torch.minimum(same, opposite).mean()
 
 
-class BetaLoss(nn.Module):
+def position_mean_square(predicted_m: Tensor, true_m: Tensor) -> Tensor:
+    """Mean squared difference of the coordinates of positions (B, 3)."""
+    return nn.functional.mse_loss(predicted_m, true_m)
+
+
+def quat_mean_square(predicted_wxyz: Tensor, true_wxyz: Tensor) -> Tensor:
+    """Mean squared difference of unit quaternions (B, 4); ``q`` and ``-q`` are far apart.
+
+    The prediction is brought to unit length first.
+    """
+    return nn.functional.mse_loss(nn.functional.normalize(predicted_wxyz, dim=1), true_wxyz)
+
+
+class Distances(NamedTuple):
+    """Scalar distances of positions (B, 3) and of quaternions (B, 4), predicted and true."""
+
+    position: Callable[[Tensor, Tensor], Tensor]
+    orientation: Callable[[Tensor, Tensor], Tensor]
+
+
+# Norms are those of the localizers' papers, mean squares those of the Synfeal authors' code.
+DISTANCES: dict[Literal["norm", "mse"], Distances] = {
+    "norm": Distances(position_distance, quat_distance),
+    "mse": Distances(position_mean_square, quat_mean_square),
+}
+
+
+class PoseLoss(nn.Module):
+    """A weighted sum of a distance of positions and one of quaternions.
+
+    Attributes:
+        distance: a key of ``DISTANCES``.
+    """
+
+    distance: Literal["norm", "mse"] = "norm"
+
+    def distances(
+        self, prediction: PosePrediction, position_m: Tensor, quat_wxyz: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Distances of predictions, in float32, to positions (B, 3) and unit quaternions (B, 4)."""
+        position, orientation = DISTANCES[self.distance]
+        return (
+            position(prediction.position_m.float(), position_m),
+            orientation(prediction.quat_wxyz.float(), quat_wxyz),
+        )
+
+
+class BetaLoss(PoseLoss):
     """``L_position + beta * L_orientation`` (Kendall et al., ICCV 2015, eq. 2)."""
 
     def __init__(self, beta: float) -> None:
@@ -42,11 +90,11 @@ class BetaLoss(nn.Module):
 
     def forward(self, prediction: PosePrediction, position_m: Tensor, quat_wxyz: Tensor) -> Tensor:
         """Scalar loss of predictions against positions (B, 3) and unit quaternions (B, 4)."""
-        position = position_distance(prediction.position_m, position_m)
-        return position + self.beta * quat_distance(prediction.quat_wxyz, quat_wxyz)
+        position, orientation = self.distances(prediction, position_m, quat_wxyz)
+        return position + self.beta * orientation
 
 
-class LearnedWeightLoss(nn.Module):
+class LearnedWeightLoss(PoseLoss):
     """``exp(-s_p) L_position + s_p + exp(-s_o) L_orientation + s_o`` with learned ``s``.
 
     Homoscedastic uncertainty (Kendall and Cipolla, CVPR 2017, eq. 4). For constant errors the
@@ -60,7 +108,6 @@ class LearnedWeightLoss(nn.Module):
 
     def forward(self, prediction: PosePrediction, position_m: Tensor, quat_wxyz: Tensor) -> Tensor:
         """Scalar loss of predictions against positions (B, 3) and unit quaternions (B, 4)."""
-        position = position_distance(prediction.position_m, position_m)
-        orientation = quat_distance(prediction.quat_wxyz, quat_wxyz)
+        position, orientation = self.distances(prediction, position_m, quat_wxyz)
         weighted_position = torch.exp(-self.s_position) * position + self.s_position
         return weighted_position + torch.exp(-self.s_orientation) * orientation + self.s_orientation

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Literal
 
-BackboneName = Literal["googlenet", "resnet34"]
+from synfeal.config.learning import NetworkConfig
 
-BACKBONE_OF: dict[str, BackboneName] = {
-    "posenet": "googlenet",
-    "poselstm": "googlenet",
-    "hourglass": "resnet34",
-    "posenet2resnet": "resnet34",
-    "posenet2": "googlenet",
-}
+BackboneName = Literal["googlenet", "inception_v3", "resnet34"]
+
+RESNET_LOCALIZERS = frozenset({"hourglass", "posenet2resnet"})
+
+
+def backbone_of(model: str, network: NetworkConfig) -> BackboneName:
+    """The backbone of a localizer: ResNet-34, or the Inception network of the configuration."""
+    return "resnet34" if model in RESNET_LOCALIZERS else network.backbone

@@ -9,9 +9,10 @@ r"""PoseLSTM.
 }
 
 Differences from the paper: batch normalisation in the backbone; hidden states of 128 units per
-direction, as in the Synfeal authors' code, where the paper has 256; q and -q count as the same
-rotation. At a width below 1 the feature's two sides and the hidden states shrink with its square
-root.
+direction, as in the Synfeal authors' code, where PoseLSTM's own code has 256; q and -q count as the
+same rotation, except with ``protocol: published``. The Synfeal authors' code has two auxiliary
+regressors, with LSTMs, and reads the pooled maps of Inception v3 without the paper's layer before.
+At a width below 1 the feature's two sides and the hidden states shrink with its square root.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import torch
 from torch import Tensor, nn
 
 from baselines.localizers.backbones.channels import scaled_channels
-from baselines.localizers.backbones.googlenet import GoogLeNet
+from baselines.localizers.backbones.weights import build_inception
 from baselines.localizers.base import Localizer, beta_loss
 from baselines.localizers.heads import PoseRegressor
 from baselines.localizers.losses import PosePrediction
@@ -50,13 +51,13 @@ class FourDirectionLstm(nn.Module):
 
 
 class PoseLstm(Localizer):
-    """GoogLeNet, a feature reduced by LSTMs in four directions, fixed weight ``beta``."""
+    """An Inception network, its feature reduced by LSTMs in four directions, weight ``beta``."""
 
     def __init__(self, network: NetworkConfig, hyper: LocalizerConfig) -> None:
         super().__init__()
         side = math.sqrt(network.width)
         rows, columns = scaled_channels(ROWS, side), scaled_channels(COLUMNS, side)
-        self.backbone = GoogLeNet(network.width)
+        self.backbone = build_inception(network.backbone, network.width)
         self.feature = nn.Sequential(
             nn.AdaptiveAvgPool2d(1),
             nn.Flatten(),
@@ -69,5 +70,5 @@ class PoseLstm(Localizer):
 
     def forward(self, images: Tensor) -> list[PosePrediction]:
         """One prediction."""
-        features = self.feature(self.backbone(images).inception5b)
+        features = self.feature(self.backbone(images).last)
         return [self.regressor(self.lstm(features))]

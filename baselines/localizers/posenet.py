@@ -7,8 +7,11 @@
   year      = {2015}
 }
 
-Differences from the paper: batch normalisation in the backbone; q and -q count as the same
-rotation.
+Differences from the paper: batch normalisation in the backbone; one rate of dropout for all three
+regressors; q and -q count as the same rotation, except with ``protocol: published``. On Inception
+v3 the auxiliary regressors keep the size they have on GoogLeNet; the Synfeal authors' code makes
+them larger (maps of 5 x 5, 2048 units) and predicts the main pose from the pooled maps, without the
+paper's layer of 2048 units between.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from __future__ import annotations
 from torch import Tensor, nn
 
 from baselines.localizers.backbones.channels import scaled_channels
-from baselines.localizers.backbones.googlenet import GoogLeNet
+from baselines.localizers.backbones.weights import build_inception
 from baselines.localizers.base import Localizer, beta_loss
 from baselines.localizers.heads import PooledRegressor, PoseRegressor
 from baselines.localizers.losses import PosePrediction
@@ -24,7 +27,7 @@ from synfeal.config.models import LocalizerConfig, NetworkConfig
 
 
 class AuxiliaryRegressor(nn.Sequential):
-    """GoogLeNet's auxiliary head with a pose instead of classes."""
+    """GoogLeNet's auxiliary head with a pose instead of classes: maps of 4 x 4, 1024 units."""
 
     def __init__(self, n_in: int, width: float, dropout: float) -> None:
         n_conv, n_features = scaled_channels(128, width), scaled_channels(1024, width)
@@ -41,11 +44,11 @@ class AuxiliaryRegressor(nn.Sequential):
 
 
 class PoseNet(Localizer):
-    """GoogLeNet, one regressor at its end and two auxiliary ones, fixed weight ``beta``."""
+    """An Inception network, a regressor at its end, two on the way, fixed weight ``beta``."""
 
     def __init__(self, network: NetworkConfig, hyper: LocalizerConfig) -> None:
         super().__init__()
-        self.backbone = GoogLeNet(network.width)
+        self.backbone = build_inception(network.backbone, network.width)
         first, second = self.backbone.n_aux
         self.regressor = PooledRegressor(self.backbone.n_out, network.width, hyper.dropout)
         self.auxiliary1 = AuxiliaryRegressor(first, network.width, hyper.dropout)
@@ -56,7 +59,7 @@ class PoseNet(Localizer):
         """Main prediction, then those of the first and second auxiliary regressor."""
         maps = self.backbone(images)
         return [
-            self.regressor(maps.inception5b),
-            self.auxiliary1(maps.inception4a),
-            self.auxiliary2(maps.inception4d),
+            self.regressor(maps.last),
+            self.auxiliary1(maps.auxiliary1),
+            self.auxiliary2(maps.auxiliary2),
         ]

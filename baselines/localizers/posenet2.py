@@ -7,16 +7,19 @@
   year      = {2017}
 }
 
+The weights start at ``s_position`` and ``s_orientation``, by default at the paper's 0 and -3.
 Differences from the paper: batch normalisation in the backbone; Euclidean norms, where the paper
-found L1 norms slightly better; no fine-tuning on reprojection errors, as in Synfeal; q and -q count
-as the same rotation.
+found L1 norms slightly better; the predicted quaternion is not normalised (``quat_distance`` says
+why), and q and -q count as the same rotation, except with ``protocol: published``; no fine-tuning
+on reprojection errors, as in Synfeal. The Synfeal authors' code has PoseNet's two auxiliary
+regressors here too.
 """
 
 from __future__ import annotations
 
 from torch import Tensor
 
-from baselines.localizers.backbones.googlenet import GoogLeNet
+from baselines.localizers.backbones.weights import build_inception
 from baselines.localizers.base import Localizer, learned_loss
 from baselines.localizers.heads import PooledRegressor
 from baselines.localizers.losses import PosePrediction
@@ -24,14 +27,14 @@ from synfeal.config.models import LocalizerConfig, NetworkConfig
 
 
 class PoseNet2(Localizer):
-    """GoogLeNet, one regressor, learned weights."""
+    """An Inception network, one regressor, learned weights."""
 
     def __init__(self, network: NetworkConfig, hyper: LocalizerConfig) -> None:
         super().__init__()
-        self.backbone = GoogLeNet(network.width)
+        self.backbone = build_inception(network.backbone, network.width)
         self.regressor = PooledRegressor(self.backbone.n_out, network.width, hyper.dropout)
         self.criterion = learned_loss(hyper)
 
     def forward(self, images: Tensor) -> list[PosePrediction]:
         """One prediction."""
-        return [self.regressor(self.backbone(images).inception5b)]
+        return [self.regressor(self.backbone(images).last)]

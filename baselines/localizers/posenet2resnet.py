@@ -9,7 +9,7 @@ The loss is the one of
   year      = {2017}
 }
 
-Differences: those of ``posenet2``, and the backbone.
+Differences: those of ``posenet2``, and the backbone. The Synfeal authors' code has the same layers.
 """
 
 from __future__ import annotations

@@ -1,16 +1,39 @@
-"""Trained localizers on disk: weights, and the image statistics they were trained with."""
+"""Trained localizers on disk: weights, image statistics, and what it takes to use them."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import torch
 
 from baselines.localizers.base import Localizer
+from baselines.localizers.registry import build_localizer
 from baselines.training.data import ImageStatistics
+from baselines.training.description import ModelDescription, parse_description
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
+
+
+@dataclass(frozen=True)
+class TrainedLocalizer:
+    """A localizer that was read from a checkpoint, ready for prediction.
+
+    Attributes:
+        description: what it is.
+        network: the network on its device, in evaluation mode.
+        statistics: of the images it was trained on.
+    """
+
+    description: ModelDescription
+    network: Localizer
+    statistics: ImageStatistics
+
+    @property
+    def device(self) -> torch.device:
+        """Where the network is."""
+        return self.statistics.mean.device
 
 
 def save_atomically(path: Path, value: Any) -> None:
@@ -19,28 +42,61 @@ def save_atomically(path: Path, value: Any) -> None:
         torch.save(value, temporary)
 
 
-def save_checkpoint(path: Path, localizer: Localizer, statistics: ImageStatistics) -> None:
-    """Write everything prediction needs beside the configuration."""
-    state = {name: value.detach().cpu() for name, value in localizer.state_dict().items()}
-    statistic = {"mean": statistics.mean.cpu(), "deviation": statistics.deviation.cpu()}
-    save_atomically(path, {"localizer": state, "images": statistic})
+def save_checkpoint(
+    path: Path, localizer: Localizer, statistics: ImageStatistics, description: ModelDescription
+) -> None:
+    """Write everything prediction needs; tensors and plain values, so that reading runs no code."""
+    checkpoint = {
+        "description": description.model_dump(mode="json"),
+        "localizer": {name: v.detach().cpu() for name, v in localizer.state_dict().items()},
+        "images": {"mean": statistics.mean.cpu(), "deviation": statistics.deviation.cpu()},
+    }
+    save_atomically(path, checkpoint)
 
 
-def load_checkpoint(path: Path, localizer: Localizer, device: torch.device) -> ImageStatistics:
-    """Load weights into a localizer on ``device`` and return its image statistics.
+def read_checkpoint(path: Path, device: torch.device) -> TrainedLocalizer:
+    """Build the localizer that a checkpoint describes, with its weights, on ``device``.
 
     Raises:
-        InputError: the file cannot be read, or belongs to another localizer or network shape.
+        InputError: the file is missing or damaged, is no checkpoint, or is one without description.
     """
+    content = _read(path, device)
+    if "description" not in content:
+        raise InputError(
+            f"{path}: does not say which localizer it is (written before checkpoints did);"
+            " train it again"
+        )
+    description = parse_description(content["description"], path)
     try:
-        checkpoint = torch.load(path, map_location=device, weights_only=True)
-        localizer.load_state_dict(checkpoint["localizer"])
-        found = ImageStatistics(**checkpoint["images"])
-        for value in (found.mean, found.deviation):
-            if value.shape != (1, 3, 1, 1) or not value.isfinite().all():
-                raise ValueError("its image statistics are damaged")
-        return found
+        network = build_localizer(description.localizer, description.network, description.hyper)
+        network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+        network.load_state_dict(content["localizer"])
+        statistics = _checked(ImageStatistics(**content["images"]))
+    except Exception as error:  # damaged values are refused in every way there is
+        message = f"{path}: its weights are not those of the {description.localizer} it describes"
+        raise InputError(f"{message} ({str(error)[:200]}); train it again") from None
+    return TrainedLocalizer(description, network.eval(), statistics)
+
+
+def _read(path: Path, device: torch.device) -> dict[str, Any]:
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; name the model.pt of a training")
+    try:
+        content = torch.load(path, map_location=device, weights_only=True)
     except Exception as error:  # torch.load raises whatever the broken file provokes
-        reason = str(error)[:200]
-        message = f"{path}: is no checkpoint of {type(localizer).__name__} at this network shape"
-        raise InputError(f"{message} ({reason}); train it again") from None
+        reason = str(error).strip().splitlines() or [type(error).__name__]
+        raise InputError(
+            f"{path}: cannot be read as a trained localizer ({reason[0][:200]})"
+        ) from None
+    if not isinstance(content, dict) or not {"localizer", "images"} <= content.keys():
+        raise InputError(f"{path}: holds no trained localizer; name the model.pt of a training")
+    return content
+
+
+def _checked(statistics: ImageStatistics) -> ImageStatistics:
+    for value in (statistics.mean, statistics.deviation):
+        if value.shape != (1, 3, 1, 1) or not value.isfinite().all():
+            raise ValueError("its image statistics are damaged")
+    if not (statistics.deviation > 0).all():
+        raise ValueError("its image statistics have no deviation")
+    return statistics

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from synfeal.dataset.packed import read_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
 
-# Frames per step when statistics of a whole set are computed.
+# Frames per step when a whole set is read, or its statistics are computed.
 CHUNK = 500
 
 
@@ -29,26 +31,56 @@ class ImageStatistics:
         return (images.float() - self.mean).div_(self.deviation)
 
 
-@dataclass(frozen=True)
-class LabelledFrames:
-    """A split on the device.
-
-    Attributes:
-        images: (N, 3, H, W) uint8, channels last in memory.
-        position_m: (N, 3) float32.
-        quat_wxyz: (N, 4) float32, unit length.
-    """
+class Batch(NamedTuple):
+    """Images (B, 3, H, W) uint8, positions (B, 3) in metres and unit quaternions (B, 4)."""
 
     images: Tensor
     position_m: Tensor
     quat_wxyz: Tensor
 
+
+@dataclass(frozen=True)
+class LabelledFrames:
+    """A split on the device, or a part of one: parts share the images.
+
+    Attributes:
+        images: (N, 3, H, W) uint8 of the split, channels last in memory.
+        position_m: (M, 3) float32, of the part.
+        quat_wxyz: (M, 4) float32, of the part, unit length.
+        path: (M,) index of the straight path each frame of the part belongs to.
+        rows: (M,) int64: which of the images belong to the part.
+    """
+
+    images: Tensor
+    position_m: Tensor
+    quat_wxyz: Tensor
+    path: NDArray[np.int64]
+    rows: Tensor
+
     def __len__(self) -> int:
-        return len(self.images)
+        return len(self.rows)
+
+    def batch(self, chosen: Tensor) -> Batch:
+        """The frames of the part with these indices (B,)."""
+        rows = self.rows[chosen]
+        return Batch(self.images[rows], self.position_m[chosen], self.quat_wxyz[chosen])
+
+    def part(self, mask: NDArray[np.bool_]) -> LabelledFrames:
+        """The frames of the part where ``mask`` (M,) is true; no image is copied."""
+        kept = torch.from_numpy(np.flatnonzero(mask)).to(self.rows.device)
+        return LabelledFrames(
+            self.images,
+            self.position_m[kept],
+            self.quat_wxyz[kept],
+            self.path[mask],
+            self.rows[kept],
+        )
 
 
 def read_images(path: Path, count: int, input_px: int, device: torch.device) -> Tensor:
     """The first ``count`` frames of a packed file as (count, 3, px, px) uint8, channels last.
+
+    Beside the result no more than ``CHUNK`` frames are in memory, on whatever device it is.
 
     Raises:
         InputError: the file is no packed frames, has another size, or holds too few of them.
@@ -61,7 +93,11 @@ def read_images(path: Path, count: int, input_px: int, device: torch.device) -> 
         )
     if len(frames) < count:
         raise InputError(f"{path}: holds {len(frames)} frames, but {count} are labelled")
-    return torch.from_numpy(np.array(frames[:count])).to(device).permute(0, 3, 1, 2)
+    images = torch.empty((count, *frames.shape[1:]), dtype=torch.uint8, device=device)
+    for start in range(0, count, CHUNK):
+        chunk = images[start : start + CHUNK]
+        chunk.copy_(torch.from_numpy(np.array(frames[start : start + len(chunk)])))
+    return images.permute(0, 3, 1, 2)
 
 
 def read_labelled_frames(
@@ -77,7 +113,8 @@ def read_labelled_frames(
         raise InputError(f"{labels}: has no rows; nothing to learn from")
     images = read_images(frames, len(table), input_px, device)
     position_m, quat_wxyz = _poses(table, device)
-    return LabelledFrames(images, position_m, quat_wxyz)
+    rows = torch.arange(len(table), device=device)
+    return LabelledFrames(images, position_m, quat_wxyz, table.path, rows)
 
 
 def image_statistics(images: Tensor) -> ImageStatistics:

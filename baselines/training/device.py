@@ -1,4 +1,4 @@
-"""Where networks run, and what the processor is told first."""
+"""Where networks run, in which precision, and what the processor is told first."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import Literal
 import torch
 
 from synfeal.errors import InputError
+
+Precision = Literal["float32", "bfloat16"]
 
 
 def open_device(wanted: Literal["auto", "cpu", "cuda"]) -> torch.device:
@@ -21,10 +23,22 @@ def open_device(wanted: Literal["auto", "cpu", "cuda"]) -> torch.device:
     """
     if wanted == "cuda" and not torch.cuda.is_available():
         raise InputError(
-            "training.device: 'cuda' was asked for, but torch finds no GPU; use 'auto'"
+            "training.device or --device: 'cuda' is asked for, but torch finds no GPU; use 'auto'"
         )
     if wanted != "cpu" and torch.cuda.is_available():
         return torch.device("cuda")
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)
     return torch.device("cpu")
+
+
+def precision_on(device: torch.device, wanted: Literal["auto", "float32", "bfloat16"]) -> Precision:
+    """The precision networks compute in; ``auto`` is bfloat16 on a GPU, float32 elsewhere."""
+    if wanted != "auto":
+        return wanted
+    return "bfloat16" if device.type == "cuda" else "float32"
+
+
+def autocast(device: torch.device, precision: Precision) -> torch.autocast:
+    """A context in which networks compute in this precision; weights stay in float32."""
+    return torch.autocast(device.type, torch.bfloat16, enabled=precision == "bfloat16")

@@ -2,43 +2,30 @@
 
 from __future__ import annotations
 
-import csv
-import logging
-import time
-from collections.abc import Iterator
-from pathlib import Path
-from typing import NamedTuple
+from typing import Protocol as Interface
 
 import torch
-from torch import Tensor, nn
-from torch.optim.lr_scheduler import OneCycleLR
+from torch import Tensor
 
 from baselines.localizers.base import Localizer
 from baselines.training.data import ImageStatistics, LabelledFrames
-from synfeal.files import atomic_path
+from baselines.training.device import Precision, autocast
+from baselines.training.optimizer import Schedule, optimizer_of
+from baselines.training.order import BatchOrder
+from baselines.training.progress import HistoryRow, Progress
+from baselines.training.protocol import PROTOCOLS, Protocol
+from baselines.training.resume import RandomState, Restorable, ResumeFile, stop_signals
+from baselines.training.selection import Selection
 
-log = logging.getLogger(__name__)
-
-# Seconds between progress lines, and rows of the history of a training.
-LOG_EVERY_S = 5.0
-HISTORY_ROWS = 50
-
-
-class Schedule(NamedTuple):
-    """How long and how fast to learn."""
-
-    samples_seen: int
-    batch_size: int
-    learning_rate: float
-    weight_decay: float
+LAST_WEIGHTS = PROTOCOLS["corrected"]._replace(selection="last")
+NOT_KEPT = ResumeFile(None, "")
 
 
-class HistoryRow(NamedTuple):
-    """Mean loss since the row before."""
+class Augmentation(Restorable, Interface):
+    """Changes training images and the labels with them; its state is where its generator stands."""
 
-    samples_seen: int
-    loss: float
-    learning_rate: float
+    def __call__(self, images: Tensor, quat_wxyz: Tensor) -> tuple[Tensor, Tensor]:
+        """Other images (B, 3, H, W), normalised, and their unit quaternions (B, 4)."""
 
 
 def fit(
@@ -47,103 +34,79 @@ def fit(
     statistics: ImageStatistics,
     schedule: Schedule,
     seed: int,
+    *,
+    protocol: Protocol = LAST_WEIGHTS,
+    held_out: LabelledFrames | None = None,
+    patience: int | None = None,
+    precision: Precision = "float32",
+    augment: Augmentation | None = None,
+    resume: ResumeFile = NOT_KEPT,
 ) -> list[HistoryRow]:
-    """Train in place with AdamW and a one-cycle schedule (Smith and Topin, 2019).
+    """Train in place and return the history.
 
-    Stops early when the loss is no longer finite: the run then scores as failed.
+    Stops when the loss is no longer finite. Such a training has failed: all its weights become NaN,
+    also where weights from before would do, because a good one is not one that was stopped in time.
+
+    Args:
+        localizer: on the device of the frames.
+        frames: to learn from.
+        statistics: of the images.
+        schedule: how long and how fast.
+        seed: of the order of the frames; dropout draws from torch's global generator.
+        protocol: how.
+        held_out: frames that decide which weights are kept; without any it is the last ones.
+        patience: evaluations without a new best after which training stops.
+        precision: of the network; losses and weights are float32.
+        augment: applied to each batch of normalised images.
+        resume: where the state is kept; a training that finds its own there goes on with it.
     """
-    steps = -(-schedule.samples_seen // schedule.batch_size)
-    # A shorter memory of squared gradients than the default: it must fit into a few hundred steps.
-    optimizer = torch.optim.AdamW(
-        _parameter_groups(localizer, schedule.weight_decay), betas=(0.9, 0.99), fused=True
-    )
-    scheduler = OneCycleLR(
-        optimizer, schedule.learning_rate, total_steps=max(steps, 2), pct_start=0.2
-    )
-    progress = Progress(steps, schedule.batch_size)
+    device, steps = frames.images.device, schedule.steps
+    optimizer, scheduler = optimizer_of(protocol.schedule, localizer, schedule)
+    order = BatchOrder(len(frames), schedule.batch_size, seed, protocol.order == "shuffled")
+    progress = Progress(steps, schedule.batch_size, device)
+    selection = Selection(protocol.selection, localizer, statistics, held_out, precision)
+    evaluations = selection.due_after(steps, schedule.samples_seen)
+    localizer.criterion.distance = protocol.distance
+    parts: dict[str, Restorable] = {
+        "localizer": localizer,
+        "optimizer": optimizer,
+        "scheduler": scheduler,
+        "order": order,
+        "progress": progress,
+        "selection": selection,
+        "random": RandomState(device),
+    }
+    if augment is not None:
+        parts["augment"] = augment
+    resume.load(parts)
     localizer.train()
-    for indices in shuffled_batches(len(frames), schedule.batch_size, steps, seed):
-        indices = indices.to(frames.images.device)
-        predictions = localizer(statistics.normalise(frames.images[indices]))
-        loss = localizer.loss(predictions, frames.position_m[indices], frames.quat_wxyz[indices])
-        optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
-        optimizer.step()
-        rate = float(scheduler.get_last_lr()[0])
-        scheduler.step()
-        if not progress.record(loss, rate):
-            break
+    with stop_signals() as stopped:
+        while not (stopped() or progress.ended or selection.stale(patience)):
+            images, position_m, quat_wxyz = frames.batch(order.next_batch().to(device))
+            normalised = statistics.normalise(images)
+            if augment is not None:
+                normalised, quat_wxyz = augment(normalised, quat_wxyz)
+            with autocast(device, precision):
+                predictions = localizer(normalised)
+            loss = localizer.loss(predictions, position_m, quat_wxyz)
+            optimizer.zero_grad()
+            loss.backward()  # type: ignore[no-untyped-call]
+            optimizer.step()
+            rate = float(scheduler.get_last_lr()[0])
+            scheduler.step()
+            progress.add(loss)
+            errors = selection.evaluate() if progress.done in evaluations else None
+            progress.end_step(rate, errors)
+            resume.save_if_due(parts, now=stopped())
+    if progress.diverged:
+        _spoil(localizer)
+    else:
+        selection.restore()
     return progress.rows
 
 
-def shuffled_batches(n_frames: int, batch_size: int, steps: int, seed: int) -> Iterator[Tensor]:
-    """``steps`` batches of indices: one shuffled epoch after another, cut without regard to epochs.
-
-    Every batch is full, also when the set is smaller than a batch, so batch statistics stay stable.
-    """
-    generator = torch.Generator().manual_seed(seed)
-    pending = torch.empty(0, dtype=torch.long)
-    for _ in range(steps):
-        while len(pending) < batch_size:
-            pending = torch.cat([pending, torch.randperm(n_frames, generator=generator)])
-        yield pending[:batch_size]
-        pending = pending[batch_size:]
-
-
-class Progress:
-    """Collects the history and says every few seconds how far the training is."""
-
-    def __init__(self, steps: int, batch_size: int) -> None:
-        self.rows: list[HistoryRow] = []
-        self._steps, self._batch_size = steps, batch_size
-        self._every = max(1, steps // HISTORY_ROWS)
-        self._losses: list[Tensor] = []
-        self._done = 0
-        self._start = self._said = time.monotonic()
-
-    def record(self, loss: Tensor, learning_rate: float) -> bool:
-        """Note one step; False when the loss has stopped being finite.
-
-        Losses are fetched from the device once per row, so that a GPU is not waited for.
-        """
-        self._losses.append(loss.detach())
-        self._done += 1
-        if self._done % self._every and self._done != self._steps:
-            return True
-        mean = float(torch.stack(self._losses).mean())
-        self._losses.clear()
-        self.rows.append(HistoryRow(self._done * self._batch_size, mean, learning_rate))
-        self._say(mean, learning_rate)
-        if mean != mean or abs(mean) == float("inf"):
-            log.warning("the loss is %s after %d steps: training stops", mean, self._done)
-            return False
-        return True
-
-    def _say(self, loss: float, learning_rate: float) -> None:
-        now = time.monotonic()
-        if now - self._said < LOG_EVERY_S and self._done != self._steps:
-            return
-        self._said = now
-        left_s = (now - self._start) / self._done * (self._steps - self._done)
-        samples = self._done * self._batch_size
-        message = "%d of %d samples, loss %.4f, learning rate %.1e, %.0f s left"
-        log.info(message, samples, self._steps * self._batch_size, loss, learning_rate, left_s)
-
-
-def write_history(path: Path, rows: list[HistoryRow]) -> None:
-    """Write the history as CSV, one column per field of a row."""
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(HistoryRow._fields)
-        writer.writerows(rows)
-
-
-def _parameter_groups(localizer: nn.Module, weight_decay: float) -> list[dict[str, object]]:
-    """Weights decay; biases, batch normalisation and loss weights do not."""
-    parameters = list(localizer.parameters())
-    weights = [p for p in parameters if p.ndim > 1]
-    others = [p for p in parameters if p.ndim <= 1]
-    return [
-        {"params": weights, "weight_decay": weight_decay},
-        {"params": others, "weight_decay": 0.0},
-    ]
+@torch.no_grad()
+def _spoil(localizer: Localizer) -> None:
+    """Leave nothing that could be taken for a result."""
+    for parameter in localizer.parameters():
+        parameter.fill_(torch.nan)

@@ -1,68 +1,66 @@
-"""Predictions of a trained localizer for a test set."""
+"""Predictions of a trained localizer."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import Tensor
 
-from baselines.localizers.base import Localizer
-from baselines.localizers.registry import build_localizer
-from baselines.training.checkpoint import load_checkpoint
-from baselines.training.data import ImageStatistics, read_images
+from baselines.training.checkpoint import TrainedLocalizer, read_checkpoint
+from baselines.training.data import read_images
 from baselines.training.device import open_device
-from synfeal.config.models import LocalizerConfig, NetworkConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 
+# Images per step; float32 sums may come out differently in the last digits at another number.
 BATCH = 100
 
 
 def predict_poses(
-    name: str,
     model: Path,
     frames: Path,
     labels_like: Path,
-    network: NetworkConfig,
-    hyper: LocalizerConfig,
     out: Path,
+    device: Literal["auto", "cpu", "cuda"] = "auto",
 ) -> None:
     """Write predictions as a pose table with unit quaternions, w >= 0.
 
     Args:
-        name: a key of ``LOCALIZERS``.
-        model: checkpoint of it.
+        model: checkpoint.
         frames: packed frames of the split.
         labels_like: a pose table that says which frames there are; its poses are not used.
-        network: input side and width the model was trained with.
-        hyper: of this localizer.
-        out: pose table to write; poses of a diverged network are ``nan``.
+        out: pose table to write; a value the network gives no finite number for is ``nan``.
+        device: where to predict.
 
     Raises:
         InputError: one of the files cannot be used.
     """
-    device = open_device("auto")
+    trained = read_checkpoint(model, open_device(device))
     table = read_pose_table(labels_like)
-    images = read_images(frames, len(table), network.input_px, device)
-    localizer = build_localizer(name, network, hyper)
-    localizer.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
-    statistics = load_checkpoint(model, localizer, device)
-    position_m, quat_wxyz = predict(localizer, images, statistics)
+    input_px = trained.description.network.input_px
+    images = read_images(frames, len(table), input_px, trained.device)
+    position_m, quat_wxyz = predict(trained, images)
     write_pose_table(out, PoseTable(table.frame, table.path, position_m, quat_wxyz))
 
 
 @torch.inference_mode()
 def predict(
-    localizer: Localizer, images: Tensor, statistics: ImageStatistics
+    trained: TrainedLocalizer, images: Tensor
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Positions (N, 3) and unit quaternions (N, 4), w >= 0, for images (N, 3, H, W) uint8."""
-    localizer.eval()
-    main = [localizer(statistics.normalise(batch))[0] for batch in torch.split(images, BATCH)]
+    """Positions (N, 3) and unit quaternions (N, 4), w >= 0, for images (N, 3, H, W) uint8.
+
+    A quaternion of zeros, or with a value that is not finite, stands for no rotation: it is
+    returned as four times ``nan``.
+    """
+    normalise = trained.statistics.normalise
+    main = [trained.network(normalise(batch))[0] for batch in torch.split(images, BATCH)]
     position_m = torch.cat([p.position_m for p in main]).double().cpu()
-    quat_wxyz = nn.functional.normalize(
-        torch.cat([p.quat_wxyz for p in main]).double().cpu(), dim=1
-    )
+    quat_wxyz = torch.cat([p.quat_wxyz for p in main]).double().cpu()
+    # In double precision the length of no float32 quaternion but 0 is 0; 0 / 0 and inf / inf: nan.
+    quat_wxyz /= torch.linalg.vector_norm(quat_wxyz, dim=1, keepdim=True)
+    quat_wxyz = torch.where(quat_wxyz.isfinite().all(dim=1, keepdim=True), quat_wxyz, torch.nan)
     quat_wxyz = torch.where(quat_wxyz[:, :1] < 0, -quat_wxyz, quat_wxyz)
     return position_m.numpy(), quat_wxyz.numpy()

@@ -25,12 +25,13 @@ from baselines.localizers.names import BackboneName
 from baselines.training.checkpoint import save_atomically
 from baselines.training.data import image_statistics, read_labelled_frames
 from baselines.training.device import open_device
-from baselines.training.fit import Schedule, fit
+from baselines.training.fit import fit
+from baselines.training.optimizer import Schedule
+from baselines.training.rotation import random_rotation
 from synfeal.config.models import NetworkConfig, PretrainingConfig
 
 log = logging.getLogger(__name__)
 
-BATCH_SIZE = 32
 WEIGHT_DECAY = 1e-4
 
 
@@ -97,7 +98,8 @@ def _train_pretext(
     localizer.set_pose_prior(data.position_m.mean(0))
     log.info("%s: %d frames of the pretext on %s", backbone, len(data), device)
     schedule = Schedule(
-        pretraining.samples_seen, BATCH_SIZE, pretraining.learning_rate, WEIGHT_DECAY
+        pretraining.samples_seen, pretraining.batch_size, pretraining.learning_rate, WEIGHT_DECAY
     )
-    fit(localizer, data, image_statistics(data.images), schedule, seed)
+    augment = random_rotation(frames, network.input_px, pretraining.augmentation, seed)
+    fit(localizer, data, image_statistics(data.images), schedule, seed, augment=augment)
     return localizer.backbone

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 
 from synfeal.bootstrap import limits, medians, path_counts
 from synfeal.dataset.number_table import read_numbers
-from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table, whole_numbers
+from synfeal.dataset.pose_table import (
+    HEADER,
+    UNIT_TOLERANCE,
+    PoseTable,
+    read_pose_table,
+    whole_numbers,
+)
 from synfeal.errors import InputError
 from synfeal.files import atomic_path, write_json
 from synfeal.geometry.poses import position_error_m
@@ -39,8 +45,9 @@ def score_run(
     ``position_m`` and ``orientation_deg`` are against ``labels``, which is what the paper reports;
     the names ending in ``_true`` are against ``truth``. ``position_rms_m`` is the published code's
     definition, the root mean square over the three axes. ``baseline_position_m_true`` is the median
-    error of always predicting the mean training position. ``failed`` counts predictions that are
-    not finite; their error is infinite. A median that is not finite is ``null`` in the JSON.
+    error of always predicting the mean training position. ``failed`` counts predictions that are no
+    pose, i.e. not finite or without a unit quaternion; their error is infinite. A
+    median that is not finite is ``null`` in the JSON.
 
     Args:
         predictions: pose table of the test frames; may hold ``nan``.
@@ -74,13 +81,23 @@ def score_run(
 
 def pose_errors(predicted: PoseTable, reference: PoseTable) -> dict[str, Array]:
     """``position_m`` and ``orientation_deg`` (N,); infinite where a prediction is no pose."""
-    values = np.concatenate([predicted.position_m, predicted.quat_wxyz], axis=1)
-    good = (np.abs(values) < 1e100).all(axis=1) & (values[:, 3:] != 0).any(axis=1)
+    good = _is_pose(predicted)
     position, orientation = np.full(len(good), np.inf), np.full(len(good), np.inf)
     position[good] = position_error_m(predicted.position_m[good], reference.position_m[good])
     angles = rotation_angle_rad(predicted.quat_wxyz[good], reference.quat_wxyz[good])
     orientation[good] = np.degrees(angles)
     return {"position_m": position, "orientation_deg": orientation}
+
+
+def _is_pose(predicted: PoseTable) -> NDArray[np.bool_]:
+    """Which predictions (N,) are finite and have a quaternion of unit length.
+
+    Another length is not mended: a quaternion of zeros, say, has no direction to be brought to.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = np.abs(np.linalg.norm(predicted.quat_wxyz, axis=1) - 1.0)
+        position = np.abs(predicted.position_m).max(axis=1)
+    return np.asarray((position < 1e100) & (off <= UNIT_TOLERANCE))
 
 
 def median_metrics(errors: Mapping[str, Array], path: NDArray[np.int64]) -> dict[str, float | None]:

@@ -39,14 +39,12 @@ def _speed(axes: Axes, rows: Sequence[Row], colour: str) -> None:
     """One graph: a line through TORO's runs, and the two least-squares solvers."""
     toro = [row for row in rows if str(row["optimiser"]).startswith("TORO")]
     axes.plot(_values(toro, "seconds"), _values(toro, "chi2_ratio"), "o-", color=colour)
-    for row in rows:
-        x, y, name = (
-            *(_values([row], key)[0] for key in ("seconds", "chi2_ratio")),
-            row["optimiser"],
-        )
+    for row in [*toro, *(row for row in rows if row["optimiser"] in MARK_OF)]:
+        x, y = (_values([row], key)[0] for key in ("seconds", "chi2_ratio"))
+        name = str(row["optimiser"])
         if name in MARK_OF:
-            axes.plot(x, y, MARK_OF[str(name)], color=colour, markersize=10)
-        label = f"{row['graph']}, {name}" if name in MARK_OF else str(name)
+            axes.plot(x, y, MARK_OF[name], color=colour, markersize=10)
+        label = f"{row['graph']}, {name}" if name in MARK_OF else name
         axes.annotate(label, (x, y), (4, 5), textcoords="offset points", fontsize=7)
 
 

@@ -20,6 +20,7 @@ from baselines.groundtruth.sfm.batch import cpu_s
 from baselines.groundtruth.sfm.features import extract_features, match_features
 from baselines.groundtruth.sfm.images import link_images
 from baselines.groundtruth.sfm.mapping import camera_poses, map_matches, read_matches
+from baselines.groundtruth.sfm.refine import refine_model
 from baselines.groundtruth.sfm.scale import metric_trajectory
 from baselines.groundtruth.trajectory import BatchTrajectory
 from synfeal.config.models import CameraConfig, GroundTruthConfig, SfmConfig
@@ -104,8 +105,11 @@ def _measure(
     shutil.rmtree(models, ignore_errors=True)
     begin = time.process_time()
     mapping = map_matches(read_matches(directory / "images", database), models, cfg, SEED)
-    mapping_s = time.process_time() - begin
     true = np.array([read_pose(path) for path in batch.poses])
+    mapped = _errors(metric_trajectory(*camera_poses(mapping.model), true), true)
+    if mapping.model is not None:
+        refine_model(mapping.model)
+    mapping_s = time.process_time() - begin
     frames, model_from_cam = camera_poses(mapping.model)
     trajectory = metric_trajectory(frames, model_from_cam, true)
     return {
@@ -120,6 +124,8 @@ def _measure(
         "starts": mapping.starts,
         "explained": mapping.explained,
         **_errors(trajectory, true),
+        "mapped_median_m": mapped["median_m"],
+        "mapped_median_deg": mapped["median_deg"],
         "fitted_median_m": fitted_median_m(model_from_cam[:, :3, 3], true[frames, :3, 3]),
         "features_s": features_s,
         "matching_s": matching_s,

@@ -41,6 +41,8 @@ COLUMNS = (
     "max_deg",
     "last_deg",
     "fitted_median_m",
+    "mapped_median_m",
+    "mapped_median_deg",
     "assisted",
     "features_s",
     "matching_s",

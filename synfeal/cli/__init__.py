@@ -1,4 +1,4 @@
-"""Command line: look at a mesh, make a 7-Scenes data set from it, plan and compare runs."""
+"""Command line: look at a mesh, make a data set of it, plan and compare runs, use a model."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import logging
 from collections.abc import Sequence
 
 from synfeal import __version__
-from synfeal.cli import collect, compare, export, inspect, plan, validate
+from synfeal.cli import collect, compare, export, inspect, localize, plan, validate
 from synfeal.errors import exit_status
 
 COMMANDS = (
@@ -15,6 +15,7 @@ COMMANDS = (
     inspect.COMMAND,
     validate.COMMAND,
     export.COMMAND,
+    localize.COMMAND,
     plan.COMMAND,
     compare.COMMAND,
 )

@@ -3,22 +3,40 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from synfeal.config.collection import Count, Finite, Fraction, NonNegative, Positive, Slug, Strict
+
+InceptionName = Literal["googlenet", "inception_v3"]
+# A smaller image leaves nothing of its last maps: its reductions have no padding.
+INCEPTION_V3_MIN_PX = 75
 
 
 class NetworkConfig(Strict):
     """Shape shared by all localizers."""
 
+    backbone: InceptionName = Field(
+        "googlenet",
+        description="what PoseNet, PoseLSTM and PoseNet2 stand on: `googlenet` as in their papers,"
+        " `inception_v3` as in the Synfeal authors' code (299 pixels there, at least 75)",
+    )
     input_px: Annotated[int, Field(ge=32, le=1024)] = Field(
         224, description="side of the square input"
     )
     width: Annotated[float, Field(gt=0, le=1)] = Field(
         1.0, description="factor on the channels of every backbone; only 1 loads ImageNet weights"
     )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.backbone == "inception_v3" and self.input_px < INCEPTION_V3_MIN_PX:
+            raise ValueError(
+                f"input_px: must be at least {INCEPTION_V3_MIN_PX} with `backbone: inception_v3`,"
+                f" found {self.input_px}"
+            )
+        return self
 
 
 class LocalizerConfig(Strict):
@@ -29,6 +47,11 @@ class LocalizerConfig(Strict):
     )
     weight_decay: NonNegative = Field(1e-4, description="decoupled weight decay")
     dropout: Fraction = Field(0.5, description="dropout before the regressors")
+    skip: Literal["sum", "concatenation"] = Field(
+        "sum",
+        description="Hourglass alone: how its decoder joins the encoder's maps; the Synfeal"
+        " authors' code concatenates",
+    )
     beta: Positive | None = Field(None, description="weight of the orientation term (beta losses)")
     s_position: Finite = Field(0.0, description="initial log-variance of position (learned losses)")
     s_orientation: Finite = Field(
@@ -36,13 +59,67 @@ class LocalizerConfig(Strict):
     )
 
 
-class TrainingConfig(Strict):
-    """The one protocol all localizers are trained with."""
+class AugmentationConfig(Strict):
+    """New poses from old images: each is turned as if its camera had been, and its label with it.
 
+    Angles are drawn anew whenever an image is shown. Exact for pinhole cameras; what the frame did
+    not see is filled with its border.
+    """
+
+    tilt_deg: Annotated[float, Field(ge=0, le=45)] = Field(
+        0.0, description="largest turn about the camera's x and y axes"
+    )
+    roll_deg: Annotated[float, Field(ge=0, le=180)] = Field(
+        0.0, description="largest turn about its optical axis"
+    )
+
+    @property
+    def turns(self) -> bool:
+        """Whether anything changes."""
+        return max(self.tilt_deg, self.roll_deg) > 0
+
+
+class TrainingConfig(Strict):
+    """How all localizers are trained."""
+
+    protocol: Literal["corrected", "published"] = Field(
+        "corrected",
+        description="`corrected`: frames shuffled, weights chosen on training paths that are held"
+        " out, Euclidean norms, one cycle of the learning rate; `published`, as in the Synfeal"
+        " authors' code: frames in the order of collection, weights chosen on the test set, mean"
+        " squared errors, learning rate halved at intervals",
+    )
+    validation_share: Annotated[float, Field(ge=0, lt=1)] = Field(
+        0.1,
+        description="`corrected`: share of the training paths that are held out to choose the"
+        " weights (at least one path); 0 learns from all and keeps the last weights",
+    )
+    patience: Count | None = Field(
+        None,
+        description="`published`: evaluations (20 in a training) without a new best after which"
+        " training stops; not with `corrected`, whose cycle makes most of its gain at the end,"
+        " when the rate falls",
+    )
+    augmentation: AugmentationConfig = Field(
+        default_factory=AugmentationConfig,
+        description="`corrected`: random rotations of the camera",
+    )
+    precision: Literal["auto", "float32", "bfloat16"] = Field(
+        "auto", description="what networks compute in; `auto`: bfloat16 on a GPU, else float32"
+    )
     batch_size: Count = Field(32, description="images per step")
     samples_seen: dict[str, Count] = Field(description="images shown in all, by data set size")
     repetitions: Count = Field(1, description="independent seeds per cell")
     device: Literal["auto", "cpu", "cuda"] = Field("auto", description="where to train")
+
+    @model_validator(mode="after")
+    def _check_patience(self) -> Self:
+        if self.patience is not None and self.protocol == "corrected":
+            raise ValueError(
+                "patience: must be left out with `protocol: corrected`, whose learning rate follows"
+                " one cycle of a length known beforehand; lower samples_seen instead"
+            )
+        return self
 
 
 class PretrainingConfig(Strict):
@@ -54,5 +131,9 @@ class PretrainingConfig(Strict):
     scene: Slug = Field("pretext_room", description="pretext: the scene to train the backbones on")
     frames: Count = Field(2000, description="pretext: frames to render (not scaled)")
     samples_seen: Count = Field(64_000, description="pretext: images shown in all")
+    batch_size: Count = Field(32, description="pretext: images per step")
     learning_rate: Positive = Field(1e-3, description="pretext: peak learning rate")
+    augmentation: AugmentationConfig = Field(
+        default_factory=AugmentationConfig, description="pretext: random rotations of the camera"
+    )
     weights_dir: Path = Field(Path("weights"), description="imagenet: where the files are kept")

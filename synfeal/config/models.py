@@ -24,6 +24,7 @@ from synfeal.config.collection import (
     Strict,
 )
 from synfeal.config.learning import (
+    AugmentationConfig,
     LocalizerConfig,
     NetworkConfig,
     PretrainingConfig,
@@ -33,6 +34,7 @@ from synfeal.config.learning import (
 __all__ = [
     "MODELS",
     "Angles",
+    "AugmentationConfig",
     "Box",
     "CameraConfig",
     "CollectionConfig",

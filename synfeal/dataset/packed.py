@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,12 +78,26 @@ def read_packed(path: Path) -> NDArray[np.uint8]:
     return frames
 
 
+class Crop(NamedTuple):
+    """A frame made smaller, and where in it the square lies that localizers see; pixels."""
+
+    width: int
+    height: int
+    left: int
+    top: int
+
+
+def crop_of(size: tuple[int, int], input_px: int) -> Crop:
+    """Of a frame of ``size`` (width, height): short side ``input_px + 1``, a square amid it."""
+    scale = (input_px + 1) / min(size)
+    width, height = (max(input_px + 1, round(side * scale)) for side in size)
+    return Crop(width, height, (width - input_px) // 2, (height - input_px) // 2)
+
+
 def fit_frame(image: Image.Image, input_px: int) -> NDArray[np.uint8]:
     """Pixels (input_px, input_px, 3): short side resized to ``input_px + 1``, then centre crop."""
-    scale = (input_px + 1) / min(image.size)
-    width, height = (max(input_px + 1, round(side * scale)) for side in image.size)
+    width, height, left, top = crop_of(image.size, input_px)
     small = image.resize((width, height), Image.Resampling.BILINEAR)
-    left, top = (width - input_px) // 2, (height - input_px) // 2
     return np.asarray(small.crop((left, top, left + input_px, top + input_px)))
 
 

@@ -16,6 +16,7 @@ from synfeal.report.render_speed import COLUMNS as RENDER_COLUMNS
 from synfeal.report.render_speed import render_rows
 from synfeal.report.results import read_table
 from synfeal.report.tables import Value, write_rows
+from synfeal.report.training_speed import training_rows
 
 NAME = "speed_vs_error"
 COLUMNS = (
@@ -100,4 +101,9 @@ def label_rows(root: Path, scene: str) -> list[Row]:
     ]
 
 
-READERS: tuple[Callable[[Path, str], list[Row]], ...] = (collision_rows, render_rows, label_rows)
+READERS: tuple[Callable[[Path, str], list[Row]], ...] = (
+    collision_rows,
+    render_rows,
+    label_rows,
+    training_rows,
+)

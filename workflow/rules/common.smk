@@ -1,7 +1,7 @@
 # What the rules share: the checked configuration, and which files a target needs. No rules here.
 import sys
 
-from baselines.localizers.names import BACKBONE_OF
+from baselines.localizers.names import backbone_of
 from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.methods import (
     METHODS,
@@ -42,7 +42,7 @@ wildcard_constraints:
     batch=r"\d+",
     init="pretrained|scratch",
     model="|".join(MODELS),
-    backbone="|".join(sorted(set(BACKBONE_OF.values()))),
+    backbone="|".join(sorted({backbone_of(m, CONFIG.network) for m in MODELS})),
     repetition=r"\d+",
     size=r"\w+",
     reconstructed="|".join(RECONSTRUCTED),
@@ -108,7 +108,20 @@ def backbone_weights(wildcards):
     """The pretrained backbone a run starts from; nothing when it starts from scratch."""
     if wildcards.init == "scratch":
         return []
-    return f"{ROOT}/pretrained/{BACKBONE_OF[wildcards.model]}.pt"
+    return f"{ROOT}/pretrained/{backbone_of(wildcards.model, CONFIG.network)}.pt"
+
+
+def training_mem_mb(n_frames):
+    """Memory of a training in MB: frames as they are, layers of a batch, parameters five times.
+
+    The factors are Hourglass's, the largest: 60 MB an image and 0.5 GB of parameters at 224 px.
+    """
+    network, batch_size = CONFIG.network, CONFIG.training.batch_size
+    layers_mb = 1.2e-3 * batch_size * network.width
+    parameters_mb = 0.05 * network.width**2
+    return round(
+        1000 + network.input_px**2 * (3e-6 * n_frames + layers_mb + parameters_mb)
+    )
 
 
 def metrics_of(experiments):

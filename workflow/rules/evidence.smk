@@ -113,6 +113,10 @@ rule speed_vs_error:
             scene=sorted({e.scene for e in EXPERIMENTS}),
         ),
         labels=rules.label_error.output.csv,
+        trainings=expand(
+            f"{ROOT}/tables/{{table}}.csv",
+            table=[t for t in TABLE_NAMES if t == "table4_size"],
+        ),
     output:
         csv=f"{ROOT}/tables/speed_vs_error.csv",
     log:

@@ -25,7 +25,7 @@ rule pretrain:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=training_mem_mb(CONFIG.pretraining.frames),
     params:
         pretraining=dump(CONFIG.pretraining),
         network=dump(CONFIG.network),
@@ -53,7 +53,9 @@ rule train:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=lambda w: training_mem_mb(
+            sum(CONFIG.n_frames(w.scene, w.size, split) for split in SPLITS)
+        ),
     params:
         network=dump(CONFIG.network),
         localizer=lambda w: dump(CONFIG.localizers[w.model]),

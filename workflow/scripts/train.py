@@ -12,6 +12,7 @@ with job(snakemake.log[0]):
     training = TrainingConfig(**params.training, samples_seen={})
     weights = Path(str(inputs.weights)) if inputs.weights else None
     frames, labels = Path(inputs.frames), Path(inputs.labels)
+    test_frames, test_labels = Path(inputs.test_frames), Path(inputs.test_labels)
     train_localizer(
         name,
         frames,
@@ -24,13 +25,6 @@ with job(snakemake.log[0]):
         params.seed,
         model,
         Path(outputs.history),
+        test=(test_frames, test_labels),
     )
-    predict_poses(
-        name,
-        model,
-        Path(inputs.test_frames),
-        Path(inputs.test_labels),
-        network,
-        hyper,
-        Path(outputs.predictions),
-    )
+    predict_poses(model, test_frames, test_labels, Path(outputs.predictions), training.device)

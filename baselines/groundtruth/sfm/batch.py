@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from baselines.groundtruth.sfm.features import extract_features, match_features
 from baselines.groundtruth.sfm.images import link_images
 from baselines.groundtruth.sfm.mapping import Mapping, camera_poses, map_matches, read_matches
+from baselines.groundtruth.sfm.refine import refine_model
 from baselines.groundtruth.sfm.scale import metric_trajectory
 from baselines.groundtruth.trajectory import BatchTrajectory
 from synfeal.config.models import CameraConfig, SfmConfig
@@ -30,12 +31,12 @@ class SfmFacts:
         registered: frames with a pose.
         models: parts that the batch fell into; the poses are those of one of them.
         starts: how often the mapper started.
-        explained: share of the matched image points that the model explains.
-        points: 3D points of the model.
+        explained: share of the matched image points that the model explained as it was mapped.
+        points: 3D points of the refined model.
         reprojection_px: mean distance of image points from the projections of their 3D points.
         features_s: CPU seconds spent on finding features.
         matching_s: CPU seconds spent on matching them.
-        mapping_s: CPU seconds spent on building models.
+        mapping_s: CPU seconds spent on building models and refining one.
         peak_memory_mb: most memory the process has held so far.
     """
 
@@ -111,6 +112,8 @@ def sfm_batch(
         begin = time.process_time()
         matches = read_matches(images, database)
         mapping = map_matches(matches, Path(temporary) / "models", cfg, seed)
+        if mapping.model is not None:
+            refine_model(mapping.model)
         seconds.append(time.process_time() - begin)
     trajectory = metric_trajectory(*camera_poses(mapping.model), true_world_from_cam)
     return SfmEstimate(trajectory, _facts(trajectory, mapping, seconds))

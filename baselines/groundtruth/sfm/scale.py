@@ -5,11 +5,11 @@ the batch, as the published code does: the metric scale, from distances to the f
 pose of the first registered camera. Its full pose is used, and not a similarity fitted to the
 camera centres, because the centres of a straight path leave the rotation about its line free.
 
-On long paths this makes most of the error: a wrong scale over the first frames, and a first camera
-that few others share points with, grow with the distance. Of 251 frames, 7.5 m, with COLMAP's
-contrast the median error is 36 mm in the Large Room and 158 mm in the Sanctuary; after a similarity
-fit of the same models it is 5 and 10 mm (``results/benchmarks/sfm_settings.csv``). The rule is kept
-because it is the assistance that the published labels had.
+A wrong scale over the first frames and a first camera that few others share points with grow with
+the distance, so the placed error of a long path is larger than that after a similarity fit
+(``results/benchmarks/sfm_settings.csv``). The rule is kept because it is the assistance that the
+published labels had; what bent models, and their first cameras with them, is removed before
+(``refine.py``).
 """
 
 from __future__ import annotations

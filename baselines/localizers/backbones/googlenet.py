@@ -8,12 +8,11 @@ in ceil mode) we follow it, because its official weights only fit that network.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import torch
 from torch import Tensor, nn
 
 from baselines.localizers.backbones.channels import scaled_channels
+from baselines.localizers.backbones.inception import ConvBn, InceptionBackbone, InceptionMaps
 
 # Output channels of each block: 1x1 | 3x3 reduce, 3x3 | "5x5" reduce, "5x5" | pooling projection.
 INCEPTIONS: dict[str, tuple[int, int, int, int, int, int]] = {
@@ -27,25 +26,6 @@ INCEPTIONS: dict[str, tuple[int, int, int, int, int, int]] = {
     "inception5a": (256, 160, 320, 32, 128, 128),
     "inception5b": (384, 192, 384, 48, 128, 128),
 }
-
-
-# The official weights were trained on images scaled to [-1, 1]. This turns images normalised with
-# ImageNet's mean (0.485, 0.456, 0.406) and deviation (0.229, 0.224, 0.225) into those.
-INPUT_SCALE = (0.458, 0.448, 0.450)
-INPUT_SHIFT = (-0.030, -0.088, -0.188)
-
-
-class ConvBn(nn.Module):
-    """Convolution without bias, batch normalisation, ReLU."""
-
-    def __init__(self, n_in: int, n_out: int, kernel: int, stride: int = 1) -> None:
-        super().__init__()
-        self.conv = nn.Conv2d(n_in, n_out, kernel, stride, padding=kernel // 2, bias=False)
-        self.bn = nn.BatchNorm2d(n_out, eps=0.001)
-
-    def forward(self, maps: Tensor) -> Tensor:
-        """(B, n_in, H, W) to (B, n_out, ceil(H / stride), ceil(W / stride))."""
-        return torch.relu_(self.bn(self.conv(maps)))
 
 
 class Inception(nn.Module):
@@ -66,30 +46,16 @@ class Inception(nn.Module):
         return torch.cat([branch(maps) for branch in branches], dim=1)
 
 
-class GoogLeNetMaps(NamedTuple):
-    """Feature maps: the two points where auxiliary heads branch off, and the last one."""
-
-    inception4a: Tensor
-    inception4d: Tensor
-    inception5b: Tensor
-
-
-class GoogLeNet(nn.Module):
+class GoogLeNet(InceptionBackbone):
     """GoogLeNet without its classifiers.
 
-    Attributes:
-        n_aux: channels of ``inception4a`` and ``inception4d`` (512 and 528 at width 1).
-        n_out: channels of ``inception5b`` (1024 at width 1); the stride of that map is 32.
+    Auxiliary heads branch off where the paper has them: after ``inception4a`` and ``inception4d``
+    (512 and 528 channels at width 1, stride 16). The last map is that of ``inception5b`` (1024
+    channels, stride 32).
     """
-
-    input_scale: Tensor
-    input_shift: Tensor
 
     def __init__(self, width: float = 1.0) -> None:
         super().__init__()
-        scale, shift = torch.tensor([INPUT_SCALE, INPUT_SHIFT]).view(2, 3, 1, 1)
-        self.register_buffer("input_scale", scale, persistent=False)
-        self.register_buffer("input_shift", shift, persistent=False)
         stem, n = scaled_channels(64, width), scaled_channels(192, width)
         self.conv1 = ConvBn(3, stem, 7, 2)
         self.conv2 = ConvBn(stem, stem, 1)
@@ -104,9 +70,9 @@ class GoogLeNet(nn.Module):
         self.n_aux = (n_out["inception4a"], n_out["inception4d"])
         self.n_out = n
 
-    def forward(self, images: Tensor) -> GoogLeNetMaps:
-        """Feature maps of images (B, 3, H, W) of zero mean and unit deviation per channel."""
-        maps = self.pool3(self.conv1(images * self.input_scale + self.input_shift))
+    def maps_of(self, images: Tensor) -> InceptionMaps:
+        """Feature maps of images (B, 3, H, W) in [-1, 1]."""
+        maps = self.pool3(self.conv1(images))
         maps = self.pool3(self.conv3(self.conv2(maps)))
         points: dict[str, Tensor] = {}
         for name in INCEPTIONS:
@@ -115,4 +81,4 @@ class GoogLeNet(nn.Module):
             elif name == "inception5a":
                 maps = self.pool2(maps)
             maps = points[name] = self.get_submodule(name)(maps)
-        return GoogLeNetMaps(points["inception4a"], points["inception4d"], points["inception5b"])
+        return InceptionMaps(points["inception4a"], points["inception4d"], points["inception5b"])

@@ -10,26 +10,35 @@ import torch
 from torch import Tensor, nn
 
 from baselines.localizers.backbones.googlenet import GoogLeNet
+from baselines.localizers.backbones.inception import InceptionBackbone
+from baselines.localizers.backbones.inception_v3 import InceptionV3
 from baselines.localizers.backbones.resnet import ResNet34
 from baselines.localizers.names import BackboneName
+from synfeal.config.learning import InceptionName
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
 
-Backbone = GoogLeNet | ResNet34
+Backbone = InceptionBackbone | ResNet34
 
 URL = "https://download.pytorch.org/models"
 # The eight digits are the beginning of each file's SHA-256.
 IMAGENET_FILES: dict[BackboneName, str] = {
     "googlenet": "googlenet-1378be20.pth",
+    "inception_v3": "inception_v3_google-0cc3c7bd.pth",
     "resnet34": "resnet34-b627a593.pth",
 }
 # Classifiers of the ImageNet networks, which no localizer has.
-CLASSIFIERS = ("fc.", "aux1.", "aux2.")
+CLASSIFIERS = ("fc.", "aux1.", "aux2.", "AuxLogits.")
+
+
+def build_inception(name: InceptionName, width: float) -> InceptionBackbone:
+    """The backbone of PoseNet, PoseLSTM and PoseNet2, randomly initialised."""
+    return GoogLeNet(width) if name == "googlenet" else InceptionV3(width)
 
 
 def build_backbone(name: BackboneName, width: float) -> Backbone:
     """A backbone without its classifier, randomly initialised."""
-    return GoogLeNet(width) if name == "googlenet" else ResNet34(width)
+    return ResNet34(width) if name == "resnet34" else build_inception(name, width)
 
 
 def imagenet_weights_path(name: BackboneName, weights_dir: Path) -> Path:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.methods import METHODS, NOISE, frame_methods, graph_methods, stages_of
-from baselines.localizers.names import BACKBONE_OF
+from baselines.localizers.names import backbone_of
 from synfeal.config import Config, Experiment, runs_of
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.sequences import sequences_of
@@ -30,7 +30,7 @@ RENDERING, TRAINING = "rendering", "training"
 UNITS: dict[str, tuple[str, ...]] = {
     RENDERING: ("frames", "Msamples"),
     TRAINING: ("layer steps", "TFLOP"),
-    "render_speed": ("Mpx",),
+    "render_speed": ("image sizes",),
     "plan": ("frames",),
     "pack": ("MB",),
     "dataset": ("frames",),
@@ -68,8 +68,6 @@ LAW_OF = {
 }
 # Bytes of memory per pixel of a batch: what peaks differ by between profiles (docs/cost.md).
 HELD_PER_PX = {"sfm": 10, "rgbd": 26, **dict.fromkeys(frame_methods(), 26)}
-# Images per step of the pretext: baselines.training.pretrain.BATCH_SIZE, which would load torch.
-PRETEXT_BATCH = 32
 
 
 @dataclass(frozen=True)
@@ -244,12 +242,14 @@ def _estimated(config: Config, e: Experiment, counts: dict[str, int]) -> Iterato
 def _trainings(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[Job]:
     runs = runs_of(experiments, config.training.repetitions)
     hypers = {str(name): hyper for name, hyper in config.localizers.items()}
-    for backbone in sorted({BACKBONE_OF[r.model] for r in runs if r.init == "pretrained"}):
+    pretrained = {backbone_of(r.model, config.network) for r in runs if r.init == "pretrained"}
+    for backbone in sorted(pretrained):
         work = pretext_work(backbone, config.network)
         samples = config.pretraining.samples_seen if _pretext(config) else 0
         held = config.pretraining.frames if _pretext(config) else 0
-        size = work.size(samples, PRETEXT_BATCH, 0)
-        memory = packed_bytes(held, config.network.input_px) + work.held_bytes(PRETEXT_BATCH)
+        batch = config.pretraining.batch_size
+        size = work.size(samples, batch, 0)
+        memory = packed_bytes(held, config.network.input_px) + work.held_bytes(batch)
         yield Job("pretrain", backbone, size, work.parameter_bytes, memory)
     for run in runs:
         train, test = (config.n_frames(run.scene, run.size, split) for split in SPLITS)
@@ -266,7 +266,7 @@ def _evidence(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[J
     for name in (*tables, *SIDE_TABLES):
         yield Job("tables", name)
     for scene in sorted({e.scene for e in experiments}):
-        yield Job("render_speed", scene, (_speed_size(config),))
+        yield Job("render_speed", scene, (config.render_speed.sizes,))
         for split in SPLITS:
             yield Job("coverage", f"{scene}/{split}")
     runs = runs_of(experiments, config.training.repetitions)
@@ -274,10 +274,3 @@ def _evidence(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[J
     yield Job("claims", "", (scored,))
     for stage in ("figures", "summary", "provenance", "report", "report_document"):
         yield Job(stage, "")
-
-
-def _speed_size(config: Config) -> float:
-    """Pixels of the views that rendering is timed on, in millions, each size with all poses."""
-    cameras = (config.network_camera, config.groundtruth_camera, CameraConfig())
-    pixels = sum(c.width * c.height for c in cameras[: config.render_speed.sizes])
-    return config.render_speed.poses * pixels / 1e6

@@ -17,6 +17,7 @@ from synfeal.report.figures import (
     poses,
     render_speed,
     speed_vs_error,
+    training_speed,
     trajectories,
 )
 from synfeal.report.figures.sources import Results
@@ -94,6 +95,12 @@ FIGURES: dict[str, Entry] = {
         partial(speed_vs_error.draw, stage="labels"),
         "Frames that each ground-truth method labels per second of processor time against the "
         "median position error of its labels after assistance; filled marks form the Pareto front.",
+    ),
+    "speed_vs_error_training": Entry(
+        training_speed.draw,
+        "Images that each localizer learns from per second of processor time, and its median "
+        "position error against the true poses, at the largest size of each scene; filled marks "
+        "form the Pareto front.",
     ),
 }
 CAPTIONS: dict[str, str] = {name: entry.caption for name, entry in FIGURES.items()}

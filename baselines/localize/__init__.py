@@ -1,0 +1,1 @@
+"""A trained localizer on a person's own pictures."""

@@ -1,0 +1,154 @@
+"""Pictures in, poses out: ``synfeal localize`` as a function."""
+
+from __future__ import annotations
+
+import csv
+import logging
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import median
+from typing import Literal, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from baselines.localize.pictures import find_pictures, read_picture
+from baselines.training.checkpoint import TrainedLocalizer, read_checkpoint
+from baselines.training.description import ModelDescription
+from baselines.training.device import open_device
+from baselines.training.predict import BATCH, predict
+from synfeal.dataset.directories import writing_to
+from synfeal.dataset.pose_table import COLUMNS
+from synfeal.dataset.progress import Progress, Stopwatch
+from synfeal.errors import InputError
+from synfeal.files import atomic_path
+
+log = logging.getLogger(__name__)
+
+HEADER = ("image", *COLUMNS[2:])
+# How often the network is timed on one picture, after one pass that is not.
+TIMED_PASSES = 10
+
+Array = NDArray[np.float64]
+
+
+class Localized(NamedTuple):
+    """What became of some pictures.
+
+    Attributes:
+        description: of the localizer.
+        device: where it ran, ``cpu`` or ``cuda``.
+        n_images: pictures.
+        n_failed: those whose pose is not finite.
+        read_ms: median time to read and shrink a picture.
+        network_ms: median time of the network on one picture alone.
+        images_per_s: pictures per second in batches, reading included.
+    """
+
+    description: ModelDescription
+    device: str
+    n_images: int
+    n_failed: int
+    read_ms: float
+    network_ms: float
+    images_per_s: float
+
+
+def localize(
+    model: Path, named: Sequence[Path], out: Path, device: Literal["auto", "cpu", "cuda"]
+) -> Localized:
+    """Write the pose of each picture as CSV (columns of ``HEADER``), in the order named.
+
+    Poses are ``world_from_cam`` in the world of the training labels. A pose that is not finite is
+    written as ``nan``.
+
+    Args:
+        model: checkpoint of a trained localizer.
+        named: pictures, and directories of pictures.
+        out: file to write; it appears when all pictures are done.
+        device: where to run.
+
+    Raises:
+        InputError: the model or a picture cannot be used, or ``out`` cannot be written.
+    """
+    trained = read_checkpoint(model, open_device(device))
+    pictures = find_pictures(named)
+    _check_out(out, [model, *pictures])
+    network_ms = _alone_ms(trained, _batch(trained, pictures[:1], []))
+    read_s: list[float] = []
+    watch = Stopwatch()
+    position_m, quat_wxyz = _predict_all(trained, pictures, read_s)
+    seconds = watch.seconds
+    _write(out, pictures, np.concatenate([position_m, quat_wxyz], axis=1))
+    good = np.isfinite(position_m).all(axis=1) & np.isfinite(quat_wxyz).all(axis=1)
+    return Localized(
+        description=trained.description,
+        device=trained.device.type,
+        n_images=len(pictures),
+        n_failed=int((~good).sum()),
+        read_ms=1000 * median(read_s),
+        network_ms=network_ms,
+        images_per_s=len(pictures) / seconds,
+    )
+
+
+def _predict_all(
+    trained: TrainedLocalizer, pictures: Sequence[Path], read_s: list[float]
+) -> tuple[Array, Array]:
+    """Positions (N, 3) and quaternions (N, 4), in batches as a test set is predicted in."""
+    poses = []
+    with Progress(len(pictures), "localize") as progress:
+        for start in range(0, len(pictures), BATCH):
+            watch = Stopwatch()
+            batch = pictures[start : start + BATCH]
+            poses.append(predict(trained, _batch(trained, batch, read_s)))
+            progress.update(len(batch))
+            if len(pictures) > BATCH:
+                name = f"picture {start + len(batch)} of {len(pictures)}"
+                progress.shard_done(name, len(batch), watch.seconds)
+    position_m, quat_wxyz = zip(*poses, strict=True)
+    return np.concatenate(position_m), np.concatenate(quat_wxyz)
+
+
+def _batch(trained: TrainedLocalizer, pictures: Sequence[Path], read_s: list[float]) -> Tensor:
+    """Pictures as (B, 3, px, px) uint8, channels last; notes how long each took to read."""
+    px = trained.description.network.input_px
+    frames = np.empty((len(pictures), px, px, 3), np.uint8)
+    for frame, path in zip(frames, pictures, strict=True):
+        watch = Stopwatch()
+        frame[:] = read_picture(path, px)
+        read_s.append(watch.seconds)
+    return torch.from_numpy(frames).to(trained.device).permute(0, 3, 1, 2)
+
+
+def _alone_ms(trained: TrainedLocalizer, image: Tensor) -> float:
+    """Median milliseconds of the network on one image, its pose on the processor included."""
+    predict(trained, image)
+    times = []
+    for _ in range(TIMED_PASSES):
+        begin = time.perf_counter()
+        predict(trained, image)
+        times.append(time.perf_counter() - begin)
+    return 1000 * median(times)
+
+
+def _check_out(out: Path, inputs: Sequence[Path]) -> None:
+    if out.is_dir():
+        raise InputError(f"{out}: is a directory; name a file with --out")
+    if out.exists() and any(path.exists() and out.samefile(path) for path in inputs):
+        raise InputError(f"{out}: is one of the inputs; choose another file with --out")
+
+
+def _write(out: Path, pictures: Sequence[Path], poses: Array) -> None:
+    """Numbers with enough digits to read back the same values; names as the bytes they are."""
+    with (
+        writing_to(out, lambda: "choose another file with --out"),
+        atomic_path(out) as temporary,
+        temporary.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file,
+    ):
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(HEADER)
+        writer.writerows([path, *pose] for path, pose in zip(pictures, poses.tolist(), strict=True))

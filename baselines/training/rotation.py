@@ -1,0 +1,144 @@
+"""Training images as the camera would have seen them, had it been turned a little where it was.
+
+The image of a camera that turns about its centre changes by a homography, whatever the scene: with
+the intrinsics ``K`` and the turned camera's axes ``R`` in the old camera's frame, the new pixel
+``x`` shows what the old pixel ``K R K^-1 x`` showed (Hartley and Zisserman, Multiple View Geometry,
+2nd ed., section 8.4.2). The position of the label stays, its rotation is multiplied by ``R``: exact
+new poses for nothing but a resampling, so that few paths teach more orientations than they have.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import torch
+from torch import Tensor, nn
+
+from baselines.training.description import FrameCamera, frame_camera
+from synfeal.camera.intrinsics import Intrinsics
+from synfeal.config.models import AugmentationConfig
+from synfeal.dataset.packed import crop_of
+from synfeal.errors import InputError
+
+# Rays beyond this slope, of very wide cameras turned far, look sideways and see no pixel.
+LEAST_DEPTH = 1e-3
+
+
+class RandomRotation:
+    """Turns every image of a batch by its own random rotation.
+
+    Rotation vectors are uniform in a box: up to ``tilt_deg`` about the camera's x and y axes, up to
+    ``roll_deg`` about its optical axis. What the frame did not see is filled with its border.
+    """
+
+    def __init__(
+        self,
+        intrinsics: Intrinsics,
+        input_px: int,
+        augmentation: AugmentationConfig,
+        seed: int,
+    ) -> None:
+        tilt, roll = math.radians(augmentation.tilt_deg), math.radians(augmentation.roll_deg)
+        self._largest_rad = torch.tensor([tilt, tilt, roll])
+        # Drawn on the processor, so that one seed gives one training wherever it runs.
+        self._generator = torch.Generator().manual_seed(seed)
+        self._input_px, self._intrinsics = input_px, intrinsics
+        self._rays = _rays(intrinsics, input_px)
+
+    def __call__(self, images: Tensor, quat_wxyz: Tensor) -> tuple[Tensor, Tensor]:
+        """Turned images (B, 3, S, S), channels last, and their quaternions (B, 4)."""
+        draws = torch.rand(len(images), 3, generator=self._generator)
+        rotvec_rad = ((2 * draws - 1) * self._largest_rad).to(images.device)
+        return self.turned(images, rotvec_rad), quat_product(quat_wxyz, quat_of(rotvec_rad))
+
+    def turned(self, images: Tensor, old_from_new_rad: Tensor) -> Tensor:
+        """Images (B, 3, S, S) after rotations about the camera's axes, as rotation vectors (B, 3).
+
+        A positive turn about y looks further right, one about x further up, one about z rolls the
+        camera clockwise.
+        """
+        self._rays = self._rays.to(images.device)
+        directions = self._rays @ rotation_of(old_from_new_rad).transpose(1, 2)
+        slopes = directions[..., :2] / directions[..., 2:].clamp_min(LEAST_DEPTH)
+        fx, fy, cx, cy = self._intrinsics
+        pixels = slopes * slopes.new_tensor([fx, fy]) + slopes.new_tensor([cx, cy])
+        grid = (2 / self._input_px * pixels - 1).view(len(images), *images.shape[2:], 2)
+        # align_corners=False puts the centre of the first pixel at 0.5, as our cameras do.
+        sampled = nn.functional.grid_sample(
+            images, grid, mode="bilinear", padding_mode="border", align_corners=False
+        )
+        return sampled.contiguous(memory_format=torch.channels_last)
+
+    def state_dict(self) -> dict[str, Tensor]:
+        """Where the generator stands."""
+        return {"generator": self._generator.get_state()}
+
+    def load_state_dict(self, state: Mapping[str, Tensor], /) -> None:
+        """Set the generator."""
+        self._generator.set_state(state["generator"])
+
+
+def random_rotation(
+    frames: Path, input_px: int, augmentation: AugmentationConfig, seed: int
+) -> RandomRotation | None:
+    """For packed frames, by the record beside them; None where nothing is to be turned.
+
+    Raises:
+        InputError: there is no record, or the lens of its camera bends lines.
+    """
+    if not augmentation.turns:
+        return None
+    camera = frame_camera(frames)
+    if camera is None or any(camera.distortion):
+        reason = "says nothing of the camera" if camera is None else "names a lens with distortion"
+        raise InputError(
+            f"{frames.with_suffix('.json')}: {reason}; images can only be turned through a known "
+            "pinhole camera, so set training.augmentation to 0"
+        )
+    return RandomRotation(packed_intrinsics(camera, input_px), input_px, augmentation, seed)
+
+
+def packed_intrinsics(camera: FrameCamera, input_px: int) -> Intrinsics:
+    """Intrinsics, in pixels, of frames of ``camera`` that were made smaller and cropped."""
+    crop = crop_of((camera.width, camera.height), input_px)
+    x, y = crop.width / camera.width, crop.height / camera.height
+    return Intrinsics(
+        camera.fx * x, camera.fy * y, camera.cx * x - crop.left, camera.cy * y - crop.top
+    )
+
+
+def rotation_of(rotvec_rad: Tensor) -> Tensor:
+    """Rotation matrices (B, 3, 3) of rotation vectors (B, 3)."""
+    x, y, z = rotvec_rad.unbind(1)
+    o = torch.zeros_like(x)
+    skew = torch.stack([o, -z, y, z, o, -x, -y, x, o], dim=1).view(-1, 3, 3)
+    matrices: Tensor = torch.linalg.matrix_exp(skew)
+    return matrices
+
+
+def quat_of(rotvec_rad: Tensor) -> Tensor:
+    """Unit quaternions wxyz (B, 4) of rotation vectors (B, 3); exact at zero."""
+    angle_rad = torch.linalg.vector_norm(rotvec_rad, dim=1, keepdim=True)
+    # sin(a / 2) / a as sinc, which is 1 at 0; torch's has pi in its argument.
+    vector = 0.5 * torch.sinc(angle_rad / (2 * math.pi)) * rotvec_rad
+    return torch.cat([torch.cos(angle_rad / 2), vector], dim=1)
+
+
+def quat_product(a_wxyz: Tensor, b_wxyz: Tensor) -> Tensor:
+    """Hamilton product (B, 4): the rotation ``b`` first, then ``a``."""
+    aw, av = a_wxyz[:, :1], a_wxyz[:, 1:]
+    bw, bv = b_wxyz[:, :1], b_wxyz[:, 1:]
+    scalar = aw * bw - (av * bv).sum(1, keepdim=True)
+    vector = aw * bv + bw * av + torch.linalg.cross(av, bv)
+    return torch.cat([scalar, vector], dim=1)
+
+
+def _rays(intrinsics: Intrinsics, input_px: int) -> Tensor:
+    """Directions (S * S, 3) through the pixel centres, row by row, of depth 1."""
+    centres = torch.arange(input_px) + 0.5
+    x = (centres - intrinsics.cx) / intrinsics.fx
+    y = (centres - intrinsics.cy) / intrinsics.fy
+    down, across = torch.meshgrid(y, x, indexing="ij")
+    return torch.stack([across, down, torch.ones_like(across)], dim=-1).view(-1, 3)

@@ -1,0 +1,130 @@
+"""Which weights of a training are kept: those with the smallest errors on held-out frames."""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import Any, Literal, NamedTuple
+
+import torch
+from torch import Tensor, nn
+
+from baselines.localizers.base import Localizer
+from baselines.localizers.losses import PosePrediction
+from baselines.training.data import ImageStatistics, LabelledFrames
+from baselines.training.device import Precision, autocast
+
+log = logging.getLogger(__name__)
+
+# Evaluations of a training. Validation takes at most this share of its time, if predicting takes
+# a third of the time of learning, and is looked at less often where that is not enough.
+EVALUATIONS = 20
+TIME_SHARE = 0.05
+PREDICTIONS_PER_SAMPLE = 3
+# Images per prediction.
+BATCH = 100
+
+
+class HeldOutErrors(NamedTuple):
+    """Loss of the main predictions, and median errors."""
+
+    loss: float
+    position_m: float
+    orientation_deg: float
+
+    def score(self, selection: Literal["validation", "test"]) -> float:
+        """What the kept weights have least of.
+
+        ``test``: the loss, as the paper's authors do. ``validation``: the product of the two median
+        errors. No unit and no weight enters, so losses whose weights are learned can be compared
+        over a training; it is smallest where the sum of logarithms is, which is what the loss with
+        learned weights comes to at its best weights (Kendall and Cipolla, CVPR 2017, eq. 4).
+        """
+        return self.loss if selection == "test" else self.position_m * self.orientation_deg
+
+
+class Selection:
+    """Looks at held-out frames now and then, and keeps the best weights."""
+
+    def __init__(
+        self,
+        kind: Literal["validation", "test", "last"],
+        localizer: Localizer,
+        statistics: ImageStatistics,
+        held_out: LabelledFrames | None,
+        precision: Precision,
+    ) -> None:
+        self._kind, self._localizer, self._statistics = kind, localizer, statistics
+        self._held_out, self._precision = held_out, precision
+        self._best: dict[str, Tensor] = {}
+        self._score, self._since_best = math.inf, 0
+
+    def due_after(self, steps: int, samples_seen: int) -> frozenset[int]:
+        """After which of the steps to evaluate: evenly spread, the last one among them."""
+        if self._kind == "last" or not self._held_out:
+            return frozenset()
+        allowed = TIME_SHARE * PREDICTIONS_PER_SAMPLE * samples_seen / len(self._held_out)
+        count = EVALUATIONS if self._kind == "test" else min(EVALUATIONS, max(1, int(allowed)))
+        return frozenset(-(-steps * k // count) for k in range(1, count + 1))
+
+    def evaluate(self) -> HeldOutErrors:
+        """Errors on the held-out frames now; keeps the weights if there were no better ones."""
+        assert self._kind != "last"
+        assert self._held_out is not None
+        errors = held_out_errors(self._localizer, self._held_out, self._statistics, self._precision)
+        score = errors.score(self._kind)
+        self._since_best += 1
+        if score < self._score:  # never true of NaN
+            self._score, self._since_best = score, 0
+            self._best = {k: v.detach().clone() for k, v in self._localizer.state_dict().items()}
+        return errors
+
+    def stale(self, patience: int | None) -> bool:
+        """Whether there have been ``patience`` evaluations without a new best."""
+        return patience is not None and self._since_best >= patience
+
+    def restore(self) -> None:
+        """Give the localizer the best weights; the last ones where none were ever looked at."""
+        if self._best:
+            self._localizer.load_state_dict(self._best)
+
+    def state_dict(self) -> dict[str, Any]:
+        """The best weights so far."""
+        return {"best": self._best, "score": self._score, "since_best": self._since_best}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Go on with the best weights of another selection."""
+        self._best, self._score = state["best"], state["score"]
+        self._since_best = state["since_best"]
+
+
+@torch.no_grad()
+def held_out_errors(
+    localizer: Localizer, frames: LabelledFrames, statistics: ImageStatistics, precision: Precision
+) -> HeldOutErrors:
+    """Errors of the main predictions, by the labels the frames carry; training mode afterwards."""
+    localizer.eval()
+    device = frames.images.device
+    predictions: list[PosePrediction] = []
+    for rows in torch.split(torch.arange(len(frames), device=device), BATCH):
+        with autocast(device, precision):
+            predictions.append(localizer(statistics.normalise(frames.batch(rows).images))[0])
+    localizer.train()
+    position_m, quat_wxyz = (torch.cat(values).float() for values in zip(*predictions, strict=True))
+    loss = localizer.criterion(
+        PosePrediction(position_m, quat_wxyz), frames.position_m, frames.quat_wxyz
+    )
+    distance_m = torch.linalg.vector_norm(position_m - frames.position_m, dim=1)
+    angle_rad = _angles(nn.functional.normalize(quat_wxyz, dim=1), frames.quat_wxyz)
+    return HeldOutErrors(float(loss), _median(distance_m), math.degrees(_median(angle_rad)))
+
+
+def _angles(a_wxyz: Tensor, b_wxyz: Tensor) -> Tensor:
+    """Angles (N,) in radians between rotations as unit quaternions (N, 4)."""
+    same = torch.linalg.vector_norm(a_wxyz - b_wxyz, dim=1)
+    opposite = torch.linalg.vector_norm(a_wxyz + b_wxyz, dim=1)
+    return 4 * torch.asin((torch.minimum(same, opposite) / 2).clamp(max=1.0))
+
+
+def _median(values: Tensor) -> float:
+    return float(values.quantile(0.5))

@@ -1,0 +1,86 @@
+"""Frames whose poses can be read off: what localizers are trained on in tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from scipy.spatial.transform import Rotation
+from torch import Tensor
+
+from baselines.training.data import LabelledFrames, image_statistics, read_labelled_frames
+from baselines.training.loop import train_localizer
+from synfeal.config.models import LocalizerConfig, NetworkConfig, TrainingConfig
+from synfeal.dataset.pose_table import PoseTable, write_pose_table
+
+NETWORK = NetworkConfig(input_px=32, width=0.125)
+HYPER = LocalizerConfig(learning_rate=4e-3, dropout=0.0, beta=1.0, s_orientation=-1.0)
+TRAINING = TrainingConfig(batch_size=16, samples_seen={}, device="cpu")
+PX = NETWORK.input_px
+CPU = torch.device("cpu")
+Split = tuple[Path, Path]
+
+
+def coloured_frames(count: int, rng: np.random.Generator) -> tuple[np.ndarray, PoseTable]:
+    """Frames whose colour is the position and whose gradient is the yaw, with a little noise."""
+    position_m = rng.uniform(-1, 1, (count, 3))
+    yaw = rng.uniform(-0.5, 0.5, count)
+    ramp = np.linspace(-1, 1, PX)[None, None, :, None]
+    images = 128 + 60 * position_m[:, None, None, :] + 80 * yaw[:, None, None, None] * ramp
+    images = images + rng.normal(scale=2.0, size=(count, PX, PX, 3))
+    quat = Rotation.from_euler("z", yaw[:, None]).as_quat(canonical=True, scalar_first=True)
+    frame = np.arange(count)
+    table = PoseTable(frame, frame // 10, position_m, quat)
+    return images.clip(0, 255).astype(np.uint8), table
+
+
+def write_split(folder: Path, name: str, count: int, seed: int, spare: int = 0) -> Split:
+    """Packed frames, ``spare`` of them without a label, and labels."""
+    images, table = coloured_frames(count + spare, np.random.default_rng(seed))
+    np.save(folder / f"{name}.npy", images)
+    write_pose_table(folder / f"{name}.csv", table.first(count))
+    return folder / f"{name}.npy", folder / f"{name}.csv"
+
+
+def read_split(split: Split) -> LabelledFrames:
+    """A split as trainings read it."""
+    return read_labelled_frames(*split, PX, CPU)
+
+
+def statistics_of(frames: LabelledFrames):
+    """Image statistics of a split."""
+    return image_statistics(frames.images)
+
+
+def train(
+    split, folder, *, samples=96, seed=1, weights=None, name="posenet2", hyper=HYPER,
+    training=TRAINING, **further,
+):  # fmt: skip
+    """A short training; returns the paths of checkpoint and history."""
+    model, history = folder / "model.pt", folder / "history.csv"
+    train_localizer(
+        name, *split, NETWORK, hyper, training, samples, weights, seed, model, history, **further
+    )
+    return model, history
+
+
+class Jitter:
+    """An augmentation with a generator of its own, which counts its calls and may act on one."""
+
+    def __init__(self, at=0, act=None) -> None:
+        self.calls, self._at, self._act = 0, at, act
+        self._generator = torch.Generator().manual_seed(5)
+
+    def __call__(self, images: Tensor, quat_wxyz: Tensor) -> tuple[Tensor, Tensor]:
+        self.calls += 1
+        if self.calls == self._at:
+            self._act()
+        noise = torch.randn(len(images), 3, 1, 1, generator=self._generator)
+        return images + 0.05 * noise, quat_wxyz
+
+    def state_dict(self):
+        return {"generator": self._generator.get_state()}
+
+    def load_state_dict(self, state) -> None:
+        self._generator.set_state(state["generator"])

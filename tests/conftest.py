@@ -1,0 +1,16 @@
+"""What every test module leaves behind as it found it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _denormal_numbers() -> Iterator[None]:
+    """Opening a device has the processor flush denormal numbers, for good and in all of numpy."""
+    yield
+    if "torch" in sys.modules:
+        sys.modules["torch"].set_flush_denormal(False)

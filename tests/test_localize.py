@@ -1,0 +1,340 @@
+"""``synfeal localize``: pictures in, poses out, as a person uses it."""
+
+from __future__ import annotations
+
+import csv
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+from PIL import Image
+
+from baselines.localize.pictures import find_pictures, read_picture
+from baselines.training.description import frame_camera
+from baselines.training.predict import predict, predict_poses
+from synfeal.cli import main
+from synfeal.config.models import CameraConfig
+from synfeal.dataset.manifest import camera_record
+from synfeal.dataset.packed import pack_frames
+from synfeal.dataset.png import encode_png
+from synfeal.dataset.pose_table import PoseTable, write_pose_table
+from synfeal.errors import InputError
+from synfeal.files import write_json
+from tests.trained_localizers import NETWORK, answering, save, untrained
+
+COUNT = 120  # more than a batch
+WIDTH, HEIGHT = 52, 39
+PX = NETWORK.input_px
+
+
+def picture(rng: np.random.Generator, width: int = WIDTH, height: int = HEIGHT) -> NDArray:
+    """A smooth picture (height, width, 3) with some noise."""
+    coarse = rng.integers(0, 256, (4, 5, 3), np.uint8)
+    smooth = np.asarray(Image.fromarray(coarse).resize((width, height), Image.Resampling.BICUBIC))
+    noise = rng.integers(-9, 10, smooth.shape)
+    return (smooth.astype(int) + noise).clip(0, 255).astype(np.uint8)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory with a sequence of frames, a localizer and what it predicts for them."""
+    folder = tmp_path_factory.mktemp("run")
+    sequence = folder / "seq-01"
+    sequence.mkdir()
+    rng = np.random.default_rng(0)
+    for index in range(COUNT):
+        stem = f"frame-{index:06d}"
+        (sequence / f"{stem}.color.png").write_bytes(encode_png(picture(rng)))
+        depth = np.full((HEIGHT, WIDTH), 1000, np.uint16)
+        (sequence / f"{stem}.depth.png").write_bytes(encode_png(depth))
+        (sequence / f"{stem}.pose.txt").write_text("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n")
+    frames, labels = folder / "frames.npy", folder / "labels.csv"
+    pack_frames([sequence], PX, frames)
+    camera = CameraConfig(width=WIDTH, height=HEIGHT, horizontal_fov_deg=70.0)
+    write_json(folder / "frames.json", {"camera": camera_record(camera)})
+    camera = frame_camera(frames)
+    assert camera is not None
+    save(folder / "model.pt", untrained(camera=camera))
+    at_origin = np.zeros((COUNT, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (COUNT, 1))
+    write_pose_table(labels, PoseTable(np.arange(COUNT), np.arange(COUNT) // 10, *at_origin))
+    predict_poses(folder / "model.pt", frames, labels, folder / "predictions.csv", "cpu")
+    return folder
+
+
+def localized(model: Path, out: Path, *images: Path) -> list[list[str]]:
+    """Rows that the command wrote, the header first."""
+    named = [str(path) for path in images]
+    assert main(["localize", str(model), *named, "--out", str(out), "--device", "cpu"]) == 0
+    with out.open(encoding="utf-8", newline="") as file:
+        return list(csv.reader(file))
+
+
+def only_error(capsys: pytest.CaptureFixture[str]) -> str:
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1, lines
+    assert lines[0].startswith("error: ")
+    return lines[0]
+
+
+def test_frames_of_a_run_get_its_predictions_to_the_last_digit(run: Path, tmp_path: Path) -> None:
+    header, *rows = localized(run / "model.pt", tmp_path / "poses.csv", run / "seq-01")
+    assert header == ["image", "tx", "ty", "tz", "qw", "qx", "qy", "qz"]
+    assert [Path(row[0]).name for row in rows] == [
+        f"frame-{index:06d}.color.png" for index in range(COUNT)
+    ]
+    predictions = (run / "predictions.csv").read_text().splitlines()[1:]
+    assert [row[1:] for row in rows] == [line.split(",")[2:] for line in predictions]
+    assert len({tuple(row) for row in rows}) == COUNT
+
+
+def test_other_company_changes_no_more_than_float32_rounding(run: Path, tmp_path: Path) -> None:
+    one = run / "seq-01/frame-000007.color.png"
+    _, row = localized(run / "model.pt", tmp_path / "poses.csv", one)
+    expected = (run / "predictions.csv").read_text().splitlines()[8].split(",")[2:]
+    np.testing.assert_allclose(np.float64(row[1:]), np.float64(expected), atol=2e-5)
+
+
+def test_what_is_printed(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    localized(run / "model.pt", tmp_path / "poses.csv", run / "seq-01")
+    printed = capsys.readouterr()
+    model, poses = printed.out.splitlines()
+    fov_deg = 2 * math.degrees(math.atan(math.tan(math.radians(35)) * HEIGHT / WIDTH))
+    assert model.endswith(
+        f": posenet2, pictures shrunk to 32 x 32 pixels; the short side must see {fov_deg:.1f}"
+        " degrees"
+    )
+    assert f"poses.csv: {COUNT} poses; " in poses
+    assert " ms for one picture (median: read " in poses
+    assert poses.endswith(" pictures/s in batches, on cpu")
+    assert [line.split(",")[0] for line in printed.err.splitlines()] == [
+        "picture 100 of 120",
+        "picture 120 of 120",
+    ]
+
+
+def test_pictures_come_in_the_order_named(run: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "more"
+    folder.mkdir()
+    rng = np.random.default_rng(1)
+    for name in ("b.JPG", "a, b.png", ".hidden.png", "c.txt", "d.depth.png"):
+        Image.fromarray(picture(rng)).save(folder / name, format="PNG")
+    one = run / "seq-01/frame-000003.color.png"
+    _, *rows = localized(run / "model.pt", tmp_path / "poses.csv", one, folder, one)
+    expected = [str(one), f"{folder}/a, b.png", f"{folder}/b.JPG", str(one)]
+    assert [row[0] for row in rows] == expected
+    assert rows[0] == rows[3] != rows[1]
+
+
+def test_an_earlier_file_is_replaced(run: Path, tmp_path: Path) -> None:
+    out = tmp_path / "new/poses.csv"
+    localized(run / "model.pt", out, run / "seq-01")
+    one = run / "seq-01/frame-000000.color.png"
+    assert len(localized(run / "model.pt", out, one)) == 2
+    assert [path.name for path in out.parent.iterdir()] == ["poses.csv"]
+
+
+def broken(folder: Path, kind: str) -> Path:
+    """A picture that cannot be used."""
+    path = folder / f"{kind}.png"
+    good = encode_png(picture(np.random.default_rng(2)))
+    if kind == "long":
+        Image.new("RGB", (2100, 100)).save(path)
+    elif kind == "text":
+        path.write_text("no picture")
+    elif kind == "empty":
+        path.touch()
+    elif kind == "cut":
+        path.write_bytes(good[: len(good) // 2])
+    elif kind == "grey16":
+        path.write_bytes(encode_png(np.full((HEIGHT, WIDTH), 700, np.uint16)))
+    elif kind == "gif":
+        Image.new("RGB", (20, 20)).save(path, format="GIF")
+    return path
+
+
+@pytest.mark.parametrize("kind", ["absent", "text", "empty", "cut", "gif", "grey16", "long"])
+def test_one_bad_picture_stops_all_and_leaves_what_there_was(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
+) -> None:
+    out = tmp_path / "poses.csv"
+    out.write_text("earlier")
+    bad, good = broken(tmp_path, kind), run / "seq-01/frame-000000.color.png"
+    before = sorted(tmp_path.iterdir())
+    assert main(["localize", str(run / "model.pt"), str(good), str(bad), "--out", str(out)]) == 1
+    assert f"{bad}: " in only_error(capsys)
+    assert out.read_text() == "earlier"
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_directory_without_pictures_is_named(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "frame.pose.txt").write_text("1 0 0 0")
+    assert main(["localize", str(run / "model.pt"), str(tmp_path)]) == 1
+    assert f"{tmp_path}: holds no .png, .jpg, .jpeg" in only_error(capsys)
+
+
+@pytest.mark.parametrize("out", ["seq-01", "model.pt", "seq-01/frame-000000.color.png"])
+def test_nothing_of_the_input_is_overwritten(
+    run: Path, capsys: pytest.CaptureFixture[str], out: str
+) -> None:
+    named = ["localize", str(run / "model.pt"), str(run / "seq-01"), "--out", str(run / out)]
+    size = (run / out).stat().st_size
+    assert main(named) == 1
+    assert f"{run / out}: is " in only_error(capsys)
+    assert (run / out).stat().st_size == size
+
+
+def test_a_place_where_nothing_can_be_written(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    one = str(run / "seq-01/frame-000000.color.png")
+    assert main(["localize", str(run / "model.pt"), one, "--out", f"{tmp_path}/file/p.csv"]) == 1
+    assert "choose another file with --out" in only_error(capsys)
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without a GPU")
+def test_a_gpu_that_is_not_there(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    named = ["localize", str(run / "model.pt"), str(run / "seq-01"), "--device", "cuda"]
+    assert main(named) == 1
+    assert "--device: 'cuda' is asked for" in only_error(capsys)
+
+
+NAN, ZERO = math.nan, [0.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("position_m", "quat_wxyz"),
+    [
+        ([1.0, 2.0, 3.0], ZERO),
+        ([1.0, 2.0, 3.0], [1.0, NAN, 0.0, 0.0]),
+        ([1.0, 2.0, 3.0], [math.inf, 0.0, 0.0, 0.0]),
+        ([NAN, 2.0, 3.0], [1.0, 0.0, 0.0, 0.0]),
+    ],
+)
+def test_a_pose_that_is_none_is_nan_and_counted(
+    run: Path,
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+    position_m: list[float],
+    quat_wxyz: list[float],
+) -> None:
+    model = save(tmp_path / "model.pt", answering(position_m, quat_wxyz))
+    _, *rows = localized(model, tmp_path / "poses.csv", run / "seq-01/frame-000000.color.png")
+    pose = np.float64(rows[0][1:])
+    np.testing.assert_array_equal(pose[:3], position_m)
+    assert np.isnan(pose[3:]).all() == (quat_wxyz != [1.0, 0.0, 0.0, 0.0])
+    assert "1 of 1 poses are not finite" in caplog.text
+
+
+@pytest.mark.parametrize("length", [1e-30, 1e-3, 1.0, 1e30])
+def test_a_quaternion_of_any_length_but_0_is_a_rotation(length: float) -> None:
+    trained = answering([0.0, 0.0, 0.0], [-0.6 * length, 0.0, 0.8 * length, 0.0])
+    images = torch.zeros((2, 3, PX, PX), dtype=torch.uint8)
+    _, quat_wxyz = predict(trained, images)
+    np.testing.assert_allclose(quat_wxyz, [[0.6, 0.0, -0.8, 0.0]] * 2, atol=1e-7)
+    np.testing.assert_allclose(np.linalg.norm(quat_wxyz, axis=1), 1.0, atol=1e-15)
+
+
+def shrunk(tmp_path: Path, image: Image.Image, name: str = "p.png", **options: object) -> NDArray:
+    image.save(tmp_path / name, **options)  # type: ignore[arg-type]
+    return read_picture(tmp_path / name, PX)
+
+
+@pytest.fixture
+def upright() -> Image.Image:
+    return Image.fromarray(picture(np.random.default_rng(3)))
+
+
+def test_a_grey_picture_has_three_equal_channels(tmp_path: Path, upright: Image.Image) -> None:
+    grey = shrunk(tmp_path, upright.convert("L"))
+    assert (grey == grey[:, :, :1]).all()
+    coloured = Image.merge("RGB", [upright.convert("L")] * 3)
+    np.testing.assert_array_equal(grey, shrunk(tmp_path, coloured))
+
+
+@pytest.mark.parametrize("alpha", [0, 128, 255])
+def test_an_alpha_channel_changes_nothing(tmp_path: Path, upright: Image.Image, alpha: int) -> None:
+    expected = shrunk(tmp_path, upright)
+    upright.putalpha(alpha)
+    np.testing.assert_array_equal(shrunk(tmp_path, upright), expected)
+
+
+@pytest.mark.parametrize("transparency", [None, 0, b"\x00\x80\xff"])
+def test_a_palette_means_its_colours(
+    tmp_path: Path, upright: Image.Image, transparency: object
+) -> None:
+    indexed = upright.quantize(64)
+    options = {} if transparency is None else {"transparency": transparency}
+    expected = shrunk(tmp_path, indexed.convert("RGB"))
+    np.testing.assert_array_equal(shrunk(tmp_path, indexed, **options), expected)
+
+
+def test_sixteen_bits_of_colour_become_their_upper_eight(
+    tmp_path: Path, upright: Image.Image
+) -> None:
+    pixels = np.asarray(upright)
+    deep = pixels[:, :, ::-1].astype(np.uint16) * 256 + 77
+    assert cv2.imwrite(str(tmp_path / "deep.png"), deep)
+    found = read_picture(tmp_path / "deep.png", PX)
+    np.testing.assert_array_equal(found, shrunk(tmp_path, upright))
+
+
+def test_sixteen_bits_of_grey_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"grey16\.png: holds pixels of mode I;16, such as depth"):
+        read_picture(broken(tmp_path, "grey16"), PX)
+
+
+# What the camera stored is the upright picture after the inverse of these.
+TURNS = {
+    1: None,
+    2: Image.Transpose.FLIP_LEFT_RIGHT,
+    3: Image.Transpose.ROTATE_180,
+    4: Image.Transpose.FLIP_TOP_BOTTOM,
+    5: Image.Transpose.TRANSPOSE,
+    6: Image.Transpose.ROTATE_90,
+    7: Image.Transpose.TRANSVERSE,
+    8: Image.Transpose.ROTATE_270,
+}
+
+
+@pytest.mark.parametrize(("orientation", "stored_by"), TURNS.items())
+def test_a_picture_is_turned_upright(
+    tmp_path: Path,
+    upright: Image.Image,
+    orientation: int,
+    stored_by: Image.Transpose | None,
+) -> None:
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    stored = upright if stored_by is None else upright.transpose(stored_by)
+    found = shrunk(tmp_path, stored, exif=exif)
+    np.testing.assert_array_equal(found, shrunk(tmp_path, upright, "upright.png"))
+    jpeg = shrunk(tmp_path, stored, "p.jpg", exif=exif, quality=95).astype(int)
+    assert np.abs(jpeg - found).mean() < 12  # another orientation is off by 40 and more
+
+
+@pytest.mark.parametrize("size", [(1, 1), (8, 6), (33, 33), (640, 480), (30, 590)])
+def test_pictures_of_any_size_are_read(tmp_path: Path, size: tuple[int, int]) -> None:
+    found = shrunk(tmp_path, Image.new("RGB", size, (10, 200, 30)))
+    assert found.shape == (PX, PX, 3)
+    assert (found == (10, 200, 30)).all()
+
+
+def test_the_colour_images_of_a_sequence_are_its_pictures(run: Path) -> None:
+    found = find_pictures([run / "seq-01"])
+    assert len(found) == COUNT
+    assert all(path.name.endswith(".color.png") for path in found)
+
+
+def test_the_command_line_loads_torch_only_to_localize() -> None:
+    code = "import sys, synfeal.cli; print('torch' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

@@ -1,0 +1,224 @@
+"""Scores keep their digits from the predictions to the table, and what is no pose has none."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from baselines.training.predict import predict_poses
+from baselines.training.score import pose_errors, score_run
+from synfeal.dataset.pose_table import PoseTable, write_pose_table
+from synfeal.geometry.rotations import rotation_angle_rad
+from synfeal.report.cells import read_cells
+from synfeal.report.compare.runs import read_run
+from synfeal.report.figures.cumulative_error import cumulative
+from synfeal.report.tables import record_of
+from tests.report_results import experiment
+from tests.trained_localizers import NETWORK, answering, save
+
+MP = mpmath.MPContext()
+MP.dps = 60
+N = 24
+GAPS = [0.0, *(10.0**-k for k in range(12, 2, -1))]
+ANGLES = [*GAPS, 1.0, *(MP.pi - MP.mpf(gap) for gap in GAPS)]
+Array = NDArray[np.float64]
+
+
+def turned(base: Sequence[float], axis: Sequence[float], angle: Any) -> Array:
+    """The unit quaternion ``base`` followed by a turn, rounded to doubles at the end."""
+    half = MP.mpf(angle) / 2
+    length = MP.sqrt(sum(MP.mpf(v) ** 2 for v in axis))
+    w, *v = MP.cos(half), *(MP.sin(half) * MP.mpf(a) / length for a in axis)
+    b = [MP.mpf(value) for value in base]
+    product = (
+        b[0] * w - b[1] * v[0] - b[2] * v[1] - b[3] * v[2],
+        b[0] * v[0] + b[1] * w + b[2] * v[2] - b[3] * v[1],
+        b[0] * v[1] - b[1] * v[2] + b[2] * w + b[3] * v[0],
+        b[0] * v[2] + b[1] * v[1] - b[2] * v[0] + b[3] * w,
+    )
+    return np.array([float(value) for value in product])
+
+
+def exact_angle(a: Array, b: Array) -> Any:
+    """The angle between two quaternions of doubles, by Kahan's formula for angles of vectors."""
+    p, q = ([MP.mpf(float(v)) for v in quat] for quat in (a, b))
+    if sum(x * y for x, y in zip(p, q, strict=True)) < 0:
+        q = [-v for v in q]
+    size_p, size_q = (MP.sqrt(sum(v * v for v in quat)) for quat in (p, q))
+    pairs = [(x * size_q, y * size_p) for x, y in zip(p, q, strict=True)]
+    apart = MP.sqrt(sum((x - y) ** 2 for x, y in pairs))
+    together = MP.sqrt(sum((x + y) ** 2 for x, y in pairs))
+    return 4 * MP.atan2(apart, together)
+
+
+BASES = ((1.0, 0.0, 0.0, 0.0), (0.5, -0.5, 0.5, 0.5), (0.1, 0.7, -0.5, 0.5))
+AXES = ((0.0, 0.0, 1.0), (2.0, -3.0, 6.0))
+
+
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("base", BASES)
+def test_the_reference_is_the_angle_turned_by(base: Sequence[float], axis: Sequence[float]) -> None:
+    for angle in ANGLES:
+        found = exact_angle(np.array(base), turned(base, axis, angle))
+        assert abs(found - angle) < 1e-15
+
+
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_angles_from_0_to_180_degrees_keep_their_digits(
+    base: Sequence[float], axis: Sequence[float], sign: float
+) -> None:
+    quats = np.array([sign * turned(base, axis, angle) for angle in ANGLES])
+    found = rotation_angle_rad(np.tile(base, (len(quats), 1)), quats)
+    for angle, quat, truth in zip(found, quats, ANGLES, strict=True):
+        assert abs(MP.mpf(float(angle)) - exact_angle(np.array(base), quat)) < 1e-15
+        assert abs(MP.mpf(float(angle)) - truth) < 1e-15
+
+
+Scored = Callable[..., tuple[dict[str, Any], list[dict[str, str]]]]
+
+
+@pytest.fixture
+def score(tmp_path: Path) -> Scored:
+    """Score predictions against labels that are also the truth; metrics and rows of errors."""
+
+    def run(predicted: PoseTable | Path, labels: PoseTable, out: Path = tmp_path) -> Any:
+        write_pose_table(out / "labels.csv", labels)
+        if isinstance(predicted, PoseTable):
+            write_pose_table(out / "predictions.csv", predicted)
+        label_files = [out / "labels.csv"] * 3
+        files = [out / "errors.csv", out / "metrics.json"]
+        score_run(out / "predictions.csv", *label_files, *files, {})
+        with files[0].open(encoding="utf-8", newline="") as file:
+            return json.loads(files[1].read_text()), list(csv.DictReader(file))
+
+    return run
+
+
+def table(quat_wxyz: Array, position_m: Array | None = None) -> PoseTable:
+    frame = np.arange(len(quat_wxyz))
+    if position_m is None:
+        position_m = np.zeros((len(frame), 3))
+    return PoseTable(frame, frame // 4, position_m, quat_wxyz)
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_the_errors_written_are_exact_to_a_billionth_of_a_radian(
+    score: Scored, base: Sequence[float]
+) -> None:
+    """The whole path: numbers to text, text to numbers, angles, degrees, text."""
+    quats = np.array([turned(base, AXES[1], angle) for angle in ANGLES])
+    offset_m = np.outer(0.1 * np.arange(len(quats)), [3.0, 0.0, 4.0])
+    _, rows = score(table(quats, offset_m), table(np.tile(base, (len(quats), 1))))
+    for row, angle, index in zip(rows, ANGLES, range(len(rows)), strict=True):
+        found_rad = MP.mpf(row["orientation_deg"]) * MP.pi / 180
+        assert abs(found_rad - angle) < 2e-15
+        assert MP.mpf(row["orientation_deg"]) == MP.mpf(row["orientation_deg_true"])
+        assert float(row["position_m"]) == pytest.approx(0.5 * index, rel=1e-15, abs=0)
+
+
+def test_medians_in_the_json_are_those_of_the_table(score: Scored) -> None:
+    quats = np.array([turned(BASES[1], AXES[1], angle) for angle in ANGLES])
+    metrics, rows = score(table(quats), table(np.tile(BASES[1], (len(quats), 1))))
+    for name in ("position_m", "orientation_deg", "orientation_deg_true"):
+        assert metrics[name] == np.median([float(row[name]) for row in rows])
+
+
+NO_POSE = {
+    "quaternion 0": ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]),
+    "nan in the quaternion": ([0.0, 0.0, 0.0], [1.0, math.nan, 0.0, 0.0]),
+    "nan in the position": ([0.0, math.nan, 0.0], [1.0, 0.0, 0.0, 0.0]),
+    "inf in the position": ([0.0, 0.0, -math.inf], [1.0, 0.0, 0.0, 0.0]),
+    "inf in the quaternion": ([0.0, 0.0, 0.0], [math.inf, 0.0, 0.0, 0.0]),
+    "no unit quaternion": ([0.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0]),
+    "a quaternion of length 1e-200": ([0.0, 0.0, 0.0], [1e-200, 0.0, 0.0, 0.0]),
+    "a quaternion of length 1e200": ([0.0, 0.0, 0.0], [1e200, 0.0, 0.0, 0.0]),
+    "a position of 1e200 m": ([1e200, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]),
+}
+
+
+@pytest.mark.parametrize("kind", NO_POSE)
+@pytest.mark.parametrize("lost", [1, N])
+def test_what_is_no_pose_has_failed(score: Scored, kind: str, lost: int) -> None:
+    truth = table(np.tile([1.0, 0.0, 0.0, 0.0], (N, 1)))
+    position, quat = truth.position_m.copy(), truth.quat_wxyz.copy()
+    position[:lost], quat[:lost] = NO_POSE[kind]
+    metrics, rows = score(table(quat, position), truth)
+    assert metrics["failed"] == lost
+    for name in ("position_m", "orientation_deg", "position_m_true", "orientation_deg_true"):
+        assert [float(row[name]) for row in rows] == [math.inf] * lost + [0.0] * (N - lost)
+        assert metrics[name] == (None if lost == N else 0.0)
+
+
+def test_half_of_the_predictions_lost_leave_no_median(score: Scored) -> None:
+    """Even half: the median of an even number is the mean of the middle two."""
+    truth = table(np.tile([1.0, 0.0, 0.0, 0.0], (N, 1)))
+    quat = truth.quat_wxyz.copy()
+    quat[: N // 2] = math.nan
+    metrics, _ = score(table(quat), truth)
+    assert (metrics["failed"], metrics["position_m"], metrics["orientation_deg"]) == (
+        N // 2,
+        None,
+        None,
+    )
+
+
+@pytest.mark.parametrize("quat_wxyz", [[0.0] * 4, [math.nan] * 4, [math.inf, 0.0, 0.0, 0.0]])
+def test_a_network_without_an_answer_is_scored_as_failed(
+    score: Scored, tmp_path: Path, quat_wxyz: list[float]
+) -> None:
+    """From the network's output to the score, through the files between them."""
+    model = save(tmp_path / "model.pt", answering([1.0, 2.0, 3.0], quat_wxyz))
+    np.save(tmp_path / "frames.npy", np.zeros((N, NETWORK.input_px, NETWORK.input_px, 3), np.uint8))
+    truth = table(np.tile([1.0, 0.0, 0.0, 0.0], (N, 1)))
+    write_pose_table(tmp_path / "labels.csv", truth)
+    out = tmp_path / "predictions.csv"
+    predict_poses(model, tmp_path / "frames.npy", tmp_path / "labels.csv", out, "cpu")
+    metrics, _ = score(out, truth)
+    assert (metrics["failed"], metrics["position_m"], metrics["orientation_deg"]) == (N, None, None)
+
+
+def test_a_diverged_repetition_is_counted_and_averaged_into_nothing(
+    score: Scored, tmp_path: Path
+) -> None:
+    """Three seeds of one cell, the second lost: the mean is that of the other two."""
+    row = experiment("table4_size")
+    truth = table(np.tile([1.0, 0.0, 0.0, 0.0], (N, 1)))
+    seeds = []
+    for repetition, offset_m in enumerate((0.5, math.nan, 1.5)):
+        out = tmp_path / f"runs/large_room/6k/synfeal/{row.init}/posenet/seed{repetition}"
+        out.mkdir(parents=True)
+        seeds.append(out)
+        score(table(truth.quat_wxyz, truth.position_m + np.array([offset_m, 0.0, 0.0])), truth, out)
+        for model in ("poselstm", "hourglass", "posenet2resnet", "posenet2"):
+            other = out.parent.parent / model / out.name
+            other.mkdir(parents=True)
+            (other / "metrics.json").write_bytes((out / "metrics.json").read_bytes())
+    for cell in read_cells("table4_size", [row], 3, tmp_path):
+        record = record_of("table4_size", cell)
+        assert (record["position_m"], record["position_m_sd"]) == (1.0, math.sqrt(0.5))
+        assert record["position_m_low"] == record["position_m_high"] == 1.0
+        assert (record["failed"], record["n_seeds"], cell.own.n_finished) == (N, 3, 2)
+    errors = read_run(seeds)
+    assert errors.failed == N
+    error_m, percent = cumulative(errors.errors[:, 0].ravel())
+    assert np.isfinite(error_m).all()
+    assert percent[-1] == pytest.approx(100 * 2 / 3)
+
+
+def test_errors_of_no_poses_raise_no_warning() -> None:
+    """Warnings are errors here: nothing is divided by zero and nothing overflows."""
+    position, quat = (np.array(values) for values in zip(*NO_POSE.values(), strict=True))
+    errors = pose_errors(table(quat, position), table(np.tile(BASES[0], (len(quat), 1))))
+    assert np.isinf(errors["position_m"]).all()
+    assert np.isinf(errors["orientation_deg"]).all()

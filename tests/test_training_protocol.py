@@ -1,0 +1,244 @@
+"""The parts of the two protocols: order, held-out paths, selection, distances, schedules."""
+
+from __future__ import annotations
+
+import csv
+import math
+
+import numpy as np
+import pytest
+import torch
+from pydantic import ValidationError
+from scipy.spatial.transform import Rotation
+
+from baselines.localizers.losses import DISTANCES, PosePrediction
+from baselines.localizers.registry import build_localizer
+from baselines.training import selection
+from baselines.training.fit import fit
+from baselines.training.optimizer import Schedule, optimizer_of
+from baselines.training.order import BatchOrder, held_out_paths
+from baselines.training.protocol import HALVE_EVERY, PROTOCOLS
+from baselines.training.selection import HeldOutErrors, Selection, held_out_errors
+from synfeal.config.models import MODELS, TrainingConfig
+from synfeal.errors import InputError
+from tests.coloured_frames import (
+    HYPER,
+    NETWORK,
+    TRAINING,
+    read_split,
+    statistics_of,
+    train,
+    write_split,
+)
+
+PUBLISHED = TRAINING.model_copy(update={"protocol": "published"})
+
+
+@pytest.fixture(scope="module")
+def splits(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("splits")
+    return write_split(folder, "train", 60, 0), write_split(folder, "test", 30, 1)
+
+
+@pytest.mark.parametrize("shuffled", [True, False])
+@pytest.mark.parametrize(("n_frames", "batch_size"), [(10, 4), (3, 8)])
+def test_every_frame_is_shown_equally_often(n_frames, batch_size, shuffled):
+    order = BatchOrder(n_frames, batch_size, 0, shuffled)
+    batches = [order.next_batch() for _ in range(15)]
+    assert [len(batch) for batch in batches] == [batch_size] * 15
+    shown = torch.cat(batches)
+    counts = torch.bincount(shown, minlength=n_frames)
+    assert counts.max() - counts.min() <= 1
+    in_order = torch.equal(shown, torch.arange(len(shown)) % n_frames)
+    assert in_order == (not shuffled)
+
+
+@pytest.mark.parametrize("n_paths", [1, 2, 3, 10, 25])
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.1, 0.5, 0.99])
+def test_whole_paths_are_held_out(n_paths, share):
+    lengths = np.random.default_rng(3).integers(1, 9, n_paths)
+    path = np.repeat(np.arange(n_paths) * 2 + 1, lengths)
+    mask = held_out_paths(path, share, seed=4)
+    held, learned = set(path[mask]), set(path[~mask])
+    assert held.isdisjoint(learned)
+    assert learned
+    if share == 0.0 or n_paths == 1:
+        assert not held
+    else:
+        assert len(held) == min(max(round(share * n_paths), 1), n_paths - 1)
+
+
+def test_the_seed_draws_the_paths():
+    path = np.arange(20).repeat(3)
+    drawn = {tuple(held_out_paths(path, 0.2, seed)) for seed in range(8)}
+    assert len(drawn) > 5
+    assert (held_out_paths(path, 0.2, 1) == held_out_paths(path, 0.2, 1)).all()
+
+
+def test_parts_share_images_and_keep_their_labels(splits):
+    whole = read_split(splits[0])
+    part = whole.part(whole.path % 2 == 1)
+    assert part.images is whole.images
+    inner = part.part(part.path == 3)
+    rows = torch.arange(30, 40)  # ten frames a path
+    found = inner.batch(torch.arange(10))
+    assert torch.equal(found.images, whole.images[rows])
+    assert torch.equal(found.position_m, whole.position_m[rows])
+    assert torch.equal(found.quat_wxyz, whole.quat_wxyz[rows])
+    assert set(inner.path) == {3}
+
+
+def test_the_corrected_protocol_never_opens_the_test_set(splits, tmp_path):
+    absent = (tmp_path / "absent.npy", tmp_path / "absent.csv")
+    train(splits[0], tmp_path, samples=32, test=absent)
+    with pytest.raises(InputError, match="absent"):
+        train(splits[0], tmp_path, samples=32, test=absent, training=PUBLISHED)
+
+
+def test_held_out_paths_are_not_learned_from(splits, monkeypatch):
+    """Their images may be anything."""
+    frames = read_split(splits[0])
+    mask = held_out_paths(frames.path, 0.4, 1)
+    states = []
+    for grey in (0, 255):
+        images = frames.images.clone()
+        images[torch.from_numpy(mask)] = grey
+        changed = type(frames)(images, *(getattr(frames, n) for n in FIELDS))
+        torch.manual_seed(0)
+        localizer = build_localizer("posenet2", NETWORK, HYPER)
+        statistics = statistics_of(frames)
+        fit(localizer, changed.part(~mask), statistics, Schedule(96, 16, 1e-3, 0.0), 0)
+        states.append(localizer.state_dict())
+    assert all(torch.equal(states[0][k], states[1][k]) for k in states[0])
+
+
+FIELDS = ("position_m", "quat_wxyz", "path", "rows")
+
+
+@pytest.mark.parametrize("training", [TRAINING, PUBLISHED], ids=lambda t: t.protocol)
+def test_the_best_weights_looked_at_are_kept(training, splits):
+    frames, test = read_split(splits[0]), read_split(splits[1])
+    statistics = statistics_of(frames)
+    protocol = PROTOCOLS[training.protocol]
+    localizer = build_localizer("posenet2", NETWORK, HYPER)
+    rows = fit(
+        localizer, frames, statistics, Schedule(480, 16, 2e-2, 0.0), 0,
+        protocol=protocol, held_out=test,
+    )  # fmt: skip
+    looked_at = [HeldOutErrors(*row[3:]) for row in rows if row.held_out_loss is not None]
+    scores = [errors.score(protocol.selection) for errors in looked_at]
+    kept = held_out_errors(localizer, test, statistics, "float32")
+    assert kept.score(protocol.selection) == pytest.approx(min(scores), rel=1e-6)
+    assert len(scores) > 1
+
+
+# Loss and product of the medians disagree about which is best; not a number never is.
+COURSE = [
+    HeldOutErrors(math.nan, math.nan, math.nan),
+    HeldOutErrors(3.0, 2.0, 2.0),
+    HeldOutErrors(1.0, 1.0, 5.0),
+    HeldOutErrors(2.0, 1.0, 3.0),
+    HeldOutErrors(math.nan, math.nan, math.nan),
+]
+
+
+@pytest.mark.parametrize(("kind", "best"), [("validation", 3), ("test", 2)])
+def test_test_frames_choose_by_loss_and_validation_by_errors(kind, best, splits, monkeypatch):
+    course = iter(COURSE)
+    monkeypatch.setattr(selection, "held_out_errors", lambda *_: next(course))
+    localizer = build_localizer("posenet2", NETWORK, HYPER)
+    chosen = Selection(kind, localizer, None, read_split(splits[1]), "float32")
+    for index in range(len(COURSE)):
+        torch.nn.init.constant_(localizer.criterion.s_position, index)
+        chosen.evaluate()
+    assert [chosen.stale(p) for p in (None, 4 - best, 5 - best)] == [False, True, False]
+    chosen.restore()
+    assert localizer.criterion.s_position.item() == best
+
+
+@pytest.mark.parametrize("n_held_out", [1, 30])
+def test_validation_takes_five_percent_of_the_time(n_held_out, splits):
+    frames = read_split(splits[1]).part(np.arange(30) < n_held_out)
+    localizer = build_localizer("posenet2", NETWORK, HYPER)
+    for samples in (400, 2000, 10_000):
+        steps = samples // 16
+        chosen = Selection("validation", localizer, None, frames, "float32")
+        due = chosen.due_after(steps, samples)
+        assert steps in due
+        assert max(due) == steps
+        assert len(due) == 20 or len(due) * n_held_out / 3 <= 0.05 * samples
+        assert len(due) == 20 or (len(due) + 1) * n_held_out / 3 > 0.05 * samples
+        gaps = np.diff([0, *sorted(due)])
+        assert gaps.max() - gaps.min() <= 1
+        assert len(Selection("test", localizer, None, frames, "float32").due_after(steps, 1)) == 20
+    assert not Selection("last", localizer, None, frames, "float32").due_after(100, 1600)
+
+
+def test_held_out_errors_are_those_of_another_implementation(splits, monkeypatch):
+    frames = read_split(splits[1])
+    rng = np.random.default_rng(2)
+    position_m = frames.position_m.numpy() + rng.normal(size=(30, 3))
+    turned = Rotation.from_rotvec(rng.normal(size=(30, 3)))
+    quat_wxyz = -2.5 * turned.as_quat(scalar_first=True)  # neither sign nor length counts
+    localizer = build_localizer("posenet2", NETWORK, HYPER)
+    answer = PosePrediction(
+        *(torch.tensor(v, dtype=torch.float32) for v in (position_m, quat_wxyz))
+    )
+    monkeypatch.setattr(localizer, "forward", lambda images: [answer])
+    found = held_out_errors(localizer, frames, statistics_of(frames), "float32")
+    true = Rotation.from_quat(frames.quat_wxyz.numpy(), scalar_first=True)
+    distance = np.linalg.norm(position_m - frames.position_m.numpy(), axis=1)
+    angle = np.degrees((turned.inv() * true).magnitude())
+    assert found.position_m == pytest.approx(np.median(distance), rel=1e-5)
+    assert found.orientation_deg == pytest.approx(np.median(angle), rel=1e-4)
+    assert localizer.training
+
+
+def test_mean_squares_in_closed_form():
+    position, orientation = DISTANCES["mse"]
+    zero = torch.zeros(2, 3)
+    assert position(torch.tensor([[3.0, 0, 0], [0, 0, 3.0]]), zero).item() == pytest.approx(3.0)
+    quat = torch.tensor([[0.5, 0.5, 0.5, 0.5]])
+    assert orientation(7 * quat, quat).item() == pytest.approx(0.0, abs=1e-12)
+    assert orientation(-quat, quat).item() == pytest.approx(1.0)
+
+
+def test_the_rate_is_halved_at_each_share():
+    parameter = torch.nn.Linear(2, 2)
+    optimizer, scheduler = optimizer_of("halving", parameter, Schedule(1600, 16, 0.8, 0.0, 0.3))
+    rates = []
+    for _ in range(100):
+        rates.append(scheduler.get_last_lr()[0])
+        optimizer.step()
+        scheduler.step()
+    assert rates == pytest.approx([0.8] * 30 + [0.4] * 30 + [0.2] * 30 + [0.1] * 10)
+    assert set(HALVE_EVERY) == set(MODELS)
+
+
+@pytest.mark.parametrize(("kind", "decays"), [("one_cycle", False), ("halving", True)])
+def test_biases_decay_in_the_published_protocol_alone(kind, decays):
+    layer = torch.nn.Linear(2, 2)
+    torch.nn.init.ones_(layer.bias)
+    optimizer, _ = optimizer_of(kind, layer, Schedule(160, 16, 0.1, 0.5))
+    for parameter in layer.parameters():
+        parameter.grad = torch.zeros_like(parameter)
+    before = layer.weight.detach().clone()
+    optimizer.step()
+    assert (layer.bias < 1).all() == decays
+    assert (layer.weight.abs() < before.abs()).all()
+
+
+def test_patience_ends_a_published_training_early(splits, tmp_path, monkeypatch):
+    worse = iter(HeldOutErrors(float(k), 1.0, 1.0) for k in range(99))
+    monkeypatch.setattr(selection, "held_out_errors", lambda *_: next(worse))
+    training = PUBLISHED.model_copy(update={"patience": 3})
+    _, history = train(splits[0], tmp_path, samples=640, training=training, test=splits[1])
+    with history.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert int(rows[-1]["samples_seen"]) == 640 // 20 * 4
+
+
+def test_patience_is_refused_where_the_rate_follows_one_cycle():
+    with pytest.raises(ValidationError, match=r"patience: must be left out with `protocol: corr"):
+        TrainingConfig(samples_seen={}, patience=3)
+    assert TrainingConfig(samples_seen={}, patience=3, protocol="published").patience == 3

@@ -1,0 +1,49 @@
+"""Localizers for tests: of random weights, or made to answer what a test wants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import torch
+
+from baselines.localizers.registry import build_localizer
+from baselines.training.checkpoint import TrainedLocalizer, save_checkpoint
+from baselines.training.data import ImageStatistics
+from baselines.training.description import FrameCamera, ModelDescription
+from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig
+
+NETWORK = NetworkConfig(input_px=32, width=0.125)
+HYPER = LocalizerConfig(learning_rate=4e-3, dropout=0.0, beta=1.0, s_orientation=-1.0)
+
+
+def untrained(
+    name: ModelName = "posenet2",
+    network: NetworkConfig = NETWORK,
+    hyper: LocalizerConfig = HYPER,
+    camera: FrameCamera | None = None,
+) -> TrainedLocalizer:
+    """A localizer of random weights that looks at each image."""
+    torch.manual_seed(0)
+    built = build_localizer(name, network, hyper).eval()
+    built.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    statistics = ImageStatistics(torch.full((1, 3, 1, 1), 128.0), torch.full((1, 3, 1, 1), 60.0))
+    description = ModelDescription(localizer=name, network=network, hyper=hyper, camera=camera)
+    return TrainedLocalizer(description, built, statistics)
+
+
+def answering(position_m: Sequence[float], quat_wxyz: Sequence[float]) -> TrainedLocalizer:
+    """A localizer that gives every image this pose."""
+    trained = untrained()
+    head = trained.network.regressor[-1]  # type: ignore[index]
+    with torch.no_grad():
+        for layer, values in ((head.position, position_m), (head.quat, quat_wxyz)):
+            layer.weight.zero_()
+            layer.bias.copy_(torch.tensor(values))
+    return trained
+
+
+def save(path: Path, trained: TrainedLocalizer) -> Path:
+    """Write its checkpoint."""
+    save_checkpoint(path, trained.network, trained.statistics, trained.description)
+    return path
