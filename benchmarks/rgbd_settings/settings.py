@@ -18,7 +18,7 @@ _CHANGES: dict[str, dict[str, object]] = {
     "start: identity": {"start": "identity"},
     "keyframe every 5": {"keyframe_every": 5},
     "keyframe every 20": {"keyframe_every": 20},
-    "3 loops a keyframe": {"loops_per_keyframe": 3},
+    "6 loops a keyframe": {"loops_per_keyframe": 6},
     "intensity": {"method": "intensity"},
     "hybrid, Kinect": {"method": "hybrid", "sensor": "kinect"},
 }

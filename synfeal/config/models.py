@@ -115,7 +115,7 @@ class RgbdConfig(DepthConfig):
     )
     keyframe_every: Count = Field(10, description="frames between keyframes for loop closures")
     loops_per_keyframe: Annotated[int, Field(ge=0, le=10**9)] = Field(
-        6, description="most loop closures from a keyframe to earlier ones; 0 closes none"
+        3, description="most loop closures from a keyframe to earlier ones; 0 closes none"
     )
     max_rmse_m: Positive = Field(0.05, description="motions with a larger residual are rejected")
     min_fitness: Fraction = Field(0.3, description="motions with less overlap are rejected")
