@@ -43,6 +43,13 @@ MODEL: ModelName = "posenet2"
 SIDES_PX, WIDTHS = (32, 48, 64, 92), (0.125, 0.25, 0.5)
 SIDE_COLORS = dict(zip(SIDES_PX, (ORANGE, GREEN, BLUE, BLACK), strict=True))
 WIDTH_SIZES = dict(zip(WIDTHS, (5, 8, 12), strict=True))
+RING: Style = {
+    "linestyle": "",
+    "marker": "o",
+    "markersize": 17,
+    "markerfacecolor": "none",
+    "markeredgecolor": VERMILION,
+}
 SPLITS = ("train", "test")
 
 
@@ -135,13 +142,7 @@ def draw(path: Path, rows: list[Row], network: NetworkConfig) -> None:
                 style = style_of(row)
                 axes.plot(float(row["train_cpu_s"]), float(row[measure]), **style)
                 if row["model"] == MODEL and is_profiles(row, network):
-                    ring = {"marker": "o", "markersize": 19, "markerfacecolor": "none"}
-                    axes.plot(
-                        float(row["train_cpu_s"]),
-                        float(row[measure]),
-                        markeredgecolor=VERMILION,
-                        **ring,
-                    )
+                    axes.plot(float(row["train_cpu_s"]), float(row[measure]), **RING)
             axes.set(xscale="log", xlabel="processor seconds to train", ylabel=f"median {title}")
             axes.xaxis.set_major_formatter("{x:g}")
             axes.grid(color="0.93", which="both")
@@ -167,7 +168,8 @@ def handles() -> list[Line2D]:
     shown = {f"{TITLES[MODEL]}, {side} px": base | {"input_px": str(side)} for side in SIDES_PX}
     shown |= {f"width {width:g}": base | {"width": str(width)} for width in WIDTHS}
     shown |= {TITLES[model]: base | {"model": model} for model in MODELS if model != MODEL}
-    return [Line2D([], [], label=label, **style_of(row)) for label, row in shown.items()]
+    marks = [Line2D([], [], label=label, **style_of(row)) for label, row in shown.items()]
+    return [*marks, Line2D([], [], label="the profile's shape", **RING)]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -28,6 +28,7 @@ VARIANTS: dict[str, Protocol] = {
     "selection: test": CORRECTED._replace(selection="test"),
     "distance: mse": CORRECTED._replace(distance="mse"),
     "schedule: halving": CORRECTED._replace(schedule="halving"),
+    "images: plain": CORRECTED._replace(images="plain"),
     "published": PUBLISHED,
 }
 # Where the two losses of a fixed weight are made to agree: errors as trainings of this size have.
@@ -90,7 +91,7 @@ def write(config: Config, options: argparse.Namespace, rows: list[Row]) -> None:
         f"Large Room, {SIZE}, pretrained, {rows[0]['samples_seen']} images shown. Median errors on"
         " the test set against the true poses: mean over the seeds, in brackets the least and the"
         " largest. A line names what is exchanged in the corrected protocol; `published` exchanges"
-        " order, selection, distance and schedule at once. Learning rates are the profile's in all"
+        " all of these at once. Learning rates are the profile's in all"
         " lines. Rows that choose weights on the test set are scored on the same test set; they,"
         " and `selection: last`, learn from the paths that the others hold out."
         f" `{MATCHED.strip(', ')}`: PoseNet's weight of orientation times"

@@ -169,7 +169,7 @@ def predict_ms(model: Path, frames: Path, count: int) -> float:
 def measure_missing(
     trainings: Sequence[Training], config: Config, root: Path, table: Path, jobs: int
 ) -> list[Row]:
-    """All rows of the table, after trainings that it lacks were made, ``jobs`` side by side."""
+    """Their rows of the table, after what it lacks was made, ``jobs`` side by side."""
     known = {key_of(row, trainings[0].key) for row in read_rows(table)}
     missing = [t for t in trainings if key_of(t.key, t.key) not in known]
     table.parent.mkdir(parents=True, exist_ok=True)
@@ -182,7 +182,8 @@ def measure_missing(
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-    return read_rows(table)
+    wanted = {key_of(training.key, training.key) for training in trainings}
+    return [row for row in read_rows(table) if key_of(row, trainings[0].key) in wanted]
 
 
 def key_of(row: Key, names: Key) -> tuple[str, ...]:

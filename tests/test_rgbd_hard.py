@@ -30,6 +30,24 @@ def fusion(paths, camera=CAMERA):
 METHODS = pytest.mark.parametrize("method", [rgbd, fusion])
 
 
+@pytest.fixture(scope="module")
+def written():
+    return {}
+
+
+@pytest.fixture
+def write_once(request, written, tmp_path_factory):
+    """Writes the frames of a test once for both methods; tests that damage files write their own."""
+
+    def write(poses, room=FURNISHED, camera=CAMERA):
+        name = (request.node.originalname, len(poses))
+        if name not in written:
+            written[name] = write_room(tmp_path_factory.mktemp("room"), poses, room, camera)
+        return written[name]
+
+    return write
+
+
 def errors(first_from_cam, poses):
     """Position errors in metres and orientation errors in degrees."""
     truth = relative(np.array(poses)[0], np.array(poses))
@@ -51,33 +69,33 @@ def assert_right(result, poses, max_m=0.02, max_deg=0.5):
 
 
 @METHODS
-def test_no_motion_before_a_white_wall_is_claimed_to_be_measured(method, tmp_path):
+def test_no_motion_before_a_white_wall_is_claimed_to_be_measured(method, write_once):
     wall = Room((((-3.0, -40.0, -40.0), (3.0, 40.0, 40.0)),), plain=True)
     poses = [pose_at([1.0, 0.03 * k, 1.5], pitch_deg=0) for k in range(40)]
-    first_from_cam, known, _ = method(write_room(tmp_path, poses, wall))
+    first_from_cam, known, _ = method(write_once(poses, wall))
     assert known[0]
     assert not known[1:].any()
     assert np.isfinite(first_from_cam).all()
 
 
 @METHODS
-def test_pure_rotation_is_recovered(method, tmp_path):
+def test_pure_rotation_is_recovered(method, write_once):
     poses = [pose_at([-1.0, 0, 1.4], yaw_deg=25 + 2.5 * k) for k in range(12)]
-    assert_right(method(write_room(tmp_path, poses)), poses)
+    assert_right(method(write_once(poses)), poses)
 
 
 @METHODS
-def test_a_camera_at_rest_stays_where_it_is(method, tmp_path):
+def test_a_camera_at_rest_stays_where_it_is(method, write_once):
     poses = [pose_at([-1.0, 0, 1.4], yaw_deg=30)] * 8
-    assert_right(method(write_room(tmp_path, poses)), poses, max_m=0.005, max_deg=0.1)
+    assert_right(method(write_once(poses)), poses, max_m=0.005, max_deg=0.1)
 
 
 @METHODS
-def test_identical_rooms_are_not_taken_for_one(method, tmp_path):
+def test_identical_rooms_are_not_taken_for_one(method, write_once):
     """Every 3 m along the way the view repeats; no closure may join two repetitions."""
     row = Room((((-20.0, -2.5, 0.0), (30.0, 2.5, 2.6)), *FURNISHED.boxes[1:4]), period_m=3.0)
     poses = [pose_at([0.15 * k - 1, -1.5, 1.4], yaw_deg=60) for k in range(28)]
-    result = method(write_room(tmp_path, poses, row))
+    result = method(write_once(poses, row))
     assert_right(result, poses, max_m=0.1, max_deg=1.0)
     for edge in result[2].edges if result[2] else ():
         error_m = pose_error(edge.i_from_j, relative(poses[edge.i], poses[edge.j]))[0]
@@ -85,11 +103,11 @@ def test_identical_rooms_are_not_taken_for_one(method, tmp_path):
 
 
 @METHODS
-def test_a_right_angle_in_five_frames_is_recovered_or_lost(method, tmp_path):
+def test_a_right_angle_in_five_frames_is_recovered_or_lost(method, write_once):
     """18 degrees a frame: features find them; KinectFusion has none and says that it is lost."""
     yaw_deg = np.concatenate([np.zeros(4), np.linspace(0, 90, 6)[1:], np.full(4, 90)])
     poses = [pose_at([-1.0 + 0.03 * k, 0, 1.4], yaw_deg=a) for k, a in enumerate(yaw_deg)]
-    first_from_cam, known, _ = method(write_room(tmp_path, poses))
+    first_from_cam, known, _ = method(write_once(poses))
     error_m, error_deg = errors(first_from_cam, poses)
     assert error_m[known].max() < 0.05
     assert error_deg[known].max() < 1.0
@@ -98,9 +116,9 @@ def test_a_right_angle_in_five_frames_is_recovered_or_lost(method, tmp_path):
 
 @METHODS
 @pytest.mark.parametrize("n_frames", [2, 3])
-def test_the_shortest_batches_are_recovered(method, n_frames, tmp_path):
+def test_the_shortest_batches_are_recovered(method, n_frames, write_once):
     poses = [pose_at([-1.0 + 0.03 * k, 0.01 * k, 1.4], yaw_deg=30 + k) for k in range(n_frames)]
-    assert_right(method(write_room(tmp_path, poses)), poses)
+    assert_right(method(write_once(poses)), poses)
 
 
 @METHODS
@@ -141,11 +159,11 @@ def test_depth_of_another_kind_is_named(method, tmp_path):
 
 
 @METHODS
-def test_a_principal_point_off_the_centre_costs_nothing_only_when_it_is_known(method, tmp_path):
+def test_a_principal_point_off_the_centre_costs_nothing_only_when_it_is_known(method, write_once):
     fx, fy, cx, cy = intrinsics_of(CAMERA)
     off = CameraConfig(width=CAMERA.width, height=CAMERA.height, fx=fx, fy=fy, cx=cx + 20, cy=cy)
     poses = [pose_at([-1.0 + 0.02 * k, 0.01 * k, 1.4], yaw_deg=30 + k) for k in range(12)]
-    paths = write_room(tmp_path, poses, camera=off)
+    paths = write_once(poses, camera=off)
     assert_right(method(paths, off), poses)
     wrong, known, _ = method(paths, CAMERA)
     assert np.isfinite(wrong).all()

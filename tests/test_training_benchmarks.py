@@ -155,6 +155,7 @@ def test_a_table_that_is_complete_starts_nothing(config, tmp_path):
     # Nothing of these trainings exists: starting one would fail.
     assert measure_missing(made, config, tmp_path, table, 1) == read_rows(table)
     assert len(read_rows(table)) == 3
+    assert measure_missing(made[1:2], config, tmp_path, table, 1) == read_rows(table)[1:2]
 
 
 def test_changes_are_taken_seed_by_seed(config, tmp_path):
