@@ -37,7 +37,7 @@ def written():
 
 @pytest.fixture
 def write_once(request, written, tmp_path_factory):
-    """Writes the frames of a test once for both methods; tests that damage files write their own."""
+    """Writes the frames of a test once for both methods, unless it changes the files."""
 
     def write(poses, room=FURNISHED, camera=CAMERA):
         name = (request.node.originalname, len(poses))

@@ -44,8 +44,8 @@ class RandomRotation:
         self._largest_rad = torch.tensor([tilt, tilt, roll])
         # Drawn on the processor, so that one seed gives one training wherever it runs.
         self._generator = torch.Generator().manual_seed(seed)
-        self._input_px, self._intrinsics = input_px, intrinsics
         self._rays = _rays(intrinsics, input_px)
+        self._grid_from_ray = _grid_from_ray(intrinsics, input_px)
 
     def __call__(self, images: Tensor, quat_wxyz: Tensor) -> tuple[Tensor, Tensor]:
         """Turned images (B, 3, S, S), channels last, and their quaternions (B, 4)."""
@@ -59,13 +59,11 @@ class RandomRotation:
         A positive turn about y looks further right, one about x further up, one about z rolls the
         camera clockwise.
         """
-        self._rays = self._rays.to(images.device)
-        directions = self._rays @ rotation_of(old_from_new_rad).transpose(1, 2)
-        slopes = directions[..., :2] / directions[..., 2:].clamp_min(LEAST_DEPTH)
-        fx, fy, cx, cy = self._intrinsics
-        pixels = slopes * slopes.new_tensor([fx, fy]) + slopes.new_tensor([cx, cy])
-        grid = (2 / self._input_px * pixels - 1).view(len(images), *images.shape[2:], 2)
-        # align_corners=False puts the centre of the first pixel at 0.5, as our cameras do.
+        device = images.device
+        self._rays, self._grid_from_ray = self._rays.to(device), self._grid_from_ray.to(device)
+        points = self._grid_from_ray @ rotation_of(old_from_new_rad) @ self._rays
+        across, down = points[:, :2].div_(points[:, 2:].clamp_min(LEAST_DEPTH)).unbind(1)
+        grid = torch.stack([across, down], dim=-1).view(len(images), *images.shape[2:], 2)
         sampled = nn.functional.grid_sample(
             images, grid, mode="bilinear", padding_mode="border", align_corners=False
         )
@@ -136,9 +134,21 @@ def quat_product(a_wxyz: Tensor, b_wxyz: Tensor) -> Tensor:
 
 
 def _rays(intrinsics: Intrinsics, input_px: int) -> Tensor:
-    """Directions (S * S, 3) through the pixel centres, row by row, of depth 1."""
+    """Directions (3, S * S) through the pixel centres, row by row, of depth 1."""
     centres = torch.arange(input_px) + 0.5
     x = (centres - intrinsics.cx) / intrinsics.fx
     y = (centres - intrinsics.cy) / intrinsics.fy
     down, across = torch.meshgrid(y, x, indexing="ij")
-    return torch.stack([across, down, torch.ones_like(across)], dim=-1).view(-1, 3)
+    return torch.stack([across, down, torch.ones_like(across)]).view(3, -1)
+
+
+def _grid_from_ray(intrinsics: Intrinsics, input_px: int) -> Tensor:
+    """Projection (3, 3) to ``grid_sample``'s coordinates: -1 and 1 are the image's borders.
+
+    With ``align_corners=False`` the centre of the first pixel is half a pixel from them, as in our
+    cameras.
+    """
+    projection = torch.tensor(intrinsics.matrix(), dtype=torch.float32)
+    projection[:2] *= 2 / input_px
+    projection[:2, 2] -= 1
+    return projection
