@@ -28,11 +28,11 @@ MEASURES = {"position_m": "position", "orientation_deg": "orientation"}
 
 
 def trainings(config: Config, options: argparse.Namespace) -> list[Training]:
-    """All trainings, one repetition after the other, small sets first."""
+    """All trainings, small sets first, one repetition after the other."""
     return [
         training_of(config, options.results, model, size, init, repetition, options.samples)
-        for repetition, size, model, init in product(
-            range(options.repetitions), SIZES, config.localizers, INITS
+        for size, repetition, model, init in product(
+            SIZES, range(options.repetitions), config.localizers, INITS
         )
     ]
 

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 _MIN_INLIERS, _MIN_LOOP_INLIERS = 8, 12
 # Depth has slid when it says something else than at least so many features: metres, and a share of
 # the motion. Neighbours 3 cm apart whose features were right to 3 mm were up to 4 cm off by depth.
-_MIN_WITNESSES, _SLIDE_M, _SLIDE_SHARE = 30, 0.008, 0.04
+_MIN_WITNESSES, _SLIDE_M, _SLIDE_SHARE = 100, 0.008, 0.04
 
 
 @dataclass(frozen=True)
