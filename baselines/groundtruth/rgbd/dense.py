@@ -37,9 +37,8 @@ _MAX_FINE = 4
 _CLOSE = 0.2
 # A motion that agrees less is no longer sure: other starting points are tried.
 SURE_AGREEMENT = 0.8
-# Depth alone is trusted when the surfaces in view constrain the motion at least so well; where they
-# do it less than firmly, the border of a pillar in front of a wall has held it back by centimetres.
-MIN_CONSTRAINT, FIRM_CONSTRAINT = 1e-3, 3e-3
+# Depth alone is trusted when the surfaces in view constrain the motion at least so well.
+MIN_CONSTRAINT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -100,11 +99,11 @@ class DenseOdometry:
     camera: CameraConfig
     cfg: RgbdConfig
 
-    def constraint(self, frame: RgbdFrame) -> float:
-        """How well what is compared tells every motion of the camera; infinite with colour."""
+    def constrained(self, frame: RgbdFrame) -> bool:
+        """Whether what is compared can tell every motion of the camera."""
         if self.cfg.method != "point-to-plane":
-            return np.inf
-        return constraint(frame.depth_m, self.camera)
+            return True
+        return constraint(frame.depth_m, self.camera) >= MIN_CONSTRAINT
 
     def overlap(self, i: RgbdFrame, j: RgbdFrame, i_from_j: Array) -> float:
         """Share of the points of j that agree with i under a motion (4, 4), 0 if rejected."""
