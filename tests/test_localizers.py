@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,11 +17,7 @@ from baselines.localizers.base import Localizer
 from baselines.localizers.heads import PoseRegressor
 from baselines.localizers.hourglass import UpBlock
 from baselines.localizers.losses import (
-    BetaLoss,
-    LearnedWeightLoss,
     PosePrediction,
-    position_distance,
-    quat_distance,
 )
 from baselines.localizers.names import RESNET_LOCALIZERS, backbone_of
 from baselines.localizers.poselstm import FourDirectionLstm
@@ -122,23 +117,6 @@ def test_the_backbone_is_the_one_named(case):
     expected = build_backbone(named, case.network.width)
     assert type(found) is type(expected)
     assert found.state_dict().keys() == expected.state_dict().keys()
-
-
-@once
-def test_a_batch_can_be_learned_by_heart(case):
-    images, position_m, quat_wxyz = case.batch(4)
-    localizer = case.build()
-    localizer.set_pose_prior(position_m.mean(0))
-    optimizer = torch.optim.AdamW(localizer.parameters(), 3e-3)
-    for step in range(40):
-        if step == 28:
-            optimizer.param_groups[0]["lr"] = 3e-4
-        optimizer.zero_grad()
-        localizer.loss(localizer(images), position_m, quat_wxyz).backward()
-        optimizer.step()
-    main = localizer(images)[0]
-    assert position_distance(main.position_m, position_m) < 0.2
-    assert quat_distance(main.quat_wxyz, quat_wxyz) < 0.1
 
 
 @all_localizers
@@ -275,71 +253,6 @@ def test_the_lstm_reads_in_four_directions():
     torch.testing.assert_close(lstm(features)[0, :5], state[0, 0])
     _, (state, _) = lstm.horizontal(matrix.T[:, None, :])
     torch.testing.assert_close(lstm(features)[0, 10:15], state[0, 0])
-
-
-def test_position_distance_is_euclidean():
-    true_m = torch.zeros(2, 3)
-    predicted_m = torch.tensor([[3.0, 4.0, 0.0], [0.0, 0.0, 2.0]])
-    assert position_distance(predicted_m, true_m).item() == pytest.approx(3.5)
-
-
-@pytest.mark.parametrize("angle_deg", [0.0, 10.0, 90.0, 180.0])
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_quat_distance_is_the_chord_of_half_the_angle(angle_deg, sign):
-    """|p - q| = 2 sin(angle / 4) whatever the sign of the prediction."""
-    half = math.radians(angle_deg) / 2
-    quat = torch.tensor([[math.cos(half), 0.0, math.sin(half), 0.0]])
-    distance = quat_distance(sign * quat, torch.tensor([[1.0, 0.0, 0.0, 0.0]]))
-    assert distance.item() == pytest.approx(2 * math.sin(half / 2), abs=1e-6)
-
-
-@pytest.mark.parametrize("criterion", [BetaLoss(7.0), LearnedWeightLoss(0.3, -2.0)])
-def test_opposite_quaternions_cost_the_same(criterion):
-    _, position_m, quat_wxyz = batch()
-    prediction = PosePrediction(torch.randn(6, 3), torch.randn(6, 4))
-    opposite = PosePrediction(prediction.position_m, -prediction.quat_wxyz)
-    loss = criterion(prediction, position_m, quat_wxyz)
-    torch.testing.assert_close(criterion(opposite, position_m, quat_wxyz), loss)
-    torch.testing.assert_close(criterion(prediction, position_m, -quat_wxyz), loss)
-
-
-@pytest.mark.parametrize("criterion", [BetaLoss(7.0), LearnedWeightLoss(0.3, -2.0)])
-def test_a_perfect_prediction_has_a_finite_gradient(criterion):
-    _, position_m, quat_wxyz = batch()
-    guess = PosePrediction(position_m.clone().requires_grad_(), quat_wxyz.clone().requires_grad_())
-    criterion(guess, position_m, quat_wxyz).backward()
-    assert torch.isfinite(guess.position_m.grad).all()
-    assert torch.isfinite(guess.quat_wxyz.grad).all()
-
-
-def off_by(distance_m: float, angle_rad: float) -> tuple[PosePrediction, Tensor, Tensor]:
-    """A prediction off by a distance and an angle, and what would have been right."""
-    quat = torch.tensor([[math.cos(angle_rad / 2), math.sin(angle_rad / 2), 0.0, 0.0]])
-    prediction = PosePrediction(torch.tensor([[0.0, distance_m, 0.0]]), quat)
-    return prediction, torch.zeros(1, 3), torch.tensor([[1.0, 0.0, 0.0, 0.0]])
-
-
-def test_beta_loss_in_closed_form():
-    loss = BetaLoss(10.0)(*off_by(0.7, 1.2))
-    assert loss.item() == pytest.approx(0.7 + 10.0 * 2 * math.sin(0.3), rel=1e-5)
-
-
-def test_learned_loss_in_closed_form():
-    loss = LearnedWeightLoss(0.5, -3.0)(*off_by(0.7, 1.2))
-    orientation = 2 * math.sin(0.3)
-    expected = math.exp(-0.5) * 0.7 + 0.5 + math.exp(3.0) * orientation - 3.0
-    assert loss.item() == pytest.approx(expected, rel=1e-5)
-
-
-def test_learned_weights_settle_at_the_logarithm_of_the_error():
-    criterion = LearnedWeightLoss(0.0, -3.0)
-    optimizer = torch.optim.Adam(criterion.parameters(), 0.05)
-    for _ in range(400):
-        optimizer.zero_grad()
-        criterion(*off_by(0.7, 1.2)).backward()
-        optimizer.step()
-    assert criterion.s_position.item() == pytest.approx(math.log(0.7), abs=1e-2)
-    assert criterion.s_orientation.item() == pytest.approx(math.log(2 * math.sin(0.3)), abs=1e-2)
 
 
 def test_initial_weights_depend_on_the_seed_alone():
