@@ -28,6 +28,8 @@ def figure_of(rows: Sequence[Row]) -> Figure:
     for axes, scene in zip(panels, scenes, strict=True):
         draw_panel(axes, [row for row in rows if row["scene"] == scene])
         axes.set(title=scene_title(scene), xlabel="images per second of processor time")
+    # Set once for all: a limit set by the first panel would cut off marks of the next.
+    panels[0].set_ylim(0, 1.1 * max(float(row["error"]) for row in rows))
     panels[0].set_ylabel("median position error (m)")
     handles, labels = max(
         (axes.get_legend_handles_labels() for axes in panels), key=lambda found: len(found[1])
@@ -48,6 +50,5 @@ def draw_panel(axes: Axes, rows: Sequence[Row]) -> None:
         style["markerfacecolor"] = style["color"] if on_front else "none"
         axes.plot(x, y, label=row["variant"], **style)
     axes.set_xlim(0, 1.15 * speed.max())
-    axes.set_ylim(0, None)
     axes.grid(color="0.94")
     axes.set_axisbelow(True)
