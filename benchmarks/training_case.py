@@ -63,7 +63,7 @@ class Case:
         with torch.no_grad():
             for parameter in localizer.parameters():
                 parameter.mul_(1 + nudge * torch.randn(parameter.shape, generator=generator))
-        localizer.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        localizer.place_on(self.data.images.device)
         schedule = self.schedule(steps)
         rows = fit(localizer, self.data, self.statistics, schedule, self.seed, protocol=PUBLISHED)
         return [row.loss for row in rows]

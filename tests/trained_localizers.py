@@ -12,9 +12,7 @@ from baselines.training.checkpoint import TrainedLocalizer, save_checkpoint
 from baselines.training.data import ImageStatistics
 from baselines.training.description import FrameCamera, ModelDescription
 from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig
-
-NETWORK = NetworkConfig(input_px=32, width=0.125)
-HYPER = LocalizerConfig(learning_rate=4e-3, dropout=0.0, beta=1.0, s_orientation=-1.0)
+from tests.coloured_frames import HYPER, NETWORK
 
 
 def untrained(
@@ -26,7 +24,7 @@ def untrained(
     """A localizer of random weights that looks at each image."""
     torch.manual_seed(0)
     built = build_localizer(name, network, hyper).eval()
-    built.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    built.place_on(torch.device("cpu"))
     statistics = ImageStatistics(torch.full((1, 3, 1, 1), 128.0), torch.full((1, 3, 1, 1), 60.0))
     description = ModelDescription(localizer=name, network=network, hyper=hyper, camera=camera)
     return TrainedLocalizer(description, built, statistics)

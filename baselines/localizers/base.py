@@ -36,6 +36,10 @@ class Localizer(nn.Module):
         main, *auxiliary = (self.criterion(p, position_m, quat_wxyz) for p in predictions)
         return torch.as_tensor(main + AUXILIARY_WEIGHT * sum(auxiliary))
 
+    def place_on(self, device: torch.device) -> None:
+        """Move to a device, channels last in memory as the frames are."""
+        self.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+
     def set_pose_prior(self, mean_position_m: Tensor) -> None:
         """Let every regressor start at the mean training position (3,).
 

@@ -29,9 +29,14 @@ def quat_distance(predicted_wxyz: Tensor, true_wxyz: Tensor) -> Tensor:
     For a unit ``p`` it is ``2 sin(angle / 4)``: near 0 half of the angle, in radians. Like PoseNet
     (section 3.1) it leaves ``p`` as it is: normalised, predictions grow long and stop learning.
     """
-    same = torch.linalg.vector_norm(predicted_wxyz - true_wxyz, dim=1)
-    opposite = torch.linalg.vector_norm(predicted_wxyz + true_wxyz, dim=1)
-    return torch.minimum(same, opposite).mean()
+    return quat_chords(predicted_wxyz, true_wxyz).mean()
+
+
+def quat_chords(a_wxyz: Tensor, b_wxyz: Tensor) -> Tensor:
+    """``min(|a - b|, |a + b|)`` (B,) of quaternions (B, 4)."""
+    same = torch.linalg.vector_norm(a_wxyz - b_wxyz, dim=1)
+    opposite = torch.linalg.vector_norm(a_wxyz + b_wxyz, dim=1)
+    return torch.minimum(same, opposite)
 
 
 def position_mean_square(predicted_m: Tensor, true_m: Tensor) -> Tensor:

@@ -69,7 +69,7 @@ def read_checkpoint(path: Path, device: torch.device) -> TrainedLocalizer:
     description = parse_description(content["description"], path)
     try:
         network = build_localizer(description.localizer, description.network, description.hyper)
-        network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+        network.place_on(device)
         network.load_state_dict(content["localizer"])
         statistics = _checked(ImageStatistics(**content["images"]))
     except Exception as error:  # damaged values are refused in every way there is

@@ -80,11 +80,8 @@ def train_localizer(
     data = read_labelled_frames(frames, labels, network.input_px, device)
     statistics = image_statistics(data.images)
     learned, held_out = _split(data, protocol, training.validation_share, seed, test)
-    torch.manual_seed(seed)
-    localizer = build_localizer(name, network, hyper)
-    if backbone_weights is not None:
-        load_backbone_weights(localizer.backbone, backbone_weights)
-    localizer.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+    localizer = _initial(name, network, hyper, backbone_weights, seed)
+    localizer.place_on(device)
     localizer.set_pose_prior(learned.position_m.mean(0))
     _log_start(name, learned, held_out, protocol, samples_seen, device)
     settings = (name, network, hyper, training, protocol, samples_seen, seed)
@@ -120,6 +117,21 @@ def train_localizer(
     save_checkpoint(out_model, localizer, statistics, description)
     write_history(out_history, rows)
     resume.remove()
+
+
+def _initial(
+    name: ModelName,
+    network: NetworkConfig,
+    hyper: LocalizerConfig,
+    backbone_weights: Path | None,
+    seed: int,
+) -> Localizer:
+    """The localizer that training starts from; seeds the generator that dropout draws from too."""
+    torch.manual_seed(seed)
+    localizer = build_localizer(name, network, hyper)
+    if backbone_weights is not None:
+        load_backbone_weights(localizer.backbone, backbone_weights)
+    return localizer
 
 
 def _split(

@@ -94,7 +94,7 @@ def _train_pretext(
     data = read_labelled_frames(frames, labels, network.input_px, device)
     torch.manual_seed(seed)
     localizer = PretextLocalizer(backbone, network.width)
-    localizer.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+    localizer.place_on(device)
     localizer.set_pose_prior(data.position_m.mean(0))
     log.info("%s: %d frames of the pretext on %s", backbone, len(data), device)
     schedule = Schedule(

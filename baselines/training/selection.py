@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from baselines.localizers.base import Localizer
-from baselines.localizers.losses import PosePrediction
+from baselines.localizers.losses import PosePrediction, quat_chords
 from baselines.training.data import ImageStatistics, LabelledFrames
 from baselines.training.device import Precision, autocast
 
@@ -121,9 +121,7 @@ def held_out_errors(
 
 def _angles(a_wxyz: Tensor, b_wxyz: Tensor) -> Tensor:
     """Angles (N,) in radians between rotations as unit quaternions (N, 4)."""
-    same = torch.linalg.vector_norm(a_wxyz - b_wxyz, dim=1)
-    opposite = torch.linalg.vector_norm(a_wxyz + b_wxyz, dim=1)
-    return 4 * torch.asin((torch.minimum(same, opposite) / 2).clamp(max=1.0))
+    return 4 * torch.asin((quat_chords(a_wxyz, b_wxyz) / 2).clamp(max=1.0))
 
 
 def _median(values: Tensor) -> float:

@@ -57,8 +57,10 @@ def comparison(name: str, truth: Array, graph: PoseGraph) -> list[Row]:
     """One row for the reference and one per optimiser; seconds are of processor time."""
     optimise_toro(graph, 1, 1e-9)  # compiles
     rows: list[Row] = []
-    from_truth: Optimise = lambda graph: optimise_lm(PoseGraph(truth, graph.edges), 100)  # noqa: E731
-    for optimiser, optimise in ({REFERENCE: from_truth} | OPTIMISERS).items():
+    optimisers: dict[str, Optimise] = {
+        REFERENCE: lambda graph: optimise_lm(PoseGraph(truth, graph.edges), 100)
+    }
+    for optimiser, optimise in (optimisers | OPTIMISERS).items():
         begin = time.process_time()
         poses = optimise(graph)
         seconds = time.process_time() - begin
