@@ -123,7 +123,7 @@ def test_only_a_fixed_weight_is_matched(config, tmp_path):
     made = protocols.trainings(config, options(tmp_path))
     matched = {t.model for t in made if t.key["protocol"].endswith(protocols.MATCHED)}
     assert matched == {"posenet"}
-    assert len(made) == 2 * (7 + 2 + 7)
+    assert len(made) == 2 * (8 + 2 + 8)
     assert len({key_of(t.key, t.key) for t in made}) == len(made)
 
 
@@ -176,7 +176,7 @@ def test_pages_show_every_training(module, config, tmp_path):
     module.write(config, given, read_rows(tmp_path / "t.csv"))
     lines = (tmp_path / "page.md").read_text().splitlines()
     cells = [line.split(" | ") for line in lines if line.startswith("| ")][2:]
-    expected = {protocols: 9 + 7, pretraining: 3 * len(MODELS)}[module]
+    expected = {protocols: 10 + 8, pretraining: 3 * len(MODELS)}[module]
     assert len(cells) == expected
     assert all("2" in line for line in cells)
     assert (tmp_path / "page.png").exists() == (module is pretraining)
