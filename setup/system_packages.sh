@@ -22,7 +22,7 @@ done
 "$python" -c 'import ensurepip, venv' 2>/dev/null || missing+=(python3-venv)
 [ ${#missing[@]} -gt 0 ] || exit 0
 
-command="apt-get install --yes --no-install-recommends ${missing[*]}"
+command="apt-get -o DPkg::Lock::Timeout=600 install --yes --no-install-recommends ${missing[*]}"
 if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     as_root=()
 elif command -v apt-get >/dev/null && sudo -n true 2>/dev/null; then

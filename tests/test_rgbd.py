@@ -5,8 +5,9 @@ from PIL import Image
 from baselines.groundtruth.features import FeatureOdometry
 from baselines.groundtruth.posegraph.lm import optimise_lm
 from baselines.groundtruth.posegraph.toro import optimise_toro
-from baselines.groundtruth.rgbd import rgbd_graph
+from baselines.groundtruth.rgbd import dense, rgbd_graph, surface
 from baselines.groundtruth.rgbd.agreement import depth_agreement
+from baselines.groundtruth.rgbd.frames import read_frame
 from baselines.groundtruth.rgbd.loops import loop_candidates
 from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig, RgbdConfig
@@ -84,6 +85,19 @@ def test_result_is_repeatable(paths, graph):
     again = rgbd_graph(*paths, CAMERA, CFG)
     assert [(e.i, e.j) for e in again.edges] == [(e.i, e.j) for e in graph.edges]
     np.testing.assert_allclose(again.first_from_cam, graph.first_from_cam, atol=1e-3)
+
+
+def test_steps_of_one_scale_end_where_open3ds_own_loop_ends(tmp_path, monkeypatch):
+    poses = np.array([pose_at([-1.8, 0.0, 1.4]), pose_at([-1.78, 0.01, 1.4], yaw_deg=0.3)])
+    colors, depths = write_room(tmp_path, poses)
+    i, j = (read_frame(*pair, ROOM_CAMERA, CFG, 0) for pair in zip(colors, depths, strict=True))
+    stage = surface.Stage(stride=1, max_steps=8, huber_m=0.05, rest_m=0.0, rest_deg=0.0)
+    monkeypatch.setattr(surface, "STAGES", (stage,))
+    monkeypatch.setattr(dense, "_PASSES", (((8,), 0.05),))
+    theirs = dense.register(i.rgbd, j.rgbd, np.eye(4), ROOM_CAMERA, CFG)
+    ours = surface.align(i.surfaces, j.surfaces, np.eye(4), 2 * CFG.max_rmse_m)
+    assert np.abs(ours - theirs).max() < 1e-6
+    assert np.abs(ours - np.eye(4)).max() > 1e-2
 
 
 def test_unmeasurable_pair_keeps_a_weak_edge(paths, tmp_path):

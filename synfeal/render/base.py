@@ -7,8 +7,11 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.config.models import RenderConfig
+
 Rgb = NDArray[np.uint8]
 Depth = NDArray[np.float32]
+DEFAULT_SUPERSAMPLING = RenderConfig().supersampling
 
 
 class Renderer(Protocol):

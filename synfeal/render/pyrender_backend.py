@@ -18,11 +18,10 @@ from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.render.base import Depth, Renderer, Rgb
+from synfeal.render.base import DEFAULT_SUPERSAMPLING, Depth, Renderer, Rgb
 from synfeal.render.cutouts import thresholded
 from synfeal.render.pieces import pieces
 
-SUPERSAMPLING = 2
 # OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
 CAM_FROM_GL: NDArray[np.float64] = np.diag([1.0, -1.0, -1.0, 1.0])
 
@@ -86,7 +85,7 @@ class PyrenderRenderer(Renderer):
     """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
 
     def __init__(
-        self, mesh: TexturedMesh, camera: CameraConfig, supersampling: int = SUPERSAMPLING
+        self, mesh: TexturedMesh, camera: CameraConfig, supersampling: int = DEFAULT_SUPERSAMPLING
     ) -> None:
         """Prepare the mesh, which is uploaded by the first render.
 

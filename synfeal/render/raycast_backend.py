@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.mesh.model import TexturedMesh
-from synfeal.render.base import Depth, Renderer, Rgb
+from synfeal.render.base import DEFAULT_SUPERSAMPLING, Depth, Renderer, Rgb
 from synfeal.render.raycast.triangles import Floats, Points, TexturedTriangles, View
 
-SUPERSAMPLING = 2
 RAYS_AT_ONCE = 1 << 15  # 30 MB
 
 
@@ -26,7 +25,7 @@ class RaycastRenderer(Renderer):
     """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
 
     def __init__(
-        self, mesh: TexturedMesh, camera: CameraConfig, supersampling: int = SUPERSAMPLING
+        self, mesh: TexturedMesh, camera: CameraConfig, supersampling: int = DEFAULT_SUPERSAMPLING
     ) -> None:
         """Prepare triangles and textures.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,28 +10,23 @@ from numpy.typing import NDArray
 
 from baselines.groundtruth.rgbd.agreement import constraint, depth_agreement
 from baselines.groundtruth.rgbd.frames import RgbdFrame
+from baselines.groundtruth.rgbd.surface import align
 from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig, KinectFusionConfig, RgbdConfig
 from synfeal.geometry.poses import pose_error
 
 Array = NDArray[np.float64]
-Pass = tuple[tuple[int, ...], float]
 
 _METHODS = {
     "point-to-plane": o3d.t.pipelines.odometry.Method.PointToPlane,
     "hybrid": o3d.t.pipelines.odometry.Method.Hybrid,
     "intensity": o3d.t.pipelines.odometry.Method.Intensity,
 }
-# Passes: steps per scale, coarse to fine, and the depth difference beyond which a point counts by
-# its distance, not its square. The coarse pass finds a motion, but pulls those that depth hardly
-# tells by 0.1 degrees; fine passes come to rest where edges, and what only one image shows, weigh
-# little.
-COARSE, FINE = ((5, 3, 2), 0.05), ((5,), 0.002)
+# Passes of Open3D's own loop: steps per scale, coarse to fine, and the depth difference beyond which
+# a point counts by its distance, not its square, as in the stages of ``surface``.
+_PASSES = (((5, 3, 2), 0.05), ((5,), 0.002))
 # The result may not leave its starting point by more.
 MAX_CHANGE_M, MAX_CHANGE_DEG = 0.25, 10.0
-# After a fine pass that moves it by less (metres, degrees) a motion is at rest.
-_REST = (0.0002, 0.01)
-_MAX_FINE = 4
 # Motions are compared by the depth that agrees within this share of the accepted residual.
 _CLOSE = 0.2
 # A motion that agrees less is no longer sure: other starting points are tried.
@@ -67,14 +61,16 @@ def register(
     camera: CameraConfig,
     cfg: RgbdConfig | KinectFusionConfig,
     method: str = "point-to-plane",
-    passes: Sequence[Pass] = (COARSE, FINE),
 ) -> Array | None:
-    """Motion ``i_from_j`` (4, 4) near a starting point (4, 4), or None where there is none."""
+    """Motion ``i_from_j`` (4, 4) near a starting point (4, 4), or None where there is none.
+
+    By Open3D's own loop over scales, which knows all its methods.
+    """
     odometry = o3d.t.pipelines.odometry
     matrix = o3d.core.Tensor.from_numpy(intrinsics_of(camera).matrix(centre_shift_px=-0.5))
     i_from_j = o3d.core.Tensor.from_numpy(np.ascontiguousarray(start))
     try:
-        for steps, huber_m in passes:
+        for steps, huber_m in _PASSES:
             i_from_j = odometry.rgbd_odometry_multi_scale(
                 j,
                 i,
@@ -113,27 +109,15 @@ class DenseOdometry:
 
     def refine(self, i: RgbdFrame, j: RgbdFrame, start: Array) -> Motion | None:
         """Refined and accepted motion ``i_from_j`` from a starting point (4, 4), or None."""
-        found = self._register(i, j, start, COARSE)
-        if found is None:
-            return None
-        settled = self._settled(i, j, found)
-        if not near(start, settled) or not self.overlap(i, j, settled):
+        found = self._moved(i, j, start)
+        if found is None or not near(start, found) or not self.overlap(i, j, found):
             return None
         close_m = _CLOSE * self.cfg.max_rmse_m
-        share, _ = depth_agreement(i.depth_m, j.depth_m, settled, self.camera, close_m)
-        return Motion(settled, share)
+        share, _ = depth_agreement(i.depth_m, j.depth_m, found, self.camera, close_m)
+        return Motion(found, share)
 
-    def _settled(self, i: RgbdFrame, j: RgbdFrame, i_from_j: Array) -> Array:
-        """A motion (4, 4) after fine passes until they hardly move it."""
-        for _ in range(_MAX_FINE):
-            found = self._register(i, j, i_from_j, FINE)
-            if found is None:
-                return i_from_j
-            at_rest = near(i_from_j, found, *_REST)
-            i_from_j = found
-            if at_rest:
-                break
-        return i_from_j
-
-    def _register(self, i: RgbdFrame, j: RgbdFrame, start: Array, one: Pass) -> Array | None:
-        return register(i.rgbd, j.rgbd, start, self.camera, self.cfg, self.cfg.method, (one,))
+    def _moved(self, i: RgbdFrame, j: RgbdFrame, start: Array) -> Array | None:
+        """Refined motion (4, 4) that nothing has checked, or None."""
+        if self.cfg.method == "point-to-plane":
+            return align(i.surfaces, j.surfaces, start, 2 * self.cfg.max_rmse_m)
+        return register(i.rgbd, j.rgbd, start, self.camera, self.cfg, self.cfg.method)

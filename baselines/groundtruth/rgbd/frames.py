@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from baselines.groundtruth.rgbd.sensor import frame_generator, kinect_depth
+from baselines.groundtruth.rgbd.surface import Surfaces, surfaces_of
 from synfeal.config.models import CameraConfig, DepthConfig
 from synfeal.dataset.png import IMAGE_DAMAGE
 from synfeal.errors import InputError
@@ -27,12 +29,22 @@ class RgbdFrame:
     Attributes:
         color: (H, W, 3) uint8.
         depth_m: (H, W) along the optical axis, inf where nothing was measured.
-        rgbd: both as Open3D takes them, depth 0 where nothing was measured.
+        camera: of both.
     """
 
     color: NDArray[np.uint8]
     depth_m: NDArray[np.float32]
-    rgbd: o3d.t.geometry.RGBDImage
+    camera: CameraConfig
+
+    @cached_property
+    def rgbd(self) -> o3d.t.geometry.RGBDImage:
+        """Both images as Open3D takes them, depth 0 where nothing was measured."""
+        return o3d.t.geometry.RGBDImage(open3d_image(self.color), open3d_depth(self.depth_m))
+
+    @cached_property
+    def surfaces(self) -> Surfaces:
+        """What the depth shows, as the registration takes it."""
+        return surfaces_of(self.depth_m, self.camera)
 
 
 def read_frame(
@@ -46,8 +58,7 @@ def read_frame(
     """
     color = read_image(color_path, camera, "RGB")
     depth_m = read_depth(depth_path, camera, cfg, seed)
-    rgbd = o3d.t.geometry.RGBDImage(open3d_image(color), open3d_depth(depth_m))
-    return RgbdFrame(color, depth_m, rgbd)
+    return RgbdFrame(color, depth_m, camera)
 
 
 def read_depth(

@@ -20,20 +20,18 @@ from synfeal.config.collection import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import TexturedMesh
-from synfeal.render.base import Depth, Renderer, Rgb
+from synfeal.render.base import DEFAULT_SUPERSAMPLING, Depth, Renderer, Rgb
 from synfeal.render.opengl import shaders
 from synfeal.render.opengl.context import finish, shared_context
 from synfeal.render.opengl.part import DevicePart
 from synfeal.render.pieces import pieces
-
-SUPERSAMPLING = 2
 
 
 class OpenglRenderer(Renderer):
     """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
 
     def __init__(
-        self, mesh: TexturedMesh, camera: CameraConfig, supersampling: int = SUPERSAMPLING
+        self, mesh: TexturedMesh, camera: CameraConfig, supersampling: int = DEFAULT_SUPERSAMPLING
     ) -> None:
         """Upload the mesh.
 
