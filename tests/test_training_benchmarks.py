@@ -13,7 +13,7 @@ from baselines.localizers.losses import DISTANCES
 from baselines.localizers.registry import build_localizer
 from baselines.training.data import image_statistics, read_labelled_frames
 from baselines.training.optimizer import Schedule
-from benchmarks import learners, pretraining, protocols
+from benchmarks import images_shown, learners, pretraining, protocols
 from benchmarks.plain_training import ImageFiles
 from benchmarks.rgbd_settings.results import append_row
 from benchmarks.training_case import PUBLISHED, Case
@@ -169,17 +169,17 @@ def test_changes_are_taken_seed_by_seed(config, tmp_path):
     assert pretraining.change_percent(chosen(rows, init="scratch"), "position_m") == []
 
 
-@pytest.mark.parametrize("module", [protocols, pretraining])
+@pytest.mark.parametrize("module", [protocols, pretraining, images_shown])
 def test_pages_show_every_training(module, config, tmp_path):
     given = options(tmp_path)
     write_all(tmp_path / "t.csv", rows_of(module.trainings(config, given)))
     module.write(config, given, read_rows(tmp_path / "t.csv"))
     lines = (tmp_path / "page.md").read_text().splitlines()
     cells = [line.split(" | ") for line in lines if line.startswith("| ")][2:]
-    expected = {protocols: 10 + 8, pretraining: 3 * len(MODELS)}[module]
-    assert len(cells) == expected
+    expected = {protocols: 10 + 8, pretraining: 3 * len(MODELS)}
+    assert len(cells) == expected.get(module, len(images_shown.SAMPLES))
     assert all("2" in line for line in cells)
-    assert (tmp_path / "page.png").exists() == (module is pretraining)
+    assert (tmp_path / "page.png").exists() == (module is not protocols)
 
 
 def test_the_page_of_learners_marks_the_profiles_shape(config, tmp_path, monkeypatch):
