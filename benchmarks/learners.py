@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 
 from benchmarks.scene_difficulty.pool import run_tasks
 from benchmarks.training_pages import chosen, numbers, options_of, run, with_range, write_page
-from benchmarks.trainings import SCENE, Row, Training, training_of
+from benchmarks.trainings import LARGEST, SCENE, Row, Training, training_of
 from synfeal.config.models import MODELS, Config, ModelName, NetworkConfig
 from synfeal.dataset.packed import join_packed
 from synfeal.dataset.packed_record import write_packed_record
@@ -86,7 +86,8 @@ def frames_of(config: Config, options: argparse.Namespace, input_px: int) -> Pat
 def render(config: Config, root: Path, split: str, input_px: int, folder: Path) -> None:
     """Packed frames of a split with their record, which is written last."""
     plan = root / "plans" / SCENE / f"{split}.csv"
-    poses = read_frames(plan, 0, config.n_frames(SCENE, SIZE, split))
+    size = LARGEST if split == "test" else SIZE  # what a training is judged on: see ``measure``
+    poses = read_frames(plan, 0, config.n_frames(SCENE, size, split))
     mesh, shard = root / "scenes" / SCENE / "mesh.glb", folder / f"{split}-shard.npy"
     render_packed(mesh, config.network_camera, poses, input_px, shard, config.render)
     out, record = folder / f"{split}.npy", shard.with_suffix(".json")

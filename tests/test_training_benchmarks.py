@@ -195,6 +195,22 @@ def test_the_page_of_learners_marks_the_profiles_shape(config, tmp_path, monkeyp
     assert (tmp_path / "page.png").stat().st_size > 1000
 
 
+def test_frames_of_other_sides_are_as_many_as_are_labelled(config, tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        learners, "read_frames", lambda plan, *span: asked.append((plan.stem, *span))
+    )
+    for name in ("render_packed", "join_packed", "write_packed_record"):
+        monkeypatch.setattr(learners, name, lambda *_: None)
+    for split in learners.SPLITS:
+        for file in (f"{split}-shard.npy", f"{split}-shard.json"):
+            (tmp_path / file).touch()
+        learners.render(config, tmp_path, split, 32, tmp_path)
+    # Errors of every size are measured on the largest set's test frames.
+    trained, tested = round(20_000 * config.scale), round(20_000 * config.scale)
+    assert asked == [("train", 0, trained), ("test", 0, tested)]
+
+
 def test_numbers_over_seeds(tmp_path):
     assert with_range([1.0], 2) == "1.00"
     assert with_range([1.0, 2.0, 6.0], 1) == "3.0 (1.0 – 6.0)"
