@@ -1,14 +1,11 @@
 import json
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from baselines.groundtruth.batches import batches_of
-from baselines.groundtruth.chain import chain_batches, fill_gaps
+from baselines.groundtruth.chain import chain_batches, chain_unassisted, fill_gaps
 from baselines.groundtruth.trajectory import (
     BatchTrajectory,
     failed_trajectory,
@@ -62,19 +59,6 @@ def moved_last(trajectory, offset_m):
     return BatchTrajectory(poses, trajectory.registered)
 
 
-@given(st.integers(2, 400), st.integers(1, 60))
-def test_batches_share_one_frame_and_cover_the_split(n_frames, batch_frames):
-    batches = batches_of(n_frames, batch_frames)
-    assert [b.index for b in batches] == list(range(len(batches)))
-    assert batches[0].start == 0
-    assert batches[-1].stop == n_frames
-    for before, after in pairwise(batches):
-        assert after.start == before.stop - 1
-        assert len(before) == batch_frames + 1
-    assert 2 <= len(batches[-1]) <= batch_frames + 1
-    assert sum(len(b) - 1 for b in batches) == n_frames - 1
-
-
 def test_the_paper_has_34_batches():
     assert len(batches_of(6000, 250)) + len(batches_of(2500, 250)) == 34
 
@@ -97,7 +81,9 @@ def test_short_splits_and_short_last_batches(n_frames, spans):
 
 @pytest.mark.parametrize(("n_frames", "batch_frames"), [(0, 5), (5, 0)])
 def test_impossible_splits_are_refused(n_frames, batch_frames):
-    with pytest.raises(ValueError, match="at least one frame"):
+    with pytest.raises(
+        ValueError, match=f"at least one frame .* >= 1: {n_frames}, {batch_frames}$"
+    ):
         batches_of(n_frames, batch_frames)
 
 
@@ -156,6 +142,23 @@ def test_assistance_above_ten_degrees_only(angle_deg, assisted):
     assert last_turn == pytest.approx(0.0 if assisted else abs(angle_deg), abs=1e-6)
 
 
+def test_an_error_as_large_as_the_threshold_is_none():
+    truth = straight_truth(6)
+    batches = batches_of(6, 5)
+    off = turned_last(moved_last(perfect(truth, batches)[0], [0, 0.125, 0]), 7.0)
+    error_deg = chain_batches(batches, [off], truth, CFG)[1].records[0].error_before_deg
+
+    def assisted(limit_m, limit_deg):
+        limits = {"assist_position_m": limit_m, "assist_orientation_deg": limit_deg}
+        cfg = GroundTruthConfig(batch_frames=5, **limits)
+        return chain_batches(batches, [off], truth, cfg)[1].records[0].assisted
+
+    assert error_deg == pytest.approx(7.0)
+    assert not assisted(0.125, error_deg)
+    assert assisted(0.124, error_deg)
+    assert assisted(0.125, np.nextafter(error_deg, 0.0))
+
+
 def test_only_the_last_pose_is_replaced():
     truth = straight_truth(6)
     batches = batches_of(6, 5)
@@ -206,6 +209,10 @@ def test_gaps_are_interpolated_and_the_end_is_held():
     filled = fill_gaps(BatchTrajectory(broken, registered))
     np.testing.assert_allclose(filled[:6], poses[:6], atol=1e-12)
     np.testing.assert_allclose(filled[6], poses[5], atol=1e-12)
+    broken[0, :3, 3] = 9.0  # means nothing, and is left alone
+    before = broken.copy()
+    np.testing.assert_allclose(fill_gaps(BatchTrajectory(broken, registered))[:6], poses[:6])
+    np.testing.assert_array_equal(broken, before)
 
 
 def test_filled_frames_are_counted():
@@ -224,15 +231,18 @@ def test_what_does_not_fit_together_is_refused():
     truth = straight_truth(11)
     batches = batches_of(11, 5)
     trajectories = perfect(truth, batches)
-    with pytest.raises(ValueError, match="2 batches but 1"):
-        chain_batches(batches, trajectories[:1], truth, CFG)
-    with pytest.raises(ValueError, match="end at frame 5"):
-        chain_batches(batches[:1], trajectories[:1], truth, CFG)
-    with pytest.raises(ValueError, match="starts at 5"):
-        chain_batches(batches[1:], trajectories[1:], truth, CFG)
-    with pytest.raises(ValueError, match="3 poses, 6 frames"):
-        chain_batches(batches, [failed_trajectory(3), trajectories[1]], truth, CFG)
-    with pytest.raises(ValueError, match="2 flags"):
+    short = [failed_trajectory(3), trajectories[1]]
+    for parts, estimates, message in (
+        (batches, trajectories[:1], "^2 batches but 1 trajectories$"),
+        (batches[:1], trajectories[:1], "^the batches end at frame 5, the split at 10$"),
+        (batches[1:], trajectories[1:], "^batch 1 starts at 5, not at 0$"),
+        (batches, short, "^batch 0: 3 poses, 6 frames$"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            chain_batches(parts, estimates, truth, CFG)
+        with pytest.raises(ValueError, match=message):
+            chain_unassisted(parts, estimates, truth)
+    with pytest.raises(ValueError, match=r"^2 flags for poses of shape \(1, 4, 4\)$"):
         BatchTrajectory(np.eye(4)[None], np.ones(2, dtype=bool))
 
 
@@ -257,6 +267,10 @@ def test_trajectory_file_round_trip(tmp_path):
         ("frame,tx\n0,1\n", "header must be"),
         ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n0,1,2\n", "needs 9 numbers"),
         ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n0,1,nan,0,0,1,0,0,0\n", "row 2"),
+        ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n1,1,0,0,0,1,0,0,0\n", "frames must count from 0"),
+        ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n0,2,0,0,0,1,0,0,0\n", "registered be 0 or 1; est"),
+        ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n0,1.5,0,0,0,1,0,0,0\n", "row 2 must begin with"),
+        ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n0,1,0,0,0,2,0,0,0\n", "line 2 holds a quat"),
     ],
 )
 def test_broken_trajectory_files_are_named(tmp_path, text, message):

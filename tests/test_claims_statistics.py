@@ -29,6 +29,7 @@ INF, NAN = math.inf, math.nan
         ([-1] * 5 + [1] * 5, 5, 10, 1),
         ([0, 0, -2, -0.5, 3], 2, 3, 1),  # those at 0 do not count
         ([-INF, -1, INF, NAN], 2, 3, 1),
+        ([-0.5, 0.25, 0.5], 1, 3, 1),
         ([-1] * 8, 8, 8, Fraction(2, 2**8)),
         ([0.0], 0, 0, 1),
         ([], 0, 0, 1),
@@ -91,11 +92,22 @@ def test_medians_of_resamples_are_numpys_of_the_repeated_frames(monkeypatch):
     assert medians(errors, path, counts).tolist() == repeated
 
 
+def test_no_more_counts_are_held_at_once_than_the_block_allows(monkeypatch):
+    held, plain = [], bootstrap._medians
+    monkeypatch.setattr(bootstrap, "BLOCK", 60)
+    monkeypatch.setattr(bootstrap, "_medians", lambda r, c: held.append(c.shape) or plain(r, c))
+    counts = path_counts(4, np.random.default_rng(0), 24)  # 25 rows of 12 frames: 300 counts
+    medians(np.arange(12.0), np.arange(12) % 4, counts)
+    assert held == [(5, 12)] * 5
+
+
 def test_draws_are_of_whole_paths_and_as_many_as_there_are():
     counts = path_counts(20, np.random.default_rng(0), 4000)
     assert counts.shape == (4001, 20)
     assert (counts[0] == 1).all()
     assert (counts.sum(axis=1) == 20).all()
+    assert counts.dtype == np.int64
+    assert path_counts(2, np.random.default_rng(0)).shape == (1 + bootstrap.RESAMPLES, 2)
     # Each path is drawn Binomial(20, 1/20) times: mean 1, and left out with chance 0.95^20.
     assert counts[1:].mean(axis=0) == pytest.approx(np.ones(20), abs=0.08)
     assert (counts[1:] == 0).mean() == pytest.approx(0.95**20, abs=0.005)
@@ -106,6 +118,9 @@ def test_changes_of_failures():
     old = np.array([1.0, 1.0, INF, INF])
     assert relative_change(new, old)[:3].tolist() == [-50, INF, -100]
     assert np.isnan(relative_change(new, old)[3])
+    zero = np.array([0.0, 0.0])  # no error at all, as of a set that repeats its training frames
+    assert relative_change(np.array([1.0, 0.0]), zero)[0] == INF
+    assert np.isnan(relative_change(np.array([1.0, 0.0]), zero)[1])
     assert np.isnan(difference(np.array([INF]), np.array([INF]))[0])
     assert mean_of([np.array([1.0, INF]), np.array([3.0, 1.0])]).tolist() == [2, INF]
 
@@ -114,6 +129,11 @@ def test_limits_leave_two_and_a_half_percent_on_either_side():
     sample = np.concatenate([[50.0], np.random.default_rng(1).permutation(np.arange(1, 1001))])
     assert limits(sample) == (26, 975)
     assert limits(sample, 5) == (6, 995)
+
+
+def test_a_tail_that_is_whole_but_for_rounding_is_whole(monkeypatch):
+    monkeypatch.setattr(bootstrap, "CONFIDENCE", 0.9)  # 1 - 0.9 is a little less than 0.1
+    assert limits(np.concatenate([[0.0], np.arange(1.0, 1001.0)])) == (51, 950)
 
 
 def test_what_cannot_be_known_widens_limits_at_both_ends():

@@ -9,10 +9,7 @@ import pytest
 from scipy import stats
 
 from synfeal.report.compare.runs import RunErrors
-from synfeal.report.compare.stats import (
-    Difference,
-    compare_errors,
-)
+from synfeal.report.compare.stats import Difference, _Draws, compare_errors
 from synfeal.report.stats import MEASURES
 
 N = 120
@@ -132,3 +129,46 @@ def test_seeds_give_means_and_the_standard_error_of_welch(errors: np.ndarray) ->
     welch = stats.ttest_ind(medians[1], medians[0], equal_var=False)
     assert found.se_seeds is not None
     assert found.value / found.se_seeds == pytest.approx(welch.statistic)
+
+
+def test_each_measure_is_compared_with_itself(errors: np.ndarray) -> None:
+    frame = np.arange(N)
+    a, b = (np.stack([(k + 1) * errors + shift * k for k in range(4)])[None] for shift in (0, 1))
+    found = compare_errors(RunErrors(frame, frame, a), RunErrors(frame, frame, b), paired=True)
+    for k, measure in enumerate(MEASURES):
+        assert found[measure].a == pytest.approx((k + 1) * np.median(errors))
+        assert found[measure].value == pytest.approx(k)
+
+
+def test_draws_are_a_thousand_and_others_for_the_other_tree() -> None:
+    path = np.array([7, 7, 2, 9])
+    a, again, b = (_Draws.of(path, tree) for tree in "aab")
+    assert a.path.tolist() == [1, 1, 0, 2]
+    assert a.counts.shape == (1000, 3)
+    assert (a.counts.sum(axis=1) == 3).all()
+    np.testing.assert_array_equal(a.counts, again.counts)
+    assert not np.array_equal(a.counts, b.counts)
+
+
+def test_one_finite_seed_has_no_deviation(errors: np.ndarray) -> None:
+    failed = np.full(N, np.inf)
+    found = difference(run(errors, errors + 1, failed), run(errors, errors + 3))
+    assert found.sd_a == pytest.approx(math.sqrt(0.5))  # of the two that are finite
+    assert found.sd_b == pytest.approx(math.sqrt(4.5))
+    assert found.se_seeds == pytest.approx(math.sqrt(0.5 / 2 + 4.5 / 2))
+    found = difference(run(errors, errors + 1), run(errors))
+    assert (found.sd_b, found.se_seeds) == (None, None)
+    found = difference(run(errors), run(errors, errors + 1))
+    assert (found.sd_a, found.se_seeds) == (None, None)
+    assert difference(run(errors, failed), run(errors, errors + 1)).sd_a is None
+
+
+def test_limits_are_differences_that_occur() -> None:
+    whole = np.arange(N, dtype=float)  # medians of whole numbers, and so their differences
+    found = difference(run(whole), run(whole[::-1] ** 2), paired=False)
+    assert (2 * found.low) % 1 == 0
+    assert (2 * found.high) % 1 == 0
+    half_failed = np.where(np.arange(N) % 2 == 0, np.inf, 1.0)
+    found = difference(run(whole), run(half_failed), paired=False)
+    assert found.high == math.inf
+    assert not math.isnan(found.low)

@@ -116,6 +116,36 @@ def test_relative_error_needs_enough_frames_and_some_way():
     assert np.isnan(relative_error([(standing, standing)], 25).per_metre_m)
 
 
+def test_sequences_that_are_too_short_do_not_count():
+    truth, short = table_of(straight(60)), table_of(straight(25))
+    labels = table_of(straight(60, step_m=1.02 * STEP_M, turn_deg=0.2))
+    lost = table_of(straight(25, step_m=0.0))
+    found = relative_error([(lost, short), (labels, truth)], 25)
+    assert found == relative_error([(labels, truth)], 25)
+    # 26 frames hold one motion over 25 of them.
+    one = relative_error([(table_of(straight(26, step_m=0.0)), table_of(straight(26)))], 25)
+    assert one.rmse_m == pytest.approx(25 * STEP_M)
+    assert one.per_metre_m == pytest.approx(1.0)
+    assert np.isnan(relative_error([(lost, lost)], 1).per_metre_deg)
+
+
+def test_a_trajectory_that_is_not_of_its_batch_is_named(tmp_path):
+    truth, labels, unassisted = (tmp_path / f"{name}.csv" for name in "tlu")
+    write_pose_table(truth, table_of(straight(BATCH + 2)))
+    files = [tmp_path / "0.csv", tmp_path / "1.csv"]
+    write_trajectory(files[0], failed_trajectory(BATCH + 1))
+    write_trajectory(files[1], failed_trajectory(3))
+    with pytest.raises(InputError) as refusal:
+        chain_split(files, truth, labels, unassisted, CFG)
+    assert str(refusal.value) == f"{files[1]}: holds 3 poses for 2 frames; estimate it again"
+    write_trajectory(files[1], failed_trajectory(2))
+    for some in (files[:1], [*files, files[1]]):
+        with pytest.raises(ValueError, match="zip"):
+            chain_split(some, truth, labels, unassisted, CFG)
+    assert not labels.exists()
+    assert not unassisted.exists()
+
+
 def test_the_share_within_limits_includes_the_limits():
     errors = np.array([0.05, 0.05, 0.051, 0.0]), np.array([5.0, 5.1, 0.0, 0.0])
     assert share_within(errors, 0.05, 5.0) == 0.5

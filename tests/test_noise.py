@@ -39,6 +39,13 @@ def test_no_noise_is_bit_identical_part_by_part():
         np.testing.assert_array_equal(noisy.path, clean.path)
 
 
+def test_no_noise_keeps_the_sign_of_zero():
+    clean = table_of(20)
+    clean.position_m[:] = -0.0
+    noisy = add_noise(clean, 0.0, 5.0, np.random.default_rng(0))
+    assert np.signbit(noisy.position_m).all()
+
+
 def test_directions_are_uniform_on_the_sphere():
     count = 40_000
     clean = table_of(count)
@@ -75,6 +82,7 @@ def test_input_is_left_alone_and_quaternions_stay_canonical():
     np.testing.assert_allclose(np.linalg.norm(noisy.quat_wxyz, axis=1), 1)
 
 
-def test_negative_noise_is_refused():
-    with pytest.raises(ValueError, match="negative"):
-        add_noise(table_of(2), -0.1, 0.0, np.random.default_rng(0))
+@pytest.mark.parametrize(("noise_m", "noise_deg"), [(-0.1, 0.0), (0.0, -5.0), (-0.1, -5.0)])
+def test_negative_noise_is_refused(noise_m, noise_deg):
+    with pytest.raises(ValueError, match=f"must not be negative: {noise_m} m, {noise_deg} deg$"):
+        add_noise(table_of(2), noise_m, noise_deg, np.random.default_rng(0))

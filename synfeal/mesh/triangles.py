@@ -12,6 +12,17 @@ from numpy.typing import NDArray
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
 
+PLY_HEADER = """\
+ply
+format binary_little_endian 1.0
+element vertex {vertices}
+property double x
+property double y
+property double z
+element face {faces}
+property list uchar uint vertex_indices
+end_header
+"""
 MERGE_M = 1e-5  # copies of a vertex on a texture seam differ by rounding only
 
 
@@ -39,14 +50,16 @@ def weld(points_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np
 
 
 def save_collision_mesh(path: Path, mesh: Triangles) -> None:
-    """Write a binary PLY in double precision: scans may lie at map coordinates."""
-    import open3d as o3d  # takes a second: who only reads does not need it
+    """Write a binary PLY in double precision: scans may lie at map coordinates.
 
-    vertices = o3d.utility.Vector3dVector(mesh.vertices_m)
-    faces = o3d.utility.Vector3iVector(mesh.faces.astype(np.int32))
+    Open3D's writer is not used: on a full disk it leaves an empty file and says that all is well.
+    """
+    header = PLY_HEADER.format(vertices=len(mesh.vertices_m), faces=len(mesh.faces))
+    faces = np.empty(len(mesh.faces), [("corners", "u1"), ("index", "<u4", 3)])
+    faces["corners"], faces["index"] = 3, mesh.faces
     with atomic_path(path) as temporary:
-        if not o3d.io.write_triangle_mesh(temporary, o3d.geometry.TriangleMesh(vertices, faces)):
-            raise OSError(f"{temporary}: Open3D could not write the collision mesh")
+        vertices = np.ascontiguousarray(mesh.vertices_m, "<f8")
+        temporary.write_bytes(header.encode() + vertices.tobytes() + faces.tobytes())
 
 
 def load_collision_mesh(path: Path) -> Triangles:

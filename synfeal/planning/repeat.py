@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.pose_table import PoseTable, check_unit, read_pose_table
 from synfeal.dataset.sevenscenes import SPLIT_FILES, frame_paths, read_pose, read_split
 from synfeal.errors import InputError
@@ -91,7 +92,7 @@ def _read_frames(directories: list[Path], source: Path) -> PoseTable:
     return PoseTable(np.arange(len(poses)), path, poses[:, :3, 3].copy(), quat_wxyz_of(poses))
 
 
-def _rigid(path: Path) -> NDArray[np.float64]:
+def _rigid(path: FrameFile) -> NDArray[np.float64]:
     """A pose (4, 4) that is a rotation and a translation."""
     pose = read_pose(path)
     rotation = pose[:3, :3].clip(-2.0, 2.0)  # anything beyond 1 is none, and must not overflow

@@ -1,0 +1,75 @@
+"""What property tests share: how they name the functions they are about, and what they draw."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from hypothesis import Phase, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from synfeal.dataset.pose_table import PoseTable
+
+# Of a mutant (docs/testing.md) any failing example will do: it need not be the simplest.
+SIMPLEST = () if "MUTANT_UNDER_TEST" in os.environ else (Phase.shrink, Phase.explain)
+PHASES = (Phase.explicit, Phase.generate, *SIMPLEST)
+# The same examples in every run: a test that fails once fails until it is mended.
+few = settings(derandomize=True, deadline=None, max_examples=25, database=None, phases=PHASES)
+fewer = settings(few, max_examples=6)
+
+
+def about(*functions: Any) -> Callable[[Any], Any]:
+    """Names the public functions whose properties a test states."""
+
+    def mark(test: Any) -> Any:
+        test.about = functions
+        return test
+
+    return mark
+
+
+def unit(vector: Any) -> np.ndarray:
+    return np.asarray(vector, dtype=np.float64) / np.linalg.norm(vector)
+
+
+def turn(axis: Any, angle_rad: float) -> np.ndarray:
+    """Quaternion (wxyz) of a turn by its definition."""
+    return np.array([np.cos(angle_rad / 2), *(np.sin(angle_rad / 2) * np.asarray(axis))])
+
+
+def rotation_of(quat_wxyz: Any) -> np.ndarray:
+    """Rotation matrix (3, 3) of a quaternion, by SciPy."""
+    return Rotation.from_quat(quat_wxyz, scalar_first=True).as_matrix()
+
+
+def pose_of(position_m: Any, quat_wxyz: Any) -> np.ndarray:
+    """Pose (4, 4) put together by hand."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation_of(quat_wxyz), position_m
+    return pose
+
+
+def table_of(poses: Any, path: Any = None) -> PoseTable:
+    """A table of poses (N, 4, 4), quaternions by SciPy; one path unless told."""
+    poses = np.asarray(poses)
+    quat = Rotation.from_matrix(poses[:, :3, :3]).as_quat(scalar_first=True)
+    quat *= np.where(quat[:, :1] < 0, -1.0, 1.0)
+    frame = np.arange(len(poses))
+    return PoseTable(frame, 0 * frame if path is None else path, poses[:, :3, 3].copy(), quat)
+
+
+def vectors(bound: float, size: int = 3) -> st.SearchStrategy[np.ndarray]:
+    return st.tuples(*[st.floats(-bound, bound)] * size).map(np.array)
+
+
+directions = vectors(1.0).filter(lambda v: np.linalg.norm(v) > 0.1).map(unit)
+angles_rad = st.floats(-np.pi, np.pi)
+quats = st.builds(turn, directions, angles_rad)
+positions = vectors(100.0)
+poses = st.builds(pose_of, positions, quats)
+poses_near = st.builds(pose_of, vectors(3.0), quats)
+fractions = st.floats(0.0, 1.0)
+seeds = st.integers(0, 2**32 - 1)

@@ -1,0 +1,155 @@
+"""Properties of what a plan covers, in a room all of whose points see each other."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
+
+from synfeal.planning.connected import ConnectedSpace
+from synfeal.planning.coverage import (
+    MAX_VOXELS,
+    VOXEL_M,
+    free_space_coverage,
+    headings,
+    plan_coverage,
+    voxel_centres,
+)
+from synfeal.planning.path import poses_of
+from synfeal.planning.seen_surface import (
+    FARTHEST_M,
+    MAX_FRAMES,
+    N_POINTS,
+    has_line,
+    in_image,
+    seen_surface,
+    shown_frames,
+    visible_points,
+)
+from tests.empty_room import (
+    EMPTY,
+    ROOM,
+    SCENE,
+    SQUARE,
+    divided,
+    inside_poses,
+    mesh_of,
+    pose_vectors,
+    walls,
+)
+from tests.property_support import about, directions, few, fewer, poses, seeds, table_of, vectors
+
+columns = st.floats(-10.0, 74.0)  # of an image of 64
+YAW = np.array([0, 0, 0, 0, 0, 0.3])  # well within a sector of heading
+
+
+@about(voxel_centres)
+@few
+@given(vectors(20.0), st.tuples(*[st.floats(0.01, 60.0)] * 3))
+@example(np.zeros(3), (0.01, 0.01, 0.01))
+def test_voxels_are_equal_and_fill_the_box(corner, sides_m):
+    box = np.stack([corner, corner + sides_m])
+    centres, edge_m = voxel_centres(box)
+    counts = [len(np.unique(axis.round(9))) for axis in centres.T]
+    assert np.prod(counts) == len(centres)
+    cell_m = np.array(sides_m) / counts
+    np.testing.assert_allclose(centres.min(axis=0), box[0] + cell_m / 2, atol=1e-9)
+    np.testing.assert_allclose(centres.max(axis=0), box[1] - cell_m / 2, atol=1e-9)
+    np.testing.assert_allclose(centres.mean(axis=0), box.mean(axis=0), atol=1e-9)
+    assert edge_m >= VOXEL_M
+    wanted = np.maximum(np.array(sides_m) / edge_m, 1.0)
+    assert (np.abs(counts - wanted) <= 0.5 + 1e-9).all()
+    assert edge_m == VOXEL_M or np.isclose(edge_m**3 * MAX_VOXELS, np.prod(sides_m))
+
+
+@about(headings)
+@few
+@given(st.lists(pose_vectors, min_size=1, max_size=8))
+def test_heading_is_the_eighth_of_the_circle_the_yaw_lies_in(listed):
+    given_vectors = np.array(listed)
+    sector = given_vectors[:, 5] / (np.pi / 4)
+    clear = np.abs(sector - np.round(sector)) > 1e-6
+    found = headings(table_of(poses_of(given_vectors)))
+    assert ((found >= 0) & (found < 8)).all()
+    np.testing.assert_array_equal(found[clear], np.floor(sector[clear]) % 8)
+
+
+@about(free_space_coverage)
+@fewer
+@given(seeds, st.integers(1, 20), st.integers(1, 20))
+def test_more_cameras_cover_more_of_the_free_space(seed, count, more):
+    space = ConnectedSpace(EMPTY, np.array([[0.0, 0.0, 1.0]]))
+    plan = table_of(poses_of(inside_poses(seed, count + more)))
+    some, all_ = (free_space_coverage(space, ROOM, p) for p in (plan.first(count), plan))
+    assert some.voxels == all_.voxels == 24 * 16 * 10
+    assert (some.voxel_m, some.within_m) == (0.25, 0.5)
+    assert 0.0 < some.positions_share <= all_.positions_share <= 1.0
+    assert some.headings_share <= all_.headings_share <= all_.positions_share
+    alike = table_of(poses_of(inside_poses(seed, count) * [1, 1, 1, 1, 1, 0] + YAW))
+    same_way = free_space_coverage(space, ROOM, alike)
+    assert same_way.headings_share == pytest.approx(same_way.positions_share / 8)
+    # No camera reaches more than the centres within a ball of radius 2 edges.
+    assert all_.positions_share <= (count + more) * 1.4 * (4 / 3 * np.pi * 8) / all_.voxels
+
+
+@about(seen_surface, plan_coverage)
+@settings(few, max_examples=3)
+@given(seeds, st.integers(1, 5))
+def test_in_an_empty_room_all_can_be_seen_and_more_frames_see_more(seed, count):
+    plan = table_of(poses_of(inside_poses(seed, count + 3)))
+    mesh, hubs = mesh_of(ROOM), np.array([[0.0, 0.0, 1.0]])
+    few_, all_ = (seen_surface(mesh, EMPTY, hubs, p, SQUARE) for p in (plan.first(count), plan))
+    assert few_.visible == all_.visible == N_POINTS
+    assert few_.seen_often <= few_.seen <= all_.seen <= N_POINTS
+    assert few_.seen_often <= all_.seen_often <= all_.seen
+    found = plan_coverage(mesh, ROOM, SCENE, plan, SQUARE)
+    assert found["frames"] == found["surface"]["frames_looked_at"] == count + 3
+    assert found["surface"]["seen_share"] == all_.seen / N_POINTS
+    assert found["surface"]["seen_often_share"] == all_.seen_often / N_POINTS
+
+
+@about(shown_frames)
+@few
+@given(st.integers(1, 5000))
+@example(MAX_FRAMES)
+@example(MAX_FRAMES + 1)
+def test_frames_shown_are_spread_evenly_from_first_to_last(count):
+    found = shown_frames(count)
+    assert len(found) == min(count, MAX_FRAMES)
+    assert (found[0], found[-1]) == (0, count - 1) or count == 1
+    gaps = np.diff(found)
+    assert (gaps >= 1).all()
+    assert len(set(gaps)) <= 2
+
+
+@about(has_line, visible_points)
+@few
+@given(seeds, walls)
+def test_of_a_divided_room_each_part_sees_its_own_surface(seed, wall):
+    rng, caster = np.random.default_rng(seed), divided(wall)
+    floor = rng.uniform([-2.9, -1.9, 0.0], [2.9, 1.9, 0.0], (40, 3))
+    floor = floor[np.abs(floor[:, 0] - wall - 0.05) > 0.2]
+    places = np.array([[-2.0, 0.0, 1.0], [2.5, 0.0, 1.0]])
+    near = floor[:, 0] < wall
+    np.testing.assert_array_equal(has_line(caster, places[0], floor), near)
+    np.testing.assert_array_equal(has_line(caster, places[1], floor), ~near)
+    np.testing.assert_array_equal(visible_points(caster, places[:1], floor), floor[near])
+    np.testing.assert_array_equal(visible_points(caster, places, floor), floor)
+    assert len(visible_points(caster, places[:0], floor)) == 0
+
+
+@about(in_image)
+@few
+@given(poses, st.tuples(columns, columns), st.floats(0.06, 6.0), directions)
+@example(np.eye(4), (32.0, 32.0), 4.9, np.array([0.0, 0.0, 1.0]))
+@example(np.eye(4), (32.0, 32.0), 5.1, np.array([0.0, 0.0, 1.0]))
+@example(np.eye(4), (32.0, 65.0), 1.0, np.array([0.0, 0.0, 1.0]))
+@example(np.eye(4), (-1.0, 32.0), 1.0, np.array([0.0, 0.0, 1.0]))
+def test_a_point_is_in_the_image_if_its_pixel_is_and_it_is_near_enough(pose, pixel, depth_m, way):
+    slope = (np.array(pixel) - 32.0) / 32.0  # 64 pixels and a right angle: f = 32
+    in_cam = depth_m * np.array([*slope, 1.0])
+    distance_m = np.linalg.norm(in_cam)
+    assume(abs(distance_m - FARTHEST_M) > 1e-6)
+    assume(min(abs(value - edge) for value in pixel for edge in (0, 64)) > 1e-6)
+    expected = all(0 < value < 64 for value in pixel) and distance_m < FARTHEST_M
+    points = np.array([pose[:3, :3] @ p + pose[:3, 3] for p in (in_cam, -in_cam, 0.04 * way)])
+    assert in_image(SQUARE, pose, points).tolist() == [expected, False, False]

@@ -1,0 +1,209 @@
+"""Properties of planning in a room whose free space is known in closed form."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from synfeal.config.models import CollectionConfig, SceneConfig
+from synfeal.errors import InputError
+from synfeal.mesh.triangles import save_collision_mesh
+from synfeal.planning.candidates import CandidateStream
+from synfeal.planning.connected import ConnectedSpace, connected_space
+from synfeal.planning.coverage import plan_coverage, scene_coverage
+from synfeal.planning.independent import independent_poses
+from synfeal.planning.plan import plan_scene, plan_split, sampling_box_of
+from synfeal.planning.questions import Questions, draw_questions
+from synfeal.planning.start import largest_group, sample_start
+from synfeal.planning.target import admissible, farthest_admissible, has_free_view
+from tests.empty_room import (
+    BOUNDS,
+    EMPTY,
+    ROOM,
+    SCENE,
+    SQUARE,
+    divided,
+    inside_poses,
+    mesh_of,
+    wall_distance_m,
+    walls,
+)
+from tests.property_support import about, few, fewer, seeds, vectors
+
+distances = st.floats(0.0, 4.0)
+
+
+def free_by_closed_form(vectors_, least_m):
+    """Whether poses in the empty room look farther, and which of them are too near to tell."""
+    rotation = Rotation.from_euler("ZYX", vectors_[:, :2:-1])
+    distance = wall_distance_m(vectors_[:, :3], rotation.apply([1.0, 0.0, 0.0]))
+    return distance > least_m, np.abs(distance - least_m) < 1e-4
+
+
+@about(has_free_view, admissible, Questions.answers)
+@few
+@given(seeds, distances)
+def test_in_an_empty_room_a_candidate_needs_a_free_view_and_no_more(seed, least_m):
+    candidates = inside_poses(seed, 40)
+    expected, near = free_by_closed_form(candidates, least_m)
+    found = has_free_view(EMPTY, candidates, least_m)
+    np.testing.assert_array_equal(found[~near], expected[~near])
+    starts = inside_poses(seed + 1, 40)
+    for start in (starts[0], starts):
+        np.testing.assert_array_equal(admissible(EMPTY, start, candidates, least_m), found)
+    questions = Questions(starts, candidates, least_m)
+    np.testing.assert_array_equal(questions.answers(EMPTY), found)
+
+
+@about(admissible)
+@few
+@given(seeds, walls)
+def test_no_candidate_behind_a_wall_is_admissible(seed, wall):
+    candidates, start = inside_poses(seed, 60), np.array([-2.0, 0, 1, 0, 0, 0])
+    found = admissible(divided(wall), start, candidates, 0.0)
+    assert not found[candidates[:, 0] > wall].any()
+    assert found[candidates[:, 0] < wall - 1e-3].all()
+
+
+@about(Questions.n_rays)
+@few
+@given(st.integers(0, 20))
+def test_every_question_costs_two_rays(count):
+    assert Questions(np.zeros((count, 6)), np.zeros((count, 6)), 0.0).n_rays == 2 * count
+
+
+@about(farthest_admissible)
+@few
+@given(seeds, st.integers(1, 4), st.integers(1, 5), st.floats(0.0, 7.0), walls)
+def test_target_is_what_trying_one_after_the_other_finds(seed, n_rounds, k, min_path_m, wall):
+    rounds = inside_poses(seed, n_rounds * k).reshape(n_rounds, k, 6)
+    has_view = np.random.default_rng(seed).random((n_rounds, k)) < 0.5
+    start, caster = np.array([-2.0, 0, 1, 0, 0, 0]), divided(wall)
+    expected = None
+    for r, c in np.ndindex(n_rounds, k):
+        length_m = np.linalg.norm(rounds[r, c, :3] - start[:3])
+        fit = has_view[r, c] and rounds[r, c, 0] < wall and length_m >= min_path_m
+        if fit and (expected is None or (expected[0] == r and length_m > expected[1])):
+            expected = (r, length_m, c)
+    found = farthest_admissible(caster, start, rounds, has_view, min_path_m)
+    assert found == (expected and (expected[0], expected[2]))
+
+
+@about(CandidateStream.next_target)
+@few
+@given(seeds, st.integers(1, 9), st.floats(0.0, 2.0), st.floats(0.0, 2.0))
+def test_targets_of_the_stream_are_far_enough_and_have_a_view(seed, k, view_m, min_path_m):
+    stream = CandidateStream(EMPTY, BOUNDS, k, view_m, np.random.default_rng(seed))
+    start = np.array([0.0, 0, 1.2, 0, 0, 0])
+    for _ in range(3):
+        target = stream.next_target(start, min_path_m, 500)
+        assert target is not None
+        assert np.linalg.norm(target[:3] - start[:3]) >= min_path_m
+        free, near = free_by_closed_form(target[None], view_m)
+        assert free[0] or near[0]
+        assert ((target >= BOUNDS[0]) & (target <= BOUNDS[1])).all()
+        start = target
+    assert stream.next_target(start, 10.0, 3) is None  # farther than the room is long
+
+
+@about(largest_group, sample_start, connected_space, ConnectedSpace.contains)
+@fewer
+@given(seeds, walls, st.floats(0.0, 1.0))
+def test_of_a_divided_room_the_larger_part_is_the_space(seed, wall, view_m):
+    caster = divided(wall)
+    group = largest_group(caster, BOUNDS, view_m, 100, 200, np.random.default_rng(seed))
+    assert (group[:, 0] < wall).all()
+    assert has_free_view(caster, group, view_m).all()
+    start = sample_start(caster, BOUNDS, view_m, 100, np.random.default_rng(seed))
+    assert ((start >= BOUNDS[0]) & (start <= BOUNDS[1])).all()
+    assert has_free_view(caster, start[None], view_m).all()
+    space = connected_space(caster, BOUNDS, view_m, 100, np.random.default_rng(seed))
+    points = inside_poses(seed, 50)[:, :3]
+    points = points[np.abs(points[:, 0] - wall) > 0.2]
+    np.testing.assert_array_equal(space.contains(points), points[:, 0] < wall)
+
+
+@about(draw_questions)
+@fewer
+@given(seeds, walls)
+def test_questions_start_where_a_camera_can_get_to(seed, wall):
+    caster = divided(wall)
+    scene = SCENE.model_copy(update={"min_view_distance_m": 0.5})
+    found = draw_questions(caster, scene, ROOM, np.random.default_rng(seed), 50)
+    assert len(found.starts) == len(found.candidates) == 50
+    assert found.min_view_distance_m == 0.5
+    side = found.starts[:, 0] < wall  # walks never pass the wall, wherever they began
+    assert side.all() or not side.any()
+    assert has_free_view(caster, found.starts, 0.5).all()
+    assert ((found.candidates >= BOUNDS[0]) & (found.candidates <= BOUNDS[1])).all()
+
+
+@about(independent_poses)
+@settings(few, max_examples=3)
+@given(seeds, walls, st.integers(1, 300))
+def test_independent_poses_fill_the_larger_part_and_fewer_are_a_prefix(seed, wall, count):
+    caster = divided(wall)
+
+    def drawn(n):
+        rng = np.random.default_rng(seed)
+        return independent_poses(caster, BOUNDS, 0.5, CollectionConfig(mode="random"), n, rng)
+
+    found = drawn(count)
+    assert found.shape == (count, 6)
+    assert (found[:, 0] < wall).all()
+    assert has_free_view(caster, found, 0.5).all()
+    np.testing.assert_array_equal(drawn(count + 100)[:count], found)
+
+
+@about(plan_split)
+@fewer
+@given(seeds, st.integers(1, 200), st.floats(0.05, 0.5), st.sampled_from(["rpy", "slerp"]))
+def test_a_plan_is_a_free_path_and_a_prefix_of_longer_ones(seed, count, spacing_m, how):
+    collection = CollectionConfig(frame_spacing_m=spacing_m, interpolation=how)
+
+    def planned(n):
+        return plan_split(EMPTY, ROOM, SCENE, collection, n, np.random.default_rng(seed))
+
+    found = planned(count)
+    np.testing.assert_array_equal(found.frame, np.arange(count))
+    assert set(np.diff(found.path)) <= {0, 1}
+    assert ((found.position_m >= ROOM[0]) & (found.position_m <= ROOM[1])).all()
+    steps = np.linalg.norm(np.diff(found.position_m, axis=0), axis=1)
+    # A path of at least 1.5 m is cut into a whole number of steps: n - 1/2 of n spacings at least.
+    assert (np.abs(steps - spacing_m) <= 0.25 * spacing_m).all()
+    longer = planned(count + 37)
+    np.testing.assert_array_equal(longer.position_m[:count], found.position_m)
+    np.testing.assert_array_equal(longer.quat_wxyz[:count], found.quat_wxyz)
+    np.testing.assert_array_equal(longer.path[:count], found.path)
+
+
+@about(plan_scene, scene_coverage)
+@settings(few, max_examples=1)
+@given(seed=seeds)
+def test_a_scene_is_planned_and_measured_from_its_collision_mesh(seed, tmp_path_factory):
+    mesh, path = mesh_of(ROOM), tmp_path_factory.mktemp("scene") / "collision.ply"
+    save_collision_mesh(path, mesh)
+    collection = CollectionConfig(frame_spacing_m=0.2)
+    plan = plan_scene(path, SCENE, collection, 20, np.random.default_rng(seed))
+    same = plan_split(EMPTY, ROOM, SCENE, collection, 20, np.random.default_rng(seed))
+    np.testing.assert_allclose(plan.position_m, same.position_m, atol=1e-9)
+    found = scene_coverage(path, SCENE, plan, SQUARE)
+    assert found == plan_coverage(mesh, ROOM, SCENE, plan, SQUARE)
+
+
+@about(sampling_box_of)
+@few
+@given(vectors(5.0), vectors(5.0))
+def test_the_box_is_the_configured_one_and_else_the_mesh(a, b):
+    np.testing.assert_array_equal(sampling_box_of(SCENE, ROOM, "scene"), ROOM)
+    box = np.sort([a, b], axis=0)
+    assume((box[1] - box[0] > 0.1).all())
+    sides = dict(zip("xyz", box.T.tolist(), strict=True))
+    scene = SceneConfig.model_validate({**SCENE.model_dump(), "sampling_box": sides})
+    overlap = np.minimum(box[1], ROOM[1]) - np.maximum(box[0], ROOM[0])
+    if (overlap > 0.0).all():
+        np.testing.assert_array_equal(sampling_box_of(scene, ROOM, "scene"), box)
+    else:
+        with pytest.raises(InputError, match=r"^scene: .* lies outside the mesh"):
+            sampling_box_of(scene, ROOM, "scene")

@@ -1,0 +1,104 @@
+"""From the scores of repetitions to a cell, by hand."""
+
+import json
+import math
+from itertools import count
+
+import pytest
+
+from synfeal.errors import InputError
+from synfeal.report.stats import MEASURES, combine, percent_change, read_metrics, score_of
+from tests.report_results import failed_metrics, metrics
+
+KEYS = [*MEASURES, *(f"{m}_{end}" for m in MEASURES for end in ("low", "high"))]
+
+
+def run_of(first):
+    """Scores that all differ: ``first``, ``first + 1``, ... in the order of ``KEYS``."""
+    values = metrics("6k", 1.0, 1.0) | dict(zip(KEYS, map(float, count(first)), strict=False))
+    return values | {"position_rms_m": first + 50.0, "baseline_position_m_true": first + 60.0}
+
+
+def test_a_cell_is_the_mean_of_its_runs_measure_by_measure():
+    cell = combine([run_of(0), run_of(2), run_of(10)])  # offsets 0, 2, 10: mean 4, sd sqrt(28)
+    assert list(cell.scores) == list(MEASURES)
+    for place, measure in enumerate(MEASURES):
+        score = cell.scores[measure]
+        low = len(MEASURES) + 2 * place
+        assert (score.value, score.low, score.high) == (place + 4, low + 4, low + 5)
+        assert score.sd == pytest.approx(math.sqrt(28))
+    assert (cell.position_rms_m, cell.baseline_m) == (54, 64)
+    assert (cell.n_train, cell.n_test) == (300, 125)
+    assert (cell.n_seeds, cell.n_finished, cell.failed) == (3, 3, 0)
+
+
+def test_runs_without_a_score_count_as_runs_and_give_no_score():
+    cell = combine([failed_metrics("6k"), run_of(3) | {"failed": 7}])
+    assert cell.scores["position_m"].value == 3
+    assert cell.scores["position_m"].sd is None
+    assert cell.baseline_m == (1 + 63) / 2  # that of guessing the mean needs no score
+    assert cell.position_rms_m == 53
+    assert (cell.n_seeds, cell.n_finished, cell.failed) == (2, 1, 125 + 7)
+    nothing = combine([failed_metrics("6k")])
+    assert nothing.scores["orientation_deg"].value is None
+    assert (nothing.position_rms_m, nothing.n_finished, nothing.n_test) == (None, 0, 125)
+
+
+def test_one_wide_limit_makes_the_mean_limit_unknown():
+    score = score_of([run_of(0), run_of(2) | {"position_m_high": None}], "position_m")
+    assert (score.value, score.low, score.high) == (1, 5, None)
+    assert score.sd == pytest.approx(math.sqrt(2))
+
+
+@pytest.mark.parametrize(
+    ("new", "old", "percent"),
+    [
+        (3, 2, 50),
+        (1, 2, -50),
+        (2, 2, 0),
+        (0, 2, -100),
+        (None, 2, None),
+        (2, None, None),
+        (2, 0, None),
+    ],
+)
+def test_percent_change(new, old, percent):
+    assert percent_change(new, old) == percent
+
+
+def test_metrics_are_read_back_as_they_are(tmp_path):
+    path = tmp_path / "metrics.json"
+    values = run_of(0) | {"position_m_high": None, "more": "of it"}
+    path.write_text(json.dumps(values))
+    assert read_metrics(path) == values
+
+
+@pytest.mark.parametrize("key", [*KEYS, "position_rms_m", "baseline_position_m_true"])
+@pytest.mark.parametrize("value", [-1.0, "one", [1.0]])
+def test_a_score_that_is_no_error_is_refused_by_name(tmp_path, key, value):
+    path = tmp_path / "metrics.json"
+    path.write_text(json.dumps(run_of(0) | {key: value}))
+    with pytest.raises(InputError, match=f"{key}.*score that run again") as refusal:
+        read_metrics(path)
+    assert str(refusal.value).startswith(str(path))
+
+
+@pytest.mark.parametrize("key", ["n_train", "n_test", "failed"])
+@pytest.mark.parametrize("value", [-1, 0.5, None])
+def test_a_count_that_is_none_is_refused_by_name(tmp_path, key, value):
+    path = tmp_path / "metrics.json"
+    path.write_text(json.dumps(run_of(0) | {key: value}))
+    with pytest.raises(InputError, match=f"{key}.*score that run again") as refusal:
+        read_metrics(path)
+    assert str(refusal.value).startswith(str(path))
+
+
+@pytest.mark.parametrize("key", [*KEYS, "position_rms_m", "n_train", "failed"])
+def test_a_missing_score_is_named(tmp_path, key):
+    path = tmp_path / "metrics.json"
+    values = run_of(0)
+    del values[key]
+    path.write_text(json.dumps(values))
+    with pytest.raises(InputError, match=f"{key} .*score that run again") as refusal:
+        read_metrics(path)
+    assert str(refusal.value).startswith(str(path))
