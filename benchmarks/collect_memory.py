@@ -80,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         tasks = missing_tasks(part / DATA, job, read_plans(part, job.counts), Shard(1, 1))
         with scratch(part) as temporary, Watching(n_frames, "collect") as progress:
             studio = Studio(mesh, job.camera, job.render, True, part / DATA, temporary)
-            render_tasks(studio, tasks, 1, progress)
+            render_tasks(studio, tasks, 1, progress, lambda _: None)
     last = max(progress.resident_mb)
     early, late = progress.resident_mb[EVERY], progress.resident_mb[last]
     print(f"{early:.1f} MB at frame {EVERY:,}, {late:.1f} MB at frame {last:,}", end="")

@@ -16,6 +16,7 @@ CONFIG = Path(__file__).parent.parent / "config"
 PROFILES = {
     "mini": ("config.yaml",),
     "smoke": ("config.yaml", "smoke.yaml"),
+    "gpu": ("config.yaml", "gpu.yaml"),
     "paper": ("config.yaml", "paper.yaml"),
 }
 
@@ -286,7 +287,7 @@ def test_the_generated_documentation_matches_the_models():
 
 
 def test_documentation_that_drifted_is_noticed(tmp_path, capsys):
-    for name in ("config.yaml", "smoke.yaml", "paper.yaml"):
+    for name in ("config.yaml", "smoke.yaml", "gpu.yaml", "paper.yaml"):
         (tmp_path / name).write_bytes((CONFIG / name).read_bytes())
     assert main(["--folder", str(tmp_path)]) == 0
     assert main(["--check", "--folder", str(tmp_path)]) == 0

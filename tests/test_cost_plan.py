@@ -9,9 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from baselines.training.device import open_device
 from synfeal.cli import main
 from synfeal.config import load_config, read_experiments
-from synfeal.report.cost.estimate import Machine, by_table, job_costs, stage_costs, wall_seconds
+from synfeal.report.cost import steps
+from synfeal.report.cost.compare import compare_cost
+from synfeal.report.cost.estimate import (
+    Machine,
+    by_table,
+    job_costs,
+    run_wall,
+    stage_costs,
+    wall_seconds,
+)
 from synfeal.report.cost.jobs import (
     Job,
     experiment_jobs,
@@ -20,9 +30,10 @@ from synfeal.report.cost.jobs import (
     table_keys,
 )
 from synfeal.report.cost.laws import Law, fit_laws, fit_seconds
-from synfeal.report.cost.measured import last_look_s, read_measured, write_measured
+from synfeal.report.cost.measured import Measured, last_look_s, read_measured, write_measured
 from synfeal.report.cost.networks import training_work
-from synfeal.report.cost.run import comparison_text
+from synfeal.report.cost.profiles import read_run
+from synfeal.report.cost.run import compare_runs
 
 ROOT = Path(__file__).parent.parent
 HEADER = "s\tmax_rss\tcpu_time\n"
@@ -69,10 +80,12 @@ def made_up_run(smoke, tmp_path_factory):
     return root
 
 
-def test_jobs_are_those_of_snakemake(tmp_path, smoke):
+@pytest.mark.parametrize("name", ["smoke", "gpu"])
+def test_jobs_are_those_of_snakemake(tmp_path, name):
+    profile = ["--configfile", f"config/{name}.yaml", "--config", f"results={tmp_path}"]
     command = [sys.executable, "-m", "snakemake", "--dry-run", "--quiet", "rules", "--cores", "1"]
-    profile = ["--configfile", "config/smoke.yaml", "--config", f"results={tmp_path}", "--", "all"]
-    run = subprocess.run([*command, *profile], capture_output=True, text=True, check=True)
+    whole = [*command, *profile, "--", "all"]
+    run = subprocess.run(whole, capture_output=True, text=True, check=True)
     rules = {name: int(n) for name, n in re.findall(r"^(\w+) +(\d+)$", run.stdout, re.MULTILINE)}
     stages = {"labels": 0, "posegraph": 0, "estimate": 0, "tables": 0}
     merged = {
@@ -81,16 +94,16 @@ def test_jobs_are_those_of_snakemake(tmp_path, smoke):
         **dict.fromkeys(("label_error", "speed_vs_error", "hard_cases", "document"), "tables"),
         **dict.fromkeys(("rgbd-toro", "rgbd-g2o"), "posegraph"),
     }
-    for name, count in rules.items():
-        if name not in ("all", "total"):
-            stage = merged.get(name, name)
+    for rule, count in rules.items():
+        if rule not in ("all", "total"):
+            stage = merged.get(rule, rule)
             stages[stage] = stages.get(stage, 0) + count
     ours = dict.fromkeys(stages, 0)
-    for job in run_jobs(*smoke):
+    for job in run_jobs(*design(name)):
         stage = merged.get(job.stage, "estimate" if job.stage == "kinect-fusion" else job.stage)
         ours[stage] = ours.get(stage, 0) + 1
     assert ours == stages
-    assert rules["total"] - 1 == len(run_jobs(*smoke))
+    assert rules["total"] - 1 == len(run_jobs(*design(name)))
 
 
 def test_every_job_has_a_name_of_its_own(smoke):
@@ -172,6 +185,17 @@ def test_jobs_of_one_size_tell_only_the_rate():
     assert fit_seconds(np.empty((3, 0)), np.array([1.0, 2.0, 6.0]), 1.0) == (3.0, ())
 
 
+def test_chance_is_no_rate():
+    # Short jobs that take 1 s whatever their size, off by up to 30 %: a thousand times the size
+    # must not become a thousand times the time, whichever job happened to be slow.
+    rng = np.random.default_rng(0)
+    sizes = np.array([25, 60, 25, 60, 50, 200, 25, 60], dtype=float)[:, None]
+    for _ in range(20):
+        fixed_s, rates = fit_seconds(sizes, rng.uniform(0.9, 1.3, 8), 0.9)
+        assert fixed_s >= 0.85
+        assert fixed_s + rates[0] * 2000 < 12
+
+
 def test_no_part_is_negative():
     sizes = np.linspace(1, 10, 20)[:, None]
     fixed_s, rates = fit_seconds(sizes, 5 * sizes[:, 0] ** 1.5, 0.1)
@@ -180,10 +204,10 @@ def test_no_part_is_negative():
 
 
 def test_the_made_up_runs_costs_are_predicted(made_up_run, smoke):
-    text = comparison_text([made_up_run], made_up_run)
-    factors = re.findall(r"^(\S+) .* ([\d.]+)$", text, re.MULTILINE)
-    assert {stage for stage, _ in factors} >= {"train", "render_packed", "sfm", "total"}
-    assert [float(factor) for _, factor in factors] == pytest.approx([1.0] * len(factors), abs=0.05)
+    rows = compare_runs([made_up_run], made_up_run)[str(made_up_run), str(made_up_run)]
+    factors = {row.stage: row.factor for row in rows}
+    assert factors.keys() >= {"train", "render_packed", "sfm", "total"}
+    assert list(factors.values()) == pytest.approx([1.0] * len(factors), abs=0.05)
 
 
 def test_rendering_scales_with_samples():
@@ -194,22 +218,26 @@ def test_rendering_scales_with_samples():
     [stage] = stage_costs(costs, law, machine)
     seconds = 5 + 10 + 122.88
     assert stage.cpu_s == pytest.approx((1.5 * seconds, 3 * seconds, 6 * seconds))
-    assert stage.wall_s == pytest.approx(2 * seconds)  # three equal jobs on two cores
+    assert stage.wall_s.mid == pytest.approx(2 * seconds)  # three equal jobs on two cores
+    assert stage.wall_s.high == pytest.approx(4 * seconds)
     assert stage.beyond == pytest.approx(12.288)
     assert stage.peak_mb == pytest.approx(705)
 
 
 def test_trainings_on_a_gpu_take_the_assumed_throughput():
     law = {"training": Law(3.0, (1e-4, 8.0), (0.9, 1.1), 9, 1.0, 400.0)}
-    jobs = [Job("train", str(i), (1e6, 7200.0)) for i in range(4)]
+    jobs = [Job("train", str(i), (1e5, 7200.0)) for i in range(4)]
     [on_gpu] = stage_costs(job_costs(jobs, law, Machine(8, 2, 10.0)), law, Machine(8, 2, 10.0))
     # 4 x 7200 TFLOP at 20, 10 and 5 TFLOP/s; a core drives each, and starts it.
     assert on_gpu.gpu_s == pytest.approx((1440, 2880, 5760))
     assert on_gpu.cpu_s.mid == pytest.approx(2880 + 4 * 3)
-    assert on_gpu.wall_s == pytest.approx(2 * (720 + 3))
+    assert on_gpu.wall_s.mid == pytest.approx(2 * (720 + 3))
+    # Starting ten million layers, at 0.1 ms each, takes longer than the arithmetic.
+    [cost] = job_costs([Job("train", "a", (1e7, 7200.0))], law, Machine(8, 2, 10.0))
+    assert cost.gpu_s.mid == pytest.approx(1000)
     [on_cpu] = stage_costs(job_costs(jobs, law, Machine(4, 0, 10.0)), law, Machine(4, 0, 10.0))
     assert on_cpu.gpu_s.mid == 0
-    assert on_cpu.cpu_s.mid == pytest.approx(4 * (3 + 100 + 57_600))
+    assert on_cpu.cpu_s.mid == pytest.approx(4 * (3 + 10 + 57_600))
 
 
 def test_unmeasured_stages_are_said_to_be():
@@ -231,26 +259,96 @@ def test_tables_add_up_to_the_run(smoke):
     laws = fit_laws([])
     laws |= {job.law: Law(1.0, (0.0,) * len(job.size), (1.0, 1.0), 1, None, None) for job in jobs}
     costs = job_costs(jobs, laws, Machine(1, 0, 1.0))
-    rows = by_table(costs, table_keys(config, experiments))
-    assert sum(row.jobs for row in rows) == len(jobs)
-    assert sum(row.cpu_s.mid for row in rows) == pytest.approx(len(jobs))
-    alone = {row.name: row.alone[0].mid for row in rows if row.alone}
+    rows = by_table(costs, table_keys(config, experiments), Machine(1, 0, 1.0))
+    assert sum(row.own.jobs for row in rows) == len(jobs)
+    assert sum(row.own.cpu_s.mid for row in rows) == pytest.approx(len(jobs))
+    assert run_wall(costs, Machine(1, 0, 1.0)).mid == pytest.approx(len(jobs))
+    alone = {row.name: row.alone.cpu_s.mid for row in rows if row.alone}
     # By itself a table needs the jobs of its rows and the one that makes it.
     rows4 = tuple(e for e in experiments if e.table == "table4_size")
     assert alone["table4_size"] == pytest.approx(len(experiment_jobs(config, rows4)) + 1)
 
 
+def read_rows(path):
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_rates_of_steps_are_found(smoke, monkeypatch):
+    config, _ = smoke
+    batch = config.training.batch_size
+
+    def step_s(name, hyper, *_):
+        layers, tflop = training_work(name, config.network, hyper).size(batch, batch, 0)
+        return 3e-4 * layers + 20 * tflop
+
+    monkeypatch.setattr(steps, "_step_s", step_s)
+    assert steps.timed_rates(config).rates == pytest.approx((3e-4, 20))
+
+
+def test_a_step_is_trained_and_timed(smoke):
+    config, _ = smoke
+    hyper = config.localizers["posenet2"]
+    assert 0 < steps._step_s("posenet2", hyper, config, open_device("cpu")) < 60
+
+
+def test_steps_that_are_timed_tell_what_a_small_run_does_not(smoke):
+    """Mini is predicted from a smoke run whose jobs are each 15 % off, one way or the other."""
+    mini, _ = read_run(Path("results/mini"))
+    laws = fit_laws(mini)
+    jobs = [job for job in known_jobs(*smoke) if job.law in laws]
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        run = [
+            (job, Measured(*job.key, 0.0, laws[job.law].seconds(job.size) * factor, None))
+            for job, factor in zip(jobs, np.exp(rng.normal(0, 0.15, len(jobs))), strict=True)
+        ]
+        *_, total = compare_cost(fit_laws(run, laws["training"].rates), mini)
+        assert 1 / 1.5 < total.factor < 1.5
+
+
+def test_timed_steps_of_a_gpu_replace_the_assumption():
+    law = {"training": Law(3.0, (1e-4, 8.0), (0.9, 1.1), 9, 1.0, 400.0)}
+    machine = Machine(8, 2, 10.0, gpu_rates=(1e-5, 0.05))
+    [cost] = job_costs([Job("train", "a", (1e6, 7200.0))], law, machine)
+    assert cost.gpu_s.mid == pytest.approx(1e6 * 1e-5 + 7200 * 0.05)
+
+
 def test_the_command_prints_and_writes_the_plan(made_up_run, tmp_path, capsys):
     out = tmp_path / "plan.csv"
-    options = ["--profile", "smoke", "--measured", str(made_up_run), "--cores", "2"]
-    assert main(["plan", *options, "--csv", str(out), "--compare", str(made_up_run)]) == 0
+    options = ["--profile", "smoke", "--measured", str(made_up_run)]
+    assert main(["plan", *options, "--cores", "1", "4", "--csv", str(out)]) == 0
     text = capsys.readouterr().out
-    assert "table5_from_scratch" in text
-    assert "predicted from" in text
-    with out.open() as file:
-        rows = {row["stage"]: row for row in csv.DictReader(file)}
-    expected_s = sum(true_seconds(j) for j in run_jobs(*design("smoke")) if j.stage == "train")
-    assert float(rows["train"]["cpu_h"]) * 3600 == pytest.approx(expected_s, rel=0.05)
+    assert "Profile smoke on 1 core: " in text
+    assert "Profile smoke on 4 cores: " in text
+    assert "GPU" not in text
+    rows = {(row["cores"], row["part"], row["name"]): row for row in read_rows(out)}
+    jobs = run_jobs(*design("smoke"))
+    expected_s = sum(true_seconds(job) for job in jobs if job.stage == "train")
+    for cores in ("1", "4"):
+        cpu_h = float(rows[cores, "stage", "train"]["cpu_h"])
+        assert cpu_h * 3600 == pytest.approx(expected_s, rel=0.05)
+    # One core works all the time, and a table by itself takes less than the run.
+    total = rows["1", "run", "total"]
+    assert float(total["wall_h"]) == pytest.approx(float(total["cpu_h"]), rel=0.01)
+    assert float(total["cpu_h"]) * 3600 == pytest.approx(sum(map(true_seconds, jobs)), rel=0.05)
+    alone = rows["4", "table alone", "table4_size"]
+    assert 0 < float(alone["wall_h"]) < float(rows["4", "run", "total"]["wall_h"])
+
+
+def test_runs_are_predicted_from_each_other(made_up_run, tmp_path, capsys):
+    out = tmp_path / "check.csv"
+    # Twice the time for every job: one direction is twice too high, the other half.
+    slow = tmp_path / "smoke"
+    for job in known_jobs(*design("smoke")):
+        write_job(slow / "benchmarks", job, 2 * true_seconds(job))
+    options = ["--measured", str(made_up_run), "--compare", str(slow), "--csv", str(out)]
+    assert main(["plan", *options]) == 0
+    text = capsys.readouterr().out
+    assert f"{slow} predicted from {made_up_run}" in text
+    assert f"{made_up_run} predicted from {slow}" in text
+    rows = [row for row in read_rows(out) if row["stage"] == "total"]
+    assert [float(row["factor"]) for row in rows] == pytest.approx([0.5, 2.0], rel=0.05)
 
 
 @pytest.mark.parametrize(

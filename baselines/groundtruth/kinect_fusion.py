@@ -14,7 +14,6 @@ and have to agree better. After a few lost frames the rest of the batch is lost.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import open3d as o3d
@@ -26,6 +25,7 @@ from baselines.groundtruth.rgbd.frames import RgbdFrame, open3d_depth, read_fram
 from baselines.groundtruth.trajectory import BatchTrajectory
 from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig, KinectFusionConfig
+from synfeal.dataset.archive import FrameFile
 from synfeal.geometry.poses import relative
 
 Array = NDArray[np.float64]
@@ -114,8 +114,8 @@ class FusedModel:
 
 
 def kinect_fusion_batch(
-    color_paths: Sequence[Path],
-    depth_paths: Sequence[Path],
+    color_paths: Sequence[FrameFile],
+    depth_paths: Sequence[FrameFile],
     camera: CameraConfig,
     cfg: KinectFusionConfig,
     seed: int = 0,

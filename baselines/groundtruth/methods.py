@@ -25,6 +25,7 @@ from baselines.groundtruth.posegraph.graph import Edge, PoseGraph
 from baselines.groundtruth.trajectory import BatchTrajectory
 from synfeal.config import Experiment
 from synfeal.config.models import CameraConfig, GroundTruthConfig, PoseGraphConfig
+from synfeal.dataset.archive import FrameFile
 from synfeal.errors import InputError
 
 Facts = dict[str, float]
@@ -98,8 +99,8 @@ def check_sources(rows: Sequence[Experiment], path: Path) -> None:
 
 def estimate_batch(
     name: str,
-    color_paths: Sequence[Path],
-    depth_paths: Sequence[Path],
+    color_paths: Sequence[FrameFile],
+    depth_paths: Sequence[FrameFile],
     camera: CameraConfig,
     groundtruth: GroundTruthConfig,
     seed: int,

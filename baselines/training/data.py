@@ -15,6 +15,8 @@ from synfeal.dataset.packed import read_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
 
+# A larger set is not read on a processor: it stays on the disk, mapped into memory.
+MOST_READ_BYTES = 2**31
 # Frames per step when a whole set is read, or its statistics are computed.
 CHUNK = 500
 
@@ -80,7 +82,8 @@ class LabelledFrames:
 def read_images(path: Path, count: int, input_px: int, device: torch.device) -> Tensor:
     """The first ``count`` frames of a packed file as (count, 3, px, px) uint8, channels last.
 
-    Beside the result no more than ``CHUNK`` frames are in memory, on whatever device it is.
+    Beside the result no more than ``CHUNK`` frames are in memory, on whatever device it is. On a
+    processor a result of over 2 GiB is a map of the file, which must not be changed meanwhile.
 
     Raises:
         InputError: the file is no packed frames, has another size, or holds too few of them.
@@ -93,6 +96,10 @@ def read_images(path: Path, count: int, input_px: int, device: torch.device) -> 
         )
     if len(frames) < count:
         raise InputError(f"{path}: holds {len(frames)} frames, but {count} are labelled")
+    n_bytes = count * input_px**2 * 3
+    if device.type == "cpu" and n_bytes > MOST_READ_BYTES:
+        content = torch.from_file(str(path), size=frames.offset + n_bytes, dtype=torch.uint8)
+        return content[frames.offset :].view(count, input_px, input_px, 3).permute(0, 3, 1, 2)
     images = torch.empty((count, *frames.shape[1:]), dtype=torch.uint8, device=device)
     for start in range(0, count, CHUNK):
         chunk = images[start : start + CHUNK]

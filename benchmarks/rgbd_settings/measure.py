@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from baselines.groundtruth.posegraph.optimise import optimise
 from baselines.groundtruth.rgbd import rgbd_graph_with_facts
 from synfeal.config.models import CameraConfig, PoseGraphConfig, RgbdConfig
-from synfeal.dataset.sevenscenes import frame_paths, read_pose
+from synfeal.dataset.sevenscenes import read_pose
 from synfeal.geometry.poses import pose_error, relative
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ class Batch:
 
 def batches_of(scene: str, directory: Path, length: int, count: int) -> list[Batch]:
     """The first batches of a 7-Scenes sequence, each of which begins where the last ends."""
-    color = frame_paths([directory], "color.png")
+    color = sorted(directory.glob("frame-*.color.png"))
     starts = range(0, len(color) - length + 1, length - 1)
     return [Batch(scene, k, tuple(color[k : k + length])) for k in starts[:count]]
 

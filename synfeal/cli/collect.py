@@ -27,6 +27,7 @@ OPTIONS: Options = (
     ("--spacing", {"type": float, "default": 0.03, "help": "metres between frames (0.03)"}),
     ("--seed", {"type": int, "default": 0, "help": "root of all random numbers (0)"}),
     ("--depth", {"action": "store_true", "help": "write depth images too"}),
+    ("--archive", {"action": "store_true", "help": "write each sequence as one seq-XX.zip"}),
     ("--packed", {"type": int, "metavar": "PX", "help": "write frames of PX x PX in one .npy too"}),
     ("--backend", {"choices": BACKENDS, "default": "auto", "help": "what draws (auto)"}),
     ("--workers", {"type": int, "default": 1, "help": "processes that render (1)"}),
@@ -73,6 +74,7 @@ def run(arguments: argparse.Namespace) -> None:
         with_depth=arguments.depth,
         packed_px=arguments.packed,
         out=arguments.out,
+        archived=arguments.archive,
     )
     collect(job, arguments.workers, shard)
     frames = f"{job.n_train} training and {job.n_test} test frames"

@@ -9,7 +9,10 @@ from pathlib import Path
 from synfeal.cli.options import Command, Options
 
 OPTIONS: Options = (
-    ("dataset", {"type": Path, "metavar": "DATASET", "help": "directory that holds seq-01"}),
+    (
+        "dataset",
+        {"type": Path, "metavar": "DATASET", "help": "directory of seq-01 or seq-01.zip"},
+    ),
     (
         "--to",
         {"choices": ("colmap", "nerfstudio", "tum"), "required": True, "help": "format to write"},

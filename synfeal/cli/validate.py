@@ -10,7 +10,10 @@ from synfeal.cli.options import Command, Options
 from synfeal.errors import InputError
 
 OPTIONS: Options = (
-    ("dataset", {"type": Path, "metavar": "DATASET", "help": "directory that holds seq-01"}),
+    (
+        "dataset",
+        {"type": Path, "metavar": "DATASET", "help": "directory of seq-01 or seq-01.zip"},
+    ),
     ("--camera", {"type": Path, "metavar": "FILE", "help": "calibration file (manifest.json)"}),
     (
         "--all",

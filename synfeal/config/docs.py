@@ -23,7 +23,7 @@ from synfeal.config.load import read_yaml
 from synfeal.config.models import Config
 from synfeal.files import atomic_path
 
-FILES = ("config.yaml", "smoke.yaml", "paper.yaml")
+FILES = ("config.yaml", "smoke.yaml", "gpu.yaml", "paper.yaml")
 INTRO = """\
 # Configuration
 
@@ -49,8 +49,8 @@ five localizers. Rows may share runs: a run is made once. Columns:
 SETTINGS = """\
 ## What the profiles set
 
-A dash means that the profile does not set the key: `smoke` and `paper` then take the value of
-`mini`, and `mini` takes the default.
+A dash means that the profile does not set the key: `smoke`, `gpu` and `paper` then take the value
+of `mini`, and `mini` takes the default.
 """
 
 
@@ -85,7 +85,7 @@ def documents(folder: Path) -> dict[str, str]:
         "## Keys\n",
         keys,
         SETTINGS,
-        table(("key", "mini", "smoke", "paper"), setting_rows(profiles)),
+        table(("key", "mini", "smoke", "gpu", "paper"), setting_rows(profiles)),
         EXPERIMENTS,
         table(("column", "type", "meaning"), experiment_rows()),
     ]

@@ -166,6 +166,9 @@ class Config(Strict):
     experiments: Path = Field(Path("config/experiments.csv"), description="the design as a table")
     results: Path = Field(Path("results"), description="where everything is written")
     shard_frames: Count = Field(500, description="frames per render job and sequence directory")
+    archive_sequences: bool = Field(
+        False, description="write each sequence of image files as one `seq-XX.zip`"
+    )
     scenes: dict[Slug, SceneConfig] = Field(description="scenes by name")
     collection: CollectionConfig = Field(
         default_factory=CollectionConfig, description="camera movement"

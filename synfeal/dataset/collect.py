@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from synfeal.dataset.collect_job import CollectJob, record_of
 from synfeal.dataset.directories import refuse_existing, writing_to
-from synfeal.dataset.finish import complete
+from synfeal.dataset.finish import archive_whole, complete
 from synfeal.dataset.progress import Progress
 from synfeal.dataset.render_pieces import Studio, Task, render_tasks
 from synfeal.dataset.render_sequence import resolved
 from synfeal.dataset.sequences import Sequence
-from synfeal.dataset.shards import Shard, pieces_of
+from synfeal.dataset.shards import Shard, pieces_of, sequences_within
 from synfeal.dataset.unfinished import (
     DATA,
     Plans,
@@ -143,12 +143,22 @@ def record_coverage(data: Path, mesh: TexturedMesh, job: CollectJob, plans: Plan
 def render_missing(
     part: Path, job: CollectJob, mesh: TexturedMesh, workers: int, shard: Shard
 ) -> None:
-    """Render what is missing of a shard."""
-    tasks = missing_tasks(part / DATA, job, read_plans(part, job.counts), shard)
+    """Render what is missing of a shard; with ``job.archived``, pack each sequence that is whole.
+
+    Sequences that shards share are left to the command that finishes the data set.
+    """
+    data = part / DATA
+    tasks = missing_tasks(data, job, read_plans(part, job.counts), shard)
     n_frames = sum(len(task.numbers) for task in tasks)
+    own = sequences_within(job.sequences, *shard.bounds(job.n_train + job.n_test))
+
+    def on_done(task: Task) -> None:
+        if job.archived and task.piece.sequence in own:
+            archive_whole(data, [task.piece.sequence], job.kinds)
+
     with scratch(part) as temporary, Progress(n_frames, "collect") as progress:
-        studio = Studio(mesh, job.camera, job.render, job.with_depth, part / DATA, temporary)
-        render_tasks(studio, tasks, workers, progress)
+        studio = Studio(mesh, job.camera, job.render, job.with_depth, data, temporary)
+        render_tasks(studio, tasks, workers, progress, on_done)
 
 
 def missing_tasks(data: Path, job: CollectJob, plans: Plans, shard: Shard) -> list[Task]:

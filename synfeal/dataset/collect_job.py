@@ -25,7 +25,8 @@ LONGEST_NAME = 200  # bytes: of 255, with those that unfinished directories add
 class CollectJob:
     """Everything a collection depends on; ``scene.source`` is ``mesh``.
 
-    ``packed_px`` asks for packed frames of that side as well.
+    ``packed_px`` asks for packed frames of that side as well, ``archived`` for each sequence as
+    one ``seq-XX.zip`` in place of a directory.
     """
 
     scene: SceneConfig
@@ -38,6 +39,7 @@ class CollectJob:
     with_depth: bool
     packed_px: int | None
     out: Path
+    archived: bool = False
 
     @property
     def counts(self) -> dict[str, int]:
@@ -94,6 +96,7 @@ def record_of(job: CollectJob, mesh: TexturedMesh) -> dict[str, Any]:
         "seed": job.seed,
         "depth": job.with_depth,
         "packed": job.packed_px,
+        "archived": job.archived,
     }
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import synfeal
 from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
+from synfeal.dataset.archive import frame_file, sequence_at, sequence_names
 from synfeal.dataset.sequences import Sequence
 from synfeal.errors import InputError
 from synfeal.files import read_json, write_json
@@ -40,7 +41,7 @@ def write_manifest(
                 "name": sequence.name,
                 "split": sequence.split,
                 "frames": len(sequence),
-                "sha256": sequence_sha256(dataset_dir / sequence.name),
+                "sha256": sequence_sha256(sequence_at(dataset_dir / sequence.name)),
             }
             for sequence in sequences
         ],
@@ -80,15 +81,28 @@ def verify_manifest(dataset_dir: Path) -> None:
             raise ValueError(f"'{unknown[0]}' is no name of a sequence")
     except (OSError, ValueError, TypeError, LookupError) as error:
         raise InputError(f"{path}: cannot be read as a manifest ({error!r})") from None
-    bad = [name for name, found in entries if sequence_sha256(dataset_dir / name) != found]
+    bad = [name for name, found in entries if _sha256_or_none(dataset_dir / name) != found]
     if bad:
         raise InputError(f"{path}: {', '.join(bad)} differ from what was written; copy them again")
 
 
-def sequence_sha256(directory: Path) -> str:
-    """SHA-256 over the names and contents of the files of a sequence, in order of name."""
+def _sha256_or_none(directory: Path) -> str | None:
+    """Of a sequence, None where it is missing or damaged."""
+    try:
+        return sequence_sha256(sequence_at(directory))
+    except OSError:
+        return None
+
+
+def sequence_sha256(sequence: Path) -> str:
+    """SHA-256 over the names and contents of the frames, in order of name; archived or not.
+
+    Raises:
+        OSError: the sequence (``seq-01`` or ``seq-01.zip``) or a file cannot be read.
+    """
     digest = hashlib.sha256()
-    for path in sorted(directory.glob("frame-*")):
-        content = hashlib.sha256(path.read_bytes()).hexdigest()
-        digest.update(f"{content}  {path.name}\n".encode())
+    for name in sequence_names(sequence):
+        if name.startswith("frame-"):
+            content = hashlib.sha256(frame_file(sequence, name).read_bytes()).hexdigest()
+            digest.update(f"{content}  {name}\n".encode())
     return digest.hexdigest()

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import io
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.png import IMAGE_DAMAGE
 from synfeal.dataset.sevenscenes import frame_paths
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
+
+COPIED_BYTES = 2**24  # at a time
 
 
 @contextmanager
@@ -30,7 +35,7 @@ def new_packed(out: Path, n_frames: int, input_px: int) -> Iterator[NDArray[np.u
         frames.flush()
 
 
-def pack_frames(sequence_dirs: list[Path], input_px: int, out: Path) -> None:
+def pack_frames(sequences: list[Path], input_px: int, out: Path) -> None:
     """Write the colour frames of the sequences, in order, as one ``.npy``.
 
     uint8 (N, input_px, input_px, 3). As in the published code the short side is resized to
@@ -39,14 +44,14 @@ def pack_frames(sequence_dirs: list[Path], input_px: int, out: Path) -> None:
     Raises:
         InputError: a sequence has no frames, or a frame cannot be read.
     """
-    paths = frame_paths(sequence_dirs, "color.png")
+    paths = frame_paths(sequences, "color.png")
     with new_packed(out, len(paths), input_px) as packed:
         for index, path in enumerate(paths):
             packed[index] = fit_frame(_open(path), input_px)
 
 
 def join_packed(parts: list[Path], out: Path) -> None:
-    """Write packed frames one after the other into one file; at most one part is in memory.
+    """Write packed frames one after the other into one file; a few of them are in memory.
 
     Raises:
         InputError: a part cannot be read, or its frames have another size.
@@ -56,24 +61,30 @@ def join_packed(parts: list[Path], out: Path) -> None:
     for path, array in zip(parts, arrays, strict=True):
         if array.shape[1] != input_px:
             raise InputError(f"{path}: holds frames of {array.shape[1]} px, others {input_px} px")
-    with new_packed(out, sum(map(len, arrays)), input_px) as packed:
-        np.concatenate(arrays, out=packed)
+    header = np.lib.format.header_data_from_array_1_0(arrays[0])
+    header["shape"] = (sum(map(len, arrays)), *arrays[0].shape[1:])
+    with atomic_path(out) as temporary, temporary.open("wb") as joined:
+        np.lib.format.write_array_header_1_0(joined, header)
+        for path, array in zip(parts, arrays, strict=True):
+            with path.open("rb") as part:
+                part.seek(array.offset)
+                shutil.copyfileobj(part, joined, COPIED_BYTES)
 
 
-def read_packed(path: Path) -> NDArray[np.uint8]:
+def read_packed(path: Path) -> np.memmap[Any, np.dtype[np.uint8]]:
     """Packed frames (N, S, S, 3) as a memory map.
 
     Raises:
         InputError: the file is missing or holds no packed frames.
     """
     try:
-        frames: NDArray[np.uint8] = np.lib.format.open_memmap(path, mode="r")
+        frames: np.memmap[Any, np.dtype[np.uint8]] = np.lib.format.open_memmap(path, mode="r")
     except Exception as error:  # a damaged header is refused in every way there is
         raise InputError(
             f"{path}: cannot be read as packed frames ({error}); render it again"
         ) from None
     side = frames.shape[1] if frames.ndim == 4 else 0
-    if frames.dtype != np.uint8 or frames.shape[1:] != (side, side, 3):
+    if frames.dtype != np.uint8 or frames.shape[1:] != (side, side, 3) or np.isfortran(frames):
         raise InputError(f"{path}: holds {frames.dtype} {frames.shape}, not packed frames")
     return frames
 
@@ -101,9 +112,9 @@ def fit_frame(image: Image.Image, input_px: int) -> NDArray[np.uint8]:
     return np.asarray(small.crop((left, top, left + input_px, top + input_px)))
 
 
-def _open(path: Path) -> Image.Image:
+def _open(path: FrameFile) -> Image.Image:
     try:
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(path.read_bytes())) as image:
             return image.convert("RGB")
     except IMAGE_DAMAGE as error:
         raise InputError(f"{path}: cannot be read as an image ({error})") from None

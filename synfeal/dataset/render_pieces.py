@@ -73,8 +73,14 @@ class Studio:
         return watch.seconds
 
 
-def render_tasks(studio: Studio, tasks: list[Task], workers: int, progress: Progress) -> None:
-    """Render all tasks.
+def render_tasks(
+    studio: Studio,
+    tasks: list[Task],
+    workers: int,
+    progress: Progress,
+    on_done: Callable[[Task], object],
+) -> None:
+    """Render all tasks; ``on_done`` is called in this process for each that is done.
 
     Raises:
         InputError: this machine cannot render, or a worker process was killed.
@@ -82,15 +88,22 @@ def render_tasks(studio: Studio, tasks: list[Task], workers: int, progress: Prog
     """
     workers = min(workers, len(tasks))
     if workers > 1:
-        _render_parallel(studio, tasks, workers, progress)
+        _render_parallel(studio, tasks, workers, progress, on_done)
     elif tasks:
         with studio.open() as renderer:
             for task in tasks:
                 seconds = studio.carry_out(renderer, task, progress.update)
                 progress.shard_done(task.name, len(task.numbers), seconds)
+                on_done(task)
 
 
-def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: Progress) -> None:
+def _render_parallel(
+    studio: Studio,
+    tasks: list[Task],
+    workers: int,
+    progress: Progress,
+    on_done: Callable[[Task], object],
+) -> None:
     context = multiprocessing.get_context("spawn")  # a forked OpenGL context does not work
     n_done, stop = context.Value("q", 0), context.Event()
     initial = (studio, workers, n_done, stop)
@@ -106,6 +119,7 @@ def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: 
             for future in ended:
                 task = running.pop(future)
                 progress.shard_done(task.name, len(task.numbers), future.result())
+                on_done(task)
     except BrokenProcessPool:
         raise InputError(
             "collect: a worker process was killed, perhaps for lack of memory; what is done is"

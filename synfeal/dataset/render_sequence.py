@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.config.models import CameraConfig, RenderConfig
-from synfeal.dataset.directories import atomic_directory, writing_to
+from synfeal.dataset.archive import is_archive, write_archive
+from synfeal.dataset.directories import atomic_directory, refuse_existing, writing_to
 from synfeal.dataset.frame_writer import FrameWriter
 from synfeal.dataset.packed import fit_frame, new_packed
 from synfeal.dataset.pose_table import PoseTable
@@ -29,34 +31,49 @@ def render_sequence(
     mesh_path: Path,
     camera: CameraConfig,
     poses: PoseTable,
-    out_dir: Path,
+    out: Path,
     with_depth: bool,
     render: RenderConfig | None = None,
 ) -> None:
-    """Render every pose of the table into a new directory, which appears when it is complete.
+    """Render every pose of the table into a new sequence, which appears when it is complete.
 
     Frames are numbered from 0 inside the sequence. ``mesh_path`` is a mesh in the world frame, as
-    :func:`synfeal.mesh.save.save_glb` writes it.
+    :func:`synfeal.mesh.save.save_glb` writes it. ``out`` is a directory, or an archive if its name
+    ends in ``.zip``.
 
     Raises:
-        InputError: the mesh cannot be read, or ``out_dir`` is not empty.
+        InputError: the mesh cannot be read, or ``out`` is not empty.
     """
     with open_renderer(load_mesh(mesh_path), camera, render) as renderer:
-        write_sequence(renderer, poses, out_dir, with_depth)
+        write_sequence(renderer, poses, out, with_depth)
 
 
-def write_sequence(renderer: Renderer, poses: PoseTable, out_dir: Path, with_depth: bool) -> None:
+def write_sequence(renderer: Renderer, poses: PoseTable, out: Path, with_depth: bool) -> None:
     """Render every pose of the table; files are written while the next frames are rendered."""
     watch = Stopwatch()
     with (
-        writing_to(out_dir, lambda: REMEDY),
-        Progress(len(poses), out_dir.name) as progress,
-        atomic_directory(out_dir) as directory,
-        tempfile.TemporaryDirectory(prefix=".frames-", dir=out_dir.parent) as scratch,
+        writing_to(out, lambda: REMEDY),
+        Progress(len(poses), out.name) as progress,
+        _new_sequence(out) as directory,
+        tempfile.TemporaryDirectory(prefix=".frames-", dir=directory.parent) as scratch,
         FrameWriter(Path(scratch), progress.update) as writer,
     ):
         render_frames(renderer, enumerate(poses.world_from_cam), directory, with_depth, writer)
-    progress.shard_done(out_dir.name, len(poses), watch.seconds)
+    progress.shard_done(out.name, len(poses), watch.seconds)
+
+
+@contextmanager
+def _new_sequence(out: Path) -> Iterator[Path]:
+    """A directory to fill with frames, which becomes ``out``, or is packed into it."""
+    if not is_archive(out):
+        with atomic_directory(out) as directory:
+            yield directory
+        return
+    refuse_existing(out)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{out.stem}-", dir=out.parent) as directory_name:
+        yield Path(directory_name)
+        write_archive(Path(directory_name), out)
 
 
 def resolved(render: RenderConfig) -> RenderConfig:

@@ -6,6 +6,7 @@ Depth is along the optical axis, 16-bit PNG in millimetres, 65535 where nothing 
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from synfeal.dataset.archive import FrameFile, frame_file, sequence_at, sequence_names
 from synfeal.dataset.png import IMAGE_DAMAGE
 from synfeal.dataset.sequences import Sequence
 from synfeal.errors import InputError
@@ -30,14 +32,14 @@ def depth_mm_of(depth_m: NDArray[np.float32]) -> NDArray[np.uint16]:
     return np.minimum(depth_mm, INVALID_MM).astype(np.uint16)
 
 
-def read_depth_m(path: Path) -> NDArray[np.float32]:
+def read_depth_m(path: FrameFile) -> NDArray[np.float32]:
     """Depth (H, W) in metres along the optical axis, inf where it is invalid.
 
     Raises:
         InputError: the file is no 16-bit image.
     """
     try:
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(path.read_bytes())) as image:
             depth_mm = np.asarray(image)
     except IMAGE_DAMAGE as error:
         raise InputError(f"{path}: cannot be read as a depth image ({error})") from None
@@ -53,7 +55,7 @@ def pose_text(world_from_cam: NDArray[np.float64]) -> str:
     return "".join(f"{row}\n" for row in rows)
 
 
-def read_pose(path: Path) -> NDArray[np.float64]:
+def read_pose(path: FrameFile) -> NDArray[np.float64]:
     """A pose (4, 4).
 
     Raises:
@@ -69,18 +71,22 @@ def read_pose(path: Path) -> NDArray[np.float64]:
     return pose
 
 
-def frame_paths(sequence_dirs: Iterable[Path], kind: str) -> list[Path]:
+def frame_paths(sequences: Iterable[Path], kind: str) -> list[FrameFile]:
     """Files of one kind (``color.png``, ``depth.png`` or ``pose.txt``) in frame order.
 
     Raises:
-        InputError: a sequence has no such file.
+        InputError: a sequence (``seq-01`` or ``seq-01.zip``) cannot be read or has no such file.
     """
-    paths: list[Path] = []
-    for directory in sequence_dirs:
-        found = sorted(Path(directory).glob(f"frame-*.{kind}"))
+    paths: list[FrameFile] = []
+    for sequence in sequences:
+        try:
+            names = sequence_names(sequence)
+        except OSError as error:
+            raise InputError(f"{sequence}: cannot be read as a sequence ({error})") from None
+        found = [name for name in names if name.startswith("frame-") and name.endswith(f".{kind}")]
         if not found:
-            raise InputError(f"{directory}: holds no frame-XXXXXX.{kind}; render it again")
-        paths += found
+            raise InputError(f"{sequence}: holds no frame-XXXXXX.{kind}; render it again")
+        paths += [frame_file(sequence, name) for name in found]
     return paths
 
 
@@ -94,7 +100,7 @@ def write_splits(dataset_dir: Path, sequences: Iterable[Sequence]) -> None:
 
 
 def read_split(dataset_dir: Path, split: str) -> list[Path]:
-    """Directories of the sequences of a split, in order.
+    """The sequences of a split in order, each the directory or the archive that is there.
 
     Raises:
         InputError: the split file is missing or holds a line that names no sequence.
@@ -109,4 +115,5 @@ def read_split(dataset_dir: Path, split: str) -> list[Path]:
     bad = [line for line in lines if not SEQUENCE.fullmatch(line)]
     if bad:
         raise InputError(f"{path}: '{bad[0][:40]}' names no sequence; lines look like 'sequence1'")
-    return [dataset_dir / f"seq-{int(line.removeprefix('sequence')):02d}" for line in lines]
+    numbers = [int(line.removeprefix("sequence")) for line in lines]
+    return [sequence_at(dataset_dir / f"seq-{number:02d}") for number in numbers]

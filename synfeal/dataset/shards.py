@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from synfeal.dataset.archive import archive_of
 from synfeal.dataset.sequences import Sequence
 from synfeal.errors import InputError
 
@@ -44,8 +45,13 @@ class Piece:
         return f"{self.sequence.name} frames {self.start}-{self.stop - 1}"
 
     def missing(self, data: Path, kinds: tuple[str, ...]) -> list[int]:
-        """Frames that are not whole yet: a file is missing, or empty after a power cut."""
+        """Frames that are not whole yet: a file is missing, or empty after a power cut.
+
+        An archive is written from a whole sequence only.
+        """
         directory = data / self.sequence.name
+        if archive_of(directory).is_file():
+            return []
         if not directory.is_dir():
             return list(range(self.start, self.stop))
         found = {path.name for path in directory.iterdir() if path.stat().st_size}
@@ -81,3 +87,14 @@ def pieces_of(sequences: Iterable[Sequence], first: int, last: int) -> list[Piec
         ]
         offset += len(sequence)
     return pieces
+
+
+def sequences_within(sequences: Iterable[Sequence], first: int, last: int) -> list[Sequence]:
+    """Those of which all frames lie in ``first`` to ``last`` (exclusive), counted through."""
+    within: list[Sequence] = []
+    offset = 0
+    for sequence in sequences:
+        if first <= offset and offset + len(sequence) <= last:
+            within.append(sequence)
+        offset += len(sequence)
+    return within

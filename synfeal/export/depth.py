@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.sevenscenes import INVALID_MM
 from synfeal.validate.images import read_depth_mm
 
 
-def rewrite_depth(source: Path, target: Path, units_per_m: int) -> float:
+def rewrite_depth(source: FrameFile, target: Path, units_per_m: int) -> float:
     """Write a depth image anew; returns the share of known depths that are too large for it.
 
     Args:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.collection import CameraConfig
+from synfeal.dataset.archive import FrameFile, link_or_unpack
 from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.errors import InputError
 from synfeal.validate.camera import camera_of_dataset
@@ -38,15 +39,15 @@ class ExportFrame:
     @property
     def sequence(self) -> str:
         """Name of the sequence."""
-        return self.frame.directory.name
+        return self.frame.sequence.stem
 
     @property
-    def color(self) -> Path:
+    def color(self) -> FrameFile:
         """The colour image."""
         return self.frame.path(COLOR)
 
     @property
-    def depth(self) -> Path:
+    def depth(self) -> FrameFile:
         """The depth image, which need not exist."""
         return self.frame.path(DEPTH)
 
@@ -88,11 +89,11 @@ def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
     problems = check_names(sequences).failures + check_rigid(poses, unreadable).failures
     if any((dataset / name).exists() for name in SPLIT_FILES.values()):
         problems += check_splits(dataset, sequences, splits, split_failures).failures
-    split_of = {s.directory: split for split, listed in splits.items() for s in listed}
+    split_of = {s.path: split for split, listed in splits.items() for s in listed}
     if problems:
         raise InputError(f"{problems[0]}; synfeal validate says more")
     frames = tuple(
-        ExportFrame(frame, poses[frame], split_of.get(frame.directory))
+        ExportFrame(frame, poses[frame], split_of.get(frame.sequence))
         for sequence in sequences
         for frame in sequence.frames
     )
@@ -101,7 +102,7 @@ def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
     return ExportSet(dataset, camera.config, frames, has_depth, bool(splits))
 
 
-def _check_size(path: Path, camera: CameraConfig) -> None:
+def _check_size(path: FrameFile, camera: CameraConfig) -> None:
     height, width = read_color(path).shape[:2]
     if (width, height) != (camera.width, camera.height):
         raise InputError(
@@ -110,10 +111,10 @@ def _check_size(path: Path, camera: CameraConfig) -> None:
         )
 
 
-def place(source: Path, target: Path, copy: bool) -> None:
-    """Link ``target`` to ``source``, by its absolute path, or copy it."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    if copy:
+def place(source: FrameFile, target: Path, copy: bool) -> None:
+    """Link ``target`` to ``source``, by its absolute path, or copy it; what is archived, always."""
+    if copy and isinstance(source, Path):
+        target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, target)
     else:
-        target.symlink_to(source.resolve())
+        link_or_unpack(source, target)

@@ -90,17 +90,17 @@ def choose_pairs(
     sequences = list(sequences)
     for gap in GAPS:
         pairs = [
-            (frame, Frame(frame.directory, frame.number + gap))
+            (frame, Frame(frame.sequence, frame.number + gap))
             for sequence in sequences
             for frame in sequence.frames
-            if frame in usable and Frame(frame.directory, frame.number + gap) in usable
+            if frame in usable and Frame(frame.sequence, frame.number + gap) in usable
         ]
         if not every and len(pairs) > PAIRS_PER_GAP:
             index = np.linspace(0, len(pairs) - 1, PAIRS_PER_GAP).round().astype(int)
             pairs = [pairs[i] for i in index]
         chosen += pairs
-    order = {sequence.directory: index for index, sequence in enumerate(sequences)}
-    return sorted(chosen, key=lambda p: (order[p[0].directory], p[0].number, p[1].number))
+    order = {sequence.path: index for index, sequence in enumerate(sequences)}
+    return sorted(chosen, key=lambda p: (order[p[0].sequence], p[0].number, p[1].number))
 
 
 def check_consistency(
@@ -194,7 +194,7 @@ def _measure_check(measure: Measure, pairs: list[Pair]) -> Check:
 def _blame(measure: Measure, wrong: list[tuple[Pair, float]], total: int) -> str:
     """The frame in the most pairs that are wrong, the earliest of several."""
     counts = Counter(frame for pair, _ in wrong for frame in (pair.a, pair.b))
-    frame = min(counts, key=lambda f: (-counts[f], f.directory.name, f.number))
+    frame = min(counts, key=lambda f: (-counts[f], f.sequence.name, f.number))
     pair, value = max((p for p in wrong if frame in (p[0].a, p[0].b)), key=lambda p: p[1])
     other = pair.b if frame == pair.a else pair.a
     kind = DEPTH if measure.field in ("depth_mm", "in_front") else COLOR

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.collection import CameraConfig
+from synfeal.dataset.archive import FrameFile, foreign_members, is_archive
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError
 from synfeal.validate.check import Check
@@ -35,10 +35,13 @@ def check_names(sequences: Sequence[SequenceListing]) -> Check:
 
 def _gaps(sequence: SequenceListing, kinds: Iterable[str]) -> Iterable[str]:
     if not sequence.frames:
-        yield f"{sequence.directory}: holds no frame"
+        yield f"{sequence.path}: holds no frame"
         return
+    if is_archive(sequence.path):
+        for name in foreign_members(sequence.path):
+            yield f"{sequence.path}: '{name[:80]}' does not unpack to one file in {sequence.name}"
     for number in range(sequence.frames[-1].number + 1):
-        frame = Frame(sequence.directory, number)
+        frame = Frame(sequence.path, number)
         for kind in kinds:
             if number not in sequence.numbers[kind]:
                 yield f"{frame.path(kind)}: missing"
@@ -51,7 +54,7 @@ def check_images(
 ) -> Check:
     """Every image decodes to its last row and has the size of the camera, or of the first one."""
     size = (camera.height, camera.width) if camera else None
-    readers: dict[str, Callable[[Path], Pixels]] = {COLOR: read_color, DEPTH: read_depth_mm}
+    readers: dict[str, Callable[[FrameFile], Pixels]] = {COLOR: read_color, DEPTH: read_depth_mm}
     failures: list[str] = []
     n_images = 0
     for sequence in sequences:

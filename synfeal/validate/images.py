@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.png import IMAGE_DAMAGE
 from synfeal.errors import InputError
 
@@ -18,7 +18,7 @@ Pixels = NDArray[Any]
 _COLOR_MODES = ("RGB", "RGBA", "L", "P")
 
 
-def read_color(path: Path) -> NDArray[np.uint8]:
+def read_color(path: FrameFile) -> NDArray[np.uint8]:
     """Colours (H, W, 3).
 
     Raises:
@@ -30,7 +30,7 @@ def read_color(path: Path) -> NDArray[np.uint8]:
     return np.asarray(image.convert("RGB"))
 
 
-def read_depth_mm(path: Path) -> NDArray[np.uint16]:
+def read_depth_mm(path: FrameFile) -> NDArray[np.uint16]:
     """Depth (H, W) in millimetres as stored; 0 and 65535 mean no depth.
 
     Raises:
@@ -43,8 +43,9 @@ def read_depth_mm(path: Path) -> NDArray[np.uint16]:
     return depth.astype(np.uint16)
 
 
-def _decoded(path: Path) -> Image.Image:
+def _decoded(path: FrameFile) -> Image.Image:
     """A PNG with every checksum verified and every row decoded."""
+    content = b""
     try:
         content = path.read_bytes()
         with Image.open(io.BytesIO(content), formats=["PNG"]) as image:

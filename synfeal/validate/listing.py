@@ -7,6 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from synfeal.dataset.archive import (
+    SUFFIX,
+    FrameFile,
+    frame_file,
+    is_archive,
+    sequence_at,
+    sequence_names,
+)
 from synfeal.errors import InputError
 
 COLOR, DEPTH, POSE = "color.png", "depth.png", "pose.txt"
@@ -16,53 +24,62 @@ _FRAME = re.compile(r"frame-(\d{6,})\.(color\.png|depth\.png|pose\.txt)")
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame: its sequence and its number in it."""
+    """One frame: its sequence (``seq-01`` or ``seq-01.zip``) and its number in it."""
 
-    directory: Path
+    sequence: Path
     number: int
 
-    def path(self, kind: str) -> Path:
+    def path(self, kind: str) -> FrameFile:
         """The file of one kind."""
-        return self.directory / f"frame-{self.number:06d}.{kind}"
+        return frame_file(self.sequence, f"frame-{self.number:06d}.{kind}")
 
 
 @dataclass(frozen=True)
 class SequenceListing:
     """The frames of one sequence, by kind of file."""
 
-    directory: Path
+    path: Path
     numbers: dict[str, frozenset[int]]
 
     @property
     def name(self) -> str:
-        """Name of the directory: ``seq-01``."""
-        return self.directory.name
+        """Name of the sequence: ``seq-01``, archived or not."""
+        return self.path.stem
 
     @cached_property
     def frames(self) -> tuple[Frame, ...]:
         """All frames of which any file is there, in order."""
         numbers = sorted(frozenset().union(*self.numbers.values()))
-        return tuple(Frame(self.directory, number) for number in numbers)
+        return tuple(Frame(self.path, number) for number in numbers)
 
 
 def list_sequences(dataset: Path) -> list[SequenceListing]:
     """The sequences of a data set, in order of their numbers.
 
     Raises:
-        InputError: ``dataset`` is no directory, or holds no ``seq-XX``.
+        InputError: ``dataset`` is no directory, holds no ``seq-XX``, or an archive is damaged.
     """
     if not dataset.is_dir():
         raise InputError(f"{dataset}: is no directory; give the directory that holds seq-01")
-    found = [path for path in dataset.glob("seq-*") if path.is_dir() and path.name[4:].isdecimal()]
+    names = {path.name.removesuffix(SUFFIX) for path in dataset.glob("seq-*")}
+    paths = [sequence_at(dataset / name) for name in names if name[4:].isdecimal()]
+    found = [path for path in paths if path.is_dir() or is_archive(path)]
     if not found:
-        raise InputError(f"{dataset}: holds no seq-01; give the directory of a 7-Scenes data set")
-    return [_list(path) for path in sorted(found, key=lambda path: (int(path.name[4:]), path.name))]
+        raise InputError(
+            f"{dataset}: holds no seq-01 and no seq-01{SUFFIX}; give the directory of a 7-Scenes"
+            " data set"
+        )
+    return [_list(path) for path in sorted(found, key=lambda path: (int(path.stem[4:]), path.stem))]
 
 
-def _list(directory: Path) -> SequenceListing:
+def _list(path: Path) -> SequenceListing:
     numbers: dict[str, set[int]] = {kind: set() for kind in KINDS}
-    for path in directory.iterdir():
-        match = _FRAME.fullmatch(path.name)
-        if match and path.is_file():
+    try:
+        names = sequence_names(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read as a sequence ({error})") from None
+    for name in names:
+        match = _FRAME.fullmatch(name)
+        if match:
             numbers[match[2]].add(int(match[1]))
-    return SequenceListing(directory, {kind: frozenset(found) for kind, found in numbers.items()})
+    return SequenceListing(path, {kind: frozenset(found) for kind, found in numbers.items()})

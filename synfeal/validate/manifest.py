@@ -59,14 +59,14 @@ def _differences(
 ) -> Iterator[str]:
     said_split, frames, sha256 = entry
     if len(listing.frames) != frames:
-        yield f"{listing.directory}: {len(listing.frames)} frames, {path.name} says {frames}"
+        yield f"{listing.path}: {len(listing.frames)} frames, {path.name} says {frames}"
     if split is not None and split != said_split:
-        yield f"{listing.directory}: is in {split}, {path.name} says {said_split}"
+        yield f"{listing.path}: is in {split}, {path.name} says {said_split}"
     try:
-        if sequence_sha256(listing.directory) != sha256:
-            yield f"{listing.directory}: differs from what was written ({path.name}: sha256)"
+        if sequence_sha256(listing.path) != sha256:
+            yield f"{listing.path}: differs from what was written ({path.name}: sha256)"
     except OSError as error:
-        yield f"{listing.directory}: cannot be read ({error})"
+        yield f"{listing.path}: cannot be read ({error})"
 
 
 def _wrong_counts(

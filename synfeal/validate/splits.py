@@ -18,7 +18,7 @@ def read_splits(
     dataset: Path, sequences: Iterable[SequenceListing]
 ) -> tuple[Splits, tuple[str, ...]]:
     """The sequences of each split that can be read, in order, and what is wrong with the files."""
-    by_path = {sequence.directory: sequence for sequence in sequences}
+    by_path = {sequence.path: sequence for sequence in sequences}
     splits: Splits = {}
     failures: list[str] = []
     for split, name in SPLIT_FILES.items():

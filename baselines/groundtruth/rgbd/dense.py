@@ -22,8 +22,8 @@ _METHODS = {
     "hybrid": o3d.t.pipelines.odometry.Method.Hybrid,
     "intensity": o3d.t.pipelines.odometry.Method.Intensity,
 }
-# Passes of Open3D's own loop: steps per scale, coarse to fine, and the depth difference beyond which
-# a point counts by its distance, not its square, as in the stages of ``surface``.
+# Passes of Open3D's own loop: steps per scale, coarse to fine, and the depth difference beyond
+# which a point counts by its distance, not its square, as in the stages of ``surface``.
 _PASSES = (((5, 3, 2), 0.05), ((5,), 0.002))
 # The result may not leave its starting point by more.
 MAX_CHANGE_M, MAX_CHANGE_DEG = 0.25, 10.0

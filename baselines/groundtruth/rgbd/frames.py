@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from PIL import Image
 from baselines.groundtruth.rgbd.sensor import frame_generator, kinect_depth
 from baselines.groundtruth.rgbd.surface import Surfaces, surfaces_of
 from synfeal.config.models import CameraConfig, DepthConfig
+from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.png import IMAGE_DAMAGE
 from synfeal.errors import InputError
 
@@ -48,7 +49,7 @@ class RgbdFrame:
 
 
 def read_frame(
-    color_path: Path, depth_path: Path, camera: CameraConfig, cfg: DepthConfig, seed: int
+    color_path: FrameFile, depth_path: FrameFile, camera: CameraConfig, cfg: DepthConfig, seed: int
 ) -> RgbdFrame:
     """Read a frame.
 
@@ -62,7 +63,7 @@ def read_frame(
 
 
 def read_depth(
-    path: Path, camera: CameraConfig, cfg: DepthConfig, seed: int
+    path: FrameFile, camera: CameraConfig, cfg: DepthConfig, seed: int
 ) -> NDArray[np.float32]:
     """Depth (H, W) in metres as the sensor of the configuration measures it, inf where nothing."""
     depth_mm = read_image(path, camera)
@@ -85,14 +86,14 @@ def open3d_image(pixels: NDArray[Any]) -> o3d.t.geometry.Image:
     return o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(np.ascontiguousarray(pixels)))
 
 
-def read_image(path: Path, camera: CameraConfig, mode: str | None = None) -> NDArray[Any]:
+def read_image(path: FrameFile, camera: CameraConfig, mode: str | None = None) -> NDArray[Any]:
     """An image of the camera's size as an array, converted to ``mode`` if one is given.
 
     Raises:
         InputError: it cannot be read, or has another size.
     """
     try:
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(path.read_bytes())) as image:
             pixels = np.asarray(image.convert(mode) if mode else image)
     except IMAGE_DAMAGE as error:
         raise InputError(f"{path}: cannot be read as an image ({error})") from None

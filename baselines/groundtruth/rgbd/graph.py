@@ -6,7 +6,6 @@ import resource
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
 import open3d as o3d
@@ -19,6 +18,7 @@ from baselines.groundtruth.rgbd.frames import read_frame
 from baselines.groundtruth.rgbd.loops import loop_candidates, most_telling
 from baselines.groundtruth.rgbd.tracks import View, closure, neighbour
 from synfeal.config.models import CameraConfig, RgbdConfig
+from synfeal.dataset.archive import FrameFile
 from synfeal.geometry.poses import relative
 
 Array = NDArray[np.float64]
@@ -58,8 +58,8 @@ class _Track:
 
 
 def rgbd_graph(
-    color_paths: Sequence[Path],
-    depth_paths: Sequence[Path],
+    color_paths: Sequence[FrameFile],
+    depth_paths: Sequence[FrameFile],
     camera: CameraConfig,
     cfg: RgbdConfig,
     seed: int = 0,
@@ -69,8 +69,8 @@ def rgbd_graph(
 
 
 def rgbd_graph_with_facts(
-    color_paths: Sequence[Path],
-    depth_paths: Sequence[Path],
+    color_paths: Sequence[FrameFile],
+    depth_paths: Sequence[FrameFile],
     camera: CameraConfig,
     cfg: RgbdConfig,
     seed: int = 0,
@@ -111,8 +111,8 @@ def rgbd_graph_with_facts(
 
 
 def _odometry(
-    color_paths: Sequence[Path],
-    depth_paths: Sequence[Path],
+    color_paths: Sequence[FrameFile],
+    depth_paths: Sequence[FrameFile],
     camera: CameraConfig,
     cfg: RgbdConfig,
     seed: int,

@@ -8,11 +8,10 @@ real sensors show along edges is not modelled.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.dataset.archive import FrameFile
 from synfeal.seeds import generator_of
 
 # One step of normalised disparity (1/m) and the standard deviation of the noise, in steps.
@@ -30,6 +29,6 @@ def kinect_depth(depth_m: NDArray[np.float32], rng: np.random.Generator) -> NDAr
     return np.where(seen, 1 / (steps * STEP_PER_M), np.inf).astype(np.float32)
 
 
-def frame_generator(seed: int, path: Path) -> np.random.Generator:
+def frame_generator(seed: int, path: FrameFile) -> np.random.Generator:
     """Noise of one image: the same wherever it is read, for batches share a frame."""
     return generator_of(seed, "depth-sensor", path.parent.name, path.name)

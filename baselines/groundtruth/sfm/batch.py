@@ -20,6 +20,7 @@ from baselines.groundtruth.sfm.refine import refine_model
 from baselines.groundtruth.sfm.scale import metric_trajectory
 from baselines.groundtruth.trajectory import BatchTrajectory
 from synfeal.config.models import CameraConfig, SfmConfig
+from synfeal.dataset.archive import FrameFile
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ class SfmEstimate:
 
 
 def sfm_batch(
-    color_paths: Sequence[Path],
+    color_paths: Sequence[FrameFile],
     camera: CameraConfig,
     true_world_from_cam: NDArray[np.float64],
     cfg: SfmConfig,

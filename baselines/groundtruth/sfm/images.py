@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
 from PIL import Image
 
 from synfeal.config.models import CameraConfig
+from synfeal.dataset.archive import FrameFile, link_or_unpack
 from synfeal.dataset.png import IMAGE_DAMAGE
 from synfeal.errors import InputError
 
 
-def link_images(color_paths: Sequence[Path], camera: CameraConfig, images: Path) -> None:
+def link_images(color_paths: Sequence[FrameFile], camera: CameraConfig, images: Path) -> None:
     """A new directory ``images`` in which the order of the names is the order of the frames.
 
     COLMAP leaves out an image that it cannot read, which would look like a frame without texture.
@@ -23,14 +25,14 @@ def link_images(color_paths: Sequence[Path], camera: CameraConfig, images: Path)
     images.mkdir()
     for frame, path in enumerate(color_paths):
         _check(path, camera)
-        (images / f"{frame:06d}{path.suffix}").symlink_to(path.resolve())
+        link_or_unpack(path, images / f"{frame:06d}{path.suffix}")
 
 
-def _check(path: Path, camera: CameraConfig) -> None:
+def _check(path: FrameFile, camera: CameraConfig) -> None:
     if not path.is_file():
         raise InputError(f"{path}: no such image; collect the data set again")
     try:
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(path.read_bytes())) as image:
             image.load()
             size = image.size
     except IMAGE_DAMAGE as error:

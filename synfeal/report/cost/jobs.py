@@ -34,7 +34,7 @@ UNITS: dict[str, tuple[str, ...]] = {
     "plan": ("frames",),
     "pack": ("MB",),
     "dataset": ("frames",),
-    "labels": ("frames",),
+    "labels": ("rows",),
     "sfm": ("Mpx",),
     "rgbd": ("Mpx",),
     **dict.fromkeys(frame_methods(), ("Mpx",)),
@@ -219,7 +219,9 @@ def _label_sets(config: Config, experiments: tuple[Experiment, ...]) -> Iterator
         for split, frames in counts.items():
             for name in names:
                 path = f"{e.scene}/{e.size}/{name}/{split}"
-                yield Job("labels", path, (frames,), pose_bytes(frames))
+                # True labels are the first rows of the whole plan.
+                read = config.n_largest(e.scene, split) if name == "synfeal" else frames
+                yield Job("labels", path, (read + frames,), pose_bytes(frames))
         if e.labels in METHODS:
             yield from _estimated(config, e, counts)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from synfeal.report.cost.jobs import Job
+from synfeal.report.cost.jobs import TRAINING, Job
 from synfeal.report.cost.measured import Measured
 
 # Least ratio of the largest to the smallest job that tells the fixed part from the part per unit.
@@ -56,51 +56,69 @@ def matched(jobs: Iterable[Job], measured: Iterable[Measured]) -> Pairs:
     return [(known[m.key], m) for m in measured if m.key in known]
 
 
-def fit_laws(pairs: Pairs) -> dict[str, Law]:
-    """A law for everything that was measured."""
+def fit_laws(pairs: Pairs, training: tuple[float, ...] | None = None) -> dict[str, Law]:
+    """A law for everything that was measured; parts per unit of trainings may be known better."""
     start_s = _start(pairs)
     by_law: dict[str, Pairs] = {}
     for job, measured in pairs:
         by_law.setdefault(job.law, []).append((job, measured))
-    return {name: _law(group, start_s) for name, group in by_law.items()}
+    return {
+        name: _law(group, start_s, training if name == TRAINING else None)
+        for name, group in by_law.items()
+    }
 
 
 def fit_seconds(
     sizes: NDArray[np.float64], seconds: NDArray[np.float64], start_s: float
 ) -> tuple[float, tuple[float, ...]]:
-    """Fixed part and parts per unit, none negative.
+    """Fixed part, at least the start of a program, and parts per unit, none negative.
 
     Sizes (N, K) that differ enough are fitted by robust least squares on relative residuals. Else
-    the fixed part is the start of a program, and the rest is per main (last) unit.
+    the fixed part is the start of a program, and what all jobs took beyond that is per main (last)
+    unit.
     """
     n_units = sizes.shape[1]
     if n_units == 0:
         return fmean(seconds), ()
-    main = sizes[:, -1]
     varied = max(np.ptp(np.log(np.maximum(column, 1e-12))) for column in sizes.T)
-    if len(sizes) < 2 * (n_units + 1) or varied < np.log(LEAST_RATIO):
-        rest = np.maximum(seconds - start_s, 0)[main > 0] / main[main > 0]
-        rate = float(np.median(rest)) if len(rest) else 0.0
-        return min(start_s, float(np.median(seconds))), (*[0.0] * (n_units - 1), rate)
+    if len(sizes) >= 2 * (n_units + 1) and varied >= np.log(LEAST_RATIO):
+        return _regression(sizes, seconds, min(start_s, float(seconds.min())))
+    fixed_s, work = min(start_s, float(np.median(seconds))), float(sizes[:, -1].sum())
+    rate = max(float(np.sum(seconds - fixed_s)), 0.0) / work if work else 0.0
+    return fixed_s, (*[0.0] * (n_units - 1), rate)
+
+
+def _regression(
+    sizes: NDArray[np.float64], seconds: NDArray[np.float64], least_s: float
+) -> tuple[float, tuple[float, ...]]:
+    """Fixed part and parts per unit, none negative, the fixed part at least ``least_s``."""
     design = np.column_stack([np.ones(len(sizes)), sizes])
     scale = np.maximum(design.max(axis=0), 1e-12)
     weighted = design / scale / seconds[:, None]
-    guess = np.full(n_units + 1, seconds.mean() / (n_units + 1))
+    least = np.array([least_s, *[0.0] * sizes.shape[1]])
     fit = least_squares(
-        lambda x: weighted @ x - 1, guess, bounds=(0, np.inf), loss="soft_l1", f_scale=OUTLIER
+        lambda x: weighted @ x - 1,
+        least + seconds.mean() / len(least),
+        bounds=(least, np.inf),
+        loss="soft_l1",
+        f_scale=OUTLIER,
     )
     fixed_s, *rates = fit.x / scale
     return float(fixed_s), tuple(float(rate) for rate in rates)
 
 
-def _law(pairs: Pairs, start_s: float) -> Law:
+def _law(pairs: Pairs, start_s: float, known: tuple[float, ...] | None) -> Law:
     sizes = np.array([job.size for job, _ in pairs], dtype=float).reshape(len(pairs), -1)
     seconds = np.array([max(measured.cpu_s, 1e-3) for _, measured in pairs])
-    fixed_s, rates = fit_seconds(sizes, seconds, start_s)
+    if known is None:
+        fixed_s, rates = fit_seconds(sizes, seconds, start_s)
+        # Scenes differ, and a robust fit follows most jobs: the sum of all is what is asked for.
+        level = float(seconds.sum() / (fixed_s + sizes @ np.array(rates)).sum())
+        fixed_s, rates = fixed_s * level, tuple(rate * level for rate in rates)
+    else:
+        rates = known
+        fixed_s = max(start_s, float(np.median(seconds - sizes @ np.array(rates))))
     fitted = fixed_s + sizes @ np.array(rates)
-    # Scenes differ, and a robust fit follows most jobs: the sum of all is what is asked for.
-    level = float(seconds.sum() / fitted.sum())
-    fixed_s, rates, fitted = fixed_s * level, tuple(r * level for r in rates), fitted * level
     low, high = np.quantile(seconds / fitted, QUANTILES)
     spread = (float(low), float(high)) if len(pairs) >= LEAST_JOBS else (1.0, 1.0)
     bases = [m.peak_mb - job.held_bytes / 1e6 for job, m in pairs if m.peak_mb is not None]

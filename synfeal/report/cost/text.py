@@ -1,124 +1,111 @@
-"""The plan as text for a terminal and as CSV."""
+"""The plan as text for a terminal."""
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 
-from synfeal.files import atomic_path
 from synfeal.report.cost.compare import Comparison
-from synfeal.report.cost.estimate import NOTHING, Machine, Span, StageCost, TableCost
+from synfeal.report.cost.estimate import LAUNCH_S, Span, StageCost, TableCost
+from synfeal.report.cost.plan import Plan
 
-CSV_COLUMNS = [
-    "stage",
-    "jobs",
-    "work",
-    "unit",
-    "cpu_h",
-    "cpu_h_low",
-    "cpu_h_high",
-    "gpu_h",
-    "gpu_h_low",
-    "gpu_h_high",
-    "wall_h",
-    "disk_gb",
-    "peak_memory_gb",
-    "times_measured_size",
-    "measured",
-]
+# The largest unit of which there are at least so many.
+DURATIONS = ((48 * 3600.0, 86400.0, "d"), (5400.0, 3600.0, "h"), (90.0, 60.0, "min"), (0, 1.0, "s"))
+SIZES = ((1e9, 1e9, "GB"), (0, 1e6, "MB"))
 
 
-def stage_table(stages: Sequence[StageCost]) -> str:
+def plan_lines(plan: Plan) -> Iterator[str]:
+    """The whole plan: one line that sums it up, stages, tables, and what the numbers rest on."""
+    machine, whole = plan.machine, plan.whole
+    on = counted(machine.cores, "core")
+    on += f" and {counted(machine.gpus, 'GPU')}" if machine.gpus else ""
+    yield f"Profile {plan.profile} on {on}: {spoken(whole.wall_s)}"
+    parts = [f"processor time {spoken(whole.cpu_s)}"]
+    if machine.gpus:
+        parts.append(f"GPU time {spoken(whole.gpu_s)}")
+    parts.append(f"disk {scaled(plan.disk_bytes, SIZES)}")
+    parts.append(f"memory of the largest job {scaled(plan.peak_mb * 1e6, SIZES)}")
+    yield "; ".join(parts)
+    yield ""
+    yield stage_table(plan)
+    yield table_table(plan.tables, bool(machine.gpus))
+    yield from notes(plan)
+
+
+def stage_table(plan: Plan) -> str:
     """One line per stage, and the sum."""
-    head = ["stage", "jobs", "work", "", "CPU h", "range", "GPU h", "range", "wall h"]
-    rows = [[*head, "disk GB", "peak GB", "size"]]
-    rows += [_stage_row(stage) for stage in stages]
-    cpu_s, gpu_s = NOTHING, NOTHING
-    for stage in stages:
-        cpu_s, gpu_s = cpu_s.plus(stage.cpu_s), gpu_s.plus(stage.gpu_s)
-    peak = max((stage.peak_mb or 0 for stage in stages), default=0)
-    wall_s = sum(stage.wall_s for stage in stages)
-    disk = sum(stage.disk_bytes for stage in stages)
-    jobs = sum(stage.jobs for stage in stages)
-    tail = [number(wall_s / 3600), number(disk / 1e9), number(peak / 1e3), ""]
-    rows.append(["total", f"{jobs:,}", "", "", *_span(cpu_s), *_span(gpu_s), *tail])
+    on_gpu = bool(plan.machine.gpus)
+    gpu = ["GPU time", "range"] if on_gpu else []
+    head = ["stage", "jobs", "work", "", "CPU time", "range", *gpu, "wall time"]
+    rows = [[*head, "disk", "memory", "x measured"]]
+    rows += [_stage_row(stage, on_gpu) for stage in plan.stages]
+    whole = plan.whole
+    spans = [*_span(whole.cpu_s), *(_span(whole.gpu_s) if on_gpu else [])]
+    tail = [duration(whole.wall_s.mid), scaled(plan.disk_bytes, SIZES)]
+    peak = scaled(plan.peak_mb * 1e6, SIZES)
+    rows.append(["total", f"{whole.jobs:,}", "", "", *spans, *tail, peak, ""])
     return aligned(rows, left=(0, 3))
 
 
-def _stage_row(stage: StageCost) -> list[str]:
+def _stage_row(stage: StageCost, on_gpu: bool) -> list[str]:
     work, unit = stage.work or (0.0, "")
     row = [stage.stage, f"{stage.jobs:,}", number(work) if unit else "", unit]
-    disk = number(stage.disk_bytes / 1e9)
+    disk = scaled(stage.disk_bytes, SIZES) if stage.disk_bytes else ""
     if not stage.known:
-        return [*row, "not measured", "", "", "", "", disk, "", ""]
-    peak = "" if stage.peak_mb is None else number(stage.peak_mb / 1e3)
-    beyond = "" if stage.beyond is None else f"x{number(stage.beyond)}"
-    wall = number(stage.wall_s / 3600)
-    return [*row, *_span(stage.cpu_s), *_span(stage.gpu_s), wall, disk, peak, beyond]
+        return [*row, "not measured", "", *([""] * 2 * on_gpu), "", disk, "", ""]
+    peak = "" if stage.peak_mb is None else scaled(stage.peak_mb * 1e6, SIZES)
+    beyond = "" if stage.beyond is None else number(stage.beyond)
+    gpu = (_span(stage.gpu_s) if stage.gpu_s.mid else ["", ""]) if on_gpu else []
+    return [*row, *_span(stage.cpu_s), *gpu, duration(stage.wall_s.mid), disk, peak, beyond]
 
 
-def table_table(tables: Sequence[TableCost]) -> str:
+def table_table(tables: Sequence[TableCost], on_gpu: bool) -> str:
     """One line per table of the paper: its own jobs, and all it needs."""
-    rows = [["needed by", "jobs", "CPU h", "range", "GPU h", "alone: CPU h", "GPU h"]]
+    gpu = ["GPU time"] if on_gpu else []
+    rows = [["needed by", "jobs", "CPU time", *gpu, "alone: CPU time", *gpu, "wall time", "range"]]
     for table in tables:
-        alone = ["", ""]
-        if table.alone is not None:
-            alone = [number(span.mid / 3600) for span in table.alone]
-        gpu = number(table.gpu_s.mid / 3600)
-        rows.append([table.name, f"{table.jobs:,}", *_span(table.cpu_s), gpu, *alone])
+        row = [table.name, f"{table.own.jobs:,}"]
+        for share in (table.own, table.alone):
+            row += [""] * (1 + on_gpu) if share is None else [duration(share.cpu_s.mid)]
+            row += [duration(share.gpu_s.mid)] if on_gpu and share is not None else []
+        row += ["", ""] if table.alone is None else _span(table.alone.wall_s)
+        rows.append(row)
     return aligned(rows)
 
 
 def comparison_table(rows: Sequence[Comparison]) -> str:
     """Prediction beside measurement."""
-    cells = [["stage", "jobs", "predicted CPU s", "measured CPU s", "factor"]]
-    cells += [
-        [r.stage, str(r.jobs), number(r.predicted_s), number(r.measured_s), f"{r.factor:.2f}"]
-        for r in rows
-    ]
+    cells = [["stage", "jobs", "predicted CPU", "range", "measured CPU", "predicted/measured"]]
+    for r in rows:
+        span = _span(Span(r.low_s, r.predicted_s, r.high_s))
+        cells.append([r.stage, str(r.jobs), *span, duration(r.measured_s), f"{r.factor:.2f}"])
     return aligned(cells)
 
 
-def notes(machine: Machine, stages: Sequence[StageCost], measured: str) -> str:
+def notes(plan: Plan) -> Iterator[str]:
     """What the numbers rest on."""
-    lines = [
-        f"measured  {measured}",
-        "CPU h     processor time of a core like that run's; range: 10 and 90 % of its jobs about"
-        " the fitted law",
-        f"wall h    {machine.cores} cores, {machine.gpus} GPUs; stage after stage, longest jobs"
-        " first, no waiting for disk",
-        "size      largest planned job over largest measured one; far above 1 is extrapolated",
-    ]
-    if machine.gpus:
-        lines.append(
-            f"GPU h     assumed, not measured: {machine.gpu_tflops:g} TFLOP/s sustained, range half"
-            " to double; a core is busy too"
+    machine = plan.machine
+    yield f"measured    {plan.origin}"
+    yield (
+        "CPU time    of a core like that run's; range: 10 and 90 % of its jobs about the fitted law"
+    )
+    yield (
+        "wall time   stage after stage, one job for each core"
+        + (", one training for each GPU" if machine.gpus else "")
+        + ", longest first, no waiting for disks"
+    )
+    yield "memory      of one job; several run at a time"
+    yield "x measured  largest planned job over largest measured one; far above 1 is extrapolated"
+    if machine.gpus and machine.gpu_rates is not None:
+        yield "GPU time    from steps timed on this machine's GPU; range half to double"
+    elif machine.gpus:
+        yield (
+            f"GPU time    assumed, not measured: {machine.gpu_tflops:g} TFLOP/s sustained, at least"
+            f" {LAUNCH_S * 1e3:g} ms for each layer and step; range half to double;"
+            " a core is busy too"
         )
-    unknown = [stage.stage for stage in stages if not stage.known]
+    unknown = [stage.stage for stage in plan.stages if not stage.known]
     if unknown:
-        lines.append(f"missing   {', '.join(unknown)}: in no measured run, left out of the sums")
-    return "\n".join(lines)
-
-
-def write_csv(path: Path, stages: Sequence[StageCost]) -> None:
-    """The table of stages, in hours and 10^9 bytes."""
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(CSV_COLUMNS)
-        writer.writerows(_csv_row(stage) for stage in stages)
-
-
-def _csv_row(stage: StageCost) -> list[str]:
-    work, unit = stage.work or (0.0, "")
-    hours = [stage.cpu_s.mid, stage.cpu_s.low, stage.cpu_s.high]
-    hours += [stage.gpu_s.mid, stage.gpu_s.low, stage.gpu_s.high, stage.wall_s]
-    cells = [f"{s / 3600:.6g}" if stage.known else "" for s in hours]
-    peak = "" if stage.peak_mb is None else f"{stage.peak_mb / 1e3:.4g}"
-    beyond = "" if stage.beyond is None else f"{stage.beyond:.4g}"
-    measured = "yes" if stage.known else "no"
-    disk = f"{stage.disk_bytes / 1e9:.6g}"
-    return [stage.stage, str(stage.jobs), f"{work:.6g}", unit, *cells, disk, peak, beyond, measured]
+        yield f"missing     {', '.join(unknown)}: in no measured run, left out of the sums"
 
 
 def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
@@ -143,6 +130,30 @@ def number(value: float) -> str:
     return f"{value:,.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2g}"
 
 
+def scaled(value: float, units: Sequence[tuple[float, float, str]]) -> str:
+    """A value in the unit that suits it."""
+    _, unit, name = next(u for u in units if value >= u[0])
+    return f"{number(value / unit)} {name}"
+
+
+def duration(seconds: float) -> str:
+    """Seconds in the unit that suits them."""
+    return scaled(seconds, DURATIONS)
+
+
+def spoken(span: Span) -> str:
+    """As in ``3.5 h (2 h to 7 h)``."""
+    low, mid, high = map(duration, span)
+    return mid if low == high else f"{mid} ({low} to {high})"
+
+
+def counted(n: int, what: str) -> str:
+    """As in ``1 core``, ``16 cores``."""
+    return f"{n} {what}" + "s" * (n != 1)
+
+
 def _span(span: Span) -> list[str]:
-    low, mid, high = (number(seconds / 3600) for seconds in span)
-    return [mid, "" if low == high else f"{low} - {high}"]
+    """The middle, and both ends in the unit of the upper one."""
+    _, unit, name = next(u for u in DURATIONS if span.high >= u[0])
+    low, high = number(span.low / unit), number(span.high / unit)
+    return [duration(span.mid), "" if low == high else f"{low} - {high} {name}"]

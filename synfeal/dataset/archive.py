@@ -1,0 +1,186 @@
+"""A sequence in one file: ``seq-01.zip``, unpacked where it lies, is the directory ``seq-01``.
+
+The authors of 7-Scenes ship theirs so; a large data set then takes one file for each sequence
+instead of three for each frame. Nothing is compressed again, for images are already. Archives that
+others packed are read too, compressed or not.
+
+Where functions take a sequence they take either form: ``seq-01`` or ``seq-01.zip``.
+"""
+
+from __future__ import annotations
+
+import os
+import zipfile
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path, PurePath
+
+from synfeal.files import atomic_path
+
+SUFFIX = ".zip"
+MOST_OPEN = 16  # archives; each holds a file descriptor
+MOST_BYTES = 2**28  # of a member; no frame is that large, but a damaged archive may say so
+# The earliest time the format knows: archives of the same frames are the same bytes.
+EPOCH = (1980, 1, 1, 0, 0, 0)
+UNIX, PLAIN_FILE = 3, 0o100644
+# What zipfile raises on damaged or encrypted archives.
+ARCHIVE_DAMAGE = (
+    *(zipfile.BadZipFile, zlib.error, EOFError, ValueError),
+    *(NotImplementedError, RuntimeError, OverflowError),
+)
+
+
+@dataclass(frozen=True)
+class ArchivedFile:
+    """A file of an archived sequence, read like the path it has when it is unpacked.
+
+    Attributes:
+        archive: ``<data set>/seq-01.zip``.
+        name: ``frame-000000.color.png``.
+    """
+
+    archive: Path
+    name: str
+
+    def __str__(self) -> str:
+        return str(self.archive / self.name)
+
+    @property
+    def parent(self) -> Path:
+        """The directory it lies in when it is unpacked."""
+        return self.archive.with_suffix("")
+
+    @property
+    def suffix(self) -> str:
+        """As a path has it: ``.png``."""
+        return PurePath(self.name).suffix
+
+    def read_bytes(self) -> bytes:
+        """What it holds, its checksum verified.
+
+        Raises:
+            OSError: it is missing (``FileNotFoundError``), or the archive is damaged.
+        """
+        member = f"{self.archive.stem}/{self.name}"
+        with reading(self.archive) as opened:
+            try:
+                info = opened.getinfo(member)
+            except KeyError:
+                raise FileNotFoundError(f"{self}: missing") from None
+            if info.file_size > MOST_BYTES:
+                raise OSError(f"{self}: {info.file_size} bytes are too many for a frame")
+            return opened.read(info)
+
+    def read_text(self, encoding: str = "utf-8") -> str:
+        """The same as text."""
+        return self.read_bytes().decode(encoding)
+
+    def is_file(self) -> bool:
+        """Whether the archive holds it."""
+        return self.archive.is_file() and self.name in sequence_names(self.archive)
+
+
+# A file of a sequence, wherever it lies.
+FrameFile = Path | ArchivedFile
+
+
+def is_archive(sequence: Path) -> bool:
+    """Whether a sequence is named as an archive; its directory has no suffix."""
+    return sequence.suffix == SUFFIX
+
+
+def archive_of(directory: Path) -> Path:
+    """The archive of a sequence that is, or would be, the directory ``seq-01``."""
+    return directory.with_name(directory.name + SUFFIX)
+
+
+def sequence_at(directory: Path) -> Path:
+    """The form in which a sequence is there: ``seq-01``, or where that is not, ``seq-01.zip``."""
+    archive = archive_of(directory)
+    return archive if archive.is_file() and not directory.is_dir() else directory
+
+
+def frame_file(sequence: Path, name: str) -> FrameFile:
+    """A file of a sequence, which need not exist."""
+    return ArchivedFile(sequence, name) if is_archive(sequence) else sequence / name
+
+
+def sequence_names(sequence: Path) -> list[str]:
+    """Names of the files of a sequence, in order.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    if not is_archive(sequence):
+        return sorted(path.name for path in sequence.iterdir() if path.is_file())
+    prefix = f"{sequence.stem}/"
+    with reading(sequence) as opened:
+        return sorted(
+            name.removeprefix(prefix)
+            for name in opened.namelist()
+            if _is_plain(name, prefix) and name != prefix
+        )
+
+
+def foreign_members(archive: Path) -> list[str]:
+    """Members that unpack to anything but one file each in the directory of the sequence.
+
+    Raises:
+        OSError: the archive cannot be read.
+    """
+    prefix = f"{archive.stem}/"
+    with reading(archive) as opened:
+        counts = Counter(opened.namelist())
+    return [name for name, count in counts.items() if count > 1 or not _is_plain(name, prefix)]
+
+
+def _is_plain(name: str, prefix: str) -> bool:
+    """Whether a member is ``seq-01/`` or a file right in it."""
+    rest = name.removeprefix(prefix)
+    return name.startswith(prefix) and rest not in (".", "..") and not set(rest) & set("/\\")
+
+
+def write_archive(directory: Path, archive: Path) -> None:
+    """Pack the frames of a sequence; the archive appears, safe on the disk, when it is complete.
+
+    Args:
+        directory: where ``frame-*`` lie.
+        archive: ``<data set>/seq-01.zip``; the same frames always give the same bytes.
+    """
+    with atomic_path(archive) as temporary:
+        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as packed:
+            for path in sorted(directory.glob("frame-*")):
+                info = zipfile.ZipInfo(f"{archive.stem}/{path.name}", EPOCH)
+                info.create_system, info.external_attr = UNIX, PLAIN_FILE << 16
+                packed.writestr(info, path.read_bytes())
+        with temporary.open("rb") as file:  # the frames may be deleted as soon as it is there
+            os.fsync(file.fileno())
+
+
+def link_or_unpack(source: FrameFile, target: Path) -> None:
+    """Put a file at ``target`` for programs that read paths: a link, or what an archive holds."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if isinstance(source, ArchivedFile):
+        target.write_bytes(source.read_bytes())
+    else:
+        target.symlink_to(source.resolve())
+
+
+@contextmanager
+def reading(archive: Path) -> Iterator[zipfile.ZipFile]:
+    """An open archive; what is wrong with it is an ``OSError`` that names it."""
+    try:
+        status = archive.stat()
+        yield _opened(archive, status.st_ino, status.st_size, status.st_mtime_ns)
+    except ARCHIVE_DAMAGE as error:
+        raise OSError(f"{archive}: is damaged ({error})") from None
+
+
+@lru_cache(MOST_OPEN)
+def _opened(archive: Path, *_: int) -> zipfile.ZipFile:
+    """Opened once; a file that is written anew under the same name has another status."""
+    return zipfile.ZipFile(archive)

@@ -1,0 +1,269 @@
+"""Archived sequences: unpacked by other programs they are the data set; readers need not unpack."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.groundtruth.rgbd.sensor import frame_generator
+from baselines.groundtruth.sfm.images import link_images
+from benchmarks.collect_faults import save_room, tree_of
+from synfeal.cli import main
+from synfeal.dataset import archive as archive_module
+from synfeal.dataset.archive import (
+    ArchivedFile,
+    foreign_members,
+    frame_file,
+    sequence_at,
+    write_archive,
+)
+from synfeal.dataset.manifest import verify_manifest
+from synfeal.dataset.packed import pack_frames, read_packed
+from synfeal.dataset.render_sequence import write_sequence
+from synfeal.dataset.sevenscenes import frame_paths, read_depth_m, read_pose, read_split
+from synfeal.errors import InputError
+from synfeal.planning.repeat import read_poses
+from tests.damaged_sets import CAMERA, write_planar_set
+from tests.test_dataset import FakeRenderer, poses_of
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
+
+
+@pytest.fixture(scope="module")
+def planar(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("planar") / "set"
+    write_planar_set(folder)
+    return folder
+
+
+def archived(folder: Path, out: Path) -> Path:
+    """A copy with every sequence as an archive."""
+    shutil.copytree(folder, out)
+    for directory in sorted(out.glob("seq-*")):
+        write_archive(directory, out / f"{directory.name}.zip")
+        shutil.rmtree(directory)
+    return out
+
+
+@pytest.fixture(scope="module")
+def packed(planar: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return archived(planar, tmp_path_factory.mktemp("packed") / "set")
+
+
+def unpacked(folder: Path) -> Path:
+    """Unpack every archive where it lies, with another program than ours where there is one."""
+    unzip = shutil.which("unzip")
+    for path in sorted(folder.glob("seq-*.zip")):
+        command = [unzip, "-q"] if unzip else [sys.executable, "-m", "zipfile", "-e"]
+        subprocess.run([*command, path.name, *([] if unzip else ["."])], cwd=folder, check=True)
+        path.unlink()
+    return folder
+
+
+def test_other_programs_unpack_the_data_set(planar: Path, packed: Path, tmp_path: Path) -> None:
+    assert sorted(path.name for path in packed.glob("seq-*")) == ["seq-01.zip", "seq-02.zip"]
+    copy = Path(shutil.copytree(packed, tmp_path / "set"))
+    assert tree_of(unpacked(copy)) == tree_of(planar)
+
+
+def test_nothing_is_compressed_and_nothing_but_frames_decides_the_bytes(
+    planar: Path, packed: Path, tmp_path: Path
+) -> None:
+    directory = Path(shutil.copytree(planar / "seq-01", tmp_path / "seq-01"))
+    for path in directory.iterdir():
+        os.utime(path, (1e9, 1e9))
+        path.chmod(0o600)
+    (directory / "Thumbs.db").write_bytes(b"not a frame")
+    write_archive(directory, tmp_path / "seq-01.zip")
+    data = (tmp_path / "seq-01.zip").read_bytes()
+    assert data == (packed / "seq-01.zip").read_bytes()
+    # First local header (APPNOTE 4.3.7): method 0 is stored; the name, then the file as it is.
+    signature, method, size, name_length = struct.unpack("<I4xH8x4xIH", data[:28])
+    assert (signature, method) == (0x04034B50, 0)
+    assert data[30 : 30 + name_length] == b"seq-01/frame-000000.color.png"
+    first = (planar / "seq-01" / "frame-000000.color.png").read_bytes()
+    assert data[30 + name_length :][:size] == first
+
+
+def test_readers_see_the_same_frames(planar: Path, packed: Path, tmp_path: Path) -> None:
+    assert read_split(packed, "test") == [packed / "seq-02.zip"]
+    inside, outside = packed / "seq-01.zip", planar / "seq-01"
+    for kind, read in (("pose.txt", read_pose), ("depth.png", read_depth_m)):
+        both = [frame_paths([at], kind) for at in (inside, outside)]
+        assert [path.name for path in both[0]] == [path.name for path in both[1]]
+        np.testing.assert_array_equal(read(both[0][3]), read(both[1][3]))
+    # The noise of a depth sensor is that of the frame, however its sequence is kept.
+    generators = [
+        frame_generator(1, frame_file(at, "frame-000004.depth.png")) for at in (inside, outside)
+    ]
+    assert generators[0].random() == generators[1].random()
+    for at, name in ((inside, "in.npy"), (outside, "out.npy")):
+        pack_frames([at], 32, tmp_path / name)
+    np.testing.assert_array_equal(
+        read_packed(tmp_path / "in.npy"), read_packed(tmp_path / "out.npy")
+    )
+    color = [frame_paths([at], "color.png")[:2] for at in (inside, outside)]
+    for paths, name in zip(color, ("in", "out"), strict=True):
+        link_images(paths, CAMERA, tmp_path / name)
+    assert tree_of(tmp_path / "in") == tree_of(tmp_path / "out")
+
+
+def test_repeated_poses_may_be_archived(planar: Path, packed: Path, tmp_path: Path) -> None:
+    for source, name in ((planar, "plain"), (packed, "packed")):
+        shutil.copytree(source, tmp_path / name, ignore=shutil.ignore_patterns("*.csv"))
+    tables = [read_poses(tmp_path / name, "test") for name in ("plain", "packed")]
+    np.testing.assert_array_equal(tables[0].world_from_cam, tables[1].world_from_cam)
+
+
+def test_validate_passes_archives_as_directories(
+    planar: Path, packed: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    reports = []
+    for folder in (planar, packed):
+        assert main(["validate", str(folder)]) == 0
+        reports.append(capsys.readouterr().out.splitlines()[1:])
+    assert reports[0] == reports[1]
+    verify_manifest(packed)  # the same hashes as those of the directories
+
+
+@pytest.mark.parametrize("to", ["colmap", "nerfstudio", "tum"])
+def test_exports_are_those_of_the_directories(
+    planar: Path, packed: Path, tmp_path: Path, to: str
+) -> None:
+    for folder, more in ((planar, ["--copy"]), (packed, [])):
+        out = tmp_path / folder.parent.name
+        assert main(["export", str(folder), "--to", to, "--out", str(out), *more]) == 0
+    first, second = sorted(tmp_path.iterdir())
+    assert tree_of(first) == tree_of(second)
+    assert not [path for path in second.rglob("*") if path.is_symlink()]
+
+
+def changed(packed: Path, tmp_path: Path, **members: bytes) -> Path:
+    """A data set whose first archive has more members, which may replace others."""
+    folder = Path(shutil.copytree(packed, tmp_path / "set"))
+    with zipfile.ZipFile(folder / "seq-01.zip") as old:
+        content = {info.filename: old.read(info) for info in old.infolist()}
+    with zipfile.ZipFile(folder / "seq-01.zip", "w", zipfile.ZIP_DEFLATED) as new:
+        for name, data in {**content, **members}.items():
+            new.writestr(name, data)
+    return folder
+
+
+@pytest.mark.parametrize(
+    "name", ["../evil.txt", "/etc/evil", "seq-01/../../evil", "seq-02/frame-000000.color.png",
+             "seq-01/sub/evil", "seq-01/..", "evil"]
+)  # fmt: skip
+def test_members_that_unpack_elsewhere_are_found(
+    packed: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = changed(packed, tmp_path, **{name: b"evil"})
+    assert main(["validate", str(folder)]) == 1
+    assert f"seq-01.zip: '{name}' does not unpack to one file in seq-01" in capsys.readouterr().err
+
+
+def test_archives_of_others_are_read(packed: Path, tmp_path: Path) -> None:
+    # 7-Scenes' own hold the directory and thumbnails too, and are compressed.
+    folder = changed(packed, tmp_path, **{"seq-01/": b"", "seq-01/Thumbs.db": b"thumbs"})
+    assert main(["validate", str(folder)]) == 0
+    with (
+        pytest.warns(UserWarning, match="Duplicate"),
+        zipfile.ZipFile(folder / "seq-01.zip", "a") as again,
+    ):
+        again.writestr("seq-01/Thumbs.db", b"twice")
+    assert foreign_members(folder / "seq-01.zip") == ["seq-01/Thumbs.db"]
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda data: data[:-40], r"seq-01\.zip: cannot be read as a sequence \(.*damaged"),
+        (lambda data: b"", r"seq-01\.zip: cannot be read as a sequence \(.*damaged"),
+        (lambda data: data[:5000] + bytes(9) + data[5009:], r"Bad CRC-32|cannot be decoded"),
+    ],
+)
+def test_damage_ends_in_one_line(
+    packed: Path, tmp_path: Path, damage: object, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = Path(shutil.copytree(packed, tmp_path / "set"))
+    path = folder / "seq-01.zip"
+    path.write_bytes(damage(path.read_bytes()))  # type: ignore[operator]
+    assert main(["validate", str(folder)]) == 1
+    errors = capsys.readouterr().err.replace("\r", "\n").splitlines()
+    assert any(line.startswith("error: ") and re.search(message, line) for line in errors)
+    assert "Traceback" not in "".join(errors)
+    with pytest.raises(InputError, match="seq-01 differ"):
+        verify_manifest(folder)
+
+
+def test_a_member_that_says_it_is_huge_is_not_read(
+    packed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(archive_module, "MOST_BYTES", 100)
+    with pytest.raises(OSError, match="too many for a frame"):
+        ArchivedFile(packed / "seq-01.zip", "frame-000000.color.png").read_bytes()
+    with pytest.raises(FileNotFoundError, match=r"seq-01\.zip/frame-000099\.color\.png"):
+        ArchivedFile(packed / "seq-01.zip", "frame-000099.color.png").read_bytes()
+
+
+def test_a_directory_goes_before_an_archive_of_its_name(packed: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(packed, tmp_path / "set"))
+    assert sequence_at(folder / "seq-01") == folder / "seq-01.zip"
+    (folder / "seq-01").mkdir()
+    assert sequence_at(folder / "seq-01") == folder / "seq-01"
+
+
+def test_a_sequence_is_rendered_into_an_archive_or_not_at_all(tmp_path: Path) -> None:
+    poses = poses_of(3)
+    for out in (tmp_path / "plain" / "seq-01", tmp_path / "packed" / "seq-01.zip"):
+        write_sequence(FakeRenderer(), poses, out, True)  # type: ignore[arg-type]
+    assert [path.name for path in (tmp_path / "packed").iterdir()] == ["seq-01.zip"]
+    assert tree_of(unpacked(tmp_path / "packed")) == tree_of(tmp_path / "plain")
+    with pytest.raises(RuntimeError, match="on fire"):
+        write_sequence(FakeRenderer(2), poses, tmp_path / "none" / "seq-01.zip", True)  # type: ignore[arg-type]
+    assert list((tmp_path / "none").iterdir()) == []
+
+
+FRAMES = ("--frames", "8", "--test-frames", "4", "--width", "40", "--height", "32")
+
+
+@pytest.fixture(scope="module")
+def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("mesh") / "room.glb"
+    save_room(path)
+    return path
+
+
+def collect(mesh: Path, out: Path, *more: str) -> dict[str, str]:
+    command = ["collect", "--mesh", str(mesh), "--out", str(out), *FRAMES, "--packed", "24", *more]
+    assert main([*command, "--spacing", "0.2"]) == 0
+    return tree_of(out)
+
+
+def test_collections_are_archived_however_they_are_interrupted(
+    mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("synfeal.dataset.collect_job.SEQUENCE_FRAMES", 4)
+    plain = collect(mesh, tmp_path / "plain")
+    calm = collect(mesh, tmp_path / "calm", "--archive")
+    assert len([name for name in calm if name.endswith(".zip")]) == 3
+    assert not [name for name in calm if name.startswith("seq-01/")]
+    # Shards that share a sequence leave it to the last command; a whole one is packed at once.
+    out = tmp_path / "shared"
+    collect(mesh, out, "--archive", "--shard", "1/2")
+    data = tmp_path / "shared.part" / "data"
+    assert sorted(path.name for path in data.glob("seq-*")) == ["seq-01.zip", "seq-02"]
+    # As if killed between the archive and the removal of its directory.
+    (data / "seq-01").mkdir()
+    (data / "seq-01" / "frame-000003.pose.txt").write_text("left over")
+    assert collect(mesh, out, "--archive") == calm
+    assert tree_of(unpacked(out)) == plain
+    assert main(["validate", str(tmp_path / "calm")]) == 0
