@@ -39,8 +39,12 @@ rule all:
         f"{ROOT}/tables/speed_vs_error.csv",
         f"{ROOT}/tables/hard_cases.csv",
         f"{ROOT}/figures",
+        f"{ROOT}/provenance.json",
+        expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
+        rules.speed_vs_error.input,
         coverages(),
         manifests("groundtruth"),
+        files_of_runs(),
 
 
 rule scenes:
@@ -56,7 +60,7 @@ rule datasets:
 
 rule labels:
     input:
-        all_labels(),
+        files_of_labels(),
         f"{ROOT}/tables/assistance.csv",
         f"{ROOT}/tables/label_error.csv",
         label_figures(),
@@ -64,12 +68,20 @@ rule labels:
 
 rule runs:
     input:
-        all_metrics(),
+        files_of_runs(),
 
 
 rule tables:
     input:
+        files_of_runs(),
         expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
+
+
+onstart:
+    try:
+        begin_run(CONFIG.root)
+    except InputError as error:
+        sys.exit(f"error: {error}")
 
 
 onsuccess:

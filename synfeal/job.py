@@ -5,8 +5,9 @@ from __future__ import annotations
 import logging
 import os
 import sys
+import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from synfeal.errors import InputError
@@ -16,23 +17,44 @@ from synfeal.errors import InputError
 def job(log: str | Path) -> Iterator[None]:
     """Send everything the block prints, native libraries included, to the file ``log``.
 
-    An :class:`InputError` becomes one line on the real standard error and exit status 1; any other
-    exception keeps its traceback, in the log.
+    What a person can mend becomes one line on the real standard error and exit status 1: an
+    :class:`InputError`, a full disk, too little memory. Every exception but the first keeps its
+    traceback, in the log.
     """
     sys.stdout.flush()
     sys.stderr.flush()
     real_stderr = os.dup(2)
+    try:
+        _print_to(log)
+        yield
+    except (InputError, MemoryError, OSError) as error:
+        line = f"error: {_sentence(error)}\n"
+        os.write(real_stderr, line.encode())
+        with suppress(OSError):  # the log may lie on the disk that is full
+            if not isinstance(error, InputError):
+                traceback.print_exc()
+            sys.stderr.write(line)
+        sys.exit(1)
+    finally:
+        os.close(real_stderr)
+
+
+def _print_to(log: str | Path) -> None:
     with Path(log).open("w", encoding="utf-8") as file:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
     sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
-    try:
-        yield
-    except InputError as error:
-        line = f"error: {error}\n"
-        sys.stderr.write(line)
-        os.write(real_stderr, line.encode())
-        sys.exit(1)
-    finally:
-        os.close(real_stderr)
+
+
+def _sentence(error: InputError | MemoryError | OSError) -> InputError:
+    """The error as a line for people, with what to do."""
+    if isinstance(error, InputError):
+        return error
+    if isinstance(error, MemoryError):
+        return InputError(
+            f"out of memory ({error or 'no more is to be had'}); start again with fewer jobs at"
+            " once (--cores), or on a machine with more"
+        )
+    where = f"{error.filename}: " if error.filename else ""
+    return InputError(f"{where}{error.strerror or error}; mend that and start again")

@@ -12,6 +12,7 @@ from baselines.localizers.base import Localizer
 from baselines.localizers.registry import build_localizer
 from baselines.training.data import ImageStatistics
 from baselines.training.description import ModelDescription, parse_description
+from baselines.training.serial import serialised
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
 
@@ -37,9 +38,10 @@ class TrainedLocalizer:
 
 
 def save_atomically(path: Path, value: Any) -> None:
-    """``torch.save`` to a temporary name, then rename."""
+    """Write what ``torch.load`` reads, under its name only when it is whole."""
+    content = serialised(value)
     with atomic_path(path) as temporary:
-        torch.save(value, temporary)
+        temporary.write_bytes(content)
 
 
 def save_checkpoint(

@@ -18,7 +18,7 @@ from baselines.training.data import (
     read_labelled_frames,
 )
 from baselines.training.description import ModelDescription, frame_camera
-from baselines.training.device import open_device, precision_on
+from baselines.training.device import memory_errors, open_device, precision_on
 from baselines.training.fit import Augmentation, fit
 from baselines.training.optimizer import Schedule
 from baselines.training.order import held_out_paths
@@ -34,6 +34,7 @@ log = logging.getLogger(__name__)
 FINGERPRINT_IMAGES = 64
 
 
+@memory_errors()
 def train_localizer(
     name: ModelName,
     frames: Path,
@@ -74,6 +75,7 @@ def train_localizer(
 
     Raises:
         InputError: one of the files cannot be used.
+        MemoryError: there is too little memory; no checkpoint is written.
     """
     protocol = protocol or PROTOCOLS[training.protocol]
     device = open_device(training.device)

@@ -12,13 +12,14 @@ from torch import Tensor
 
 from baselines.training.checkpoint import TrainedLocalizer, read_checkpoint
 from baselines.training.data import read_images
-from baselines.training.device import open_device
+from baselines.training.device import memory_errors, open_device
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 
 # Images per step; float32 sums may come out differently in the last digits at another number.
 BATCH = 100
 
 
+@memory_errors()
 def predict_poses(
     model: Path,
     frames: Path,
@@ -37,6 +38,7 @@ def predict_poses(
 
     Raises:
         InputError: one of the files cannot be used.
+        MemoryError: there is too little memory.
     """
     trained = read_checkpoint(model, open_device(device))
     table = read_pose_table(labels_like)

@@ -24,7 +24,7 @@ from baselines.localizers.losses import LearnedWeightLoss, PosePrediction
 from baselines.localizers.names import BackboneName
 from baselines.training.checkpoint import save_atomically
 from baselines.training.data import image_statistics, read_labelled_frames
-from baselines.training.device import open_device
+from baselines.training.device import memory_errors, open_device
 from baselines.training.fit import fit
 from baselines.training.optimizer import Schedule
 from baselines.training.rotation import random_rotation
@@ -51,6 +51,7 @@ class PretextLocalizer(Localizer):
         return [self.regressor(self.backbone(images)[-1])]
 
 
+@memory_errors()
 def pretrain_backbone(
     backbone: BackboneName,
     frames: Path | None,
@@ -73,6 +74,7 @@ def pretrain_backbone(
 
     Raises:
         InputError: a file cannot be used, or the ImageNet weights cannot be had.
+        MemoryError: there is too little memory.
     """
     if frames is None or labels is None:
         trained = build_backbone(backbone, network.width)

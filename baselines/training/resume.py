@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor
 
+from baselines.training.serial import serialised
 from synfeal.files import atomic_path
 
 log = logging.getLogger(__name__)
@@ -61,10 +62,10 @@ class ResumeFile:
         if self._path is None or not (now or time.monotonic() - self._saved >= RESUME_EVERY_S):
             return
         states = {name: part.state_dict() for name, part in parts.items()}
-        with atomic_path(self._path) as temporary:
-            torch.save({"fingerprint": self._fingerprint, "parts": states}, temporary)
-            with temporary.open("r+b") as file:  # read to its end, then written there
-                file.write(hashlib.file_digest(file, "sha256").digest())
+        content = serialised({"fingerprint": self._fingerprint, "parts": states})
+        with atomic_path(self._path) as temporary, temporary.open("wb") as file:
+            file.write(content)
+            file.write(hashlib.sha256(content).digest())
         self._saved = time.monotonic()
 
     def remove(self) -> None:

@@ -17,7 +17,7 @@ rule scene:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=grown(4000),
     params:
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
         collision_agreement=CONFIG.collection.collision_agreement,
@@ -40,7 +40,7 @@ rule plan:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=grown(2000),
     params:
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
         collection=dump(CONFIG.collection),
@@ -64,7 +64,7 @@ rule coverage:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
         camera=dump(CONFIG.network_camera),
@@ -86,7 +86,7 @@ rule render:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=3000,
+        mem_mb=grown(3000),
     params:
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
         start=lambda w: sequence_named(w).start,
@@ -111,7 +111,7 @@ rule render_speed:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=3000,
+        mem_mb=grown(3000),
     params:
         network_camera=dump(CONFIG.network_camera),
         groundtruth_camera=dump(CONFIG.groundtruth_camera),
@@ -137,7 +137,7 @@ rule render_packed:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=3000,
+        mem_mb=grown(3000),
     params:
         camera=dump(CONFIG.network_camera),
         start=lambda w: sequence_named(w, "network").start,
@@ -164,7 +164,7 @@ rule pack:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=grown(2000),
     params:
         camera=dump(CONFIG.network_camera),
         render=dump(CONFIG.render),
@@ -187,7 +187,7 @@ rule dataset:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
         counts=lambda w: [n_frames(w.scene, w.camera, split) for split in SPLITS],
@@ -211,7 +211,7 @@ rule true_labels:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
     script:

@@ -1,5 +1,6 @@
 # What the rules share: the checked configuration, and which files a target needs. No rules here.
 import sys
+from functools import cache
 
 from baselines.localizers.names import backbone_of
 from baselines.groundtruth.batches import batches_of
@@ -10,11 +11,13 @@ from baselines.groundtruth.methods import (
     graph_methods,
     stages_of,
 )
+from baselines.training.memory import training_mb
 from synfeal.config import check_mesh_files, parse_config, read_experiments, runs_of
 from synfeal.config.models import MODELS
 from synfeal.dataset.sequences import sequences_of
 from synfeal.errors import InputError
 from synfeal.provenance import config_hash
+from synfeal.run_lock import begin_run
 from synfeal.seeds import seed_of
 
 try:
@@ -65,6 +68,7 @@ def n_frames(scene, camera, split):
     return max((CONFIG.n_frames(scene, size, split) for size in sizes), default=0)
 
 
+@cache
 def sequences(scene, camera):
     counts = [n_frames(scene, camera, split) for split in SPLITS]
     return sequences_of(*counts, CONFIG.shard_frames)
@@ -111,17 +115,15 @@ def backbone_weights(wildcards):
     return f"{ROOT}/pretrained/{backbone_of(wildcards.model, CONFIG.network)}.pt"
 
 
-def training_mem_mb(n_frames):
-    """Memory of a training in MB: frames as they are, layers of a batch, parameters five times.
+def grown(mem_mb):
+    """Memory of a job in MB: as much again with every attempt that a profile's ``retries`` allows."""
+    return lambda wildcards, attempt: attempt * mem_mb
 
-    The factors are Hourglass's, the largest: 60 MB an image and 0.5 GB of parameters at 224 px.
-    """
-    network, batch_size = CONFIG.network, CONFIG.training.batch_size
-    layers_mb = 1.2e-3 * batch_size * network.width
-    parameters_mb = 0.05 * network.width**2
-    return round(
-        1000 + network.input_px**2 * (3e-6 * n_frames + layers_mb + parameters_mb)
-    )
+
+def train_mem_mb(wildcards, attempt):
+    scene, size = wildcards.scene, wildcards.size
+    frames = sum(CONFIG.n_frames(scene, size, split) for split in SPLITS)
+    return attempt * training_mb(frames, CONFIG.network, CONFIG.training.batch_size)
 
 
 def metrics_of(experiments):
@@ -228,3 +230,48 @@ def batch_facts():
             )
         }
     )
+
+
+# Of a job that fails or is killed no output stays, and Snakemake does not make a file again that
+# only finished files need: after a change of the configuration the tables of the old one would
+# pass for the new. So the targets ask for an output of every job, not of the last ones alone.
+def pretext_scene():
+    """The scene of the pretext, if a run starts from it."""
+    used = CONFIG.pretraining.source == "pretext"
+    return {CONFIG.pretraining.scene} if used and backbones() else set()
+
+
+def backbones():
+    """Backbones that runs start from."""
+    return {
+        backbone_of(r.model, CONFIG.network) for r in RUNS if r.init == "pretrained"
+    }
+
+
+def files_of_labels():
+    """An output of every job that labels are made by."""
+    scenes = sorted({e.scene for e in EXPERIMENTS})
+    return [
+        *(f"{ROOT}/scenes/{scene}/properties.json" for scene in scenes),
+        *(f"{ROOT}/plans/{scene}/{split}.csv" for scene in scenes for split in SPLITS),
+        *(d for scene in scenes for d in sequence_dirs(scene, "groundtruth")),
+        *pose_labels(),
+        *all_labels(),
+        *batch_facts(),
+        *assistance_files(),
+    ]
+
+
+def files_of_runs():
+    """An output of every job that runs are made by."""
+    pretext = sorted(pretext_scene())
+    return [
+        *files_of_labels(),
+        *(f"{ROOT}/scenes/{scene}/properties.json" for scene in pretext),
+        *(f"{ROOT}/plans/{scene}/train.csv" for scene in pretext),
+        *(f"{ROOT}/frames/{scene}/train.npy" for scene in pretext),
+        *packed_frames("npy"),
+        *(f"{ROOT}/pretrained/{backbone}.pt" for backbone in sorted(backbones())),
+        *(m.replace("metrics.json", "predictions.csv") for m in all_metrics()),
+        *all_metrics(),
+    ]

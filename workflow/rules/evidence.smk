@@ -22,7 +22,7 @@ rule table1_meshes:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         scenes=sorted({e.scene for e in EXPERIMENTS}),
     script:
@@ -49,7 +49,7 @@ rule table:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         rows=lambda w: [dump(row) for row in rows_of(w.table)],
         repetitions=CONFIG.training.repetitions,
@@ -71,7 +71,7 @@ rule assistance:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         rows=[dump(e) for e in EXPERIMENTS if e.labels in RECONSTRUCTED],
     script:
@@ -95,7 +95,7 @@ rule label_error:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         rows=[dump(e) for e in EXPERIMENTS if e.labels in RECONSTRUCTED],
     script:
@@ -127,7 +127,7 @@ rule speed_vs_error:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         scenes=sorted({e.scene for e in EXPERIMENTS}),
     script:
@@ -145,7 +145,7 @@ rule hard_cases:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=grown(2000),
     script:
         "../scripts/hard_cases.py"
 
@@ -163,7 +163,7 @@ rule document:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     script:
         "../scripts/document.py"
 
@@ -202,7 +202,7 @@ rule figures:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=grown(2000),
     params:
         rows=[dump(e) for e in EXPERIMENTS],
         repetitions=CONFIG.training.repetitions,
@@ -225,7 +225,7 @@ rule summary:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         rows=[dump(e) for e in EXPERIMENTS],
         repetitions=CONFIG.training.repetitions,
@@ -252,7 +252,7 @@ rule claims:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         rows=[dump(e) for e in EXPERIMENTS],
         repetitions=CONFIG.training.repetitions,
@@ -281,7 +281,7 @@ rule provenance:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         seed=CONFIG.seed,
         config_hash=config_hash(CONFIG),
@@ -314,7 +314,7 @@ rule report:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=grown(4000),
     params:
         rows=[dump(e) for e in EXPERIMENTS],
         repetitions=CONFIG.training.repetitions,
@@ -338,6 +338,6 @@ rule report_document:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     script:
         "../scripts/report_document.py"

@@ -14,7 +14,7 @@ rule noisy_labels:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         seed=lambda w: seed_of(
             CONFIG.seed, "noise", w.scene, w.size, w.noise_m, w.noise_deg, w.split
@@ -40,7 +40,7 @@ rule sfm:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=grown(4000),
     params:
         start=lambda w: batch_of(w).start,
         stop=lambda w: batch_of(w).stop,
@@ -67,7 +67,7 @@ rule rgbd:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=grown(4000),
     params:
         start=lambda w: batch_of(w).start,
         stop=lambda w: batch_of(w).stop,
@@ -94,7 +94,7 @@ rule estimate:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=grown(4000),
     params:
         start=lambda w: batch_of(w).start,
         stop=lambda w: batch_of(w).stop,
@@ -121,7 +121,7 @@ rule posegraph:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=grown(2000),
     params:
         posegraph=dump(CONFIG.groundtruth.posegraph),
     script:
@@ -148,7 +148,7 @@ rule chain:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         groundtruth=dump(
             CONFIG.groundtruth,

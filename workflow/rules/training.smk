@@ -25,7 +25,13 @@ rule pretrain:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=training_mem_mb(CONFIG.pretraining.frames),
+        mem_mb=grown(
+            training_mb(
+                CONFIG.pretraining.frames,
+                CONFIG.network,
+                CONFIG.pretraining.batch_size,
+            )
+        ),
     params:
         pretraining=dump(CONFIG.pretraining),
         network=dump(CONFIG.network),
@@ -53,9 +59,7 @@ rule train:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=lambda w: training_mem_mb(
-            sum(CONFIG.n_frames(w.scene, w.size, split) for split in SPLITS)
-        ),
+        mem_mb=train_mem_mb,
     params:
         network=dump(CONFIG.network),
         localizer=lambda w: dump(CONFIG.localizers[w.model]),
@@ -93,7 +97,7 @@ rule score:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=grown(1000),
     params:
         seed=CONFIG.seed,
     script:

@@ -1,0 +1,76 @@
+"""What results hold: which files are promised to be the same, and which differ in two trees."""
+
+from __future__ import annotations
+
+import fnmatch
+import hashlib
+from pathlib import Path
+
+# Files of a results directory that say how long something took, or embed what does; by why.
+TIMED = {
+    "benchmarks/*": "what jobs took",
+    "benchmarks.csv": "what jobs took",
+    "logs/*": "progress and times",
+    "provenance.json": "dates, times and hashes of timed files",
+    "report.html": "shows what jobs took",
+    "report.tex": "shows times of hard cases",
+    "scenes/*/render_speed.csv": "times of frames",
+    "scenes/*/collision_curve.csv": "times of rays",
+    "tables/speed_vs_error.csv": "times",
+    "tables/hard_cases.csv": "times of every case",
+    "groundtruth/*.json": "what stages of a batch took",
+    "figures/speed_vs_error.*": "shows times",
+    "figures/training_speed.*": "shows times",
+    "figures/render_speed.*": "shows times",
+}
+# Files that go when what needs them is made.
+PASSING = ("frames/*/shards/*", "runs/*/resume.pt")
+HIDDEN = ".*"  # the lock, Snakemake's stamps, and what is not finished
+
+
+def reason_to_differ(name: str) -> str | None:
+    """Why a file, by its path below the results directory, may differ between two runs."""
+    return next((why for pattern, why in TIMED.items() if fnmatch.fnmatch(name, pattern)), None)
+
+
+class Hashes:
+    """SHA-256 of files; one that has not changed since is not read again."""
+
+    def __init__(self) -> None:
+        self._known: dict[Path, tuple[tuple[int, int], str]] = {}
+
+    def of(self, path: Path) -> str:
+        """Of one file."""
+        stat = path.stat()
+        state = (stat.st_mtime_ns, stat.st_size)
+        if path not in self._known or self._known[path][0] != state:
+            self._known[path] = (state, hashlib.sha256(path.read_bytes()).hexdigest())
+        return self._known[path][1]
+
+    def tree(self, root: Path) -> dict[str, str]:
+        """Of all finished files below a directory that stay, by their paths there."""
+        paths = (path for path in sorted(root.rglob("*")) if path.is_file())
+        named = ((path.relative_to(root), path) for path in paths)
+        return {
+            name.as_posix(): self.of(path)
+            for name, path in named
+            if not any(fnmatch.fnmatch(part, HIDDEN) for part in name.parts)
+            and not is_passing(name)
+        }
+
+
+def is_passing(name: Path) -> bool:
+    """Whether a file, by its path below the results directory, is not there in the end."""
+    return any(fnmatch.fnmatch(name.as_posix(), pattern) for pattern in PASSING)
+
+
+def damaged(expected: dict[str, str], found: dict[str, str]) -> list[str]:
+    """Files under final names that are promised to be those of another tree, and are not."""
+    return sorted(
+        name for name in found if expected.get(name) != found[name] and not reason_to_differ(name)
+    )
+
+
+def missing(expected: dict[str, str], found: dict[str, str]) -> list[str]:
+    """Files of a complete tree that another one lacks."""
+    return sorted(expected.keys() - found.keys())

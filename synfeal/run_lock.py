@@ -1,0 +1,84 @@
+"""One run at a time in a results directory, and nothing left there of runs that were killed."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import re
+import shutil
+import socket
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from synfeal.errors import InputError
+
+LOCK = ".lock"
+# Names that atomic_path, atomic_directory and the writer of frames give what is not finished.
+TEMPORARY = re.compile(r"\..+-[a-z0-9_]{8}(\.\w+)?")
+
+
+def begin_run(root: Path) -> None:
+    """Keep other runs out of ``root`` until this process ends; put in order what earlier ones left.
+
+    The system frees the lock when the process ends, however it ends: nothing has to be unlocked.
+    What is not finished is removed, and no file stays dated in the future.
+
+    Raises:
+        InputError: another run is at work there, or nothing can be written there.
+    """
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        _lock_for_life(root / LOCK)
+        _end_future(root)
+    except OSError as error:
+        raise InputError(
+            f"{error.filename or root}: {error.strerror}; nothing was started"
+        ) from None
+    for path in list(unfinished(root)):
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def unfinished(root: Path) -> Iterator[Path]:
+    """Files and directories below ``root`` under the names of what is not finished."""
+    for folder, directories, files in os.walk(root):
+        found = [name for name in (*directories, *files) if TEMPORARY.fullmatch(name)]
+        yield from (Path(folder, name) for name in found)
+        directories[:] = [name for name in directories if name not in found]
+
+
+def _end_future(root: Path) -> None:
+    """Date now, in their order, what a clock that jumped back has left dated in the future.
+
+    Snakemake fails every job that reads a file younger than what the job writes.
+    """
+    now_ns = time.time_ns()
+    dates_ns = {path: path.lstat().st_mtime_ns for path in root.rglob("*") if path.is_file()}
+    future = {path: date_ns for path, date_ns in dates_ns.items() if date_ns > now_ns}
+    rank = {date_ns: rank for rank, date_ns in enumerate(sorted(set(future.values())))}
+    for path, date_ns in future.items():
+        new_ns = now_ns + rank[date_ns] * 1000  # dates are compared as floats: 1 µs is kept apart
+        os.utime(path, ns=(new_ns, new_ns), follow_symlinks=False)
+    if future:
+        print(f"{root}: {len(future)} files dated in the future are now dated now", file=sys.stderr)
+
+
+def _lock_for_life(path: Path) -> None:
+    """Lock a file through a descriptor that nobody closes before the process ends."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        holder = os.read(descriptor, 200).decode(errors="replace") or "it did not say which"
+        raise InputError(
+            f"{path.parent}: another run is at work there ({holder}); wait for its end, or end it"
+        ) from None
+    except OSError as error:  # some network file systems know no locks
+        print(f"{path}: {error.strerror}; see yourself that no other run starts", file=sys.stderr)
+        return
+    os.ftruncate(descriptor, 0)
+    os.write(descriptor, f"process {os.getpid()} on {socket.gethostname()}".encode())
