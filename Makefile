@@ -1,16 +1,19 @@
 # `make help` lists the targets.
 PYTHON ?= python3
 CORES ?= 2
+LOCK ?= requirements.lock
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
+SLURM_INSTALLED := $(VENV)/installed-slurm
+QUALITY := $(VENV)/quality
 export PYTHONHASHSEED := 0
 
-.PHONY: help reproduce smoke publish test check format lock clean
+.PHONY: help reproduce smoke publish test test-slurm coverage mutate check format lock clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
 
 reproduce: $(INSTALLED)  ## install everything, then make every table (results/mini)
 	$(BIN)/snakemake --cores $(CORES) all
@@ -21,8 +24,20 @@ smoke: $(INSTALLED)  ## every rule and every model at toy size (results/smoke)
 publish: reproduce  ## make the tracked results anew, and the read-me's numbers from them
 	$(BIN)/python -m synfeal.report.readme
 
+plan: smoke  ## what paper and gpu cost, and what such plans are worth (results/benchmarks)
+	mkdir -p results/benchmarks/smoke && cp results/smoke/benchmarks.csv results/benchmarks/smoke/
+	$(BIN)/synfeal plan --profile paper --cores 16 64 --gpus 1 4 --csv results/benchmarks/plan_paper.csv
+	$(BIN)/synfeal plan --profile gpu --cores 16 --gpus 1 --csv results/benchmarks/plan_gpu.csv
+	$(BIN)/synfeal plan --measured results/benchmarks/smoke --compare results/mini --time-steps \
+	  --csv results/benchmarks/plan_check.csv
+
 test: check  ## static checks and the test suite
 	$(BIN)/pytest
+
+test-slurm: $(SLURM_INSTALLED)  ## the smoke profile here and through a SLURM cluster of one node, which is killed
+	setup/slurm_cluster.sh install
+	$(BIN)/python -m benchmarks.slurm_run --work results/slurm_test $(if $(LOCAL),--local $(LOCAL))
+	$(BIN)/pytest tests/test_clusters.py tests/test_slurm_run.py
 
 check: $(INSTALLED)  ## static checks alone: format, lint, types, workflow
 	$(BIN)/ruff check .
@@ -38,16 +53,26 @@ format: $(INSTALLED)  ## format the code in place
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile workflow
 
-lock: $(INSTALLED)  ## write the versions installed now to requirements.lock
+lock: $(INSTALLED)  ## write the versions installed now to the lock files
 	setup/lock.sh $(BIN)/python > requirements.lock.new
 	mv requirements.lock.new requirements.lock
+	setup/lock_cuda.sh $(BIN)/python > requirements-cuda.lock.new
+	mv requirements-cuda.lock.new requirements-cuda.lock
 
 clean:  ## remove results of the smoke profile and caches
 	rm -rf results/smoke .pytest_cache .mypy_cache .ruff_cache
 
-$(INSTALLED): requirements.lock pyproject.toml setup/system_packages.sh
+$(INSTALLED): $(LOCK) pyproject.toml setup/system_packages.sh
 	setup/system_packages.sh $(PYTHON)
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet --requirement $(LOCK)
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	touch $@
+
+$(QUALITY): $(INSTALLED)
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[quality]'
+	touch $@
+
+$(SLURM_INSTALLED): $(INSTALLED) requirements-slurm.lock
+	$(BIN)/python -m pip install --quiet --requirement requirements-slurm.lock
 	touch $@

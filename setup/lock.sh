@@ -2,5 +2,7 @@
 # Print exact pins of everything installed in the environment of PYTHON. Usage: lock.sh PYTHON
 set -euo pipefail
 echo "# Exact versions of everything installed; written by 'make lock', read by 'make reproduce'."
-# A local build's suffix (torch's "+cpu") is not part of a version that an index offers.
-"$1" -m pip freeze --exclude-editable --exclude synfeal | sed -E 's/\+[a-z0-9.]+$//' | grep -v ' @ '
+# A local build's suffix (torch's "+cpu") is not part of a version that an index offers, and what only
+# torch's CUDA build and `make test-slurm` need stands in requirements-cuda.lock and -slurm.lock.
+"$1" -m pip freeze --exclude-editable --exclude synfeal | sed -E 's/\+[a-z0-9.]+$//' |
+    grep -Ev ' @ |^(nvidia|cuda)-|^triton=|^snakemake-executor-plugin-slurm'

@@ -1,0 +1,100 @@
+"""Images, conda and lock files agree with the project; that they work only building them tells."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from packaging.version import Version
+
+ROOT = Path(__file__).parent.parent
+CPU, CUDA = "requirements.lock", "requirements-cuda.lock"
+
+
+def read(name: str) -> str:
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def pins(name: str) -> dict[str, str]:
+    """Versions by canonical name; a name twice is an error."""
+    lines = [line for line in read(name).splitlines() if line and line[0] not in "#-"]
+    pairs = [re.fullmatch(r"([\w.-]+)={2,3}([\w.]+)", line) for line in lines]
+    assert all(pairs), "every line is an exact pin"
+    found = {canonicalize_name(pair[1]): pair[2] for pair in pairs if pair}
+    assert len(found) == len(lines)
+    return found
+
+
+def test_every_dependency_is_locked_within_its_range() -> None:
+    project = tomllib.loads(read("pyproject.toml"))["project"]
+    locked = pins(CPU)
+    for text in (*project["dependencies"], *project["optional-dependencies"]["dev"]):
+        requirement = Requirement(text)
+        version = locked[canonicalize_name(requirement.name)]
+        assert requirement.specifier.contains(version, prereleases=True), requirement
+
+
+def test_the_locks_differ_in_what_cuda_needs() -> None:
+    lines, cpu, cuda = read(CUDA).splitlines(), pins(CPU), pins(CUDA)
+    assert f"--requirement {CPU}" in lines
+    assert f"torch==={cpu['torch']}" in lines  # no local build: "==" would take "+cpu" too
+    assert cuda.keys() & cpu.keys() == {"torch"}
+    assert any(name.startswith("nvidia-cudnn") for name in cuda)
+    assert not [name for name in cpu if name.startswith(("nvidia-", "cuda-"))]
+
+
+@pytest.mark.parametrize("name", ["Dockerfile", "apptainer.def"])
+def test_images_are_built_by_the_makefile_and_the_one_list_of_packages(name: str) -> None:
+    text = read(name)
+    base = re.search(r"^(?:FROM|From:) (\S+)$", text, re.MULTILINE)
+    assert base is not None
+    assert base[1] == "debian:bookworm-slim"
+    assert "setup/container.sh" in text
+    assert re.search(r"make LOCK=\S*( \}\})?.* \.venv/installed", text)
+    assert "LOCK=requirements.lock" in text
+    assert "apt-get" not in text
+    assert "pip install" not in text
+    script = read("setup/container.sh")
+    assert "system_packages.sh" in script
+    # A package that system_packages.sh knows is not named a second time.
+    known = set(re.findall(r"\]=([\w.-]+)", read("setup/system_packages.sh")))
+    assert len(known) == 5
+    assert not known & set(script.split())
+
+
+def test_one_python_everywhere() -> None:
+    conda = yaml.safe_load(read("environment.yaml"))["dependencies"]
+    inner = yaml.safe_load(read("workflow/envs/synfeal.yaml"))["dependencies"]
+    [python] = [text for text in conda if str(text).startswith("python=")]
+    assert python in inner
+    project = tomllib.loads(read("pyproject.toml"))
+    version = python.removeprefix("python=")
+    assert Version(version) in Requirement("x" + project["project"]["requires-python"]).specifier
+    assert project["tool"]["mypy"]["python_version"] == version  # Debian bookworm's
+
+
+def test_what_make_needs_is_in_the_image() -> None:
+    script = read("setup/container.sh").split()
+    conda = yaml.safe_load(read("environment.yaml"))["dependencies"]
+    for program in ("git", "make", "unzip"):
+        assert program in script
+        assert program in conda
+
+
+@pytest.mark.parametrize("name", ["container.sh", "system_packages.sh", "lock.sh", "lock_cuda.sh"])
+def test_scripts_are_programs_of_bash(name: str) -> None:
+    path = ROOT / "setup" / name
+    assert path.stat().st_mode & 0o111
+    subprocess.run(["bash", "-n", str(path)], check=True)
+
+
+def test_results_and_environments_stay_out_of_the_build() -> None:
+    ignored = read(".dockerignore").splitlines()
+    assert {".venv", ".snakemake", "results/*/datasets", "results/*/runs"} <= set(ignored)
+    assert ".git" not in ignored  # results say which commit made them
