@@ -1,0 +1,92 @@
+"""Cluster profiles: what they name is there, and the paper's design is planned through them."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from packaging.requirements import Requirement
+
+from baselines.training.memory import training_mb
+from synfeal.report.cost.networks import pretext_work, training_work
+from synfeal.report.cost.profiles import read_profile
+from tests.test_containers import pins
+from tests.test_workflow import planned_jobs
+
+ROOT = Path(__file__).parent.parent
+PROFILES = {
+    name: ROOT / f"workflow/profiles/{name}/profile.yaml" for name in ("slurm", "kubernetes")
+}
+WORKFLOW = "".join(path.read_text() for path in sorted((ROOT / "workflow/rules").glob("*.smk")))
+RULES = frozenset(re.findall(r"^rule (\w+):", WORKFLOW, re.MULTILINE))
+
+
+def profile(name: str) -> dict[str, Any]:
+    settings: dict[str, Any] = yaml.safe_load(PROFILES[name].read_text())
+    return settings
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_every_rule_a_profile_names_is_a_rule(name: str) -> None:
+    settings = profile(name)
+    assert RULES.issuperset({*settings["set-resources"], *settings["groups"]})
+    assert settings["group-components"].keys() <= set(settings["groups"].values())
+
+
+def test_the_plugin_is_locked_within_its_range_and_beside_the_other_pins() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    (plugin,) = map(Requirement, project["optional-dependencies"]["slurm"])
+    locked = pins("requirements-slurm.lock")
+    assert plugin.specifier.contains(locked[plugin.name])
+    assert not locked.keys() & pins("requirements.lock").keys()
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_no_setting_is_lost_to_the_default_profile(name: str) -> None:
+    default = yaml.safe_load((ROOT / "profiles/default/profile.yaml").read_text())
+    assert not default.keys() & profile(name).keys()
+
+
+def test_jobs_of_a_group_go_to_one_partition() -> None:
+    settings = profile("slurm")
+    partitions: dict[str, set[str]] = {}
+    for rule, group in settings["groups"].items():
+        chosen = {**settings["default-resources"], **settings["set-resources"].get(rule, {})}
+        partitions.setdefault(group, set()).add(chosen["slurm_partition"])
+    assert all(len(names) == 1 for names in partitions.values()), partitions
+
+
+def test_the_papers_design_is_planned_for_slurm(tmp_path: Path) -> None:
+    pytest.importorskip("snakemake_executor_plugin_slurm")
+    arguments = ("--profile", "workflow/profiles/slurm", "--configfile", "config/paper.yaml")
+    jobs = planned_jobs(tmp_path, *arguments, "--", "all")
+    assert jobs["sfm"] == jobs["rgbd"] == jobs["estimate"] == 24 + 10  # 6,000 and 2,500 by 250
+    assert jobs["render_packed"] == 80 + 20 + 95 + 20  # thousands of frames of both scenes
+    assert jobs["train"] == jobs["score"] == 125
+
+
+@pytest.mark.parametrize(
+    ("name", "models"), [("mini", ["hourglass"]), ("paper", ["hourglass", "posenet", "poselstm"])]
+)
+def test_a_training_asks_for_what_the_largest_network_takes_and_not_for_twice_that(
+    name: str, models: list[str]
+) -> None:
+    config = read_profile(name).config
+    batch = config.training.batch_size
+    works = [training_work(m, config.network, config.localizers[m]) for m in models]
+    counted_mb = max(work.held_bytes(batch) for work in works) / 1e6
+    frames, frame_mb = 10_000, 3 * config.network.input_px**2 / 1e6
+    asked_mb = training_mb(frames, config.network, batch)
+    assert counted_mb + frames * frame_mb < asked_mb - 900  # the program itself takes 0.5 to 0.9 GB
+    assert asked_mb - 1000 < 2 * (counted_mb + frames * frame_mb)
+
+
+def test_a_pretraining_fits_too() -> None:
+    config = read_profile("mini").config
+    batch = config.pretraining.batch_size
+    counted_mb = pretext_work("resnet34", config.network).held_bytes(batch) / 1e6
+    assert counted_mb < training_mb(0, config.network, batch) - 900
