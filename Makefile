@@ -9,7 +9,7 @@ SLURM_INSTALLED := $(VENV)/installed-slurm
 QUALITY := $(VENV)/quality
 export PYTHONHASHSEED := 0
 
-.PHONY: help reproduce smoke publish test test-slurm coverage mutate check format lock clean
+.PHONY: help reproduce smoke publish plan test test-slurm coverage mutate check format lock clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -38,6 +38,17 @@ test-slurm: $(SLURM_INSTALLED)  ## the smoke profile here and through a SLURM cl
 	setup/slurm_cluster.sh install
 	$(BIN)/python -m benchmarks.slurm_run --work results/slurm_test $(if $(LOCAL),--local $(LOCAL))
 	$(BIN)/pytest tests/test_clusters.py tests/test_slurm_run.py
+
+coverage: $(QUALITY)  ## which lines the test suite runs (results/benchmarks/coverage.csv)
+	$(BIN)/coverage erase
+	$(BIN)/coverage run -m pytest
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage json --quiet
+	$(BIN)/python -m benchmarks.line_coverage
+
+mutate: $(QUALITY)  ## which deliberate defects the tests notice (results/benchmarks/mutation.csv)
+	$(BIN)/mutmut run --max-children $(CORES)
+	$(BIN)/python -m benchmarks.mutation
 
 check: $(INSTALLED)  ## static checks alone: format, lint, types, workflow
 	$(BIN)/ruff check .
@@ -74,5 +85,5 @@ $(QUALITY): $(INSTALLED)
 	touch $@
 
 $(SLURM_INSTALLED): $(INSTALLED) requirements-slurm.lock
-	$(BIN)/python -m pip install --quiet --requirement requirements-slurm.lock
+	$(BIN)/python -m pip install --quiet --no-deps --requirement requirements-slurm.lock
 	touch $@

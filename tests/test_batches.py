@@ -258,6 +258,8 @@ def test_trajectory_file_round_trip(tmp_path):
         again.first_from_cam[:, :3, 3], trajectory.first_from_cam[:, :3, 3]
     )
     np.testing.assert_allclose(again.first_from_cam, trajectory.first_from_cam, atol=1e-14)
+    flags = [line.split(",")[:2] for line in path.read_text().splitlines()[1:]]
+    assert flags == [[str(k), "0" if k in (2, 5) else "1"] for k in range(8)]
 
 
 @pytest.mark.parametrize(

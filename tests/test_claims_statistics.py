@@ -70,6 +70,7 @@ def test_share_limits_are_the_closed_form_at_the_ends():
         ([1, INF, 2], [1, 1, 1], 2),
         ([1, NAN, 2], [1, 1, 1], 2),  # not a number is as bad as infinite
         ([1, INF], [1, 1], INF),
+        ([1, NAN], [1, 1], INF),
         ([1, INF, NAN], [1, 1, 1], INF),
         ([1, INF, 2, 3], [1, 1, 1, 1], 2.5),
     ],
@@ -123,6 +124,7 @@ def test_changes_of_failures():
     assert np.isnan(relative_change(np.array([1.0, 0.0]), zero)[1])
     assert np.isnan(difference(np.array([INF]), np.array([INF]))[0])
     assert mean_of([np.array([1.0, INF]), np.array([3.0, 1.0])]).tolist() == [2, INF]
+    assert np.isnan(mean_of([np.array([INF]), np.array([-INF])])[0])
 
 
 def test_limits_leave_two_and_a_half_percent_on_either_side():

@@ -163,6 +163,15 @@ def test_one_finite_seed_has_no_deviation(errors: np.ndarray) -> None:
     assert difference(run(errors, failed), run(errors, errors + 1)).sd_a is None
 
 
+def test_limits_leave_out_two_and_a_half_percent_of_the_resamples_on_either_side() -> None:
+    a, b = np.random.default_rng(8).lognormal(size=(2, 30))
+    found = difference(run(a), run(b))
+    counts = _Draws.of(np.arange(30), "a").counts
+    drawn = np.array([np.median(np.repeat(b, k)) - np.median(np.repeat(a, k)) for k in counts])
+    assert (drawn < found.low).mean() <= 0.026 <= (drawn <= found.low).mean()
+    assert (drawn > found.high).mean() <= 0.026 <= (drawn >= found.high).mean()
+
+
 def test_limits_are_differences_that_occur() -> None:
     whole = np.arange(N, dtype=float)  # medians of whole numbers, and so their differences
     found = difference(run(whole), run(whole[::-1] ** 2), paired=False)
