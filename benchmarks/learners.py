@@ -15,6 +15,7 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from benchmarks.scene_difficulty.pool import run_tasks
 from benchmarks.training_pages import chosen, numbers, options_of, run, with_range, write_page
@@ -145,7 +146,9 @@ def draw(path: Path, rows: list[Row], network: NetworkConfig) -> None:
                 if row["model"] == MODEL and is_profiles(row, network):
                     axes.plot(float(row["train_cpu_s"]), float(row[measure]), **RING)
             axes.set(xscale="log", xlabel="processor seconds to train", ylabel=f"median {title}")
+            axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
             axes.xaxis.set_major_formatter("{x:g}")
+            axes.xaxis.set_minor_formatter(NullFormatter())
             axes.grid(color="0.93", which="both")
         figure.legend(handles=handles(), loc="outside right center")
         figure.savefig(temporary, dpi=130)

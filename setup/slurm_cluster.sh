@@ -71,12 +71,12 @@ ReturnToService=2
 # Finished jobs are listed for as long: what Snakemake asks for when there is no accounting.
 MinJobAge=600
 GresTypes=gpu
-NodeName=$host NodeAddr=127.0.0.1 $(grep -oE '(CPUs|RealMemory)=[0-9]+' <<<"$hardware" | xargs) Gres=gpu:1
+NodeName=$host NodeAddr=127.0.0.1 $(grep -oE '(CPUs|RealMemory)=[0-9]+' <<<"$hardware" | xargs) Gres=gpu:2
 PartitionName=cpu Nodes=$host Default=YES MaxTime=INFINITE
 PartitionName=gpu Nodes=$host MaxTime=INFINITE
 CONF
-    # A GPU by name only: requests for one are granted, and nothing is there to compute on.
-    echo "Name=gpu File=/dev/null" >"$dir/gres.conf"
+    # GPUs by name only: requests for one are granted, and nothing is there to compute on.
+    printf 'Name=gpu File=%s\n' /dev/null /dev/zero >"$dir/gres.conf"
 }
 
 # A link that an earlier cluster of this script did not come to remove.
@@ -106,14 +106,17 @@ stop_daemon() {
 }
 
 # The node's daemon, those of its steps, and all that its jobs run, which their environment tells.
+# They are stopped first: a process that sees its child die tidies up, which nothing does in a crash.
 kill_node() {
-    local process
+    local signal process
     stop_daemon slurmd KILL
-    for process in /proc/[0-9]*; do
-        if grep -qzsx "SLURM_CLUSTER_NAME=$cluster" "$process/environ" ||
-            { grep -qsx slurmstepd "$process/comm" && grep -qzsxF "SLURM_CONF=$SLURM_CONF" "$process/environ"; }; then
-            kill -KILL "${process#/proc/}" 2>/dev/null || true
-        fi
+    for signal in STOP KILL; do
+        for process in /proc/[0-9]*; do
+            if grep -qzsx "SLURM_CLUSTER_NAME=$cluster" "$process/environ" ||
+                { grep -qsx slurmstepd "$process/comm" && grep -qzsxF "SLURM_CONF=$SLURM_CONF" "$process/environ"; }; then
+                kill "-$signal" "${process#/proc/}" 2>/dev/null || true
+            fi
+        done
     done
 }
 

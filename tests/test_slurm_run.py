@@ -77,12 +77,25 @@ def test_a_table_that_differs_or_lacks_is_named(
     assert "| of these, tables | 1 | 0 equal |" in text
 
 
+@pytest.mark.parametrize(("error_m", "differing"), [("0.02", 0), ("0.03", 1)])
+def test_times_in_a_table_may_differ_and_errors_may_not(
+    trees: tuple[Path, Path], error_m: str, differing: int
+) -> None:
+    name = "tables/label_error.csv"
+    (trees[0] / name).write_text("position_m,seconds_per_frame,peak_memory_mb\n0.02,0.1,160\n")
+    (trees[1] / name).write_text(
+        f"position_m,seconds_per_frame,peak_memory_mb\n{error_m},0.2,170\n"
+    )
+    assert len(compare(*trees).differing) == differing
+
+
 def test_the_dry_run_is_told_in_its_own_numbers() -> None:
     rules = ("render_packed", "sfm", "rgbd", "estimate", "posegraph", "train", "total")
     jobs = dict(zip(rules, (215, 34, 34, 34, 68, 125, 718), strict=True))
-    (line,) = filter(None, plan_lines(DryRun(jobs, 20.0, 8.0, 151.0)))
+    (line,) = filter(None, plan_lines(DryRun(jobs, 20.0, 8.0, 151.0, 4.0, 2)))
     assert "plans 718 jobs, of them 215 `render_packed`, 34 `sfm`" in line
-    assert line.endswith("in 20 s (8.0 s of a processor) and 151 MB.")
+    assert "in 20 s (8.0 s of a processor, 2 of which were shared by 4.0 processes)" in line
+    assert line.endswith("and 151 MB.")
 
 
 @pytest.mark.skipif(

@@ -18,11 +18,11 @@ CLUSTER = ROOT / "setup/slurm_cluster.sh"
 LOCAL = ("--cores", "2")
 WHAT = ("--configfile", "config/smoke.yaml")
 # The profile as it is, but: there is no accounting to ask, a small cluster answers at once, and
-# trainings of seconds go many to a job.
+# jobs of seconds go so many to a group that there are two groups, one for each core.
 SLURM = (
     *("--profile", "workflow/profiles/slurm", "--slurm-status-command", "squeue"),
     *("--slurm-init-seconds-before-status-checks", "5", "--latency-wait", "5"),
-    *("--group-components", "fits=20", "plans=5", "chains=3", "shards=9", "batches=10"),
+    *("--group-components", "fits=20", "plans=3", "chains=2", "shards=5", "batches=5"),
 )
 LOOK_EVERY_S = 2.0
 NODE_GONE_S = 300.0
@@ -56,12 +56,16 @@ class DryRun:
         wall_s: from start to end.
         cpu_s: processor time.
         peak_mb: largest resident memory.
+        load: processes that wanted a processor in the last minute, itself among them.
+        processors: of the machine.
     """
 
     jobs: dict[str, int]
     wall_s: float
     cpu_s: float
     peak_mb: float
+    load: float
+    processors: int
 
 
 def dry_run(work: Path) -> DryRun:
@@ -78,7 +82,8 @@ def dry_run(work: Path) -> DryRun:
         raise InputError(f"the dry run of config/paper.yaml failed; start it alone: {command}")
     jobs = {name: int(n) for name, n in re.findall(r"^(\w+) +(\d+)$", text, re.MULTILINE)}
     cpu_s = usage.ru_utime + usage.ru_stime
-    return DryRun(jobs, time.monotonic() - begin, cpu_s, usage.ru_maxrss / 1024)
+    wall_s, processors = time.monotonic() - begin, os.cpu_count() or 1
+    return DryRun(jobs, wall_s, cpu_s, usage.ru_maxrss / 1024, os.getloadavg()[0], processors)
 
 
 def snakemake(work: Path, name: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
