@@ -53,8 +53,8 @@ def _sentence(error: InputError | MemoryError | OSError) -> InputError:
         return error
     if isinstance(error, MemoryError):
         return InputError(
-            f"out of memory ({error or 'no more is to be had'}); start again with fewer jobs at"
-            " once (--cores), or on a machine with more"
+            f"out of memory ({str(error) or 'no more is to be had'}); start again with fewer jobs"
+            " at once (--cores), or on a machine with more"
         )
     where = f"{error.filename}: " if error.filename else ""
     return InputError(f"{where}{error.strerror or error}; mend that and start again")

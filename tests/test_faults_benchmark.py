@@ -64,6 +64,23 @@ def test_only_what_is_promised_and_differs_is_damaged(tmp_path: Path) -> None:
     assert missing(calm, {}) == sorted(calm)
 
 
+def timed_tree(root: Path, rmse: str, seconds: str) -> dict[str, str]:
+    """Hashes of results of which an error or a time is another one."""
+    tables = {
+        "tables/label_error.csv": f"rmse,seconds_per_frame,peak_memory_mb\n{rmse},{seconds},9\n",
+        "tables/label_error.tex": f"SfM & {rmse} m & {seconds} & 9 MB\n",
+        "claims.csv": f"id,measured\nC13,{rmse}\nC14,{seconds} frames/s\nC15,1\n",
+    }
+    return tree(root, **tables)
+
+
+def test_times_in_a_table_may_differ_and_errors_may_not(tmp_path: Path) -> None:
+    calm = timed_tree(tmp_path / "calm", "0.5", "2")
+    assert damaged(calm, timed_tree(tmp_path / "slower", "0.5", "3")) == []
+    wrong = damaged(calm, timed_tree(tmp_path / "wrong", "0.6", "2"))
+    assert wrong == ["claims.csv", "tables/label_error.csv", "tables/label_error.tex"]
+
+
 def test_a_stage_counts_its_files_and_says_why_they_differ() -> None:
     calm = {"logs/a.log": "1", "runs/r/6k/synfeal/scratch/posenet/seed0/model.pt": "2"}
     others = Others(again=calm | {"logs/a.log": "5"}, one_core=dict.fromkeys(calm, "6"))

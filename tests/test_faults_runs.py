@@ -142,7 +142,7 @@ def test_a_job_tells_of_too_little_memory_in_one_line(tmp_path: Path) -> None:
     )
     assert run.returncode == 1
     (line,) = run.stderr.splitlines()
-    assert line.startswith("error: out of memory (")
+    assert line.startswith("error: out of memory (no more is to be had); ")
     assert "--cores" in line
     assert "MemoryError" in log.read_text()
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from benchmarks.workflow_faults.session import (
     HARD_CASES,
-    LONG,
+    PACKED,
     RESULTS,
+    SPEED,
     Ended,
     copy_repository,
     run_until,
@@ -22,9 +23,9 @@ from synfeal.run_lock import unfinished
 
 CPU_S = (5.0, 36.0)  # a run is killed after so many seconds of processor time, uniformly drawn
 UNDISTURBED = float("inf")
-# A job that takes longer than the time between two kills never ends: after so many kills the long
+# A job that takes longer than the time between two kills never ends. So after this many kills long
 # ones are left in peace once, and runs that begin anew keep what they made.
-KILLS_OF_LONG_JOBS = 4
+LEFT_IN_PEACE = {4: ("scenes", *SPEED, HARD_CASES), 14: PACKED}
 
 
 @dataclass(frozen=True)
@@ -86,8 +87,8 @@ def shower(work: Path, kills: int, cores: int, seed: int, out: Path) -> list[Kil
     while n_kills < kills or not complete:
         if complete:
             begin_anew(place)
-        if n_kills == KILLS_OF_LONG_JOBS:
-            run_until(place, cores, UNDISTURBED, LONG)
+        if n_kills in LEFT_IN_PEACE:
+            run_until(place, cores, UNDISTURBED, LEFT_IN_PEACE[n_kills])
         cpu_s = float(moments.uniform(*CPU_S)) if n_kills < kills else UNDISTURBED
         ended = run_until(place, cores, cpu_s)
         n_kills += ended.status is None
@@ -111,7 +112,7 @@ def undisturbed(place: Path, cores: int) -> Path:
 
 def begin_anew(place: Path) -> None:
     """Remove the results of a copy but for what long jobs made."""
-    kept = (place / RESULTS / "scenes", place / HARD_CASES)
+    kept = (place / RESULTS / "scenes", place / RESULTS / "frames", place / HARD_CASES)
     for path in sorted((place / RESULTS).rglob("*"), reverse=True):
         if any(keep == path or keep in path.parents for keep in kept):
             continue
