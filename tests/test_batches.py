@@ -265,7 +265,7 @@ def test_trajectory_file_round_trip(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "cannot be read"),
+        ("", "header must be .*, found ''"),
         ("frame,tx\n0,1\n", "header must be"),
         ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n0,1,2\n", "needs 9 numbers"),
         ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n0,1,nan,0,0,1,0,0,0\n", "row 2"),

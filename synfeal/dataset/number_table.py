@@ -28,8 +28,8 @@ def read_numbers(path: Path, header: str, kind: str, finite: bool = True) -> NDA
     """
     n_columns = header.count(",") + 1
     try:
-        found, *lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError, ValueError) as error:
+        found, *lines = path.read_text(encoding="utf-8").splitlines() or [""]
+    except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as a {kind} ({error})") from None
     if found != header:
         raise InputError(f"{path}: header must be '{header}', found '{found[:80]}'")
