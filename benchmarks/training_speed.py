@@ -27,9 +27,9 @@ from synfeal.files import atomic_path
 
 SIZES = ((128, 96), (640, 480))
 WORKERS = (0, 1)
-ROUNDS, STEPS = 5, 30
+ROUNDS, STEPS = 5, 10
 # A row of the history is the loss of a single step where there are fewer than 100 of them.
-COMPARED_STEPS = 99
+COMPARED_STEPS = 40
 # Weights that start so far off, the spacing of float32, show what rounding makes of a training.
 NUDGE = 2.0**-23
 # Adam makes steps of one size of gradients that are next to nothing, whose sign is rounding: at the
