@@ -85,9 +85,11 @@ def test_a_stage_counts_its_files_and_says_why_they_differ() -> None:
     calm = {"logs/a.log": "1", "runs/r/6k/synfeal/scratch/posenet/seed0/model.pt": "2"}
     others = Others(again=calm | {"logs/a.log": "5"}, one_core=dict.fromkeys(calm, "6"))
     assert stage_of("runs/r/6k/synfeal/scratch/posenet/seed0/model.pt") == "trained weights"
-    trained = ("trained weights", 1, 1, 0, 1, "model.pt", "NOT EXPECTED")
+    trained = ("trained weights", 1, 1, 1, 0, 1, "model.pt", "NOT EXPECTED")
     assert row_of("trained weights", calm, others) == trained
-    assert row_of("what jobs took", calm, others)[1:4] == (1, 0, 0)
+    assert row_of("what jobs took", calm, others)[1:5] == (1, 0, 1, 0)
+    not_made = row_of("trained weights", calm, others._replace(one_core={}))
+    assert not_made == ("trained weights", 1, 1, 0, 0, 1, "", "")
 
 
 def test_a_run_begins_anew_but_for_what_takes_long(tmp_path: Path) -> None:
