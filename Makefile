@@ -28,7 +28,7 @@ plan: smoke  ## what paper and gpu cost, and what such plans are worth (results/
 	mkdir -p results/benchmarks/smoke && cp results/smoke/benchmarks.csv results/benchmarks/smoke/
 	$(BIN)/synfeal plan --profile paper --cores 16 64 --gpus 1 4 --csv results/benchmarks/plan_paper.csv
 	$(BIN)/synfeal plan --profile gpu --cores 16 --gpus 1 --csv results/benchmarks/plan_gpu.csv
-	$(BIN)/synfeal plan --measured results/benchmarks/smoke --compare results/mini --time-steps \
+	$(BIN)/synfeal plan --measured results/benchmarks/smoke --compare results/mini \
 	  --csv results/benchmarks/plan_check.csv
 
 test: check  ## static checks and the test suite
