@@ -39,7 +39,7 @@ def test_first_frames_are_a_prefix_and_too_many_are_refused() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "cannot be read"),
+        ("", "header must be"),
         ("a,b\n1,2\n", "header"),
         (f"{HEADER}\n0,0,1,2,3,1,0,0\n", "9 numbers"),
         (f"{HEADER}\n0,0,1,2,x,1,0,0,0\n", "x"),
