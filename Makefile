@@ -1,5 +1,6 @@
 # `make help` lists the targets.
 PYTHON ?= python3
+PROFILE ?= mini
 CORES ?= 2
 LOCK ?= requirements.lock
 VENV := .venv
@@ -9,7 +10,7 @@ SLURM_INSTALLED := $(VENV)/installed-slurm
 QUALITY := $(VENV)/quality
 export PYTHONHASHSEED := 0
 
-.PHONY: help reproduce smoke publish plan test test-slurm coverage mutate check format lock clean
+.PHONY: help reproduce smoke publish archive plan test test-slurm coverage mutate check format lock clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -21,14 +22,22 @@ reproduce: $(INSTALLED)  ## install everything, then make every table (results/m
 smoke: $(INSTALLED)  ## every rule and every model at toy size (results/smoke)
 	$(BIN)/snakemake --cores $(CORES) --configfile config/smoke.yaml -- all
 
-publish: reproduce  ## make the tracked results anew, and the read-me's numbers from them
+publish: $(INSTALLED)  ## track what PROFILE's run made (results/published), and the pages' numbers from it
+	$(BIN)/python -m synfeal.report.publish --profile $(PROFILE)
 	$(BIN)/python -m synfeal.report.readme
+
+archive: $(INSTALLED)  ## PROFILE's tables, figures and report.html in one file, for a release
+	mkdir -p build
+	tar --create --gzip --file build/results-$(PROFILE).tar.gz --directory results \
+	  --owner 0 --group 0 --sort name --exclude '.snakemake*' \
+	  $(addprefix $(PROFILE)/,report.html report.tex summary.md claims.csv provenance.json benchmarks.csv tables figures)
+	@echo build/results-$(PROFILE).tar.gz
 
 plan: smoke  ## what paper and gpu cost, and what such plans are worth (results/benchmarks)
 	mkdir -p results/benchmarks/smoke && cp results/smoke/benchmarks.csv results/benchmarks/smoke/
 	$(BIN)/synfeal plan --profile paper --cores 16 64 --gpus 1 4 --csv results/benchmarks/plan_paper.csv
 	$(BIN)/synfeal plan --profile gpu --cores 16 --gpus 1 --csv results/benchmarks/plan_gpu.csv
-	$(BIN)/synfeal plan --measured results/benchmarks/smoke --compare results/mini \
+	$(BIN)/synfeal plan --measured results/benchmarks/smoke --compare results/published/mini \
 	  --csv results/benchmarks/plan_check.csv
 
 test: check  ## static checks and the test suite

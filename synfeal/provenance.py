@@ -56,7 +56,7 @@ def config_hash(model: BaseModel) -> str:
 def git_commit(folder: Path) -> str:
     """Commit checked out around ``folder``, with ``-dirty`` after it when tracked files changed.
 
-    Changed results do not count: a run that makes tracked results anew must change them.
+    Changed results do not count: publishing one run must not mark the next one.
     ``unknown`` outside a repository and without git: an installed package has no commit.
     """
     commit = _git(folder, "rev-parse", "HEAD")

@@ -294,7 +294,7 @@ def test_a_step_is_trained_and_timed(smoke):
 
 def test_steps_that_are_timed_tell_what_a_small_run_does_not(smoke):
     """Mini is predicted from a smoke run whose jobs are each 15 % off, one way or the other."""
-    mini, _ = read_run(Path("results/mini"))
+    mini, _ = read_run(Path("results/published/mini"))
     laws = fit_laws(mini)
     jobs = [job for job in known_jobs(*smoke) if job.law in laws]
     for seed in range(4):

@@ -43,9 +43,9 @@ OPTIONS: Options = (
         {
             "type": Path,
             "nargs": "+",
-            "default": [Path("results/mini")],
+            "default": [Path("results/published/mini")],
             "metavar": "RESULTS",
-            "help": "runs to predict from (results/mini)",
+            "help": "runs to predict from (results/published/mini)",
         },
     ),
     (

@@ -22,7 +22,7 @@ from synfeal.report.layouts import SOURCES, TITLES, scene_title
 from synfeal.report.results import read_table, read_text
 
 README = Path("README.md")
-ROOT = Path("results/mini")
+ROOT = Path("results/published/mini")
 DIFFICULTY = Path("results/benchmarks/scene_difficulty")
 Row = Mapping[str, str]
 
@@ -94,7 +94,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "labels": labels_table,
     "assistance": assistance,
     "claims": claims,
-    "difficulty": lambda root: difficulty(root.parent / "benchmarks" / "scene_difficulty"),
+    "difficulty": lambda root: difficulty(root.parent.parent / "benchmarks" / "scene_difficulty"),
 }
 
 
