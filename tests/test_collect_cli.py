@@ -97,7 +97,7 @@ def test_box_confines_the_camera(mesh: Path, tmp_path: Path) -> None:
         (["--frames", "3", "--spacing", "nan"], ["frame_spacing_m"]),
         (["--frames", "3", "--fov", "180"], ["horizontal_fov_deg"]),
         (["--frames", "3", "--box", "1", "0", "0", "1", "0", "1"], ["sampling_box", "x"]),
-        (["--frames", "3", "--unit-m", "0.001"], ["min_view_distance_m", "unit_m"]),
+        (["--frames", "3", "--unit-m", "0.001"], ["near_m", "unit-m"]),
         (["--frames", "3", "--box", "90", "91", "0", "1", "0", "1"], ["outside", "unit_m"]),
     ],
 )

@@ -14,6 +14,7 @@ from synfeal.planning.coverage import (
     plan_coverage,
     voxel_centres,
 )
+from synfeal.planning.empty_pixels import COLUMNS, ROWS, empty_pixels, empty_shares
 from synfeal.planning.path import poses_of
 from synfeal.planning.seen_surface import (
     FARTHEST_M,
@@ -34,6 +35,7 @@ from tests.empty_room import (
     inside_poses,
     mesh_of,
     pose_vectors,
+    wall_distance_m,
     walls,
 )
 from tests.property_support import about, directions, few, fewer, poses, seeds, table_of, vectors
@@ -153,3 +155,27 @@ def test_a_point_is_in_the_image_if_its_pixel_is_and_it_is_near_enough(pose, pix
     expected = all(0 < value < 64 for value in pixel) and distance_m < FARTHEST_M
     points = np.array([pose[:3, :3] @ p + pose[:3, 3] for p in (in_cam, -in_cam, 0.04 * way)])
     assert in_image(SQUARE, pose, points).tolist() == [expected, False, False]
+
+
+@about(empty_shares, empty_pixels)
+@few
+@given(seeds, st.integers(1, 20), st.floats(0.5, 5.0))
+def test_what_is_beyond_the_far_plane_is_empty(seed, count, far_m):
+    vectors = inside_poses(seed, count)
+    plan = table_of(poses_of(vectors))
+    near = SQUARE.model_copy(update={"near_m": 0.01})  # nearer than any wall
+    assert (empty_shares(EMPTY, plan.world_from_cam, near) == 0.0).all()
+    camera = near.model_copy(update={"far_m": far_m})
+    x, y = np.meshgrid((np.arange(COLUMNS) + 0.5) / COLUMNS, (np.arange(ROWS) + 0.5) / ROWS)
+    ray = np.stack([2 * x - 1, 2 * y - 1, np.ones_like(x)], axis=-1).reshape(-1, 3)
+    expected = []
+    for pose in plan.world_from_cam:
+        ways = ray @ pose[:3, :3].T
+        depth_m = wall_distance_m(np.tile(pose[:3, 3], (len(ways), 1)), ways)
+        expected.append(np.mean(depth_m > far_m))
+    shares = empty_shares(EMPTY, plan.world_from_cam, camera)
+    np.testing.assert_allclose(shares, expected, atol=2.5 / (COLUMNS * ROWS))
+    found = empty_pixels(EMPTY, plan, camera)
+    assert found.share == pytest.approx(shares.mean(), abs=1e-6)
+    assert found.worst_frame_share == pytest.approx(shares.max(), abs=1e-6)
+    assert found.mostly_empty_frames == pytest.approx(np.mean(shares > 0.5), abs=1e-6)

@@ -84,15 +84,19 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def coverage_text(coverage: Mapping[str, Any]) -> str:
-    """What the training frames cover, in a line, from ``coverage.json``."""
-    space, surface = coverage["free_space"], coverage["surface"]
+    """What the training frames cover and how much of them is empty, from ``coverage.json``."""
+    space, surface, empty = coverage["free_space"], coverage["surface"], coverage["empty_pixels"]
+    pixels = (
+        f"empty pixels: {empty['share']:.1%}, {empty['worst_frame_share']:.0%} of the emptiest"
+        f" frame; {empty['mostly_empty_frames']:.1%} of the frames are more than half empty"
+    )
     if space["positions_share"] is None:
-        return "coverage: no free space found in the sampling box"
+        return f"coverage: no free space found in the sampling box\n{pixels}"
     return (
         f"coverage: {space['positions_share']:.0%} of the free space,"
         f" {space['headings_share']:.0%} of its headings;"
         f" {surface['seen_share']:.0%} of the visible surface,"
-        f" {surface['seen_often_share']:.0%} three times or more"
+        f" {surface['seen_often_share']:.0%} three times or more\n{pixels}"
     )
 
 

@@ -16,6 +16,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.dataset.blank import refuse_blank, refuse_invisible
 from synfeal.dataset.collect_job import CollectJob, record_of
 from synfeal.dataset.directories import refuse_existing, writing_to
 from synfeal.dataset.finish import archive_whole, complete
@@ -107,10 +108,16 @@ def _kept(part: Path) -> str:
 
 
 def plan_splits(mesh: TexturedMesh, job: CollectJob) -> Plans:
-    """Plans of the splits that have frames, each with random numbers of its own."""
-    box = sampling_box_of(job.scene, mesh.bounds_m, str(job.scene.path))
+    """Plans of the splits that have frames, each with random numbers of its own.
+
+    Raises:
+        InputError: nothing can be planned, or images would be blank.
+    """
+    name = str(job.scene.path)
+    refuse_invisible(mesh, job.camera, name)
     caster = RayCaster(*mesh.merged())
-    return {
+    box = sampling_box_of(job.scene, mesh.bounds_m, name)
+    plans = {
         split: plan_split(
             caster,
             box,
@@ -122,6 +129,8 @@ def plan_splits(mesh: TexturedMesh, job: CollectJob) -> Plans:
         )
         for split, count in job.counts.items()
     }
+    refuse_blank(caster, plans, job.camera, name)
+    return plans
 
 
 def record_coverage(data: Path, mesh: TexturedMesh, job: CollectJob, plans: Plans) -> None:

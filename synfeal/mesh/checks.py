@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
 
+ROUNDING = 1.0  # grey levels
+
 
 def check_mesh(mesh: TexturedMesh, path: Path) -> None:
     """Faces, finite coordinates and some colour.
@@ -50,6 +52,23 @@ def has_colour(mesh: TexturedMesh) -> bool:
     if any(part.texture is not None or part.vertex_rgb is not None for part in mesh.parts):
         return True
     return len({part.base_color.tobytes() for part in mesh.parts}) > 1
+
+
+def shows_one_colour(mesh: TexturedMesh) -> bool:
+    """Whether every image of the mesh would be of one colour, whatever textures it has."""
+    colours = np.concatenate([_extreme_colours(part) for part in mesh.parts])
+    return bool(np.ptp(colours, axis=0).max() <= ROUNDING)
+
+
+def _extreme_colours(part: MeshPart) -> NDArray[np.float64]:
+    """The least and the greatest value (2, 3) of each channel that a part shows."""
+    shown = np.full((1, 3), 255, np.uint8)
+    if part.texture is not None:
+        shown = part.texture[..., :3].reshape(-1, 3)
+    elif part.vertex_rgb is not None:
+        shown = part.vertex_rgb
+    extremes = np.stack([shown.min(axis=0), shown.max(axis=0)])
+    return np.asarray(extremes * (part.base_color[:3] / 255.0))
 
 
 def check_sampling_box(box: NDArray[np.float64], bounds_m: NDArray[np.float64], name: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from synfeal.errors import InputError
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, load_collision_mesh
 from synfeal.planning.connected import ConnectedSpace, connected_space
+from synfeal.planning.empty_pixels import MOSTLY, empty_pixels
 from synfeal.planning.plan import sampling_box_of
 from synfeal.planning.sampling import pose_bounds
 from synfeal.planning.seen_surface import FARTHEST_M, OFTEN, seen_surface, shown_frames
@@ -38,6 +40,9 @@ DEFINITIONS = {
     "seen_share": "share of the visible surface in at least one frame: projected into the image,"
     " not hidden, no farther than farthest_m; of frames_looked_at frames spread evenly",
     "seen_often_share": f"the same, in at least {OFTEN} of these frames",
+    "empty_pixels": "rays of frames_looked_at frames that meet nothing between the near and the"
+    " far plane: share of all, of those of the emptiest frame, and share of the frames of which"
+    f" more than {MOSTLY:.0%} is empty",
     "surface_points": "points, uniform over the surface, the shares of the surface are counted on",
 }
 
@@ -83,6 +88,7 @@ def plan_coverage(
             "seen_share": counts.seen / visible,
             "seen_often_share": counts.seen_often / visible,
         },
+        "empty_pixels": asdict(empty_pixels(caster, plan, camera)),
         "definitions": DEFINITIONS,
     }
 

@@ -1,0 +1,130 @@
+"""Nothing blank in silence: what would show nothing is refused or said before it is rendered."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+
+from synfeal.cli import main
+from synfeal.config.models import CameraConfig, CollectionConfig, RenderConfig, SceneConfig
+from synfeal.mesh.load import load_mesh
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.rays import RayCaster
+from synfeal.mesh.save import save_glb
+from synfeal.planning.empty_pixels import empty_shares
+from synfeal.planning.plan import plan_split
+from synfeal.render import open_renderer
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
+
+CAMERA = CameraConfig(width=64, height=48)
+SMALL = ("--frames", "30", "--spacing", "0.8", "--width", "64", "--height", "48")
+
+
+def box_room(scale: float = 1.0) -> trimesh.Trimesh:
+    """A room of 6 x 5 x 3 units, times ``scale``."""
+    return trimesh.creation.box((6.0, 5.0, 3.0)).subdivide().subdivide().apply_scale(scale)
+
+
+def save(path: Path, mesh: trimesh.Trimesh, rgb: NDArray[np.uint8] | None = None) -> Path:
+    if rgb is None:
+        rgb = np.random.default_rng(0).integers(0, 256, (len(mesh.vertices), 3), np.uint8)
+    part = MeshPart("room", np.asarray(mesh.vertices), np.asarray(mesh.faces), vertex_rgb=rgb)
+    save_glb(path, TexturedMesh((part,)))
+    return path
+
+
+def millimetres(folder: Path) -> Path:
+    return save(folder / "room.glb", box_room(1000.0))
+
+
+def kilometres(folder: Path) -> Path:
+    return save(folder / "room.glb", box_room(0.001))
+
+
+def one_grey(folder: Path) -> Path:
+    return save(
+        folder / "room.glb", box_room(), np.full((len(box_room().vertices), 3), 99, np.uint8)
+    )
+
+
+def obj_without_its_mtl(folder: Path) -> Path:
+    mesh = box_room()
+    lines = ["mtllib room.mtl", *("v {} {} {}".format(*v) for v in mesh.vertices)]
+    lines += ["vt {} {}".format(*v[:2]) for v in mesh.vertices]
+    faces = [" ".join(["f", *(f"{i + 1}/{i + 1}" for i in face)]) for face in mesh.faces]
+    half = len(faces) // 2
+    lines += ["usemtl one", *faces[:half], "usemtl two", *faces[half:]]
+    (folder / "room.obj").write_text("\n".join(lines) + "\n")
+    return folder / "room.obj"
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (millimetres, ["room.glb", "100% of the pixels", "far_m (100 m)", "--unit-m"]),
+        (kilometres, ["room.glb", "near_m (0.05 m)", "--unit-m"]),
+        (one_grey, ["room.glb", "one colour"]),
+        (obj_without_its_mtl, ["room.obj", "one colour", ".mtl"]),
+    ],
+)
+def test_what_is_certainly_blank_is_refused_before_rendering(
+    make: Callable[[Path], Path],
+    words: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    mesh = make(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    assert main(["collect", "--mesh", str(mesh), "--out", str(tmp_path / "set"), *SMALL]) == 1
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert all(word in line for word in words), line
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def open_room() -> trimesh.Trimesh:
+    """Neither ceiling nor one of the walls."""
+    mesh = box_room()
+    mesh.update_faces(mesh.face_normals[:, [0, 2]].max(axis=1) < 0.5)
+    return mesh
+
+
+@pytest.mark.parametrize(("mesh", "warns"), [(box_room(), False), (open_room(), True)])
+def test_collect_always_says_how_many_pixels_are_empty(
+    mesh: trimesh.Trimesh,
+    warns: bool,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    path, out = save(tmp_path / "room.glb", mesh), tmp_path / "set"
+    with caplog.at_level(logging.WARNING):
+        assert main(["collect", "--mesh", str(path), "--out", str(out), *SMALL]) == 0
+    share = json.loads((out / "coverage.json").read_text())["train"]["empty_pixels"]["share"]
+    assert (share > 0.1) == warns
+    assert f"empty pixels: {share:.1%}" in capsys.readouterr().out
+    assert any("will be empty" in line for line in caplog.messages) == warns
+
+
+def test_what_is_predicted_empty_is_what_is_rendered_empty(tmp_path: Path) -> None:
+    """Depth is infinite where nothing was hit: another code than the one that predicts."""
+    mesh = load_mesh(save(tmp_path / "room.glb", open_room()))
+    caster = RayCaster(*mesh.merged())
+    scene = SceneConfig.model_validate({"source": "mesh", "path": "room.glb"})
+    spaced = CollectionConfig(frame_spacing_m=0.5)
+    rng = np.random.default_rng(0)
+    plan = plan_split(caster, mesh.bounds_m, scene, spaced, 20, rng)
+    predicted = empty_shares(caster, plan.world_from_cam, CAMERA)
+    with open_renderer(mesh, CAMERA, RenderConfig(backend="raycast")) as renderer:
+        rendered = [np.isinf(renderer.render_rgbd(pose)[1]).mean() for pose in plan.world_from_cam]
+    assert np.ptp(rendered) > 0.2
+    np.testing.assert_allclose(predicted, rendered, atol=0.05)
+    assert predicted.mean() == pytest.approx(np.mean(rendered), abs=0.01)
