@@ -1,0 +1,120 @@
+"""One training run: what it takes, and how wrong its predictions are on other frames."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+import torch
+from pydantic import Field, TypeAdapter, model_validator
+
+from baselines.localizers.names import backbone_of
+from baselines.training.checkpoint import read_checkpoint
+from baselines.training.data import read_images
+from baselines.training.loop import train_localizer
+from baselines.training.predict import BATCH, predict, predict_poses
+from baselines.training.protocol import PROTOCOLS, Protocol
+from baselines.training.score import pose_errors
+from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig, Strict, TrainingConfig
+from synfeal.dataset.pose_table import read_pose_table
+from synfeal.seeds import seed_of
+
+# Calls of a prediction that is timed; the first, which builds what is built on demand, is left out.
+PREDICTIONS = 11
+PROTOCOL = TypeAdapter(Protocol)
+
+
+class Case(Strict):
+    """What is trained on what."""
+
+    model: ModelName = Field(description="the localizer")
+    train_frames: Path = Field(description="packed frames to learn from")
+    train_labels: Path = Field(description="pose table of them, or of the first of them")
+    test_frames: Path = Field(description="packed frames that are held out")
+    test_labels: Path = Field(description="pose table of them")
+    weights: str | None = Field(
+        None, description="of the backbone, whose name stands for {backbone}; none: from scratch"
+    )
+    samples_seen: int = Field(description="images shown in all")
+    protocol: dict[str, str] = Field(
+        default_factory=dict, description="parts exchanged in the protocol of `training`"
+    )
+    network: NetworkConfig = Field(description="shape of the network")
+    localizers: dict[ModelName, LocalizerConfig] = Field(description="settings of each localizer")
+    training: TrainingConfig = Field(description="settings of all")
+
+    @model_validator(mode="after")
+    def _check_protocol(self) -> Self:
+        _ = self.exchanged
+        return self
+
+    @property
+    def start(self) -> Path | None:
+        """The file of the weights, if any."""
+        if self.weights is None:
+            return None
+        return Path(self.weights.replace("{backbone}", backbone_of(self.model, self.network)))
+
+    @property
+    def exchanged(self) -> Protocol:
+        """The protocol with its parts exchanged."""
+        parts = PROTOCOLS[self.training.protocol]._asdict()
+        return PROTOCOL.validate_python({**parts, **self.protocol})
+
+
+def run(case: Case, seed: int) -> dict[str, float]:
+    """Train, predict and score; the same seed means the same initial weights and held-out paths.
+
+    ``train_cpu_s`` and ``train_wall_s`` are of the training alone, without imports;
+    ``predict_ms_1`` and ``predict_ms_100`` are wall-clock milliseconds per image, one by one and in
+    batches; ``position_m`` and ``orientation_deg`` are medians over the test frames, against their
+    labels; ``failed`` counts predictions that are no pose.
+
+    Raises:
+        InputError: a file cannot be used.
+    """
+    with tempfile.TemporaryDirectory(prefix="training-") as folder:
+        model, predictions = Path(folder) / "model.pt", Path(folder) / "predictions.csv"
+        wall_s, cpu_s = time.perf_counter(), time.process_time()
+        train_localizer(
+            case.model,
+            case.train_frames,
+            case.train_labels,
+            case.network,
+            case.localizers[case.model],
+            case.training,
+            case.samples_seen,
+            case.start,
+            seed_of(seed, "train"),
+            model,
+            Path(folder) / "history.csv",
+            test=(case.test_frames, case.test_labels),
+            protocol=case.exchanged,
+        )
+        wall_s, cpu_s = time.perf_counter() - wall_s, time.process_time() - cpu_s
+        predict_poses(model, case.test_frames, case.test_labels, predictions)
+        errors = pose_errors(read_pose_table(predictions), read_pose_table(case.test_labels))
+        one, many = (predict_ms(model, case.test_frames, count) for count in (1, BATCH))
+    return {
+        "train_cpu_s": cpu_s,
+        "train_wall_s": wall_s,
+        "predict_ms_1": one,
+        f"predict_ms_{BATCH}": many,
+        **{name: float(np.median(values)) for name, values in errors.items()},
+        "failed": float(np.isinf(errors["position_m"]).sum()),
+    }
+
+
+def predict_ms(model: Path, frames: Path, count: int) -> float:
+    """Median milliseconds per image of predicting ``count`` images at once."""
+    trained = read_checkpoint(model, torch.device("cpu"))
+    images = read_images(frames, count, trained.description.network.input_px, trained.device)
+    taken_s = []
+    for _ in range(PREDICTIONS):
+        begin = time.perf_counter()
+        predict(trained, images)
+        taken_s.append(time.perf_counter() - begin)
+    return 1e3 * float(np.median(taken_s[1:])) / count

@@ -1,0 +1,101 @@
+"""The page of a benchmark: one table, one picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import pandas as pd
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from benchmarks.sweep import Picture, Sweep
+from synfeal.files import atomic_path
+from synfeal.report.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, RC, SKY, VERMILION
+
+COLORS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
+MARKERS = "os^DvP"
+
+
+def write_page(out: Path, name: str, sweep: Sweep, rows: pd.DataFrame) -> None:
+    """Write ``out.md`` and, where the sweep asks for one, the picture ``out.png``.
+
+    Args:
+        out: path without ending.
+        name: of the sweep on the command line.
+        sweep: the benchmark.
+        rows: all runs; see ``run_missing``.
+    """
+    if sweep.picture is not None:
+        draw(out.with_suffix(".png"), sweep, sweep.picture, rows)
+    environment = Environment(
+        loader=PackageLoader("benchmarks", "."),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        keep_trailing_newline=True,
+    )
+    table = summary(sweep, rows).to_markdown(index=False, disable_numparse=True)
+    picture = out.with_suffix(".png").name if sweep.picture else None
+    text = environment.get_template("page.md.j2").render(
+        sweep=sweep, name=name, table=table, picture=picture
+    )
+    with atomic_path(out.with_suffix(".md")) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def summary(sweep: Sweep, rows: pd.DataFrame) -> pd.DataFrame:
+    """A line for each combination: means over the seeds with the least and the largest, as text."""
+    lines = []
+    for values, runs in rows.groupby(list(sweep.vary), sort=False):
+        line: dict[str, Any] = dict(zip(sweep.vary, values, strict=True))
+        line["seeds"] = str(len(runs))
+        for column, shown in sweep.show.items():
+            line[shown.title] = with_range(runs[column], shown.digits)
+        lines.append(line)
+    return pd.DataFrame(lines)
+
+
+def with_range(values: pd.Series, digits: int) -> str:
+    """Mean, and the least and the largest where there are several."""
+    text = f"{values.mean():.{digits}f}"
+    if len(values) == 1:
+        return text
+    return f"{text} ({values.min():.{digits}f} – {values.max():.{digits}f})"
+
+
+def draw(path: Path, sweep: Sweep, picture: Picture, rows: pd.DataFrame) -> None:
+    """A mark for every run; the means of one group are joined in the order of the table."""
+    axes, titles = list(sweep.vary), {name: shown.title for name, shown in sweep.show.items()}
+    groups = [("", rows)] if picture.group is None else rows.groupby(picture.group, sort=False)
+    joined = [name for name in axes if name != picture.group]
+    with mpl.rc_context(RC), atomic_path(path) as temporary:
+        figure = Figure(figsize=(4.3 * len(picture.y), 3.9), layout="constrained")
+        panels = figure.subplots(1, len(picture.y), squeeze=False)[0]
+        for place, (label, runs) in enumerate(groups):
+            style = {"color": COLORS[place % len(COLORS)], "marker": MARKERS[place // len(COLORS)]}
+            means = runs.groupby(joined or axes, sort=False).mean(numeric_only=True)
+            for panel, measure in zip(panels, picture.y, strict=True):
+                marks = style | {"linestyle": "", "markersize": 3.5, "alpha": 0.5}
+                panel.plot(runs[picture.x], runs[measure], **marks)
+                panel.plot(means[picture.x], means[measure], label=str(label), **style)
+        for panel, measure in zip(panels, picture.y, strict=True):
+            panel.set(xlabel=titles[picture.x], ylabel=titles[measure])
+            panel.grid(color="0.93", which="both")
+            if picture.log:
+                _logarithmic(panel)
+        if picture.group is not None:
+            handles = panels[0].get_legend_handles_labels()
+            figure.legend(*handles, title=picture.group, loc="outside lower center", ncols=4)
+        figure.savefig(temporary, dpi=130)
+
+
+def _logarithmic(panel: Axes) -> None:
+    panel.set(xscale="log", yscale="log")
+    axes = ((panel.xaxis, (1, 2, 3, 5)), (panel.yaxis, (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8)))
+    for axis, marked in axes:
+        axis.set_major_locator(LogLocator(subs=marked))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,151 @@
+"""A benchmark as a table of settings: what is measured, under which values, with which seeds.
+
+A sweep is a YAML file. ``given`` holds what all its runs share, ``vary`` its axes: a list holds the
+values of the setting that the axis is named after, a mapping names groups of changes. Runs are all
+combinations. A setting is a dotted key of what the measure asks for; sections that a profile has
+too, such as ``training``, start from the sweep's ``profile``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from benchmarks.measures import MEASURES, open_measure
+from synfeal.config.load import describe, load_config, merge, read_yaml
+from synfeal.config.models import Strict
+from synfeal.errors import InputError
+
+Value = str | int | float | bool | None
+Changes = dict[str, Value]
+
+RESULTS = "{results}"  # in a path: the directory given on the command line
+
+
+class Shown(Strict):
+    """A column of the page."""
+
+    title: str = Field(description="head of the column, with its unit")
+    digits: int = Field(3, description="after the decimal point")
+
+
+class Picture(Strict):
+    """Measured values against one of them: a panel for each of ``y``, a colour along ``group``."""
+
+    x: str = Field(description="column along the horizontal axis")
+    y: list[str] = Field(description="columns, one panel each")
+    group: str | None = Field(None, description="axis whose values differ in colour, if any")
+    log: bool = Field(True, description="both axes logarithmic")
+
+
+class Sweep(Strict):
+    """One benchmark."""
+
+    title: str = Field(description="of the page")
+    notes: str = Field(description="what a reader of the page has to know")
+    measure: str = Field(description=f"one of {', '.join(MEASURES)}")
+    profile: Path = Field(Path("config/config.yaml"), description="where settings start from")
+    given: Changes = Field(default_factory=dict, description="what all runs share")
+    vary: dict[str, list[Value] | dict[str, Changes]] = Field(description="the axes")
+    seeds: int = Field(1, ge=1, description="runs of each combination, seeds 0, 1, ...")
+    show: dict[str, Shown] = Field(description="measured columns of the page")
+    picture: Picture | None = Field(None, description="what is drawn")
+
+    @model_validator(mode="after")
+    def _check_picture(self) -> Self:
+        if self.picture is not None:
+            for name in (self.picture.x, *self.picture.y):
+                if name not in self.show:
+                    raise ValueError(f"picture: '{name}' must be a column of `show`")
+            if self.picture.group not in (None, *self.vary):
+                raise ValueError(f"picture.group: must be one of {', '.join(self.vary)}")
+        return self
+
+
+class Run(NamedTuple):
+    """One row of the table that is to be measured.
+
+    Attributes:
+        key: value of every axis, and the seed, as the table writes them.
+        case: what the measure takes.
+        settings: digest of the case: a row is taken for this run's only where it is the same.
+    """
+
+    key: dict[str, str]
+    case: Strict
+    settings: str
+
+
+def read_sweep(path: Path) -> Sweep:
+    """Read and check a sweep.
+
+    Raises:
+        InputError: the file cannot be used.
+    """
+    try:
+        sweep = Sweep.model_validate(read_yaml(path))
+    except ValidationError as error:
+        raise InputError(f"{path}: {describe(error, Sweep)}") from None
+    if sweep.measure not in MEASURES:
+        raise InputError(f"{path}: measure: '{sweep.measure}' must be one of {', '.join(MEASURES)}")
+    return sweep
+
+
+def runs_of(sweep: Sweep, results: Path, n_seeds: int) -> list[Run]:
+    """All runs of a sweep, one seed after the other.
+
+    Raises:
+        InputError: a setting does not exist or its value is not allowed.
+    """
+    profile = load_config(sweep.profile).model_dump()
+    return [
+        _run({**axes, "seed": str(seed)}, changes, sweep, profile, results)
+        for seed in range(n_seeds)
+        for axes, changes in _combinations(sweep)
+    ]
+
+
+def _combinations(sweep: Sweep) -> Iterator[tuple[dict[str, str], Changes]]:
+    """The value of every axis as text, and all changes it stands for."""
+    axes = [
+        [(name, str(value), {name: value}) for value in values]
+        if isinstance(values, list)
+        else [(name, label, changes) for label, changes in values.items()]
+        for name, values in sweep.vary.items()
+    ]
+    for chosen in product(*axes):
+        changes = {key: value for *_, change in chosen for key, value in change.items()}
+        yield {name: label for name, label, _ in chosen}, changes
+
+
+def _run(
+    key: dict[str, str], changes: Changes, sweep: Sweep, profile: Mapping[str, Any], results: Path
+) -> Run:
+    model = open_measure(sweep.measure).case
+    raw = {name: profile[name] for name in model.model_fields if name in profile}
+    for name, value in {**sweep.given, **changes}.items():
+        raw = merge(raw, _nested(name, value))
+    try:
+        settings = model.model_validate(raw).model_dump_json()
+        case = model.model_validate(_filled(raw, str(results)))
+    except ValidationError as error:
+        where = ", ".join(f"{name} {value}" for name, value in key.items())
+        raise InputError(f"{sweep.title} ({where}): {describe(error, model)}") from None
+    return Run(key, case, hashlib.sha256(settings.encode()).hexdigest()[:12])
+
+
+def _nested(name: str, value: Value) -> dict[str, Any]:
+    first, _, rest = name.partition(".")
+    return {first: _nested(rest, value) if rest else value}
+
+
+def _filled(value: Any, results: str) -> Any:
+    """Every text in a nested mapping with the directory of results filled in."""
+    if isinstance(value, dict):
+        return {key: _filled(inner, results) for key, inner in value.items()}
+    return value.replace(RESULTS, results) if isinstance(value, str) else value
