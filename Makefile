@@ -8,6 +8,9 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
 SLURM_INSTALLED := $(VENV)/installed-slurm
 QUALITY := $(VENV)/quality
+# One line that stays and the first scores; what Snakemake says is in .snakemake/log, and on the screen
+# where it is called by itself.
+RUN := PYTHONPATH=workflow/plugins $(BIN)/snakemake --cores $(CORES) --logger synfeal --quiet host
 export PYTHONHASHSEED := 0
 
 .PHONY: help reproduce smoke publish archive plan test test-slurm coverage mutate check format lock clean
@@ -17,10 +20,10 @@ help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
 
 reproduce: $(INSTALLED)  ## install everything, then make every table (results/mini)
-	$(BIN)/snakemake --cores $(CORES) all
+	$(RUN) all
 
 smoke: $(INSTALLED)  ## every rule and every model at toy size (results/smoke)
-	$(BIN)/snakemake --cores $(CORES) --configfile config/smoke.yaml -- all
+	$(RUN) --configfile config/smoke.yaml -- all
 
 publish: $(INSTALLED)  ## track what PROFILE's run made (results/published), and the pages' numbers from it
 	$(BIN)/python -m synfeal.report.publish --profile $(PROFILE)

@@ -82,7 +82,9 @@ onstart:
         begin_run(CONFIG.root)
     except InputError as error:
         sys.exit(f"error: {error}")
+    logger.info(None, extra={"plan": run_plan(workflow)})  # for workflow/plugins alone
 
 
 onsuccess:
-    shell("cat {ROOT}/summary.txt 2>/dev/null || true")
+    summary = Path(ROOT, "summary.txt")
+    print(summary.read_text() if summary.exists() else "", end="")

@@ -78,5 +78,12 @@ def alive_sentences(cells: Mapping[str, Sequence[Cell]]) -> list[str]:
 
 def terminal_text(root: Path, summary: Path, findings: Sequence[str]) -> str:
     """What a person sees when the run ends: findings, and where the tables are."""
-    places = [f"Tables:  {root / 'tables'}", f"Figures: {root / 'figures'}", f"Summary: {summary}"]
-    return "\n".join([*(f"- {finding}" for finding in findings), *places]) + "\n"
+    places = {
+        "Report": root / "report.html",
+        "Tables": root / "tables",
+        "Figures": root / "figures",
+        "Summary": summary,
+    }
+    lines = [f"{name + ':':<8} {path}" for name, path in places.items()]
+    lines[0] += "   (one page with everything; open it in a browser)"
+    return "\n".join([*(f"- {finding}" for finding in findings), *lines]) + "\n"

@@ -1,6 +1,9 @@
 # What the rules share: the checked configuration, and which files a target needs. No rules here.
 import sys
 from functools import cache
+from pathlib import Path
+
+from snakemake.logging import logger
 
 from baselines.localizers.names import backbone_of
 from baselines.groundtruth.batches import batches_of
@@ -230,6 +233,18 @@ def batch_facts():
             )
         }
     )
+
+
+def run_plan(workflow):
+    """What this run is going to do, worked out if somebody shows it (workflow/plugins)."""
+    jobs = [job.benchmark for job in workflow.dag.needrun_jobs() if job.benchmark]
+
+    def plan():
+        from synfeal.report.progress.plan import plan_run
+
+        return plan_run(CONFIG, EXPERIMENTS, map(str, jobs), workflow.cores or 1)
+
+    return plan
 
 
 # Of a job that fails or is killed no output stays, and Snakemake does not make a file again that

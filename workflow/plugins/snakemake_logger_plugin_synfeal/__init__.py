@@ -1,0 +1,72 @@
+"""Shows a run as a person wants to see it.
+
+``PYTHONPATH=workflow/plugins snakemake --logger synfeal --cores 2 all``, as ``make`` calls it.
+
+Everything that Snakemake says is in its own log file; here it says what went wrong and no more.
+"""
+
+from logging import WARNING, LogRecord
+from pathlib import Path
+
+from rich.console import Console
+from snakemake_interface_logger_plugins.base import LogHandlerBase
+from snakemake_interface_logger_plugins.common import LogEvent
+
+from synfeal.report.progress.plan import job_name
+from synfeal.report.progress.view import RunView
+
+SAID = ("Nothing to be done", "Complete log")
+
+
+class LogHandler(LogHandlerBase):
+    """Hands the events of a run to its view."""
+
+    writes_to_stream = True
+    writes_to_file = False
+    has_filter = True
+    has_formatter = False
+    needs_rulegraph = False
+
+    def __post_init__(self) -> None:
+        """Before any event."""
+        self.view = RunView(Console(stderr=True, no_color=self.common_settings.nocolor or None))
+        self.jobs: dict[int, tuple[str, list[Path]]] = {}
+
+    def emit(self, record: LogRecord) -> None:
+        """Called for one event after the other, in one thread."""
+        try:
+            self._show(record)
+        except Exception:
+            self.handleError(record)
+
+    def close(self) -> None:
+        """After all events."""
+        self.view.end()
+        super().close()
+
+    def _show(self, record: LogRecord) -> None:
+        fields = record.__dict__
+        match fields.get("event"):
+            case LogEvent.JOB_INFO if fields["benchmark"]:
+                job = job_name(fields["benchmark"])
+                self.jobs[fields["jobid"]] = job, [Path(path) for path in fields["output"]]
+                self.view.started(job)
+            case LogEvent.JOB_FINISHED:
+                self._finish(fields["job_id"])
+            case LogEvent.PROGRESS:
+                self.view.progress(fields["done"], fields["total"])
+            case LogEvent.JOB_ERROR:
+                self._finish(fields["jobid"])
+                self.view.say(self.format(record), "red")
+            case _ if "plan" in fields:
+                self.view.begin(fields["plan"]())
+            case _ if record.levelno >= WARNING or record.getMessage().startswith(SAID):
+                self.view.say(self.format(record))
+
+    def _finish(self, jobid: int) -> None:
+        job, outputs = self.jobs.pop(jobid, ("", []))
+        if job:
+            self.view.finished(job)
+        for path in outputs:
+            if path.name == "metrics.json" and path.exists():
+                self.view.scored(path)
