@@ -82,7 +82,9 @@ onstart:
         begin_run(CONFIG.root)
     except InputError as error:
         sys.exit(f"error: {error}")
-    logger.info(None, extra={"plan": run_plan(workflow)})  # for workflow/plugins alone
+    logger.info(
+        None, extra={"plan": run_plan(workflow)}
+    )  # for workflow/plugins alone
 
 
 onsuccess:

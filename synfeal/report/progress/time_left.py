@@ -52,12 +52,11 @@ class TimeLeft:
         left = list(self._left_s(now_s).values())
         return max(sum(left) / self._cores, max(left, default=0.0))
 
-    def share(self, now_s: float) -> float:
-        """Part of the work that is done, from 0 to 1."""
-        left_s = sum(self._left_s(now_s).values())
-        running_s = sum(now_s - began for began in tuple(self._began.values()))
-        done_s = sum(tuple(self._taken_s.values())) + running_s
-        return done_s / (done_s + left_s) if left_s else 1.0
+    def share(self) -> float:
+        """Part of the expected work that is done, from 0 to 1: it never falls."""
+        expected_s = dict(self.expected_s)
+        done_s = sum(expected_s[job] for job in tuple(self._taken_s))
+        return done_s / sum(expected_s.values()) if expected_s else 1.0
 
     def _left_s(self, now_s: float) -> dict[str, float]:
         ratio, ratios = self._ratios()

@@ -129,8 +129,8 @@ class RunView:
 
     def _say_line(self) -> None:
         self._said_s = self._clock()
-        share = self._time_left.share(self._said_s)
-        self.say(f"{time.strftime('%H:%M')}  {100 * share:.0f} %  {self.line()}")
+        share = 100 * self._time_left.share()
+        self.say(f"{time.strftime('%H:%M')}  {share:.0f} %  {self.line()}")
 
     def _picture(self) -> Group:
         """The rows that are being filled, as many as there is room for, and the line."""
@@ -139,9 +139,9 @@ class RunView:
         table = _columns(self._console.width)
         for row in rows:
             table.add_row(*self._scores.cells(row), style="dim")
-        share = self._time_left.share(self._clock())
         line = Table.grid(padding=(0, 1))
-        line.add_row(ProgressBar(100, 100 * share, BAR_CELLS), Text(self.line(), no_wrap=True))
+        bar = ProgressBar(1, self._time_left.share(), BAR_CELLS)
+        line.add_row(bar, Text(self.line(), no_wrap=True))
         return Group(table, line)
 
     def _print_row(self, row: Row) -> None:
