@@ -24,6 +24,7 @@ localrules:
     labels,
     runs,
     tables,
+    rescored,
 
 
 rule all:
@@ -75,6 +76,20 @@ rule tables:
     input:
         files_of_runs(),
         expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
+
+
+# Every table from what was restored (synfeal restore), training nothing.
+rule rescored:
+    input:
+        predictions_there,
+        expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
+        f"{ROOT}/tables/all_tables.tex",
+        f"{ROOT}/tables/assistance.csv",
+        f"{ROOT}/tables/label_error.csv",
+        f"{ROOT}/tables/speed_vs_error.csv",
+        f"{ROOT}/tables/hard_cases.csv",
+        f"{ROOT}/claims.csv",
+        f"{ROOT}/summary.md",
 
 
 onstart:

@@ -6,7 +6,7 @@ import logging
 import os
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -37,6 +37,19 @@ def job(log: str | Path) -> Iterator[None]:
         sys.exit(1)
     finally:
         os.close(real_stderr)
+
+
+def refuse_restored(inputs: Collection[object], output: str | Path) -> None:
+    """Refuse to make again what was restored (``synfeal restore``): its rule has no inputs.
+
+    Raises:
+        InputError: there are none.
+    """
+    if not len(inputs):
+        raise InputError(
+            f"{output}: was restored, not made here; restore it once more, or delete restored.json"
+            " to make everything anew"
+        )
 
 
 def _print_to(log: str | Path) -> None:

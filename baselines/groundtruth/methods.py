@@ -18,12 +18,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from pkgutil import resolve_name
+from typing import Any
 
 import numpy as np
 
 from baselines.groundtruth.posegraph.graph import Edge, PoseGraph
 from baselines.groundtruth.trajectory import BatchTrajectory
-from synfeal.config import Experiment
+from synfeal.config import Config, Experiment
 from synfeal.config.models import CameraConfig, GroundTruthConfig, PoseGraphConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.errors import InputError
@@ -95,6 +96,18 @@ def check_sources(rows: Sequence[Experiment], path: Path) -> None:
     for row in rows:
         if row.labels not in known:
             raise InputError(f"{path}: labels '{row.labels}': not one of {', '.join(known)}")
+
+
+def estimation_parameters(config: Config, name: str) -> dict[str, Any]:
+    """The part of a configuration that the labels of a method depend on, ready for JSON."""
+    chained = {"batch_frames", "assist_position_m", "assist_orientation_deg"}
+    method = METHODS[name]
+    settings = {"rgbd", "posegraph"} if method.optimiser else {method.settings or name}
+    return {
+        "groundtruth": config.groundtruth.model_dump(mode="json", include=chained | settings),
+        "camera": config.groundtruth_camera.model_dump(mode="json"),
+        "seed": config.seed,
+    }
 
 
 def estimate_batch(

@@ -15,6 +15,8 @@ from baselines.training.data import read_images
 from baselines.training.device import memory_errors, open_device
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 
+# Of a prediction, metres and quaternions: float32 holds hardly more, and files stay small.
+DECIMALS = 6
 # Images per step; float32 sums may come out differently in the last digits at another number.
 BATCH = 100
 
@@ -45,6 +47,7 @@ def predict_poses(
     input_px = trained.description.network.input_px
     images = read_images(frames, len(table), input_px, trained.device)
     position_m, quat_wxyz = predict(trained, images)
+    position_m, quat_wxyz = position_m.round(DECIMALS), quat_wxyz.round(DECIMALS)
     write_pose_table(out, PoseTable(table.frame, table.path, position_m, quat_wxyz))
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines.training.record import check_same_labels
 from synfeal.bootstrap import limits, medians, path_counts
 from synfeal.dataset.number_table import read_numbers
 from synfeal.dataset.pose_table import (
@@ -59,8 +60,10 @@ def score_run(
         info: further keys of the JSON, e.g. what the run was.
 
     Raises:
-        InputError: a file cannot be read, or the tables are not about the same frames.
+        InputError: a file cannot be read, the tables are not about the same frames, or the labels
+            are not those that the run was trained for.
     """
+    check_same_labels(predictions.parent, labels)
     predicted = _read_predictions(predictions)
     label_table, true_table = _read_like(labels, predicted), _read_like(truth, predicted)
     train = read_pose_table(train_labels)

@@ -7,7 +7,7 @@ import logging
 from collections.abc import Sequence
 
 from synfeal import __version__
-from synfeal.cli import collect, compare, export, inspect, localize, plan, validate
+from synfeal.cli import collect, compare, export, inspect, keep, localize, plan, validate
 from synfeal.errors import exit_status
 
 COMMANDS = (
@@ -18,6 +18,7 @@ COMMANDS = (
     localize.COMMAND,
     plan.COMMAND,
     compare.COMMAND,
+    *keep.COMMANDS,
 )
 
 

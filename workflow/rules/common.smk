@@ -1,25 +1,37 @@
 # What the rules share: the checked configuration, and which files a target needs. No rules here.
 import sys
+from pathlib import Path
 from functools import cache
 from pathlib import Path
 
 from snakemake.logging import logger
+
+from snakemake.exceptions import WorkflowError
 
 from baselines.localizers.names import backbone_of
 from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.methods import (
     METHODS,
     check_sources,
+    estimation_parameters,
     frame_methods,
     graph_methods,
     stages_of,
 )
 from baselines.training.memory import training_mb
-from synfeal.config import check_mesh_files, parse_config, read_experiments, runs_of
+from baselines.training.record import training_parameters
+from synfeal.config import (
+    Run,
+    check_mesh_files,
+    parse_config,
+    read_experiments,
+    runs_of,
+)
 from synfeal.config.models import MODELS
 from synfeal.dataset.sequences import sequences_of
 from synfeal.errors import InputError
 from synfeal.provenance import config_hash
+from synfeal.report.predictions.restored import restored_files
 from synfeal.run_lock import begin_run
 from synfeal.seeds import seed_of
 
@@ -30,6 +42,7 @@ try:
     check_mesh_files(CONFIG.scenes)
     EXPERIMENTS = read_experiments(CONFIG)
     check_sources(EXPERIMENTS, CONFIG.experiments)
+    RESTORED = restored_files(CONFIG)
 except InputError as error:
     sys.exit(f"error: {error}")
 
@@ -111,6 +124,26 @@ def batch_files(wildcards, split):
     return [f"{stem}/{split}/batch-{b.index:03d}.csv" for b in batches]
 
 
+def batch_sequences(wildcards):
+    """Sequences that hold the frames of a batch."""
+    stop = batch_of(wildcards).stop
+    return sequence_dirs(wildcards.scene, "groundtruth", wildcards.split, stop)
+
+
+def unless_restored(output, source):
+    """Input of a rule: ``source`` (a path or a function), or none where ``output`` was restored.
+
+    What was restored (``synfeal restore``) is done, whatever is made again of what it came from.
+    """
+
+    def needed(wildcards):
+        if output.format(**wildcards) in RESTORED:
+            return []
+        return source(wildcards) if callable(source) else source.format(**wildcards)
+
+    return needed
+
+
 def backbone_weights(wildcards):
     """The pretrained backbone a run starts from; nothing when it starts from scratch."""
     if wildcards.init == "scratch":
@@ -149,6 +182,18 @@ def table_metrics(wildcards):
 
 def all_metrics():
     return [f"{ROOT}/runs/{run.directory}/metrics.json" for run in RUNS]
+
+
+def predictions_there(wildcards):
+    """Predictions of every run, none of which is to be made for this."""
+    paths = [m.replace("metrics.json", "predictions.csv") for m in all_metrics()]
+    missing = [path for path in paths if not Path(path).exists()]
+    if missing:
+        raise WorkflowError(
+            f"{len(missing)} of {len(paths)} runs have no predictions, the first of them"
+            f" {missing[0]}; restore them (synfeal restore), or make 'all'"
+        )
+    return paths
 
 
 def all_labels():

@@ -1,5 +1,7 @@
 # Label sets other than the simulator's: reconstructed in batches with assistance, or noisy.
 
+CHAINED = f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/assistance.json"
+
 
 rule noisy_labels:
     input:
@@ -25,10 +27,14 @@ rule noisy_labels:
 
 rule sfm:
     input:
-        sequences=lambda w: sequence_dirs(
-            w.scene, "groundtruth", w.split, batch_of(w).stop
+        sequences=unless_restored(
+            f"{ROOT}/groundtruth/{{scene}}/{{size}}/sfm/{{split}}/batch-{{batch}}.json",
+            batch_sequences,
         ),
-        truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/{{split}}.csv",
+        truth=unless_restored(
+            f"{ROOT}/groundtruth/{{scene}}/{{size}}/sfm/{{split}}/batch-{{batch}}.json",
+            f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/{{split}}.csv",
+        ),
     output:
         trajectory=f"{ROOT}/groundtruth/{{scene}}/{{size}}/sfm/{{split}}/batch-{{batch}}.csv",
         facts=f"{ROOT}/groundtruth/{{scene}}/{{size}}/sfm/{{split}}/batch-{{batch}}.json",
@@ -53,8 +59,9 @@ rule sfm:
 
 rule rgbd:
     input:
-        sequences=lambda w: sequence_dirs(
-            w.scene, "groundtruth", w.split, batch_of(w).stop
+        sequences=unless_restored(
+            f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd/{{split}}/batch-{{batch}}.json",
+            batch_sequences,
         ),
     output:
         graph=f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd/{{split}}/batch-{{batch}}.g2o",
@@ -80,8 +87,9 @@ rule rgbd:
 
 rule estimate:
     input:
-        sequences=lambda w: sequence_dirs(
-            w.scene, "groundtruth", w.split, batch_of(w).stop
+        sequences=unless_restored(
+            f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{frame_method}}/{{split}}/batch-{{batch}}.json",
+            batch_sequences,
         ),
     output:
         trajectory=f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{frame_method}}/{{split}}/batch-{{batch}}.csv",
@@ -109,7 +117,10 @@ rule estimate:
 
 rule posegraph:
     input:
-        graph=f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd/{{split}}/batch-{{batch}}.g2o",
+        graph=unless_restored(
+            f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{graph_method}}/{{split}}/batch-{{batch}}.json",
+            f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd/{{split}}/batch-{{batch}}.g2o",
+        ),
     output:
         trajectory=f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{graph_method}}/{{split}}/batch-{{batch}}.csv",
         facts=f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{graph_method}}/{{split}}/batch-{{batch}}.json",
@@ -130,16 +141,21 @@ rule posegraph:
 
 rule chain:
     input:
-        train_batches=lambda w: batch_files(w, "train"),
-        test_batches=lambda w: batch_files(w, "test"),
-        train_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
-        test_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
+        train_batches=unless_restored(CHAINED, lambda w: batch_files(w, "train")),
+        test_batches=unless_restored(CHAINED, lambda w: batch_files(w, "test")),
+        train_truth=unless_restored(
+            CHAINED, f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv"
+        ),
+        test_truth=unless_restored(
+            CHAINED, f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv"
+        ),
     output:
         train=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/train.csv",
         test=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/test.csv",
         train_unassisted=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/train-unassisted.csv",
         test_unassisted=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/test-unassisted.csv",
-        assistance=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/assistance.json",
+        assistance=CHAINED,
+        record=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/estimation.json",
     log:
         f"{ROOT}/logs/chain/{{scene}}/{{size}}/{{reconstructed}}.log",
     benchmark:
@@ -154,5 +170,6 @@ rule chain:
             CONFIG.groundtruth,
             include={"batch_frames", "assist_position_m", "assist_orientation_deg"},
         ),
+        estimation=lambda w: estimation_parameters(CONFIG, w.reconstructed),
     script:
         "../scripts/chain.py"

@@ -42,14 +42,25 @@ rule pretrain:
 
 rule train:
     input:
-        frames=f"{ROOT}/frames/{{scene}}/train.npy",
-        labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
-        test_frames=f"{ROOT}/frames/{{scene}}/test.npy",
-        test_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
-        weights=backbone_weights,
+        frames=unless_restored(
+            f"{RUN}/predictions.csv", f"{ROOT}/frames/{{scene}}/train.npy"
+        ),
+        labels=unless_restored(
+            f"{RUN}/predictions.csv",
+            f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
+        ),
+        test_frames=unless_restored(
+            f"{RUN}/predictions.csv", f"{ROOT}/frames/{{scene}}/test.npy"
+        ),
+        test_labels=unless_restored(
+            f"{RUN}/predictions.csv",
+            f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
+        ),
+        weights=unless_restored(f"{RUN}/predictions.csv", backbone_weights),
     output:
         model=f"{RUN}/model.pt",
         history=f"{RUN}/history.csv",
+        record=f"{RUN}/training.json",
         predictions=f"{RUN}/predictions.csv",
     log:
         f"{ROOT}/logs/train/{RUN_LOG}.log",
@@ -61,20 +72,7 @@ rule train:
     resources:
         mem_mb=train_mem_mb,
     params:
-        network=dump(CONFIG.network),
-        localizer=lambda w: dump(CONFIG.localizers[w.model]),
-        training=dump(CONFIG.training, exclude={"samples_seen", "repetitions"}),
-        samples_seen=lambda w: CONFIG.training.samples_seen[w.size],
-        seed=lambda w: seed_of(
-            CONFIG.seed,
-            "train",
-            w.scene,
-            w.size,
-            w.labels,
-            w.init,
-            w.model,
-            w.repetition,
-        ),
+        run=lambda w: training_parameters(CONFIG, Run(**w)),
     script:
         "../scripts/train.py"
 

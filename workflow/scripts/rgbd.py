@@ -5,10 +5,11 @@ from baselines.groundtruth.rgbd import rgbd_graph_with_facts
 from synfeal.config.models import CameraConfig, RgbdConfig
 from synfeal.dataset.sevenscenes import frame_paths
 from synfeal.files import write_json
-from synfeal.job import job
+from synfeal.job import job, refuse_restored
 
 params = snakemake.params
 with job(snakemake.log[0]):
+    refuse_restored(snakemake.input, snakemake.output[0])
     sequences = [Path(path) for path in snakemake.input.sequences]
     color = frame_paths(sequences, "color.png")[params.start : params.stop]
     depth = frame_paths(sequences, "depth.png")[params.start : params.stop]

@@ -8,10 +8,11 @@ from synfeal.config.models import CameraConfig, SfmConfig
 from synfeal.dataset.pose_table import read_frames
 from synfeal.dataset.sevenscenes import frame_paths
 from synfeal.files import write_json
-from synfeal.job import job
+from synfeal.job import job, refuse_restored
 
 params = snakemake.params
 with job(snakemake.log[0]), tempfile.TemporaryDirectory() as work_dir:
+    refuse_restored(snakemake.input, snakemake.output[0])
     color = frame_paths(map(Path, snakemake.input.sequences), "color.png")[
         params.start : params.stop
     ]

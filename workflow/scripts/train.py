@@ -2,29 +2,21 @@ from pathlib import Path
 
 from baselines.training.loop import train_localizer
 from baselines.training.predict import predict_poses
+from baselines.training.record import write_training_record
 from synfeal.config.models import LocalizerConfig, NetworkConfig, TrainingConfig
-from synfeal.job import job
+from synfeal.job import job, refuse_restored
 
-inputs, outputs, params = snakemake.input, snakemake.output, snakemake.params
+outputs, run = snakemake.output, snakemake.params.run
 with job(snakemake.log[0]):
-    name, model = snakemake.wildcards.model, Path(outputs.model)
-    network, hyper = NetworkConfig(**params.network), LocalizerConfig(**params.localizer)
-    training = TrainingConfig(**params.training, samples_seen={})
-    weights = Path(str(inputs.weights)) if inputs.weights else None
-    frames, labels = Path(inputs.frames), Path(inputs.labels)
-    test_frames, test_labels = Path(inputs.test_frames), Path(inputs.test_labels)
-    train_localizer(
-        name,
-        frames,
-        labels,
-        network,
-        hyper,
-        training,
-        params.samples_seen,
-        weights,
-        params.seed,
-        model,
-        Path(outputs.history),
-        test=(test_frames, test_labels),
-    )
-    predict_poses(model, test_frames, test_labels, Path(outputs.predictions), training.device)
+    model, predictions = Path(outputs.model), Path(outputs.predictions)
+    inputs = {name: Path(str(file)) for name, file in snakemake.input.items() if file}
+    refuse_restored(snakemake.input, predictions)
+    data = inputs["frames"], inputs["labels"]
+    test = inputs["test_frames"], inputs["test_labels"]
+    network, hyper = NetworkConfig(**run["network"]), LocalizerConfig(**run["localizer"])
+    training = TrainingConfig(**run["training"], samples_seen={})
+    settings = network, hyper, training, run["samples_seen"], inputs.get("weights"), run["seed"]
+    history = Path(outputs.history)
+    train_localizer(snakemake.wildcards.model, *data, *settings, model, history, test=test)
+    write_training_record(Path(outputs.record), run, inputs)
+    predict_poses(model, *test, predictions, training.device)

@@ -1,0 +1,110 @@
+"""What a run was trained from, beside its predictions: whether a later run would be the same.
+
+Predictions travel further than models and frames (``synfeal keep``). Where they arrive, this record
+tells whether the configuration and the labels there are those that they were made with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from synfeal.config import Config, Run
+from synfeal.config.models import ModelName
+from synfeal.dataset.packed_record import file_sha256
+from synfeal.errors import InputError
+from synfeal.files import read_json, write_json
+from synfeal.provenance import provenance
+from synfeal.seeds import seed_of
+
+RECORD = "training.json"
+
+
+def training_parameters(config: Config, run: Run) -> dict[str, Any]:
+    """The part of a configuration that a training run depends on, ready for JSON.
+
+    Which poses it learns from is not in it: the hashes of the label files say that.
+    """
+    hyper = config.training.model_dump(mode="json", exclude={"samples_seen", "repetitions"})
+    parameters = {
+        "localizer": config.localizers[cast(ModelName, run.model)].model_dump(mode="json"),
+        "network": config.network.model_dump(mode="json"),
+        "training": hyper,
+        "samples_seen": config.training.samples_seen[run.size],
+        "camera": config.network_camera.model_dump(mode="json"),
+        "seed": seed_of(
+            config.seed,
+            *("train", run.scene, run.size, run.labels, run.init, run.model, str(run.repetition)),
+        ),
+    }
+    if run.init == "pretrained":
+        parameters["pretraining"] = config.pretraining.model_dump(mode="json")
+    return parameters
+
+
+def write_training_record(
+    path: Path, parameters: Mapping[str, Any], inputs: Mapping[str, Path]
+) -> None:
+    """Write what a run was trained from.
+
+    Args:
+        path: ``training.json`` beside the predictions.
+        parameters: from :func:`training_parameters`.
+        inputs: files by what they are; packed frames are told by the hash in their own record.
+    """
+    hashes = {name: _sha256(file) for name, file in inputs.items()}
+    origin = provenance(parameters["seed"], "")
+    kept = ("commit", "packages", "platform", "time_utc")
+    write_json(
+        path,
+        {
+            "parameters": dict(parameters),
+            "sha256": hashes,
+            **{key: origin[key] for key in kept},
+        },
+    )
+
+
+def _sha256(path: Path) -> str:
+    record = path.with_suffix(".json")
+    if path.suffix == ".npy" and record.exists():
+        return str(read_json(record)["sha256"])
+    return file_sha256(path)
+
+
+def read_training_record(path: Path) -> dict[str, Any]:
+    """The record of a run.
+
+    Raises:
+        InputError: it is missing or damaged.
+    """
+    try:
+        record = read_json(path)
+        if not isinstance(record["parameters"], dict) or not isinstance(record["sha256"], dict):
+            raise TypeError("parameters and sha256 must be mappings")
+    except (OSError, ValueError, TypeError, LookupError) as error:
+        raise InputError(
+            f"{path}: cannot be read as the record of a training run ({error!r}); train it again"
+        ) from None
+    return dict(record)
+
+
+def check_same_labels(run: Path, test_labels: Path) -> None:
+    """Refuse to score predictions by other labels than they were made for.
+
+    Args:
+        run: directory of a run; one without a record is passed over.
+        test_labels: labels of the test set as they are now.
+
+    Raises:
+        InputError: the labels have changed since the run was trained.
+    """
+    if not (run / RECORD).exists():
+        return
+    recorded = read_training_record(run / RECORD)["sha256"].get("test_labels")
+    if recorded != file_sha256(test_labels):
+        raise InputError(
+            f"{test_labels}: not the labels that {run / 'predictions.csv'} was made for; restore"
+            " both from one file, or delete the directory of the run to train it again"
+        )
