@@ -47,7 +47,6 @@ def predict_poses(
     input_px = trained.description.network.input_px
     images = read_images(frames, len(table), input_px, trained.device)
     position_m, quat_wxyz = predict(trained, images)
-    position_m, quat_wxyz = position_m.round(DECIMALS), quat_wxyz.round(DECIMALS)
     write_pose_table(out, PoseTable(table.frame, table.path, position_m, quat_wxyz))
 
 
@@ -56,6 +55,8 @@ def predict(
     trained: TrainedLocalizer, images: Tensor
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Positions (N, 3) and unit quaternions (N, 4), w >= 0, for images (N, 3, H, W) uint8.
+
+    Both have :data:`DECIMALS` decimals.
 
     A quaternion of zeros, or with a value that is not finite, stands for no rotation: it is
     returned as four times ``nan``.
@@ -68,4 +69,4 @@ def predict(
     quat_wxyz /= torch.linalg.vector_norm(quat_wxyz, dim=1, keepdim=True)
     quat_wxyz = torch.where(quat_wxyz.isfinite().all(dim=1, keepdim=True), quat_wxyz, torch.nan)
     quat_wxyz = torch.where(quat_wxyz[:, :1] < 0, -quat_wxyz, quat_wxyz)
-    return position_m.numpy(), quat_wxyz.numpy()
+    return position_m.numpy().round(DECIMALS), quat_wxyz.numpy().round(DECIMALS)

@@ -55,15 +55,8 @@ def write_training_record(
     """
     hashes = {name: _sha256(file) for name, file in inputs.items()}
     origin = provenance(parameters["seed"], "")
-    kept = ("commit", "packages", "platform", "time_utc")
-    write_json(
-        path,
-        {
-            "parameters": dict(parameters),
-            "sha256": hashes,
-            **{key: origin[key] for key in kept},
-        },
-    )
+    kept = {key: origin[key] for key in ("commit", "packages", "platform")}
+    write_json(path, {"parameters": dict(parameters), "sha256": hashes, **kept})
 
 
 def _sha256(path: Path) -> str:

@@ -51,13 +51,14 @@ STAGES = {
     "chain": tuple(
         f"labels/{SET}/sfm/{name}"
         for name in (
-            *("test.csv", "train.csv", "assistance.json"),
+            *("test.csv", "train.csv", "assistance.json", "estimation.json"),
             *("test-unassisted.csv", "train-unassisted.csv"),
         )
     ),
     "pretrain": ("pretrained/googlenet.pt",),
     "train": tuple(
-        f"{RUN}/posenet/seed0/{name}" for name in ("model.pt", "history.csv", "predictions.csv")
+        f"{RUN}/posenet/seed0/{name}"
+        for name in ("model.pt", "history.csv", "training.json", "predictions.csv")
     ),
     "score": tuple(f"{RUN}/posenet/seed0/{name}" for name in ("metrics.json", "errors.csv")),
     "table1_meshes": ("tables/table1_meshes.csv", "tables/table1_meshes.tex"),
@@ -77,7 +78,7 @@ STAGES = {
 TRAININGS = tuple(
     f"{RUN}/{model}/seed0/{name}"
     for model in ("posenet2", "posenet")
-    for name in ("model.pt", "history.csv", "predictions.csv")
+    for name in ("model.pt", "history.csv", "training.json", "predictions.csv")
 )
 BEGUN = re.compile(r"samples, on ")  # what a training logs when it has read its data
 

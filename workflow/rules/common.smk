@@ -6,8 +6,6 @@ from pathlib import Path
 
 from snakemake.logging import logger
 
-from snakemake.exceptions import WorkflowError
-
 from baselines.localizers.names import backbone_of
 from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.methods import (
@@ -189,8 +187,8 @@ def predictions_there(wildcards):
     paths = [m.replace("metrics.json", "predictions.csv") for m in all_metrics()]
     missing = [path for path in paths if not Path(path).exists()]
     if missing:
-        raise WorkflowError(
-            f"{len(missing)} of {len(paths)} runs have no predictions, the first of them"
+        sys.exit(
+            f"error: {len(missing)} of {len(paths)} runs have no predictions, the first of them"
             f" {missing[0]}; restore them (synfeal restore), or make 'all'"
         )
     return paths

@@ -1,0 +1,250 @@
+"""Finished runs in one file and back: nothing is lost, nothing trained again, nothing mistaken."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.groundtruth.methods import estimation_parameters
+from baselines.training.record import training_parameters, write_training_record
+from baselines.training.score import score_run
+from synfeal.cli import main
+from synfeal.config import Config, Run, load_config, read_experiments, runs_of
+from synfeal.dataset.pose_table import COLUMNS, PoseTable, write_pose_table
+from synfeal.files import write_json
+from synfeal.report.predictions.package import POSES
+
+REPO = Path(__file__).parent.parent
+DESIGN = """table,block,scene,size,labels,noise_m,noise_deg,init
+table2_ground_truth,,large_room,6k,sfm,0,0,pretrained
+table4_size,,large_room,6k,synfeal,0,0,pretrained
+table4_size,,large_room,20k,synfeal,0,0,pretrained
+"""
+
+
+def smoke_config(folder: Path) -> Config:
+    """The smoke profile with fifteen runs, in a folder."""
+    (folder / "design.csv").write_text(DESIGN, encoding="utf-8")
+    raw = load_config(REPO / "config/config.yaml", REPO / "config/smoke.yaml")
+    return raw.model_copy(update={"results": folder, "experiments": folder / "design.csv"})
+
+
+def table(count: int) -> PoseTable:
+    """The first poses of one plan, four frames to a path."""
+    rng = np.random.default_rng(7)
+    position_m, quat = rng.normal(size=(500, 3)), rng.normal(size=(500, 4))
+    quat /= np.linalg.norm(quat, axis=1, keepdims=True) * np.sign(quat[:, :1])
+    frame = np.arange(count)
+    return PoseTable(frame, frame // 4, position_m[:count], quat[:count])
+
+
+def write_results(config: Config) -> None:
+    """What a finished run of the workflow leaves that is kept; and models, which are not."""
+    root = config.root
+    for size in ("6k", "20k"):
+        for split in ("train", "test"):
+            count = config.n_frames("large_room", size, split)
+            write_pose_table(root / f"labels/large_room/{size}/synfeal/{split}.csv", table(count))
+    estimated = root / "labels/large_room/6k/sfm"
+    for name in ("train", "test", "train-unassisted", "test-unassisted"):
+        write_pose_table(estimated / f"{name}.csv", table(25))
+    write_json(estimated / "assistance.json", {"method": "sfm"})
+    write_json(estimated / "estimation.json", {"parameters": estimation_parameters(config, "sfm")})
+    for split, batches in (("train", 3), ("test", 2)):
+        for batch in range(batches):
+            stem = root / f"groundtruth/large_room/6k/sfm/{split}/batch-{batch:03d}"
+            write_json(stem.with_suffix(".json"), {"frames": 20})
+            stem.with_suffix(".csv").write_text("x\n")
+    for run in runs_of(read_experiments(config), 1):
+        folder = root / "runs" / run.directory
+        test_labels = root / f"labels/{run.scene}/{run.size}/{run.labels}/test.csv"
+        shutil.copytree(test_labels.parent, folder)
+        for name in folder.iterdir():
+            name.unlink()
+        shutil.copyfile(test_labels, folder / "predictions.csv")
+        (folder / "history.csv").write_text("samples_seen\n320\n")
+        (folder / "model.pt").write_bytes(b"large")
+        write_training_record(
+            folder / "training.json",
+            training_parameters(config, run),
+            {"test_labels": test_labels},
+        )
+
+
+def contents(root: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(root).as_posix(): path.read_bytes()
+        for path in root.rglob("*")
+        if path.is_file() and path.suffix != ".zip" and path.name not in (".lock", "restored.json")
+    }
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Config:
+    config = smoke_config(tmp_path_factory.mktemp("made"))
+    write_results(config)
+    assert main(["keep", str(config.root)]) == 0
+    return config
+
+
+@pytest.fixture(scope="module")
+def package(made: Config) -> Path:
+    return made.root / "predictions.zip"
+
+
+def test_everything_but_models_comes_back_byte_for_byte(
+    made: Config, package: Path, tmp_path: Path
+) -> None:
+    assert main(["restore", str(package), str(tmp_path / "new")]) == 0
+    before = {k: v for k, v in contents(made.root).items() if not k.endswith("model.pt")}
+    assert contents(tmp_path / "new") == before
+    restored = json.loads((tmp_path / "new/restored.json").read_text())["files"]
+    assert sorted(restored) == sorted(before)
+
+
+def test_the_file_is_a_data_package_that_holds_shared_poses_once(
+    made: Config, package: Path
+) -> None:
+    """Checked by the standard's words alone: hashes, sizes, schema; no code of ours reads it."""
+    with zipfile.ZipFile(package) as opened:
+        descriptor = json.loads(opened.read("datapackage.json"))
+        for entry in descriptor["resources"]:
+            data = opened.read(entry.get("member", entry["path"]))[: entry["bytes"]]
+            assert entry["hash"] == f"sha256:{hashlib.sha256(data).hexdigest()}"
+            assert (entry.get("schema") == "schemas/poses.json") == data.startswith(b"frame,path,")
+        schema = json.loads(opened.read("schemas/poses.json"))
+        names = opened.namelist()
+    assert [field["name"] for field in schema["fields"]] == list(COLUMNS)
+    assert schema == POSES
+    assert "labels/large_room/20k/synfeal/train.csv" in names
+    assert "labels/large_room/6k/synfeal/train.csv" not in names  # the 20k set begins with it
+
+
+def test_a_longer_run_gives_the_same_bytes_for_what_was_there(
+    made: Config, package: Path, tmp_path: Path
+) -> None:
+    root = Path(shutil.copytree(made.root, tmp_path / "smoke"))
+    main(["keep", str(root), "--out", str(tmp_path / "same.zip")])
+    assert (tmp_path / "same.zip").read_bytes() == package.read_bytes()
+    with zipfile.ZipFile(package) as opened:
+        first = opened.infolist()[0]
+        at = package.read_bytes()[: first.header_offset + first.compress_size]
+    shutil.copytree(
+        root / "runs/large_room/6k/synfeal", root / "runs/large_room/6k/synfeal2"
+    )  # sorts behind
+    shutil.copytree(root / "labels/large_room/6k/synfeal", root / "labels/large_room/6k/synfeal2")
+    main(["keep", str(root), "--out", str(tmp_path / "more.zip")])
+    assert (tmp_path / "more.zip").read_bytes().startswith(at)
+
+
+def rewritten(package: Path, out: Path, changes: dict[str, bytes | None]) -> Path:
+    with zipfile.ZipFile(package) as old, zipfile.ZipFile(out, "w") as new:
+        for name in old.namelist():
+            data = changes.get(name, old.read(name))
+            if data is not None:
+                new.writestr(name, data)
+    return out
+
+
+PREDICTED = "runs/large_room/20k/synfeal/pretrained/posenet/seed0/predictions.csv"
+OUTSIDE = b'{"resources": [{"path": "../x", "hash": "sha256:0", "bytes": 1}]}'
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"datapackage.json": None}, "datapackage.json"),
+        ({"datapackage.json": b"[1]"}, "synfeal keep"),
+        ({"datapackage.json": b'{"resources": [{"path": "a"}]}'}, "synfeal keep"),
+        ({"datapackage.json": OUTSIDE}, "'../x' does not lie"),
+        ({PREDICTED: None}, f"{PREDICTED}: is damaged"),
+        ({PREDICTED: b"other\n"}, f"{PREDICTED}: differs from its hash"),
+        (None, "synfeal keep"),
+    ],
+)
+def test_a_damaged_package_is_refused_in_one_line_and_writes_nothing(
+    package: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    changes: dict[str, bytes | None] | None,
+    words: str,
+) -> None:
+    bad = tmp_path / "bad.zip"
+    if changes is None:
+        bad.write_bytes(package.read_bytes()[:-30])
+    else:
+        rewritten(package, bad, changes)
+    assert main(["restore", str(bad), str(tmp_path / "out")]) == 1
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert words in error
+    assert str(bad) in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_results_that_differ_are_not_overwritten(
+    made: Config, package: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = tmp_path / "out" / PREDICTED
+    other.parent.mkdir(parents=True)
+    other.write_text("mine\n")
+    assert main(["restore", str(package), str(tmp_path / "out")]) == 1
+    assert f"{other}: exists and differs" in capsys.readouterr().err
+    assert [p for p in (tmp_path / "out").rglob("*") if p.is_file()] == [other]
+
+
+def test_predictions_are_not_scored_by_other_labels(made: Config, tmp_path: Path) -> None:
+    run = Run("large_room", "6k", "synfeal", "pretrained", "posenet", 0)
+    folder = Path(shutil.copytree(made.root / "runs" / run.directory, tmp_path / "run"))
+    labels = made.root / "labels/large_room/6k/synfeal"
+    outputs = tmp_path / "errors.csv", tmp_path / "metrics.json"
+    given = (folder / "predictions.csv", labels / "test.csv", labels / "test.csv")
+    score_run(*given, labels / "train.csv", *outputs, {})
+    write_pose_table(
+        tmp_path / "other.csv",
+        PoseTable(
+            *(getattr(table(25), n) for n in ("frame", "path")),
+            table(25).position_m + 1,
+            table(25).quat_wxyz,
+        ),
+    )
+    with pytest.raises(Exception, match="not the labels that"):
+        score_run(given[0], tmp_path / "other.csv", given[2], labels / "train.csv", *outputs, {})
+
+
+def planned(config: Config, target: str, *changes: str) -> subprocess.CompletedProcess[str]:
+    given = [f"results={config.results}", f"experiments={config.experiments}", *changes]
+    command = [sys.executable, "-m", "snakemake", "--cores", "1", "--dry-run", "--configfile"]
+    command += ["config/smoke.yaml", "--config", *given, "--", target]
+    return subprocess.run(command, cwd=REPO, capture_output=True, text=True, check=False)
+
+
+def jobs_of(run: subprocess.CompletedProcess[str]) -> set[str]:
+    assert run.returncode == 0, run.stdout + run.stderr
+    return {name for name, _ in re.findall(r"^(\w+) +(\d+)$", run.stdout, re.MULTILINE)}
+
+
+def test_the_workflow_goes_on_from_restored_runs(package: Path, tmp_path: Path) -> None:
+    config = smoke_config(tmp_path)
+    assert main(["restore", str(package), str(config.root)]) == 0
+    everything = jobs_of(planned(config, "all"))
+    assert {"scene", "render", "pack", "score"} <= everything  # all of it is made again ...
+    assert not {"train", "sfm", "chain"} & everything  # ... but for what was restored
+    changed = planned(config, "all", "training={batch_size: 16}")
+    assert changed.returncode == 1
+    assert "training.batch_size" in changed.stderr
+    assert "Traceback" not in changed.stderr
+    shutil.rmtree(config.root / "runs/large_room/20k")
+    assert "train" in jobs_of(planned(config, "all"))
+    missing = planned(config, "rescored")
+    assert missing.returncode == 1
+    assert "5 of 15 runs have no predictions" in missing.stderr
