@@ -8,7 +8,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from synfeal.inspect.density import detail_of, texels_per_m
-from synfeal.inspect.doubts import doubts_of, floor_areas_m2
+from synfeal.inspect.doubts import colour_doubts, doubts_of, floor_areas_m2
 from synfeal.inspect.freespace import FreeSpace
 from synfeal.inspect.picture import round_length_m
 from synfeal.inspect.surface import SurfacePoints, nearest_texels
@@ -16,7 +16,6 @@ from synfeal.mesh.model import MeshPart, TexturedMesh
 
 UNIT_UV = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 TWO = np.array([[0, 1, 2], [0, 2, 3]])
-ALL_TEXTURED = {"textured": 1.0, "coloured_by_vertex": 0.0, "plain": 0.0}
 
 
 def square(side_m: float, texture: NDArray[np.uint8] | None = None, **values: object) -> MeshPart:
@@ -99,7 +98,7 @@ def test_base_colours_multiply_vertex_colours() -> None:
 
 def doubts(extents: tuple[float, float, float], **values: object) -> str:
     floors = np.array([1.0, 1.0, 10.0])
-    given = {"floors_m2": floors, "area_m2": ALL_TEXTURED, "space": closed_space(), **values}
+    given = {"floors_m2": floors, "space": closed_space(), **values}
     return "\n".join(doubts_of(np.array(extents), **given))  # type: ignore[arg-type]
 
 
@@ -121,7 +120,10 @@ def test_sizes_that_are_not_metres_are_doubted(
 
 def test_plain_and_open_meshes_are_doubted() -> None:
     plain = {"textured": 1.0, "coloured_by_vertex": 0.0, "plain": 3.0}
-    assert "75%" in doubts((5.0, 5.0, 3.0), area_m2=plain)
+    two = (square(1.0, vertex_rgb=np.eye(4, 3, dtype=np.uint8) * 255), square(2.0))
+    assert "75%" in colour_doubts(TexturedMesh(two), plain)[0]
+    assert "of one colour" in colour_doubts(TexturedMesh(two[1:]), plain)[0]
+    assert not colour_doubts(TexturedMesh(two), {**plain, "plain": 0.5})
     assert "25%" in doubts((5.0, 5.0, 3.0), space=closed_space(0.75))
 
 

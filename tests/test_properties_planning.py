@@ -15,7 +15,7 @@ from synfeal.planning.coverage import plan_coverage, scene_coverage
 from synfeal.planning.independent import independent_poses
 from synfeal.planning.plan import plan_scene, plan_split, sampling_box_of
 from synfeal.planning.questions import Questions, draw_questions
-from synfeal.planning.start import largest_group, sample_start
+from synfeal.planning.start import largest_group, sample_start, seeing_groups
 from synfeal.planning.target import admissible, farthest_admissible, has_free_view
 from tests.empty_room import (
     BOUNDS,
@@ -107,7 +107,7 @@ def test_targets_of_the_stream_are_far_enough_and_have_a_view(seed, k, view_m, m
     assert stream.next_target(start, 10.0, 3) is None  # farther than the room is long
 
 
-@about(largest_group, sample_start, connected_space, ConnectedSpace.contains)
+@about(largest_group, seeing_groups, sample_start, connected_space, ConnectedSpace.contains)
 @fewer
 @given(seeds, walls, st.floats(0.0, 1.0))
 def test_of_a_divided_room_the_larger_part_is_the_space(seed, wall, view_m):
@@ -121,6 +121,10 @@ def test_of_a_divided_room_the_larger_part_is_the_space(seed, wall, view_m):
     space = connected_space(caster, BOUNDS, view_m, 100, np.random.default_rng(seed))
     points = inside_poses(seed, 50)[:, :3]
     points = points[np.abs(points[:, 0] - wall) > 0.2]
+    groups = seeing_groups(caster, points)
+    np.testing.assert_array_equal(
+        groups[:, None] == groups, (points[:, 0] < wall)[:, None] == (points[:, 0] < wall)
+    )
     np.testing.assert_array_equal(space.contains(points), points[:, 0] < wall)
 
 

@@ -27,8 +27,9 @@ def run(arguments: argparse.Namespace) -> None:
         scene = SceneConfig.model_validate(scene_values(arguments))
     except ValidationError as error:
         raise InputError(f"inspect: {describe(error)}") from None
-    print(inspect_mesh(scene, out))
-    print(f"\n{out}: inspect.html, inspect.png and inspect.json")
+    text = inspect_mesh(scene, out, arguments.unit_m is not None)
+    print(f"{out}: inspect.html, inspect.png and inspect.json\n")
+    print(text)
 
 
 COMMAND = Command("inspect", "numbers, picture and 3D view of a mesh", OPTIONS + MESH_OPTIONS, run)

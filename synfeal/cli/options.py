@@ -42,7 +42,7 @@ MESH_OPTIONS: Options = (
         },
     ),
     ("--up-axis", {"choices": ("auto", "y", "z"), "default": "auto", "help": "up in the file"}),
-    ("--unit-m", {"type": float, "default": 1.0, "help": "metres per unit of the file (1)"}),
+    ("--unit-m", {"type": float, "help": "metres per unit of the file (1)"}),
 )
 
 
@@ -54,7 +54,7 @@ def scene_values(arguments: argparse.Namespace) -> dict[str, Any]:
         "source": "mesh",
         "path": mesh,
         "up_axis": arguments.up_axis,
-        "unit_m": arguments.unit_m,
+        "unit_m": 1.0 if arguments.unit_m is None else arguments.unit_m,
         "sampling_box": _box(arguments.box),
     }
 

@@ -6,6 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.inspect.freespace import FreeSpace
+from synfeal.inspect.suggest import Suggestion
+from synfeal.mesh.checks import shows_one_colour
+from synfeal.mesh.model import TexturedMesh
 
 Array = NDArray[np.float64]
 
@@ -15,29 +18,69 @@ FLOOR_BIN_M = 0.1
 FLOOR_RATIO = 1.5
 MIN_ENCLOSURE = 0.9
 MAX_PLAIN = 0.5
+MAX_EMPTY = 0.1
+MAX_ELSEWHERE = 0.1
 
 
-def doubts_of(
-    extents_m: Array, floors_m2: Array, area_m2: dict[str, float], space: FreeSpace
-) -> list[str]:
+def doubts_of(extents_m: Array, floors_m2: Array, space: FreeSpace) -> list[str]:
     """Sentences, each with what to try; empty if nothing looks wrong.
 
     Args:
         extents_m: (3,) size of the mesh.
         floors_m2: (3,) what :func:`floor_areas_m2` found along x, y and z.
-        area_m2: surface by what colours it, from :func:`synfeal.inspect.density.detail_of`.
         space: the free space of the mesh.
     """
     doubts = [*_unit(extents_m), *_up_axis(floors_m2)]
-    plain = area_m2["plain"] / max(sum(area_m2.values()), 1e-12)
-    if plain > MAX_PLAIN:
-        doubts.append(f"{plain:.0%} of the surface has one plain colour: little to localize by")
-    if not space.is_free.any():
-        doubts.append("no free space was found: check unit, up axis and box")
-    elif space.enclosure < MIN_ENCLOSURE:
+    if space.floor_m is None:
+        doubts.append(
+            "no place to stand with walls around it was found, so no box is suggested: check unit"
+            " and up axis, or give --box where cameras shall go"
+        )
+        return doubts
+    if space.enclosure < MIN_ENCLOSURE:
         doubts.append(
             f"the mesh is open: from half of its free points, more than {1 - space.enclosure:.0%}"
-            " of the rays leave it; images will show its background"
+            " of the level and upward rays leave it; images will show its background"
+        )
+    if space.elsewhere > MAX_ELSEWHERE:
+        doubts.append(
+            f"{space.elsewhere:.0%} of the places to stand are in other rooms or on other floors,"
+            " which cannot be seen from the suggested box; give --box to look at one of them"
+        )
+    return doubts
+
+
+def colour_doubts(mesh: TexturedMesh, area_m2: dict[str, float]) -> list[str]:
+    """Whether there is anything to see.
+
+    Args:
+        mesh: the mesh.
+        area_m2: its surface by what colours it, from :func:`synfeal.inspect.density.detail_of`.
+    """
+    if shows_one_colour(mesh):
+        return [
+            "the mesh is of one colour, and collect refuses it; put its texture files (of an OBJ"
+            " also the .mtl) where it names them"
+        ]
+    plain = area_m2["plain"] / max(sum(area_m2.values()), 1e-12)
+    if plain > MAX_PLAIN:
+        return [f"{plain:.0%} of the surface has one plain colour: little to localize by"]
+    return []
+
+
+def suggestion_doubts(suggestion: Suggestion) -> list[str]:
+    """What planning the suggested command once has shown."""
+    doubts, empty = [], suggestion.empty
+    if suggestion.is_narrow:
+        doubts.append(
+            "the free space is too narrow for the default paths; the command below allows shorter"
+            " ones (--min-path) and nearer views (--min-view-distance)"
+        )
+    if empty.share > MAX_EMPTY:
+        doubts.append(
+            f"{empty.share:.0%} of the pixels that the command below makes will be empty, and"
+            f" {empty.mostly_empty_frames:.0%} of its frames more than half: cameras look out where"
+            " the mesh is open; pitch bounds or a smaller --box show less of that"
         )
     return doubts
 

@@ -11,13 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 import synfeal
-from synfeal.config.models import SceneConfig
 from synfeal.inspect.density import detail_of
-from synfeal.inspect.doubts import doubts_of, floor_areas_m2
-from synfeal.inspect.freespace import DEFINITION, FreeSpace
-from synfeal.inspect.surface import SurfacePoints, triangle_areas_m2
+from synfeal.inspect.doubts import colour_doubts, doubts_of, floor_areas_m2, suggestion_doubts
+from synfeal.inspect.freespace import DEFINITION
+from synfeal.inspect.inspection import Inspection
+from synfeal.inspect.sides import back_face_share
+from synfeal.inspect.suggest import N_FRAMES, Suggestion
+from synfeal.inspect.surface import triangle_areas_m2
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.properties import mesh_properties
+from synfeal.mesh.title import slug_of, title_of
 from synfeal.mesh.topology import mesh_topology
 from synfeal.mesh.triangles import merge_vertices
 
@@ -26,37 +29,20 @@ Array = NDArray[np.float64]
 N_HOLES = 10  # of which the length is told
 
 
-def facts_of(
-    scene: SceneConfig,
-    mesh: TexturedMesh,
-    surface: SurfacePoints,
-    space: FreeSpace,
-    box_m: Array,
-    suggested_m: Array | None,
-) -> dict[str, Any]:
-    """Numbers, findings and doubts, ready for JSON.
-
-    Args:
-        scene: path, up axis and unit of the mesh.
-        mesh: the mesh.
-        surface: points spread over it.
-        space: its free space within ``box_m``.
-        box_m: (2, 3) the box that was searched.
-        suggested_m: (2, 3) the suggested sampling box, if there is one.
-    """
-    properties = mesh_properties(mesh)
+def facts_of(found: Inspection) -> dict[str, Any]:
+    """Numbers, findings and doubts, ready for JSON."""
+    scene, mesh, space, suggestion = found.scene, found.mesh, found.space, found.suggestion
+    title = title_of(Path(str(scene.path)))
     detail = detail_of(mesh)
-    area_m2 = sum(detail["area_m2"].values())
-    floors_m2 = floor_areas_m2(surface.normal, surface.position_m, area_m2)
-    extents_m = np.array(properties["extents_m"])
     return {
+        "title": title,
         "mesh": {
             "path": str(scene.path),
             "sha256": sha256_of(Path(str(scene.path))),
             "up_axis": scene.up_axis,
             "unit_m": scene.unit_m,
         },
-        "properties": properties,
+        "properties": mesh_properties(mesh),
         "materials": len({_material_key(part) for part in mesh.parts}),
         "parts": [_part(part) for part in mesh.parts],
         "detail": detail,
@@ -64,15 +50,39 @@ def facts_of(
         "findings": list(mesh.findings),
         "free_space": {
             "definition": DEFINITION,
-            "box_m": box_m.tolist(),
+            "box_m": found.box_m.tolist(),
             "share": space.share,
-            "volume_m3": space.share * float(np.prod(box_m[1] - box_m[0])),
+            "volume_m3": space.share * float(np.prod(found.box_m[1] - found.box_m[0])),
             "enclosure": space.enclosure,
             "floor_m": space.floor_m,
+            "elsewhere": space.elsewhere,
         },
-        "suggested_sampling_box": None if suggested_m is None else as_box(suggested_m),
-        "doubts": doubts_of(extents_m, floors_m2, detail["area_m2"], space),
+        "back_faces_share": back_face_share(mesh, found.caster, space),
+        "suggested_sampling_box": None if suggestion is None else as_box(suggestion.box_m),
+        "collect": None if suggestion is None else _collect(suggestion, title),
+        "doubts": _doubts(found, detail["area_m2"]),
         "version": synfeal.__version__,
+    }
+
+
+def _doubts(found: Inspection, area_m2: dict[str, float]) -> list[str]:
+    """What was assumed first, then what looks wrong."""
+    bounds_m, surface = found.mesh.bounds_m, found.surface
+    floors_m2 = floor_areas_m2(surface.normal, surface.position_m, sum(area_m2.values()))
+    return [
+        *found.assumed,
+        *colour_doubts(found.mesh, area_m2),
+        *doubts_of(bounds_m[1] - bounds_m[0], floors_m2, found.space),
+        *([] if found.suggestion is None else suggestion_doubts(found.suggestion)),
+    ]
+
+
+def _collect(suggestion: Suggestion, title: str) -> dict[str, Any]:
+    """The command, and what planning it once showed."""
+    return {
+        "command": suggestion.command(f"{slug_of(title)}-frames"),
+        "frames": N_FRAMES,
+        "empty_pixels": asdict(suggestion.empty),
     }
 
 

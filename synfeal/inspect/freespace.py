@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
 from synfeal.inspect.largest_box import largest_box
 from synfeal.mesh.rays import RayCaster
+from synfeal.planning.connected import ConnectedSpace
+from synfeal.planning.start import seeing_groups
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -20,17 +21,41 @@ MAX_CELLS = 300  # along one axis
 MAX_LAYER_M = 0.3
 N_RAYS = 64
 MAX_ELEVATION_DEG = 30.0  # as high as cameras look: a scan without a ceiling is a room too
-MIN_HITS = 0.7  # an endless plain blocks 2/3 of these rays; a point inside sees more than a floor
-NEAR_M = 0.2
+REACH_M = 50.0  # what is farther encloses nobody
+MIN_ENCLOSURE = 0.25  # a corner of two walls, all else open
+SLACK = 0.25  # by which a point may be less enclosed than the best of the mesh
 CLEARANCE_M = 0.3
 CAMERA_HEIGHT_M = (0.8, 2.0)  # hand-held cameras, above the floor
 FLOOR_BIN_M = 0.05
+N_PLACES = 400  # that are tested for seeing each other
+N_HUBS = 100  # of these, to tell what else belongs to their space
 
 DEFINITION = (
-    f"A point of a regular grid is free if at least {MIN_HITS:.0%} of {N_RAYS} rays, spread evenly"
-    f" over all directions up to {MAX_ELEVATION_DEG:.0f} degrees above the horizon, hit the mesh,"
-    f" and most of those that hit are longer than {NEAR_M} m."
+    f"Of {N_RAYS} rays from a point, spread evenly from level to {MAX_ELEVATION_DEG:.0f} degrees"
+    f" above, the share that hit the mesh within {REACH_M:.0f} m is how enclosed it is. Free points"
+    " of a regular grid are about as enclosed as the best places to stand in the mesh and can be"
+    " seen from the largest group of such places that see each other: neither inside walls, slabs"
+    " and cupboards nor outside."
 )
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What rays tell of a regular grid of points in a box; nothing is decided yet.
+
+    Attributes:
+        axes_m: coordinates along x, y and z.
+        points_m: (N, 3) all points, x slowest.
+        enclosure: (N,) share of the rays that hit the mesh.
+        is_clear: (N,) at least 0.3 m from any surface.
+        is_stand: (N,) clear, and 0.8 to 2.0 m above what lies straight below.
+    """
+
+    axes_m: tuple[Array, Array, Array]
+    points_m: Array
+    enclosure: Array
+    is_clear: Mask
+    is_stand: Mask
 
 
 @dataclass(frozen=True)
@@ -40,10 +65,11 @@ class FreeSpace:
     Attributes:
         axes_m: coordinates along x, y and z.
         is_free: (X, Y, Z); see ``DEFINITION``.
-        is_clear: (X, Y, Z); the largest connected set of free points at least 0.3 m from any
-            surface: the room, not the inside of a cupboard.
-        enclosure: median share of rays that hit the mesh, over free points; 1 in a closed room.
-        floor_m: height at which most of the clear points find a surface below; None without any.
+        is_clear: (X, Y, Z); free points at least 0.3 m from any surface.
+        enclosure: median over free points; 1 in a closed room.
+        floor_m: height at which most of the places to stand find a surface below; None without any.
+        elsewhere: places to stand as enclosed as these that cannot be seen from here, as a share
+            of all of them: other floors, other rooms.
     """
 
     axes_m: tuple[Array, Array, Array]
@@ -51,6 +77,7 @@ class FreeSpace:
     is_clear: Mask
     enclosure: float
     floor_m: float | None
+    elsewhere: float = 0.0
 
     @property
     def share(self) -> float:
@@ -58,8 +85,8 @@ class FreeSpace:
         return float(self.is_free.mean())
 
 
-def find_free_space(caster: RayCaster, surface_m: Array, box_m: Array) -> FreeSpace:
-    """The free space in a box.
+def survey(caster: RayCaster, surface_m: Array, box_m: Array) -> Survey:
+    """Cast rays from a grid of points in a box.
 
     Winding cannot tell inside from outside in a scan, which is open; what rays hit can.
 
@@ -69,18 +96,56 @@ def find_free_space(caster: RayCaster, surface_m: Array, box_m: Array) -> FreeSp
         box_m: (2, 3) lower and upper corner of the box to look in, metres.
     """
     axes, step_m = _grid(box_m)
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    shape, points = points.shape[:3], points.reshape(-1, 3)
-    hits, far_hits = _hit_shares(caster, points)
-    is_free = (hits >= MIN_HITS) & (far_hits > hits / 2.0)
-    distance_m, _ = cKDTree(surface_m).query(points[is_free])
-    is_clear = is_free.copy()
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    enclosure = _enclosure(caster, points)
+    is_clear = enclosure >= MIN_ENCLOSURE
+    distance_m, _ = cKDTree(surface_m).query(points[is_clear])
     # A quarter of a step more, by which the suggested box reaches beyond its outermost points.
-    is_clear[is_free] = distance_m >= CLEARANCE_M + step_m / 4.0
-    is_clear = _largest_piece(is_clear.reshape(shape))
-    enclosure = float(np.median(hits[is_free])) if is_free.any() else 0.0
-    floor_m = _floor_m(caster, points[is_clear.reshape(-1)])
-    return FreeSpace(axes, is_free.reshape(shape), is_clear, enclosure, floor_m)
+    is_clear[is_clear] = distance_m >= CLEARANCE_M + step_m / 4.0
+    is_stand = is_clear.copy()
+    height_m = points[is_clear, 2] - _floors_m(caster, points[is_clear])
+    half_m = _step(axes[2]) / 2.0
+    low, high = CAMERA_HEIGHT_M
+    is_stand[is_clear] = (height_m >= low - half_m) & (height_m <= high + half_m)
+    return Survey(axes, points, enclosure, is_clear, is_stand)
+
+
+def find_free_space(caster: RayCaster, found: Survey, slack: float = SLACK) -> FreeSpace:
+    """The largest space in which cameras see each other; see ``DEFINITION``.
+
+    Args:
+        caster: rays against the mesh.
+        found: what :func:`survey` found.
+        slack: by how much less enclosed a point may be than the best places to stand.
+    """
+    shape = tuple(len(axis) for axis in found.axes_m)
+    nothing = np.zeros(shape, dtype=np.bool_)
+    if not found.is_stand.any():
+        return FreeSpace(found.axes_m, nothing, nothing, 0.0, None)
+    best = float(np.quantile(found.enclosure[found.is_stand], 0.95))
+    is_enclosed = found.enclosure >= max(best - slack, MIN_ENCLOSURE)
+    hubs_m, share = _largest_space(caster, found.points_m[found.is_stand & is_enclosed])
+    is_free = is_enclosed.copy()
+    space = ConnectedSpace(caster, hubs_m)
+    is_free[is_enclosed] = space.contains(found.points_m[is_enclosed])
+    floors_m = _floors_m(caster, found.points_m[is_free & found.is_stand])
+    return FreeSpace(
+        axes_m=found.axes_m,
+        is_free=is_free.reshape(shape),
+        is_clear=(is_free & found.is_clear).reshape(shape),
+        enclosure=float(np.median(found.enclosure[is_free])),
+        floor_m=_most_frequent(floors_m),
+        elsewhere=1.0 - share,
+    )
+
+
+def _largest_space(caster: RayCaster, stands_m: Array) -> tuple[Array, float]:
+    """Some (H, 3) of the places (N, 3) of the largest group that see each other, and its share."""
+    rng = np.random.default_rng(0)
+    places = rng.permutation(stands_m)[:N_PLACES]
+    group = seeing_groups(caster, places)
+    largest = places[group == np.bincount(group).argmax()]
+    return largest[:N_HUBS], len(largest) / len(places)
 
 
 def suggest_box(space: FreeSpace) -> Array | None:
@@ -115,9 +180,9 @@ def viewpoint(space: FreeSpace, box_m: Array | None) -> Array | None:
 
 
 def ray_directions() -> Array:
-    """Directions (64, 3) spread evenly, from straight down to the greatest elevation."""
+    """Directions (64, 3) spread evenly, from level to the greatest elevation."""
     index = np.arange(N_RAYS) + 0.5
-    z = -1.0 + index / N_RAYS * (1.0 + np.sin(np.deg2rad(MAX_ELEVATION_DEG)))
+    z = index / N_RAYS * np.sin(np.deg2rad(MAX_ELEVATION_DEG))
     turn = np.pi * (1.0 + np.sqrt(5.0)) * index
     radius = np.sqrt(1.0 - z**2)
     return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)
@@ -143,35 +208,28 @@ def _step(axis: Array) -> float:
     return float(axis[1] - axis[0]) if len(axis) > 1 else 0.1
 
 
-def _hit_shares(caster: RayCaster, points: Array) -> tuple[Array, Array]:
-    """Shares (N,) of the rays from each point that hit, and that hit beyond 0.2 m."""
-    directions = ray_directions()
-    hits = np.empty((len(directions), len(points)))
-    for row, direction in enumerate(directions):
-        hits[row] = caster.first_hit_m(points, np.broadcast_to(direction, points.shape))
-    found = np.isfinite(hits)
-    return found.mean(axis=0), (found & (hits > NEAR_M)).mean(axis=0)
+def _enclosure(caster: RayCaster, points: Array) -> Array:
+    """Share (N,) of the rays from each point (N, 3) that hit within reach."""
+    hits = np.zeros(len(points))
+    for direction in ray_directions():
+        hits += caster.first_hit_m(points, np.broadcast_to(direction, points.shape)) <= REACH_M
+    return hits / N_RAYS
 
 
-def _largest_piece(mask: Mask) -> Mask:
-    """The largest set of neighbouring points."""
-    pieces, count = label(mask)
-    if count == 0:
-        return mask
-    sizes = np.bincount(pieces.ravel())
-    sizes[0] = 0
-    return np.asarray(pieces == sizes.argmax(), dtype=np.bool_)
-
-
-def _floor_m(caster: RayCaster, points: Array) -> float | None:
-    """Most frequent height of what lies straight below the points."""
+def _floors_m(caster: RayCaster, points: Array) -> Array:
+    """Height (N,) of what lies straight below points (N, 3); -inf where nothing does."""
     if not len(points):
+        return np.empty(0)
+    return points[:, 2] - caster.first_hit_m(
+        points, np.broadcast_to([0.0, 0.0, -1.0], points.shape)
+    )
+
+
+def _most_frequent(heights_m: Array) -> float | None:
+    """The middle of the heights (N,) that most of them are near."""
+    heights_m = heights_m[np.isfinite(heights_m)]
+    if not len(heights_m):
         return None
-    down = caster.first_hit_m(points, np.broadcast_to([0.0, 0.0, -1.0], points.shape))
-    heights = points[:, 2] - down
-    heights = heights[np.isfinite(heights)]
-    if not len(heights):
-        return None
-    bins, counts = np.unique(np.round(heights / FLOOR_BIN_M), return_counts=True)
-    chosen = np.round(heights / FLOOR_BIN_M) == bins[counts.argmax()]
-    return float(np.median(heights[chosen]))
+    bins, counts = np.unique(np.round(heights_m / FLOOR_BIN_M), return_counts=True)
+    chosen = np.round(heights_m / FLOOR_BIN_M) == bins[counts.argmax()]
+    return float(np.median(heights_m[chosen]))

@@ -28,7 +28,7 @@ def page_html(
         title: heading.
         doubts: sentences to stand out at the top.
         sections: tables of numbers.
-        snippet: lines for a configuration file.
+        snippet: lines for a configuration file and for a shell.
         picture_png: the picture.
         scene: what :meth:`synfeal.inspect.viewer_mesh.ViewerMesh.scene` returns.
     """

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,18 +11,13 @@ from synfeal.config.models import SceneConfig
 from synfeal.dataset.directories import refuse_foreign
 from synfeal.files import atomic_path, write_json
 from synfeal.inspect.facts import facts_of
-from synfeal.inspect.freespace import find_free_space, suggest_box, viewpoint
+from synfeal.inspect.inspection import Inspection
 from synfeal.inspect.page import page_html
 from synfeal.inspect.picture import picture_png
-from synfeal.inspect.surface import SurfacePoints
-from synfeal.inspect.text import Facts, plain_text, sections_of, snippet
+from synfeal.inspect.text import Facts, how_to_go_on, plain_text, sections_of
 from synfeal.inspect.viewer_mesh import ACROSS_RAD, viewer_mesh
 from synfeal.inspect.views import inside_views, top_view
-from synfeal.mesh.load import load_mesh
-from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
-from synfeal.planning.plan import sampling_box_of
-from synfeal.seeds import generator_of
 
 Array = NDArray[np.float64]
 
@@ -32,7 +26,7 @@ N_LEVEL_RAYS = 64
 BOX_RGB = (213, 94, 0)
 
 
-def inspect_mesh(scene: SceneConfig, out: Path) -> str:
+def inspect_mesh(scene: SceneConfig, out: Path, unit_is_given: bool = True) -> str:
     """Write ``inspect.json``, ``inspect.png`` and ``inspect.html`` into ``out``; the text to print.
 
     Earlier files of these names are replaced.
@@ -40,29 +34,22 @@ def inspect_mesh(scene: SceneConfig, out: Path) -> str:
     Args:
         scene: ``source`` is ``mesh``; a ``sampling_box`` confines the search for free space.
         out: directory, made if need be.
+        unit_is_given: whether ``scene.unit_m`` may not be doubted.
 
     Raises:
         InputError: the mesh cannot be used, the box misses it, or ``out`` holds other files.
     """
     refuse_foreign(out, OUTPUTS, "an inspection")
-    path = cast(Path, scene.path)
-    mesh = load_mesh(path, scene.up_axis, scene.unit_m)
-    box_m = sampling_box_of(scene, mesh.bounds_m, str(path))
-    surface = SurfacePoints.of(mesh, generator_of(0, "inspect"))
-    caster = RayCaster(*mesh.merged())
-    space = find_free_space(caster, surface.position_m, box_m)
-    suggested_m = suggest_box(space)
-    found_m = viewpoint(space, suggested_m)
-    position_m = mesh.bounds_m.mean(axis=0) if found_m is None else found_m
-    facts = facts_of(scene, mesh, surface, space, box_m, suggested_m)
-    picture = _picture(path.name, facts, mesh, position_m, suggested_m)
-    polylines = (
-        [] if suggested_m is None else [(edges, BOX_RGB) for edges in box_lines(suggested_m)]
+    found = Inspection.of(scene, unit_is_given or scene.sampling_box is not None)
+    facts = facts_of(found)
+    picture = _picture(facts, found)
+    edges = [] if found.suggested_m is None else box_lines(found.suggested_m)
+    heading = heading_from_opening(found.caster, found.viewpoint_m)
+    drawing = viewer_mesh(found.mesh, found.surface).scene(
+        [(edge, BOX_RGB) for edge in edges], heading
     )
-    heading = heading_from_opening(caster, position_m)
-    drawing = viewer_mesh(mesh, surface).scene(polylines, heading)
     page = page_html(
-        path.name, facts["doubts"], sections_of(facts), snippet(facts), picture, drawing
+        facts["title"], facts["doubts"], sections_of(facts), how_to_go_on(facts), picture, drawing
     )
     _write(out / OUTPUTS[1], picture)
     _write(out / OUTPUTS[2], page.encode("utf-8"))
@@ -92,10 +79,9 @@ def heading_from_opening(caster: RayCaster, position_m: Array) -> float:
     return float(np.arctan2(-out[1], -out[0]))
 
 
-def _picture(
-    name: str, facts: Facts, mesh: TexturedMesh, position_m: Array, suggested_m: Array | None
-) -> bytes:
+def _picture(facts: Facts, found: Inspection) -> bytes:
     """Title, numbers and views; the mesh is cut at mid-height of the box, if there is one."""
+    mesh, suggested_m, position_m = found.mesh, found.suggested_m, found.viewpoint_m
     low, high = mesh.bounds_m
     cut_m = float(low[2] + 0.6 * (high[2] - low[2]))
     if suggested_m is not None:
@@ -106,8 +92,8 @@ def _picture(
         f"{values['vertices']:,} vertices, {values['faces']:,} faces, {size} m,"
         f" {facts['free_space']['share']:.0%} of the box is free space"
     )
-    views = inside_views(mesh, position_m)
-    return picture_png(name, caption, top_view(mesh, cut_m), cut_m, suggested_m, position_m, views)
+    views, top = inside_views(mesh, position_m), top_view(mesh, cut_m)
+    return picture_png(facts["title"], caption, top, cut_m, suggested_m, position_m, views)
 
 
 def _write(path: Path, content: bytes) -> None:

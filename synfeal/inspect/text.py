@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from itertools import zip_longest
-from pathlib import Path
 from textwrap import wrap
 from typing import Any, NamedTuple
+
+from synfeal.mesh.title import slug_of
 
 Facts = Mapping[str, Any]
 
@@ -47,7 +47,18 @@ def plain_text(facts: Facts) -> str:
         lines += [title, *(line for row in rows for line in _aligned(*row, width)), ""]
     if facts["doubts"]:
         lines += ["Look at this first", *_bullets(facts["doubts"]), ""]
-    return "\n".join([*lines, "For a configuration file, under scenes:", snippet(facts)])
+    return "\n".join([*lines, how_to_go_on(facts)])
+
+
+def how_to_go_on(facts: Facts) -> str:
+    """A scene for a configuration file and, last, the command that collects a first data set."""
+    lines = ["For a configuration file, under scenes:", snippet(facts), ""]
+    collect = facts["collect"]
+    if collect is None:
+        return "\n".join([*lines, "No command is suggested: no box was found to plan paths in."])
+    empty = collect["empty_pixels"]["share"]
+    said = f"A first data set, planned once: {collect['frames']} frames, {empty:.1%} empty pixels"
+    return "\n".join([*lines, f"{said}:", "", collect["command"]])
 
 
 def _bullets(texts: Sequence[str]) -> list[str]:
@@ -66,7 +77,7 @@ def snippet(facts: Facts) -> str:
     """A scene in YAML, ready to paste under ``scenes:``."""
     mesh = facts["mesh"]
     lines = [
-        f"  {slug(Path(mesh['path']).stem)}:",
+        f"  {slug_of(facts['title'])}:",
         "    source: mesh",
         f"    path: {json.dumps(mesh['path'], ensure_ascii=False)}",
         f"    sha256: {mesh['sha256']}",
@@ -80,12 +91,6 @@ def snippet(facts: Facts) -> str:
         inner = ", ".join(f"{axis}: [{low:z.2f}, {high:z.2f}]" for axis, (low, high) in box.items())
         lines.append(f"    sampling_box: {{{inner}}}")
     return "\n".join(lines)
-
-
-def slug(name: str) -> str:
-    """A name that a configuration accepts for a scene."""
-    found = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
-    return found or "scene"
 
 
 def _mesh_rows(facts: Facts) -> tuple[tuple[str, str], ...]:
@@ -125,6 +130,10 @@ def _surface_rows(facts: Facts) -> tuple[tuple[str, str], ...]:
         rows.append(("texels per metre, median", text))
     if vertices is not None:
         rows.append(("coloured vertices per metre", f"{vertices:.0f}"))
+    backs = facts["back_faces_share"]
+    if backs is not None:
+        text = f"{backs:.0%} of what cameras see; drawn like front faces"
+        rows.append(("back sides of faces", text))
     return tuple(rows)
 
 
@@ -144,13 +153,13 @@ def _topology_rows(topology: Facts) -> tuple[tuple[str, str], ...]:
 
 def _space_rows(facts: Facts) -> tuple[tuple[str, str], ...]:
     space, suggested = facts["free_space"], facts["suggested_sampling_box"]
-    box = "none: no clear point 0.8 to 2.0 m above the floor"
+    box = "none"
     if suggested is not None:
         box = ", ".join(f"{axis} {a:z.2f} to {b:z.2f}" for axis, (a, b) in suggested.items()) + " m"
     floor = "not found" if space["floor_m"] is None else f"z = {space['floor_m']:z.2f} m"
     return (
         ("share of the box", f"{space['share']:.1%} ({space['volume_m3']:.1f} m^3)"),
-        ("rays that hit, median", f"{space['enclosure']:.0%} over free points"),
+        ("enclosed, median", f"{space['enclosure']:.0%} over free points"),
         ("floor", floor),
         ("suggested sampling box", box),
         ("definition", space["definition"]),

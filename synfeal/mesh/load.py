@@ -75,10 +75,14 @@ def _check_file(path: Path) -> None:
     refuse_kind(path)
 
 
+def is_y_up(path: Path, up_axis: UpAxis) -> bool:
+    """Whether y points up in a file; ``auto`` goes by its kind."""
+    return path.suffix.lower() in GLTF_SUFFIXES if up_axis == "auto" else up_axis == "y"
+
+
 def _world_from_file(path: Path, up_axis: UpAxis) -> NDArray[np.float64]:
     """Rotation (3, 3) from the axes of the file to the world."""
-    y_up = path.suffix.lower() in GLTF_SUFFIXES if up_axis == "auto" else up_axis == "y"
-    return WORLD_FROM_Y_UP if y_up else np.eye(3)
+    return WORLD_FROM_Y_UP if is_y_up(path, up_axis) else np.eye(3)
 
 
 def _read_parts(

@@ -63,13 +63,14 @@ def largest_group(
             f"plan: no pose in the sampling box looks farther than min_view_distance_m"
             f" ({min_view_distance_m} m); lower it, or check sampling_box, unit_m and up_axis"
         )
-    return found[_largest_group(caster, found)]
+    group = seeing_groups(caster, found[:, :3])
+    largest: PoseVectors = found[group == np.bincount(group).argmax()]
+    return largest
 
 
-def _largest_group(caster: RayCaster, poses: PoseVectors) -> NDArray[np.intp]:
-    """Indices of the largest set of poses (N, 6) connected by free lines of sight."""
-    i, j = np.triu_indices(len(poses), k=1)
-    free = caster.sees(poses[i, :3], poses[j, :3]) if len(i) else np.empty(0, np.bool_)
-    graph = coo_array((np.ones(int(free.sum())), (i[free], j[free])), shape=(len(poses),) * 2)
-    _, group = connected_components(graph, directed=False)
-    return np.flatnonzero(group == np.bincount(group).argmax())
+def seeing_groups(caster: RayCaster, places_m: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Number (N,) of the group of each place (N, 3); free lines of sight connect a group."""
+    i, j = np.triu_indices(len(places_m), k=1)
+    free = caster.sees(places_m[i], places_m[j]) if len(i) else np.empty(0, np.bool_)
+    graph = coo_array((np.ones(int(free.sum())), (i[free], j[free])), shape=(len(places_m),) * 2)
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
