@@ -71,7 +71,7 @@ from synfeal.validate.images import read_color, read_depth_mm
 from synfeal.validate.run import validate
 from tests.mesh_samples import UV, box_mesh, store_gltf, textured, triangle_gltf, write_obj
 from tests.planar_scene import straight_path
-from tests.report_results import experiment
+from tests.report_results import design_of, experiment
 
 CAMERA = CameraConfig(width=24, height=18)
 N = 6
@@ -373,7 +373,7 @@ def _score(path: Path) -> object:
 
 
 def _evidence(path: Path) -> object:
-    evidence = evidence_of([ROW], 1, path.parents[7])
+    evidence = evidence_of(design_of([ROW]), path.parents[7])
     with suppress(Missing):  # which ends in a verdict
         return evidence.errors(Cell("posenet"))
     return None
@@ -413,7 +413,7 @@ def _rate(path: Path) -> object:
     root = next(parent for parent in path.parents if (parent / "benchmarks").is_dir())
     claim = next(claim for claim in published_claims() if claim.id == "C14")
     with suppress(Missing):
-        return collection_rate(claim, evidence_of([ROW], 1, root))
+        return collection_rate(claim, evidence_of(design_of([ROW]), root))
     return None
 
 
@@ -529,7 +529,7 @@ _sizes = table_of(
 
 
 def _figure_table(path: Path) -> list[float]:
-    rows = Results(path.parents[1], (), 1).table(path.stem)
+    rows = Results(path.parents[1], design_of(())).table(path.stem)
     return [number(row[column]) for row in rows for column in row if column not in TEXTS]
 
 
@@ -582,7 +582,7 @@ KINDS: tuple[Kind, ...] = (
     Kind(
         "errors, figure",
         of_run("errors.csv"),
-        lambda p: read_errors(Results(p.parents[7], (ROW,), 1), ROW),
+        lambda p: read_errors(Results(p.parents[7], design_of((ROW,))), ROW),
         form=",",
     ),
     Kind("metrics", of_run("metrics.json"), lambda p: combine([read_metrics(p)]), form="json"),

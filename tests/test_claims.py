@@ -17,7 +17,7 @@ from tests.claims_results import (
     rows_where,
     write_collection,
 )
-from tests.report_results import fill_assistance
+from tests.report_results import design_of, fill_assistance
 
 HOLDS, FAILS = "holds", "does not hold"
 UNDECIDED, UNTESTED = "undecided at this scale", "not testable here"
@@ -269,15 +269,15 @@ def test_repetitions_are_averaged(results):
         for model in MODELS:
             results.write(row, model, (0.2, 10.0))
             results.write(row, model, (0.4, 20.0), repetition=1)
-    evidence = evidence_of(results.design, 2, results.root)
-    position, orientation = evidence.errors(next(iter(evidence.design)))
+    evidence = evidence_of(design_of(results.design, 2), results.root)
+    position, orientation = evidence.errors(next(iter(evidence.runs)))
     assert position == pytest.approx(np.full(4001, 0.3))
     assert orientation == pytest.approx(np.full(4001, 15.0))
 
 
 def test_the_file_has_the_columns_and_comes_out_the_same_again(paper, tmp_path):
     for name in ("a.csv", "b.csv"):
-        write_claims(paper.design, 1, paper.root, tmp_path / name)
+        write_claims(design_of(paper.design), paper.root, tmp_path / name)
     assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
     with (tmp_path / "a.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))

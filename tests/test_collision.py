@@ -38,7 +38,7 @@ from synfeal.planning.target import admissible, has_free_view
 from synfeal.report.figures import Results, write_figures
 from synfeal.report.speed_vs_error import COLUMNS, collision_rows, write_speed_vs_error
 from synfeal.report.tables import write_rows
-from tests.report_results import read
+from tests.report_results import design_of, read
 
 SCENE = SceneConfig.model_validate({"source": "mesh", "path": "scene.glb"})
 ROOM = np.array([[-3.0, -2.0, 0.0], [3.0, 2.0, 2.5]])
@@ -247,7 +247,7 @@ def test_the_table_rids_speeds_of_what_else_the_machine_did(tmp_path: Path) -> N
     assert [float(row["error"]) for row in rows] == pytest.approx([0.0, 0.002, 0.1])
     assert [row["chosen"] for row in rows] == ["0", "1", "0"]
     assert {(row["stage"], row["scene"]) for row in rows} == {("collision", "large_room")}
-    write_figures(Results(tmp_path, (), 1), tmp_path / "figures")
+    write_figures(Results(tmp_path, design_of(())), tmp_path / "figures")
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {
         "speed_vs_error_collision.png",
         "speed_vs_error_collision.svg",

@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from synfeal.config import load_config, parse_config, read_experiments, runs_of
+from synfeal.config import Design, Run, load_config, parse_config, read_design, read_experiments
 from synfeal.config.docs import documents, main
 from synfeal.config.load import merge, read_yaml
 from synfeal.errors import InputError
+from tests.report_results import design_of, experiment
 
 CONFIG = Path(__file__).parent.parent / "config"
 PROFILES = {
@@ -174,6 +175,39 @@ def test_a_configuration_cannot_be_changed_after_it_was_checked():
         config.scale = 1.0
 
 
+def test_a_run_is_repeated_as_often_as_any_of_its_tables_asks():
+    rows = (
+        experiment("table4_size"),
+        experiment("table2_ground_truth", labels="sfm"),
+        experiment("table2_ground_truth"),
+        experiment("table5_from_scratch", size="20k", init="scratch"),
+    )
+    design = Design(rows=rows, repetitions={"default": 2, "table2_ground_truth": 3})
+    asked = Counter((r.size, r.labels, r.init) for r in design.runs if r.model == "posenet")
+    assert asked == {
+        ("6k", "synfeal", "pretrained"): 3,  # Table 4 shows the third as well
+        ("6k", "sfm", "pretrained"): 3,
+        ("20k", "synfeal", "scratch"): 2,
+        ("20k", "synfeal", "pretrained"): 2,  # what Table 5 compares with, in no row of its own
+    }
+    first = rows[0]
+    assert design.runs_of(first, "posenet")[0] == Run(
+        "large_room", "6k", "synfeal", "pretrained", "posenet", 0
+    )
+    assert len(design.table_runs("table4_size")) == 3 * 5
+    assert set(design_of([first]).runs) < set(design.runs)
+
+
+def test_repetitions_of_an_unknown_table_are_refused(tmp_path):
+    override = tmp_path / "mine.yaml"
+    override.write_text("training: {repetitions: {table9_nothing: 3}}\n")
+    with pytest.raises(InputError, match=r"training\.repetitions\.table9_nothing: .*'default'"):
+        load_config(CONFIG / "config.yaml", override)
+    override.write_text("training: {repetitions: {table3_inconsistencies: 3}}\n")
+    design = read_design(load_config(CONFIG / "config.yaml", override))
+    assert max(run.repetition for run in design.runs) == 2
+
+
 @pytest.mark.parametrize("name", ["mini", "paper"])
 def test_the_design_is_the_papers(name):
     config = profile(name)
@@ -184,11 +218,11 @@ def test_the_design_is_the_papers(name):
         "table3_inconsistencies": 12,
         "table4_size": 8,
         "table5_from_scratch": 4,
+        "table6_label_errors": 1 + 4 * 2,  # our own
     }
-    assert sum(rows.values()) == 29
-    runs = runs_of(experiments, 1)
-    assert len(runs) == len({run.directory for run in runs}) == 125
-    assert len(runs_of(experiments, 3)) == 375
+    runs = design_of(experiments).runs
+    # 25 data sets and starts of the paper, and the six of Table 6 that Table 3 does not share
+    assert len(runs) == len({run.directory for run in runs}) == (25 + 6) * 5
     assert "large_room/6k/noise-p0.1-r5/pretrained/posenet/seed0" in {r.directory for r in runs}
     noise = {
         (row.noise_m, row.noise_deg)

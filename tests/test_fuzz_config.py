@@ -10,9 +10,10 @@ from pydantic import BaseModel
 
 from baselines.groundtruth.methods import check_sources
 from synfeal.cli import main
-from synfeal.config import Config, load_config, parse_config, read_experiments, runs_of
+from synfeal.config import Config, load_config, parse_config, read_experiments
 from tests.fuzzing import Damage, damages, problem_with, put, removed, replaced, text_damages
 from tests.mesh_samples import write_obj
+from tests.report_results import design_of
 from tests.test_workflow import snakemake
 
 REPOSITORY = Path(__file__).parent.parent
@@ -187,7 +188,7 @@ def test_yaml_that_is_more_than_plain_values_is_refused(label, tmp_path):
 
 def is_design(rows: Any) -> bool:
     """Whether every run and label set has a directory of its own below the results."""
-    for run in runs_of(rows, 1):
+    for run in design_of(rows).runs:
         assert all(part.strip(".") and "\0" not in part for part in Path(run.directory).parts)
         assert len(Path(run.directory).parts) == 6
     label_sets = {(row.scene, row.size, row.label_id): row for row in rows}

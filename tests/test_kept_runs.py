@@ -18,7 +18,7 @@ from baselines.groundtruth.methods import estimation_parameters
 from baselines.training.record import training_parameters, write_training_record
 from baselines.training.score import score_run
 from synfeal.cli import main
-from synfeal.config import Config, Run, load_config, read_experiments, runs_of
+from synfeal.config import Config, Run, load_config, read_design
 from synfeal.dataset.pose_table import COLUMNS, PoseTable, write_pose_table
 from synfeal.files import write_json
 from synfeal.report.predictions.package import POSES
@@ -64,7 +64,7 @@ def write_results(config: Config) -> None:
             stem = root / f"groundtruth/large_room/6k/sfm/{split}/batch-{batch:03d}"
             write_json(stem.with_suffix(".json"), {"frames": 20})
             stem.with_suffix(".csv").write_text("x\n")
-    for run in runs_of(read_experiments(config), 1):
+    for run in read_design(config).runs:
         folder = root / "runs" / run.directory
         test_labels = root / f"labels/{run.scene}/{run.size}/{run.labels}/test.csv"
         shutil.copytree(test_labels.parent, folder)

@@ -25,7 +25,7 @@ from synfeal.report.render_speed import render_rows
 from synfeal.report.speed_vs_error import COLUMNS as TABLE_COLUMNS
 from synfeal.report.tables import write_rows
 from tests.render_backends import BACKENDS, PYOPENGL_WARNS, camera_of
-from tests.report_results import read
+from tests.report_results import design_of, read
 from tests.small_room import furnished_room, room_poses
 
 pytestmark = pytest.mark.filterwarnings(PYOPENGL_WARNS)
@@ -229,7 +229,7 @@ def test_rows_say_what_each_variant_is(made_up: Path) -> None:
 
 
 def test_the_figure_has_a_panel_per_size_with_the_choice_ringed(made_up: Path) -> None:
-    figure = render_speed.draw(Results(made_up, (), 1))
+    figure = render_speed.draw(Results(made_up, design_of(())))
     assert figure is not None
     small, large = figure.axes
     assert (small.get_xscale(), small.get_yscale()) == ("log", "log")
@@ -246,7 +246,7 @@ def test_the_figure_has_a_panel_per_size_with_the_choice_ringed(made_up: Path) -
 
 
 def test_the_figure_is_written_under_its_name(made_up: Path) -> None:
-    write_figures(Results(made_up, (), 1), made_up / "figures")
+    write_figures(Results(made_up, design_of(())), made_up / "figures")
     assert {path.name for path in (made_up / "figures").iterdir()} == {
         "speed_vs_error_render.png",
         "speed_vs_error_render.svg",

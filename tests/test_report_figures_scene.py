@@ -39,7 +39,7 @@ from tests.figure_results import (
     true_poses,
     wrong_poses,
 )
-from tests.report_results import TABLE4, fill, make
+from tests.report_results import TABLE4, design_of, fill, make
 
 SPEED_KEYS = ("stage", "scene", "variant", "faces", "items_per_s", "error", "chosen")
 SPEEDS = (
@@ -57,11 +57,11 @@ RENDERED = {"seconds_per_item": 0.01, "backend": "opengl", "supersampling": 2, "
 def results(tmp_path_factory):
     root = fill_figures(tmp_path_factory.mktemp("results") / "toy")
     fill(root, design())
-    make(TABLE4, [row for row in design() if row.table == TABLE4], root)
+    make(TABLE4, design(), root)
     speeds = [dict(zip(SPEED_KEYS, row, strict=True)) for row in SPEEDS]
     speeds[-1] |= RENDERED | {"width": 64, "height": 48}
     write_rows(root / "tables" / "speed_vs_error.csv", SPEED_COLUMNS, speeds)
-    return Results(root, design(), 1)
+    return Results(root, design_of(design()))
 
 
 @pytest.fixture(autouse=True)
@@ -123,7 +123,7 @@ def test_trajectories_draw_both_paths_and_ring_what_was_assisted(results):
 
 def test_a_design_without_such_labels_has_no_label_set(results):
     rows = tuple(row for row in results.rows if row.table == TABLE4)
-    assert read_labelled_set(Results(results.root, rows, 1)) is None
+    assert read_labelled_set(Results(results.root, design_of(rows))) is None
 
 
 def test_poses_draw_every_camera_of_every_size(results):
@@ -231,7 +231,7 @@ def test_captions_are_single_sentences_in_reading_order():
 
 
 def test_every_drawing_is_a_figure_or_left_out(results):
-    nothing = Results(results.root, (), 1)
+    nothing = Results(results.root, design_of(()))
     drawn = {name for name, entry in FIGURES.items() if entry.draw(nothing) is not None}
     stages = ("collision", "labels", "render", "training")
     assert drawn == {f"speed_vs_error_{stage}" for stage in stages}

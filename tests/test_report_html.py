@@ -20,7 +20,7 @@ from synfeal.report.html.figures import LARGEST_SIDE_PX, data_address, figure_fi
 from synfeal.report.html.skipped import missing_figures, missing_rows
 from synfeal.report.html.tables import score_table
 from tests.report_page import edit_json, large_room_design, page_results
-from tests.report_results import TABLE4, failed_metrics, fill, shipped_design, write_run
+from tests.report_results import TABLE4, design_of, failed_metrics, fill, shipped_design, write_run
 
 RUN = "runs/large_room/6k/sfm/pretrained/posenet/seed0/metrics.json"
 TABLE5 = "table5_from_scratch"
@@ -45,13 +45,13 @@ def text_of(html):
 
 
 def written(root):
-    page.write_report(large_room_design(), 1, root, root / "report.html")
+    page.write_report(design_of(large_room_design()), root, root / "report.html")
     return (root / "report.html").read_text()
 
 
 def table_of(name, root, design=None):
     rows = [row for row in design or shipped_design() if row.table == name]
-    return ET.fromstring(score_table(name, read_cells(name, rows, 1, root)))
+    return ET.fromstring(score_table(name, read_cells(name, design_of(rows), root)))
 
 
 def numbers_of(row, style):

@@ -8,6 +8,7 @@ import pytest
 from synfeal.report.html.page import write_report
 from synfeal.report.html.rooms import SPLITS, paths_of, trajectories
 from tests.report_page import PLANS, large_room_design, page_results, straight
+from tests.report_results import design_of
 from tests.test_inspect_page import CHROMIUM, Reply, browse
 
 # Answers with what PROBE finds, after the views were drawn.
@@ -43,7 +44,7 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     root = page_results(tmp_path_factory.mktemp("browser") / "tiny")
-    write_report(large_room_design(), 1, root, root / "report.html")
+    write_report(design_of(large_room_design()), root, root / "report.html")
     return root / "report.html"
 
 

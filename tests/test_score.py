@@ -95,6 +95,23 @@ def test_the_baseline_predicts_the_mean_training_position(score):
     assert metrics["n_train"] == 60
 
 
+def test_the_mean_pose_and_the_true_poses_are_scored_against_the_labels_too(score):
+    """Cameras turned by -20, 0 and 20 degrees about one axis have no rotation for their mean."""
+    turns = np.radians([-20.0, 0.0, 20.0] * 5)
+    axes = np.array([0.0, 0.0, 1.0])
+    quat = Rotation.from_rotvec(turns[:, None] * axes).as_quat(canonical=True, scalar_first=True)
+    frame = np.arange(15)
+    train = PoseTable(frame, frame, np.tile([1.0, 2.0, 3.0], (15, 1)), quat)
+    truth = PoseTable(frame, frame, train.position_m, np.tile([1.0, 0, 0, 0], (15, 1)))
+    labels = moved(truth, np.array([0.0, 3.0, 4.0]), math.radians(30))
+    metrics, _ = score(truth, labels, truth, train)
+    assert metrics["baseline_position_m_true"] == pytest.approx(0, abs=1e-12)
+    assert metrics["baseline_orientation_deg_true"] == pytest.approx(0, abs=1e-9)
+    assert metrics["baseline_position_m"] == metrics["floor_position_m"] == pytest.approx(5)
+    assert metrics["baseline_orientation_deg"] == pytest.approx(30)
+    assert metrics["floor_orientation_deg"] == pytest.approx(30)
+
+
 @pytest.mark.parametrize(("lost", "is_null"), [(5, False), (N, True)])
 def test_predictions_that_are_not_finite_are_failures(score, lost, is_null):
     table = poses(np.random.default_rng(5))

@@ -22,7 +22,7 @@ from synfeal.report.cells import read_cells
 from synfeal.report.compare.runs import read_run
 from synfeal.report.figures.cumulative_error import cumulative
 from synfeal.report.tables import record_of
-from tests.report_results import experiment
+from tests.report_results import design_of, experiment
 from tests.trained_localizers import NETWORK, answering, save
 
 MP = mpmath.MPContext()
@@ -204,7 +204,7 @@ def test_a_diverged_repetition_is_counted_and_averaged_into_nothing(
             other = out.parent.parent / model / out.name
             other.mkdir(parents=True)
             (other / "metrics.json").write_bytes((out / "metrics.json").read_bytes())
-    for cell in read_cells("table4_size", [row], 3, tmp_path):
+    for cell in read_cells("table4_size", design_of([row], 3), tmp_path):
         record = record_of("table4_size", cell)
         assert (record["position_m"], record["position_m_sd"]) == (1.0, math.sqrt(0.5))
         assert record["position_m_low"] == record["position_m_high"] == 1.0

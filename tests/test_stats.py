@@ -16,7 +16,7 @@ KEYS = [*MEASURES, *(f"{m}_{end}" for m in MEASURES for end in ("low", "high"))]
 def run_of(first):
     """Scores that all differ: ``first``, ``first + 1``, ... in the order of ``KEYS``."""
     values = metrics("6k", 1.0, 1.0) | dict(zip(KEYS, map(float, count(first)), strict=False))
-    return values | {"position_rms_m": first + 50.0, "baseline_position_m_true": first + 60.0}
+    return values | {"position_rms_m": first + 50.0, "floor_position_m": first + 60.0}
 
 
 def test_a_cell_is_the_mean_of_its_runs_measure_by_measure():
@@ -27,7 +27,7 @@ def test_a_cell_is_the_mean_of_its_runs_measure_by_measure():
         low = len(MEASURES) + 2 * place
         assert (score.value, score.low, score.high) == (place + 4, low + 4, low + 5)
         assert score.sd == pytest.approx(math.sqrt(28))
-    assert (cell.position_rms_m, cell.baseline_m) == (54, 64)
+    assert (cell.position_rms_m, cell.references["floor_position_m"]) == (54, 60)
     assert (cell.n_train, cell.n_test) == (300, 125)
     assert (cell.n_seeds, cell.n_finished, cell.failed) == (3, 3, 0)
 
@@ -36,7 +36,7 @@ def test_runs_without_a_score_count_as_runs_and_give_no_score():
     cell = combine([failed_metrics("6k"), run_of(3) | {"failed": 7}])
     assert cell.scores["position_m"].value == 3
     assert cell.scores["position_m"].sd is None
-    assert cell.baseline_m == (1 + 63) / 2  # that of guessing the mean needs no score
+    assert cell.references["baseline_position_m_true"] == 1  # guessing the mean needs no score
     assert cell.position_rms_m == 53
     assert (cell.n_seeds, cell.n_finished, cell.failed) == (2, 1, 125 + 7)
     nothing = combine([failed_metrics("6k")])
@@ -73,7 +73,7 @@ def test_metrics_are_read_back_as_they_are(tmp_path):
     assert read_metrics(path) == values
 
 
-@pytest.mark.parametrize("key", [*KEYS, "position_rms_m", "baseline_position_m_true"])
+@pytest.mark.parametrize("key", [*KEYS, "position_rms_m", "baseline_orientation_deg"])
 @pytest.mark.parametrize("value", [-1.0, "one", [1.0]])
 def test_a_score_that_is_no_error_is_refused_by_name(tmp_path, key, value):
     path = tmp_path / "metrics.json"

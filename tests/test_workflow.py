@@ -27,14 +27,14 @@ def planned_jobs(results: Path, *arguments: str) -> dict[str, int]:
 
 def test_default_profile_plans_the_papers_design(tmp_path: Path) -> None:
     jobs = planned_jobs(tmp_path)
-    assert jobs["train"] == jobs["score"] == 125  # 25 distinct data set x initialisation, 5 models
+    assert jobs["train"] == jobs["score"] == 155  # 31 distinct data set x initialisation, 5 models
     assert jobs["scene"] == 3
-    assert jobs["noisy_labels"] == 9 * 2
+    assert jobs["erroneous_labels"] == (9 + 6) * 2
     assert jobs["sfm"] == jobs["rgbd"] == 12 + 5  # 300 and 125 frames in batches of 25
     assert jobs["posegraph"] == 2 * jobs["rgbd"]
     assert jobs["estimate"] == jobs["rgbd"]
     assert jobs["chain"] == 4
-    assert jobs["table"] + jobs["table1_meshes"] == 5
+    assert jobs["table"] + jobs["table1_meshes"] == 6
 
 
 def test_a_single_experiment_is_a_target(tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ import numpy as np
 from baselines.groundtruth.posegraph.graph import Edge, PoseGraph
 from baselines.groundtruth.trajectory import BatchTrajectory
 from synfeal.config import Config, Experiment
+from synfeal.config.experiments import INJECTED
 from synfeal.config.models import CameraConfig, GroundTruthConfig, PoseGraphConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.errors import InputError
@@ -67,7 +68,7 @@ METHODS: dict[str, Method] = {
         settings="kinect_fusion",
     ),
 }
-SIMULATOR, NOISE = "synfeal", "noise"
+SIMULATOR = "synfeal"
 _SMALLEST = PoseGraph(np.stack([np.eye(4)] * 2), (Edge(0, 1, np.eye(4), np.eye(6)),))
 
 
@@ -92,7 +93,7 @@ def check_sources(rows: Sequence[Experiment], path: Path) -> None:
     Raises:
         InputError: naming the design, the label source, and the sources there are.
     """
-    known = (SIMULATOR, NOISE, *METHODS)
+    known = (SIMULATOR, *INJECTED, *METHODS)
     for row in rows:
         if row.labels not in known:
             raise InputError(f"{path}: labels '{row.labels}': not one of {', '.join(known)}")

@@ -16,7 +16,6 @@ from synfeal.dataset.packed_record import file_sha256
 from synfeal.errors import InputError
 from synfeal.files import read_json, write_json
 from synfeal.provenance import provenance
-from synfeal.seeds import seed_of
 
 RECORD = "training.json"
 
@@ -33,10 +32,7 @@ def training_parameters(config: Config, run: Run) -> dict[str, Any]:
         "training": hyper,
         "samples_seen": config.training.samples_seen[run.size],
         "camera": config.network_camera.model_dump(mode="json"),
-        "seed": seed_of(
-            config.seed,
-            *("train", run.scene, run.size, run.labels, run.init, run.model, str(run.repetition)),
-        ),
+        "seed": run.seed(config.seed),
     }
     if run.init == "pretrained":
         parameters["pretraining"] = config.pretraining.model_dump(mode="json")

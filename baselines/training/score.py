@@ -25,6 +25,7 @@ from synfeal.errors import InputError
 from synfeal.files import atomic_path, write_json
 from synfeal.geometry.poses import position_error_m
 from synfeal.geometry.rotations import rotation_angle_rad
+from synfeal.labels.constant import constant_pose
 from synfeal.seeds import generator_of
 
 Array = NDArray[np.float64]
@@ -45,16 +46,17 @@ def score_run(
 
     ``position_m`` and ``orientation_deg`` are against ``labels``, which is what the paper reports;
     the names ending in ``_true`` are against ``truth``. ``position_rms_m`` is the published code's
-    definition, the root mean square over the three axes. ``baseline_position_m_true`` is the median
-    error of always predicting the mean training position. ``failed`` counts predictions that are no
-    pose, i.e. not finite or without a unit quaternion; their error is infinite. A
-    median that is not finite is ``null`` in the JSON.
+    definition, the root mean square over the three axes. ``baseline_*`` are the median errors of
+    always answering the mean training pose, ``floor_*`` those of the true poses against ``labels``:
+    what a perfect localizer scores. ``failed`` counts predictions that are no pose, i.e. not finite
+    or without a unit quaternion; their error is infinite. A median that is not finite is ``null``
+    in the JSON.
 
     Args:
         predictions: pose table of the test frames; may hold ``nan``.
         labels: the test split's labels.
         truth: the test split's true poses.
-        train_labels: labels of the training split.
+        train_labels: labels that the run was trained on.
         out_errors: CSV to write, one row per frame.
         out_metrics: JSON to write.
         info: further keys of the JSON, e.g. what the run was.
@@ -67,19 +69,26 @@ def score_run(
     predicted = _read_predictions(predictions)
     label_table, true_table = _read_like(labels, predicted), _read_like(truth, predicted)
     train = read_pose_table(train_labels)
-    errors = pose_errors(predicted, label_table)
-    errors |= {f"{name}_true": e for name, e in pose_errors(predicted, true_table).items()}
-    baseline = position_error_m(train.position_m.mean(axis=0), true_table.position_m)
+    errors = _both_scores(predicted, label_table, true_table)
+    constant = _both_scores(constant_pose(train, label_table), label_table, true_table)
+    floor = pose_errors(true_table, label_table)
     metrics = {
         **info,
         **median_metrics(errors, predicted.path),
         "n_train": len(train),
         "n_test": len(predicted),
         "failed": int(np.isinf(errors["position_m"]).sum()),
-        "baseline_position_m_true": float(np.median(baseline)),
+        **{f"baseline_{name}": float(np.median(e)) for name, e in constant.items()},
+        **{f"floor_{name}": float(np.median(e)) for name, e in floor.items()},
     }
     _write_errors(out_errors, predicted.frame, errors)
     write_json(out_metrics, metrics)
+
+
+def _both_scores(poses: PoseTable, labels: PoseTable, truth: PoseTable) -> dict[str, Array]:
+    """Errors (N,) against the labels, and under names that end in ``_true`` against the truth."""
+    true = {f"{name}_true": e for name, e in pose_errors(poses, truth).items()}
+    return pose_errors(poses, labels) | true
 
 
 def pose_errors(predicted: PoseTable, reference: PoseTable) -> dict[str, Array]:

@@ -42,7 +42,7 @@ STAGES = {
     ),
     "render_speed": ("scenes/large_room/render_speed.csv",),
     "true_labels": (f"labels/{SET}/synfeal/test.csv",),
-    "noisy_labels": (f"labels/{SET}/noise-p0.3-r20/test.csv",),
+    "erroneous_labels": (f"labels/{SET}/noise-p0.3-r20/test.csv",),
     "sfm": tuple(f"groundtruth/{SET}/sfm/test/batch-000.{kind}" for kind in ("csv", "json")),
     "rgbd": tuple(f"groundtruth/{SET}/rgbd/test/batch-000.{kind}" for kind in ("g2o", "json")),
     "posegraph": tuple(

@@ -1,6 +1,6 @@
 """Configuration: typed models, reading, and the table of experiments."""
 
-from synfeal.config.experiments import Experiment, Run, read_experiments, runs_of
+from synfeal.config.experiments import Design, Experiment, Run, read_design, read_experiments
 from synfeal.config.load import load_config, parse_config
 from synfeal.config.mesh_files import check_mesh_files
 from synfeal.config.models import MODELS, Config
@@ -8,11 +8,12 @@ from synfeal.config.models import MODELS, Config
 __all__ = [
     "MODELS",
     "Config",
+    "Design",
     "Experiment",
     "Run",
     "check_mesh_files",
     "load_config",
     "parse_config",
+    "read_design",
     "read_experiments",
-    "runs_of",
 ]

@@ -180,6 +180,8 @@ def _model_below(annotation: Any, key: str) -> tuple[type[BaseModel] | None, str
 def _default(field: FieldInfo) -> str:
     if field.is_required():
         return "required"
+    if field.default_factory is not None:
+        return f"`{field.get_default(call_default_factory=True)}`"
     if field.default is PydanticUndefined or field.default is None:
         return "none"
     value = list(field.default) if isinstance(field.default, tuple) else field.default

@@ -3,51 +3,55 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 from pydantic import Field, ValidationError, model_validator
 
 from synfeal.config.load import describe
 from synfeal.config.models import MODELS, Config, NonNegative, Strict
+from synfeal.config.tables import KEYS, Repetitions, TableName
 from synfeal.errors import InputError
+from synfeal.seeds import seed_of
 
 Init = Literal["pretrained", "scratch"]
-# What tells the rows of a table apart; a table shows each once.
-KEYS: Mapping[str, tuple[str, ...]] = {
-    "table2_ground_truth": ("scene", "labels"),
-    "table3_inconsistencies": ("block", "noise_m", "noise_deg"),
-    "table4_size": ("scene", "size"),
-    "table5_from_scratch": ("scene", "size"),
-}
+# Errors that are put into true poses, of a size that noise_m and noise_deg name: one by frame,
+# one by path, a bend of space, another scale (`synfeal/labels/errors.py`).
+INJECTED = ("noise", "offset", "bend", "scale")
+FROM_SCRATCH: TableName = "table5_from_scratch"
 COLUMNS = ("table", "block", "scene", "size", "labels", "noise_m", "noise_deg", "init")
 
 
 class Experiment(Strict):
     """One table row: five cells, one per localizer."""
 
-    table: Literal[
-        "table2_ground_truth", "table3_inconsistencies", "table4_size", "table5_from_scratch"
-    ] = Field(description="the table of the paper the row belongs to")
+    table: TableName = Field(description="the table the row belongs to; table 6 is our own")
     block: Literal["", "orientation", "position", "both"] = Field(
         description="rows of table 3: its block; empty in the other tables"
     )
     scene: str = Field(description="a key of `scenes`")
     size: str = Field(description="a key of `scenes.<scene>.sizes` and of `training.samples_seen`")
     labels: str = Field(
-        description="where the labels come from: `synfeal` the simulator's own poses, `noise` the "
-        "same with noise, or a key of `METHODS` in `baselines/groundtruth/methods.py`: re-estimated"
+        description="where the labels come from: `synfeal` the simulator's own poses; the same "
+        "with errors: `noise` of each frame's own, `offset` one of each path, `bend` a smooth "
+        "deformation of space, `scale` too large a scale; or a key of `METHODS` in "
+        "`baselines/groundtruth/methods.py`: re-estimated"
     )
-    noise_m: NonNegative = Field(description="nominal position noise, metres")
-    noise_deg: NonNegative = Field(description="nominal orientation noise, degrees")
-    init: Init = Field(description="weights a training starts from: `pretrained` or `scratch`")
+    noise_m: NonNegative = Field(description="median position error put into labels, metres")
+    noise_deg: NonNegative = Field(description="the same of orientation, degrees; 0 with `scale`")
+    init: Init = Field(description="weights a training run starts from: `pretrained` or `scratch`")
 
     @model_validator(mode="after")
     def _check(self) -> Experiment:
         noisy = self.noise_m > 0 or self.noise_deg > 0
-        if noisy != (self.labels == "noise"):
-            raise ValueError("labels: must be `noise` exactly when noise_m or noise_deg is above 0")
+        if noisy != (self.labels in INJECTED):
+            kinds = ", ".join(f"`{kind}`" for kind in INJECTED)
+            raise ValueError(
+                f"labels: must be one of {kinds} exactly when noise_m or noise_deg is above 0"
+            )
+        if self.labels == "scale" and (self.noise_deg or not self.noise_m):
+            raise ValueError("noise_deg: must be 0 with labels `scale`, which turn nothing")
         if (self.table == "table3_inconsistencies") != (self.block != ""):
             raise ValueError("block: rows of table 3, and only those, name one of three blocks")
         for name in ("noise_m", "noise_deg"):
@@ -58,14 +62,19 @@ class Experiment(Strict):
     @property
     def label_id(self) -> str:
         """Directory name of the label set, e.g. ``sfm`` or ``noise-p0.1-r5``."""
-        if self.labels != "noise":
+        if self.labels not in INJECTED:
             return self.labels
-        return f"noise-p{self.noise_m:g}-r{self.noise_deg:g}"
+        return f"{self.labels}-p{self.noise_m:g}-r{self.noise_deg:g}"
+
+    @property
+    def pretrained(self) -> Experiment:
+        """The same data set, trained with transfer learning."""
+        return self.model_copy(update={"init": "pretrained"})
 
 
 @dataclass(frozen=True, order=True)
 class Run:
-    """One training: what the path of its results spells out."""
+    """One training run: what the path of its results spells out."""
 
     scene: str
     size: str
@@ -73,6 +82,15 @@ class Run:
     init: str
     model: str
     repetition: int
+
+    def seed(self, profile_seed: int) -> int:
+        """Seed of what the run draws, its labels left out.
+
+        So runs that differ in their labels alone have the same initial weights, held-out paths,
+        order and rotations: a comparison of labels is paired.
+        """
+        names = (self.scene, self.size, self.init, self.model, self.repetition)
+        return seed_of(profile_seed, "train", *names)
 
     @property
     def directory(self) -> str:
@@ -124,7 +142,7 @@ def _refuse_repeats(experiments: Sequence[Experiment], places: Sequence[str]) ->
 def _refuse_depth_methods(experiments: Sequence[Experiment], places: Sequence[str]) -> None:
     """Refuse labels that are estimated from depth; of the estimators only SfM knows distortion."""
     for experiment, where in zip(experiments, places, strict=True):
-        if experiment.labels not in ("synfeal", "noise", "sfm"):
+        if experiment.labels not in ("synfeal", "sfm", *INJECTED):
             raise InputError(
                 f"{where}: labels '{experiment.labels}' need pinhole images; leave"
                 " groundtruth_camera.distortion at zero (a calibration sets it) or drop the row"
@@ -152,15 +170,66 @@ def _parse(row: dict[str, str], where: str, config: Config) -> Experiment:
     return experiment
 
 
-def runs_of(experiments: tuple[Experiment, ...], repetitions: int) -> list[Run]:
-    """All distinct trainings behind some table rows; rows may share them."""
-    runs = {
-        Run(e.scene, e.size, e.label_id, e.init, model, repetition)
-        for e in experiments
-        for model in MODELS
-        for repetition in range(repetitions)
-    }
-    return sorted(runs)
+class Design(Strict):
+    """Rows of tables and how often each of their runs is repeated.
+
+    A run has a name of its own, not a table's: tables that show the same one share it, repetition
+    by repetition, and each uses as many as there are.
+    """
+
+    rows: tuple[Experiment, ...] = Field(description="in the order of the file")
+    repetitions: Repetitions = Field(description="`training.repetitions`")
+
+    @property
+    def tables(self) -> list[str]:
+        """The tables that have rows."""
+        return sorted({row.table for row in self.rows})
+
+    @property
+    def runs(self) -> list[Run]:
+        """Every run, each once: as many repetitions as any of the tables asks for."""
+        runs = {
+            Run(e.scene, e.size, e.label_id, e.init, model, repetition)
+            for row in self.rows
+            for e in _compared(row)
+            for model in MODELS
+            for repetition in range(self._asked(row.table))
+        }
+        return sorted(runs)
+
+    def rows_of(self, table: str) -> list[Experiment]:
+        """The rows of one table."""
+        return [row for row in self.rows if row.table == table]
+
+    def runs_of(self, row: Experiment, model: str) -> list[Run]:
+        """All repetitions of a cell, whichever table asked for them."""
+        cell = (row.scene, row.size, row.label_id, row.init)
+        asked = [
+            self._asked(other.table)
+            for other in self.rows
+            for e in _compared(other)
+            if (e.scene, e.size, e.label_id, e.init) == cell
+        ]
+        return [Run(*cell, model, repetition) for repetition in range(max(asked, default=0))]
+
+    def table_runs(self, table: str) -> list[Run]:
+        """Every run a table reads."""
+        rows = [e for row in self.rows_of(table) for e in _compared(row)]
+        return sorted({run for row in rows for model in MODELS for run in self.runs_of(row, model)})
+
+    def _asked(self, table: TableName) -> int:
+        return self.repetitions.get(table, self.repetitions.get("default", 1))
 
 
-assert set(KEYS) == set(get_args(Experiment.model_fields["table"].annotation))
+def read_design(config: Config) -> Design:
+    """The design of a profile.
+
+    Raises:
+        InputError: naming file, row and column of the first problem.
+    """
+    return Design(rows=read_experiments(config), repetitions=config.training.repetitions)
+
+
+def _compared(row: Experiment) -> list[Experiment]:
+    """A row and what its table shows it against: Table 5 the same run with transfer learning."""
+    return [row, row.pretrained] if row.table == FROM_SCRATCH else [row]

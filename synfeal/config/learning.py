@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from synfeal.config.collection import Count, Finite, Fraction, NonNegative, Positive, Slug, Strict
+from synfeal.config.tables import Repetitions, once
 
 InceptionName = Literal["googlenet", "inception_v3"]
 # A smaller image leaves nothing of its last maps: its reductions have no padding.
@@ -109,7 +110,11 @@ class TrainingConfig(Strict):
     )
     batch_size: Count = Field(32, description="images per step")
     samples_seen: dict[str, Count] = Field(description="images shown in all, by data set size")
-    repetitions: Count = Field(1, description="independent seeds per cell")
+    repetitions: Repetitions = Field(
+        default_factory=once,
+        description="seeds per cell, by table (`table2_ground_truth`, ...), `default` for the rest;"
+        " a run that several tables show is repeated as often as any of them asks",
+    )
     device: Literal["auto", "cpu", "cuda"] = Field("auto", description="where to train")
 
     @model_validator(mode="after")

@@ -18,6 +18,8 @@ from scipy.spatial.transform import Rotation
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.rotations import canonical_quat_wxyz
 
+Array = NDArray[np.float64]
+
 
 def add_noise(
     table: PoseTable, noise_m: float, noise_deg: float, rng: np.random.Generator
@@ -38,18 +40,28 @@ def add_noise(
     """
     if noise_m < 0 or noise_deg < 0:
         raise ValueError(f"noise must not be negative: {noise_m} m, {noise_deg} deg")
-    shift, axis = _unit_vectors(len(table), rng), _unit_vectors(len(table), rng)
+    shift, axis = unit_vectors(len(table), rng), unit_vectors(len(table), rng)
+    return displaced(table, noise_m * shift, np.radians(noise_deg) * axis)
+
+
+def displaced(table: PoseTable, shift_m: Array, rotvec_rad: Array) -> PoseTable:
+    """Poses moved and then turned in the world; where all of a part is zero it stays as it is.
+
+    Args:
+        table: the poses.
+        shift_m: displacements (N, 3) in the world.
+        rotvec_rad: rotation vectors (N, 3) in the world.
+    """
     position_m, quat_wxyz = table.position_m.copy(), table.quat_wxyz.copy()
-    if noise_m > 0:
-        position_m += noise_m * shift
-    if noise_deg > 0:
-        turn = Rotation.from_rotvec(np.radians(noise_deg) * axis)
-        turned = turn * Rotation.from_quat(quat_wxyz, scalar_first=True)
+    if shift_m.any():
+        position_m += shift_m
+    if rotvec_rad.any():
+        turned = Rotation.from_rotvec(rotvec_rad) * Rotation.from_quat(quat_wxyz, scalar_first=True)
         quat_wxyz = canonical_quat_wxyz(turned.as_quat(scalar_first=True))
     return PoseTable(table.frame, table.path, position_m, quat_wxyz)
 
 
-def _unit_vectors(count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+def unit_vectors(count: int, rng: np.random.Generator) -> Array:
     """Vectors (count, 3) uniform on the sphere: normal variates have no preferred direction."""
     vectors = rng.standard_normal((count, 3))
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True), dtype=np.float64)

@@ -70,7 +70,7 @@ def _check(cells: Sequence[Cell]) -> SceneCheck:
         scene=cells[0].row.scene,
         smallest=smallest,
         largest=largest,
-        baseline_m=next(iter(last.values())).own.baseline_m,
+        baseline_m=next(iter(last.values())).own.references["baseline_position_m_true"],
         position_m={model: _error(cell, "position_m_true") for model, cell in last.items()},
         position_falls={m: _fall(first[m], last[m], "position_m_true") for m in last},
         orientation_falls={m: _fall(first[m], last[m], "orientation_deg_true") for m in last},

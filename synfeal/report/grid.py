@@ -1,8 +1,8 @@
 """A table as it is read on paper, before it becomes LaTeX or Markdown.
 
 A grid has groups (the blocks between two rules), a group has rows (one data set each), and a row
-has lines: the regenerated errors, the same against the true poses, and the paper's. Text is
-Unicode; the writers translate it.
+has lines: the regenerated errors, the same against the true poses, the first in the unit that the
+paper prints, and the paper's. Text is Unicode; the writers translate it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-Kind = Literal["labels", "truth", "paper"]
+Kind = Literal["labels", "truth", "unit", "paper"]
 
 
 @dataclass(frozen=True)

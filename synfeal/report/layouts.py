@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from baselines.groundtruth.methods import METHODS
 from synfeal.config import MODELS
-from synfeal.report.cells import FROM_SCRATCH, Cell
+from synfeal.config.experiments import FROM_SCRATCH
+from synfeal.report.cells import Cell
 from synfeal.report.grid import Entry, Grid, Group, Kind, Line, Value, with_bold
 from synfeal.report.stats import Score
 
@@ -18,6 +20,14 @@ TITLES = {
     "posenet2": "PoseNet2",
 }
 SOURCES = {**{name: method.title for name, method in METHODS.items()}, "synfeal": "Synfeal"}
+ERRORS = {
+    "noise": "independent noise",
+    "offset": "one error per path",
+    "bend": "a bend of space",
+    "scale": "a wrong scale",
+}
+# What has not been trained, printed beside the localizers: columns of metrics.
+REFERENCES = {"baseline": "Mean pose", "floor": "True pose"}
 BLOCKS = {"": "", "orientation": "Ori.", "position": "Pos.", "both": "Pos.+Ori."}
 CAPTIONS = {
     "table2_ground_truth": "Median localization error with labels from different data collection "
@@ -27,18 +37,29 @@ CAPTIONS = {
     "table4_size": "Median localization error on data sets of different size.",
     "table5_from_scratch": "Median localization error without transfer learning on data sets of "
     "different size, and the change against the same run with transfer learning.",
+    "table6_label_errors": "Median localization error with labels of the same median error and "
+    "different kinds of it; this table is not in the paper.",
 }
 HEADINGS = {
     "table2_ground_truth": "Ground truth provided by",
     "table3_inconsistencies": "Inconsistencies",
     "table4_size": "(# train, # test)",
     "table5_from_scratch": "(# train, # test)",
+    "table6_label_errors": "Errors of the labels",
 }
 SCORES = (
     "Errors are against the labels the test set carries (the paper's protocol) and against the "
     "true poses of the simulator."
 )
-PAPER = "Lines marked paper: the values the paper printed, on its own meshes and at its own scale."
+PAPER = (
+    "Lines marked paper: the values the paper printed, on its own meshes and at its own scale. Its "
+    "position errors are root mean squares over the three axes; lines marked paper's unit are ours "
+    "in that unit."
+)
+UNTRAINED = (
+    "Mean pose: the error of always answering the mean pose of the training labels. True pose: "
+    "that of the true poses against the labels, what a perfect localizer would score."
+)
 CHANGE = (
     "Red: worse than with transfer learning; green: not worse. Changes come from unrounded errors; "
     "some printed in the paper differ from what its rounded cells give."
@@ -62,9 +83,9 @@ def grid_of(name: str, cells: Sequence[Cell]) -> Grid:
     return Grid(
         name,
         f"{CAPTIONS[name]} {_where(name, rows)} Best scores in bold.",
-        (HEADINGS[name], "Error against", *TITLES.values()),
+        (HEADINGS[name], "Error against", *TITLES.values(), *references_of(one_truth)),
         groups,
-        (SCORES, PAPER, *([CHANGE] if name == FROM_SCRATCH else [])),
+        (SCORES, UNTRAINED, PAPER, *([CHANGE] if name == FROM_SCRATCH else [])),
     )
 
 
@@ -87,7 +108,37 @@ def lines_of(name: str, row: ByModel, one_truth: bool) -> tuple[Line, ...]:
     else:
         lines = _score_lines(row, "labels", label, "labels")
         lines += _score_lines(row, "truth", "", "truth")
-    return (*lines, *_paper_lines(name, row))
+    width = len(row) + len(references_of(one_truth))
+    lines += _paper_lines(name, row)
+    blank = Entry((Value(""),))
+    return tuple(
+        replace(line, entries=(*line.entries, *[blank] * (width - len(line.entries))))
+        for line in (_with_references(line, row[0], one_truth) for line in lines)
+    )
+
+
+def references_of(one_truth: bool) -> tuple[str, ...]:
+    """Titles of the columns after the localizers; true labels have no floor but zero."""
+    return tuple(REFERENCES.values())[: 1 if one_truth else 2]
+
+
+def _with_references(line: Line, cell: Cell, one_truth: bool) -> Line:
+    """A line of scores with what the untrained score, the same for every localizer of the row."""
+    if line.kind not in ("labels", "truth") or line.against == "change":
+        return line
+    end = "_true" if line.kind == "truth" else ""
+    found = cell.own.references
+    entries = [
+        Entry((_plain(found[f"{name}_position_m{end}"], " m"), _plain(found[degrees], "°")))
+        for name in list(REFERENCES)[: len(references_of(one_truth))]
+        if (degrees := f"{name}_orientation_deg{end}") in found
+    ]
+    return replace(line, entries=(*line.entries, *entries))
+
+
+def _plain(value: float | None, unit: str) -> Value:
+    """A number that does not compete for bold."""
+    return Value("–" if value is None else f"{value:.2f}{unit}")
 
 
 def row_label(name: str, cell: Cell) -> str:
@@ -97,6 +148,9 @@ def row_label(name: str, cell: Cell) -> str:
         return SOURCES.get(row.labels, row.label_id)
     if name == "table3_inconsistencies":
         return f"{_level(row.noise_m)} m, {row.noise_deg:g}°"
+    if name == "table6_label_errors":
+        size = f"{_level(row.noise_m)} m, {row.noise_deg:g}°"
+        return f"{ERRORS[row.labels]}, {size}" if row.labels in ERRORS else "none"
     return f"{row.size}: ({cell.own.n_train}, {cell.own.n_test})"
 
 
@@ -155,10 +209,15 @@ def _paper_lines(name: str, row: ByModel) -> list[Line]:
     if name in ("table4_size", FROM_SCRATCH):
         label = f"({_thousands(printed.n_train)}, {_thousands(printed.n_test)})"
     entries = tuple(_paper_entry(cell) for cell in row)
-    lines = [Line("paper", label, "paper", entries, printed.row_note)]
+    unit = Line("unit", "", "labels, paper's unit", tuple(_entry_in_print(cell) for cell in row))
+    lines = [unit, Line("paper", label, "paper", entries, printed.row_note)]
     if name == FROM_SCRATCH:
         lines.append(Line("paper", "", "change, paper", tuple(_paper_change(cell) for cell in row)))
     return lines
+
+
+def _entry_in_print(cell: Cell) -> Entry:
+    return Entry((_plain(cell.own.position_rms_m, " m"),))
 
 
 def _paper_entry(cell: Cell) -> Entry:

@@ -15,7 +15,8 @@ from synfeal.report.results import check_result, read_result
 
 MEASURES = ("position_m", "orientation_deg", "position_m_true", "orientation_deg_true")
 COUNTS = ("n_train", "n_test", "failed")
-BASELINE = "baseline_position_m_true"
+BASELINES = tuple(f"baseline_{measure}" for measure in MEASURES)
+FLOORS = tuple(f"floor_{measure}" for measure in MEASURES[:2])
 Metrics = Mapping[str, Any]
 REMEDY = "score that run again"
 _COUNTS = TypeAdapter(dict[str, NonNegativeInt])
@@ -46,7 +47,8 @@ class CellScores:
     Attributes:
         scores: by measure (:data:`MEASURES`).
         position_rms_m: median position error as the published code computes it, metres.
-        baseline_m: median error of always answering the mean training position, metres.
+        references: median errors of what has not been trained: ``baseline_*`` of the mean training
+            pose, by measure, ``floor_*`` of the true poses against the labels.
         n_train: training frames.
         n_test: test frames.
         n_seeds: repetitions, those without a score included.
@@ -57,7 +59,7 @@ class CellScores:
 
     scores: dict[str, Score]
     position_rms_m: float | None
-    baseline_m: float | None
+    references: dict[str, float]
     n_train: int
     n_test: int
     n_seeds: int
@@ -72,7 +74,7 @@ def read_metrics(path: Path) -> Metrics:
         InputError: the file is missing, is not JSON, lacks a key, or holds no numbers there.
     """
     limits = [f"{measure}_{end}" for measure in MEASURES for end in ("low", "high")]
-    scores = (*MEASURES, *limits, "position_rms_m", BASELINE)
+    scores = (*MEASURES, *limits, "position_rms_m", *BASELINES, *FLOORS)
     values = read_result(path, (*COUNTS, *scores), REMEDY)
     check_result(path, {name: values[name] for name in COUNTS}, _COUNTS, REMEDY)
     check_result(path, {name: values[name] for name in scores}, _SCORES, REMEDY)
@@ -85,7 +87,7 @@ def combine(runs: Sequence[Metrics]) -> CellScores:
     return CellScores(
         scores={measure: score_of(finished, measure) for measure in MEASURES},
         position_rms_m=_mean(finished, "position_rms_m"),
-        baseline_m=_mean(runs, BASELINE),
+        references={name: runs[0][name] for name in (*BASELINES, *FLOORS)},
         n_train=runs[0]["n_train"],
         n_test=runs[0]["n_test"],
         n_seeds=len(runs),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from synfeal.config import Experiment
+from synfeal.config import Design
 from synfeal.files import atomic_path
 from synfeal.report.alive import check_scenes, sentences
 from synfeal.report.cells import Cell, read_cells
@@ -23,12 +23,11 @@ frame counts are in `tables/*.csv`, and as LaTeX in `tables/*.tex`.
 """
 
 
-def write_summary(rows: Sequence[Experiment], repetitions: int, root: Path, out_md: Path) -> str:
+def write_summary(design: Design, root: Path, out_md: Path) -> str:
     """Write the summary of a profile's results.
 
     Args:
-        rows: the whole design of the profile.
-        repetitions: seeds per cell.
+        design: of the profile.
         root: results directory of the profile.
         out_md: the page: checks, then every table beside the paper's.
 
@@ -38,13 +37,11 @@ def write_summary(rows: Sequence[Experiment], repetitions: int, root: Path, out_
     Raises:
         InputError: a result file is missing or unreadable.
     """
-    tables: list[str] = sorted({row.table for row in rows})
-    cells = {
-        name: read_cells(name, [row for row in rows if row.table == name], repetitions, root)
-        for name in tables
-    }
+    cells = {name: read_cells(name, design, root) for name in design.tables}
     findings = [runs_sentence(cells), *alive_sentences(cells)]
-    meshes = {scene: read_mesh_facts(root, scene) for scene in dict.fromkeys(r.scene for r in rows)}
+    meshes = {
+        scene: read_mesh_facts(root, scene) for scene in dict.fromkeys(r.scene for r in design.rows)
+    }
     grids = [meshes_grid(meshes), *(grid_of(name, found) for name, found in cells.items())]
     parts = [
         INTRO.format(profile=root.name),

@@ -6,13 +6,14 @@ import csv
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from synfeal.config import Experiment
-from synfeal.config.experiments import KEYS
+from synfeal.config import Design
+from synfeal.config.experiments import FROM_SCRATCH
+from synfeal.config.tables import KEYS
 from synfeal.files import atomic_path
-from synfeal.report.cells import FROM_SCRATCH, Cell, read_cells
+from synfeal.report.cells import Cell, read_cells
 from synfeal.report.latex import write_latex
 from synfeal.report.layouts import grid_of
-from synfeal.report.stats import MEASURES
+from synfeal.report.stats import BASELINES, FLOORS, MEASURES
 
 LIMITS = tuple(f"{measure}_{end}" for measure in MEASURES for end in ("low", "high"))
 CHANGES = {
@@ -26,8 +27,7 @@ Value = str | int | float | None
 
 def write_table(
     name: str,
-    rows: Sequence[Experiment],
-    repetitions: int,
+    design: Design,
     root: Path,
     out_csv: Path,
     out_tex: Path,
@@ -36,8 +36,7 @@ def write_table(
 
     Args:
         name: the table, e.g. ``table4_size``.
-        rows: the table's rows of the design.
-        repetitions: seeds per cell; with several, columns ``*_sd`` are added.
+        design: of the profile, the rows of this table among others.
         root: results directory of the profile, where ``runs`` is.
         out_csv: one row per cell.
         out_tex: a table environment; the packages it needs are named in its first lines.
@@ -45,20 +44,23 @@ def write_table(
     Raises:
         InputError: a run's scores are missing or unreadable.
     """
-    cells = read_cells(name, rows, repetitions, root)
-    write_rows(out_csv, columns_of(name, repetitions), [record_of(name, cell) for cell in cells])
+    cells = read_cells(name, design, root)
+    records = [record_of(name, cell) for cell in cells]
+    repeated = any(cell.own.n_seeds > 1 for cell in cells)
+    write_rows(out_csv, columns_of(name, repeated), records)
     write_latex(out_tex, grid_of(name, cells))
 
 
-def columns_of(name: str, repetitions: int) -> list[str]:
-    """Columns of a table's CSV, in order."""
-    deviations = [f"{measure}_sd" for measure in MEASURES] if repetitions > 1 else []
+def columns_of(name: str, repeated: bool = False) -> list[str]:
+    """Columns of a table's CSV, in order; ``*_sd`` where a cell has several seeds."""
+    deviations = [f"{measure}_sd" for measure in MEASURES] if repeated else []
     change = [*CHANGES.values()] if name == FROM_SCRATCH else []
     published = ["published_position_m", "published_orientation_deg"]
     if name == FROM_SCRATCH:
         published += [f"published_{CHANGES[m]}" for m in ("position_m", "orientation_deg")]
     return [
         *(*KEYS[name], "model", *MEASURES, "position_rms_m", *LIMITS, *deviations, *change),
+        *(*BASELINES, *FLOORS),
         *("n_train", "n_test", "n_seeds", "failed", *published, "published_flag"),
     ]
 
@@ -74,6 +76,7 @@ def record_of(name: str, cell: Cell) -> dict[str, Value]:
         record[f"{measure}_sd"] = score.sd
     for count in ("position_rms_m", "n_train", "n_test", "n_seeds", "failed"):
         record[count] = getattr(cell.own, count)
+    record.update(cell.own.references)
     record.update({CHANGES[m]: value for m, value in cell.change_percent.items()})
     return record | _published_record(cell)
 

@@ -18,16 +18,12 @@ from baselines.groundtruth.methods import (
 )
 from baselines.training.memory import training_mb
 from baselines.training.record import training_parameters
-from synfeal.config import (
-    Run,
-    check_mesh_files,
-    parse_config,
-    read_experiments,
-    runs_of,
-)
+from synfeal.config import Run, check_mesh_files, parse_config, read_design
+from synfeal.config.experiments import INJECTED
 from synfeal.config.models import MODELS
 from synfeal.dataset.sequences import sequences_of
 from synfeal.errors import InputError
+from synfeal.labels.errors import seed_names
 from synfeal.provenance import config_hash
 from synfeal.report.predictions.restored import restored_files
 from synfeal.run_lock import begin_run
@@ -38,7 +34,8 @@ try:
         config, " + ".join(map(str, workflow.configfiles)) or "config"
     )
     check_mesh_files(CONFIG.scenes)
-    EXPERIMENTS = read_experiments(CONFIG)
+    DESIGN = read_design(CONFIG)
+    EXPERIMENTS = DESIGN.rows
     check_sources(EXPERIMENTS, CONFIG.experiments)
     RESTORED = restored_files(CONFIG)
 except InputError as error:
@@ -46,8 +43,8 @@ except InputError as error:
 
 ROOT = CONFIG.root.as_posix()
 SPLITS = ("train", "test")
-RUNS = runs_of(EXPERIMENTS, CONFIG.training.repetitions)
-TABLE_NAMES = ["table1_meshes", *sorted({e.table for e in EXPERIMENTS})]
+RUNS = DESIGN.runs
+TABLE_NAMES = ["table1_meshes", *DESIGN.tables]
 RECONSTRUCTED = tuple(METHODS)
 
 
@@ -62,6 +59,7 @@ wildcard_constraints:
     backbone="|".join(sorted({backbone_of(m, CONFIG.network) for m in MODELS})),
     repetition=r"\d+",
     size=r"\w+",
+    error_kind="|".join(INJECTED),
     reconstructed="|".join(RECONSTRUCTED),
     frame_method="|".join(frame_methods()),
     graph_method="|".join(graph_methods()),
@@ -160,26 +158,12 @@ def train_mem_mb(wildcards, attempt):
     return attempt * training_mb(frames, CONFIG.network, CONFIG.training.batch_size)
 
 
-def metrics_of(experiments):
-    runs = runs_of(tuple(experiments), CONFIG.training.repetitions)
+def metrics_of(runs):
     return [f"{ROOT}/runs/{run.directory}/metrics.json" for run in runs]
 
 
-def rows_of(table):
-    """The experiments of one table, as plain data: only their change makes the table anew."""
-    return [e for e in EXPERIMENTS if e.table == table]
-
-
-def table_metrics(wildcards):
-    """Every run a table shows; table 5 is read against the pretrained runs of the same size."""
-    rows = rows_of(wildcards.table)
-    if wildcards.table == "table5_from_scratch":
-        rows = rows + [row.model_copy(update={"init": "pretrained"}) for row in rows]
-    return metrics_of(rows)
-
-
 def all_metrics():
-    return [f"{ROOT}/runs/{run.directory}/metrics.json" for run in RUNS]
+    return metrics_of(RUNS)
 
 
 def predictions_there(wildcards):
@@ -214,8 +198,8 @@ def pose_labels():
     ]
 
 
-def errors_of(experiments):
-    return [m.replace("metrics.json", "errors.csv") for m in metrics_of(experiments)]
+def errors_of(runs):
+    return [f"{ROOT}/runs/{run.directory}/errors.csv" for run in runs]
 
 
 def packed_frames(kind, splits=SPLITS):

@@ -31,7 +31,7 @@ rule table1_meshes:
 
 rule table:
     input:
-        metrics=table_metrics,
+        metrics=lambda w: metrics_of(DESIGN.table_runs(w.table)),
     output:
         csv=report(
             f"{ROOT}/tables/{{table}}.csv",
@@ -44,15 +44,14 @@ rule table:
     benchmark:
         f"{ROOT}/benchmarks/tables/{{table}}.tsv"
     wildcard_constraints:
-        table="table[2-5]_[a-z_]+",
+        table="table[2-6]_[a-z_]+",
     conda:
         "../envs/synfeal.yaml"
     threads: 1
     resources:
         mem_mb=grown(1000),
     params:
-        rows=lambda w: [dump(row) for row in rows_of(w.table)],
-        repetitions=CONFIG.training.repetitions,
+        design=dump(DESIGN),
     script:
         "../scripts/table.py"
 
@@ -180,7 +179,7 @@ rule figures:
         speed=rules.speed_vs_error.output.csv,
         labels=pose_labels(),
         assistance=assistance_files(),
-        errors=errors_of(rows_of("table4_size")),
+        errors=errors_of(DESIGN.table_runs("table4_size")),
         collision=expand(
             f"{ROOT}/scenes/{{scene}}/collision.ply",
             scene=sorted({e.scene for e in EXPERIMENTS}),
@@ -204,8 +203,7 @@ rule figures:
     resources:
         mem_mb=grown(2000),
     params:
-        rows=[dump(e) for e in EXPERIMENTS],
-        repetitions=CONFIG.training.repetitions,
+        design=dump(DESIGN),
     script:
         "../scripts/figures.py"
 
@@ -227,8 +225,7 @@ rule summary:
     resources:
         mem_mb=grown(1000),
     params:
-        rows=[dump(e) for e in EXPERIMENTS],
-        repetitions=CONFIG.training.repetitions,
+        design=dump(DESIGN),
     script:
         "../scripts/summary.py"
 
@@ -254,8 +251,7 @@ rule claims:
     resources:
         mem_mb=grown(1000),
     params:
-        rows=[dump(e) for e in EXPERIMENTS],
-        repetitions=CONFIG.training.repetitions,
+        design=dump(DESIGN),
     script:
         "../scripts/claims.py"
 
@@ -316,8 +312,7 @@ rule report:
     resources:
         mem_mb=grown(4000),
     params:
-        rows=[dump(e) for e in EXPERIMENTS],
-        repetitions=CONFIG.training.repetitions,
+        design=dump(DESIGN),
     script:
         "../scripts/report.py"
 

@@ -1,17 +1,18 @@
-# Label sets other than the simulator's: reconstructed in batches with assistance, or noisy.
+# Label sets other than the simulator's: reconstructed in batches with assistance, or with errors.
 
 CHAINED = f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/assistance.json"
 
 
-rule noisy_labels:
+rule erroneous_labels:
     input:
         truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/{{split}}.csv",
+        train=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
     output:
-        labels=f"{ROOT}/labels/{{scene}}/{{size}}/noise-p{{noise_m}}-r{{noise_deg}}/{{split}}.csv",
+        labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{error_kind}}-p{{noise_m}}-r{{noise_deg}}/{{split}}.csv",
     log:
-        f"{ROOT}/logs/labels/{{scene}}/{{size}}/noise-p{{noise_m}}-r{{noise_deg}}/{{split}}.log",
+        f"{ROOT}/logs/labels/{{scene}}/{{size}}/{{error_kind}}-p{{noise_m}}-r{{noise_deg}}/{{split}}.log",
     benchmark:
-        f"{ROOT}/benchmarks/labels/{{scene}}/{{size}}/noise-p{{noise_m}}-r{{noise_deg}}/{{split}}.tsv"
+        f"{ROOT}/benchmarks/labels/{{scene}}/{{size}}/{{error_kind}}-p{{noise_m}}-r{{noise_deg}}/{{split}}.tsv"
     conda:
         "../envs/synfeal.yaml"
     threads: 1
@@ -19,10 +20,10 @@ rule noisy_labels:
         mem_mb=grown(1000),
     params:
         seed=lambda w: seed_of(
-            CONFIG.seed, "noise", w.scene, w.size, w.noise_m, w.noise_deg, w.split
+            CONFIG.seed, *seed_names(w.error_kind, w.split), w.scene, w.size
         ),
     script:
-        "../scripts/noisy_labels.py"
+        "../scripts/erroneous_labels.py"
 
 
 rule sfm:

@@ -83,7 +83,7 @@ rule score:
         history=f"{RUN}/history.csv",
         labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
         truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
-        train_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
+        train_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
     output:
         errors=f"{RUN}/errors.csv",
         metrics=f"{RUN}/metrics.json",

@@ -8,7 +8,7 @@ with job(snakemake.log[0]):
         Path(snakemake.input.predictions),
         Path(snakemake.input.labels),
         Path(snakemake.input.truth),
-        Path(snakemake.input.train_truth),
+        Path(snakemake.input.train_labels),
         Path(snakemake.output.errors),
         Path(snakemake.output.metrics),
         dict(snakemake.wildcards),

@@ -1,13 +1,13 @@
 from pathlib import Path
 
-from synfeal.config import Experiment
+from synfeal.config import Design
 from synfeal.files import atomic_path
 from synfeal.job import job
 from synfeal.report.summary import write_summary
 
 with job(snakemake.log[0]):
-    rows = [Experiment(**row) for row in snakemake.params.rows]
+    design = Design(**snakemake.params.design)
     page = Path(snakemake.output.page)
-    text = write_summary(rows, snakemake.params.repetitions, page.parent, page)
+    text = write_summary(design, page.parent, page)
     with atomic_path(Path(snakemake.output.text)) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -7,7 +7,7 @@ an ``InputError``, as everywhere.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -15,11 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from synfeal.bootstrap import Array, Counts, mean_of, medians, path_counts
-from synfeal.config import MODELS, Experiment
+from synfeal.config import Design, Run
 from synfeal.dataset.number_table import read_numbers
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
-from synfeal.report.cells import FROM_SCRATCH, pretrained
 from synfeal.report.claims.model import Missing
 from synfeal.report.stats import MEASURES
 from synfeal.seeds import generator_of
@@ -50,16 +49,14 @@ class Evidence:
 
     Attributes:
         root: results directory of the profile.
-        design: cells the profile runs.
-        repetitions: seeds per cell; the median errors of a cell are averaged over them.
+        runs: by cell of the profile, its runs; their median errors are averaged.
         end: ``""`` for errors against the labels, ``"_true"`` against the true poses.
         used: files read so far, relative to ``root``.
         test_paths: by test set, how many paths it has.
     """
 
     root: Path
-    design: frozenset[Cell]
-    repetitions: int
+    runs: Mapping[Cell, Sequence[Run]]
     end: str = ""
     used: dict[str, None] = field(default_factory=dict)
     test_paths: dict[tuple[str, str], int] = field(default_factory=dict)
@@ -89,12 +86,11 @@ class Evidence:
             Missing: the profile does not run the cell, or a file of it is missing.
             InputError: a file cannot be read, or is about other frames.
         """
-        if cell not in self.design:
+        if cell not in self.runs:
             raise Missing(f"this profile has no row {_name(cell)}")
         table, counts = self._test_set(cell)
         self.test_paths[cell.scene, cell.size] = counts.shape[1]
-        name = f"runs/{cell.scene}/{cell.size}/{cell.labels}/{cell.init}/{cell.model}"
-        files = [self.file(f"{name}/seed{k}/errors.csv") for k in range(self.repetitions)]
+        files = [self.file(f"runs/{run.directory}/errors.csv") for run in self.runs[cell]]
         if (cell, self.end) not in self._errors:
             path = np.unique(table.path, return_inverse=True)[1]
             runs = [_read_errors(file, table) for file in files]
@@ -114,23 +110,18 @@ class Evidence:
         return self._tests[key]
 
 
-def evidence_of(rows: Iterable[Experiment], repetitions: int, root: Path) -> Evidence:
+def evidence_of(design: Design, root: Path) -> Evidence:
     """The results of a profile.
 
     Args:
-        rows: its design.
-        repetitions: seeds per cell.
+        design: of the profile.
         root: its results directory.
     """
-    return Evidence(root, frozenset(_cells(rows)), repetitions)
-
-
-def _cells(rows: Iterable[Experiment]) -> Iterable[Cell]:
-    for row in rows:
-        needed = [row, pretrained(row)] if row.table == FROM_SCRATCH else [row]
-        for kind in needed:
-            for model in MODELS:
-                yield Cell(model, kind.scene, kind.size, kind.label_id, kind.init)
+    runs: dict[Cell, list[Run]] = {}
+    for run in design.runs:
+        cell = Cell(run.model, run.scene, run.size, run.labels, run.init)
+        runs.setdefault(cell, []).append(run)
+    return Evidence(root, runs)
 
 
 def _name(cell: Cell) -> str:

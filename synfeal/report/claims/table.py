@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from synfeal.config import Experiment
+from synfeal.config import Design
 from synfeal.report.claims.evidence import Evidence, evidence_of
 from synfeal.report.claims.model import Claim, published_claims
 from synfeal.report.claims.registry import judge
@@ -23,12 +23,11 @@ HEADINGS = (
 Row = Mapping[str, str]
 
 
-def write_claims(rows: Iterable[Experiment], repetitions: int, root: Path, out_csv: Path) -> None:
+def write_claims(design: Design, root: Path, out_csv: Path) -> None:
     """Write one row per claim of the paper.
 
     Args:
-        rows: the whole design of the profile.
-        repetitions: seeds per cell.
+        design: of the profile.
         root: results directory of the profile.
         out_csv: the table, columns :data:`COLUMNS`.
 
@@ -36,7 +35,7 @@ def write_claims(rows: Iterable[Experiment], repetitions: int, root: Path, out_c
         InputError: a result file cannot be read. One that is missing makes no error: the claims
             that need it are not testable.
     """
-    write_rows(out_csv, COLUMNS, claim_rows(evidence_of(rows, repetitions, root)))
+    write_rows(out_csv, COLUMNS, claim_rows(evidence_of(design, root)))
 
 
 def claim_rows(evidence: Evidence) -> list[dict[str, str]]:

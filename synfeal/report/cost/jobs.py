@@ -6,13 +6,14 @@ like the file below ``<root>/benchmarks`` that its measurement is written to.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from baselines.groundtruth.batches import batches_of
-from baselines.groundtruth.methods import METHODS, NOISE, frame_methods, graph_methods, stages_of
+from baselines.groundtruth.methods import METHODS, frame_methods, graph_methods, stages_of
 from baselines.localizers.names import backbone_of
-from synfeal.config import Config, Experiment, runs_of
+from synfeal.config import Config, Design, Experiment, Run
+from synfeal.config.experiments import FROM_SCRATCH, INJECTED
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.sequences import sequences_of
 from synfeal.report.cost.disk import (
@@ -101,7 +102,8 @@ class Job:
 
 def run_jobs(config: Config, experiments: tuple[Experiment, ...]) -> list[Job]:
     """Every job of the target ``all``, in the order of the stages."""
-    jobs = [*experiment_jobs(config, experiments), *_evidence(config, experiments)]
+    runs = _design(config, experiments).runs
+    jobs = [*experiment_jobs(config, experiments, runs), *_evidence(config, experiments, runs)]
     return sorted(jobs, key=lambda job: STAGES.index(job.stage))
 
 
@@ -118,22 +120,30 @@ def table_keys(
     """The jobs each table needs; table 5 is read against the pretrained runs of the same sizes."""
     scenes = sorted({e.scene for e in experiments})
     needed = {"table1_meshes": {("scene", scene) for scene in scenes}}
-    for table in sorted({e.table for e in experiments}):
-        rows = [e for e in experiments if e.table == table]
-        if table == "table5_from_scratch":
-            rows += [row.model_copy(update={"init": "pretrained"}) for row in rows]
-        needed[table] = {job.key for job in experiment_jobs(config, tuple(rows))}
+    design = _design(config, experiments)
+    for table in design.tables:
+        rows = design.rows_of(table)
+        if table == FROM_SCRATCH:
+            rows += [row.pretrained for row in rows]
+        jobs = experiment_jobs(config, tuple(rows), design.table_runs(table))
+        needed[table] = {job.key for job in jobs}
     return {table: frozenset(keys | {("tables", table)}) for table, keys in needed.items()}
 
 
-def experiment_jobs(config: Config, experiments: tuple[Experiment, ...]) -> list[Job]:
-    """Every job from the meshes to the scores of some table rows, each once."""
+def experiment_jobs(
+    config: Config, experiments: tuple[Experiment, ...], runs: Sequence[Run]
+) -> list[Job]:
+    """Every job from the meshes to the scores of some table rows and their runs, each once."""
     jobs = [
         *_collection(config, experiments),
         *_label_sets(config, experiments),
-        *_trainings(config, experiments),
+        *_trainings(config, runs),
     ]
     return list({job.key: job for job in jobs}.values())
+
+
+def _design(config: Config, experiments: tuple[Experiment, ...]) -> Design:
+    return Design(rows=experiments, repetitions=config.training.repetitions)
 
 
 def _scenes(config: Config, experiments: Iterable[Experiment]) -> dict[str, tuple[str, ...]]:
@@ -215,7 +225,7 @@ def _rendering(config: Config, camera: CameraConfig, frames: int) -> tuple[float
 def _label_sets(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[Job]:
     for e in experiments:
         counts = {split: config.n_frames(e.scene, e.size, split) for split in SPLITS}
-        names = ("synfeal", e.label_id) if e.labels == NOISE else ("synfeal",)
+        names = ("synfeal", e.label_id) if e.labels in INJECTED else ("synfeal",)
         for split, frames in counts.items():
             for name in names:
                 path = f"{e.scene}/{e.size}/{name}/{split}"
@@ -241,8 +251,7 @@ def _estimated(config: Config, e: Experiment, counts: dict[str, int]) -> Iterato
     yield Job("chain", f"{e.scene}/{e.size}/{e.labels}", (frames,), 2 * pose_bytes(frames))
 
 
-def _trainings(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[Job]:
-    runs = runs_of(experiments, config.training.repetitions)
+def _trainings(config: Config, runs: Sequence[Run]) -> Iterator[Job]:
     hypers = {str(name): hyper for name, hyper in config.localizers.items()}
     pretrained = {backbone_of(r.model, config.network) for r in runs if r.init == "pretrained"}
     for backbone in sorted(pretrained):
@@ -263,7 +272,9 @@ def _trainings(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[
         yield Job("score", run.directory, (test,), score_bytes(test))
 
 
-def _evidence(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[Job]:
+def _evidence(
+    config: Config, experiments: tuple[Experiment, ...], runs: Sequence[Run]
+) -> Iterator[Job]:
     tables = ["table1_meshes", *sorted({e.table for e in experiments})]
     for name in (*tables, *SIDE_TABLES):
         yield Job("tables", name)
@@ -271,7 +282,6 @@ def _evidence(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[J
         yield Job("render_speed", scene, (config.render_speed.sizes,))
         for split in SPLITS:
             yield Job("coverage", f"{scene}/{split}")
-    runs = runs_of(experiments, config.training.repetitions)
     scored = sum(config.n_frames(run.scene, run.size, "test") for run in runs)
     yield Job("claims", "", (scored,))
     for stage in ("figures", "summary", "provenance", "report", "report_document"):

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from synfeal.config import MODELS, Experiment, runs_of
+from synfeal.config import MODELS, Experiment
 from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
 from synfeal.report.compare.runs import ERRORS_HEADER
@@ -56,10 +56,9 @@ def read_errors(results: Results, row: Experiment) -> SceneErrors:
         InputError: a run's errors are missing or unreadable.
     """
     errors: dict[str, dict[str, Array]] = {}
-    runs = runs_of((row,), results.repetitions)
     for model in MODELS:
         parts = []
-        for run in (run for run in runs if run.model == model):
+        for run in results.design.runs_of(row, model):
             path = results.root / "runs" / run.directory / "errors.csv"
             parts.append(read_numbers(path, ERRORS_HEADER, "table of errors", finite=False))
             if not len(parts[-1]):

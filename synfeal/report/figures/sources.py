@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config import Experiment
+from synfeal.config import Design, Experiment
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.report import speed_vs_error
 from synfeal.report.results import read_table
@@ -40,13 +40,16 @@ class Results:
 
     Attributes:
         root: its directory.
-        rows: the whole design; what it leaves out is not drawn, whatever files there are.
-        repetitions: seeds per cell.
+        design: of the profile; what it leaves out is not drawn, whatever files there are.
     """
 
     root: Path
-    rows: tuple[Experiment, ...]
-    repetitions: int
+    design: Design
+
+    @property
+    def rows(self) -> tuple[Experiment, ...]:
+        """The whole design."""
+        return self.design.rows
 
     @property
     def scenes(self) -> list[str]:
@@ -55,7 +58,7 @@ class Results:
 
     def rows_of(self, table: str) -> list[Experiment]:
         """The rows of one table of the design."""
-        return [row for row in self.rows if row.table == table]
+        return self.design.rows_of(table)
 
     def table(self, name: str) -> list[Row]:
         """Rows of ``tables/<name>.csv``.
@@ -64,7 +67,7 @@ class Results:
             InputError: the table is missing or unreadable.
         """
         speeds = name == speed_vs_error.NAME
-        columns = speed_vs_error.COLUMNS if speeds else columns_of(name, 1)
+        columns = speed_vs_error.COLUMNS if speeds else columns_of(name)
         numbers = ("items_per_s", "error") if speeds else ("n_train", "n_test")
         optional = [column for column in columns if column not in TEXTS]
         return read_table(self.root / "tables" / f"{name}.csv", columns, numbers, optional)

@@ -9,7 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from string import Template
 
-from synfeal.config import Experiment
+from synfeal.config import Design, Experiment
 from synfeal.files import atomic_path
 from synfeal.inspect.viewer_mesh import viewer_js
 from synfeal.report import meshes
@@ -71,20 +71,17 @@ class Results:
     figures: Mapping[str, Path]
 
     @classmethod
-    def read(cls, rows: Sequence[Experiment], repetitions: int, root: Path) -> Results:
+    def read(cls, design: Design, root: Path) -> Results:
         """Read everything but meshes and trajectories.
 
         Raises:
             InputError: a run's scores are missing, or a file cannot be read.
         """
-        cells: dict[str, Sequence[Cell]] = {}
-        for table in sorted({row.table for row in rows}):
-            members = [row for row in rows if row.table == table]
-            cells[table] = read_cells(table, members, repetitions, root)
+        cells = {table: read_cells(table, design, root) for table in design.tables}
         claims, origin = root / CLAIMS, root / PROVENANCE
         return cls(
             root,
-            rows,
+            design.rows,
             cells,
             read_claims(claims) if claims.exists() else [],
             read_origin(origin) if origin.exists() else {},
@@ -92,12 +89,11 @@ class Results:
         )
 
 
-def write_report(rows: Sequence[Experiment], repetitions: int, root: Path, out_html: Path) -> None:
+def write_report(design: Design, root: Path, out_html: Path) -> None:
     """Write the page.
 
     Args:
-        rows: the whole design of the profile.
-        repetitions: seeds per cell.
+        design: of the profile.
         root: results directory of the profile. Without claims, provenance or figures, their
             sections say so.
         out_html: one file; it opens without a network.
@@ -105,7 +101,7 @@ def write_report(rows: Sequence[Experiment], repetitions: int, root: Path, out_h
     Raises:
         InputError: a run's scores, a mesh or a plan are missing, or a file cannot be read.
     """
-    sections = list(sections_of(Results.read(rows, repetitions, root)))
+    sections = list(sections_of(Results.read(design, root)))
     page = Template(_resource("report.html")).substitute(
         profile=escape(root.name),
         style=_resource("report.css"),

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines.groundtruth.methods import METHODS
 from synfeal.config import Experiment
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.inspect.surface import SurfacePoints
@@ -66,9 +67,7 @@ def trajectories(scene: str, root: Path, rows: Sequence[Experiment]) -> list[Tra
         if (path := root / "plans" / scene / f"{split}.csv").exists()
     ]
     sets = dict.fromkeys(
-        (row.size, row.labels)
-        for row in rows
-        if row.scene == scene and row.labels not in ("synfeal", "noise")
+        (row.size, row.labels) for row in rows if row.scene == scene and row.labels in METHODS
     )
     for (size, labels), rgb in zip(sets, LABEL_RGB * len(sets), strict=False):
         folder = root / "labels" / scene / size / labels

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from synfeal.config import Experiment
-from synfeal.config.experiments import KEYS
+from synfeal.config.tables import KEYS
 from synfeal.report.claims.model import NOT_TESTABLE
 from synfeal.report.html.claims import Claims
 from synfeal.report.layouts import BLOCKS, SOURCES, scene_title

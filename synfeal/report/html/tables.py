@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 
-from synfeal.report.cells import FROM_SCRATCH, Cell
+from synfeal.config.experiments import FROM_SCRATCH
+from synfeal.report.cells import Cell
 from synfeal.report.grid import Kind, Line, Value, footnotes, with_bold
 from synfeal.report.html.markup import Column, boxed, heading
 from synfeal.report.layouts import (
     CHANGE,
     HEADINGS,
+    REFERENCES,
     TITLES,
     grid_of,
     lines_of,
@@ -61,8 +63,9 @@ def interval(score: Score) -> str:
 def _head(name: str) -> str:
     labels = [*(["Noise in"] if name.startswith("table3") else ["Scene"]), HEADINGS[name]]
     first = "".join(heading(Column(title), place, 2) for place, title in enumerate(labels))
-    models = "".join(f'<th scope="colgroup" colspan="2">{title}</th>' for title in TITLES.values())
-    quantities = [Column(title, True) for _ in TITLES for title in ("Position", "Orient.")]
+    titles = [*TITLES.values(), *REFERENCES.values()]
+    models = "".join(f'<th scope="colgroup" colspan="2">{title}</th>' for title in titles)
+    quantities = [Column(title, True) for _ in titles for title in ("Position", "Orient.")]
     second = "".join(heading(column, 2 + place) for place, column in enumerate(quantities))
     return f"<tr>{first}{models}</tr><tr>{second}</tr>"
 
@@ -83,7 +86,8 @@ def _group(name: str, rows: Sequence[ByModel], marks: Marks) -> list[str]:
         by_kind = {(line.kind, "change" in line.against): line for line in lines}
         style = "" if place else ' class="first"'
         texts.append(f"<tr{style}>{_labels(name, row, by_kind, marks)}")
-        texts[-1] += "".join(_cells(row, by_kind, marks)) + "</tr>"
+        texts[-1] += "".join(_cells(row, by_kind, marks))
+        texts[-1] += "".join(_references(row[0], by_kind)) + "</tr>"
     return texts
 
 
@@ -125,6 +129,19 @@ def _cells(row: ByModel, lines: Lines, marks: Marks) -> Iterator[str]:
             yield f'<td class="number"{keys}>{shown}{printed}</td>'
 
 
+def _references(cell: Cell, lines: Lines) -> Iterator[str]:
+    """Two cells for each answer without training: both scores, of which one is shown."""
+    for column, name in enumerate(REFERENCES, start=len(TITLES)):
+        for place, quantity in enumerate(QUANTITIES):
+            keys, shown = "", ""
+            for style, kind, measure in _scores_of(quantity):
+                value = cell.own.references.get(f"{name}_{measure}", 0.0)  # truth is the truth
+                keys += f' data-{style}="{value}"'
+                printed = _printed(lines, kind, column, place, {})
+                shown += f'<div class="{style}">{printed}</div>'
+            yield f'<td class="number"{keys}>{shown}</td>'
+
+
 def _scores_of(quantity: str) -> Iterator[tuple[str, Kind, str]]:
     """Style, kind of line and measure of the two scores of a quantity."""
     yield "labels", "labels", quantity
@@ -133,7 +150,7 @@ def _scores_of(quantity: str) -> Iterator[tuple[str, Kind, str]]:
 
 def _printed(lines: Lines, kind: Kind, column: int, place: int, marks: Marks) -> str:
     """One number of a line; nothing where there is no such line."""
-    if (line := lines.get((kind, False))) is None:
+    if (line := lines.get((kind, False))) is None or column >= len(line.entries):
         return ""
     entry = line.entries[column]
     # A run without a score has one text for both quantities.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-from synfeal.config import Config, Experiment, Run, runs_of
+from synfeal.config import Config, Design, Experiment, Run
 from synfeal.errors import InputError
 from synfeal.report.cost.jobs import known_jobs
 from synfeal.report.cost.laws import fit_laws
@@ -49,8 +49,8 @@ def plan_run(
     known = _laws_of(config, experiments)
     usual = median(known.values()) if known else 1.0
     expected_s = {job: known.get(job, usual) for job in jobs}
-    runs = tuple(runs_of(experiments, config.training.repetitions))
-    return RunPlan(config.root, expected_s, runs, cores)
+    design = Design(rows=experiments, repetitions=config.training.repetitions)
+    return RunPlan(config.root, expected_s, tuple(design.runs), cores)
 
 
 def job_name(benchmark: str) -> str:

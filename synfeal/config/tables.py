@@ -1,0 +1,33 @@
+"""Names of the tables that localizers are trained for, and what tells their rows apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal, get_args
+
+from synfeal.config.collection import Count
+
+TableName = Literal[
+    "table2_ground_truth",
+    "table3_inconsistencies",
+    "table4_size",
+    "table5_from_scratch",
+    "table6_label_errors",
+]
+# A table shows each combination of these columns once.
+KEYS: Mapping[str, tuple[str, ...]] = {
+    "table2_ground_truth": ("scene", "labels"),
+    "table3_inconsistencies": ("block", "noise_m", "noise_deg"),
+    "table4_size": ("scene", "size"),
+    "table5_from_scratch": ("scene", "size"),
+    "table6_label_errors": ("labels", "noise_m", "noise_deg"),
+}
+assert set(KEYS) == set(get_args(TableName))
+
+# Seeds per run of a table; `default` where a table is not named.
+Repetitions = dict[Literal["default", TableName], Count]
+
+
+def once() -> Repetitions:
+    """One seed per run."""
+    return {"default": 1}

@@ -1,0 +1,120 @@
+"""Label errors of one size and different kinds, to see which of them hurt a localizer.
+
+=========  =========================================  ==============================================
+kind       what is wrong                              as it is left by
+=========  =========================================  ==============================================
+`noise`    each frame by itself                       independent errors of single frames
+`offset`   each path, all its frames alike            maps registered piece by piece
+`bend`     space, smoothly; nearby frames alike       drift that loop closures spread over a map
+`scale`    all distances by one factor                a monocular map of the wrong scale
+=========  =========================================  ==============================================
+
+All have the same median error, ``noise_m`` and ``noise_deg``: exactly so for `noise` and `offset`;
+`bend` and `scale` are errors of space, one and the same in both splits, and their sizes are set on
+the training poses. A scale turns nothing, so it has no orientation error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.config.experiments import INJECTED
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.labels.noise import add_noise, displaced, unit_vectors
+
+Array = NDArray[np.float64]
+# Kinds whose errors belong to space: both splits have the same.
+OF_SPACE = ("bend", "scale")
+
+
+def with_error(
+    kind: str,
+    table: PoseTable,
+    train: PoseTable,
+    noise_m: float,
+    noise_deg: float,
+    rng: np.random.Generator,
+) -> PoseTable:
+    """The same frames with erroneous poses.
+
+    Args:
+        kind: one of ``INJECTED``.
+        table: true poses of a split.
+        train: true poses of the training split.
+        noise_m: median position error, metres.
+        noise_deg: median orientation error, degrees; 0 with `scale`.
+        rng: source of directions and shapes. In the same state for both splits where the error is
+            one of space, in another for each split elsewhere.
+    """
+    return _KINDS[kind](table, train, noise_m, noise_deg, rng)
+
+
+def seed_names(kind: str, split: str) -> tuple[str, ...]:
+    """What the seed of a label set depends on beside the scene and the size; never on a level."""
+    return (kind,) if kind in OF_SPACE else (kind, split)
+
+
+def _noise(
+    table: PoseTable, train: PoseTable, noise_m: float, noise_deg: float, rng: np.random.Generator
+) -> PoseTable:
+    return add_noise(table, noise_m, noise_deg, rng)
+
+
+def _offset(
+    table: PoseTable, train: PoseTable, noise_m: float, noise_deg: float, rng: np.random.Generator
+) -> PoseTable:
+    """One displacement and one rotation per path, of exactly the nominal sizes."""
+    paths, place = np.unique(table.path, return_inverse=True)
+    shift, axis = unit_vectors(len(paths), rng), unit_vectors(len(paths), rng)
+    return displaced(table, noise_m * shift[place], np.radians(noise_deg) * axis[place])
+
+
+def _bend(
+    table: PoseTable, train: PoseTable, noise_m: float, noise_deg: float, rng: np.random.Generator
+) -> PoseTable:
+    """Two fields in space, of displacements and of rotation vectors, each of one wavelength.
+
+    Both sizes are given, so the rotations are not those that the displacements would imply.
+    """
+    shift_m = _smooth_field(train.position_m, noise_m, rng)
+    rotvec_rad = _smooth_field(train.position_m, np.radians(noise_deg), rng)
+    return displaced(table, shift_m(table.position_m), rotvec_rad(table.position_m))
+
+
+def _scale(
+    table: PoseTable, train: PoseTable, noise_m: float, noise_deg: float, rng: np.random.Generator
+) -> PoseTable:
+    """Too large by one factor about the first training camera, where a map would begin."""
+    origin_m = train.position_m[0]
+    distance_m = np.median(np.linalg.norm(train.position_m - origin_m, axis=1))
+    share = noise_m / distance_m if distance_m > 0 else 0.0
+    shift_m = share * (table.position_m - origin_m)
+    return displaced(table, shift_m, np.zeros_like(shift_m))
+
+
+def _smooth_field(
+    position_m: Array, median: float, rng: np.random.Generator
+) -> Callable[[Array], Array]:
+    """Vectors as a function of positions (N, 3); their median length at ``position_m`` is given.
+
+    Each component is one sine wave in a random direction with a random phase, as long as the
+    longest side of the box around the positions.
+    """
+    low, high = position_m.min(axis=0), position_m.max(axis=0)
+    length_m = max(float((high - low).max()), 1e-9)
+    wave = 2 * np.pi / length_m * unit_vectors(3, rng)
+    phase = rng.uniform(0, 2 * np.pi, 3)
+
+    def shape(at_m: Array) -> Array:
+        return np.asarray(np.sin((at_m - low) @ wave.T + phase))
+
+    size = median / np.median(np.linalg.norm(shape(position_m), axis=1))
+    return lambda at_m: size * shape(at_m)
+
+
+Kind = Callable[[PoseTable, PoseTable, float, float, np.random.Generator], PoseTable]
+_KINDS: Mapping[str, Kind] = {"noise": _noise, "offset": _offset, "bend": _bend, "scale": _scale}
+assert set(_KINDS) == set(INJECTED)

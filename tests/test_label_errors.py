@@ -1,0 +1,94 @@
+"""Kinds of label error: their sizes and shapes, from closed forms."""
+
+import numpy as np
+import pytest
+
+from synfeal.config.experiments import INJECTED
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.geometry.poses import pose_error, position_error_m
+from synfeal.labels.errors import OF_SPACE, seed_names, with_error
+from tests.test_noise import noise_of, table_of
+
+SIZES = [(0.1, 5.0), (0.3, 20.0)]
+
+
+def erroneous(kind, table, train, noise_m=0.3, noise_deg=20.0, seed=1):
+    noise_deg = 0.0 if kind == "scale" else noise_deg
+    return with_error(kind, table, train, noise_m, noise_deg, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("kind", INJECTED)
+@pytest.mark.parametrize(("noise_m", "noise_deg"), SIZES)
+def test_every_kind_has_the_same_median_error_on_the_training_poses(kind, noise_m, noise_deg):
+    train = table_of(501)
+    found = erroneous(kind, train, train, noise_m, noise_deg)
+    position_m, orientation_rad = pose_error(found.world_from_cam, train.world_from_cam)
+    assert np.median(position_m) == pytest.approx(noise_m, rel=1e-9)
+    expected = 0.0 if kind == "scale" else noise_deg
+    assert np.degrees(np.median(orientation_rad)) == pytest.approx(expected, abs=1e-6)
+    np.testing.assert_array_equal(found.frame, train.frame)
+    np.testing.assert_array_equal(found.path, train.path)
+    np.testing.assert_allclose(np.linalg.norm(found.quat_wxyz, axis=1), 1)
+
+
+def test_an_offset_is_one_rigid_error_per_path_and_another_for_the_next():
+    clean = table_of(70)  # seven frames to a path
+    shift, turn = noise_of(clean, erroneous("offset", clean, clean))
+    for vectors, size in ((shift, 0.3), (turn, np.radians(20))):
+        by_path = vectors.reshape(10, 7, 3)
+        np.testing.assert_allclose(by_path, by_path[:, :1].repeat(7, axis=1), atol=1e-9)
+        np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), size)
+        assert position_error_m(by_path[1:, 0], by_path[:-1, 0]).min() > 1e-3
+
+
+def test_a_scale_multiplies_all_distances_from_the_first_camera_on():
+    train, test = table_of(101), table_of(40, seed=2)
+    median_m = np.median(np.linalg.norm(train.position_m - train.position_m[0], axis=1))
+    found = [erroneous("scale", table, train).position_m for table in (train, test)]
+    np.testing.assert_array_equal(found[0][0], train.position_m[0])
+    for labels, truth in zip(found, (train, test), strict=True):
+        distances = [position_error_m(p[1:], p[:-1]) for p in (labels, truth.position_m)]
+        np.testing.assert_allclose(distances[0], (1 + 0.3 / median_m) * distances[1])
+    np.testing.assert_array_equal(erroneous("scale", test, train).quat_wxyz, test.quat_wxyz)
+
+
+def test_a_bend_belongs_to_space_and_is_smooth():
+    train = table_of(400)
+    low, high = train.position_m.min(axis=0), train.position_m.max(axis=0)
+    steps = np.linspace(0, 1, 2001)[:, None]
+    line = low + steps * (high - low)
+    still = np.tile([1.0, 0, 0, 0], (len(line), 1))
+    along = PoseTable(np.arange(len(line)), np.zeros(len(line), int), line, still)
+    shift, turn = noise_of(along, erroneous("bend", along, train))
+    # A sine of amplitude a and wavelength L changes by no more than 2 pi a / L per metre; the
+    # median length of the vectors is that of three sines, so a is below the median times 2.
+    travelled = np.linalg.norm(line[1] - line[0])
+    steepest = 2 * np.pi / (high - low).max() * np.sqrt(3)
+    for vectors, median in ((shift, 0.3), (turn, np.radians(20))):
+        change = np.linalg.norm(np.diff(vectors, axis=0), axis=1)
+        assert change.max() < steepest * 2 * median * travelled
+        assert np.ptp(vectors, axis=0).max() > median  # and yet it bends
+    # The same place has the same error, whichever split and path it is in.
+    again = PoseTable(train.frame, train.path[::-1], train.position_m, train.quat_wxyz)
+    one, two = (erroneous("bend", table, train).position_m for table in (train, again))
+    np.testing.assert_array_equal(one, two)
+
+
+def test_errors_of_space_are_seeded_alike_in_both_splits_and_none_by_its_size():
+    for kind in INJECTED:
+        same = seed_names(kind, "train") == seed_names(kind, "test")
+        assert same == (kind in OF_SPACE)
+
+
+@pytest.mark.parametrize("kind", INJECTED)
+def test_two_sizes_of_a_kind_differ_in_size_alone(kind):
+    train = table_of(201)
+    small, large = (noise_of(train, erroneous(kind, train, train, *size)) for size in SIZES)
+    np.testing.assert_allclose(3 * small[0], large[0], atol=1e-9)
+    if kind != "scale":
+        np.testing.assert_allclose(4 * small[1], large[1], atol=1e-9)
+
+
+def test_a_set_that_stands_still_is_not_scaled():
+    table = PoseTable(np.arange(3), np.zeros(3, int), np.ones((3, 3)), table_of(3).quat_wxyz)
+    np.testing.assert_array_equal(erroneous("scale", table, table).position_m, table.position_m)
