@@ -1,9 +1,8 @@
-"""What property tests share: how they name the functions they are about, and what they draw."""
+"""What property tests share: how many examples they take, and what they draw."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,16 +18,6 @@ PHASES = (Phase.explicit, Phase.generate, *SIMPLEST)
 # The same examples in every run: a test that fails once fails until it is mended.
 few = settings(derandomize=True, deadline=None, max_examples=25, database=None, phases=PHASES)
 fewer = settings(few, max_examples=6)
-
-
-def about(*functions: Any) -> Callable[[Any], Any]:
-    """Names the public functions whose properties a test states."""
-
-    def mark(test: Any) -> Any:
-        test.about = functions
-        return test
-
-    return mark
 
 
 def unit(vector: Any) -> np.ndarray:

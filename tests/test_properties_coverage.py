@@ -38,13 +38,12 @@ from tests.empty_room import (
     wall_distance_m,
     walls,
 )
-from tests.property_support import about, directions, few, fewer, poses, seeds, table_of, vectors
+from tests.property_support import directions, few, fewer, poses, seeds, table_of, vectors
 
 columns = st.floats(-10.0, 74.0)  # of an image of 64
 YAW = np.array([0, 0, 0, 0, 0, 0.3])  # well within a sector of heading
 
 
-@about(voxel_centres)
 @few
 @given(vectors(20.0), st.tuples(*[st.floats(0.01, 60.0)] * 3))
 @example(np.zeros(3), (0.01, 0.01, 0.01))
@@ -63,7 +62,6 @@ def test_voxels_are_equal_and_fill_the_box(corner, sides_m):
     assert edge_m == VOXEL_M or np.isclose(edge_m**3 * MAX_VOXELS, np.prod(sides_m))
 
 
-@about(headings)
 @few
 @given(st.lists(pose_vectors, min_size=1, max_size=8))
 def test_heading_is_the_eighth_of_the_circle_the_yaw_lies_in(listed):
@@ -75,7 +73,6 @@ def test_heading_is_the_eighth_of_the_circle_the_yaw_lies_in(listed):
     np.testing.assert_array_equal(found[clear], np.floor(sector[clear]) % 8)
 
 
-@about(free_space_coverage)
 @fewer
 @given(seeds, st.integers(1, 20), st.integers(1, 20))
 def test_more_cameras_cover_more_of_the_free_space(seed, count, more):
@@ -93,7 +90,6 @@ def test_more_cameras_cover_more_of_the_free_space(seed, count, more):
     assert all_.positions_share <= (count + more) * 1.4 * (4 / 3 * np.pi * 8) / all_.voxels
 
 
-@about(seen_surface, plan_coverage)
 @settings(few, max_examples=3)
 @given(seeds, st.integers(1, 5))
 def test_in_an_empty_room_all_can_be_seen_and_more_frames_see_more(seed, count):
@@ -109,7 +105,6 @@ def test_in_an_empty_room_all_can_be_seen_and_more_frames_see_more(seed, count):
     assert found["surface"]["seen_often_share"] == all_.seen_often / N_POINTS
 
 
-@about(shown_frames)
 @few
 @given(st.integers(1, 5000))
 @example(MAX_FRAMES)
@@ -123,7 +118,6 @@ def test_frames_shown_are_spread_evenly_from_first_to_last(count):
     assert len(set(gaps)) <= 2
 
 
-@about(has_line, visible_points)
 @few
 @given(seeds, walls)
 def test_of_a_divided_room_each_part_sees_its_own_surface(seed, wall):
@@ -139,7 +133,6 @@ def test_of_a_divided_room_each_part_sees_its_own_surface(seed, wall):
     assert len(visible_points(caster, places[:0], floor)) == 0
 
 
-@about(in_image)
 @few
 @given(poses, st.tuples(columns, columns), st.floats(0.06, 6.0), directions)
 @example(np.eye(4), (32.0, 32.0), 4.9, np.array([0.0, 0.0, 1.0]))
@@ -157,7 +150,6 @@ def test_a_point_is_in_the_image_if_its_pixel_is_and_it_is_near_enough(pose, pix
     assert in_image(SQUARE, pose, points).tolist() == [expected, False, False]
 
 
-@about(empty_shares, empty_pixels)
 @few
 @given(seeds, st.integers(1, 20), st.floats(0.5, 5.0))
 def test_what_is_beyond_the_far_plane_is_empty(seed, count, far_m):

@@ -25,7 +25,6 @@ from synfeal.geometry.rotations import (
     slerp_quat_wxyz,
 )
 from tests.property_support import (
-    about,
     angles_rad,
     directions,
     few,
@@ -49,7 +48,6 @@ def same_rotation(a, b, atol=1e-12):
     np.testing.assert_allclose(rotation_of(a), rotation_of(b), atol=atol)
 
 
-@about(canonical_quat_wxyz)
 @few
 @given(quats, lengths, st.sampled_from([1.0, -1.0]))
 @example(HALF_TURN, 1.0, 1.0)
@@ -61,7 +59,6 @@ def test_a_rotation_has_one_canonical_quaternion(quat, length, sign):
     np.testing.assert_allclose(canonical_quat_wxyz(found), found, rtol=1e-15)
 
 
-@about(matrix_from_quat_wxyz, quat_wxyz_from_matrix)
 @few
 @given(quats, lengths)
 @example(HALF_TURN, 1.0)
@@ -78,7 +75,6 @@ def test_quaternions_and_matrices_are_the_same_rotations(quat, length):
     same_rotation(found, quat)
 
 
-@about(quat_wxyz_from_matrix)
 @few
 @given(quats, vectors(1e-6, 9))
 def test_a_matrix_that_is_nearly_a_rotation_gives_the_nearest_one(quat, errors):
@@ -88,7 +84,6 @@ def test_a_matrix_that_is_nearly_a_rotation_gives_the_nearest_one(quat, errors):
     np.testing.assert_allclose(rotation_of(quat_wxyz_from_matrix(matrix)), nearest, atol=1e-10)
 
 
-@about(rotation_angle_rad)
 @few
 @given(quats, quats, quats, st.sampled_from([1.0, -1.0]))
 def test_angle_is_a_distance_that_no_common_rotation_changes(a, b, c, sign):
@@ -102,7 +97,6 @@ def test_angle_is_a_distance_that_no_common_rotation_changes(a, b, c, sign):
     assert rotation_angle_rad(a, c) <= angle + rotation_angle_rad(b, c) + 1e-14
 
 
-@about(rotation_angle_rad)
 @few
 @given(directions, quats, st.floats(0.0, np.pi))
 @example(np.array([1.0, 0.0, 0.0]), IDENTITY, 1e-12)
@@ -115,7 +109,6 @@ def test_angle_of_a_turn_is_the_turn(axis, quat, angle_rad):
     np.testing.assert_allclose(found, angle_rad, atol=4e-16 * 4)
 
 
-@about(rotation_from_rpy)
 @few
 @given(angles_rad, st.floats(-1.5, 1.5), angles_rad)
 def test_roll_pitch_and_yaw_can_be_read_off_the_camera(roll, pitch, yaw):
@@ -132,7 +125,6 @@ def test_roll_pitch_and_yaw_can_be_read_off_the_camera(roll, pitch, yaw):
     np.testing.assert_allclose(full_turn, np.stack([right, down, forward], axis=1), atol=1e-14)
 
 
-@about(slerp_quat_wxyz)
 @few
 @given(quats, quats, fractions, st.sampled_from([1.0, -1.0]))
 @example(IDENTITY, IDENTITY, 0.5, -1.0)
@@ -146,7 +138,6 @@ def test_slerp_turns_evenly_from_one_end_to_the_other(a, b, fraction, sign):
     same_rotation(slerp_quat_wxyz(b, a, [1 - fraction])[0], found[0], atol=1e-12)
 
 
-@about(pose_matrix, pose_from_quat)
 @few
 @given(positions, quats, positions)
 def test_a_pose_turns_points_and_then_moves_them(position_m, quat, point):
@@ -157,7 +148,6 @@ def test_a_pose_turns_points_and_then_moves_them(position_m, quat, point):
         np.testing.assert_array_equal(pose[:3, 3], position_m)
 
 
-@about(quat_wxyz_of)
 @few
 @given(poses)
 def test_quaternion_of_a_pose_turns_as_the_pose_does(pose):
@@ -166,7 +156,6 @@ def test_quaternion_of_a_pose_turns_as_the_pose_does(pose):
     np.testing.assert_allclose(rotation_of(found), pose[:3, :3], atol=1e-14)
 
 
-@about(inverse, relative)
 @few
 @given(poses, poses, poses)
 def test_motions_form_a_group(a, b, common):
@@ -179,7 +168,6 @@ def test_motions_form_a_group(a, b, common):
     np.testing.assert_array_equal(relative(a, a)[:3, 3], 0.0)
 
 
-@about(interpolate)
 @few
 @given(poses, poses, fractions)
 def test_interpolation_divides_way_and_turn_in_one_ratio(a, b, fraction):
@@ -194,7 +182,6 @@ def test_interpolation_divides_way_and_turn_in_one_ratio(a, b, fraction):
     np.testing.assert_allclose(interpolate(b, a, 1 - fraction), found, atol=1e-12)
 
 
-@about(position_error_m)
 @few
 @given(positions, positions, positions, poses)
 def test_position_error_is_the_euclidean_distance(a, b, c, motion):
@@ -206,7 +193,6 @@ def test_position_error_is_the_euclidean_distance(a, b, c, motion):
     np.testing.assert_allclose(position_error_m(*moved), error_m, atol=1e-10)
 
 
-@about(pose_error)
 @few
 @given(poses, directions, directions, st.floats(0.0, 50.0), st.floats(0.0, np.pi), poses)
 def test_pose_error_is_the_displacement_and_the_turn(pose, way, axis, moved_m, turned_rad, world):
@@ -217,7 +203,6 @@ def test_pose_error_is_the_displacement_and_the_turn(pose, way, axis, moved_m, t
         np.testing.assert_allclose(orientation_rad, turned_rad, atol=1e-7)
 
 
-@about(umeyama_sim3)
 @few
 @given(seeds, st.integers(3, 12), quats, positions, st.floats(0.1, 10.0))
 def test_umeyama_finds_the_similarity_and_its_inverse(seed, count, quat, offset, scale):
@@ -233,7 +218,6 @@ def test_umeyama_finds_the_similarity_and_its_inverse(seed, count, quat, offset,
     np.testing.assert_allclose(back[1], rotation_of(quat).T, atol=1e-9)
 
 
-@about(umeyama_sim3)
 @few
 @given(seeds, directions, st.floats(1e-4, 1e-2), vectors(1e-2))
 def test_umeyama_leaves_no_better_similarity_beside_its_own(seed, axis, angle, step):

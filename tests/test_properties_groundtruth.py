@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from baselines.groundtruth.batches import batches_of
-from baselines.groundtruth.chain import Assistance, chain_batches, chain_unassisted, fill_gaps
+from baselines.groundtruth.chain import chain_batches, chain_unassisted, fill_gaps
 from baselines.groundtruth.label_set import chain_split, write_assistance
 from baselines.groundtruth.trajectory import (
     BatchTrajectory,
@@ -19,7 +19,7 @@ from baselines.groundtruth.trajectory import (
 )
 from synfeal.config.models import GroundTruthConfig
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
-from tests.property_support import about, few, fewer, poses, seeds, table_of
+from tests.property_support import few, fewer, poses, seeds, table_of
 from tests.walks import random_poses, relative_to_first
 
 CFG = GroundTruthConfig(batch_frames=4)
@@ -37,7 +37,6 @@ def batch_estimates(walk, batches, rng, noise_m):
     return estimates
 
 
-@about(batches_of)
 @few
 @given(st.integers(1, 400), st.integers(1, 60))
 @example(1, 1)
@@ -54,7 +53,6 @@ def test_batches_share_one_frame_and_cover_the_split(n_frames, batch_frames):
         assert (batches[0].start, batches[-1].stop) == (0, n_frames)
 
 
-@about(fill_gaps)
 @few
 @given(seeds, st.lists(st.booleans(), min_size=1, max_size=9))
 @example(0, [False])
@@ -76,7 +74,6 @@ def test_filling_keeps_what_is_known_and_moves_evenly_between(seed, flags):
     )
 
 
-@about(chain_batches, chain_unassisted)
 @few
 @given(seeds, st.integers(1, 20), st.integers(1, 6), poses)
 def test_perfect_batches_chain_to_the_truth_wherever_it_lies(seed, n_frames, batch_frames, world):
@@ -95,7 +92,6 @@ def test_perfect_batches_chain_to_the_truth_wherever_it_lies(seed, n_frames, bat
     assert not any(record.assisted or record.filled or record.lost for record in assistance.records)
 
 
-@about(chain_batches, chain_unassisted, Assistance.to_json)
 @few
 @given(seeds, st.integers(2, 20), st.integers(1, 6), st.floats(0.0, 0.5))
 def test_no_batch_starts_farther_off_than_the_thresholds_allow(seed, n_frames, size, noise_m):
@@ -135,7 +131,6 @@ def test_no_batch_starts_farther_off_than_the_thresholds_allow(seed, n_frames, s
         np.testing.assert_allclose(unassisted.position_m, labels.position_m, atol=1e-9)
 
 
-@about(failed_trajectory, write_trajectory, read_trajectory)
 @few
 @given(seeds, st.lists(st.booleans(), min_size=1, max_size=6))
 def test_trajectories_are_read_back_as_they_were_written(tmp_path_factory, seed, flags):
@@ -152,7 +147,6 @@ def test_trajectories_are_read_back_as_they_were_written(tmp_path_factory, seed,
     np.testing.assert_array_equal(nothing.first_from_cam, np.tile(np.eye(4), (len(flags), 1, 1)))
 
 
-@about(chain_split, write_assistance)
 @fewer
 @given(seeds, st.integers(2, 12))
 def test_a_split_chained_from_files_is_that_chained_in_memory(tmp_path_factory, seed, n_frames):

@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 from baselines.groundtruth.label_error import absolute_errors, relative_error, share_within, spread
 from synfeal.labels.noise import add_noise
 from tests.property_support import (
-    about,
     directions,
     few,
     fractions,
@@ -25,7 +24,6 @@ from tests.property_support import (
 from tests.walks import random_poses
 
 
-@about(absolute_errors, share_within)
 @few
 @given(st.lists(poses, min_size=1, max_size=5), directions, st.floats(0, 5), st.floats(0, 180))
 def test_labels_off_by_a_known_motion_have_that_error(listed, axis, off_m, off_deg):
@@ -39,7 +37,6 @@ def test_labels_off_by_a_known_motion_have_that_error(listed, axis, off_m, off_d
     assert share_within(errors, off_m + 1e-6, off_deg - 1e-4) == 0.0
 
 
-@about(share_within)
 @few
 @given(seeds, st.integers(1, 30), fractions, fractions)
 def test_share_within_is_counted(seed, count, limit_m, limit_deg):
@@ -48,7 +45,6 @@ def test_share_within_is_counted(seed, count, limit_m, limit_deg):
     assert share_within(tuple(errors), limit_m, limit_deg) == pytest.approx(within / count)
 
 
-@about(spread)
 @few
 @given(st.lists(st.floats(0.0, 1e3), min_size=1, max_size=9), st.floats(0.1, 10.0))
 def test_spread_grows_with_the_errors_and_lies_in_order(errors, factor):
@@ -64,7 +60,6 @@ def test_spread_grows_with_the_errors_and_lies_in_order(errors, factor):
     )
 
 
-@about(relative_error)
 @few
 @given(seeds, st.integers(2, 8), st.integers(1, 3), poses_near, st.floats(0.0, 0.5))
 def test_relative_error_of_a_step_repeated_does_not_depend_on_the_world(
@@ -96,7 +91,6 @@ def drifted(truth, drift):
     return np.array(found)
 
 
-@about(add_noise)
 @few
 @given(seeds, st.floats(0.0, 10.0), st.floats(0.0, 180.0), st.lists(poses, min_size=1, max_size=5))
 @example(0, 0.0, 0.0, [np.eye(4)])

@@ -14,10 +14,9 @@ from synfeal.planning.plan import box_array
 from synfeal.planning.repeat import read_poses, repeated_poses
 from synfeal.planning.sampling import pose_bounds, sample_poses, view_directions
 from tests.empty_room import BOUNDS, pose_vectors
-from tests.property_support import about, few, poses, seeds, table_of, vectors
+from tests.property_support import few, poses, seeds, table_of, vectors
 
 
-@about(pose_bounds, box_array)
 @few
 @given(vectors(50.0), vectors(50.0), st.tuples(*[st.floats(-90, 0)] * 3), st.floats(0, 90))
 def test_bounds_are_the_box_and_the_angles_in_radians(a, b, low, width):
@@ -33,7 +32,6 @@ def test_bounds_are_the_box_and_the_angles_in_radians(a, b, low, width):
     np.testing.assert_allclose(bounds[:, 3:] * 180 / np.pi, np.transpose(intervals), atol=1e-12)
 
 
-@about(sample_poses)
 @few
 @given(seeds, st.integers(0, 40), st.integers(0, 40))
 def test_samples_lie_within_bounds_and_fewer_are_a_prefix_of_more(seed, count, more):
@@ -44,7 +42,6 @@ def test_samples_lie_within_bounds_and_fewer_are_a_prefix_of_more(seed, count, m
     np.testing.assert_array_equal(longer[:count], found)
 
 
-@about(view_directions, poses_of)
 @few
 @given(st.lists(pose_vectors, min_size=1, max_size=4))
 def test_poses_look_where_their_pitch_and_yaw_say(listed):
@@ -57,7 +54,6 @@ def test_poses_look_where_their_pitch_and_yaw_say(listed):
     np.testing.assert_allclose(view_directions(given_vectors), body.apply([1, 0, 0]), atol=1e-14)
 
 
-@about(n_frames_of)
 @few
 @given(pose_vectors, pose_vectors, st.floats(1e-3, 10.0))
 @example(np.zeros(6), np.zeros(6), 0.1)
@@ -69,7 +65,6 @@ def test_number_of_frames_is_the_distance_over_the_spacing(start, target, spacin
     assert steps < 1.5 + 1e-9 or count > 1
 
 
-@about(step_of, path_vectors)
 @few
 @given(pose_vectors, pose_vectors, st.integers(1, 50))
 @example(np.zeros(6), np.array([0.0, 0, 0, 0, 0, np.pi]), 1)
@@ -89,7 +84,6 @@ def test_steps_are_equal_and_lead_to_the_target_the_short_way_round(start, targe
     np.testing.assert_array_equal(target, before[1])
 
 
-@about(path_poses)
 @few
 @given(pose_vectors, pose_vectors, st.floats(0.5, 20.0), st.sampled_from(["rpy", "slerp"]))
 @example(np.zeros(6), np.zeros(6), 1.0, "slerp")
@@ -102,7 +96,6 @@ def test_frames_of_a_path_are_even_on_the_line_to_the_target(start, target, spac
     np.testing.assert_allclose(np.linalg.det(found[:, :3, :3]), 1.0, atol=1e-12)
 
 
-@about(read_poses, repeated_poses)
 @few
 @given(st.lists(poses, min_size=1, max_size=5))
 def test_poses_are_read_back_as_they_were_written(tmp_path_factory, listed):

@@ -10,7 +10,7 @@ from synfeal.config.models import CollectionConfig, SceneConfig
 from synfeal.errors import InputError
 from synfeal.mesh.triangles import save_collision_mesh
 from synfeal.planning.candidates import CandidateStream
-from synfeal.planning.connected import ConnectedSpace, connected_space
+from synfeal.planning.connected import connected_space
 from synfeal.planning.coverage import plan_coverage, scene_coverage
 from synfeal.planning.independent import independent_poses
 from synfeal.planning.plan import plan_scene, plan_split, sampling_box_of
@@ -29,7 +29,7 @@ from tests.empty_room import (
     wall_distance_m,
     walls,
 )
-from tests.property_support import about, few, fewer, seeds, vectors
+from tests.property_support import few, fewer, seeds, vectors
 
 distances = st.floats(0.0, 4.0)
 
@@ -41,7 +41,6 @@ def free_by_closed_form(vectors_, least_m):
     return distance > least_m, np.abs(distance - least_m) < 1e-4
 
 
-@about(has_free_view, admissible, Questions.answers)
 @few
 @given(seeds, distances)
 def test_in_an_empty_room_a_candidate_needs_a_free_view_and_no_more(seed, least_m):
@@ -56,7 +55,6 @@ def test_in_an_empty_room_a_candidate_needs_a_free_view_and_no_more(seed, least_
     np.testing.assert_array_equal(questions.answers(EMPTY), found)
 
 
-@about(admissible)
 @few
 @given(seeds, walls)
 def test_no_candidate_behind_a_wall_is_admissible(seed, wall):
@@ -66,14 +64,12 @@ def test_no_candidate_behind_a_wall_is_admissible(seed, wall):
     assert found[candidates[:, 0] < wall - 1e-3].all()
 
 
-@about(Questions.n_rays)
 @few
 @given(st.integers(0, 20))
 def test_every_question_costs_two_rays(count):
     assert Questions(np.zeros((count, 6)), np.zeros((count, 6)), 0.0).n_rays == 2 * count
 
 
-@about(farthest_admissible)
 @few
 @given(seeds, st.integers(1, 4), st.integers(1, 5), st.floats(0.0, 7.0), walls)
 def test_target_is_what_trying_one_after_the_other_finds(seed, n_rounds, k, min_path_m, wall):
@@ -90,7 +86,6 @@ def test_target_is_what_trying_one_after_the_other_finds(seed, n_rounds, k, min_
     assert found == (expected and (expected[0], expected[2]))
 
 
-@about(CandidateStream.next_target)
 @few
 @given(seeds, st.integers(1, 9), st.floats(0.0, 2.0), st.floats(0.0, 2.0))
 def test_targets_of_the_stream_are_far_enough_and_have_a_view(seed, k, view_m, min_path_m):
@@ -107,7 +102,6 @@ def test_targets_of_the_stream_are_far_enough_and_have_a_view(seed, k, view_m, m
     assert stream.next_target(start, 10.0, 3) is None  # farther than the room is long
 
 
-@about(largest_group, seeing_groups, sample_start, connected_space, ConnectedSpace.contains)
 @fewer
 @given(seeds, walls, st.floats(0.0, 1.0))
 def test_of_a_divided_room_the_larger_part_is_the_space(seed, wall, view_m):
@@ -128,7 +122,6 @@ def test_of_a_divided_room_the_larger_part_is_the_space(seed, wall, view_m):
     np.testing.assert_array_equal(space.contains(points), points[:, 0] < wall)
 
 
-@about(draw_questions)
 @fewer
 @given(seeds, walls)
 def test_questions_start_where_a_camera_can_get_to(seed, wall):
@@ -143,7 +136,6 @@ def test_questions_start_where_a_camera_can_get_to(seed, wall):
     assert ((found.candidates >= BOUNDS[0]) & (found.candidates <= BOUNDS[1])).all()
 
 
-@about(independent_poses)
 @settings(few, max_examples=3)
 @given(seeds, walls, st.integers(1, 300))
 def test_independent_poses_fill_the_larger_part_and_fewer_are_a_prefix(seed, wall, count):
@@ -160,7 +152,6 @@ def test_independent_poses_fill_the_larger_part_and_fewer_are_a_prefix(seed, wal
     np.testing.assert_array_equal(drawn(count + 100)[:count], found)
 
 
-@about(plan_split)
 @fewer
 @given(seeds, st.integers(1, 200), st.floats(0.05, 0.5), st.sampled_from(["rpy", "slerp"]))
 def test_a_plan_is_a_free_path_and_a_prefix_of_longer_ones(seed, count, spacing_m, how):
@@ -182,7 +173,6 @@ def test_a_plan_is_a_free_path_and_a_prefix_of_longer_ones(seed, count, spacing_
     np.testing.assert_array_equal(longer.path[:count], found.path)
 
 
-@about(plan_scene, scene_coverage)
 @settings(few, max_examples=1)
 @given(seed=seeds)
 def test_a_scene_is_planned_and_measured_from_its_collision_mesh(seed, tmp_path_factory):
@@ -196,7 +186,6 @@ def test_a_scene_is_planned_and_measured_from_its_collision_mesh(seed, tmp_path_
     assert found == plan_coverage(mesh, ROOM, SCENE, plan, SQUARE)
 
 
-@about(sampling_box_of)
 @few
 @given(vectors(5.0), vectors(5.0))
 def test_the_box_is_the_configured_one_and_else_the_mesh(a, b):

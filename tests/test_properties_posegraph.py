@@ -22,7 +22,6 @@ from baselines.groundtruth.posegraph.optimise import optimise
 from baselines.groundtruth.posegraph.toro import optimise_toro, spanning_tree
 from synfeal.config.models import PoseGraphConfig
 from tests.property_support import (
-    about,
     directions,
     few,
     fewer,
@@ -50,7 +49,6 @@ def random_graph(seed, count, noise=0.0):
     return PoseGraph(truth, tuple(edges))
 
 
-@about(edge_residuals, chi2)
 @few
 @given(seeds, st.integers(2, 6), poses_near)
 def test_residuals_vanish_at_the_truth_and_see_no_common_motion(seed, count, world):
@@ -64,7 +62,6 @@ def test_residuals_vanish_at_the_truth_and_see_no_common_motion(seed, count, wor
     assert chi2(graph, other) == pytest.approx(by_hand)
 
 
-@about(edge_residuals)
 @few
 @given(poses_near, directions, st.floats(0.0, 3.0), vectors(2.0))
 def test_residual_of_an_edge_is_the_motion_it_is_off_by(measured, axis, angle, way):
@@ -75,7 +72,6 @@ def test_residual_of_an_edge_is_the_motion_it_is_off_by(measured, axis, angle, w
     np.testing.assert_allclose(found, [*way, *(angle * axis)], atol=1e-7)
 
 
-@about(swapped_blocks)
 @few
 @given(vectors(5.0, 36), vectors(5.0, 6))
 def test_swapping_blocks_exchanges_translation_and_rotation(cells, residual):
@@ -86,7 +82,6 @@ def test_swapping_blocks_exchanges_translation_and_rotation(cells, residual):
     np.testing.assert_array_equal(swapped_blocks(swapped), matrix)
 
 
-@about(check_connected, spanning_tree)
 @few
 @given(st.integers(2, 8), st.lists(st.tuples(st.integers(0, 7), st.integers(0, 7)), max_size=12))
 def test_a_graph_is_connected_if_edges_lead_everywhere(count, pairs):
@@ -111,7 +106,6 @@ def test_a_graph_is_connected_if_edges_lead_everywhere(count, pairs):
         assert spanning_tree(graph).tolist() == lowest
 
 
-@about(write_g2o, read_g2o)
 @few
 @given(seeds, st.integers(2, 5))
 def test_graphs_are_read_back_as_they_were_written(tmp_path_factory, seed, count):
@@ -126,7 +120,6 @@ def test_graphs_are_read_back_as_they_were_written(tmp_path_factory, seed, count
         np.testing.assert_array_equal(same.information, symmetric)
 
 
-@about(optimise_lm, optimise_toro, optimise)
 @fewer
 @given(seeds, st.integers(3, 7))
 # Started where only the noise of the edges is left, TORO, which knows no covariances, ends above.

@@ -18,8 +18,8 @@ _ANCHOR_SIGMA = 1e-9
 _RELATIVE_CHANGE = 1e-9
 
 
-def optimise_lm(graph: PoseGraph, iterations: int) -> NDArray[np.float64]:
-    """Optimised poses (n, 4, 4) relative to the first, after at most ``iterations`` steps."""
+def factors_of(graph: PoseGraph) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+    """The graph as gtsam's factors, the first pose fixed, and its initial values."""
     factors, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
     for node, pose in enumerate(graph.first_from_cam):
         values.insert(node, gtsam.Pose3(pose))
@@ -28,11 +28,16 @@ def optimise_lm(graph: PoseGraph, iterations: int) -> NDArray[np.float64]:
     for edge in graph.edges:
         noise = gtsam.noiseModel.Gaussian.Information(swapped_blocks(edge.information))
         factors.add(gtsam.BetweenFactorPose3(edge.i, edge.j, gtsam.Pose3(edge.i_from_j), noise))
+    return factors, values
+
+
+def optimise_lm(graph: PoseGraph, iterations: int) -> NDArray[np.float64]:
+    """Optimised poses (n, 4, 4) relative to the first, after at most ``iterations`` steps."""
     params = gtsam.LevenbergMarquardtParams()
     params.setMaxIterations(iterations)
     params.setRelativeErrorTol(_RELATIVE_CHANGE)
     params.setAbsoluteErrorTol(0.0)
     # Cholesky squares the range of the information; beyond 1e12 nothing of weak edges is left.
     params.setLinearSolverType("MULTIFRONTAL_QR")
-    result = gtsam.LevenbergMarquardtOptimizer(factors, values, params).optimize()
+    result = gtsam.LevenbergMarquardtOptimizer(*factors_of(graph), params).optimize()
     return np.array([result.atPose3(node).matrix() for node in range(len(graph))])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from synfeal.hard_cases.case import REFUSAL
+from synfeal.report.hard_cases.case import REFUSAL
 
 Row = Mapping[str, str]
 

@@ -7,13 +7,13 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from synfeal.hard_cases.exact import max_abs
+from synfeal.report.hard_cases.exact import max_abs
 
-N_TIMINGS, FEWEST_TIMINGS, LONG_S = 9, 3, 0.1
+N_TIMINGS, LONG_S = 9, 0.1
 # What a formula may end in when it meets a case it was not written for.
 BREAKDOWNS = (ArithmeticError, ValueError, RuntimeError, IndexError, np.linalg.LinAlgError)
 REFUSED = "refused"
@@ -27,8 +27,8 @@ class Trial:
     Attributes:
         naive: the answer of the formula somebody would write first.
         ours: the answer of the project's function.
-        truth: the exact answer: ``mpf``, ``Fraction``, or nested lists of them; or
-            :data:`REFUSED` where no answer is the only right one.
+        truth: the exact answer, as numbers of mpmath or fractions; :data:`REFUSED` where no
+            answer is the only right one.
         error: how far an answer is from the truth, in the unit of the case.
     """
 
@@ -38,23 +38,20 @@ class Trial:
     error: Callable[[Any, Any], float] = max_abs
 
 
-@dataclass(frozen=True)
-class Case:
-    """One row of the table.
+class Family(NamedTuple):
+    """Rows of the table that differ only in their inputs.
 
     Attributes:
-        family: what is computed.
-        name: when it is hard.
+        name: what is computed.
         quantity: what the error is measured in.
         unit: of the error.
         naive: the naive formula, in words.
         ours: the function that is judged.
         reference: how the truth is computed.
         bound: the largest error we promise.
-        trial: makes the inputs and the truth; nothing in it is random but by a fixed seed.
+        cases: by name, what makes inputs and truth; nothing is random but by a fixed seed.
     """
 
-    family: str
     name: str
     quantity: str
     unit: str
@@ -62,11 +59,10 @@ class Case:
     ours: str
     reference: str
     bound: float
-    trial: Callable[[], Trial]
+    cases: dict[str, Callable[[], Trial]]
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """What both formulas did; errors are ``inf`` where there was no answer or no number."""
 
     naive_error: float
@@ -75,40 +71,30 @@ class Outcome:
     our_seconds: float
 
 
-def examine(case: Case) -> Outcome:
+def examine(trial: Trial) -> Outcome:
     """Errors and times of both formulas; the errors are the same in every run."""
-    trial = case.trial()
-    naive_error, naive_seconds = _judged(trial, trial.naive, case.unit)
-    our_error, our_seconds = _judged(trial, trial.ours, case.unit)
-    return Outcome(naive_error, our_error, naive_seconds, our_seconds)
+    naive, ours = (_judged(trial, formula) for formula in (trial.naive, trial.ours))
+    return Outcome(naive[0], ours[0], naive[1], ours[1])
 
 
-def _judged(trial: Trial, formula: Callable[[], Any], unit: str) -> tuple[float, float]:
+def _judged(trial: Trial, formula: Callable[[], Any]) -> tuple[float, float]:
     """Error of a formula's answer, and the median time of a call in seconds."""
-    seconds = []
+    seconds: list[float] = []
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # of a naive formula nothing else is expected
-        for _ in range(N_TIMINGS):
+        while len(seconds) < N_TIMINGS and sum(seconds) < LONG_S:
             begin = time.perf_counter()
-            answer = _answer(formula)
+            try:
+                answer = formula()
+            except BREAKDOWNS:
+                answer = REFUSED
             seconds.append(time.perf_counter() - begin)
-            if sum(seconds) > LONG_S and len(seconds) >= FEWEST_TIMINGS:
-                break
         return _error(trial, answer), float(np.median(seconds))
-
-
-def _answer(formula: Callable[[], Any]) -> Any:
-    """What a formula returns, or that it gave up."""
-    try:
-        return formula()
-    except BREAKDOWNS:
-        return REFUSED
 
 
 def _error(trial: Trial, answer: Any) -> float:
     """The error; a refusal is right where the truth is one and infinitely wrong elsewhere."""
-    refused = isinstance(answer, str)
-    if refused or isinstance(trial.truth, str):
-        return 0.0 if refused and isinstance(trial.truth, str) else math.inf
+    if isinstance(answer, str) or isinstance(trial.truth, str):
+        return 0.0 if isinstance(answer, str) and isinstance(trial.truth, str) else math.inf
     error = trial.error(answer, trial.truth)
     return math.inf if math.isnan(error) else error

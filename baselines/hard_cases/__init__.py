@@ -1,1 +1,0 @@
-"""Hard cases of what the paper compares: losses and pose graphs."""

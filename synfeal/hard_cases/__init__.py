@@ -1,1 +1,0 @@
-"""Where textbook formulas lose their digits: ours beside them, both against exact answers."""
