@@ -27,7 +27,7 @@ smoke: $(INSTALLED)  ## every rule and every model at toy size (results/smoke)
 
 publish: $(INSTALLED)  ## track what PROFILE's run made (results/published), and the pages' numbers from it
 	$(BIN)/python -m synfeal.report.publish --profile $(PROFILE)
-	$(BIN)/python -m synfeal.report.readme
+	$(BIN)/python -m synfeal.report.pages
 
 archive: $(INSTALLED)  ## PROFILE's tables, figures and report.html in one file, for a release
 	mkdir -p build

@@ -1,7 +1,9 @@
-"""The generated parts of the read-me: every number there comes from a tracked result file.
+"""The generated parts of pages: every number there comes from a tracked result file.
 
-A part stands between ``<!-- NAME -->`` and ``<!-- /NAME -->``. ``python -m synfeal.report.readme``
-writes all of them anew; with ``--check`` it says whether that would change anything.
+A part stands between ``<!-- NAME PROFILE -->`` and ``<!-- /NAME -->`` and shows the published
+results of that profile; ``headline`` is the largest profile that is published.
+``python -m synfeal.report.pages`` writes all parts anew, and the figure of the read-me; with
+``--check`` it says whether that would change anything.
 """
 
 from __future__ import annotations
@@ -18,13 +20,45 @@ from synfeal.errors import InputError
 from synfeal.files import atomic_path
 from synfeal.report.assistance import TOTAL
 from synfeal.report.claims.table import claims_markdown
+from synfeal.report.findings import effects, sentences
+from synfeal.report.findings_figure import is_drawn_from, write_findings_figure
 from synfeal.report.layouts import SOURCES, TITLES, scene_title
-from synfeal.report.results import read_table, read_text
+from synfeal.report.publish import PUBLISHED, RESULTS
+from synfeal.report.results import read_result, read_table
 
-README = Path("README.md")
-ROOT = Path("results/published/mini")
-DIFFICULTY = Path("results/benchmarks/scene_difficulty")
+PAGES = (Path("README.md"), Path("docs/results.md"), Path("docs/scenes.md"))
+FIGURE = Path("docs/images/findings.png")
+HEADLINES = ("night", "mini")
+PAPER_FRAMES = {"6k": 6000}
 Row = Mapping[str, str]
+
+
+def headline() -> str:
+    """The profile whose results the read-me shows."""
+    return next((name for name in HEADLINES if (PUBLISHED / name).is_dir()), HEADLINES[-1])
+
+
+def findings(root: Path) -> str:
+    """What the run found, a sentence each."""
+    return "\n".join(f"- {sentence}" for sentence in sentences(root))
+
+
+def origin(root: Path) -> str:
+    """Which run the numbers are of."""
+    record = read_result(root / "provenance.json", ("commit", "machine", "stages"), "publish again")
+    first = read_table(root / "tables" / "table4_size.csv")[0]
+    share = PAPER_FRAMES[first["size"]] / int(first["n_train"])
+    frames = "the paper's frames" if share == 1 else f"1/{share:.3g} of the paper's frames"
+    return (
+        f"Profile `{root.name}`: {frames}, {counted_seeds(first)}, at commit"
+        f" `{record['commit'][:9]}` on {record['machine']['usable_cores']} cores"
+        f" ({record['machine']['processor']})."
+    )
+
+
+def counted_seeds(row: Row) -> str:
+    """As in ``3 training runs per cell``."""
+    return f"{row['n_seeds']} training run{'s' * (row['n_seeds'] != '1')} per cell"
 
 
 def size_table(root: Path) -> str:
@@ -45,12 +79,6 @@ def labels_table(root: Path) -> str:
         "labels from",
         lambda row: SOURCES.get(row["labels"], row["labels"]),
     )
-
-
-def findings(root: Path) -> str:
-    """What the summary says of the run, sentence by sentence."""
-    lines = read_text(root / "summary.md").splitlines()
-    return "\n".join(line for line in lines if line.startswith("- "))
 
 
 def assistance(root: Path) -> str:
@@ -81,7 +109,7 @@ def claims(root: Path) -> str:
     return claims_markdown(read_table(root / "claims.csv", ["id"])).rstrip()
 
 
-def difficulty(folder: Path = DIFFICULTY) -> str:
+def difficulty(folder: Path = RESULTS / "benchmarks" / "scene_difficulty") -> str:
     """How hard the scenes are for localisation, one line per scene that was measured."""
     head = "| scene | pixels near a keypoint | keypoints | best match far away | assisted batches |"
     names = sorted(path.name.removesuffix("-sift.csv") for path in folder.glob("*-sift.csv"))
@@ -90,27 +118,40 @@ def difficulty(folder: Path = DIFFICULTY) -> str:
 
 PARTS: dict[str, Callable[[Path], str]] = {
     "findings": findings,
+    "origin": origin,
     "size": size_table,
     "labels": labels_table,
     "assistance": assistance,
     "claims": claims,
-    "difficulty": lambda root: difficulty(root.parent.parent / "benchmarks" / "scene_difficulty"),
+    "difficulty": lambda root: difficulty(),
 }
 
 
-def rewritten(text: str, parts: Mapping[str, str]) -> str:
+def rewritten(text: str, part: Callable[[str, str], str]) -> str:
     """The text with each of its generated parts replaced.
 
-    Raises:
-        InputError: a part has no place in the text.
+    Args:
+        text: a page in Markdown.
+        part: what stands there instead, by name and profile.
     """
-    for name, part in parts.items():
-        pattern = re.compile(rf"(<!-- {name} -->).*?(<!-- /{name} -->)", re.DOTALL)
-        found = pattern.search(text)
-        if found is None:
-            raise InputError(f"{README}: has no '<!-- {name} -->' … '<!-- /{name} -->'")
-        text = f"{text[: found.end(1)]}\n\n{part}\n\n{text[found.start(2) :]}"
-    return text
+    pattern = re.compile(r"<!-- (\w+) (\w+) -->.*?<!-- /\1 -->", re.DOTALL)
+
+    def fresh(found: re.Match[str]) -> str:
+        name, profile = found.groups()
+        return f"<!-- {name} {profile} -->\n\n{part(name, profile)}\n\n<!-- /{name} -->"
+
+    return pattern.sub(fresh, text)
+
+
+def part_of(name: str, profile: str) -> str:
+    """A part of a page.
+
+    Raises:
+        InputError: there is no such part, or its results are not published.
+    """
+    if name not in PARTS:
+        raise InputError(f"<!-- {name} {profile} -->: no such part; known: {', '.join(PARTS)}")
+    return PARTS[name](PUBLISHED / (headline() if profile == "headline" else profile))
 
 
 def _localizer_table(rows: Sequence[Row], heading: str, label: Callable[[Row], str]) -> str:
@@ -156,23 +197,38 @@ def _difficulty(folder: Path, name: str) -> str:
     )
 
 
+def stale(check: bool) -> list[Path]:
+    """Pages, and the figure, that did not show the published results; written unless checking."""
+    found = effects(PUBLISHED / headline())
+    changed = []
+    for page in PAGES:
+        old = page.read_text(encoding="utf-8")
+        new = rewritten(old, part_of)
+        if new != old:
+            changed.append(page)
+            if not check:
+                with atomic_path(page) as temporary:
+                    temporary.write_text(new, encoding="utf-8")
+    if not is_drawn_from(FIGURE, found):
+        changed.append(FIGURE)
+        if not check:
+            write_findings_figure(found, FIGURE)
+    return changed
+
+
 def main(argv: Sequence[str] | None = None) -> int:
-    """Write the generated parts of the read-me, or check them."""
+    """Write the generated parts of the pages, or check them."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true", help="exit 1 if anything would change")
-    arguments = parser.parse_args(argv)
-    old = README.read_text(encoding="utf-8")
+    check = parser.parse_args(argv).check
     try:
-        new = rewritten(old, {name: part(ROOT) for name, part in PARTS.items()})
+        changed = stale(check)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
-    if arguments.check:
-        print(f"{README}: {'up to date' if new == old else 'run python -m synfeal.report.readme'}")
-        return int(new != old)
-    with atomic_path(README) as temporary:
-        temporary.write_text(new, encoding="utf-8")
-    return 0
+    for path in changed:
+        print(f"{path}: {'run python -m synfeal.report.pages' if check else 'written anew'}")
+    return int(check and bool(changed))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,180 @@
+"""What a run found, against what the paper printed: how much each change moves the errors.
+
+A change (more frames, exact labels, noisy labels, no transfer learning) multiplies the median error
+of a localizer by a factor; factors of different scales, rooms and networks can be compared where
+errors in metres cannot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from synfeal.errors import InputError
+from synfeal.report.layouts import scene_title
+
+MEASURES = ("position_m", "orientation_deg")
+HERE, PAPER = "here", "paper"
+COLUMNS = ("group", "change", "spoken", "model", "measure", "source", "factor")
+VERDICTS = {
+    "holds": "hold here",
+    "does not hold": "do not",
+    "undecided at this scale": "are undecided at this scale",
+    "not testable here": "cannot be tested here",
+}
+
+
+def effects(root: Path) -> pd.DataFrame:
+    """Factors by which the median errors change.
+
+    Args:
+        root: published results of a profile.
+
+    Returns:
+        Columns ``COLUMNS``, one row per change (in the order of the tables), localizer, measure
+        (``MEASURES``) and source (``HERE`` or ``PAPER``), where both errors are known.
+
+    Raises:
+        InputError: a table is missing or cannot be read.
+    """
+    size = _table(root, "table4_size")
+    found = [*_of_size(size), *_of_labels(root), *_of_noise(root), *_of_start(root, size)]
+    return pd.concat(found, ignore_index=True)
+
+
+def mean_factor(found: pd.DataFrame, change: str, measure: str, source: str) -> float:
+    """Geometric mean of a change over the localizers; NaN where there is none."""
+    chosen = (found.change == change) & (found.measure == measure) & (found.source == source)
+    return float(np.exp(np.log(found.factor[chosen]).mean()))
+
+
+def sentences(root: Path) -> list[str]:
+    """What there is to say: each group of changes in one sentence, and how the claims fared.
+
+    Raises:
+        InputError: a table is missing or cannot be read.
+    """
+    groups = effects(root).groupby("group", sort=False)
+    return [*(_group_sentence(found) for _, found in groups), _claims_sentence(root)]
+
+
+def _of_size(size: pd.DataFrame) -> Iterator[pd.DataFrame]:
+    for scene, rows in size.groupby("scene", sort=False):
+        first, last = rows["size"].iloc[[0, -1]]
+        title = scene_title(str(scene))
+        yield _factors(
+            ("size", f"{last} frames, not {first}, {title}"),
+            f"From {first} to {last} frames of the {title}",
+            rows[rows["size"] == first],
+            rows[rows["size"] == last],
+        )
+
+
+def _of_labels(root: Path) -> Iterator[pd.DataFrame]:
+    rows = _table(root, "table2_ground_truth")
+    exact = rows[rows.labels == "synfeal"]
+    for source, title in (("sfm", "SfM"), ("rgbd-toro", "RGB-D SLAM")):
+        yield _factors(
+            ("labels", f"exact labels, not {title}'s"),
+            f"With exact labels in place of those of {title}",
+            rows[rows.labels == source],
+            exact,
+        )
+
+
+def _of_noise(root: Path) -> Iterator[pd.DataFrame]:
+    rows = _table(root, "table3_inconsistencies")
+    both = rows[rows.block == "both"]
+    clean, noisy = both[both.noise_m == 0], both[both.noise_m == both.noise_m.max()]
+    size = f"{both.noise_m.max():g} m and {both.noise_deg.max():g}°"
+    yield _factors(
+        ("noise", f"label noise of {size}, against the labels"),
+        f"With noise of {size} in the labels, measured against those labels as in the paper,",
+        clean,
+        noisy,
+        score="",
+    )
+    yield _factors(
+        ("noise", f"label noise of {size}, against the truth"),
+        "measured against the true poses",
+        clean,
+        noisy,
+    ).query("source == @HERE")
+
+
+def _of_start(root: Path, size: pd.DataFrame) -> Iterator[pd.DataFrame]:
+    scratch = _table(root, "table5_from_scratch")
+    for name in scratch["size"].iloc[[0, -1]]:
+        rows = scratch[scratch["size"] == name]
+        pretrained = size[(size["size"] == name) & size.scene.isin(rows.scene)]
+        yield _factors(
+            ("start", f"from scratch, {name} frames"),
+            f"Without pretrained weights and with {name} frames",
+            pretrained,
+            rows,
+        )
+
+
+def _factors(
+    names: tuple[str, str],
+    spoken: str,
+    before: pd.DataFrame,
+    after: pd.DataFrame,
+    score: str = "_true",
+) -> pd.DataFrame:
+    """One change, from the rows of a table without it and with it."""
+    both = before.merge(after, on="model", suffixes=("_before", "_after"), validate="1:1")
+    parts = []
+    for measure in MEASURES:
+        columns = {HERE: f"{measure}{score}", PAPER: f"published_{measure}"}
+        for source, column in columns.items():
+            factor = both[f"{column}_after"] / both[f"{column}_before"]
+            part = pd.DataFrame({"model": both.model, "factor": factor})
+            parts.append(part.assign(measure=measure, source=source))
+    found = pd.concat(parts).assign(group=names[0], change=names[1], spoken=spoken)
+    return found.dropna(subset="factor")[list(COLUMNS)]
+
+
+def _table(root: Path, name: str) -> pd.DataFrame:
+    path = root / "tables" / f"{name}.csv"
+    try:
+        return pd.read_csv(path, dtype={"size": str, "labels": str, "model": str})
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read ({error}); publish the run again") from None
+
+
+def _claims_sentence(root: Path) -> str:
+    path = root / "claims.csv"
+    try:
+        verdicts = pd.read_csv(path).verdict_true.value_counts(sort=False)
+    except (OSError, ValueError, AttributeError) as error:
+        raise InputError(f"{path}: cannot be read ({error}); publish the run again") from None
+    names = sorted(map(str, verdicts.index), key=[*VERDICTS].index)
+    parts = [f"{verdicts[name]} {VERDICTS[name]}" for name in names]
+    return f"Of {verdicts.sum()} claims of the paper, {', '.join(parts)} (against the true poses)."
+
+
+def _group_sentence(found: pd.DataFrame) -> str:
+    """The changes of a group, the paper's figures in brackets."""
+    parts: list[str] = []
+    for change, spoken in found[["change", "spoken"]].drop_duplicates().to_numpy():
+        position, orientation = (_printed(found, change, measure) for measure in MEASURES)
+        if parts:
+            parts.append(f"{spoken[0].lower()}{spoken[1:]} by {position} and {orientation}")
+        else:
+            errors = f"the position error changes by {position}", f"orientation by {orientation}"
+            parts.append(f"{spoken} {' and '.join(errors)}")
+    return "; ".join(parts) + "."
+
+
+def _printed(found: pd.DataFrame, change: str, measure: str) -> str:
+    here, paper = (mean_factor(found, change, measure, source) for source in (HERE, PAPER))
+    return percent(here) + (f" ({percent(paper)})" if np.isfinite(paper) else "")
+
+
+def percent(factor: float) -> str:
+    """A factor as a change in percent."""
+    return f"{100 * (factor - 1):+.0f} %".replace("-", "−")
