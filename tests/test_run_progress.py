@@ -127,7 +127,7 @@ def test_the_view_keeps_rows_and_one_line(
     lines = text.getvalue().splitlines()
     assert any("0.25 5°" in line for line in lines)
     assert sum("jobs" in line for line in lines) >= 2
-    assert "5 of 5 jobs, 3.3 min" in lines[-1]
+    assert "5 of 5 jobs done in 3.3 min" in lines[-1]
 
 
 SNAKEFILE = """
@@ -166,8 +166,8 @@ def test_snakemake_shows_a_run_by_the_plugin(tmp_path: Path) -> None:
     )
     assert run.returncode == 1
     assert "0 of 2 jobs" in run.stderr
-    assert "the disk is full" in run.stderr
-    assert "1 of 3 jobs" in run.stderr  # when it was broken off
+    assert "error: bad failed\nbad.log:\n    the disk is full\n" in run.stderr
+    assert "1 of 3 jobs done in" in run.stderr
     assert "Complete log" in run.stderr
     assert "Select jobs" not in run.stderr
     (log,) = (tmp_path / ".snakemake/log").glob("*.log")

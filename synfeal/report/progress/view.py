@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from rich.console import Console, Group
@@ -25,6 +25,7 @@ from synfeal.report.progress.time_left import TimeLeft
 
 INTERVAL_S = 60.0
 BAR_CELLS = 20
+LOG_LINES = 20
 STAGES_SHOWN = 2
 # Characters of a row: scene and labels, and a score; titles of localizers take up to 14.
 LABEL, NARROW_CELL, WIDE_CELL = 25, 10, 14
@@ -102,23 +103,29 @@ class RunView:
         elif not self._live.is_started and self._clock() - self._said_s >= INTERVAL_S:
             self._say_line()
 
+    def failed(self, job: str, logs: Iterable[Path]) -> None:
+        """A job failed: what its log ends with."""
+        self.say(f"error: {job} failed", "red")
+        for log in logs:
+            lines = log.read_text(errors="replace").splitlines() if log.is_file() else []
+            self.say("\n".join([f"{log}:", *(f"    {line}" for line in lines[-LOG_LINES:])]))
+
     def say(self, text: str, style: str | None = None) -> None:
         """A message that stays."""
         self._console.print(Text(text, style or ""), soft_wrap=True)
 
     def end(self) -> None:
-        """The run is over, or broken off: the line goes, and what it said last stays."""
+        """The run is over, or broken off: the line goes, and what was done is said."""
         if self._total:
             self._live.stop()
-            self._say_line()
+            done = f"{self._done} of {self._total} jobs"
+            self.say(f"{done} done in {duration(self._clock() - self._begin_s)}")
             self._total = 0
 
     def line(self) -> str:
         """Jobs done, stages at work, time left."""
         now_s = self._clock()
         parts = [f"{self._done} of {self._total} jobs"]
-        if self._done == self._total:
-            return f"{parts[0]}, {duration(now_s - self._begin_s)}"
         stages = dict.fromkeys(job.partition("/")[0] for job in self._time_left.running)
         for stage in list(stages)[:STAGES_SHOWN]:
             done, total = self._time_left.count(stage)

@@ -56,17 +56,18 @@ class LogHandler(LogHandlerBase):
             case LogEvent.PROGRESS:
                 self.view.progress(fields["done"], fields["total"])
             case LogEvent.JOB_ERROR:
-                self._finish(fields["jobid"])
-                self.view.say(self.format(record), "red")
+                job = self._finish(fields["jobid"])
+                self.view.failed(job or fields["rule_name"], map(Path, fields["log"]))
             case _ if "plan" in fields:
                 self.view.begin(fields["plan"]())
             case _ if record.levelno >= WARNING or record.getMessage().startswith(SAID):
                 self.view.say(self.format(record))
 
-    def _finish(self, jobid: int) -> None:
+    def _finish(self, jobid: int) -> str:
         job, outputs = self.jobs.pop(jobid, ("", []))
         if job:
             self.view.finished(job)
         for path in outputs:
             if path.name == "metrics.json" and path.exists():
                 self.view.scored(path)
+        return job
