@@ -48,19 +48,18 @@ test: check  ## static checks and the test suite
 
 test-slurm: $(SLURM_INSTALLED)  ## the smoke profile here and through a SLURM cluster of one node, which is killed
 	setup/slurm_cluster.sh install
-	$(BIN)/python -m benchmarks.slurm_run --work results/slurm_test $(if $(LOCAL),--local $(LOCAL))
+	$(BIN)/python -m tests.slurm_run --work results/slurm_test $(if $(LOCAL),--local $(LOCAL))
 	$(BIN)/pytest tests/test_clusters.py tests/test_slurm_run.py
 
-coverage: $(QUALITY)  ## which lines the test suite runs (results/benchmarks/coverage.csv)
+coverage: $(QUALITY)  ## which lines the test suite runs
 	$(BIN)/coverage erase
 	$(BIN)/coverage run -m pytest
 	$(BIN)/coverage combine --quiet
-	$(BIN)/coverage json --quiet
-	$(BIN)/python -m benchmarks.line_coverage
+	$(BIN)/coverage report --skip-covered
 
-mutate: $(QUALITY)  ## which deliberate defects the tests notice (results/benchmarks/mutation.csv)
+mutate: $(QUALITY)  ## which deliberate defects the tests notice
 	$(BIN)/mutmut run --max-children $(CORES)
-	$(BIN)/python -m benchmarks.mutation
+	$(BIN)/mutmut results
 
 check: $(INSTALLED)  ## static checks alone: format, lint, types, workflow
 	$(BIN)/ruff check .

@@ -16,9 +16,9 @@ from baselines.groundtruth.posegraph.lm import optimise_lm
 from baselines.groundtruth.posegraph.open3d_lm import optimise_open3d
 from baselines.groundtruth.posegraph.optimise import OPTIMISERS, optimise
 from baselines.groundtruth.posegraph.toro import optimise_toro
-from benchmarks.pose_graphs.graphs import manhattan, measured, sphere
 from synfeal.config.models import PoseGraphConfig
 from synfeal.geometry.poses import pose_error, pose_matrix, relative
+from tests.large_graphs import manhattan, measured, sphere
 
 Array = NDArray[np.float64]
 Optimise = Callable[[PoseGraph], Array]

@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
-from benchmarks.render_agreement import Frames, agreement, away_from_edges, free_poses, render_all
 from synfeal.config.models import Box, CameraConfig, SceneConfig
 from synfeal.scenes.prepare import build_or_load
+from tests.render_agreement import Frames, agreement, away_from_edges, free_poses, render_all
 from tests.render_backends import BACKENDS, PYOPENGL_WARNS
 from tests.small_room import furnished_room, room_poses
 

@@ -1,6 +1,6 @@
 """Batches that structure from motion finds hard: each ends with a stated result, in bounded time.
 
-Frames are ray-cast in closed form (``benchmarks/sfm_settings/painted_room.py``).
+Frames are ray-cast in closed form (``tests/painted_room.py``).
 """
 
 import itertools
@@ -14,12 +14,12 @@ from PIL import Image
 
 from baselines.groundtruth.chain import fill_gaps
 from baselines.groundtruth.sfm import mapping, sfm_batch
-from benchmarks.sfm_settings.painted_room import PaintedRoom, painted_room, random_texture
 from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig, SfmConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error, pose_matrix, relative
 from synfeal.geometry.rotations import rotation_from_rpy
+from tests.painted_room import PaintedRoom, painted_room, random_texture
 
 CAMERA = CameraConfig(width=160, height=120, horizontal_fov_deg=70.0)
 CFG = SfmConfig(max_features=300, peak_threshold=0.002, overlap=3)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.slurm_run.page import compare, job_records, page, plan_lines, recovery
-from benchmarks.slurm_run.run import CLUSTER, Crash, DryRun
+from tests.slurm_run.page import compare, job_records, page, plan_lines, recovery
+from tests.slurm_run.run import CLUSTER, Crash, DryRun
 
 JOBS = """\
 JobId=7 UserId=root(0) GroupId=root(0) Name=wrap JobState=NODE_FAIL Partition=gpu TimeLimit=5 \

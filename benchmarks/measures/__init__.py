@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from synfeal.config.models import Strict
 
-MEASURES = ("training",)
+MEASURES = ("rgbd", "sfm", "training")
 
 
 class Measure(NamedTuple):

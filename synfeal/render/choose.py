@@ -39,7 +39,7 @@ def _open_raycast(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig
     return RaycastRenderer(mesh, camera, render.supersampling)
 
 
-# Fastest first; benchmarks/rendering says by how much.
+# Fastest first; results/benchmarks/rendering.md says by how much.
 BACKENDS: dict[str, Opener] = {
     "opengl": _open_opengl,
     "pyrender": _open_pyrender,

@@ -7,17 +7,13 @@ depend on meshes, scans or renderers.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
-from synfeal.dataset.pose_table import PoseTable
-from synfeal.geometry.rotations import quat_wxyz_from_matrix, rotation_from_rpy
 
 Array = NDArray[np.float64]
 
@@ -88,27 +84,3 @@ def _reduced(grey: Array) -> NDArray[np.uint8]:
     fine = grey.reshape(height, SUPERSAMPLING, width, SUPERSAMPLING)
     coarse = np.round(fine.mean(axis=(1, 3))).astype(np.uint8)
     return np.repeat(coarse[..., None], 3, axis=2)
-
-
-def round_path(n_frames: int, step_m: float) -> PoseTable:
-    """A round through the room along an ellipse, looking half outwards and a little up and down."""
-    angle = np.linspace(0, 2 * np.pi, 3600)
-    centre_m, radii_m = SIZE_M / 2, np.array([1.2, 1.6, 0.3])
-    curve = centre_m + radii_m * np.stack([np.cos(angle), np.sin(angle), np.sin(3 * angle)], -1)
-    length_m = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
-    at = np.interp(step_m * np.arange(n_frames), length_m, angle)
-    position_m = centre_m + radii_m * np.stack([np.cos(at), np.sin(at), np.sin(3 * at)], -1)
-    rpy = np.column_stack([0.1 * np.sin(2 * at), 0.2 * np.cos(2 * at), at + np.pi / 4])
-    index = np.arange(n_frames)
-    return PoseTable(index, 0 * index, position_m, quat_wxyz_from_matrix(rotation_from_rpy(rpy)))
-
-
-def write_frames(
-    room: PaintedRoom, poses: PoseTable, camera: CameraConfig, directory: Path
-) -> list[Path]:
-    """Images and poses as 7-Scenes stores them, in an existing directory; returns the images."""
-    paths = [directory / f"frame-{index:06d}.color.png" for index in range(len(poses))]
-    for path, world_from_cam in zip(paths, poses.world_from_cam, strict=True):
-        Image.fromarray(room.render(world_from_cam, camera)).save(path)
-        np.savetxt(path.with_suffix("").with_suffix(".pose.txt"), world_from_cam, "%.10e")
-    return paths

@@ -7,8 +7,8 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.slurm_run.run import SLURM, Crash, DryRun
-from benchmarks.workflow_faults.trees import Hashes, damaged, missing, reason_to_differ
+from tests.slurm_run.run import SLURM, Crash, DryRun
+from tests.slurm_run.trees import Hashes, damaged, missing, reason_to_differ
 
 # What the controller writes about a node that is lost and found.
 RECOVERY = re.compile(r"requeu|not responding|now responding|returned to service", re.IGNORECASE)

@@ -1,6 +1,6 @@
 """The smoke profile on a SLURM cluster whose node crashes in the middle, against a local run.
 
-``python -m benchmarks.slurm_run --work DIR`` starts a cluster of one node on this machine
+``python -m tests.slurm_run --work DIR`` starts a cluster of one node on this machine
 (``setup/slurm_cluster.sh``), runs the workflow with ``workflow/profiles/slurm`` through it, kills
 the node once trainings are under way, lets it come back, and sets the files beside those of
 ``snakemake --cores 2``; it ends with exit status 1 where they differ. What either run has made is
@@ -14,17 +14,17 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.slurm_run.page import compare, page, plan_lines
-from benchmarks.slurm_run.run import cluster, dry_run, run_local, run_on_cluster
 from synfeal.errors import InputError, exit_status
 from synfeal.files import atomic_path
+from tests.slurm_run.page import compare, page, plan_lines
+from tests.slurm_run.run import cluster, dry_run, run_local, run_on_cluster
 
 OUT = Path("results/benchmarks/slurm.md")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Both runs, the comparison, and the page."""
-    name = "python -m benchmarks.slurm_run"
+    name = "python -m tests.slurm_run"
     parser = argparse.ArgumentParser(prog=name, description=__doc__)
     parser.add_argument("--work", type=Path, required=True, help="directory for both runs; kept")
     parser.add_argument("--local", type=Path, help="results of a local run that has been made")

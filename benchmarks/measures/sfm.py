@@ -1,0 +1,37 @@
+"""Structure from motion on one batch: errors of its poses, and what it took."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from baselines.groundtruth.chain import fill_gaps
+from baselines.groundtruth.sfm.batch import sfm_batch
+from benchmarks.measures.batches import BatchCase, errors, open_batch
+from synfeal.seeds import seed_of
+
+Case = BatchCase
+
+
+def run(case: BatchCase, seed: int) -> dict[str, float]:
+    """Errors of all frames when the batch starts at its true first pose, gaps filled.
+
+    Raises:
+        InputError: the frames cannot be used.
+    """
+    batch = open_batch(case)
+    with tempfile.TemporaryDirectory(prefix="sfm-") as work:
+        estimate = sfm_batch(
+            batch.color,
+            case.groundtruth_camera,
+            batch.world_from_cam,
+            case.groundtruth.sfm,
+            seed_of(seed, "sfm"),
+            Path(work),
+        )
+    facts = estimate.facts
+    return {
+        **facts.to_json(),
+        **errors("sfm", fill_gaps(estimate.trajectory), batch.world_from_cam),
+        "cpu_s": facts.features_s + facts.matching_s + facts.mapping_s,
+    }

@@ -1,1 +1,0 @@
-"""How fast and how well pose-graph optimisers do on large graphs."""

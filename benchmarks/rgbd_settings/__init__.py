@@ -1,1 +1,0 @@
-"""Settings of RGB-D odometry: what each costs, and how far the poses are off."""

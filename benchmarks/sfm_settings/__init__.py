@@ -1,1 +1,0 @@
-"""Settings of structure from motion: what each costs, and how far the poses are off."""
