@@ -55,8 +55,7 @@ rule scenes:
 
 rule datasets:
     input:
-        manifests("network"),
-        manifests("groundtruth"),
+        asked_datasets(),
 
 
 rule labels:

@@ -1,4 +1,4 @@
-"""One run at a time in a results directory, and nothing left there of runs that were killed."""
+"""One command at a time in a directory, and nothing left there of those that were killed."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import socket
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from synfeal.errors import InputError
@@ -30,17 +31,28 @@ def begin_run(root: Path) -> None:
     """
     try:
         root.mkdir(parents=True, exist_ok=True)
-        _lock_for_life(root / LOCK)
+        _lock(root / LOCK)  # nobody closes the descriptor before the process ends
         _end_future(root)
     except OSError as error:
         raise InputError(
             f"{error.filename or root}: {error.strerror}; nothing was started"
         ) from None
-    for path in list(unfinished(root)):
-        if path.is_dir():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            path.unlink(missing_ok=True)
+    remove_unfinished(root)
+
+
+@contextmanager
+def only_command(directory: Path, lock: Path) -> Iterator[None]:
+    """Keep other commands out of ``directory`` during the block, by a lock on the file ``lock``.
+
+    Raises:
+        InputError: another command is at work there.
+        OSError: the lock cannot be written.
+    """
+    descriptor = _lock(lock, directory)
+    try:
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def unfinished(root: Path) -> Iterator[Path]:
@@ -49,6 +61,15 @@ def unfinished(root: Path) -> Iterator[Path]:
         found = [name for name in (*directories, *files) if TEMPORARY.fullmatch(name)]
         yield from (Path(folder, name) for name in found)
         directories[:] = [name for name in directories if name not in found]
+
+
+def remove_unfinished(root: Path) -> None:
+    """Remove them."""
+    for path in list(unfinished(root)):
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
 
 
 def _end_future(root: Path) -> None:
@@ -67,18 +88,21 @@ def _end_future(root: Path) -> None:
         print(f"{root}: {len(future)} files dated in the future are now dated now", file=sys.stderr)
 
 
-def _lock_for_life(path: Path) -> None:
-    """Lock a file through a descriptor that nobody closes before the process ends."""
+def _lock(path: Path, directory: Path | None = None) -> int:
+    """Lock a file through a descriptor, which holds the lock until it is closed."""
+    directory = directory or path.parent
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         holder = os.read(descriptor, 200).decode(errors="replace") or "it did not say which"
+        os.close(descriptor)
         raise InputError(
-            f"{path.parent}: another run is at work there ({holder}); wait for its end, or end it"
+            f"{directory}: another run is at work there ({holder}); wait for its end, or end it"
         ) from None
     except OSError as error:  # some network file systems know no locks
         print(f"{path}: {error.strerror}; see yourself that no other run starts", file=sys.stderr)
-        return
+        return descriptor
     os.ftruncate(descriptor, 0)
     os.write(descriptor, f"process {os.getpid()} on {socket.gethostname()}".encode())
+    return descriptor

@@ -39,7 +39,7 @@ from synfeal.dataset.packed_record import write_packed_record
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.sequences import Sequence
 from synfeal.dataset.sevenscenes import pose_text, read_depth_m, read_pose, read_split, write_splits
-from synfeal.dataset.unfinished import open_unfinished, unfinished_of
+from synfeal.dataset.unfinished import WORK, check_settings
 from synfeal.files import write_json
 from synfeal.mesh.collision import CURVE_HEADER
 from synfeal.mesh.load import load_mesh
@@ -441,14 +441,20 @@ def _meshes_table(path: Path) -> None:
             (root / name).unlink(missing_ok=True)
 
 
+SETTINGS = {"seed": 0, "scene": {"unit_m": 1.0}}
+
+
 def _job(folder: Path) -> Path:
-    open_unfinished(folder / "out", {"seed": 0, "scene": {"unit_m": 1.0}}, dict)
-    return unfinished_of(folder / "out") / "job.json"
+    write_json(folder / WORK / "settings.json", SETTINGS)
+    return folder / WORK / "settings.json"
 
 
-def _go_on(path: Path) -> object:
-    out = path.parent.with_suffix("")
-    return open_unfinished(out, {"seed": 0, "scene": {"unit_m": 1.0}}, dict)
+def _go_on(path: Path) -> None:
+    try:
+        check_settings(path.parents[1], SETTINGS)
+    finally:
+        if path.is_file() and not path.read_bytes().strip():
+            path.unlink()
 
 
 def table_of(name: str, columns: Sequence_[str], **cells: Value) -> Callable[[Path], Path]:

@@ -16,7 +16,6 @@ import pytest
 
 from baselines.groundtruth.rgbd.sensor import frame_generator
 from baselines.groundtruth.sfm.images import link_images
-from benchmarks.collect_faults import save_room, tree_of
 from synfeal.cli import main
 from synfeal.dataset import archive as archive_module
 from synfeal.dataset.archive import (
@@ -32,6 +31,7 @@ from synfeal.dataset.render_sequence import write_sequence
 from synfeal.dataset.sevenscenes import frame_paths, read_depth_m, read_pose, read_split
 from synfeal.errors import InputError
 from synfeal.planning.repeat import read_poses
+from tests.collected import save_room, tree_of
 from tests.damaged_sets import CAMERA, write_planar_set
 from tests.test_dataset import FakeRenderer, poses_of
 
@@ -244,26 +244,14 @@ def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def collect(mesh: Path, out: Path, *more: str) -> dict[str, str]:
     command = ["collect", "--mesh", str(mesh), "--out", str(out), *FRAMES, "--packed", "24", *more]
-    assert main([*command, "--spacing", "0.2"]) == 0
+    assert main([*command, "--spacing", "0.2", "--sequence-frames", "4"]) == 0
     return tree_of(out)
 
 
-def test_collections_are_archived_however_they_are_interrupted(
-    mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("synfeal.dataset.collect_job.SEQUENCE_FRAMES", 4)
+def test_collections_are_archived(mesh: Path, tmp_path: Path) -> None:
     plain = collect(mesh, tmp_path / "plain")
-    calm = collect(mesh, tmp_path / "calm", "--archive")
-    assert len([name for name in calm if name.endswith(".zip")]) == 3
-    assert not [name for name in calm if name.startswith("seq-01/")]
-    # Shards that share a sequence leave it to the last command; a whole one is packed at once.
-    out = tmp_path / "shared"
-    collect(mesh, out, "--archive", "--shard", "1/2")
-    data = tmp_path / "shared.part" / "data"
-    assert sorted(path.name for path in data.glob("seq-*")) == ["seq-01.zip", "seq-02"]
-    # As if killed between the archive and the removal of its directory.
-    (data / "seq-01").mkdir()
-    (data / "seq-01" / "frame-000003.pose.txt").write_text("left over")
-    assert collect(mesh, out, "--archive") == calm
-    assert tree_of(unpacked(out)) == plain
-    assert main(["validate", str(tmp_path / "calm")]) == 0
+    packed = collect(mesh, tmp_path / "packed", "--archive")
+    assert len([name for name in packed if name.endswith(".zip")]) == 3
+    assert not [name for name in packed if name.startswith("seq-01/")]
+    assert main(["validate", str(tmp_path / "packed")]) == 0
+    assert tree_of(unpacked(tmp_path / "packed")) == plain

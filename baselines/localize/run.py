@@ -108,7 +108,7 @@ def _predict_all(
             progress.update(len(batch))
             if len(pictures) > BATCH:
                 name = f"picture {start + len(batch)} of {len(pictures)}"
-                progress.shard_done(name, len(batch), watch.seconds)
+                progress.part_done(name, len(batch), watch.seconds)
     position_m, quat_wxyz = zip(*poses, strict=True)
     return np.concatenate(position_m), np.concatenate(quat_wxyz)
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import logging
+import sys
 from collections.abc import Sequence
 
 from synfeal import __version__
 from synfeal.cli import collect, compare, export, inspect, keep, localize, plan, validate
+from synfeal.cli.options import numbers_apart
 from synfeal.errors import exit_status
 
 COMMANDS = (
@@ -28,7 +30,12 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"synfeal {__version__}")
     commands = parser.add_subparsers(required=True)
     for command in COMMANDS:
-        added = commands.add_parser(command.name, help=command.summary)
+        added = commands.add_parser(
+            command.name,
+            help=command.summary,
+            description=command.description,
+            epilog=f"example: {command.example}",
+        )
         for flag, details in command.options:
             added.add_argument(flag, **details)
         added.set_defaults(action=command.run)
@@ -38,5 +45,7 @@ def build_parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point: 0, 1 for what a person can mend, 2 for wrong usage, 130 after Ctrl-C."""
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
-    arguments = build_parser().parse_args(argv)
+    every = tuple(option for command in COMMANDS for option in command.options)
+    given = sys.argv[1:] if argv is None else argv
+    arguments = build_parser().parse_args(list(numbers_apart(given, every)))
     return exit_status(lambda: arguments.action(arguments), "nothing was kept")

@@ -7,35 +7,48 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, get_args
 
-from pydantic import ValidationError
-
-from synfeal.cli.camera import CAMERA_OPTIONS, camera_of
-from synfeal.cli.options import MESH_OPTIONS, Command, Options, scene_values
-from synfeal.config.load import describe
-from synfeal.config.models import CameraConfig, CollectionConfig, RenderConfig, SceneConfig
+from synfeal.cli.options import MESH_OPTIONS, Command, Options, options_among
+from synfeal.config.models import CollectionConfig, RenderConfig
 from synfeal.errors import InputError
 from synfeal.files import read_json
+from synfeal.settings import KEYS, dataset_config, in_words_of_options
 
 BACKENDS = get_args(RenderConfig.model_fields["backend"].annotation)
 MODES = get_args(CollectionConfig.model_fields["mode"].annotation)
+RANGE: dict[str, Any] = {"type": float, "nargs": 2, "metavar": ("FROM", "TO")}
 
 OPTIONS: Options = (
     ("--mesh", {"type": Path, "required": True, "help": "GLB, glTF, OBJ or PLY file"}),
     ("--frames", {"type": int, "required": True, "help": "training frames"}),
     ("--out", {"type": Path, "required": True, "help": "directory to create"}),
-    ("--test-frames", {"type": int, "default": 0, "help": "test frames (default: 0)"}),
-    ("--spacing", {"type": float, "default": 0.03, "help": "metres between frames (0.03)"}),
-    ("--seed", {"type": int, "default": 0, "help": "root of all random numbers (0)"}),
+    ("--test-frames", {"type": int, "default": 0, "help": "test frames (0)"}),
     ("--depth", {"action": "store_true", "help": "write depth images too"}),
-    ("--archive", {"action": "store_true", "help": "write each sequence as one seq-XX.zip"}),
-    ("--packed", {"type": int, "metavar": "PX", "help": "write frames of PX x PX in one .npy too"}),
-    ("--backend", {"choices": BACKENDS, "default": "auto", "help": "what draws (auto)"}),
-    ("--workers", {"type": int, "default": 1, "help": "processes that render (1)"}),
+    ("--seed", {"type": int, "help": "root of all random numbers (0)"}),
+)
+CAMERA_OPTIONS: Options = (
     (
-        "--shard",
-        {"metavar": "I/N", "help": "render this part only, say 3/8 (docs/collecting.md)"},
+        "--camera",
+        {
+            "type": Path,
+            "metavar": "FILE",
+            "help": "calibration: OpenCV or ROS .yaml or .json, COLMAP cameras.txt",
+        },
     ),
-    ("--mode", {"choices": MODES, "default": "path", "help": "where cameras go (path)"}),
+    ("--width", {"type": int, "help": "image width, pixels (640, or that of --camera)"}),
+    ("--height", {"type": int, "help": "image height, pixels (480, or that of --camera)"}),
+    ("--fov", {"type": float, "help": "horizontal field of view, degrees (60)"}),
+)
+MOVEMENT_OPTIONS: Options = (
+    ("--spacing", {"type": float, "help": "metres between frames (0.03)"}),
+    ("--roll", {**RANGE, "help": "bounds of the camera's roll, degrees (-29.8 29.8)"}),
+    ("--pitch", {**RANGE, "help": "bounds of its pitch; positive looks down (-29.8 29.8)"}),
+    ("--yaw", {**RANGE, "help": "bounds of its heading; 0 is world x, 90 is y (0 360)"}),
+    (
+        "--min-view-distance",
+        {"type": float, "help": "metres of free view that a path ends with, at least (1.2)"},
+    ),
+    ("--min-path", {"type": float, "help": "metres; shorter paths are drawn again (1.5)"}),
+    ("--mode", {"choices": MODES, "help": "where cameras go (path)"}),
     (
         "--poses",
         {
@@ -44,43 +57,53 @@ OPTIONS: Options = (
             "help": "mode repeat: data set, 7-Scenes frames, pose table (.csv) or TUM trajectory",
         },
     ),
+)
+RENDER_OPTIONS: Options = (
+    ("--backend", {"choices": BACKENDS, "help": "what draws (auto)"}),
+    ("--supersampling", {"type": int, "metavar": "N", "help": "N x N samples a pixel, 1 - 4 (2)"}),
     (
-        "--min-view-distance",
-        {"type": float, "default": 1.2, "help": "min_view_distance_m: free view of targets (1.2)"},
+        "--background",
+        {
+            "type": int,
+            "nargs": 3,
+            "metavar": ("R", "G", "B"),
+            "help": "colour where nothing is, 0 - 255 each (0 0 0)",
+        },
     ),
+    ("--workers", {"type": int, "default": 1, "help": "processes that render (1)"}),
     (
-        "--min-path",
-        {"type": float, "default": 1.5, "help": "min_path_m: shorter paths are drawn again (1.5)"},
+        "--sequence-frames",
+        {"type": int, "metavar": "N", "help": "frames of a sequence, rendered at once (500)"},
+    ),
+    ("--archive", {"action": "store_true", "help": "write each sequence as one seq-XX.zip"}),
+    ("--packed", {"type": int, "metavar": "PX", "help": "write frames of PX x PX in one .npy too"}),
+    (
+        "--print-config",
+        {
+            "action": "store_true",
+            "help": "make nothing; print a configuration with which the workflow makes the same"
+            " data set, on several machines if need be (docs/collecting.md)",
+        },
     ),
 )
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out the command."""
-    scene, collection, camera = collect_configs(arguments)
-    from synfeal.dataset.collect import collect
-    from synfeal.dataset.collect_job import CollectJob
-    from synfeal.dataset.shards import read_shard
+    config = dataset_config(options_among(arguments, KEYS), arguments.out)
+    from synfeal.dataset.collect import CollectJob, collect
+    from synfeal.dataset.configuration import configuration_text, with_backend
 
-    shard = read_shard(arguments.shard) if arguments.shard is not None else None
-    job = CollectJob(
-        scene=scene,
-        collection=collection,
-        camera=camera,
-        render=RenderConfig(backend=arguments.backend),
-        n_train=arguments.frames,
-        n_test=arguments.test_frames,
-        seed=arguments.seed,
-        with_depth=arguments.depth,
-        packed_px=arguments.packed,
-        out=arguments.out,
-        archived=arguments.archive,
-    )
-    collect(job, arguments.workers, shard)
-    frames = f"{job.n_train} training and {job.n_test} test frames"
-    print(f"{arguments.out}: {f'shard {arguments.shard} of ' if shard else ''}{frames}")
-    if arguments.out.is_dir():
-        print(coverage_text(read_json(arguments.out / "coverage.json")["train"]))
+    job = CollectJob(with_backend(config), arguments.packed, arguments.out)
+    if arguments.print_config:
+        print(configuration_text(job), end="")
+        return
+    try:
+        collect(job, arguments.workers)
+    except InputError as error:
+        raise InputError(in_words_of_options(str(error))) from None
+    print(f"{job.out}: {job.counts['train']} training and {job.counts['test']} test frames")
+    print(coverage_text(read_json(job.out / "coverage.json")["train"]))
 
 
 def coverage_text(coverage: Mapping[str, Any]) -> str:
@@ -100,31 +123,12 @@ def coverage_text(coverage: Mapping[str, Any]) -> str:
     )
 
 
-def collect_configs(
-    arguments: argparse.Namespace,
-) -> tuple[SceneConfig, CollectionConfig, CameraConfig]:
-    """The options as the models the stages take.
-
-    Raises:
-        InputError: a value is out of range.
-    """
-    try:
-        scene = SceneConfig.model_validate(
-            {**scene_values(arguments), "min_view_distance_m": arguments.min_view_distance}
-        )
-        collection = CollectionConfig.model_validate(
-            {
-                "mode": arguments.mode,
-                "repeat": arguments.poses,
-                "frame_spacing_m": arguments.spacing,
-                "min_path_m": arguments.min_path,
-            }
-        )
-    except ValidationError as error:
-        raise InputError(f"collect: {describe(error)}") from None
-    return scene, collection, camera_of(arguments)
-
-
 COMMAND = Command(
-    "collect", "make a data set from a textured mesh", OPTIONS + CAMERA_OPTIONS + MESH_OPTIONS, run
+    "collect",
+    "make a data set from a textured mesh",
+    "Plans camera paths through the free space of a mesh, renders them, and writes a 7-Scenes data"
+    " set with exact poses; started again after an interruption, it goes on.",
+    "synfeal collect --mesh scan.glb --frames 5000 --test-frames 1000 --out mydata",
+    OPTIONS + MESH_OPTIONS + MOVEMENT_OPTIONS + CAMERA_OPTIONS + RENDER_OPTIONS,
+    run,
 )

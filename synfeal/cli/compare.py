@@ -23,4 +23,11 @@ def run(arguments: argparse.Namespace) -> None:
         print(f"\n{arguments.out}: compare.md, compare.png and compare.csv")
 
 
-COMMAND = Command("compare", "two result trees: did a change matter?", OPTIONS, run)
+COMMAND = Command(
+    "compare",
+    "two result trees: did a change matter?",
+    "Compares two result trees run by run: which errors changed, by how much, with 95 % limits.",
+    "synfeal compare before/mini results/mini --out comparison",
+    OPTIONS,
+    run,
+)

@@ -38,4 +38,11 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"{out}: {n_frames} frames for {arguments.to}")
 
 
-COMMAND = Command("export", "a data set for COLMAP, Nerfstudio or TUM's tools", OPTIONS, run)
+COMMAND = Command(
+    "export",
+    "a data set for COLMAP, Nerfstudio or TUM's tools",
+    "Writes a 7-Scenes data set in the format of another program.",
+    "synfeal export mydata --to colmap --out mydata-colmap",
+    OPTIONS,
+    run,
+)

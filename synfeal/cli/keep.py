@@ -35,6 +35,21 @@ def run_restore(arguments: argparse.Namespace) -> None:
 
 
 COMMANDS = (
-    Command("keep", "predictions of finished runs in one small file", KEEP, run_keep),
-    Command("restore", "finished runs back from such a file", RESTORE, run_restore),
+    Command(
+        "keep",
+        "predictions of finished runs in one small file",
+        "Packs the predictions of all finished runs into one small file, from which every table can"
+        " be made again without training.",
+        "synfeal keep results/mini --out predictions.zip",
+        KEEP,
+        run_keep,
+    ),
+    Command(
+        "restore",
+        "finished runs back from such a file",
+        "Puts the runs of such a file back, so that the workflow goes on from them.",
+        "synfeal restore predictions.zip results/mini",
+        RESTORE,
+        run_restore,
+    ),
 )

@@ -75,4 +75,11 @@ def poses_text(done: Localized) -> str:
     return f"{poses}; {alone_ms:.2f} ms for one picture ({parts}), {rate}"
 
 
-COMMAND = Command("localize", "poses of your own pictures by a trained model", OPTIONS, run)
+COMMAND = Command(
+    "localize",
+    "poses of your own pictures by a trained model",
+    "Estimates where pictures were taken, with a model trained in that place.",
+    "synfeal localize results/mini/runs/.../model.pt photos/ --out poses.csv",
+    OPTIONS,
+    run,
+)

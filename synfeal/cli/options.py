@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
-
-from synfeal.config.mesh_files import check_mesh_file
 
 # Flag, and what argparse is told about it.
 Options = tuple[tuple[str, dict[str, Any]], ...]
@@ -20,13 +17,17 @@ class Command:
 
     Attributes:
         name: as it is typed.
-        summary: one line for ``synfeal --help``.
+        summary: a few words for ``synfeal --help``.
+        description: a sentence for its own help.
+        example: a line a person may type.
         options: its options.
         run: carries it out; imports what it needs when it is called, so that ``--help`` is quick.
     """
 
     name: str
     summary: str
+    description: str
+    example: str
     options: Options
     run: Callable[[argparse.Namespace], None]
 
@@ -37,30 +38,37 @@ MESH_OPTIONS: Options = (
         {
             "type": float,
             "nargs": 6,
+            "action": "append",
             "metavar": ("X0", "X1", "Y0", "Y1", "Z0", "Z1"),
-            "help": "sampling_box: where camera centres are sampled, metres (the mesh's bounds)",
+            "help": "where camera centres may be, metres (the mesh's bounds); again for each"
+            " further room or floor",
         },
     ),
-    ("--up-axis", {"choices": ("auto", "y", "z"), "default": "auto", "help": "up in the file"}),
+    ("--up-axis", {"choices": ("auto", "y", "z"), "help": "up in the file (auto)"}),
     ("--unit-m", {"type": float, "help": "metres per unit of the file (1)"}),
 )
 
 
-def scene_values(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What ``MESH_OPTIONS`` and the mesh say of a scene; the mesh must be there."""
-    mesh: Path = arguments.mesh
-    check_mesh_file(mesh, "--mesh")
-    return {
-        "source": "mesh",
-        "path": mesh,
-        "up_axis": arguments.up_axis,
-        "unit_m": 1.0 if arguments.unit_m is None else arguments.unit_m,
-        "sampling_box": _box(arguments.box),
-    }
+def options_among(arguments: argparse.Namespace, names: Collection[str]) -> dict[str, Any]:
+    """The options of these names that the command has, by name."""
+    return {name: value for name, value in vars(arguments).items() if name in names}
 
 
-def _box(values: Sequence[float] | None) -> dict[str, Sequence[float]] | None:
-    """X0 X1 Y0 Y1 Z0 Z1 as the mapping a configuration file holds."""
-    if values is None:
-        return None
-    return {"x": values[0:2], "y": values[2:4], "z": values[4:6]}
+def numbers_apart(arguments: Sequence[str], options: Options) -> Iterator[str]:
+    """Arguments as argparse reads negative numbers of all forms, and ``--box=0 1 ...`` too.
+
+    It takes ``-1e0`` for an option; a blank before it makes it a value.
+    """
+    several = {flag for flag, details in options if isinstance(details.get("nargs"), int)}
+    for argument in arguments:
+        flag, equals, value = argument.partition("=")
+        parts = [flag, *value.split()] if equals and flag in several else [argument]
+        yield from (f" {part}" if _is_negative(part) else part for part in parts)
+
+
+def _is_negative(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return text.startswith("-")

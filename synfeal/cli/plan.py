@@ -103,4 +103,11 @@ def _machines(arguments: argparse.Namespace) -> list[Machine]:
     return [Machine(c, g, arguments.gpu_tflops) for c, g in zip(cores, gpus, strict=True)]
 
 
-COMMAND = Command("plan", "what a run of a profile costs before it is started", OPTIONS, run)
+COMMAND = Command(
+    "plan",
+    "what a run of a profile costs before it is started",
+    "Predicts jobs, hours, memory and disk of a run of the workflow before it is started.",
+    "synfeal plan --profile paper --cores 16 --gpus 1",
+    OPTIONS,
+    run,
+)

@@ -39,4 +39,11 @@ def run(arguments: argparse.Namespace) -> None:
         raise InputError(errors[-1])
 
 
-COMMAND = Command("validate", "is a data set whole and consistent?", OPTIONS, run)
+COMMAND = Command(
+    "validate",
+    "is a data set whole and consistent?",
+    "Checks files, poses, splits, hashes and geometry of a data set; exit status 1 if one fails.",
+    "synfeal validate mydata",
+    OPTIONS,
+    run,
+)

@@ -20,8 +20,10 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, lt=1)]
 Count = Annotated[int, Field(ge=1, le=10**9)]
+MOST_FRAMES = 10**7  # of a split: at 30 frames/s four days, and 1.3 GB of poses while it is planned
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Interval = tuple[Finite, Finite]
+Channel = Annotated[int, Field(ge=0, le=255)]
 
 
 class Strict(BaseModel):
@@ -86,8 +88,10 @@ class Angles(Strict):
 class SizeConfig(Strict):
     """Frames of a data set at full scale, as the paper prints them."""
 
-    train: Count = Field(description="training frames at scale 1")
-    test: Count = Field(description="test frames at scale 1")
+    train: Annotated[int, Field(ge=1, le=MOST_FRAMES)] = Field(
+        description="training frames at scale 1"
+    )
+    test: Annotated[int, Field(ge=0, le=MOST_FRAMES)] = Field(description="test frames at scale 1")
 
 
 class SceneConfig(Strict):
@@ -110,9 +114,16 @@ class SceneConfig(Strict):
     up_axis: Literal["auto", "y", "z"] = Field(
         "auto", description="axis that points up in the file; `auto` takes y for glTF, z otherwise"
     )
-    unit_m: Positive = Field(1.0, description="length of one unit of the file in metres")
+    unit_m: Annotated[float, Field(ge=1e-6, le=1e6)] = Field(
+        1.0, description="length of one unit of the file in metres"
+    )
     sampling_box: Box | None = Field(
         None, description="where camera centres are sampled; the mesh's bounds when absent"
+    )
+    further_boxes: tuple[Box, ...] = Field(
+        (),
+        description="more of them: other rooms or floors, which no camera path has to reach from"
+        " `sampling_box`; frames are shared out by volume",
     )
     angles: Angles = Field(default_factory=Angles, description="angle bounds of sampled poses")
     min_view_distance_m: NonNegative = Field(
@@ -131,6 +142,8 @@ class SceneConfig(Strict):
             )
         if self.source == "mesh" and self.path is None:
             raise ValueError("path: a scene with `source: mesh` needs the path of its mesh file")
+        if self.further_boxes and self.sampling_box is None:
+            raise ValueError("further_boxes: come after a first one; give sampling_box")
         return self
 
 
@@ -147,22 +160,25 @@ class CollectionConfig(Strict):
         description="mode `repeat`: a data set, a directory of 7-Scenes frames, a pose table (.csv)"
         " or a TUM trajectory (.txt)",
     )
-    candidates: Count = Field(8, description="target pose candidates per path (the paper's k)")
-    frame_spacing_m: Positive = Field(
+    candidates: Annotated[int, Field(ge=1, le=10**4)] = Field(
+        8, description="target pose candidates per path (the paper's k)"
+    )
+    frame_spacing_m: Annotated[float, Field(ge=1e-4, le=1e4)] = Field(
         0.03, description="distance between frames (the paper's other d)"
     )
     min_path_m: NonNegative = Field(1.5, description="shorter paths are drawn again")
-    max_tries: Count = Field(
+    max_tries: Annotated[int, Field(ge=1, le=10**6)] = Field(
         2000, description="rounds of candidates before a scene is called too narrow"
     )
     interpolation: Literal["rpy", "slerp"] = Field(
         "rpy",
         description="`rpy` is the paper's component-wise interpolation, each angle the short way",
     )
-    collision_agreement: Annotated[float, Field(gt=0.5, le=1)] = Field(
+    collision_agreement: Annotated[float, Field(gt=0.5, le=1)] | None = Field(
         0.995,
         description="share of a planner's decisions on which the decimated collision mesh must"
-        " agree with the full mesh; 1 keeps all that any of 10,000 decisions needs",
+        " agree with the full mesh; 1 keeps all that any of 10,000 decisions needs, null takes the"
+        " mesh as it is",
     )
 
     @model_validator(mode="after")
@@ -253,6 +269,9 @@ class RenderConfig(Strict):
     )
     supersampling: Annotated[int, Field(ge=1, le=4)] = Field(
         2, description="samples per pixel along each axis; 1 is fastest and aliases"
+    )
+    background_rgb: tuple[Channel, Channel, Channel] = Field(
+        (0, 0, 0), description="colour where nothing is: red, green, blue, each 0 to 255"
     )
 
 

@@ -165,6 +165,8 @@ def _parse(row: dict[str, str], where: str, config: Config) -> Experiment:
     sizes = config.scenes[experiment.scene].sizes
     if experiment.size not in sizes:
         raise InputError(f"{where}: size '{experiment.size}': allowed: {sorted(sizes)}")
+    if not sizes[experiment.size].test:
+        raise InputError(f"{where}: size '{experiment.size}' has no test frames to score on")
     if experiment.size not in config.training.samples_seen:
         raise InputError(f"{where}: size '{experiment.size}' has no training.samples_seen entry")
     return experiment

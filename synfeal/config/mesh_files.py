@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -29,11 +30,13 @@ def check_mesh_file(path: Path, field: str) -> None:
         InputError: it is not.
     """
     try:
-        found = path.is_file()
-    except OSError:  # a name that is too long
-        found = False
-    if not found:
+        mode = path.stat().st_mode
+    except OSError as error:
+        missing = isinstance(error, FileNotFoundError | NotADirectoryError)
+        why = "does not exist" if missing else f"cannot be read ({error.strerror})"
         raise InputError(
-            f"{field}: {path} does not exist; put the mesh there or change the path"
-            f" (see {DOCUMENTATION})"
-        )
+            f"{field}: {path} {why}; put the mesh there or change the path (see {DOCUMENTATION})"
+        ) from None
+    if not stat.S_ISREG(mode):
+        kind = "a directory" if stat.S_ISDIR(mode) else "no plain file"
+        raise InputError(f"{field}: {path} is {kind}; name the mesh file itself")

@@ -23,6 +23,7 @@ from synfeal.config.collection import (
     Slug,
     Strict,
 )
+from synfeal.config.dataset import DatasetConfig
 from synfeal.config.learning import (
     AugmentationConfig,
     LocalizerConfig,
@@ -39,6 +40,7 @@ __all__ = [
     "CameraConfig",
     "CollectionConfig",
     "Config",
+    "DatasetConfig",
     "DepthConfig",
     "GroundTruthConfig",
     "KinectFusionConfig",
@@ -157,29 +159,16 @@ class GroundTruthConfig(Strict):
     )
 
 
-class Config(Strict):
+class Config(DatasetConfig):
     """A profile: everything a run depends on."""
 
-    profile: Slug = Field(description="name of the profile and of its directory under `results`")
-    seed: int = Field(0, ge=0, lt=2**63, description="root of all seeds")
-    scale: Annotated[float, Field(gt=0, le=1)] = Field(description="share of the paper's frames")
     experiments: Path = Field(Path("config/experiments.csv"), description="the design as a table")
-    results: Path = Field(Path("results"), description="where everything is written")
-    shard_frames: Count = Field(500, description="frames per render job and sequence directory")
-    archive_sequences: bool = Field(
-        False, description="write each sequence of image files as one `seq-XX.zip`"
-    )
-    scenes: dict[Slug, SceneConfig] = Field(description="scenes by name")
-    collection: CollectionConfig = Field(
-        default_factory=CollectionConfig, description="camera movement"
-    )
-    network_camera: CameraConfig = Field(
-        default_factory=CameraConfig, description="camera of the frames the localizers see"
+    datasets: tuple[Slug, ...] | None = Field(
+        None, description="scenes that the target `datasets` makes; null: those of the design"
     )
     groundtruth_camera: CameraConfig = Field(
         default_factory=CameraConfig, description="camera of the frames SfM and RGB-D SLAM see"
     )
-    render: RenderConfig = Field(default_factory=RenderConfig, description="how images are drawn")
     render_speed: RenderSpeedConfig = Field(
         default_factory=RenderSpeedConfig, description="what rendering is measured on"
     )
@@ -206,22 +195,15 @@ class Config(Strict):
             raise ValueError(
                 f"pretraining.scene: '{self.pretraining.scene}' is not one of {sorted(self.scenes)}"
             )
+        unknown = sorted(set(self.datasets or ()) - set(self.scenes))
+        if unknown:
+            raise ValueError(f"datasets: '{unknown[0]}' is not one of {sorted(self.scenes)}")
         camera = self.network_camera
         if min(camera.width, camera.height) <= self.network.input_px:
             raise ValueError(
                 f"network_camera: both sides must exceed network.input_px ({self.network.input_px})"
             )
         return self
-
-    @property
-    def root(self) -> Path:
-        """Directory of this profile's results."""
-        return self.results / self.profile
-
-    def n_frames(self, scene: str, size: str, split: str) -> int:
-        """Frames of a split at this profile's scale, at least 2."""
-        full: int = getattr(self.scenes[scene].sizes[size], split)
-        return max(2, round(full * self.scale))
 
     def n_largest(self, scene: str, split: str) -> int:
         """Frames planned and rendered for a split: those of the scene's largest size."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.sequences import Split
 from synfeal.errors import InputError
 from synfeal.mesh.checks import shows_one_colour
 from synfeal.mesh.model import TexturedMesh
@@ -41,7 +42,7 @@ def refuse_invisible(mesh: TexturedMesh, camera: CameraConfig, name: str) -> Non
 
 
 def refuse_blank(
-    caster: RayCaster, plans: Mapping[str, PoseTable], camera: CameraConfig, name: str
+    caster: RayCaster, plans: Mapping[Split, PoseTable], camera: CameraConfig, name: str
 ) -> None:
     """Warn of plans whose images would show little; refuse those that would show nothing.
 

@@ -23,13 +23,12 @@ MOST_WAITING = 2 * THREADS  # frames in memory, whatever the length of the seque
 class FrameWriter:
     """Writes the files of frames; what went wrong on a thread is raised by the next call.
 
-    Each file is written under a temporary name and renamed, colours last: a frame whose colours
-    stand under their final name is whole. Leaving the context waits for what is under way.
+    The directory they are written to gets its name when they are whole, so they need no temporary
+    ones. Leaving the context waits for what is under way.
     """
 
-    def __init__(self, scratch: Path, on_frame: Callable[[], object] = lambda: None) -> None:
-        """Write temporary files to ``scratch``; call ``on_frame`` for each frame that is whole."""
-        self._scratch = scratch
+    def __init__(self, on_frame: Callable[[], object] = lambda: None) -> None:
+        """Call ``on_frame`` for each frame that is whole."""
         self._on_frame = on_frame
         self._threads = ThreadPoolExecutor(THREADS, thread_name_prefix="frames")
         self._waiting: deque[Future[None]] = deque()
@@ -52,14 +51,9 @@ class FrameWriter:
         self, stem: Path, world_from_cam: NDArray[np.float64], rgb: Rgb, depth_m: Depth | None
     ) -> None:
         if depth_m is not None:
-            self._place(stem.with_suffix(".depth.png"), encode_png(depth_mm_of(depth_m)))
-        self._place(stem.with_suffix(".pose.txt"), pose_text(world_from_cam).encode())
-        self._place(stem.with_suffix(".color.png"), encode_png(rgb))
-
-    def _place(self, path: Path, data: bytes) -> None:
-        temporary = self._scratch / f"{path.parent.name}-{path.name}"
-        temporary.write_bytes(data)
-        temporary.replace(path)
+            stem.with_suffix(".depth.png").write_bytes(encode_png(depth_mm_of(depth_m)))
+        stem.with_suffix(".pose.txt").write_bytes(pose_text(world_from_cam).encode())
+        stem.with_suffix(".color.png").write_bytes(encode_png(rgb))
 
     def _finish_one(self) -> None:
         self._waiting.popleft().result()

@@ -1,4 +1,4 @@
-"""How far a rendering is: a bar on a terminal, one line per shard in a log."""
+"""How far a rendering is: a bar on a terminal, one line per sequence in a log."""
 
 from __future__ import annotations
 
@@ -12,16 +12,22 @@ from tqdm import tqdm
 class Progress:
     """Frames done of all that are to be rendered; everything goes to standard error."""
 
-    def __init__(self, n_frames: int, name: str) -> None:
+    def __init__(self, n_frames: int, name: str, n_done: int = 0) -> None:
         self._on_terminal = sys.stderr.isatty()
-        self._bar = tqdm(total=n_frames, unit="frame", desc=name, disable=not self._on_terminal)
+        self._bar = tqdm(
+            total=n_frames,
+            initial=n_done,
+            unit="frame",
+            desc=name,
+            disable=not self._on_terminal,
+        )
 
     def update(self, n_frames: int = 1) -> None:
         """Some more frames are done."""
         self._bar.update(n_frames)
 
-    def shard_done(self, name: str, n_frames: int, seconds: float) -> None:
-        """One shard is done; says so where there is no bar."""
+    def part_done(self, name: str, n_frames: int, seconds: float) -> None:
+        """One sequence is done; says so where there is no bar."""
         if not self._on_terminal:
             rate = n_frames / seconds if seconds else float("inf")
             line = f"{name}, {n_frames} frames in {seconds:.1f} s, {rate:.1f}/s"

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.config.models import CameraConfig, RenderConfig
@@ -44,22 +42,35 @@ def render_sequence(
     Raises:
         InputError: the mesh cannot be read, or ``out`` is not empty.
     """
-    with open_renderer(load_mesh(mesh_path), camera, render) as renderer:
-        write_sequence(renderer, poses, out, with_depth)
-
-
-def write_sequence(renderer: Renderer, poses: PoseTable, out: Path, with_depth: bool) -> None:
-    """Render every pose of the table; files are written while the next frames are rendered."""
     watch = Stopwatch()
     with (
         writing_to(out, lambda: REMEDY),
+        open_renderer(load_mesh(mesh_path), camera, render) as renderer,
         Progress(len(poses), out.name) as progress,
-        _new_sequence(out) as directory,
-        tempfile.TemporaryDirectory(prefix=".frames-", dir=directory.parent) as scratch,
-        FrameWriter(Path(scratch), progress.update) as writer,
     ):
-        render_frames(renderer, enumerate(poses.world_from_cam), directory, with_depth, writer)
-    progress.shard_done(out.name, len(poses), watch.seconds)
+        write_sequence(renderer, poses, out, with_depth, progress.update)
+    progress.part_done(out.name, len(poses), watch.seconds)
+
+
+def write_sequence(
+    renderer: Renderer,
+    poses: PoseTable,
+    out: Path,
+    with_depth: bool,
+    on_frame: Callable[[], object] = lambda: None,
+) -> None:
+    """Render every pose of the table; files are written while the next frames are rendered.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    with _new_sequence(out) as directory, FrameWriter(on_frame) as writer:
+        for number, world_from_cam in enumerate(poses.world_from_cam):
+            stem = directory / f"frame-{number:06d}"
+            if with_depth:
+                writer.add(stem, world_from_cam, *renderer.render_rgbd(world_from_cam))
+            else:
+                writer.add(stem, world_from_cam, renderer.render(world_from_cam), None)
 
 
 @contextmanager
@@ -85,22 +96,6 @@ def resolved(render: RenderConfig) -> RenderConfig:
     if render.backend != "auto":
         return render
     return render.model_copy(update={"backend": fastest_working()})
-
-
-def render_frames(
-    renderer: Renderer,
-    frames: Iterable[tuple[int, NDArray[np.float64]]],
-    directory: Path,
-    with_depth: bool,
-    writer: FrameWriter,
-) -> None:
-    """Render numbered poses (4, 4) of one sequence and hand them to ``writer``."""
-    for number, world_from_cam in frames:
-        stem = directory / f"frame-{number:06d}"
-        if with_depth:
-            writer.add(stem, world_from_cam, *renderer.render_rgbd(world_from_cam))
-        else:
-            writer.add(stem, world_from_cam, renderer.render(world_from_cam), None)
 
 
 def render_packed(
@@ -130,4 +125,4 @@ def render_packed(
             packed[index] = fit_frame(Image.fromarray(renderer.render(world_from_cam)), input_px)
             progress.update()
         write_json(out.with_suffix(".json"), {"frames": len(poses), "backend": chosen.backend})
-    progress.shard_done(out.stem, len(poses), watch.seconds)
+    progress.part_done(out.stem, len(poses), watch.seconds)

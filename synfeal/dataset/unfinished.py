@@ -1,149 +1,134 @@
 """The directory a data set grows in: ``<out>.part`` beside ``<out>``, until it is complete.
 
-::
-
-    <out>.part/job.json    which job it belongs to
-    <out>.part/lock        held by the commands that work on it
-    <out>.part/tmp-*/      files being written
-    <out>.part/data/       what becomes <out>: plan first, then frames, then the rest
-
-It appears with its plan, by a rename; so does every file in ``data``. Whenever a command is
-killed, what stands in ``data`` is whole, and the next command goes on from there.
+What stands there under its final name is whole. ``.work`` holds what is needed on the way: the
+settings, the lock of the command at work, and the prepared scene. When all is there the directory
+is renamed, and then ``.work`` goes.
 """
 
 from __future__ import annotations
 
-import fcntl
-import json
 import shutil
-import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from synfeal.dataset.collect_job import differences
-from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
+from synfeal.dataset.directories import refuse_existing, writing_to
 from synfeal.errors import InputError
 from synfeal.files import read_json, write_json
+from synfeal.run_lock import only_command, remove_unfinished
 
-Plans = dict[str, PoseTable]
-JOB, LOCK, DATA, TEMPORARY = "job.json", "lock", "data", "tmp-"
-
-
-def unfinished_of(out: Path) -> Path:
-    """Where the data set ``out`` grows."""
-    out = out.resolve()
-    return out.with_name(f"{out.name}.part")
-
-
-def open_unfinished(out: Path, record: Mapping[str, Any], plan: Callable[[], Plans]) -> Path:
-    """The unfinished directory of ``out``; made with its plan where there is none yet.
-
-    Two commands that start at once agree on the plan of the one that was first.
-
-    Raises:
-        InputError: it belongs to another job, or nothing can be planned.
-    """
-    part = unfinished_of(out)
-    if not part.exists():
-        _make(part, record, plan())
-    _check_job(part, record)
-    return part
-
-
-def read_plans(part: Path, splits: Mapping[str, int]) -> Plans:
-    """The plans of the splits that have frames.
-
-    Raises:
-        InputError: a plan is damaged.
-    """
-    plans = {split: read_pose_table(part / DATA / f"{split}.csv") for split in splits}
-    for split, count in splits.items():
-        if len(plans[split]) != count:
-            raise InputError(f"{part}: {split}.csv is damaged; delete the directory and start anew")
-    return plans
-
-
-def finish(part: Path, out: Path) -> None:
-    """Give the complete data set its name and remove what it grew in."""
-    (part / DATA).replace(out)
-    remove_remains(out)
-
-
-def remove_remains(out: Path) -> bool:
-    """Remove what a command leaves that was killed after ``out`` was complete; whether it was."""
-    part = unfinished_of(out)
-    if not out.is_dir() or not (part / JOB).is_file() or (part / DATA).exists():
-        return False
-    shutil.rmtree(part)
-    return True
+WORK = ".work"
+SETTINGS, LOCK = "settings.json", "lock"
 
 
 @contextmanager
-def locked(part: Path, alone: bool) -> Iterator[None]:
-    """Keep others away: all of them, or those that want to be alone. A lock ends with its process.
+def growing(out: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
+    """The directory that becomes ``out`` when the block ends, with what earlier commands made.
+
+    Args:
+        out: from :func:`place_of`; must not exist yet, or be an empty directory.
+        settings: what decides its bytes, ready for JSON; another command's must be the same.
 
     Raises:
-        InputError: another command is at work.
+        InputError: ``out`` is there already, cannot be written, grows from other settings, or
+            another command is at work on it.
+        KeyboardInterrupt: with what is kept, for the message.
     """
-    with (part / LOCK).open("a") as file:
-        try:
-            fcntl.flock(file, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(
-                f"{part}: another command is at work on it; wait for its end"
-            ) from None
-        yield
-
-
-@contextmanager
-def scratch(part: Path) -> Iterator[Path]:
-    """A directory for files that are being written."""
-    with tempfile.TemporaryDirectory(
-        prefix=TEMPORARY, dir=part, ignore_cleanup_errors=True
-    ) as path:
-        yield Path(path)
-
-
-def remove_temporary(part: Path) -> None:
-    """Remove what commands that were killed left half-written; no other may be at work."""
-    for path in part.glob(f"{TEMPORARY}*"):
-        shutil.rmtree(path)
-    for path in part.parent.glob(f"{part.name}-{TEMPORARY}*"):
-        shutil.rmtree(path)
-    for path in (part / DATA).glob(".*"):  # of synfeal.files.atomic_path
-        path.unlink()
-
-
-def _make(part: Path, record: Mapping[str, Any], plans: Plans) -> None:
-    part.parent.mkdir(parents=True, exist_ok=True)
-    new = Path(tempfile.mkdtemp(prefix=f"{part.name}-{TEMPORARY}", dir=part.parent))
+    refuse_existing(out)
+    part = out.with_name(f"{out.name}.part")
+    if part.is_dir() and not (part / WORK / SETTINGS).is_file() and _holds_files(part):
+        raise InputError(f"{part}: is no unfinished data set; delete it or choose another --out")
     try:
-        write_json(new / JOB, record)
-        for split, table in plans.items():
-            write_pose_table(new / DATA / f"{split}.csv", table)
-        new.chmod(0o755)
-        new.replace(part)
-    except OSError:
-        if not (part / JOB).is_file():  # else another command was first
-            raise
-    finally:
-        shutil.rmtree(new, ignore_errors=True)
+        with writing_to(part, lambda: _kept(part)):
+            (part / WORK).mkdir(parents=True, exist_ok=True)
+            with only_command(part, part / WORK / LOCK):
+                try:
+                    refuse_existing(out)  # by a command that has just ended
+                    remove_unfinished(part)
+                    check_settings(part, settings)
+                    yield part
+                    part.replace(out)
+                finally:
+                    if part.is_dir() and not _holds_files(part):
+                        shutil.rmtree(part, ignore_errors=True)
+            clean_up(out)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(_kept(part)) from None
 
 
-def _check_job(part: Path, record: Mapping[str, Any]) -> None:
+def _holds_files(part: Path) -> bool:
+    return any(path.name != WORK for path in part.iterdir())
+
+
+def place_of(out: Path) -> Path:
+    """``out`` as an absolute path.
+
+    Raises:
+        InputError: nothing can be renamed to it.
+    """
     try:
-        found = read_json(part / JOB)
+        place = out.resolve()
+        if place.is_mount():
+            raise InputError(f"--out: {out} is a whole file system; name a directory in it")
+    except (OSError, RuntimeError) as error:  # a name that is too long; links in a loop
+        reason = getattr(error, "strerror", None) or "its links lead in a circle"
+        raise InputError(f"--out: {out}: {reason}; choose another directory") from None
+    return place
+
+
+def clean_up(out: Path) -> bool:
+    """Finish what a command left that was killed when ``out`` was complete; whether it was."""
+    left = out / WORK
+    if left.is_dir():
+        shutil.rmtree(left)
+        return True
+    return False
+
+
+def _kept(part: Path) -> str:
+    if not part.is_dir():
+        return "nothing was kept"
+    return f"what is done is kept in {part}; run the same command again to go on"
+
+
+def check_settings(part: Path, settings: Mapping[str, Any]) -> None:
+    """Whether ``part`` was begun with the same settings; they are written where there are none.
+
+    Raises:
+        InputError: names what differs.
+    """
+    path = part / WORK / SETTINGS
+    if not path.is_file():
+        write_json(path, settings)
+    try:
+        found = read_json(path)
         if not isinstance(found, dict):
-            raise ValueError(f"{JOB} holds no mapping")
+            raise ValueError("holds no mapping")
     except (OSError, ValueError) as error:
-        raise InputError(
-            f"{part}: no unfinished data set ({error}); delete it or choose another --out"
-        ) from None
-    differing = differences(found, json.loads(json.dumps(record)))
+        raise InputError(f"{path}: cannot be read ({error}); delete {part} to start anew") from None
+    differing = differences(found, settings)
     if differing:
         raise InputError(
             f"{part}: belongs to another data set ({'; '.join(differing)}); go on with the options"
             f" of that one, or delete {part} to start anew"
         )
+
+
+def differences(found: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
+    """What two records disagree on, one phrase each, in the order of ``asked``."""
+    before, now = dict(_flat(found)), dict(_flat(asked))
+    return [
+        f"{key} was {before.get(key)}, is {now.get(key)}"
+        for key in {**now, **before}
+        if before.get(key) != now.get(key)
+    ]
+
+
+def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Nested keys joined by dots."""
+    for key, value in record.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value

@@ -15,6 +15,7 @@ from synfeal.mesh.rays import RayCaster
 from synfeal.planning.empty_pixels import EmptyPixels, empty_pixels
 from synfeal.planning.plan import box_array, plan_split
 from synfeal.seeds import generator_of
+from synfeal.settings import SCENE
 
 Array = NDArray[np.float64]
 
@@ -101,7 +102,7 @@ def _planned(
     assert scene.sampling_box is not None
     box_m = box_array(scene.sampling_box)
     try:
-        rng = generator_of(0, "plan", "train")
+        rng = generator_of(0, "plan", SCENE, "train")
         plan = plan_split(caster, box_m, scene, collection, N_FRAMES, rng)
     except InputError:
         return None

@@ -17,7 +17,7 @@ from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, load_collision_mesh
 from synfeal.planning.connected import ConnectedSpace, connected_space
 from synfeal.planning.empty_pixels import MOSTLY, empty_pixels
-from synfeal.planning.plan import sampling_box_of
+from synfeal.planning.plan import sampling_boxes_of
 from synfeal.planning.sampling import pose_bounds
 from synfeal.planning.seen_surface import FARTHEST_M, OFTEN, seen_surface, shown_frames
 from synfeal.planning.seen_surface import N_POINTS as N_SURFACE_POINTS
@@ -31,7 +31,7 @@ N_HEADINGS = 8
 MAX_TRIES = 2000
 
 DEFINITIONS = {
-    "voxels": "cells of the sampling box, of edge voxel_m, whose centre lies in the largest space"
+    "voxels": "cells of the sampling boxes, of edge voxel_m, whose centre lies in the largest space"
     " connected by free lines of sight",
     "positions_share": "share of the voxels with a camera centre within within_m of theirs",
     "headings_share": f"share of the pairs of a voxel and one of {N_HEADINGS} equal sectors of"
@@ -58,28 +58,28 @@ class FreeSpaceCoverage(NamedTuple):
 
 
 def plan_coverage(
-    mesh: Triangles, box_m: Array, scene: SceneConfig, plan: PoseTable, camera: CameraConfig
+    mesh: Triangles, boxes_m: Array, scene: SceneConfig, plan: PoseTable, camera: CameraConfig
 ) -> dict[str, object]:
     """What a plan covers, as the content of ``coverage.json``; see ``DEFINITIONS``.
 
     Args:
         mesh: the scene, or its collision mesh.
-        box_m: (2, 3) lower and upper corner of the space camera centres are sampled in.
+        boxes_m: (B, 2, 3) or (2, 3), corners of the spaces that camera centres are sampled in.
         scene: angle bounds.
         plan: all poses.
         camera: what it sees.
     """
     caster = RayCaster(*mesh)
-    bounds = pose_bounds(box_m, scene.angles)
+    boxes_m = np.reshape(boxes_m, (-1, 2, 3))
     try:
-        space = connected_space(caster, bounds, 0.0, MAX_TRIES, np.random.default_rng(0))
+        space = ConnectedSpace(caster, np.concatenate([_hubs(caster, b, scene) for b in boxes_m]))
     except InputError:  # poses that are repeated may lie where none can be sampled
         space = ConnectedSpace(caster, plan.position_m[shown_frames(len(plan))])
     counts = seen_surface(mesh, caster, space.hubs_m, plan, camera)
     visible = max(counts.visible, 1)
     return {
         "frames": len(plan),
-        "free_space": free_space_coverage(space, box_m, plan)._asdict(),
+        "free_space": free_space_coverage(space, boxes_m, plan)._asdict(),
         "surface": {
             "farthest_m": FARTHEST_M,
             "frames_looked_at": len(shown_frames(len(plan))),
@@ -93,19 +93,28 @@ def plan_coverage(
     }
 
 
+def _hubs(caster: RayCaster, box_m: Array, scene: SceneConfig) -> Array:
+    """Places (H, 3) of the largest free space in a box."""
+    bounds, rng = pose_bounds(box_m, scene.angles), np.random.default_rng(0)
+    return connected_space(caster, bounds, 0.0, MAX_TRIES, rng).hubs_m
+
+
 def scene_coverage(
     collision: Path, scene: SceneConfig, plan: PoseTable, camera: CameraConfig
 ) -> dict[str, object]:
     """What a plan covers of the scene of a collision mesh; see :func:`plan_coverage`."""
     mesh = load_collision_mesh(collision)
     mesh_bounds = np.stack([mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)])
-    box = sampling_box_of(scene, mesh_bounds, str(collision))
-    return plan_coverage(mesh, box, scene, plan, camera)
+    boxes = sampling_boxes_of(scene, mesh_bounds, str(collision))
+    return plan_coverage(mesh, boxes, scene, plan, camera)
 
 
-def free_space_coverage(space: ConnectedSpace, box_m: Array, plan: PoseTable) -> FreeSpaceCoverage:
-    """Which voxels of the connected space in the box (2, 3) have cameras near them."""
-    centres, edge_m = voxel_centres(box_m)
+def free_space_coverage(
+    space: ConnectedSpace, boxes_m: Array, plan: PoseTable
+) -> FreeSpaceCoverage:
+    """Which voxels of the connected space in the boxes (B, 2, 3) have cameras near them."""
+    cells = [voxel_centres(box_m) for box_m in np.reshape(boxes_m, (-1, 2, 3))]
+    centres, edge_m = np.concatenate([found for found, _ in cells]), max(edge for _, edge in cells)
     centres = centres[space.contains(centres)]
     within_m = WITHIN_VOXELS * edge_m
     heading = headings(plan)

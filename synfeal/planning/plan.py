@@ -13,7 +13,7 @@ from synfeal.errors import InputError
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.mesh.checks import check_sampling_box
 from synfeal.mesh.rays import RayCaster
-from synfeal.mesh.triangles import load_collision_mesh
+from synfeal.mesh.triangles import Triangles, load_collision_mesh
 from synfeal.planning.candidates import CandidateStream
 from synfeal.planning.independent import independent_poses
 from synfeal.planning.path import path_poses, poses_of
@@ -33,23 +33,43 @@ def plan_scene(
     split: str = "train",
 ) -> PoseTable:
     """Plan one split of a scene from its collision mesh; see :func:`plan_split`."""
-    vertices, faces = load_collision_mesh(collision)
-    mesh_bounds = np.stack([vertices.min(axis=0), vertices.max(axis=0)])
-    box = sampling_box_of(scene, mesh_bounds, str(collision))
-    return plan_split(RayCaster(vertices, faces), box, scene, collection, n_frames, rng, split)
+    mesh = load_collision_mesh(collision)
+    return plan_mesh(mesh, str(collision), scene, collection, n_frames, rng, split)
+
+
+def plan_mesh(
+    mesh: Triangles,
+    name: str,
+    scene: SceneConfig,
+    collection: CollectionConfig,
+    n_frames: int,
+    rng: np.random.Generator,
+    split: str,
+) -> PoseTable:
+    """Plan one split in a mesh called ``name``; see :func:`plan_split`."""
+    mesh_bounds = np.stack([mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)])
+    boxes = sampling_boxes_of(scene, mesh_bounds, name)
+    return plan_split(RayCaster(*mesh), boxes, scene, collection, n_frames, rng, split)
+
+
+def sampling_boxes_of(scene: SceneConfig, mesh_bounds_m: Array, name: str) -> Array:
+    """The configured sampling boxes (B, 2, 3), or the mesh's bounds (2, 3) as in the paper.
+
+    Raises:
+        InputError: a box contradicts the mesh; the message starts with ``name``.
+    """
+    if scene.sampling_box is None:
+        return mesh_bounds_m[None]
+    boxes = np.stack([box_array(box) for box in (scene.sampling_box, *scene.further_boxes)])
+    for box in boxes:
+        check_sampling_box(box, mesh_bounds_m, name)
+    return boxes
 
 
 def sampling_box_of(scene: SceneConfig, mesh_bounds_m: Array, name: str) -> Array:
-    """The configured sampling box (2, 3), or the mesh's bounds (2, 3) as in the paper.
-
-    Raises:
-        InputError: the configured box contradicts the mesh; the message starts with ``name``.
-    """
-    if scene.sampling_box is None:
-        return mesh_bounds_m
-    box = box_array(scene.sampling_box)
-    check_sampling_box(box, mesh_bounds_m, name)
-    return box
+    """The box (2, 3) around all of :func:`sampling_boxes_of`."""
+    boxes = sampling_boxes_of(scene, mesh_bounds_m, name)
+    return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
 
 def box_array(box: Box) -> Array:
@@ -59,7 +79,7 @@ def box_array(box: Box) -> Array:
 
 def plan_split(
     caster: RayCaster,
-    box: Array,
+    boxes: Array,
     scene: SceneConfig,
     collection: CollectionConfig,
     n_frames: int,
@@ -69,11 +89,13 @@ def plan_split(
     """Poses of ``n_frames`` frames of a split, as ``collection.mode`` says.
 
     ``path``: connected straight paths; the last may be cut short. ``random``: independent
-    admissible poses, each a path of its own. ``repeat``: the poses of an earlier data set.
+    admissible poses, each a path of its own. ``repeat``: the poses of an earlier data set. Every
+    box has paths of its own, and frames in proportion to its volume in every prefix of the plan.
 
     Args:
         caster: rays against the collision mesh.
-        box: (2, 3) lower and upper corner of the space camera centres are sampled in, metres.
+        boxes: (B, 2, 3), or (2, 3) for one: lower and upper corners of the spaces that camera
+            centres are sampled in, metres.
         scene: angle bounds and least view distance.
         collection: mode, candidates, frame spacing, least path length, interpolation.
         n_frames: frames wanted, at least 1.
@@ -88,37 +110,113 @@ def plan_split(
         raise InputError(f"plan: {n_frames} frames asked for; at least 1 is needed")
     if collection.repeat is not None:
         return repeated_poses(collection.repeat, split, n_frames, caster.bounds_m)
-    bounds = pose_bounds(box, scene.angles)
+    boxes = np.reshape(boxes, (-1, 2, 3))
     if collection.mode == "random":
-        view_m = scene.min_view_distance_m
-        vectors = independent_poses(caster, bounds, view_m, collection, n_frames, rng)
+        vectors = _independent(caster, boxes, scene, collection, n_frames, rng)
         return _table(list(poses_of(vectors)[:, None]), n_frames)
-    return _table(_paths(caster, bounds, scene, collection, n_frames, rng), n_frames)
+    return _table(_paths(caster, boxes, scene, collection, n_frames, rng), n_frames)
+
+
+def _independent(
+    caster: RayCaster,
+    boxes: Array,
+    scene: SceneConfig,
+    collection: CollectionConfig,
+    n_frames: int,
+    rng: np.random.Generator,
+) -> Array:
+    """Pose vectors (n_frames, 6); the boxes (B, 2, 3) take turns."""
+    turns = _Turns(boxes)
+    owner = np.array([turns.next(1) for _ in range(n_frames)])
+    vectors = np.empty((n_frames, 6))
+    for index, (box, own) in enumerate(zip(boxes, _generators(rng, len(boxes)), strict=True)):
+        count = int((owner == index).sum())
+        if not count:
+            continue
+        bounds = pose_bounds(box, scene.angles)
+        view_m = scene.min_view_distance_m
+        vectors[owner == index] = independent_poses(caster, bounds, view_m, collection, count, own)
+    return vectors
 
 
 def _paths(
     caster: RayCaster,
-    bounds: Array,
+    boxes: Array,
     scene: SceneConfig,
     collection: CollectionConfig,
     n_frames: int,
     rng: np.random.Generator,
 ) -> list[Array]:
-    """Poses (n, 4, 4) of consecutive paths that have at least ``n_frames`` between them."""
-    view_m, max_tries = scene.min_view_distance_m, collection.max_tries
-    start = sample_start(caster, bounds, view_m, max_tries, rng)  # itself no frame
-    stream = CandidateStream(caster, bounds, collection.candidates, view_m, rng)
+    """Poses (n, 4, 4) of paths that have at least ``n_frames`` between them, box after box."""
+    generators = _generators(rng, len(boxes))
+    walks = [
+        _Walk(caster, pose_bounds(box, scene.angles), scene, collection, own)
+        for box, own in zip(boxes, generators, strict=True)
+    ]
+    turns = _Turns(boxes)
     paths: list[Array] = []
-    n_planned = 0
-    while n_planned < n_frames:
-        target = stream.next_target(start, collection.min_path_m, max_tries)
-        if target is None:
-            raise InputError(_no_target(start, scene, collection))
-        spacing = collection.frame_spacing_m
-        paths.append(path_poses(start, target, spacing, collection.interpolation))
-        n_planned += len(paths[-1])
-        start = target
+    while turns.total < n_frames:
+        index = turns.next(0)
+        paths.append(walks[index].next_path())
+        turns.made[index] += len(paths[-1])
     return paths
+
+
+def _generators(rng: np.random.Generator, count: int) -> list[np.random.Generator]:
+    """One for each box, so that none shifts another's numbers."""
+    return [rng] if count == 1 else rng.spawn(count)
+
+
+class _Turns:
+    """Which box the next frames come from: the one that lacks most of its share by volume."""
+
+    def __init__(self, boxes: Array) -> None:
+        volume = np.prod(boxes[:, 1] - boxes[:, 0], axis=1)
+        self._share = volume / volume.sum()
+        self.made = np.zeros(len(boxes))
+
+    @property
+    def total(self) -> int:
+        """Frames made so far."""
+        return int(self.made.sum())
+
+    def next(self, n_frames: int) -> int:
+        """Index of the box, which is given ``n_frames``."""
+        index = int(np.argmax(self._share * (self.total + 1) - self.made))
+        self.made[index] += n_frames
+        return index
+
+
+class _Walk:
+    """Connected paths through one box: where one ends the next begins."""
+
+    def __init__(
+        self,
+        caster: RayCaster,
+        bounds: Array,
+        scene: SceneConfig,
+        collection: CollectionConfig,
+        rng: np.random.Generator,
+    ) -> None:
+        self._scene, self._collection = scene, collection
+        view_m = scene.min_view_distance_m
+        # Itself no frame.
+        self._at = sample_start(caster, bounds, view_m, collection.max_tries, rng)
+        self._stream = CandidateStream(caster, bounds, collection.candidates, view_m, rng)
+
+    def next_path(self) -> Array:
+        """Poses (n, 4, 4) of the next path.
+
+        Raises:
+            InputError: no admissible target; says what to relax.
+        """
+        asked = self._collection
+        target = self._stream.next_target(self._at, asked.min_path_m, asked.max_tries)
+        if target is None:
+            raise InputError(_no_target(self._at, self._scene, asked))
+        path = path_poses(self._at, target, asked.frame_spacing_m, asked.interpolation)
+        self._at = target
+        return path
 
 
 def _no_target(start: Array, scene: SceneConfig, collection: CollectionConfig) -> str:

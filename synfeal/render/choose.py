@@ -24,19 +24,19 @@ EGL_PACKAGES = "on Debian and Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri
 def _open_opengl(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) -> Renderer:
     from synfeal.render.opengl.backend import OpenglRenderer
 
-    return OpenglRenderer(mesh, camera, render.supersampling)
+    return OpenglRenderer(mesh, camera, render.supersampling, render.background_rgb)
 
 
 def _open_pyrender(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) -> Renderer:
     from synfeal.render.pyrender_backend import PyrenderRenderer  # takes a second: only when needed
 
-    return PyrenderRenderer(mesh, camera, render.supersampling)
+    return PyrenderRenderer(mesh, camera, render.supersampling, render.background_rgb)
 
 
 def _open_raycast(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) -> Renderer:
     from synfeal.render.raycast_backend import RaycastRenderer
 
-    return RaycastRenderer(mesh, camera, render.supersampling)
+    return RaycastRenderer(mesh, camera, render.supersampling, render.background_rgb)
 
 
 # Fastest first; results/benchmarks/rendering.md says by how much.
@@ -63,7 +63,7 @@ def open_chosen(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) 
     failure = why_not(render.backend)
     if failure is not None:
         raise InputError(
-            f"render.backend: {render.backend} does not work here: {failure}; or set auto"
+            f"render.backend: {render.backend} does not work here: {failure}; or choose auto"
         )
     return BACKENDS[render.backend](mesh, camera, render)
 

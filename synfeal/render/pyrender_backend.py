@@ -85,7 +85,11 @@ class PyrenderRenderer(Renderer):
     """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
 
     def __init__(
-        self, mesh: TexturedMesh, camera: CameraConfig, supersampling: int = DEFAULT_SUPERSAMPLING
+        self,
+        mesh: TexturedMesh,
+        camera: CameraConfig,
+        supersampling: int = DEFAULT_SUPERSAMPLING,
+        background_rgb: tuple[int, int, int] = (0, 0, 0),
     ) -> None:
         """Prepare the mesh, which is uploaded by the first render.
 
@@ -93,6 +97,7 @@ class PyrenderRenderer(Renderer):
             mesh: what is drawn.
             camera: a camera without distortion.
             supersampling: samples per pixel along each axis of the image.
+            background_rgb: colour where nothing is.
 
         Raises:
             InputError: EGL does not work here.
@@ -104,7 +109,8 @@ class PyrenderRenderer(Renderer):
         self._flags = flags.FLAT | flags.SKIP_CULL_FACES | flags.OFFSCREEN
         self._size = (camera.width, camera.height)
         self._intrinsics = intrinsics_of(camera)
-        self._scene = pyrender.Scene(bg_color=np.zeros(4))
+        self._background = np.array([*background_rgb, 0]) / 255.0
+        self._scene = pyrender.Scene()
         # Vertex buffers hold single precision: exact around the scene's own centre, wherever it is.
         self._centre_m = mesh.bounds_m.mean(axis=0)
         parts = [piece for part in mesh.parts if part.is_drawn for piece in pieces(part)]
@@ -114,21 +120,22 @@ class PyrenderRenderer(Renderer):
         )
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
-        """Colours (H, W, 3) seen from a pose (4, 4); black where nothing is."""
+        """Colours (H, W, 3) seen from a pose (4, 4)."""
         centred = np.array(world_from_cam, np.float64)
         centred[:3, 3] -= self._centre_m
         self._scene.set_pose(self._camera, centred @ CAM_FROM_GL)
-        samples = self._drawn(self._context.colour, self._supersampling)
+        samples = self._drawn(self._context.colour, self._supersampling, self._background)
         return mean_of_samples(samples, self._supersampling)
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
         """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
         rgb = self.render(world_from_cam)
-        depth_m = self._drawn(self._context.depth, 1)
+        depth_m = self._drawn(self._context.depth, 1, np.zeros(4))
         return rgb, np.where(depth_m > 0.0, depth_m, np.float32(np.inf))
 
-    def _drawn(self, one_pass: Any, factor: int) -> Any:
+    def _drawn(self, one_pass: Any, factor: int, background: NDArray[np.float64]) -> Any:
         """What a pass makes of the scene, ``factor`` times as large as the image."""
+        self._scene.bg_color = background
         self._context.platform.make_current()
         one_pass.viewport_width, one_pass.viewport_height = (factor * n for n in self._size)
         intrinsics = zip(("fx", "fy", "cx", "cy"), self._intrinsics, strict=True)

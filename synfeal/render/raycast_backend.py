@@ -25,7 +25,11 @@ class RaycastRenderer(Renderer):
     """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
 
     def __init__(
-        self, mesh: TexturedMesh, camera: CameraConfig, supersampling: int = DEFAULT_SUPERSAMPLING
+        self,
+        mesh: TexturedMesh,
+        camera: CameraConfig,
+        supersampling: int = DEFAULT_SUPERSAMPLING,
+        background_rgb: tuple[int, int, int] = (0, 0, 0),
     ) -> None:
         """Prepare triangles and textures.
 
@@ -33,16 +37,18 @@ class RaycastRenderer(Renderer):
             mesh: what is drawn.
             camera: a camera without distortion.
             supersampling: samples per pixel along each axis of the image.
+            background_rgb: colour where nothing is.
         """
         self._triangles = TexturedTriangles(mesh)
         self._camera = camera
         self._intrinsics = intrinsics_of(camera)
         steps = (np.arange(supersampling) + 0.5) / supersampling
         self._samples_px: Floats = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        self._background = np.array(background_rgb, np.float32)
         self._sample_size = 1.0 / supersampling
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
-        """Colours (H, W, 3) seen from a pose (4, 4); black where nothing is."""
+        """Colours (H, W, 3) seen from a pose (4, 4)."""
         view = self._view(world_from_cam, self._sample_size)
         return self._image(self._colours, view, world_from_cam, self._samples_px)
 
@@ -97,7 +103,7 @@ class RaycastRenderer(Renderer):
 
     def _colours(self, view: View, rays: Floats) -> Rgb:
         hit, points = self._points(view, rays)
-        rgb = np.zeros((len(rays), 3), np.float32)
+        rgb = np.tile(self._background, (len(rays), 1))
         rgb[hit] = self._triangles.rgb(view, points)
         samples = rgb.reshape(len(self._samples_px), -1, 3)
         return np.asarray(np.round(samples.mean(axis=0)), np.uint8)

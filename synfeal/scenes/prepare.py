@@ -9,18 +9,18 @@ from synfeal.config.mesh_files import check_mesh_file
 from synfeal.config.models import SceneConfig
 from synfeal.errors import InputError
 from synfeal.files import write_json
-from synfeal.mesh.collision import collision_mesh, write_curve
+from synfeal.mesh.collision import Rung, collision_mesh, write_curve
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.properties import mesh_properties
 from synfeal.mesh.save import save_glb
-from synfeal.mesh.triangles import save_collision_mesh
+from synfeal.mesh.triangles import merge_vertices, save_collision_mesh
 from synfeal.planning.plan import sampling_box_of
 from synfeal.seeds import generator_of
 
 
 def prepare_scene(
-    name: str, scene: SceneConfig, collision_agreement: float, seed: int, out_dir: Path
+    name: str, scene: SceneConfig, collision_agreement: float | None, seed: int, out_dir: Path
 ) -> None:
     """Write what later stages read of a scene into ``out_dir``.
 
@@ -31,18 +31,39 @@ def prepare_scene(
         InputError: the mesh cannot be used, is not the expected file, or contradicts the
             sampling box; or no pose in that box has a free view.
     """
-    mesh = build_or_load(scene, seed, name)
-    box = sampling_box_of(scene, mesh.bounds_m, f"scenes.{name}")
-    rng = generator_of(seed, "collision", name)
-    collision, curve = collision_mesh(mesh, scene, box, collision_agreement, rng)
-    save_glb(out_dir / "mesh.glb", mesh)
-    save_collision_mesh(out_dir / "collision.ply", collision)
-    write_curve(out_dir / "collision_curve.csv", curve)
+    mesh, n_faces = prepare_mesh(name, scene, collision_agreement, seed, out_dir)
     origin = scene.builder if scene.source == "procedural" else str(scene.path)
-    details = {"source": scene.source, "origin": origin, "collision_faces": len(collision.faces)}
+    details = {"source": scene.source, "origin": origin, "collision_faces": n_faces}
     found = {"findings": list(mesh.findings)}
     properties = {"scene": name, **mesh_properties(mesh), **details, **found}
     write_json(out_dir / "properties.json", properties)
+
+
+def prepare_mesh(
+    name: str, scene: SceneConfig, collision_agreement: float | None, seed: int, out_dir: Path
+) -> tuple[TexturedMesh, int]:
+    """Write ``collision.ply``, ``collision_curve.csv`` and, last, ``mesh.glb`` into ``out_dir``.
+
+    Without ``collision_agreement`` the collision mesh is the mesh itself, and the curve is empty.
+
+    Returns:
+        The mesh, and how many faces its collision mesh has.
+
+    Raises:
+        InputError: as :func:`prepare_scene`.
+    """
+    mesh = build_or_load(scene, seed, name)
+    box = sampling_box_of(scene, mesh.bounds_m, f"scenes.{name}")
+    curve: list[Rung] = []
+    if collision_agreement is None:
+        collision = merge_vertices(*mesh.merged())
+    else:
+        rng = generator_of(seed, "collision", name)
+        collision, curve = collision_mesh(mesh, scene, box, collision_agreement, rng)
+    save_collision_mesh(out_dir / "collision.ply", collision)
+    write_curve(out_dir / "collision_curve.csv", curve)
+    save_glb(out_dir / "mesh.glb", mesh)
+    return mesh, len(collision.faces)
 
 
 def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:

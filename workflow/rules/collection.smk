@@ -77,7 +77,7 @@ rule render:
         mesh=rules.scene.output.mesh,
         plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w).split}.csv",
     output:
-        frames=directory(f"{ROOT}/datasets/{{scene}}/{{camera}}/{{sequence}}"),
+        frames=sequence_output(f"{ROOT}/datasets/{{scene}}/{{camera}}/{{sequence}}"),
     log:
         f"{ROOT}/logs/render/{{scene}}/{{camera}}/{{sequence}}.log",
     benchmark:
@@ -91,7 +91,7 @@ rule render:
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
         start=lambda w: sequence_named(w).start,
         stop=lambda w: sequence_named(w).stop,
-        with_depth=lambda w: w.camera == "groundtruth",
+        with_depth=lambda w: w.camera == "groundtruth" or CONFIG.network_depth,
         render=dump(CONFIG.render),
     script:
         "../scripts/render.py"
@@ -174,7 +174,10 @@ rule pack:
 
 rule dataset:
     input:
+        mesh=rules.scene.output.mesh,
         sequences=lambda w: sequence_dirs(w.scene, w.camera),
+        plans=lambda w: plans_with_frames(w.scene, w.camera, "csv"),
+        coverage=lambda w: plans_with_frames(w.scene, w.camera, "coverage.json"),
     output:
         manifest=f"{ROOT}/datasets/{{scene}}/{{camera}}/manifest.json",
         train=f"{ROOT}/datasets/{{scene}}/{{camera}}/TrainSplit.txt",
@@ -190,10 +193,9 @@ rule dataset:
         mem_mb=grown(1000),
     params:
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
-        counts=lambda w: [n_frames(w.scene, w.camera, split) for split in SPLITS],
+        counts=lambda w: {s: n_frames(w.scene, w.camera, s) for s in SPLITS},
         shard_frames=CONFIG.shard_frames,
-        render=dump(CONFIG.render),
-        seed=CONFIG.seed,
+        origin=lambda w: origin_of(CONFIG, w.scene),
     script:
         "../scripts/dataset.py"
 

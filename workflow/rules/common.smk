@@ -21,6 +21,8 @@ from baselines.training.record import training_parameters
 from synfeal.config import Run, check_mesh_files, parse_config, read_design
 from synfeal.config.experiments import INJECTED
 from synfeal.config.models import MODELS
+from synfeal.dataset.archive import SUFFIX
+from synfeal.dataset.finish import origin_of
 from synfeal.dataset.sequences import sequences_of
 from synfeal.errors import InputError
 from synfeal.labels.errors import seed_names
@@ -42,6 +44,7 @@ except InputError as error:
     sys.exit(f"error: {error}")
 
 ROOT = CONFIG.root.as_posix()
+ARCHIVE = SUFFIX if CONFIG.archive_sequences else ""
 SPLITS = ("train", "test")
 RUNS = DESIGN.runs
 TABLE_NAMES = ["table1_meshes", *DESIGN.tables]
@@ -99,13 +102,27 @@ def packed_shards(scene, split, kind):
     return [f"{stem}/{s.name}.{kind}" for s in every if s.split == split]
 
 
+def sequence_output(stem):
+    """A sequence as its render job declares it: a directory, or one file."""
+    return f"{stem}{ARCHIVE}" if ARCHIVE else directory(stem)
+
+
 def sequence_dirs(scene, camera, split=None, stop=None):
-    """Directories of a data set's sequences, of one split, with frames below ``stop``."""
+    """A data set's sequences, directories or archives, of one split, with frames below ``stop``."""
     return [
-        f"{ROOT}/datasets/{scene}/{camera}/{s.name}"
+        f"{ROOT}/datasets/{scene}/{camera}/{s.name}{ARCHIVE}"
         for s in sequences(scene, camera)
         if split in (None, s.split) and (stop is None or s.start < stop)
     ]
+
+
+def plans_with_frames(scene, camera, kind):
+    """Plans of a data set's splits that have frames; what they cover (``coverage.json``) is known
+    of whole plans, which only the frames of the network camera are."""
+    if kind != "csv" and camera != "network":
+        return []
+    splits = [split for split in SPLITS if n_frames(scene, camera, split)]
+    return [f"{ROOT}/plans/{scene}/{split}.{kind}" for split in splits]
 
 
 def batch_of(wildcards):
@@ -214,6 +231,13 @@ def manifests(camera):
         e.scene for e in EXPERIMENTS if camera == "network" or e.labels in RECONSTRUCTED
     }
     return [f"{ROOT}/datasets/{s}/{camera}/manifest.json" for s in sorted(scenes)]
+
+
+def asked_datasets():
+    """Data sets of image files that the configuration names, or all of the design."""
+    if CONFIG.datasets is None:
+        return manifests("network") + manifests("groundtruth")
+    return [f"{ROOT}/datasets/{s}/network/manifest.json" for s in CONFIG.datasets]
 
 
 def estimated_sets():

@@ -1,15 +1,21 @@
 from pathlib import Path
 
 from synfeal.config.models import CameraConfig
-from synfeal.dataset.manifest import write_manifest
-from synfeal.dataset.sequences import sequences_of
-from synfeal.dataset.sevenscenes import write_splits
+from synfeal.dataset.finish import finish
+from synfeal.dataset.pose_table import read_frames, write_pose_table
+from synfeal.files import read_json, write_json
 from synfeal.job import job
 
 with job(snakemake.log[0]):
-    directory = Path(snakemake.output.manifest).parent
-    sequences = sequences_of(*snakemake.params.counts, snakemake.params.shard_frames)
-    write_splits(directory, sequences)
     params = snakemake.params
-    origin = {"scene": snakemake.wildcards.scene, "seed": params.seed, "render": params.render}
-    write_manifest(directory, sequences, CameraConfig(**snakemake.params.camera), origin)
+    directory = Path(snakemake.output.manifest).parent
+    splits = [split for split, count in params.counts.items() if count]
+    for split, plan in zip(splits, snakemake.input.plans, strict=True):
+        write_pose_table(
+            directory / f"{split}.csv", read_frames(Path(plan), 0, params.counts[split])
+        )
+    if snakemake.input.coverage:
+        covered = zip(splits, snakemake.input.coverage, strict=True)
+        write_json(directory / "coverage.json", {s: read_json(Path(path)) for s, path in covered})
+    camera, mesh = CameraConfig(**params.camera), Path(snakemake.input.mesh)
+    finish(directory, params.counts, params.shard_frames, camera, mesh, params.origin)

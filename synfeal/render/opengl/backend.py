@@ -31,7 +31,11 @@ class OpenglRenderer(Renderer):
     """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
 
     def __init__(
-        self, mesh: TexturedMesh, camera: CameraConfig, supersampling: int = DEFAULT_SUPERSAMPLING
+        self,
+        mesh: TexturedMesh,
+        camera: CameraConfig,
+        supersampling: int = DEFAULT_SUPERSAMPLING,
+        background_rgb: tuple[int, int, int] = (0, 0, 0),
     ) -> None:
         """Upload the mesh.
 
@@ -39,6 +43,7 @@ class OpenglRenderer(Renderer):
             mesh: what is drawn.
             camera: a camera without distortion.
             supersampling: samples per pixel along each axis of the image.
+            background_rgb: colour where nothing is.
 
         Raises:
             InputError: OpenGL does not work here, or draws no images as large as this.
@@ -49,6 +54,7 @@ class OpenglRenderer(Renderer):
         # Vertex buffers hold single precision: exact around the scene's own centre, wherever it is.
         self._centre_m = mesh.bounds_m.mean(axis=0)
         self._size = (camera.width, camera.height)
+        self._background = [level / 255.0 for level in background_rgb]
         with self._context:
             self._check_size(supersampling)
             self._parts = [
@@ -86,7 +92,7 @@ class OpenglRenderer(Renderer):
         self._mean = context.vertex_array(program, [])
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
-        """Colours (H, W, 3) seen from a pose (4, 4); black where nothing is."""
+        """Colours (H, W, 3) seen from a pose (4, 4)."""
         with self._context:
             return self._draw_colour(self._clip_from_mesh(world_from_cam))
 
@@ -102,7 +108,7 @@ class OpenglRenderer(Renderer):
         return np.asarray(self._clip_from_cam @ inverse(centred))
 
     def _draw_colour(self, clip_from_mesh: NDArray[np.float64]) -> Rgb:
-        self._begin(self._sample_target)
+        self._begin(self._sample_target, *self._background)
         for part in self._parts:
             part.draw_colour(clip_from_mesh)
         self._mean_target.use()
@@ -124,10 +130,10 @@ class OpenglRenderer(Renderer):
         depth_m[depth_m == 0.0] = np.inf
         return depth_m
 
-    def _begin(self, target: Any) -> None:
+    def _begin(self, target: Any, *rgb: float) -> None:
         target.use()
         self._context.enable_only(moderngl.DEPTH_TEST)
-        target.clear()
+        target.clear(*rgb)
 
     def close(self) -> None:
         """Give the mesh's memory back; the renderer must not be used afterwards."""

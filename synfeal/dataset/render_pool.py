@@ -1,4 +1,4 @@
-"""Rendering the missing frames of a data set, in this process or in several."""
+"""Rendering sequences in this process, or in several that each keep a renderer open."""
 
 from __future__ import annotations
 
@@ -14,16 +14,12 @@ from multiprocessing.connection import wait as wait_for_end
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from synfeal.config.models import CameraConfig, RenderConfig
-from synfeal.dataset.frame_writer import FrameWriter
+from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.progress import Progress, Stopwatch
-from synfeal.dataset.render_sequence import render_frames
-from synfeal.dataset.shards import Piece
+from synfeal.dataset.render_sequence import write_sequence
 from synfeal.errors import InputError
-from synfeal.mesh.model import TexturedMesh
+from synfeal.mesh.load import load_mesh
 from synfeal.render import open_renderer
 from synfeal.render.base import Renderer
 
@@ -32,78 +28,50 @@ POLL_S = 0.2
 
 @dataclass(frozen=True)
 class Task:
-    """What is missing of a piece.
+    """A sequence to render: ``seq-01`` or ``seq-01.zip``, and its poses."""
 
-    Attributes:
-        name: for progress.
-        piece: where the frames belong.
-        numbers: the missing frames, counted within the sequence.
-        world_from_cam: (len(numbers), 4, 4) their poses.
-    """
-
-    name: str
-    piece: Piece
-    numbers: list[int]
-    world_from_cam: NDArray[np.float64]
+    out: Path
+    poses: PoseTable
 
 
 @dataclass(frozen=True)
 class Studio:
-    """What every process needs: what is rendered, how, and where to."""
+    """What is rendered, and how."""
 
-    mesh: TexturedMesh
+    mesh: Path
     camera: CameraConfig
     render: RenderConfig
     with_depth: bool
-    data: Path
-    scratch: Path
 
     def open(self) -> Renderer:
         """A renderer."""
-        return open_renderer(self.mesh, self.camera, self.render)
+        return open_renderer(load_mesh(self.mesh), self.camera, self.render)
 
     def carry_out(self, renderer: Renderer, task: Task, on_frame: Callable[[], object]) -> float:
-        """Render a task; seconds it took."""
+        """Render a sequence; seconds it took."""
         watch = Stopwatch()
-        directory = self.data / task.piece.sequence.name
-        directory.mkdir(exist_ok=True)
-        with FrameWriter(self.scratch, on_frame) as writer:
-            frames = zip(task.numbers, task.world_from_cam, strict=True)
-            render_frames(renderer, frames, directory, self.with_depth, writer)
+        write_sequence(renderer, task.poses, task.out, self.with_depth, on_frame)
         return watch.seconds
 
 
-def render_tasks(
-    studio: Studio,
-    tasks: list[Task],
-    workers: int,
-    progress: Progress,
-    on_done: Callable[[Task], object],
-) -> None:
-    """Render all tasks; ``on_done`` is called in this process for each that is done.
+def render_sequences(studio: Studio, tasks: list[Task], workers: int, progress: Progress) -> None:
+    """Render all sequences; each appears when it is whole.
 
     Raises:
-        InputError: this machine cannot render, or a worker process was killed.
-        OSError: a file could not be written.
+        InputError: this machine cannot render, a worker process was killed, or a file could not be
+            written.
     """
     workers = min(workers, len(tasks))
     if workers > 1:
-        _render_parallel(studio, tasks, workers, progress, on_done)
+        _render_parallel(studio, tasks, workers, progress)
     elif tasks:
         with studio.open() as renderer:
             for task in tasks:
                 seconds = studio.carry_out(renderer, task, progress.update)
-                progress.shard_done(task.name, len(task.numbers), seconds)
-                on_done(task)
+                progress.part_done(task.out.name, len(task.poses), seconds)
 
 
-def _render_parallel(
-    studio: Studio,
-    tasks: list[Task],
-    workers: int,
-    progress: Progress,
-    on_done: Callable[[Task], object],
-) -> None:
+def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: Progress) -> None:
     context = multiprocessing.get_context("spawn")  # a forked OpenGL context does not work
     n_done, stop = context.Value("q", 0), context.Event()
     initial = (studio, workers, n_done, stop)
@@ -118,8 +86,7 @@ def _render_parallel(
             n_shown = n_seen
             for future in ended:
                 task = running.pop(future)
-                progress.shard_done(task.name, len(task.numbers), future.result())
-                on_done(task)
+                progress.part_done(task.out.name, len(task.poses), future.result())
     except BrokenProcessPool:
         raise InputError(
             "collect: a worker process was killed, perhaps for lack of memory; what is done is"
@@ -131,7 +98,7 @@ def _render_parallel(
 
 
 class _Worker:
-    """What a worker process keeps between tasks."""
+    """What a worker process keeps between sequences."""
 
     def __init__(self, studio: Studio, n_done: Any, stop: Any) -> None:
         self.studio = studio
@@ -156,7 +123,8 @@ def _start_worker(studio: Studio, workers: int, n_done: Any, stop: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     # Read by Mesa's software renderer when it starts.
-    os.environ.setdefault("LP_NUM_THREADS", str(max(1, usable_cpus() // workers)))
+    cpus = len(os.sched_getaffinity(0))
+    os.environ.setdefault("LP_NUM_THREADS", str(max(1, cpus // workers)))
     _worker = _Worker(studio, n_done, stop)
 
 
@@ -172,8 +140,3 @@ def _carry_out(task: Task) -> float:
     if _worker.renderer is None:
         _worker.renderer = _worker.studio.open()
     return _worker.studio.carry_out(_worker.renderer, task, _worker.on_frame)
-
-
-def usable_cpus() -> int:
-    """Processors this process may use."""
-    return len(os.sched_getaffinity(0))

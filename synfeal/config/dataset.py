@@ -1,0 +1,52 @@
+"""The part of a profile that data sets are made of: all that ``collect`` and `datasets` share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from synfeal.config.collection import (
+    CameraConfig,
+    CollectionConfig,
+    Count,
+    RenderConfig,
+    SceneConfig,
+    Slug,
+    Strict,
+)
+
+
+class DatasetConfig(Strict):
+    """Scenes, how many frames of them, and how they are planned and drawn."""
+
+    profile: Slug = Field(description="name of the profile and of its directory under `results`")
+    seed: int = Field(0, ge=0, lt=2**63, description="root of all seeds")
+    scale: Annotated[float, Field(gt=0, le=1)] = Field(description="share of the paper's frames")
+    results: Path = Field(Path("results"), description="where everything is written")
+    shard_frames: Count = Field(500, description="frames per render job and sequence directory")
+    archive_sequences: bool = Field(
+        False, description="write each sequence of image files as one `seq-XX.zip`"
+    )
+    scenes: dict[Slug, SceneConfig] = Field(description="scenes by name")
+    collection: CollectionConfig = Field(
+        default_factory=CollectionConfig, description="camera movement"
+    )
+    network_camera: CameraConfig = Field(
+        default_factory=CameraConfig, description="camera of the frames the localizers see"
+    )
+    network_depth: bool = Field(
+        False, description="depth images of that camera too, where image files are written"
+    )
+    render: RenderConfig = Field(default_factory=RenderConfig, description="how images are drawn")
+
+    @property
+    def root(self) -> Path:
+        """Directory of this profile's results."""
+        return self.results / self.profile
+
+    def n_frames(self, scene: str, size: str, split: str) -> int:
+        """Frames of a split at this profile's scale: at least 2, where there are as many."""
+        full: int = getattr(self.scenes[scene].sizes[size], split)
+        return max(min(2, full), round(full * self.scale))

@@ -1,0 +1,154 @@
+"""The options of a collection as the settings of a configuration, and back in what is said of them.
+
+One table names both, so that a value has one bound and one default however it is given: as an
+option of ``synfeal collect``, as an argument of :func:`synfeal.collect`, or as a key of a profile.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from synfeal.config.dataset import DatasetConfig
+from synfeal.config.load import describe
+from synfeal.config.mesh_files import check_mesh_file
+from synfeal.config.models import SceneConfig
+from synfeal.errors import InputError
+
+SCENE, SIZE = "scan", "all"  # as the configuration of a collection calls its scene and its size
+KEYS: Mapping[str, str] = {
+    "mesh": f"scenes.{SCENE}.path",
+    "up_axis": f"scenes.{SCENE}.up_axis",
+    "unit_m": f"scenes.{SCENE}.unit_m",
+    "box": f"scenes.{SCENE}.sampling_box",
+    "roll": f"scenes.{SCENE}.angles.roll_deg",
+    "pitch": f"scenes.{SCENE}.angles.pitch_deg",
+    "yaw": f"scenes.{SCENE}.angles.yaw_deg",
+    "min_view_distance": f"scenes.{SCENE}.min_view_distance_m",
+    "frames": f"scenes.{SCENE}.sizes.{SIZE}.train",
+    "test_frames": f"scenes.{SCENE}.sizes.{SIZE}.test",
+    "mode": "collection.mode",
+    "poses": "collection.repeat",
+    "spacing": "collection.frame_spacing_m",
+    "min_path": "collection.min_path_m",
+    "camera": "network_camera.calibration",
+    "width": "network_camera.width",
+    "height": "network_camera.height",
+    "fov": "network_camera.horizontal_fov_deg",
+    "depth": "network_depth",
+    "backend": "render.backend",
+    "supersampling": "render.supersampling",
+    "background": "render.background_rgb",
+    "sequence_frames": "shard_frames",
+    "archive": "archive_sequences",
+    "seed": "seed",
+}
+FURTHER_BOXES = f"scenes.{SCENE}.further_boxes"
+
+
+def dataset_config(options: Mapping[str, Any], out: Path | None = None) -> DatasetConfig:
+    """The settings of a collection.
+
+    Args:
+        options: values by the names of ``KEYS``; None stands for the default. ``box`` is a list of
+            boxes, each x0, x1, y0, y1, z0, z1, metres.
+        out: the data set, which gives the profile its name.
+
+    Raises:
+        InputError: naming the option that is wrong.
+    """
+    check_mesh_file(Path(options["mesh"]), "--mesh")
+    values = _nested(options)
+    scene = values["scenes"][SCENE]
+    scene |= {"source": "mesh", "path": str(Path(scene["path"]).absolute())}
+    scene["sha256"] = _sha256(Path(scene["path"]))
+    if values.get("collection", {}).get("repeat") is not None:
+        values["collection"]["repeat"] = Path(values["collection"]["repeat"]).absolute()
+    values.setdefault("collection", {})["collision_agreement"] = None
+    values |= {"profile": _slug(out.absolute().name if out else ""), "scale": 1.0}
+    with _options_named():
+        return DatasetConfig.model_validate(values)
+
+
+def scene_config(options: Mapping[str, Any]) -> SceneConfig:
+    """The scene alone, without sizes: of a command that collects nothing.
+
+    Raises:
+        InputError: naming the option that is wrong.
+    """
+    check_mesh_file(Path(options["mesh"]), "--mesh")
+    scene = _nested(options)["scenes"][SCENE]
+    with _options_named():
+        try:
+            return SceneConfig.model_validate({"source": "mesh", **scene})
+        except ValidationError as error:
+            raise InputError(f"scenes.{SCENE}.{describe(error)}") from None
+
+
+def in_words_of_options(message: str) -> str:
+    """What was said of a configuration, with options in place of keys."""
+    key, _, rest = message.partition(": ")
+    below = {**KEYS, "further box": FURTHER_BOXES}
+    for option, own in sorted(below.items(), key=lambda item: -len(item[1])):
+        if f"{key}.".startswith(f"{own}."):
+            inner = [name for name in key.removeprefix(own).split(".") if name.isalpha()]
+            message = ": ".join([_flag(option.removeprefix("further ")), *inner, rest])
+            break
+    for option, own in sorted(KEYS.items(), key=lambda item: -len(item[1])):
+        name = own.rpartition(".")[2]
+        words = [own, name] if "_" in name and name != option else [own]
+        for word in words:
+            message = re.sub(rf"(?<![\w./-]){re.escape(word)}(?![\w/])", _flag(option), message)
+    message = re.sub(r"(?<![\w./-])(unit_m|up_axis)(?![\w./])", lambda m: _flag(m[0]), message)
+    return re.sub(rf"scenes\.{SCENE}(: |\.)", "", message)
+
+
+def _flag(option: str) -> str:
+    return f"--{option.replace('_', '-')}"
+
+
+@contextmanager
+def _options_named() -> Iterator[None]:
+    try:
+        yield
+    except ValidationError as error:
+        raise InputError(in_words_of_options(describe(error, DatasetConfig))) from None
+    except InputError as error:
+        raise InputError(in_words_of_options(str(error))) from None
+
+
+def _nested(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options as a mapping of mappings, by their keys."""
+    unknown = sorted(set(options) - set(KEYS))
+    if unknown:
+        raise InputError(f"{unknown[0]}: no such option; there are {', '.join(KEYS)}")
+    given = {KEYS[name]: value for name, value in options.items() if value is not None}
+    boxes = given.pop(KEYS["box"], None)
+    if boxes is not None:
+        first, *others = ({"x": b[0:2], "y": b[2:4], "z": b[4:6]} for b in boxes)
+        given |= {KEYS["box"]: first, FURTHER_BOXES: others}
+    values: dict[str, Any] = {}
+    for key, value in given.items():
+        inner = values
+        *parents, last = key.split(".")
+        for parent in parents:
+            inner = inner.setdefault(parent, {})
+        inner[last] = value
+    return values
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _slug(name: str) -> str:
+    """A name for a profile, made of that of a directory."""
+    slug = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:64]
+    return slug or "mine"

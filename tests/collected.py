@@ -1,0 +1,44 @@
+"""Small collections, and what is on disk after them."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from synfeal.cli import main
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.save import save_glb
+
+SMALL = ("--width", "40", "--height", "33", "--spacing", "0.2", "--sequence-frames", "10")
+
+
+def save_room(path: Path, seed: int = 0) -> Path:
+    """A closed room of 6 x 5 x 3 m with coloured corners."""
+    box = trimesh.creation.box((6.0, 5.0, 3.0))
+    colors = np.random.default_rng(seed).integers(0, 256, (8, 3), np.uint8)
+    part = MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces), vertex_rgb=colors)
+    save_glb(path, TexturedMesh((part,)))
+    return path
+
+
+def command(mesh: Path, out: Path, *more: str) -> list[str]:
+    """24 training and 8 test frames, in four sequences."""
+    frames = ("--frames", "24", "--test-frames", "8")
+    return ["collect", "--mesh", str(mesh), "--out", str(out), *frames, *SMALL, *more]
+
+
+def collect(mesh: Path, out: Path, *more: str) -> int:
+    """Exit status of :func:`command`."""
+    return main(command(mesh, out, *more))
+
+
+def tree_of(directory: Path) -> dict[str, str]:
+    """SHA-256 of every file below a directory, by its path there."""
+    return {
+        path.relative_to(directory).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(directory.rglob("*"))
+        if path.is_file()
+    }
