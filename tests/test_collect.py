@@ -129,12 +129,13 @@ def within(points: NDArray[np.float64], low: list[float], high: list[float]) -> 
 
 @pytest.mark.parametrize("backend", ["opengl", "raycast"])
 def test_the_background_has_the_colour_asked_for(mesh: Path, tmp_path: Path, backend: str) -> None:
-    (tmp_path / "away.txt").write_text("0 0 0 9 0 0 0 1\n" * 24)  # above the room, looking up
+    (tmp_path / "away.txt").write_text("0 0 0 9 1 0 0 0\n" * 24)  # above the room, looking down
     repeat = ["--mode", "repeat", "--poses", str(tmp_path / "away.txt"), "--test-frames", "0"]
     look = ["--background", "10", "200", "30", "--supersampling", "1", "--backend", backend]
     assert collect(mesh, tmp_path / "set", *repeat, *look) == 0
     with Image.open(tmp_path / "set" / "seq-01" / "frame-000000.color.png") as frame:
-        assert frame.getextrema() == ((10, 10), (200, 200), (30, 30))
+        assert frame.getpixel((0, 0)) == (10, 200, 30)
+        assert frame.getpixel((20, 16)) != (10, 200, 30)
 
 
 class Interrupting:

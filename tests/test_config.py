@@ -115,7 +115,7 @@ def test_all_five_localizers_are_needed(raw):
 
 def test_a_scene_may_be_called_like_a_key(raw):
     raw["scenes"]["angles"] = {**raw["scenes"]["sanctuary"], "colour": 1}
-    with pytest.raises(InputError, match="allowed here: angles, builder, min_view_distance_m"):
+    with pytest.raises(InputError, match="allowed here: angles, builder, further_boxes, min_view"):
         parse_config(raw, "my.yaml")
 
 

@@ -102,9 +102,9 @@ def test_it_spares_files_of_others(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--unit-m", "-1"], ["unit_m"]),
-        (["--box", "1", "0", "0", "1", "0", "1"], ["sampling_box", "x"]),
-        (["--box", "90", "91", "0", "1", "0", "1"], ["outside", "unit_m"]),
+        (["--unit-m", "-1"], ["--unit-m"]),
+        (["--box", "1", "0", "0", "1", "0", "1"], ["--box", "x"]),
+        (["--box", "90", "91", "0", "1", "0", "1"], ["outside", "--unit-m"]),
     ],
 )
 def test_what_a_person_can_mend_is_one_line(

@@ -13,7 +13,13 @@ from synfeal.planning.candidates import CandidateStream
 from synfeal.planning.connected import connected_space
 from synfeal.planning.coverage import plan_coverage, scene_coverage
 from synfeal.planning.independent import independent_poses
-from synfeal.planning.plan import plan_scene, plan_split, sampling_box_of
+from synfeal.planning.plan import (
+    plan_mesh,
+    plan_scene,
+    plan_split,
+    sampling_box_of,
+    sampling_boxes_of,
+)
 from synfeal.planning.questions import Questions, draw_questions
 from synfeal.planning.start import largest_group, sample_start, seeing_groups
 from synfeal.planning.target import admissible, farthest_admissible, has_free_view
@@ -182,6 +188,8 @@ def test_a_scene_is_planned_and_measured_from_its_collision_mesh(seed, tmp_path_
     plan = plan_scene(path, SCENE, collection, 20, np.random.default_rng(seed))
     same = plan_split(EMPTY, ROOM, SCENE, collection, 20, np.random.default_rng(seed))
     np.testing.assert_allclose(plan.position_m, same.position_m, atol=1e-9)
+    direct = plan_mesh(mesh, "room", SCENE, collection, 20, np.random.default_rng(seed), "train")
+    np.testing.assert_array_equal(plan.position_m, direct.position_m)
     found = scene_coverage(path, SCENE, plan, SQUARE)
     assert found == plan_coverage(mesh, ROOM, SCENE, plan, SQUARE)
 
@@ -196,6 +204,9 @@ def test_the_box_is_the_configured_one_and_else_the_mesh(a, b):
     scene = SceneConfig.model_validate({**SCENE.model_dump(), "sampling_box": sides})
     overlap = np.minimum(box[1], ROOM[1]) - np.maximum(box[0], ROOM[0])
     if (overlap > 0.0).all():
+        twice = scene.model_copy(update={"further_boxes": (scene.sampling_box,)})
+        found = sampling_boxes_of(twice, ROOM, "scene")
+        np.testing.assert_array_equal(found, [box, box])
         np.testing.assert_array_equal(sampling_box_of(scene, ROOM, "scene"), box)
     else:
         with pytest.raises(InputError, match=r"^scene: .* lies outside the mesh"):
