@@ -41,7 +41,6 @@ from synfeal.dataset.sequences import Sequence
 from synfeal.dataset.sevenscenes import pose_text, read_depth_m, read_pose, read_split, write_splits
 from synfeal.dataset.unfinished import WORK, check_settings
 from synfeal.files import write_json
-from synfeal.mesh.collision import CURVE_HEADER
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import Triangles, load_collision_mesh, save_collision_mesh
@@ -66,6 +65,7 @@ from synfeal.report.meshes import write_meshes_table
 from synfeal.report.speed_vs_error import collision_rows, label_rows
 from synfeal.report.stats import combine, read_metrics
 from synfeal.report.tables import Value, columns_of, write_rows
+from synfeal.scenes.collision import CURVE_HEADER
 from synfeal.validate.camera import camera_of_dataset
 from synfeal.validate.images import read_color, read_depth_mm
 from synfeal.validate.run import validate

@@ -14,16 +14,6 @@ from hypothesis import strategies as st
 from synfeal.config.models import SceneConfig
 from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
-from synfeal.mesh.collision import (
-    CURVE_HEADER,
-    Rung,
-    Trial,
-    collision_mesh,
-    ladder,
-    last_agreeing,
-    search,
-    write_curve,
-)
 from synfeal.mesh.decimate import simplify
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
@@ -38,6 +28,16 @@ from synfeal.planning.target import admissible, has_free_view
 from synfeal.report.figures import Results, write_figures
 from synfeal.report.speed_vs_error import COLUMNS, collision_rows, write_speed_vs_error
 from synfeal.report.tables import write_rows
+from synfeal.scenes.collision import (
+    CURVE_HEADER,
+    Rung,
+    Trial,
+    collision_mesh,
+    ladder,
+    last_agreeing,
+    search,
+    write_curve,
+)
 from tests.report_results import design_of, read
 
 SCENE = SceneConfig.model_validate({"source": "mesh", "path": "scene.glb"})

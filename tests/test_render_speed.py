@@ -16,14 +16,15 @@ from synfeal.errors import InputError
 from synfeal.geometry.rotations import quat_wxyz_from_matrix
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.save import save_glb
-from synfeal.render import choose, speed
-from synfeal.render.speed_table import COLUMNS, Measured, read_speed, write_speed
+from synfeal.render import choose
 from synfeal.report.figures import render_speed
 from synfeal.report.figures.sources import Results
 from synfeal.report.figures.write import write_figures
 from synfeal.report.render_speed import render_rows
 from synfeal.report.speed_vs_error import COLUMNS as TABLE_COLUMNS
 from synfeal.report.tables import write_rows
+from synfeal.scenes import render_speed as speed
+from synfeal.scenes.render_speed_table import COLUMNS, Measured, read_speed, write_speed
 from tests.render_backends import BACKENDS, PYOPENGL_WARNS, camera_of
 from tests.report_results import design_of, read
 from tests.small_room import furnished_room, room_poses

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from synfeal.render.speed_table import Measured, read_speed
 from synfeal.report.tables import Value
+from synfeal.scenes.render_speed_table import Measured, read_speed
 
 COLUMNS = (
     *("backend", "width", "height", "supersampling", "texture_scale"),

@@ -8,7 +8,6 @@ from statistics import median
 
 from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
-from synfeal.mesh.collision import CURVE_HEADER, Rung
 from synfeal.report.assistance import TOTAL
 from synfeal.report.label_error import COLUMNS as LABEL_COLUMNS
 from synfeal.report.layouts import SOURCES
@@ -17,6 +16,7 @@ from synfeal.report.render_speed import render_rows
 from synfeal.report.results import read_table
 from synfeal.report.tables import Value, write_rows
 from synfeal.report.training_speed import training_rows
+from synfeal.scenes.collision import CURVE_HEADER, Rung
 
 NAME = "speed_vs_error"
 COLUMNS = (

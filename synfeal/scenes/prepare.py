@@ -9,13 +9,13 @@ from synfeal.config.mesh_files import check_mesh_file
 from synfeal.config.models import SceneConfig
 from synfeal.errors import InputError
 from synfeal.files import write_json
-from synfeal.mesh.collision import Rung, collision_mesh, write_curve
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.properties import mesh_properties
 from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import merge_vertices, save_collision_mesh
 from synfeal.planning.plan import sampling_box_of
+from synfeal.scenes.collision import Rung, collision_mesh, write_curve
 from synfeal.seeds import generator_of
 
 

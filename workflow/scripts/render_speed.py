@@ -2,7 +2,7 @@ from pathlib import Path
 
 from synfeal.config.models import CameraConfig, RenderConfig, RenderSpeedConfig
 from synfeal.job import job
-from synfeal.render.speed import measured_cameras, write_render_speed
+from synfeal.scenes.render_speed import measured_cameras, write_render_speed
 
 with job(snakemake.log[0]):
     measured = RenderSpeedConfig(**snakemake.params.render_speed)

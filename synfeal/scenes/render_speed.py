@@ -21,7 +21,7 @@ from synfeal.mesh.model import TexturedMesh
 from synfeal.render import choose, open_renderer
 from synfeal.render.base import Depth, Renderer, Rgb
 from synfeal.render.reference import SAMPLES_PER_AXIS, reference_images
-from synfeal.render.speed_table import Measured, write_speed
+from synfeal.scenes.render_speed_table import Measured, write_speed
 
 PAPER_CAMERA = CameraConfig(width=640, height=480)
 LARGEST_PX = 8192 // SAMPLES_PER_AXIS  # of a side, so that the reference is an image in OpenGL
@@ -72,7 +72,7 @@ def write_render_speed(
         cameras: as :func:`measured_cameras` gives them, smallest first.
         n_poses: views through the smallest; half as many through the others.
         render: what the profile renders with.
-        out_csv: the lines of :class:`synfeal.render.speed_table.Measured`.
+        out_csv: the lines of :class:`synfeal.scenes.render_speed_table.Measured`.
 
     Raises:
         InputError: the mesh or the plan cannot be read, or no backend works here.
