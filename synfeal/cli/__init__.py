@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 
 from synfeal import __version__
-from synfeal.cli import collect, compare, export, inspect, keep, localize, plan, validate
+from synfeal.cli import collect, compare, evaluate, export, inspect, keep, localize, plan, validate
 from synfeal.cli.options import numbers_apart
 from synfeal.errors import exit_status
 
@@ -17,6 +17,7 @@ COMMANDS = (
     inspect.COMMAND,
     validate.COMMAND,
     export.COMMAND,
+    evaluate.COMMAND,
     localize.COMMAND,
     plan.COMMAND,
     compare.COMMAND,

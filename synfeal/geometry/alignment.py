@@ -8,10 +8,13 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 
-def umeyama_sim3(source: ArrayLike, target: ArrayLike) -> tuple[float, Array, Array]:
+def umeyama_sim3(
+    source: ArrayLike, target: ArrayLike, with_scale: bool = True
+) -> tuple[float, Array, Array]:
     """Scale, rotation (3, 3) and translation (3,) with ``target = scale * rotation @ source + t``.
 
     Least squares over point pairs (N, 3), N >= 3 and not collinear (Umeyama, PAMI 1991, eq. 39-42).
+    Without ``with_scale`` the scale is 1.
 
     Raises:
         ValueError: fewer than three pairs, or points of either set that are collinear up to
@@ -29,7 +32,7 @@ def umeyama_sim3(source: ArrayLike, target: ArrayLike) -> tuple[float, Array, Ar
     u, singular, vt = np.linalg.svd(target_c.T @ source_c / len(source))
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt))])
     rotation = (u * sign) @ vt
-    scale = float((singular * sign).sum() / (source_c**2).sum(axis=1).mean())
+    scale = float((singular * sign).sum() / (source_c**2).sum(axis=1).mean()) if with_scale else 1.0
     return scale, rotation, target_mean - scale * rotation @ source_mean
 
 

@@ -13,6 +13,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from synfeal.config import MODELS, Experiment
 from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
+from synfeal.evaluation.metrics import cumulative
 from synfeal.report.compare.runs import ERRORS_HEADER
 from synfeal.report.figures.sources import Array, Results, counted
 from synfeal.report.figures.style import MODEL_STYLES
@@ -107,13 +108,6 @@ def draw_curves(axes: Axes, errors: Mapping[str, Array]) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.grid(axis="x", color="0.93")
     axes.set_axisbelow(True)
-
-
-def cumulative(errors: Array) -> tuple[Array, Array]:
-    """The finite errors in rising order, and the per cent of all errors up to each of them."""
-    ordered = np.sort(errors)
-    percent = 100 * np.arange(1, len(errors) + 1) / len(errors)
-    return ordered[np.isfinite(ordered)], percent[np.isfinite(ordered)]
 
 
 def _largest(results: Results, rows: list[Experiment]) -> Experiment:

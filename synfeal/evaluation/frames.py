@@ -1,0 +1,187 @@
+"""The frames that are scored, with their poses, and which estimate is of which."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.dataset.pose_table import read_pose_table
+from synfeal.dataset.sevenscenes import SPLIT_FILES
+from synfeal.errors import InputError
+from synfeal.evaluation.estimates import Estimates
+from synfeal.validate.frames import read_poses
+from synfeal.validate.listing import Frame, SequenceListing, list_sequences
+from synfeal.validate.poses import check_rigid
+from synfeal.validate.splits import read_splits
+
+Array = NDArray[np.float64]
+
+NAME = re.compile(r"(?:seq-?(\d+)[/_-])?frame-(\d{6,})(?:\D|$)")
+TIME_SLACK = 0.25  # of a frame
+
+
+@dataclass(frozen=True)
+class ScoredFrames:
+    """Frames of a split in order.
+
+    Attributes:
+        split: ``test``, ``train`` or ``all``.
+        frames: (N) their files.
+        world_from_cam: (N, 4, 4).
+        path: (N,) what the bootstrap draws: straight paths of our data sets, else sequences.
+    """
+
+    split: str
+    frames: tuple[Frame, ...]
+    world_from_cam: Array
+    path: NDArray[np.int64]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """``seq-01/frame-000000``."""
+        return tuple(f"{f.sequence.stem}/frame-{f.number:06d}" for f in self.frames)
+
+
+def read_scored_frames(dataset: Path, split: str) -> ScoredFrames:
+    """The frames of a split, all with rigid poses.
+
+    Raises:
+        InputError: the data set or its split cannot be read, or poses are missing or damaged.
+    """
+    sequences = _of_split(dataset, split, list_sequences(dataset))
+    frames = tuple(frame for sequence in sequences for frame in sequence.frames)
+    poses, unreadable = read_poses(sequences)
+    problems = check_rigid(poses, unreadable).failures
+    missing = [frame for frame in frames if frame not in poses]
+    if problems or missing:
+        reason = problems[0] if problems else f"{missing[0].path('pose.txt')}: missing"
+        raise InputError(f"{reason}; synfeal validate says more")
+    matrices = np.array([poses[frame] for frame in frames])
+    return ScoredFrames(split, frames, matrices, _paths(dataset, split, frames))
+
+
+def _of_split(
+    dataset: Path, split: str, sequences: list[SequenceListing]
+) -> Sequence[SequenceListing]:
+    if split == "all":
+        return sequences
+    splits, failures = read_splits(dataset, sequences)
+    if failures and split not in splits:
+        raise InputError(f"{failures[0]}; without it, give --split all")
+    if not splits[split]:
+        raise InputError(f"{dataset / SPLIT_FILES[split]}: lists no sequence")
+    return splits[split]
+
+
+def _paths(dataset: Path, split: str, frames: Sequence[Frame]) -> NDArray[np.int64]:
+    table = dataset / f"{split}.csv"
+    if table.is_file():
+        paths = read_pose_table(table).path
+        if len(paths) == len(frames):
+            return paths
+    stems = [frame.sequence.stem for frame in frames]
+    return np.unique(stems, return_inverse=True)[1].astype(np.int64)
+
+
+@dataclass(frozen=True)
+class Matched:
+    """Which estimate belongs to which frame.
+
+    Attributes:
+        row: (N,) of each frame, the estimate's row, -1 where there is none.
+        foreign: estimates of frames that are not scored.
+    """
+
+    row: NDArray[np.int64]
+    foreign: int
+
+
+def match(frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float) -> Matched:
+    """Find the estimate of each frame by name, by index or by time.
+
+    Raises:
+        InputError: a name says no frame, or not of which sequence; a frame has two estimates; none
+            of the scored frames has one.
+    """
+    keys = _keys(frames, estimates, path, rate_hz)
+    index = {(f.sequence.stem, f.number): i for i, f in enumerate(frames.frames)}
+    row = np.full(len(index), -1, dtype=np.int64)
+    foreign = 0
+    for estimate, key in enumerate(keys):
+        frame = index.get(key)
+        if frame is None:
+            foreign += 1
+        elif row[frame] >= 0:
+            first, second = estimates.places[row[frame]], estimates.places[estimate]
+            raise InputError(
+                f"{path}: {frames.names[frame]} has two poses, {first} and {second}; leave one"
+            )
+        else:
+            row[frame] = estimate
+    if (row < 0).all():
+        raise InputError(
+            f"{path}: none of its {len(keys)} poses is of a frame of the {frames.split} split"
+            f" ({frames.names[0]}, ...); is it of this data set, and of this --split?"
+        )
+    return Matched(row, foreign)
+
+
+Key = tuple[str, int]
+
+
+def _keys(frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float) -> list[Key]:
+    """Sequence and number of each estimate's frame."""
+    pairs = list(zip(estimates.names, estimates.places, strict=True))
+    if estimates.ordered:
+        return [_by_index(frames, name, f"{path}: {place}") for name, place in pairs]
+    stems = list(dict.fromkeys(frame.sequence.stem for frame in frames.frames))
+    timed = estimates.kind.startswith(("a TUM", "TUM"))
+    find = _by_time if timed else _by_name
+    return [find(name, stems, f"{path}: {place}", rate_hz) for name, place in pairs]
+
+
+def _by_index(frames: ScoredFrames, name: str, where: str) -> Key:
+    if not name.isdecimal():
+        raise InputError(f"{where}: frame '{name[:40]}' must be a whole number, 0 or above")
+    place = int(name)
+    if place >= len(frames.frames):
+        raise InputError(
+            f"{where}: frame {place} does not exist: the {frames.split} split has"
+            f" {len(frames.frames)} frames, counted from 0"
+        )
+    frame = frames.frames[place]
+    return frame.sequence.stem, frame.number
+
+
+def _by_name(name: str, stems: Sequence[str], where: str, _: float) -> Key:
+    found = list(NAME.finditer(name.replace("\\", "/")))
+    if not found:
+        raise InputError(f"{where}: '{name[:80]}' names no frame; names hold seq-01/frame-000000")
+    sequence, number = found[-1].groups()
+    if sequence is None and len(stems) > 1:
+        raise InputError(
+            f"{where}: '{name[:80]}' does not say of which sequence, and there are {len(stems)}"
+            f" ({stems[0]}, ...); write {stems[0]}/{Path(name).name[:40]}"
+        )
+    return stems[0] if sequence is None else f"seq-{int(sequence):02d}", int(number)
+
+
+def _by_time(name: str, stems: Sequence[str], where: str, rate_hz: float) -> Key:
+    sequence, _, stamp = name.rpartition("/")
+    if not sequence and len(stems) > 1:
+        raise InputError(
+            f"{where}: time stamps do not say of which sequence, and there are {len(stems)}; give a"
+            f" directory with one file for each: {stems[0]}.txt, ..."
+        )
+    number = float(stamp) * rate_hz
+    if not (abs(number) < 1e15 and abs(number - round(number)) <= TIME_SLACK and number >= 0):
+        raise InputError(
+            f"{where}: at {stamp} s there is no frame with {rate_hz:g} of them a second; give"
+            " --rate (1 where frames are numbered)"
+        )
+    return sequence or stems[0], round(number)

@@ -1,0 +1,143 @@
+"""Dense correspondence reprojection error (DCRE): how far a wrong pose moves the picture.
+
+Wald et al., "Beyond Controlled Environments: 3D Camera Re-Localization in Changing Indoor Scenes",
+ECCV 2020, and the evaluation of their RIO10 benchmark: the points that a frame shows are projected
+by the estimated pose; the error of a pixel is the distance to where it was, as a share of the
+image's diagonal and 1 at most; the frame's is the mean over its pixels. Unlike RIO10, a point
+behind the estimated camera counts as 1: the projection formula would put it into the image.
+
+Instead of every pixel, the middles of 8 x 6 equal cells are looked at. On 200 frames of the Large
+Room that changes a frame's DCRE by 0.6 % (median), at errors of 1 cm as of 50 cm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.camera.rays import pixels_of_slopes, slopes_of_pixels
+from synfeal.config.collection import CameraConfig
+from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.sevenscenes import INVALID_MM
+from synfeal.errors import InputError
+from synfeal.evaluation.metrics import is_pose
+from synfeal.files import atomic_path
+from synfeal.geometry.poses import pose_from_quat, relative
+from synfeal.mesh.rays import RayCaster
+from synfeal.validate.images import read_depth_mm
+
+Array = NDArray[np.float64]
+
+CELLS = (8, 6)  # columns, rows
+# RIO10 prints the share of frames with a DCRE below these.
+DCRE_BOUNDS = (0.05, 0.15)
+BLOCK = 2000  # frames at once: bounds memory
+
+
+def cell_pixels(camera: CameraConfig) -> Array:
+    """Middles (48, 2) of equal cells of an image: columns and rows, pixels, row by row."""
+    columns, rows = CELLS
+    x = (np.arange(columns) + 0.5) * camera.width / columns
+    y = (np.arange(rows) + 0.5) * camera.height / rows
+    return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+
+
+def _directions(camera: CameraConfig) -> Array:
+    """Camera coordinates (48, 3), z = 1, of the points that the cells' middles show."""
+    slopes = slopes_of_pixels(camera, cell_pixels(camera))
+    return np.concatenate([slopes, np.ones((len(slopes), 1))], axis=1)
+
+
+def cell_depth_m(caster: RayCaster, camera: CameraConfig, world_from_cam: Array) -> Array:
+    """Depth (N, 48) along the optical axis of poses (N, 4, 4), metres; ``inf`` where nothing is."""
+    direction = _directions(camera)
+    length = np.linalg.norm(direction, axis=1)
+    parts = []
+    for poses in np.array_split(world_from_cam, -(-len(world_from_cam) // BLOCK)):
+        rays = np.einsum("nij,kj->nki", poses[:, :3, :3], direction)
+        starts = np.broadcast_to(poses[:, None, :3, 3], rays.shape)
+        hit_m = caster.first_hit_m(starts.reshape(-1, 3), rays.reshape(-1, 3))
+        parts.append(hit_m.reshape(len(poses), -1) / length)
+    return np.concatenate(parts)
+
+
+def dcre(predicted: PoseTable, reference: PoseTable, depth_m: Array, camera: CameraConfig) -> Array:
+    """DCRE (N,) of predictions, as shares of the image's diagonal.
+
+    Infinite where a prediction is no pose, not a number where a frame shows nothing.
+
+    Args:
+        predicted: poses of the frames.
+        reference: labels or true poses of the same frames.
+        depth_m: (N, 48) of the frames' cells, from :func:`cell_depth_m`.
+        camera: pinhole and lens.
+    """
+    errors = np.full(len(predicted), np.inf)
+    good = np.flatnonzero(is_pose(predicted))
+    for rows in np.array_split(good, -(-len(good) // BLOCK) or 1):
+        pair = [
+            pose_from_quat(t.position_m[rows], t.quat_wxyz[rows]) for t in (predicted, reference)
+        ]
+        errors[rows] = _moved(relative(*pair), depth_m[rows], camera)
+    return errors
+
+
+def _moved(estimate_from_reference: Array, depth_m: Array, camera: CameraConfig) -> Array:
+    """Mean over the cells (N,) of how far they move, as shares of the diagonal."""
+    seen = np.isfinite(depth_m)
+    points = _directions(camera) * np.where(seen, depth_m, 1.0)[..., None]
+    points = np.einsum("nij,nkj->nki", estimate_from_reference[:, :3, :3], points)
+    points += estimate_from_reference[:, None, :3, 3]
+    ahead = points[..., 2] > 0
+    slopes = points[..., :2] / np.where(ahead, points[..., 2], 1.0)[..., None]
+    offset = pixels_of_slopes(camera, slopes) - cell_pixels(camera)
+    share = np.linalg.norm(offset, axis=-1) / np.hypot(camera.width, camera.height)
+    share = np.where(ahead, np.fmin(share, 1.0), 1.0)  # fmin: a lens may fold over far outside
+    with np.errstate(invalid="ignore"):
+        return np.asarray((share * seen).sum(axis=1) / seen.sum(axis=1))
+
+
+def write_cell_depth(path: Path, depth_m: Array) -> None:
+    """Keep depths (N, 48) in whole millimetres, 0 where there is none."""
+    depth_mm = np.where(np.isfinite(depth_m), np.round(depth_m * 1000), 0).clip(0, 65535)
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        np.save(file, depth_mm.astype(np.uint16))
+
+
+def read_cell_depth(path: Path, n_frames: int) -> Array:
+    """Depths (n_frames, 48) of the first frames; ``inf`` where there is none.
+
+    Raises:
+        InputError: the file is missing, damaged or too short.
+    """
+    try:
+        depth_mm = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(f"{path}: cannot be read as depths ({error}); make it again") from None
+    if depth_mm.dtype != np.uint16 or depth_mm.shape[1:] != (CELLS[0] * CELLS[1],):
+        raise InputError(f"{path}: does not hold depths of {CELLS[0]} x {CELLS[1]} cells")
+    if len(depth_mm) < n_frames:
+        raise InputError(
+            f"{path}: holds {len(depth_mm)} frames, {n_frames} are needed; make it again"
+        )
+    depth_mm = depth_mm[:n_frames]
+    return np.where(depth_mm > 0, depth_mm / 1000.0, np.inf)
+
+
+def depth_of_images(paths: Iterable[FrameFile], camera: CameraConfig) -> Iterator[Array]:
+    """Depths (48,) of the cells' middles, read from the depth images of frames.
+
+    Raises:
+        InputError: an image cannot be read, or is of another size than the camera's.
+    """
+    column, row = cell_pixels(camera).astype(int).T
+    for path in paths:
+        depth_mm = read_depth_mm(path)
+        if depth_mm.shape != (camera.height, camera.width):
+            raise InputError(f"{path}: is not {camera.width} x {camera.height}; give --camera")
+        values = depth_mm[row, column]
+        yield np.where((values > 0) & (values < INVALID_MM), values / 1000.0, np.inf)

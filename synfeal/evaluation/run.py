@@ -1,0 +1,212 @@
+"""``synfeal evaluate`` as a function: anyone's poses against a data set."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from synfeal.bootstrap import FEWEST_PATHS
+from synfeal.config.collection import CameraConfig
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.errors import InputError
+from synfeal.evaluation.convention import checked_convention
+from synfeal.evaluation.estimates import CONVENTIONS, Convention, Estimates
+from synfeal.evaluation.formats import read_estimates
+from synfeal.evaluation.frames import Matched, ScoredFrames, match, read_scored_frames
+from synfeal.evaluation.metrics import (
+    MEANS,
+    ORIENTATION,
+    POSITION,
+    Metrics,
+    pose_errors,
+    summary,
+)
+from synfeal.evaluation.reprojection import DCRE_BOUNDS, dcre, depth_of_images
+from synfeal.geometry.alignment import umeyama_sim3
+from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.validate.camera import camera_of_dataset
+from synfeal.validate.listing import DEPTH
+
+Array = NDArray[np.float64]
+Align = Literal["none", "se3", "sim3"]
+
+# Endings of the names of errors against the data set's poses and against the second yardstick.
+DATASET, LABELS = "", "_labels"
+
+
+class Settings(NamedTuple):
+    """What a person may choose.
+
+    Attributes:
+        split: ``test``, ``train`` or ``all``.
+        align: whether estimates are first moved onto the yardstick, as a whole.
+        convention: a key of ``CONVENTIONS``; None takes the format's and checks it.
+        rate_hz: frames a second of time stamps.
+        labels: poses of the same frames as a second yardstick.
+        camera: calibration file, for the DCRE.
+    """
+
+    split: str = "test"
+    align: Align = "none"
+    convention: str | None = None
+    rate_hz: float = 30.0
+    labels: Path | None = None
+    camera: Path | None = None
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What was found.
+
+    Attributes:
+        frames: what was scored.
+        estimates: what was read.
+        convention: as which its poses were taken.
+        matched: which estimate is of which frame.
+        rotations: (N,) frames whose estimate is a rotation.
+        errors: (N,) of all frames by name, infinite where there is no pose: ``position_m``,
+            ``orientation_deg``, ``dcre``, and the same ending in ``_labels``.
+        metrics: medians, means, recalls, with limits where there are enough paths.
+        scales: by ending, the scale of the alignment.
+    """
+
+    frames: ScoredFrames
+    estimates: Estimates
+    convention: Convention
+    matched: Matched
+    rotations: NDArray[np.bool_]
+    errors: dict[str, Array]
+    metrics: Metrics
+    scales: dict[str, float]
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Endings of the yardsticks there are."""
+        return tuple(self.scales)
+
+
+def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
+    """Score poses.
+
+    Raises:
+        InputError: the data set, the poses or the labels cannot be read, or do not belong together.
+    """
+    frames = read_scored_frames(dataset, settings.split)
+    estimates, matched, convention = _read(poses, frames, settings, settings.convention)
+    predicted = _of_frames(estimates, matched, convention)
+    yardsticks = {DATASET: frames.world_from_cam}
+    if settings.labels:
+        yardsticks[LABELS] = _labels(settings.labels, frames, settings)
+    camera = camera_of_dataset(dataset, settings.camera).config
+    depth_m = _depth(frames, camera)
+    errors: dict[str, Array] = {}
+    scales: dict[str, float] = {}
+    for end, reference in yardsticks.items():
+        moved, scales[end] = aligned(predicted, reference, settings.align, poses)
+        tables = _table(moved, frames), _table(reference, frames)
+        errors |= {f"{name}{end}": values for name, values in pose_errors(*tables).items()}
+        if depth_m is not None:
+            errors[f"dcre{end}"] = dcre(*tables, depth_m, camera)
+    rotations = np.asarray(np.isfinite(predicted).all(axis=(1, 2)))
+    if not rotations.any():
+        raise InputError(f"{poses}: none of its poses is a rotation and a position")
+    metrics = _metrics(errors, yardsticks, frames)
+    return Evaluation(frames, estimates, convention, matched, rotations, errors, metrics, scales)
+
+
+def _read(
+    path: Path, frames: ScoredFrames, settings: Settings, convention: str | None
+) -> tuple[Estimates, Matched, Convention]:
+    """Estimates, which frame each is of, and as what they are taken."""
+    estimates = read_estimates(path)
+    matched = match(frames, estimates, path, settings.rate_hz)
+    if convention:
+        return estimates, matched, CONVENTIONS[convention]
+    if settings.align == "none":
+        there = matched.row >= 0
+        checked_convention(path, estimates, matched.row[there], frames.world_from_cam[there])
+    return estimates, matched, estimates.convention
+
+
+def _of_frames(estimates: Estimates, matched: Matched, convention: Convention) -> Array:
+    """Poses (N, 4, 4) of the frames, not a number where there is none."""
+    poses = estimates.world_from_cam(convention)[matched.row]
+    poses[matched.row < 0] = np.nan
+    return poses
+
+
+def _labels(path: Path, frames: ScoredFrames, settings: Settings) -> Array:
+    """Poses (N, 4, 4) of a second yardstick, which must have every frame."""
+    estimates, matched, convention = _read(path, frames, settings, None)
+    poses = _of_frames(estimates, matched, convention)
+    lost = np.flatnonzero(~np.isfinite(poses).all(axis=(1, 2)))
+    if len(lost):
+        raise InputError(
+            f"{path}: has no pose of {frames.names[lost[0]]} ({len(lost)} of {len(poses)} frames);"
+            " labels need one for every frame"
+        )
+    return poses
+
+
+def aligned(poses: Array, reference: Array, align: Align, path: Path) -> tuple[Array, float]:
+    """Poses (N, 4, 4) moved as a whole onto ``reference``, and the scale of that, as evo does.
+
+    Least squares over the positions of the frames that have a pose (Umeyama, PAMI 1991).
+
+    Raises:
+        InputError: positions do not determine the motion.
+    """
+    if align == "none":
+        return poses, 1.0
+    there = np.isfinite(poses).all(axis=(1, 2))
+    pair = poses[there, :3, 3], reference[there, :3, 3]
+    try:
+        scale, rotation, translation = umeyama_sim3(*pair, with_scale=align == "sim3")
+    except ValueError as error:
+        raise InputError(f"{path}: cannot be aligned ({error}); give --align none") from None
+    moved = poses.copy()
+    moved[:, :3, :3] = rotation @ poses[:, :3, :3]
+    moved[:, :3, 3] = scale * poses[:, :3, 3] @ rotation.T + translation
+    return moved, scale
+
+
+def _table(poses: Array, frames: ScoredFrames) -> PoseTable:
+    good = np.isfinite(poses).all(axis=(1, 2))
+    quat = np.full((len(poses), 4), np.nan)
+    quat[good] = quat_wxyz_of(poses[good])
+    return PoseTable(np.arange(len(poses)), frames.path, poses[:, :3, 3], quat)
+
+
+def _depth(frames: ScoredFrames, camera: CameraConfig) -> Array | None:
+    """Depth (N, 48) of the frames' cells; None where a frame has no depth image."""
+    paths = [frame.path(DEPTH) for frame in frames.frames]
+    if not all(path.is_file() for path in paths):
+        return None
+    read = depth_of_images(paths, camera)
+    return np.stack(list(tqdm(read, total=len(paths), unit="frame", desc="depth", leave=False)))
+
+
+def _metrics(errors: Mapping[str, Array], ends: Iterable[str], frames: ScoredFrames) -> Metrics:
+    """Medians and recalls of all frames; mean, RMSE and maximum of those that have a pose."""
+    metrics = summary(errors, frames.path)
+    if len(np.unique(frames.path)) < FEWEST_PATHS:
+        metrics = {k: v for k, v in metrics.items() if not k.endswith(("_low", "_high"))}
+    for end in ends:
+        for name in (POSITION, ORIENTATION):
+            values = errors[name + end]
+            there = values[np.isfinite(values)]
+            metrics |= {
+                f"{MEANS[name]}{end}": float(there.mean()),
+                f"{name}_rmse{end}": float(np.sqrt((there**2).mean())),
+                f"{name}_max{end}": float(there.max()),
+            }
+        if f"dcre{end}" in errors:
+            found = errors[f"dcre{end}"]
+            metrics |= {f"dcre_below_{b:g}{end}": float(np.mean(found < b)) for b in DCRE_BOUNDS}
+    return metrics

@@ -1,0 +1,343 @@
+"""``synfeal evaluate`` against evo's numbers, on files other programs wrote, and on bad ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from evo.core.metrics import APE, PoseRelation
+from evo.core.trajectory import PosePath3D
+
+from synfeal.cli import main
+from synfeal.evaluation.run import Settings, evaluate
+from tests.foreign_poses import (
+    PER_SEQUENCE,
+    WRITERS,
+    Array,
+    disturbed,
+    frame_names,
+    write_ace,
+    write_colmap,
+    write_dataset,
+    write_hloc,
+    write_localized,
+    write_table,
+    write_tree,
+    write_tum,
+)
+
+SIMILARITY = (1.7, np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), [3.0, -2.0, 5.0])
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("evaluate") / "set"
+    write_dataset(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def truth(tmp_path_factory: pytest.TempPathFactory) -> Array:
+    return write_dataset(tmp_path_factory.mktemp("truth"))
+
+
+@pytest.fixture(scope="module")
+def estimated(truth: Array) -> Array:
+    return disturbed(truth, 0.1, 4.0)
+
+
+def evo_errors(truth: Array, poses: Array, align: str) -> dict[str, Array]:
+    """Errors of each frame by evo's own code."""
+    reference, estimate = PosePath3D(poses_se3=list(truth)), PosePath3D(poses_se3=list(poses))
+    if align != "none":
+        estimate.align(reference, correct_scale=align == "sim3")
+    relations = {
+        "position_m": PoseRelation.translation_part,
+        "orientation_deg": PoseRelation.rotation_angle_deg,
+    }
+    errors = {}
+    for name, relation in relations.items():
+        ape = APE(relation)
+        ape.process_data((reference, estimate))
+        errors[name] = ape.error
+        errors |= {f"{name}_{key}": value for key, value in ape.get_all_statistics().items()}
+    return errors
+
+
+@pytest.mark.parametrize("align", ["none", "se3", "sim3"])
+@pytest.mark.parametrize("written_as", WRITERS)
+def test_errors_are_evos_whatever_the_file(
+    dataset: Path, truth: Array, estimated: Array, tmp_path: Path, written_as: str, align: str
+) -> None:
+    poses = estimated.copy()
+    if align != "none":  # the same trajectory in a world of another origin, heading and scale
+        scale, rotation, translation = SIMILARITY
+        scale = 1.0 if align == "se3" else scale
+        poses[:, :3, 3] = (scale * estimated[:, :3, 3]) @ rotation.T + translation
+        poses[:, :3, :3] = rotation @ estimated[:, :3, :3]
+    written = WRITERS[written_as](tmp_path / "poses", poses)
+    written = written.rename(written.with_suffix(".csv")) if "table" in written_as else written
+    found = evaluate(dataset, written, Settings(align=align))
+    expected = evo_errors(truth, poses, align)
+    # pose.txt has ten decimals: 1e-10 of a matrix entry is 1e-8 degrees, and more where it adds up.
+    decimals = written_as == "7-Scenes"
+    for name, rounded in {"position_m": 2e-9, "orientation_deg": 1e-7}.items():
+        atol = rounded if decimals else 1e-9
+        np.testing.assert_allclose(found.errors[name], expected[name], rtol=0, atol=atol)
+        for ours, theirs in {"": "median", "_mean": "mean", "_rmse": "rmse", "_max": "max"}.items():
+            assert found.metrics[name + ours] == pytest.approx(
+                expected[f"{name}_{theirs}"], rel=0, abs=atol
+            )
+
+
+def test_what_is_missing_or_no_rotation_counts_as_an_error_and_is_told(
+    dataset: Path, estimated: Array, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = write_hloc(tmp_path / "poses.txt", estimated).read_text().splitlines()
+    name, *numbers = lines[4].split()
+    lines[4] = " ".join([name, "0.5 0 0 0", *numbers[4:]])  # half a quaternion
+    lines[5] = f"{lines[5].split()[0]} nan nan nan nan nan nan nan"
+    extra = lines[6].replace("seq-02", "seq-01")
+    (tmp_path / "poses.txt").write_text("\n".join([*lines[:10], *lines[12:], extra]) + "\n")
+    out = tmp_path / "out"
+    assert main(["evaluate", str(dataset), str(tmp_path / "poses.txt"), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    for words in (
+        "an hloc result file, 23 poses, taken as cam_from_world with quaternions wxyz",
+        "24 frames, 22 of them with a pose",
+        "without a pose, which counts as a failure: seq-02/frame-000010, seq-02/frame-000011\n",
+        "no rotation, which counts likewise: seq-02/frame-000004, seq-02/frame-000005\n",
+        "1 poses of other frames are left out",
+    ):
+        assert words in printed
+    errors = pd.read_csv(out / "errors.csv")
+    lost = np.isinf(errors["position_m"]).to_numpy().nonzero()[0].tolist()
+    assert lost == [4, 5, 10, 11]
+    scores = pd.read_csv(out / "scores.csv").set_index("score")["value"]
+    ok = (errors["position_m"] < 0.5) & (errors["orientation_deg"] < 15)
+    assert scores["recall_50cm_15deg"] == pytest.approx(ok.mean())
+    assert scores["position_m"] == pytest.approx(np.median(errors["position_m"]))
+    assert (out / "errors.png").stat().st_size > 10_000
+
+
+def test_labels_are_a_second_yardstick(
+    dataset: Path, truth: Array, estimated: Array, tmp_path: Path
+) -> None:
+    labels = disturbed(truth, 0.3, 20.0, seed=5)
+    settings = Settings(labels=write_tree(tmp_path / "labels", labels))
+    found = evaluate(dataset, write_ace(tmp_path / "ace.txt", estimated), settings)
+    for end, reference in {"": truth, "_labels": labels}.items():
+        expected = evo_errors(reference, estimated, "none")
+        np.testing.assert_allclose(
+            found.errors[f"position_m{end}"], expected["position_m"], rtol=0, atol=2e-9
+        )
+
+
+def test_a_swapped_convention_is_noticed_and_can_be_given(
+    dataset: Path, estimated: Array, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    swapped = write_ace(tmp_path / "ace.txt", np.linalg.inv(estimated))
+    assert main(["evaluate", str(dataset), str(swapped)]) == 1
+    error = capsys.readouterr().err
+    assert "as world_from_cam-wxyz" in error
+    assert "--convention" in error
+    found = evaluate(dataset, swapped, Settings(convention="world_from_cam-wxyz"))
+    assert found.metrics["position_m"] < 0.5
+
+
+def lines_of(write: Callable[[Path, Array], Path]) -> Callable[[Path, Array], list[str]]:
+    def lines(folder: Path, poses: Array) -> list[str]:
+        return write(folder / "written", poses).read_text().splitlines()
+
+    return lines
+
+
+HLOC, ACE = lines_of(write_hloc), lines_of(write_ace)
+TABLE, LOCALIZED = lines_of(write_table), lines_of(write_localized)
+
+
+def tum(folder: Path, poses: Array) -> list[str]:
+    return (write_tum(folder / "written", poses) / "seq-02.txt").read_text().splitlines()
+
+
+def with_line(at: int, line: str) -> Callable[[list[str]], list[str]]:
+    return lambda lines: [*lines[:at], line, *lines[at + 1 :]]
+
+
+def cut(at: int, columns: int) -> Callable[[list[str]], list[str]]:
+    return lambda lines: with_line(at, " ".join(lines[at].split()[:columns]))(lines)
+
+
+def each(change: Callable[[str], str]) -> Callable[[list[str]], list[str]]:
+    return lambda lines: [change(line) for line in lines]
+
+
+BAD_LINES = {
+    "empty": (HLOC, lambda _: [], "holds no poses"),
+    "comments alone": (HLOC, lambda _: ["# nothing"], "holds no poses"),
+    "hloc, a column short": (HLOC, cut(3, 7), "line 4 has 7 columns, those above 8"),
+    "hloc, all short": (HLOC, each(lambda x: " ".join(x.split()[:7])), "a name and 6 numbers"),
+    "hloc, a column more": (HLOC, each(lambda x: x + " 1"), "a name and 8 numbers"),
+    "ACE, a column short": (ACE, cut(5, 10), "line 6 has 10 columns, those above 11"),
+    "ACE after hloc": (ACE, lambda x: [x[0].rsplit(" ", 3)[0], *x[1:]], "line 2 has 11 columns"),
+    "word for a number": (HLOC, each(lambda x: x[:-3] + "abc"), "is no number"),
+    "decimal commas": (
+        ACE,
+        each(lambda x: x.replace(".", ",").replace(",color,png", ".color.png")),
+        "is no number",
+    ),
+    "no frame in a name": (HLOC, with_line(2, "cat.jpg 1 0 0 0 1 2 3"), "names no frame"),
+    "no sequence": (HLOC, each(lambda x: x.partition("/")[2]), "does not say of which sequence"),
+    "twice": (HLOC, lambda x: [*x, x[4]], "seq-02/frame-000004 has two poses, line 5 and line 25"),
+    "of another data set": (HLOC, each(lambda x: x.replace("seq-0", "seq-4")), "none of its 24"),
+    "no rotation at all": (HLOC, each(lambda x: f"{x.split()[0]} 0 0 0 0 1 2 3"), "rotation"),
+    "KITTI": (HLOC, lambda _: ["1 0 0 0 0 1 0 0 0 0 1 0"] * 24, "KITTI"),
+    "a matrix": (HLOC, lambda _: ["1 0 0 0", "0 1 0 0", "0 0 1 0", "0 0 0 1"], "one matrix"),
+    "TUM of two sequences": (tum, lambda x: x, "do not say of which sequence"),
+    "TUM, a column short": (tum, cut(1, 7), "line 2 has 7 columns"),
+    "TUM, all short": (tum, each(lambda x: " ".join(x.split()[:7])), "7 numbers and no name"),
+    "TUM, a word": (tum, with_line(3, "0.1 1 2 3 0 0 zero 1"), "line 4: 'zero' is no number"),
+    "table, other header": (TABLE, with_line(0, "frame,x,y,z"), "the header must be"),
+    "table, header alone": (TABLE, lambda x: x[:1], "holds no poses below its header"),
+    "table, ragged": (TABLE, lambda x: [*x[:3], x[3] + ",1", *x[4:]], "cannot be read as CSV"),
+    "table, short row": (TABLE, with_line(2, "1,0,1.0"), "line 3: '' is no number"),
+    "table, a word": (TABLE, with_line(2, "1,0,a,0,0,1,0,0,0"), "line 3: 'a' is no number"),
+    "table, half a frame": (TABLE, with_line(2, "1.5,0,0,0,0,1,0,0,0"), "must be a whole number"),
+    "table, too long": (TABLE, lambda x: [*x, "99,0,0,0,0,1,0,0,0"], "frame 99 does not exist"),
+    "table, twice": (TABLE, lambda x: [*x, x[1]], "has two poses, line 2 and line 26"),
+    "localize, no frame": (LOCALIZED, with_line(1, "a.png,0,0,0,1,0,0,0"), "names no frame"),
+    "quaternions xyzw": (
+        HLOC,
+        each(lambda x: " ".join([(c := x.split())[0], *c[2:5], c[1], *c[5:]])),
+        "as cam_from_world-xyzw",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD_LINES)
+def test_a_malformed_file_is_refused_in_one_line(
+    dataset: Path,
+    estimated: Array,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    case: str,
+) -> None:
+    write, damage, words = BAD_LINES[case]
+    bad = tmp_path / "poses"
+    bad.write_text("".join(f"{line}\n" for line in damage(write(tmp_path, estimated))))
+    refused(dataset, bad, words, capsys)
+
+
+def refused(dataset: Path, bad: Path, words: str, capsys: pytest.CaptureFixture[str], *more: str):
+    assert main(["evaluate", str(dataset), str(bad), *more]) == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert words in captured.err
+    assert str(bad) in captured.err
+
+
+def missing(folder: Path, poses: Array) -> Path:
+    return folder / "nowhere.txt"
+
+
+def bare(folder: Path, poses: Array) -> Path:
+    (folder / "bare").mkdir()
+    return folder / "bare"
+
+
+def binary_garbage(folder: Path, poses: Array) -> Path:
+    (folder / "poses.txt").write_bytes(b"\xff\xfe\x00\x01" * 40)
+    return folder / "poses.txt"
+
+
+def model_twice(folder: Path, poses: Array) -> Path:
+    model = write_colmap(folder / "model", poses, binary=True)
+    write_colmap(folder / "text", poses, binary=False)
+    (folder / "text/images.txt").rename(model / "images.txt")
+    return model
+
+
+def model_and_tree(folder: Path, poses: Array) -> Path:
+    return write_tree(write_colmap(folder / "model", poses, binary=True), poses)
+
+
+def model_without_cameras(folder: Path, poses: Array) -> Path:
+    model = write_colmap(folder / "model", poses, binary=True)
+    (model / "cameras.bin").unlink()
+    return model
+
+
+def model_cut(folder: Path, poses: Array) -> Path:
+    model = write_colmap(folder / "model", poses, binary=True)
+    data = (model / "images.bin").read_bytes()
+    (model / "images.bin").write_bytes(data[: len(data) // 2])
+    return model
+
+
+def tree_of_three_rows(folder: Path, poses: Array) -> Path:
+    tree = write_tree(folder / "tree", poses)
+    (tree / "seq-02/frame-000003.pose.txt").write_text("1 0 0 0\n0 1 0 0\n0 0 1 0\n")
+    return tree
+
+
+BAD_PATHS = {
+    missing: "missing",
+    bare: "holds no seq-01",
+    binary_garbage: "cannot be read as poses",
+    model_twice: "images.txt and images.bin",
+    model_and_tree: "holds poses twice",
+    model_without_cameras: "cannot be read as a COLMAP model",
+    model_cut: "cannot be read as a COLMAP model",
+    tree_of_three_rows: "four rows of four",
+}
+
+
+@pytest.mark.parametrize("make", BAD_PATHS, ids=lambda make: make.__name__)
+def test_a_malformed_place_is_refused_in_one_line(
+    dataset: Path,
+    estimated: Array,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    make: Callable[[Path, Array], Path],
+) -> None:
+    refused(dataset, make(tmp_path, estimated), BAD_PATHS[make], capsys)
+
+
+def test_incomplete_labels_and_points_on_a_line_are_refused(
+    dataset: Path, truth: Array, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    labels = write_tree(tmp_path / "labels", truth)
+    (labels / "seq-03/frame-000002.pose.txt").unlink()
+    line = truth.copy()
+    line[:, :3, 3] = np.arange(len(line))[:, None] * [1.0, 2.0, 3.0]
+    poses = write_hloc(tmp_path / "poses.txt", line)
+    assert main(["evaluate", str(dataset), str(poses), "--labels", str(labels)]) == 1
+    assert "has no pose of seq-03/frame-000002" in capsys.readouterr().err
+    refused(dataset, poses, "cannot be aligned", capsys, "--align", "se3")
+
+
+def test_frames_are_found_by_their_numbers_where_there_is_one_sequence(
+    dataset: Path, truth: Array, tmp_path: Path
+) -> None:
+    """Numbered time stamps, and names without a sequence, of a split with one sequence."""
+    (dataset / "TrainSplit.txt").write_text("sequence1\nsequence2\n")
+    (dataset / "TestSplit.txt").write_text("sequence3\n")
+    part = truth[PER_SEQUENCE:]
+    hloc = write_hloc(tmp_path / "hloc.txt", truth).read_text().splitlines()[PER_SEQUENCE:]
+    (tmp_path / "hloc.txt").write_text("".join(f"{x.partition('/')[2]}\n" for x in hloc))
+    rows = [line.split(",") for line in TABLE(tmp_path, part)[1:]]
+    lines = [" ".join([r[0], *r[2:5], *r[6:], r[5]]) + "\n" for r in rows]
+    (tmp_path / "tum.txt").write_text("".join(lines))
+    try:
+        for name, rate in {"hloc.txt": 30.0, "tum.txt": 1.0}.items():
+            found = evaluate(dataset, tmp_path / name, Settings(rate_hz=rate))
+            assert found.metrics["position_m_max"] == pytest.approx(0, abs=1e-9)
+            assert found.frames.names[0] == "seq-03/frame-000000"
+            assert len(found.frames.names) == PER_SEQUENCE == len(frame_names()) // 2
+    finally:
+        (dataset / "TrainSplit.txt").write_text("sequence1\n")
+        (dataset / "TestSplit.txt").write_text("sequence2\nsequence3\n")
