@@ -14,6 +14,7 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/collection.smk"
 include: "workflow/rules/groundtruth.smk"
 include: "workflow/rules/training.smk"
+include: "workflow/rules/references.smk"
 include: "workflow/rules/evidence.smk"
 
 
@@ -39,6 +40,7 @@ rule all:
         f"{ROOT}/tables/label_error.csv",
         f"{ROOT}/tables/speed_vs_error.csv",
         f"{ROOT}/tables/hard_cases.csv",
+        f"{ROOT}/tables/references.csv",
         f"{ROOT}/figures",
         f"{ROOT}/provenance.json",
         expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
@@ -46,6 +48,7 @@ rule all:
         coverages(),
         manifests("groundtruth"),
         files_of_runs(),
+        files_of_references(),
 
 
 rule scenes:

@@ -16,6 +16,7 @@ import numpy as np
 import torch
 from PIL import Image
 
+from baselines.groundtruth.images import read_image
 from baselines.groundtruth.posegraph.graph import (
     Edge,
     PoseGraph,
@@ -168,8 +169,6 @@ def _pose(folder: Path) -> Path:
 
 
 def _read_rgbd(path: Path) -> object:
-    from baselines.groundtruth.rgbd.frames import read_image  # Open3D takes a second to load
-
     return read_image(path, CAMERA, "RGB")
 
 

@@ -93,6 +93,7 @@ def test_jobs_are_those_of_snakemake(tmp_path, name):
         **dict.fromkeys(("true_labels", "erroneous_labels"), "labels"),
         **dict.fromkeys(("table1_meshes", "table", "assistance"), "tables"),
         **dict.fromkeys(("label_error", "speed_vs_error", "hard_cases", "document"), "tables"),
+        "references_table": "tables",
         **dict.fromkeys(("rgbd-toro", "rgbd-g2o"), "posegraph"),
     }
     for rule, count in rules.items():

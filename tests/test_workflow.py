@@ -34,6 +34,11 @@ def test_default_profile_plans_the_papers_design(tmp_path: Path) -> None:
     assert jobs["posegraph"] == 2 * jobs["rgbd"]
     assert jobs["estimate"] == jobs["rgbd"]
     assert jobs["chain"] == 4
+    # Each data set once; structure where frames with depth are rendered: all but the larger sizes.
+    assert jobs["image_references"] == 27
+    assert jobs["structure_references"] == 20
+    assert jobs["descriptors"] == jobs["features"] == 2
+    assert jobs["correspondences"] == jobs["references_table"] == 1
     assert jobs["table"] + jobs["table1_meshes"] == 6
 
 

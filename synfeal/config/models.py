@@ -31,6 +31,7 @@ from synfeal.config.learning import (
     PretrainingConfig,
     TrainingConfig,
 )
+from synfeal.config.references import ExternalConfig, ReferencesConfig
 
 __all__ = [
     "MODELS",
@@ -42,6 +43,7 @@ __all__ = [
     "Config",
     "DatasetConfig",
     "DepthConfig",
+    "ExternalConfig",
     "GroundTruthConfig",
     "KinectFusionConfig",
     "LocalizerConfig",
@@ -50,6 +52,7 @@ __all__ = [
     "NonNegative",
     "PoseGraphConfig",
     "PretrainingConfig",
+    "ReferencesConfig",
     "RenderConfig",
     "RenderSpeedConfig",
     "RgbdConfig",
@@ -174,6 +177,9 @@ class Config(DatasetConfig):
     )
     groundtruth: GroundTruthConfig = Field(
         default_factory=GroundTruthConfig, description="label replacement"
+    )
+    references: ReferencesConfig = Field(
+        default_factory=ReferencesConfig, description="what localizers are compared with"
     )
     network: NetworkConfig = Field(default_factory=NetworkConfig, description="network shape")
     training: TrainingConfig = Field(description="training protocol")

@@ -9,9 +9,12 @@ from synfeal.config import Design
 from synfeal.files import atomic_path
 from synfeal.report.alive import check_scenes, sentences
 from synfeal.report.cells import Cell, read_cells
+from synfeal.report.crossing import crossing_findings
 from synfeal.report.layouts import grid_of
 from synfeal.report.markdown import markdown_of
 from synfeal.report.meshes import meshes_grid, read_mesh_facts
+from synfeal.report.references import NAME as REFERENCES
+from synfeal.report.references import read_references, references_grid
 
 INTRO = """\
 # Results of profile `{profile}`
@@ -42,7 +45,12 @@ def write_summary(design: Design, root: Path, out_md: Path) -> str:
     meshes = {
         scene: read_mesh_facts(root, scene) for scene in dict.fromkeys(r.scene for r in design.rows)
     }
+    references = root / "tables" / f"{REFERENCES}.csv"
     grids = [meshes_grid(meshes), *(grid_of(name, found) for name, found in cells.items())]
+    if references.exists():
+        table = read_references(references)
+        findings += crossing_findings(table)
+        grids.append(references_grid(table))
     parts = [
         INTRO.format(profile=root.name),
         "## Do the localizers localize?\n",

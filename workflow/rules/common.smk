@@ -16,6 +16,12 @@ from baselines.groundtruth.methods import (
     graph_methods,
     stages_of,
 )
+from baselines.references.registry import (
+    answered_by,
+    data_sets,
+    has_structure,
+    in_group,
+)
 from baselines.training.memory import training_mb
 from baselines.training.record import training_parameters
 from synfeal.config import Run, check_mesh_files, parse_config, read_design
@@ -49,6 +55,7 @@ SPLITS = ("train", "test")
 RUNS = DESIGN.runs
 TABLE_NAMES = ["table1_meshes", *DESIGN.tables]
 RECONSTRUCTED = tuple(METHODS)
+EXTERNAL = CONFIG.references.external
 
 
 wildcard_constraints:
@@ -64,6 +71,7 @@ wildcard_constraints:
     size=r"\w+",
     error_kind="|".join(INJECTED),
     reconstructed="|".join(RECONSTRUCTED),
+    external="|".join(EXTERNAL) or "none",
     frame_method="|".join(frame_methods()),
     graph_method="|".join(graph_methods()),
 
@@ -244,6 +252,54 @@ def estimated_sets():
     """Scene, size and method of every label set that is re-estimated, each once."""
     sets = {(e.scene, e.size, e.labels) for e in EXPERIMENTS}
     return sorted(s for s in sets if s[2] in RECONSTRUCTED)
+
+
+def smallest_train(scene):
+    """Training frames of the smallest size of a scene that the design uses."""
+    sizes = {e.size for e in EXPERIMENTS if e.scene == scene}
+    return min(CONFIG.n_frames(scene, size, "train") for size in sizes)
+
+
+REFERENCE_FILES = ("predictions.csv", "errors.csv", "metrics.json", "facts.json")
+
+
+def reference_files(stem, names):
+    """What the reference methods ``names`` leave behind for one data set."""
+    return [f"{stem}/{name}/{file}" for name in names for file in REFERENCE_FILES]
+
+
+def external_poses(wildcards):
+    """The file with the answers of somebody else's localizer, if it is not run here."""
+    pattern = EXTERNAL[wildcards.external].poses
+    return pattern.format(**placeholders(wildcards)) if pattern else []
+
+
+def placeholders(wildcards):
+    return {name: wildcards[name] for name in ("scene", "size", "labels")}
+
+
+def reference_sets(file):
+    """One file per reference method and data set of the design."""
+    return [
+        f"{ROOT}/references/{s}/{z}/{l}/{name}/{file}"
+        for s, z, l in data_sets(EXPERIMENTS)
+        for name in answered_by(EXPERIMENTS, (s, z, l), EXTERNAL)
+    ]
+
+
+def files_of_references():
+    """An output of every job that reference methods are answered by."""
+    scenes = sorted({e.scene for e in EXPERIMENTS})
+    sizes = sorted({(e.scene, e.size) for e in EXPERIMENTS})
+    return [
+        *(f"{ROOT}/references/{scene}/descriptors.npz" for scene in scenes),
+        *(
+            f"{ROOT}/references/{s}/{z}/correspondences.npz"
+            for s, z in sizes
+            if has_structure(EXPERIMENTS, s, z)
+        ),
+        *reference_sets("metrics.json"),
+    ]
 
 
 def label_figures():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,13 +9,12 @@ from typing import Any
 import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
-from PIL import Image
 
+from baselines.groundtruth.images import read_image
 from baselines.groundtruth.rgbd.sensor import frame_generator, kinect_depth
 from baselines.groundtruth.rgbd.surface import Surfaces, surfaces_of
 from synfeal.config.models import CameraConfig, DepthConfig
 from synfeal.dataset.archive import FrameFile
-from synfeal.dataset.png import IMAGE_DAMAGE
 from synfeal.errors import InputError
 
 # Depth images hold millimetres; 0 and 65535 mean that nothing was hit.
@@ -84,22 +82,3 @@ def open3d_depth(depth_m: NDArray[np.float32]) -> o3d.t.geometry.Image:
 def open3d_image(pixels: NDArray[Any]) -> o3d.t.geometry.Image:
     """An array (H, W) or (H, W, C) as an Open3D image."""
     return o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(np.ascontiguousarray(pixels)))
-
-
-def read_image(path: FrameFile, camera: CameraConfig, mode: str | None = None) -> NDArray[Any]:
-    """An image of the camera's size as an array, converted to ``mode`` if one is given.
-
-    Raises:
-        InputError: it cannot be read, or has another size.
-    """
-    try:
-        with Image.open(io.BytesIO(path.read_bytes())) as image:
-            pixels = np.asarray(image.convert(mode) if mode else image)
-    except IMAGE_DAMAGE as error:
-        raise InputError(f"{path}: cannot be read as an image ({error})") from None
-    if pixels.shape[:2] != (camera.height, camera.width):
-        raise InputError(
-            f"{path}: is {pixels.shape[1]}x{pixels.shape[0]}, the camera of the configuration"
-            f" {camera.width}x{camera.height}; collect the data set again"
-        )
-    return pixels

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.methods import METHODS, frame_methods, graph_methods, stages_of
 from baselines.localizers.names import backbone_of
+from baselines.references.registry import answered_by, data_sets, has_structure
 from synfeal.config import Config, Design, Experiment, Run
 from synfeal.config.experiments import FROM_SCRATCH, INJECTED
 from synfeal.config.models import CameraConfig
@@ -42,12 +43,19 @@ UNITS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(graph_methods(), ("frames",)),
     "chain": ("frames",),
     "score": ("frames",),
+    "descriptors": ("frames",),
+    "features": ("Mpx",),
+    "correspondences": ("frames",),
+    "image_references": ("frames",),
+    "structure_references": ("frames",),
     "claims": ("frames",),
 }
 # Stages from the meshes to the report.
 STAGES = (
     *("scene", "plan", "render_packed", "pack", "render", "dataset", "labels", "sfm"),
     *("rgbd", *frame_methods(), *graph_methods(), "chain", "pretrain", "train", "score"),
+    *("descriptors", "features", "correspondences", "image_references", "structure_references"),
+    "external_reference",
     *(
         "coverage",
         "render_speed",
@@ -60,7 +68,9 @@ STAGES = (
         "report_document",
     ),
 )
-SIDE_TABLES = ("assistance", "label_error", "speed_vs_error", "hard_cases", "document")
+SIDE_TABLES = (
+    *("assistance", "label_error", "speed_vs_error", "hard_cases", "references", "document"),
+)
 LAW_OF = {
     "render": RENDERING,
     "render_packed": RENDERING,
@@ -69,6 +79,9 @@ LAW_OF = {
 }
 # Bytes of memory per pixel of a batch: what peaks differ by between profiles (docs/cost.md).
 HELD_PER_PX = {"sfm": 10, "rgbd": 26, **dict.fromkeys(frame_methods(), 26)}
+
+# Of a frame's global descriptors, of one SIFT feature, of a test frame's matches (measured: 800).
+DESCRIPTOR_BYTES, FEATURE_BYTES, MATCHES_BYTES = 4 * (256 + 192), 128 + 24, 800 * 56
 
 
 @dataclass(frozen=True)
@@ -103,7 +116,11 @@ class Job:
 def run_jobs(config: Config, experiments: tuple[Experiment, ...]) -> list[Job]:
     """Every job of the target ``all``, in the order of the stages."""
     runs = _design(config, experiments).runs
-    jobs = [*experiment_jobs(config, experiments, runs), *_evidence(config, experiments, runs)]
+    jobs = [
+        *experiment_jobs(config, experiments, runs),
+        *_references(config, experiments),
+        *_evidence(config, experiments, runs),
+    ]
     return sorted(jobs, key=lambda job: STAGES.index(job.stage))
 
 
@@ -270,6 +287,33 @@ def _trainings(config: Config, runs: Sequence[Run]) -> Iterator[Job]:
         memory = packed_bytes(train, config.network.input_px) + work.held_bytes(batch)
         yield Job("train", run.directory, size, work.parameter_bytes, memory)
         yield Job("score", run.directory, (test,), score_bytes(test))
+
+
+def _references(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[Job]:
+    """What the localizers are compared with: once per scene, per size, and per data set."""
+    external = config.references.external
+    for scene, largest in _largest(config, sorted({e.scene for e in experiments})).items():
+        frames = sum(largest.values())
+        yield Job("descriptors", scene, (frames,), frames * DESCRIPTOR_BYTES)
+    for scene, size in sorted({(e.scene, e.size) for e in experiments}):
+        if has_structure(experiments, scene, size):
+            counts = {split: config.n_frames(scene, size, split) for split in SPLITS}
+            camera = config.groundtruth_camera
+            for split, frames in counts.items():
+                pixels = frames * camera.width * camera.height
+                held = frames * config.references.max_features * FEATURE_BYTES
+                yield Job("features", f"{scene}/{size}/{split}", (pixels / 1e6,), 0, held)
+            matches = counts["test"] * MATCHES_BYTES
+            yield Job("correspondences", f"{scene}/{size}", (counts["test"],), matches)
+    for scene, size, labels in data_sets(experiments):
+        n_test = config.n_frames(scene, size, "test")
+        groups = ["image", *(["structure"] if has_structure(experiments, scene, size) else [])]
+        for group in groups:
+            disk = pose_bytes(n_test) + score_bytes(n_test)
+            yield Job(f"{group}_references", f"{scene}/{size}/{labels}", (n_test,), disk)
+        for name in answered_by(experiments, (scene, size, labels), external):
+            if name in external:
+                yield Job("external_reference", f"{scene}/{size}/{labels}/{name}", (), disk)
 
 
 def _evidence(

@@ -15,6 +15,7 @@ from synfeal.report.figures import (
     frames,
     label_error,
     poses,
+    references_by_noise,
     render_speed,
     speed_vs_error,
     training_speed,
@@ -67,6 +68,12 @@ FIGURES: dict[str, Entry] = {
         "Median localization error against the noise in the labels, with 95 % limits: above "
         "against the noisy labels of the test set, the paper's protocol, beside the published "
         "values in grey; below the same predictions against the true poses.",
+    ),
+    "references_by_noise": Entry(
+        references_by_noise.draw,
+        "Median error against the true poses over the errors of the labels that a method learns or "
+        "builds its map from: localizers in colour, reference methods in grey; labels from images "
+        "stand in the order of their own error.",
     ),
     "error_by_size": Entry(
         error_by_size.draw,

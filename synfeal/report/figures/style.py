@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import cycle
 from typing import Any
 
@@ -40,6 +41,26 @@ SPLIT_STYLES: dict[str, Style] = {
     "test": {"color": BLUE, "marker": "^"},  # the darker one: drawn on top, and fewer
 }
 SCENE_STYLES: tuple[Style, ...] = tuple(MODEL_STYLES.values())
+# What localizers are read against: greys, told apart by markers and dashes.
+_REFERENCE_MARKS = (
+    ("0.60", "x", (0, (1, 1))),
+    ("0.60", "+", (0, (3, 1))),
+    ("0.75", "1", "-"),
+    ("0.25", "*", "-"),
+    ("0.25", "h", "--"),
+    ("0.25", "p", "-."),
+    ("0.45", "d", (0, (5, 2))),
+)
+
+
+def reference_styles(names: Iterable[str]) -> dict[str, Style]:
+    """A style for each reference method, in order."""
+    return {
+        name: {"color": color, "marker": marker, "linestyle": dashes, "zorder": 1.5}
+        for name, (color, marker, dashes) in zip(names, cycle(_REFERENCE_MARKS), strict=False)
+    }
+
+
 PUBLISHED: Style = {"color": "0.74", "linewidth": 0.9, "markersize": 3, "zorder": 1}
 TRUTH: Style = {"color": "0.68", "linewidth": 3.0, "linestyle": "-"}
 

@@ -1,0 +1,65 @@
+"""What the reference methods may look at, read when a method asks for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from baselines.references.correspondences import Correspondences, read_correspondences
+from baselines.references.vectors import Described, read_described
+from synfeal.config.models import CameraConfig
+from synfeal.dataset.pose_table import PoseTable, read_pose_table
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A data set as the reference methods see it.
+
+    Methods answer from ``train`` and from what is computed of images and depth. ``test_truth`` is
+    for the oracle, whose use of it is the point.
+
+    Attributes:
+        labels: folder of the label set: ``train.csv``, ``test.csv``.
+        truth: folder of the true poses, likewise.
+        files: what the methods of a group need, by name.
+        camera: of the frames that features were found in.
+        seed: of whatever is random.
+    """
+
+    labels: Path
+    truth: Path
+    files: dict[str, Path]
+    camera: CameraConfig
+    seed: int
+
+    @cached_property
+    def train(self) -> PoseTable:
+        """Labels of the training frames."""
+        return read_pose_table(self.labels / "train.csv")
+
+    @cached_property
+    def test_frames(self) -> PoseTable:
+        """Which test frames there are; its poses are what methods are asked for."""
+        return read_pose_table(self.labels / "test.csv")
+
+    @cached_property
+    def train_truth(self) -> PoseTable:
+        """True poses of the training frames."""
+        return read_pose_table(self.truth / "train.csv")
+
+    @cached_property
+    def test_truth(self) -> PoseTable:
+        """True poses of the test frames."""
+        return read_pose_table(self.truth / "test.csv")
+
+    @cached_property
+    def descriptors(self) -> Described:
+        """Global descriptors of the training and test images, by name, unit length."""
+        counts = len(self.train), len(self.test_frames)
+        return read_described(self.files["descriptors"], *counts)
+
+    @cached_property
+    def correspondences(self) -> Correspondences:
+        """Features of the test images matched with those of the training images."""
+        return read_correspondences(self.files["correspondences"])

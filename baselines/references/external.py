@@ -1,0 +1,115 @@
+"""A localizer of somebody else's: its command is run or its file is read, its answers are scored.
+
+It is given what the localizers of the paper are given: the training frames, their labels, and the
+test frames. No label of a test frame is passed to it.
+"""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from baselines.references.run import score_answers
+from synfeal.dataset.pose_table import COLUMNS, PoseTable, read_pose_table
+from synfeal.errors import InputError
+
+NEEDED = ("frame", *COLUMNS[2:])
+
+
+class Answers(NamedTuple):
+    """Where the answers lie, and the seconds it took to make them."""
+
+    path: Path
+    seconds: float
+
+
+def run_external(
+    command: str, files: Mapping[str, Path], named: Mapping[str, str], folder: Path
+) -> Answers:
+    """Run a command that writes a table of poses.
+
+    Args:
+        command: words as a shell splits them, with placeholders.
+        files: ``train_frames``, ``test_frames`` and ``train`` of the data set, ``test`` for the
+            number of its test frames alone.
+        named: ``scene``, ``size`` and ``labels``, which fill placeholders too.
+        folder: where ``answers.csv`` is written.
+
+    Raises:
+        InputError: the command has an unknown placeholder, fails, or writes nothing.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    out = folder / "answers.csv"
+    values = {
+        **named,
+        "train_frames": files["train_frames"],
+        "train_labels": files["train"],
+        "test_frames": files["test_frames"],
+        "n_test": len(read_pose_table(files["test"])),
+        "out": out,
+    }
+    begin = time.perf_counter()
+    try:
+        words = [word.format(**values) for word in shlex.split(command)]
+        subprocess.run(words, check=True)
+    except (KeyError, ValueError, IndexError) as error:
+        raise InputError(
+            f"references.external: command '{command}' cannot be filled ({error!r}); placeholders"
+            f" are {', '.join(values)}"
+        ) from None
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise InputError(
+            f"references.external: command '{command}' failed ({error}); the job's log has the rest"
+        ) from None
+    if not out.is_file():
+        raise InputError(f"references.external: command '{command}' wrote no {out}")
+    return Answers(out, time.perf_counter() - begin)
+
+
+def score_external(
+    answers: Answers, files: Mapping[str, Path], folder: Path, info: Mapping[str, Any]
+) -> None:
+    """Score answers against the labels ``files["test"]`` and the truth ``files["test_truth"]``.
+
+    Raises:
+        InputError: the answers cannot be read.
+    """
+    poses = read_answers(answers.path, read_pose_table(files["test"]))
+    labels, truth = files["test"].parent, files["test_truth"].parent
+    score_answers(poses, labels, truth, folder, info, answers.seconds)
+
+
+def read_answers(path: Path, frames: PoseTable) -> PoseTable:
+    """Answers for some test frames, in any order; NaN for frames that are not in the file.
+
+    Args:
+        path: CSV with at least the columns ``frame,tx,ty,tz,qw,qx,qy,qz``: ``world_from_cam``.
+        frames: which test frames there are.
+
+    Raises:
+        InputError: the file cannot be read, lacks a column, holds anything but numbers, or names a
+            frame twice or one that is not in the test set.
+    """
+    try:
+        found = pd.read_csv(path, usecols=list(NEEDED)).astype(np.float64)
+    except (OSError, ValueError) as error:
+        message = f"{path}: cannot be read as answers with columns {','.join(NEEDED)} ({error})"
+        raise InputError(message) from None
+    twice = found.frame[found.frame.duplicated()]
+    if len(twice):
+        raise InputError(f"{path}: frame {twice.iloc[0]:g} stands in it twice; keep one answer")
+    unknown = found.frame[~found.frame.isin(frames.frame)]
+    if len(unknown):
+        raise InputError(
+            f"{path}: frame {unknown.iloc[0]:g} is not in the test set of {len(frames)} frames,"
+            " which are counted from 0"
+        )
+    values = found.set_index("frame").reindex(frames.frame).to_numpy()
+    return PoseTable(frames.frame, frames.path, values[:, :3], values[:, 3:])

@@ -1,0 +1,120 @@
+"""SIFT features of a split, found once: they depend on images alone, so all label sets share them.
+
+OpenCV's implementation takes half the time of COLMAP's for the same matches.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from baselines.groundtruth.images import read_image
+from baselines.references.arrays import read_arrays, write_arrays
+from synfeal.camera.rays import slopes_of_pixels
+from synfeal.config.models import CameraConfig, ReferencesConfig
+from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.sevenscenes import read_depth_m
+
+log = logging.getLogger(__name__)
+Array = NDArray[np.float64]
+ARRAYS = ("start", "slope", "depth_m", "descriptor")
+
+
+@dataclass(frozen=True)
+class Features:
+    """Features of the frames of a split, one frame after the other.
+
+    Attributes:
+        start: (N + 1,) where the features of each frame begin; the last is their number K.
+        slope: (K, 2) x / z and y / z of the rays they lie on, lens distortion removed.
+        depth_m: (K,) along the optical axis, inf where there is none; of no use for test frames.
+        descriptor: (K, 128) uint8.
+    """
+
+    start: NDArray[np.int64]
+    slope: Array
+    depth_m: Array
+    descriptor: NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        return len(self.start) - 1
+
+    def of(self, frame: int) -> slice:
+        """The features of a frame."""
+        return slice(int(self.start[frame]), int(self.start[frame + 1]))
+
+    @property
+    def frame(self) -> NDArray[np.int64]:
+        """The frame (K,) of each feature."""
+        return np.repeat(np.arange(len(self)), np.diff(self.start))
+
+    @property
+    def point_m(self) -> Array:
+        """Points (K, 3) in camera coordinates; not finite where there is no depth."""
+        return np.column_stack([self.slope, np.ones(len(self.slope))]) * self.depth_m[:, None]
+
+    def roots(self, frame: int) -> NDArray[np.float32]:
+        """RootSIFT descriptors (k, 128) of a frame (Arandjelović and Zisserman, CVPR 2012)."""
+        descriptor = self.descriptor[self.of(frame)].astype(np.float32)
+        roots = np.sqrt(descriptor / np.maximum(descriptor.sum(axis=1, keepdims=True), 1))
+        return np.asarray(roots, dtype=np.float32)
+
+
+def find_features(
+    color_paths: Sequence[FrameFile],
+    depth_paths: Sequence[FrameFile] | None,
+    camera: CameraConfig,
+    cfg: ReferencesConfig,
+) -> Features:
+    """Features of frames, with their depth where there are depth images.
+
+    Raises:
+        InputError: an image cannot be read or is not of the camera's size.
+    """
+    cv2.setNumThreads(1)
+    sift = cv2.SIFT.create(
+        cfg.max_features, contrastThreshold=cfg.contrast, enable_precise_upscale=True
+    )
+    found = []
+    for index, color in enumerate(tqdm(color_paths, "features", unit="frame", mininterval=5)):
+        pixel, descriptor = _frame_features(sift, read_image(color, camera, "L"))
+        depth_m = np.full(len(pixel), np.inf)
+        if depth_paths is not None:
+            column, row = pixel.astype(int).T
+            depth_m = read_depth_m(depth_paths[index])[row, column].astype(np.float64)
+        found.append((slopes_of_pixels(camera, pixel), depth_m, descriptor))
+    slope, depth, descriptors = (np.concatenate(part) for part in zip(*found, strict=True))
+    start = np.cumsum([0, *(len(part[1]) for part in found)])
+    return Features(start, slope, depth, descriptors)
+
+
+def _frame_features(sift: Any, grey: NDArray[np.uint8]) -> tuple[Array, NDArray[np.uint8]]:
+    """Positions (k, 2) in pixels, the first pixel's centre at (0.5, 0.5), and descriptors."""
+    keypoints, descriptor = sift.detectAndCompute(grey, None)
+    height, width = grey.shape
+    pixel = np.array([point.pt for point in keypoints], dtype=np.float64).reshape(-1, 2) + 0.5
+    inside = ((pixel >= 0) & (pixel < [width, height])).all(axis=1)
+    descriptor = np.zeros((0, 128)) if descriptor is None else descriptor
+    return pixel[inside], descriptor[inside].astype(np.uint8)
+
+
+def write_features(path: Path, features: Features) -> None:
+    """Write features as arrays."""
+    write_arrays(path, {name: getattr(features, name) for name in ARRAYS})
+
+
+def read_features(path: Path) -> Features:
+    """Features that :func:`write_features` wrote.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    return Features(**read_arrays(path, ARRAYS))

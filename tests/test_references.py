@@ -1,0 +1,290 @@
+"""Reference methods against closed forms, naive twins, and rooms whose poses are known."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from pkgutil import resolve_name
+
+import numpy as np
+import pytest
+import torch
+import yaml
+
+from baselines.references.correspondences import match_test_frames, mutual_matches
+from baselines.references.descriptors import Vlad, dense_sift, residuals, thumbnails
+from baselines.references.evidence import Evidence
+from baselines.references.external import read_answers, run_external, score_external
+from baselines.references.features import find_features, read_features, write_features
+from baselines.references.oracle import METRES_PER_RADIAN, nearest_rows
+from baselines.references.registry import REFERENCES, in_group
+from baselines.references.run import answer_and_score
+from baselines.references.structure import on_depth
+from baselines.references.vectors import most_alike
+from synfeal.config.models import ReferencesConfig
+from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
+from synfeal.errors import InputError
+from synfeal.geometry.poses import pose_error, pose_from_quat, pose_matrix, position_error_m
+from synfeal.geometry.rotations import quat_wxyz_from_matrix, rotation_angle_rad, rotation_from_rpy
+from tests.room_scene import CAMERA, pose_at, write_room
+
+ROOT = Path(__file__).parent.parent
+CFG = ReferencesConfig(max_features=400)
+
+
+def frames(count, side=32, seed=0):
+    return np.random.default_rng(seed).integers(0, 200, (count, side, side, 3), dtype=np.uint8)
+
+
+def random_poses(count, seed):
+    rng = np.random.default_rng(seed)
+    quat_wxyz = rng.standard_normal((count, 4))
+    quat_wxyz /= np.linalg.norm(quat_wxyz, axis=1, keepdims=True)
+    index = np.arange(count)
+    return PoseTable(index, index // 3, rng.uniform(-2, 2, (count, 3)), quat_wxyz)
+
+
+@pytest.mark.parametrize("turn", range(4))
+def test_dense_sift_of_a_ramp_has_one_direction(turn):
+    ramp = np.rot90(np.broadcast_to(4 * np.arange(32), (32, 32)), turn)
+    picture = np.repeat(ramp[None, ..., None], 3, axis=3).astype(np.uint8)
+    inner = dense_sift(picture)[0].reshape(-1, 16, 8)
+    inner = inner[len(inner) // 2]  # a descriptor that touches no border
+    direction = [0, 6, 4, 2][turn]  # a turn to the left points the gradient up, against y
+    expected = torch.zeros(16, 8)
+    expected[:, direction] = 0.25  # sixteen equal cells, roots of an L1 norm of 1
+    torch.testing.assert_close(inner, expected, atol=1e-5, rtol=0)
+
+
+def test_vlad_is_the_sum_of_residuals_from_the_nearest_word():
+    words = torch.tensor([[0.0, 0.0], [10.0, 0.0]])
+    found = residuals(np.array([[[1.0, 0.0], [0.0, 2.0], [9.0, 0.0]]], np.float32), words)
+    # Word 0: (1, 0) + (0, 2), word 1: (-1, 0); each at length 1, then both together.
+    expected = np.array([1, 2, -np.sqrt(5), 0]) / np.sqrt(5) / np.sqrt(2)
+    np.testing.assert_allclose(found[0], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["thumbnail", "vlad"])
+def test_an_image_is_found_again_darker_and_shifted_in_tone(method):
+    train = frames(20)
+    describe = thumbnails if method == "thumbnail" else Vlad.learn(train, 3).describe
+    queries = (train[[4, 17, 9]] * 0.7 + 20).astype(np.uint8)
+    vectors = describe(train)
+    np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1, rtol=1e-5)
+    assert most_alike(vectors, describe(queries), 1)[:, 0].tolist() == [4, 17, 9]
+
+
+def test_most_alike_is_a_full_sort():
+    rng = np.random.default_rng(1)
+    train, test = (rng.standard_normal((n, 6)).astype(np.float32) for n in (30, 11))
+    expected = np.argsort(-(test @ train.T), axis=1)
+    assert (most_alike(train, test, 5) == expected[:, :5]).all()
+    assert most_alike(train, test, 99).shape == (11, 30)
+
+
+def test_the_oracle_finds_the_least_metres_plus_radians():
+    train, test = random_poses(40, 0), random_poses(9, 1)
+    cost = position_error_m(test.position_m[:, None], train.position_m)
+    angles = rotation_angle_rad(test.quat_wxyz[:, None], train.quat_wxyz[None])
+    expected = np.argmin(cost + METRES_PER_RADIAN * angles, axis=1)
+    assert (nearest_rows(train, test) == expected).all()
+
+
+def test_matches_are_those_of_a_naive_search():
+    rng = np.random.default_rng(2)
+    own = np.abs(rng.standard_normal((30, 8))).astype(np.float32)
+    other = np.concatenate([own[:20] + 0.05, np.abs(rng.standard_normal((15, 8)))]).astype("f4")
+    own, other = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (own, other))
+    expected = []
+    for i, vector in enumerate(own):
+        distance = np.linalg.norm(other - vector, axis=1)
+        j, second = np.argsort(distance)[:2]
+        back = np.argmin(np.linalg.norm(own - other[j], axis=1))
+        if distance[j] < 0.8 * distance[second] and back == i:
+            expected.append((i, j))
+    assert list(zip(*mutual_matches(own, other), strict=True)) == expected
+    assert expected
+    assert [len(part) for part in mutual_matches(own[:0], other)] == [0, 0]
+    assert [len(part) for part in mutual_matches(own, other[:1])] == [0, 0]
+
+
+TRAIN = [pose_at([-2 + 0.3 * i, -0.2 + 0.05 * i, 1.3], yaw_deg=3 * i - 9) for i in range(7)]
+TEST = [pose_at([-1.85, -0.2, 1.25], yaw_deg=-6), pose_at([-0.95, 0.1, 1.4], yaw_deg=5)]
+
+
+def table_of(poses):
+    poses = np.stack(poses)
+    index = np.arange(len(poses))
+    return PoseTable(index, index // 4, poses[:, :3, 3], quat_wxyz_from_matrix(poses[:, :3, :3]))
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory):
+    """Features of a furnished room's frames, matched; labels are the true poses."""
+    folder = tmp_path_factory.mktemp("room")
+    splits = {}
+    for split, poses in (("train", TRAIN), ("test", TEST)):
+        color, depth = write_room(folder / split, poses)
+        found = find_features(color, depth if split == "train" else None, CAMERA, CFG)
+        write_features(folder / f"{split}.npz", found)
+        splits[split] = read_features(folder / f"{split}.npz")
+        write_pose_table(folder / "labels" / f"{split}.csv", table_of(poses))
+    evidence = Evidence(folder / "labels", folder / "labels", {}, CAMERA, 0)
+    near = np.tile(np.arange(len(TRAIN)), (len(TEST), 1))
+    evidence.__dict__["correspondences"] = match_test_frames(*splits.values(), near)
+    return evidence
+
+
+def test_structure_finds_the_pose_of_every_test_frame(room):
+    position_m, angle_rad = pose_error(on_depth(room), np.stack(TEST))
+    assert position_m.max() < 0.02  # the depth is rounded to millimetres, features to half a pixel
+    assert np.degrees(angle_rad).max() < 0.5
+
+
+def test_answers_move_with_the_labels(room):
+    """Labels in another world give the same answers in that world: nothing else is looked at."""
+    moved = pose_matrix(rotation_from_rpy([0.3, -0.2, 1.9]), [4.0, -7.0, 0.5])
+    other = replace(room)
+    other.__dict__["correspondences"] = room.correspondences
+    other.__dict__["train"] = room.train.with_poses(moved @ room.train.world_from_cam)
+    np.testing.assert_allclose(on_depth(other), moved @ on_depth(room), atol=2e-3)
+
+
+def test_a_frame_without_matches_fails_and_is_counted(room, tmp_path):
+    found = room.correspondences
+    first = found.of(0)
+    bare = replace(found, point_m=found.point_m.copy())
+    bare.point_m[first] = np.nan
+    other = replace(room)
+    other.__dict__["correspondences"] = bare
+    answer_and_score(other, ["structure-depth"], tmp_path, {"scene": "room"})
+    folder = tmp_path / "structure-depth"
+    metrics = json.loads((folder / "metrics.json").read_text())
+    assert metrics["failed"] == 1
+    assert metrics["n_test"] == 2
+    assert metrics["reference"] == "structure-depth"
+    rows = (folder / "predictions.csv").read_text().splitlines()
+    assert rows[1].endswith("nan,nan,nan,nan,nan,nan,nan")
+    assert np.isfinite([float(cell) for cell in rows[2].split(",")]).all()
+
+
+def test_retrieval_and_oracle_answer_with_labels(room, tmp_path):
+    """On test images that are training images, retrieval is exact, against labels and all."""
+    labels = tmp_path / "labels"
+    half = np.radians(4) / 2
+    step = pose_from_quat([0.1, 0, 0], [np.cos(half), 0, np.sin(half), 0])
+    noisy = room.train.with_poses(room.train.world_from_cam @ step)
+    write_pose_table(labels / "train.csv", noisy)
+    write_pose_table(labels / "test.csv", noisy.first(4))
+    write_pose_table(tmp_path / "truth" / "train.csv", room.train)
+    write_pose_table(tmp_path / "truth" / "test.csv", room.train.first(4))
+    evidence = Evidence(labels, tmp_path / "truth", {}, CAMERA, 0)
+    vectors = thumbnails(frames(len(noisy)))
+    evidence.__dict__["descriptors"] = dict.fromkeys(("thumbnail", "vlad"), (vectors, vectors[:4]))
+    answer_and_score(evidence, in_group("images"), tmp_path / "out", {})
+    for name in in_group("images"):
+        answered = read_pose_table(tmp_path / "out" / name / "predictions.csv")
+        np.testing.assert_array_equal(answered.position_m, noisy.position_m[:4])
+        metrics = json.loads((tmp_path / "out" / name / "metrics.json").read_text())
+        assert metrics["position_m"] == 0
+        assert metrics["position_m_true"] == pytest.approx(0.1)
+        assert metrics["orientation_deg_true"] == pytest.approx(4.0)
+
+
+def test_a_damaged_file_is_refused_in_one_line(tmp_path):
+    path = tmp_path / "features.npz"
+    path.write_bytes(b"PK\x03\x04 cut short")
+    with pytest.raises(InputError, match=r"features.npz: cannot be read"):
+        read_features(path)
+
+
+def test_every_reference_is_where_the_registry_says():
+    assert all(callable(resolve_name(reference.answer)) for reference in REFERENCES.values())
+
+
+def external_files(tmp_path):
+    """Frames and labels of a data set whose test images are training images."""
+    train, truth = random_poses(12, 5), tmp_path / "truth"
+    np.save(tmp_path / "train.npy", frames(12))
+    np.save(tmp_path / "test.npy", frames(12)[[7, 2, 5]])
+    rows = [7, 2, 5]
+    test = PoseTable(np.arange(3), np.arange(3), train.position_m[rows], train.quat_wxyz[rows])
+    for folder in (tmp_path / "labels", truth):
+        write_pose_table(folder / "train.csv", train)
+        write_pose_table(folder / "test.csv", test)
+    return {
+        "train_frames": tmp_path / "train.npy",
+        "test_frames": tmp_path / "test.npy",
+        "train": tmp_path / "labels" / "train.csv",
+        "test": tmp_path / "labels" / "test.csv",
+        "test_truth": truth / "test.csv",
+    }
+
+
+def test_the_example_of_the_documentation_answers_and_is_scored(tmp_path):
+    files = external_files(tmp_path)
+    config = yaml.safe_load((ROOT / "examples/external.yaml").read_text())["references"]["external"]
+    command = config["nearest_grey"]["command"].replace("python ", f"{sys.executable} ", 1)
+    command = command.replace("examples/", f"{ROOT}/examples/")
+    folder = tmp_path / "out"
+    answers = run_external(command, files, {}, folder)
+    score_external(answers, files, folder, {})
+    found, labels = read_pose_table(folder / "predictions.csv"), read_pose_table(files["train"])
+    nearest = np.argsort(-grey_likeness(files), axis=1)[:, :3]
+    assert nearest[:, 0].tolist() == [7, 2, 5]
+    np.testing.assert_allclose(found.position_m, labels.position_m[nearest].mean(axis=1))
+    assert json.loads((folder / "metrics.json").read_text())["failed"] == 0
+
+
+def grey_likeness(files):
+    """Correlation of test and training images."""
+    train, test = (np.load(files[f"{split}_frames"]).mean(3) for split in ("train", "test"))
+    train, test = (part.reshape(len(part), -1) for part in (train, test))
+    return np.corrcoef(np.concatenate([test, train]))[: len(test), len(test) :]
+
+
+def test_answers_may_be_incomplete_and_in_any_order(tmp_path):
+    frames = random_poses(4, 0)
+    path = tmp_path / "mine.csv"
+    path.write_text("frame,note,tx,ty,tz,qw,qx,qy,qz\n3,x,1,2,3,1,0,0,0\n1,y,4,5,6,0,1,0,0\n")
+    found = read_answers(path, frames)
+    assert np.isnan(found.position_m[[0, 2]]).all()
+    assert np.isnan(found.quat_wxyz[[0, 2]]).all()
+    np.testing.assert_array_equal(found.position_m[[1, 3]], [[4, 5, 6], [1, 2, 3]])
+    np.testing.assert_array_equal(found.quat_wxyz[[1, 3]], [[0, 1, 0, 0], [1, 0, 0, 0]])
+
+
+HEADER = "frame,tx,ty,tz,qw,qx,qy,qz\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (None, "cannot be read"),
+        ("frame,tx,ty,tz\n0,1,2,3\n", "columns frame,tx,ty,tz,qw"),
+        (HEADER + "0,1,2,3,1,0,0,zero\n", "cannot be read"),
+        (HEADER + "0,1,2,3,1,0,0,0\n0,1,2,3,1,0,0,0\n", "frame 0 stands in it twice"),
+        (HEADER + "4,1,2,3,1,0,0,0\n", "frame 4 is not in the test set of 4"),
+    ],
+)
+def test_answers_that_cannot_be_used_are_refused_in_one_line(tmp_path, text, words):
+    path = tmp_path / "mine.csv"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(InputError, match=words) as refusal:
+        read_answers(path, random_poses(4, 0))
+    assert str(path) in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("touch {nowhere}", "placeholders are"),
+        ("false", "failed"),
+        ("no-such-program {out}", "failed"),
+        ("true", "wrote no"),
+    ],
+)
+def test_commands_that_fail_are_refused_in_one_line(tmp_path, command, words):
+    with pytest.raises(InputError, match=words):
+        run_external(command, external_files(tmp_path), {}, tmp_path / "out")

@@ -1,0 +1,184 @@
+# What localizers are compared with. Descriptors, features and matches depend on images alone: they
+# are found once per scene or data set and serve all of its label sets.
+REFERENCE = f"{ROOT}/references/{{scene}}/{{size}}/{{labels}}"
+REFERENCE_LOG = "{scene}/{size}/{labels}"
+
+
+rule descriptors:
+    input:
+        train=f"{ROOT}/frames/{{scene}}/train.npy",
+        test=f"{ROOT}/frames/{{scene}}/test.npy",
+    output:
+        descriptors=f"{ROOT}/references/{{scene}}/descriptors.npz",
+    log:
+        f"{ROOT}/logs/descriptors/{{scene}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/descriptors/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(3000),
+    params:
+        learned_from=lambda w: smallest_train(w.scene),
+        seed=lambda w: seed_of(CONFIG.seed, "descriptors", w.scene),
+    script:
+        "../scripts/descriptors.py"
+
+
+rule features:
+    input:
+        sequences=lambda w: sequence_dirs(
+            w.scene,
+            "groundtruth",
+            w.split,
+            CONFIG.n_frames(w.scene, w.size, w.split),
+        ),
+    output:
+        features=temp(f"{ROOT}/references/{{scene}}/{{size}}/features-{{split}}.npz"),
+    log:
+        f"{ROOT}/logs/features/{{scene}}/{{size}}/{{split}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/features/{{scene}}/{{size}}/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(3000),
+    params:
+        n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
+        camera=dump(CONFIG.groundtruth_camera),
+        references=dump(CONFIG.references),
+    script:
+        "../scripts/features.py"
+
+
+rule correspondences:
+    input:
+        descriptors=rules.descriptors.output.descriptors,
+        train=f"{ROOT}/references/{{scene}}/{{size}}/features-train.npz",
+        test=f"{ROOT}/references/{{scene}}/{{size}}/features-test.npz",
+    output:
+        matches=f"{ROOT}/references/{{scene}}/{{size}}/correspondences.npz",
+    log:
+        f"{ROOT}/logs/correspondences/{{scene}}/{{size}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/correspondences/{{scene}}/{{size}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(3000),
+    params:
+        retrieved=CONFIG.references.retrieved,
+    script:
+        "../scripts/correspondences.py"
+
+
+rule image_references:
+    input:
+        descriptors=rules.descriptors.output.descriptors,
+        train=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
+        test=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
+        train_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
+        test_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
+    output:
+        reference_files(REFERENCE, in_group("images")),
+    log:
+        f"{ROOT}/logs/image_references/{REFERENCE_LOG}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/image_references/{REFERENCE_LOG}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(2000),
+    params:
+        group="images",
+        camera=dump(CONFIG.network_camera),
+        seed=lambda w: seed_of(CONFIG.seed, "references", w.scene, w.size, w.labels),
+    script:
+        "../scripts/references.py"
+
+
+rule structure_references:
+    input:
+        correspondences=rules.correspondences.output.matches,
+        train=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
+        test=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
+        train_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
+        test_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
+    output:
+        reference_files(REFERENCE, in_group("structure")),
+    log:
+        f"{ROOT}/logs/structure_references/{REFERENCE_LOG}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/structure_references/{REFERENCE_LOG}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(3000),
+    params:
+        group="structure",
+        camera=dump(CONFIG.groundtruth_camera),
+        seed=lambda w: seed_of(CONFIG.seed, "references", w.scene, w.size, w.labels),
+    script:
+        "../scripts/references.py"
+
+
+rule external_reference:
+    input:
+        poses=external_poses,
+        train_frames=f"{ROOT}/frames/{{scene}}/train.npy",
+        test_frames=f"{ROOT}/frames/{{scene}}/test.npy",
+        train=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
+        test=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
+        train_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
+        test_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
+    output:
+        reference_files(REFERENCE, ["{external}"]),
+    log:
+        f"{ROOT}/logs/external_reference/{REFERENCE_LOG}/{{external}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/external_reference/{REFERENCE_LOG}/{{external}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(4000),
+    params:
+        method=lambda w: dump(EXTERNAL[w.external], exclude={"title", "labels"}),
+        named=placeholders,
+    script:
+        "../scripts/external_reference.py"
+
+
+rule references_table:
+    input:
+        metrics=reference_sets("metrics.json"),
+        errors=reference_sets("errors.csv"),
+        facts=reference_sets("facts.json"),
+        localizers=all_metrics(),
+        localizer_errors=errors_of(RUNS),
+    output:
+        csv=report(
+            f"{ROOT}/tables/references.csv",
+            caption="../report/references.rst",
+            category="Tables",
+        ),
+        tex=f"{ROOT}/tables/references.tex",
+    log:
+        f"{ROOT}/logs/tables/references.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/references.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(1000),
+    params:
+        design=dump(DESIGN),
+        external={name: dump(method) for name, method in EXTERNAL.items()},
+    script:
+        "../scripts/references_table.py"
