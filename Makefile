@@ -13,7 +13,7 @@ QUALITY := $(VENV)/quality
 RUN := PYTHONPATH=workflow/plugins $(BIN)/snakemake --cores $(CORES) --logger synfeal --quiet host
 export PYTHONHASHSEED := 0
 
-.PHONY: help reproduce smoke publish archive plan test test-slurm coverage mutate check format lock clean
+.PHONY: help reproduce smoke start publish archive plan test test-slurm coverage mutate check format lock clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -24,6 +24,10 @@ reproduce: $(INSTALLED)  ## install everything, then make every table (results/m
 
 smoke: $(INSTALLED)  ## every rule and every model at toy size (results/smoke)
 	$(RUN) --configfile config/smoke.yaml -- all
+
+start: $(INSTALLED)  ## train the backbones anew that pretrained runs start from (docs/start.md)
+	$(BIN)/snakemake --cores $(CORES) --configfile config/start.yaml -- start
+	$(BIN)/python -m baselines.localizers.backbones.shipped results/start
 
 publish: $(INSTALLED)  ## track what PROFILE's run made (results/published), and the pages' numbers from it
 	$(BIN)/python -m synfeal.report.publish --profile $(PROFILE)

@@ -24,6 +24,7 @@ localrules:
     datasets,
     labels,
     runs,
+    start,
     tables,
     rescored,
 
@@ -72,6 +73,11 @@ rule labels:
 rule runs:
     input:
         files_of_runs(),
+
+
+rule start:
+    input:
+        expand(f"{ROOT}/pretrained/{{backbone}}.pt", backbone=["googlenet", "resnet34"]),
 
 
 rule tables:

@@ -15,7 +15,7 @@ from synfeal.config.models import LocalizerConfig, NetworkConfig, TrainingConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 
 NETWORK = NetworkConfig(input_px=32, width=0.125)
-HYPER = LocalizerConfig(learning_rate=4e-3, dropout=0.0, beta=1.0, s_orientation=-1.0)
+HYPER = LocalizerConfig(learning_rate=2e-3, dropout=0.0, beta=1.0, s_orientation=-1.0)
 TRAINING = TrainingConfig(batch_size=16, samples_seen={}, device="cpu")
 PX = NETWORK.input_px
 CPU = torch.device("cpu")

@@ -13,13 +13,14 @@ from baselines.localizers.backbones.channels import scaled_channels
 from baselines.localizers.backbones.googlenet import GoogLeNet
 from baselines.localizers.backbones.inception_v3 import InceptionV3
 from baselines.localizers.backbones.resnet import ResNet34
+from baselines.localizers.backbones.shipped import BACKBONES, ship, shipped_weights_path
 from baselines.localizers.backbones.weights import (
     build_backbone,
     imagenet_weights_path,
     load_backbone_weights,
 )
 from baselines.localizers.names import backbone_of
-from baselines.training.pretrain import PretextLocalizer
+from baselines.training.pretrain import RoomsNetwork
 from synfeal.config.learning import INCEPTION_V3_MIN_PX
 from synfeal.config.models import MODELS, NetworkConfig
 from synfeal.errors import InputError
@@ -243,14 +244,38 @@ def test_weights_that_are_there_are_not_downloaded(tmp_path, monkeypatch):
 
 
 @all_backbones
-def test_every_backbone_can_learn_the_pretext(name):
-    localizer = PretextLocalizer(name, 0.125)
-    (prediction,) = localizer(torch.randn(2, 3, 80, 80))
-    (prediction.position_m.sum() + prediction.quat_wxyz.sum()).backward()
-    assert all(p.grad is not None for p in localizer.backbone.parameters())
+def test_every_backbone_learns_rooms_each_with_a_regressor_of_its_own(name):
+    network = RoomsNetwork(name, 0.125, 3)
+    features = network(torch.randn(4, 3, 80, 80))
+    poses = network.heads(features, torch.tensor([0, 2, 2, 0]))
+    (poses.position_m.sum() + poses.quat_wxyz.sum()).backward()
+    assert all(p.grad is not None for p in network.backbone.parameters())
+    used = network.heads.poses.weight.grad.view(3, 7, -1).abs().amax((1, 2)) > 0
+    assert used.tolist() == [True, False, True]
 
 
 def test_every_backbone_is_one_of_a_localizer():
     networks = [NetworkConfig(backbone=name) for name in ("googlenet", "inception_v3")]
     named = {backbone_of(model, network) for model in MODELS for network in networks}
     assert named == set(weights.IMAGENET_FILES)
+
+
+def test_shipped_weights_are_those_that_were_trained_to_half_a_precision(tmp_path):
+    results, directory = tmp_path / "results", tmp_path / "shipped"
+    trained = {name: build_backbone(name, 0.125) for name in BACKBONES}
+    (results / "pretrained").mkdir(parents=True)
+    directory.mkdir()
+    for name, backbone in trained.items():
+        torch.save(backbone.state_dict(), results / "pretrained" / f"{name}.pt")
+    ship(results, directory)
+    for name, backbone in trained.items():
+        loaded = build_backbone(name, 0.125)
+        load_backbone_weights(loaded, shipped_weights_path(name, directory))
+        for key, value in loaded.state_dict().items():
+            torch.testing.assert_close(value, backbone.state_dict()[key], rtol=1e-3, atol=1e-4)
+    with pytest.raises(InputError, match=r"inception_v3 are shipped.*choose googlenet"):
+        shipped_weights_path("inception_v3", directory)
+    file = directory / "googlenet.safetensors"
+    file.write_bytes(file.read_bytes()[:-1] + b"x")
+    with pytest.raises(InputError, match=r"googlenet\.safetensors: is not the file"):
+        shipped_weights_path("googlenet", directory)

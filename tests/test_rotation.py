@@ -24,8 +24,8 @@ from baselines.training.rotation import (
     rotation_of,
 )
 from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.config.models import AugmentationConfig, CameraConfig
-from synfeal.dataset.packed import fit_frame
+from synfeal.config.models import AugmentationConfig, CameraConfig, NetworkConfig
+from synfeal.dataset.packed import View, fit_frame
 from synfeal.errors import InputError
 from synfeal.render import open_renderer
 from tests.render_backends import PYOPENGL_WARNS
@@ -37,6 +37,7 @@ PX = 64
 # Unequal focal lengths and a principal point off the centre, so that none can stand for another.
 CAMERA = CameraConfig(width=128, height=96, fx=110.0, fy=118.0, cx=60.0, cy=52.0)
 TURNS_DEG = [(8.0, 0.0, 0.0), (0.0, 8.0, 0.0), (0.0, 0.0, 15.0), (-5.0, 6.0, -12.0)]
+NETWORK = NetworkConfig(input_px=PX)
 # Columns and rows that are inside both images for all of these turns.
 INSIDE = slice(20, PX - 20)
 
@@ -49,7 +50,7 @@ def frame_camera(camera: CameraConfig) -> FrameCamera:
 
 def rotation(seed: int = 0, tilt_deg: float = 8.0, roll_deg: float = 15.0) -> RandomRotation:
     """For packed frames of ``CAMERA``."""
-    intrinsics = packed_intrinsics(frame_camera(CAMERA), PX)
+    intrinsics = packed_intrinsics(frame_camera(CAMERA), NETWORK)
     augmentation = AugmentationConfig(tilt_deg=tilt_deg, roll_deg=roll_deg)
     return RandomRotation(intrinsics, PX, augmentation, seed)
 
@@ -123,7 +124,7 @@ def test_draws_fill_the_box_and_repeat_with_the_seed() -> None:
     identity = torch.tensor([[1.0, 0.0, 0.0, 0.0]]).expand(4000, 4)
     images = torch.zeros(4000, 3, 1, 1).expand(4000, 3, 1, 1)
     small = RandomRotation(
-        packed_intrinsics(frame_camera(CAMERA), 1),
+        packed_intrinsics(frame_camera(CAMERA), NETWORK),
         1,
         AugmentationConfig(tilt_deg=8.0, roll_deg=15.0),
         0,
@@ -142,29 +143,32 @@ def test_draws_fill_the_box_and_repeat_with_the_seed() -> None:
 def test_no_angles_or_no_pinhole_camera(tmp_path: Path) -> None:
     frames, record = tmp_path / "train.npy", tmp_path / "train.json"
     turned = AugmentationConfig(roll_deg=5.0)
-    assert random_rotation(frames, PX, AugmentationConfig(), 0) is None
+    assert random_rotation(frames, NETWORK, AugmentationConfig(), 0) is None
     with pytest.raises(InputError, match=r"train\.json: says nothing of the camera"):
-        random_rotation(frames, PX, turned, 0)
+        random_rotation(frames, NETWORK, turned, 0)
     camera = frame_camera(CAMERA).model_dump()
     record.write_text(json.dumps({"camera": camera | {"distortion": [0.1, 0, 0, 0, 0]}}))
     with pytest.raises(InputError, match=r"distortion.*training\.augmentation"):
-        random_rotation(frames, PX, turned, 0)
+        random_rotation(frames, NETWORK, turned, 0)
     record.write_text(json.dumps({"camera": camera}))
-    assert random_rotation(frames, PX, turned, 0) is not None
+    assert random_rotation(frames, NETWORK, turned, 0) is not None
 
 
+@pytest.mark.parametrize("view", ["square", "whole"])
 @pytest.mark.parametrize(("width", "height"), [(128, 96), (96, 128), (640, 480), (65, 65)])
-def test_packed_intrinsics_are_those_of_the_packed_image(width: int, height: int) -> None:
+def test_packed_intrinsics_are_those_of_the_packed_image(
+    width: int, height: int, view: View
+) -> None:
     """A dot at a known direction is found where the packed intrinsics project it to."""
     camera = FrameCamera(width=width, height=height, fx=90.0, fy=80.0, cx=width / 2, cy=height / 2)
-    packed = packed_intrinsics(camera, PX)
+    packed = packed_intrinsics(camera, NETWORK.model_copy(update={"view": view}))
     for dx, dy in itertools.product((-0.15, 0.2), (-0.1, 0.12)):
         u, v = camera.fx * dx + camera.cx, camera.fy * dy + camera.cy
         x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
         spread_px = 2.0 * min(width, height) / PX
         blob = 255 * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * spread_px**2))
         image = Image.fromarray(np.repeat(blob.round().astype(np.uint8)[..., None], 3, axis=2))
-        small = fit_frame(image, PX)[..., 0].astype(float)
+        small = fit_frame(image, PX, view)[..., 0].astype(float)
         weights = small / small.sum()
         centres = np.arange(PX) + 0.5
         assert (weights.sum(0) * centres).sum() == pytest.approx(

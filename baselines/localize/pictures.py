@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageOps
 
-from synfeal.dataset.packed import fit_frame
+from synfeal.dataset.packed import View, fit_frame
 from synfeal.errors import InputError
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -30,7 +30,7 @@ def find_pictures(named: Iterable[Path]) -> list[Path]:
     return [path for name in named for path in (_in(name) if name.is_dir() else [_file(name)])]
 
 
-def read_picture(path: Path, input_px: int) -> NDArray[np.uint8]:
+def read_picture(path: Path, input_px: int, view: View = "square") -> NDArray[np.uint8]:
     """Pixels (input_px, input_px, 3), made by the function that packs training frames.
 
     A picture is first turned upright by its EXIF orientation; rendered frames have none, so the
@@ -43,7 +43,7 @@ def read_picture(path: Path, input_px: int) -> NDArray[np.uint8]:
         with Image.open(path, formats=("PNG", "JPEG")) as image:
             problem = _problem(image)
             if not problem:
-                return fit_frame(_rgb(ImageOps.exif_transpose(image)), input_px)
+                return fit_frame(_rgb(ImageOps.exif_transpose(image)), input_px, view)
     except Exception as error:  # a damaged file is refused in every way there is
         problem = f"cannot be read as a PNG or JPEG picture ({error})"
     raise InputError(f"{path}: {problem}; leave it out or mend it")

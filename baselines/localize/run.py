@@ -115,11 +115,12 @@ def _predict_all(
 
 def _batch(trained: TrainedLocalizer, pictures: Sequence[Path], read_s: list[float]) -> Tensor:
     """Pictures as (B, 3, px, px) uint8, channels last; notes how long each took to read."""
-    px = trained.description.network.input_px
+    network = trained.description.network
+    px = network.input_px
     frames = np.empty((len(pictures), px, px, 3), np.uint8)
     for frame, path in zip(frames, pictures, strict=True):
         watch = Stopwatch()
-        frame[:] = read_picture(path, px)
+        frame[:] = read_picture(path, px, network.view)
         read_s.append(watch.seconds)
     return torch.from_numpy(frames).to(trained.device).permute(0, 3, 1, 2)
 

@@ -14,7 +14,11 @@ from baselines.localizers.losses import PosePrediction
 N_FEATURES = 2048
 
 
-class PoseRegressor(nn.Module):
+class OutputLayer(nn.Module):
+    """What predicts; every layer before it is hidden. Optimisers tell the two apart."""
+
+
+class PoseRegressor(OutputLayer):
     """Two linear maps from a feature (B, n_in) to position and quaternion."""
 
     def __init__(self, n_in: int) -> None:

@@ -27,14 +27,20 @@ class FrameCamera(Strict):
     distortion: tuple[Finite, ...] = Field((), description="`k1, k2, p1, p2, k3`")
 
     @property
-    def short_side_fov_deg(self) -> float:
-        """Field of view along the short side, all of which a localizer sees but one pixel."""
-        focal, centre, side = (
-            (self.fx, self.cx, self.width)
-            if self.width < self.height
-            else (self.fy, self.cy, self.height)
+    def fov_deg(self) -> tuple[float, float]:
+        """Field of view across and down."""
+        sides = ((self.fx, self.cx, self.width), (self.fy, self.cy, self.height))
+        across, down = (
+            math.degrees(math.atan(centre / focal) + math.atan((side - centre) / focal))
+            for focal, centre, side in sides
         )
-        return math.degrees(math.atan(centre / focal) + math.atan((side - centre) / focal))
+        return across, down
+
+    @property
+    def short_side_fov_deg(self) -> float:
+        """Field of view along the short side, all of which a square view keeps but one pixel."""
+        across, down = self.fov_deg
+        return across if self.width < self.height else down
 
 
 class ModelDescription(Strict):

@@ -10,7 +10,7 @@ from torch import Tensor
 from baselines.localizers.base import Localizer
 from baselines.training.data import ImageStatistics, LabelledFrames
 from baselines.training.device import Precision, autocast
-from baselines.training.optimizer import Schedule, optimizer_of
+from baselines.training.optimizer import Schedule, optimisation_of
 from baselines.training.order import BatchOrder
 from baselines.training.progress import HistoryRow, Progress
 from baselines.training.protocol import PROTOCOLS, Protocol
@@ -61,7 +61,7 @@ def fit(
         resume: where the state is kept; a training that finds its own there goes on with it.
     """
     device, steps = frames.images.device, schedule.steps
-    optimizer, scheduler = optimizer_of(protocol.schedule, localizer, schedule)
+    optimisation = optimisation_of(protocol.optimiser, localizer, schedule)
     order = BatchOrder(len(frames), schedule.batch_size, seed, protocol.order == "shuffled")
     progress = Progress(steps, schedule.batch_size, device)
     selection = Selection(protocol.selection, localizer, statistics, held_out, precision)
@@ -69,8 +69,7 @@ def fit(
     localizer.criterion.distance = protocol.distance
     parts: dict[str, Restorable] = {
         "localizer": localizer,
-        "optimizer": optimizer,
-        "scheduler": scheduler,
+        "optimisation": optimisation,
         "order": order,
         "progress": progress,
         "selection": selection,
@@ -89,11 +88,8 @@ def fit(
             with autocast(device, precision):
                 predictions = localizer(normalised)
             loss = localizer.loss(predictions, position_m, quat_wxyz)
-            optimizer.zero_grad()
-            loss.backward()  # type: ignore[no-untyped-call]
-            optimizer.step()
-            rate = float(scheduler.get_last_lr()[0])
-            scheduler.step()
+            rate = optimisation.learning_rate
+            optimisation.step(loss)
             progress.add(loss)
             errors = selection.evaluate() if progress.done in evaluations else None
             progress.end_step(rate, errors)

@@ -88,7 +88,7 @@ def train_localizer(
     _log_start(name, learned, held_out, protocol, samples_seen, device)
     settings = (name, network, hyper, training, protocol, samples_seen, seed)
     if augment is None and protocol.images == "turned":
-        augment = random_rotation(frames, network.input_px, training.augmentation, seed)
+        augment = random_rotation(frames, network, training.augmentation, seed)
     state = augment.state_dict() if augment else None
     resume = ResumeFile(
         out_model.with_name("resume.pt"),

@@ -1,32 +1,37 @@
-"""Weights that pretrained backbones start from: ImageNet's, or those of a pretext task.
+"""Weights that pretrained backbones start from: those shipped, ImageNet's, or new ones.
 
-The pretext is camera localization itself, in a room that no experiment uses: where ImageNet cannot
+New ones learn camera localization itself, in rooms that no experiment uses: where ImageNet cannot
 be downloaded, or no published weights fit a narrow network, it teaches features that carry over.
+One backbone learns all rooms at once; each room has a regressor of its own, because the same pose
+in another room is another picture.
 """
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from pathlib import Path
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
+from baselines.localizers.backbones.shipped import shipped_weights_path
 from baselines.localizers.backbones.weights import (
     Backbone,
     build_backbone,
     imagenet_weights_path,
     load_backbone_weights,
 )
-from baselines.localizers.base import Localizer
-from baselines.localizers.heads import PooledRegressor
+from baselines.localizers.heads import OutputLayer, PooledFeature
 from baselines.localizers.losses import LearnedWeightLoss, PosePrediction
 from baselines.localizers.names import BackboneName
 from baselines.training.checkpoint import save_atomically
-from baselines.training.data import image_statistics, read_labelled_frames
-from baselines.training.device import memory_errors, open_device
-from baselines.training.fit import fit
-from baselines.training.optimizer import Schedule
+from baselines.training.data import LabelledFrames, image_statistics, read_labelled_frames
+from baselines.training.device import autocast, memory_errors, open_device, precision_on
+from baselines.training.optimizer import Schedule, optimisation_of
+from baselines.training.order import BatchOrder
+from baselines.training.progress import Progress
+from baselines.training.resume import Restorable, ResumeFile, digest, stop_signals
 from baselines.training.rotation import random_rotation
 from synfeal.config.models import NetworkConfig, PretrainingConfig
 
@@ -35,27 +40,42 @@ log = logging.getLogger(__name__)
 WEIGHT_DECAY = 1e-4
 
 
-class PretextLocalizer(Localizer):
-    """A backbone, one regressor without dropout, learned weights."""
+class RoomHeads(OutputLayer):
+    """One linear regressor for each room."""
+
+    def __init__(self, n_in: int, n_rooms: int) -> None:
+        super().__init__()
+        self.poses = nn.Linear(n_in, 7 * n_rooms)
+
+    def forward(self, features: Tensor, room: Tensor) -> PosePrediction:
+        """Poses of features (B, n_in) in their rooms (B,)."""
+        poses = self.poses(features).view(len(features), -1, 7)
+        own = poses[torch.arange(len(features), device=features.device), room]
+        return PosePrediction(own[:, :3], own[:, 3:])
+
+
+class RoomsNetwork(nn.Module):
+    """A backbone, one feature, a regressor for each room, learned weights of the two errors."""
 
     backbone: Backbone
 
-    def __init__(self, backbone: BackboneName, width: float) -> None:
+    def __init__(self, backbone: BackboneName, width: float, n_rooms: int) -> None:
         super().__init__()
         self.backbone = build_backbone(backbone, width)
-        self.regressor = PooledRegressor(self.backbone.n_out, width, dropout=0.0)
+        self.feature = PooledFeature(self.backbone.n_out, width)
+        self.heads = RoomHeads(self.feature.n_out, n_rooms)
         self.criterion = LearnedWeightLoss(s_position=0.0, s_orientation=-1.0)
 
-    def forward(self, images: Tensor) -> list[PosePrediction]:
-        """One prediction."""
-        return [self.regressor(self.backbone(images)[-1])]
+    def forward(self, images: Tensor) -> Tensor:
+        """Features (B, n) of normalised images (B, 3, H, W)."""
+        features: Tensor = self.feature(self.backbone(images)[-1])
+        return features
 
 
 @memory_errors()
 def pretrain_backbone(
     backbone: BackboneName,
-    frames: Path | None,
-    labels: Path | None,
+    rooms: Sequence[tuple[Path, Path]],
     network: NetworkConfig,
     pretraining: PretrainingConfig,
     seed: int,
@@ -65,43 +85,100 @@ def pretrain_backbone(
 
     Args:
         backbone: which one.
-        frames: packed frames of the pretext scene; None with ``source: imagenet``.
-        labels: their true poses; None with ``source: imagenet``.
+        rooms: packed frames and true poses of each room; none unless ``source`` is ``rooms``.
         network: input side and width.
-        pretraining: where the weights come from and how long the pretext is trained.
-        seed: of the pretext's initial weights and order of frames.
+        pretraining: where the weights come from, and how long they are trained if they are new.
+        seed: of the initial weights, the order of frames and their rotations.
         out: state dict to write.
 
     Raises:
         InputError: a file cannot be used, or the ImageNet weights cannot be had.
         MemoryError: there is too little memory.
     """
-    if frames is None or labels is None:
-        trained = build_backbone(backbone, network.width)
-        load_backbone_weights(trained, imagenet_weights_path(backbone, pretraining.weights_dir))
+    if pretraining.source == "rooms":
+        trained = _train_on_rooms(backbone, rooms, network, pretraining, seed, out)
     else:
-        trained = _train_pretext(backbone, frames, labels, network, pretraining, seed)
+        trained = build_backbone(backbone, network.width)
+        path = (
+            shipped_weights_path(backbone)
+            if pretraining.source == "shipped"
+            else imagenet_weights_path(backbone, pretraining.weights_dir)
+        )
+        load_backbone_weights(trained, path)
     save_atomically(out, {name: value.cpu() for name, value in trained.state_dict().items()})
 
 
-def _train_pretext(
+def _train_on_rooms(
     backbone: BackboneName,
-    frames: Path,
-    labels: Path,
+    rooms: Sequence[tuple[Path, Path]],
     network: NetworkConfig,
     pretraining: PretrainingConfig,
     seed: int,
+    out: Path,
 ) -> Backbone:
     device = open_device("auto")
-    data = read_labelled_frames(frames, labels, network.input_px, device)
+    data, room = _read_rooms(rooms, network.input_px, device)
+    statistics = image_statistics(data.images)
     torch.manual_seed(seed)
-    localizer = PretextLocalizer(backbone, network.width)
-    localizer.place_on(device)
-    localizer.set_pose_prior(data.position_m.mean(0))
-    log.info("%s: %d frames of the pretext on %s", backbone, len(data), device)
+    student = RoomsNetwork(backbone, network.width, len(rooms))
+    student.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+    log.info("%s: %d frames of %d rooms on %s", backbone, len(data), len(rooms), device)
     schedule = Schedule(
         pretraining.samples_seen, pretraining.batch_size, pretraining.learning_rate, WEIGHT_DECAY
     )
-    augment = random_rotation(frames, network.input_px, pretraining.augmentation, seed)
-    fit(localizer, data, image_statistics(data.images), schedule, seed, augment=augment)
-    return localizer.backbone
+    # Not Muon: ten thousand of its steps leave kernels fifteen times as long, and channels that one
+    # image in a batch excites; what starts from there learns no faster than from scratch.
+    optimisation = optimisation_of("adamw", student, schedule)
+    order = BatchOrder(len(data), schedule.batch_size, seed)
+    progress = Progress(schedule.steps, schedule.batch_size, device)
+    augment = random_rotation(rooms[0][0], network, pretraining.augmentation, seed)
+    parts: dict[str, Restorable] = {
+        "student": student,
+        "optimisation": optimisation,
+        "order": order,
+        "progress": progress,
+    }
+    if augment is not None:
+        parts["augment"] = augment
+    resume = ResumeFile(
+        out.with_name(f"resume-{backbone}.pt"),
+        digest(network, pretraining, seed, student.state_dict(), statistics.mean),
+    )
+    resume.load(parts)
+    precision = precision_on(device, "auto")
+    with stop_signals() as stopped:
+        while not (stopped() or progress.ended):
+            chosen = order.next_batch().to(device)
+            images, position_m, quat_wxyz = data.batch(chosen)
+            normalised = statistics.normalise(images)
+            if augment is not None:
+                normalised, quat_wxyz = augment(normalised, quat_wxyz)
+            with autocast(device, precision):
+                features = student(normalised)
+            prediction = student.heads(features.float(), room[chosen])
+            loss = student.criterion(prediction, position_m, quat_wxyz)
+            rate = optimisation.learning_rate
+            optimisation.step(loss)
+            progress.add(loss)
+            progress.end_step(rate, None)
+            resume.save_if_due(parts, now=stopped())
+    resume.remove()
+    return student.backbone
+
+
+def _read_rooms(
+    rooms: Sequence[tuple[Path, Path]], input_px: int, device: torch.device
+) -> tuple[LabelledFrames, Tensor]:
+    """Frames of all rooms, positions relative to each room's mean, and whose frame each is."""
+    sets = [read_labelled_frames(frames, labels, input_px, device) for frames, labels in rooms]
+    lengths = torch.tensor([len(some) for some in sets], device=device)
+    return (
+        LabelledFrames(
+            torch.cat([some.images for some in sets]),
+            torch.cat([some.position_m - some.position_m.mean(0) for some in sets]),
+            torch.cat([some.quat_wxyz for some in sets]),
+            sets[0].path,
+            torch.arange(int(lengths.sum()), device=device),
+        ),
+        torch.repeat_interleave(torch.arange(len(sets), device=device), lengths),
+    )

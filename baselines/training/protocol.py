@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
+from baselines.training.optimizer import OptimiserName
 from synfeal.config.models import ModelName
 
 
@@ -17,15 +18,16 @@ class Protocol(NamedTuple):
             out of the training set, those on the ``test`` set; ``last`` keeps the last weights.
         distance: ``norm``: Euclidean distances, ``q`` and ``-q`` are one rotation. ``mse``: mean
             squared differences of coordinates, predicted quaternions normalised first.
-        schedule: ``one_cycle``: AdamW, the rate rises, then falls to nothing. ``halving``: Adam
-            with L2 regularisation of all parameters, the rate is halved at regular intervals.
+        optimiser: ``muon`` for kernels and AdamW for the rest, or ``adamw`` for all: the rate
+            rises, then falls to nothing. ``halving``: Adam with L2 regularisation of all
+            parameters, the rate is halved at regular intervals.
         images: ``turned``: by ``training.augmentation``; ``plain``: as they were collected.
     """
 
     order: Literal["shuffled", "collected"]
     selection: Literal["validation", "test", "last"]
     distance: Literal["norm", "mse"]
-    schedule: Literal["one_cycle", "halving"]
+    optimiser: OptimiserName
     images: Literal["turned", "plain"]
 
 
@@ -33,7 +35,7 @@ class Protocol(NamedTuple):
 # the test set is looked at after every epoch or every tenth one, here as often as the validation
 # paths; regressors start at the mean training position and incomplete batches are filled in both.
 PROTOCOLS: dict[Literal["corrected", "published"], Protocol] = {
-    "corrected": Protocol("shuffled", "validation", "norm", "one_cycle", "turned"),
+    "corrected": Protocol("shuffled", "validation", "norm", "muon", "turned"),
     "published": Protocol("collected", "test", "mse", "halving", "plain"),
 }
 

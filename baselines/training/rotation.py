@@ -18,7 +18,7 @@ from torch import Tensor, nn
 
 from baselines.training.description import FrameCamera, frame_camera
 from synfeal.camera.intrinsics import Intrinsics
-from synfeal.config.models import AugmentationConfig
+from synfeal.config.models import AugmentationConfig, NetworkConfig
 from synfeal.dataset.packed import crop_of
 from synfeal.errors import InputError
 
@@ -79,7 +79,7 @@ class RandomRotation:
 
 
 def random_rotation(
-    frames: Path, input_px: int, augmentation: AugmentationConfig, seed: int
+    frames: Path, network: NetworkConfig, augmentation: AugmentationConfig, seed: int
 ) -> RandomRotation | None:
     """For packed frames, by the record beside them; None where nothing is to be turned.
 
@@ -95,12 +95,12 @@ def random_rotation(
             f"{frames.with_suffix('.json')}: {reason}; images can only be turned through a known "
             "pinhole camera, so set training.augmentation to 0"
         )
-    return RandomRotation(packed_intrinsics(camera, input_px), input_px, augmentation, seed)
+    return RandomRotation(packed_intrinsics(camera, network), network.input_px, augmentation, seed)
 
 
-def packed_intrinsics(camera: FrameCamera, input_px: int) -> Intrinsics:
-    """Intrinsics, in pixels, of frames of ``camera`` that were made smaller and cropped."""
-    crop = crop_of((camera.width, camera.height), input_px)
+def packed_intrinsics(camera: FrameCamera, network: NetworkConfig) -> Intrinsics:
+    """Intrinsics, in pixels, of frames of ``camera`` as they are packed for ``network``."""
+    crop = crop_of((camera.width, camera.height), network.input_px, network.view)
     x, y = crop.width / camera.width, crop.height / camera.height
     return Intrinsics(
         camera.fx * x, camera.fy * y, camera.cx * x - crop.left, camera.cy * y - crop.top

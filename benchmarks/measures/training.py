@@ -19,7 +19,8 @@ from baselines.training.predict import BATCH, predict, predict_poses
 from baselines.training.protocol import PROTOCOLS, Protocol
 from baselines.training.score import pose_errors
 from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig, Strict, TrainingConfig
-from synfeal.dataset.pose_table import read_pose_table
+from synfeal.dataset.packed import read_packed
+from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.seeds import seed_of
 
 # Calls of a prediction that is timed; the first, which builds what is built on demand, is left out.
@@ -35,6 +36,9 @@ class Case(Strict):
     train_labels: Path = Field(description="pose table of them, or of the first of them")
     test_frames: Path = Field(description="packed frames that are held out")
     test_labels: Path = Field(description="pose table of them")
+    test_rows: str | None = Field(
+        None, pattern=r"^\d+-\d+$", description="which of them, first and last, if not all"
+    )
     weights: str | None = Field(
         None, description="of the backbone, whose name stands for {backbone}; none: from scratch"
     )
@@ -78,6 +82,7 @@ def run(case: Case, seed: int) -> dict[str, float]:
     """
     with tempfile.TemporaryDirectory(prefix="training-") as folder:
         model, predictions = Path(folder) / "model.pt", Path(folder) / "predictions.csv"
+        test_frames, test_labels = _test_set(case, Path(folder))
         wall_s, cpu_s = time.perf_counter(), time.process_time()
         train_localizer(
             case.model,
@@ -91,13 +96,13 @@ def run(case: Case, seed: int) -> dict[str, float]:
             seed_of(seed, "train"),
             model,
             Path(folder) / "history.csv",
-            test=(case.test_frames, case.test_labels),
+            test=(test_frames, test_labels),
             protocol=case.exchanged,
         )
         wall_s, cpu_s = time.perf_counter() - wall_s, time.process_time() - cpu_s
-        predict_poses(model, case.test_frames, case.test_labels, predictions)
-        errors = pose_errors(read_pose_table(predictions), read_pose_table(case.test_labels))
-        one, many = (predict_ms(model, case.test_frames, count) for count in (1, BATCH))
+        predict_poses(model, test_frames, test_labels, predictions)
+        errors = pose_errors(read_pose_table(predictions), read_pose_table(test_labels))
+        one, many = (predict_ms(model, test_frames, count) for count in (1, BATCH))
     return {
         "train_cpu_s": cpu_s,
         "train_wall_s": wall_s,
@@ -106,6 +111,20 @@ def run(case: Case, seed: int) -> dict[str, float]:
         **{name: float(np.median(values)) for name, values in errors.items()},
         "failed": float(np.isinf(errors["position_m"]).sum()),
     }
+
+
+def _test_set(case: Case, folder: Path) -> tuple[Path, Path]:
+    """Frames and labels of the test set, copied where only some of its rows are meant."""
+    if case.test_rows is None:
+        return case.test_frames, case.test_labels
+    first, last = map(int, case.test_rows.split("-"))
+    frames, labels = folder / "test.npy", folder / "test.csv"
+    np.save(frames, read_packed(case.test_frames)[first : last + 1])
+    table, rows = read_pose_table(case.test_labels), slice(first, last + 1)
+    path = table.path[rows]
+    count = np.arange(len(path), dtype=np.int64)
+    write_pose_table(labels, PoseTable(count, path, table.position_m[rows], table.quat_wxyz[rows]))
+    return frames, labels
 
 
 def predict_ms(model: Path, frames: Path, count: int) -> float:

@@ -11,7 +11,8 @@ from synfeal.cli.options import Command, Options
 
 if TYPE_CHECKING:
     from baselines.localize.run import Localized
-    from baselines.training.description import ModelDescription
+    from baselines.training.description import FrameCamera, ModelDescription
+    from synfeal.dataset.packed import View
 
 OPTIONS: Options = (
     (
@@ -25,8 +26,8 @@ OPTIONS: Options = (
             "nargs": "+",
             "metavar": "IMAGE",
             "help": "PNG or JPEG of any size, or a directory of them; their short side must have"
-            " the field of view of the training frames' short side, as cropping to a square and"
-            " shrinking is all that is done to them",
+            " the field of view of the training frames' short side, or be whole as those were: what"
+            " the model says, cropping and shrinking is all that is done to them",
         },
     ),
     (
@@ -62,8 +63,16 @@ def model_text(description: ModelDescription) -> str:
         view = "the field of view of its training frames is not known"
     else:
         lens = ", through the same distorting lens" if any(camera.distortion) else ""
-        view = f"the short side must see {camera.short_side_fov_deg:.1f} degrees{lens}"
+        view = f"{_seen(camera, description.network.view)}{lens}"
     return f"{description.localizer}, pictures shrunk to {px} x {px} pixels; {view}"
+
+
+def _seen(camera: FrameCamera, view: View) -> str:
+    """What of the world a picture must show."""
+    if view == "square":
+        return f"the short side must see {camera.short_side_fov_deg:.1f} degrees"
+    across, down = camera.fov_deg
+    return f"they must see {across:.1f} x {down:.1f} degrees, as the training frames do"
 
 
 def poses_text(done: Localized) -> str:

@@ -100,8 +100,11 @@ class SceneConfig(Strict):
     source: Literal["procedural", "mesh"] = Field(
         description="`procedural` builds the stand-in of this name; `mesh` reads `path`"
     )
-    builder: Literal["large_room", "sanctuary", "pretext_room"] | None = Field(
+    builder: Literal["large_room", "sanctuary", "random_room"] | None = Field(
         None, description="procedural scenes: which stand-in to build"
+    )
+    seed: Annotated[int, Field(ge=0, lt=2**63)] | None = Field(
+        None, description="procedural scenes: their own seed, in place of the profile's"
     )
     path: Path | None = Field(
         None, description="mesh scenes: the file to read (.glb, .gltf, .obj, .ply)"
@@ -138,7 +141,7 @@ class SceneConfig(Strict):
     def _check(self) -> Self:
         if self.source == "procedural" and self.builder is None:
             raise ValueError(
-                "builder: a procedural scene needs one of large_room, sanctuary, pretext_room"
+                "builder: a procedural scene needs one of large_room, sanctuary, random_room"
             )
         if self.source == "mesh" and self.path is None:
             raise ValueError("path: a scene with `source: mesh` needs the path of its mesh file")

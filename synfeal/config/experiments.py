@@ -158,9 +158,9 @@ def _parse(row: dict[str, str], where: str, config: Config) -> Experiment:
         raise InputError(f"{where}: {describe(error)}") from None
     if experiment.scene not in config.scenes:
         raise InputError(f"{where}: scene '{experiment.scene}': allowed: {sorted(config.scenes)}")
-    if config.pretraining.source == "pretext" and experiment.scene == config.pretraining.scene:
+    if experiment.scene in config.rooms:
         raise InputError(
-            f"{where}: scene '{experiment.scene}': is what pretraining.scene trains on"
+            f"{where}: scene '{experiment.scene}': is a room that backbones are pretrained on"
         )
     sizes = config.scenes[experiment.scene].sizes
     if experiment.size not in sizes:

@@ -7,10 +7,12 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from synfeal.config.collection import Count, Finite, Fraction, NonNegative, Positive, Slug, Strict
+from synfeal.config.collection import Count, Finite, Fraction, NonNegative, Positive, Strict
 from synfeal.config.tables import Repetitions, once
 
 InceptionName = Literal["googlenet", "inception_v3"]
+# Of the backbones that come with the package.
+SHIPPED_WIDTH = 0.25
 # A smaller image leaves nothing of its last maps: its reductions have no padding.
 INCEPTION_V3_MIN_PX = 75
 
@@ -25,6 +27,11 @@ class NetworkConfig(Strict):
     )
     input_px: Annotated[int, Field(ge=32, le=1024)] = Field(
         224, description="side of the square input"
+    )
+    view: Literal["square", "whole"] = Field(
+        "square",
+        description="what of a frame the network sees: its central `square`, as in the authors'"
+        " code, or the `whole` of it, squeezed into a square",
     )
     width: Annotated[float, Field(gt=0, le=1)] = Field(
         1.0, description="factor on the channels of every backbone; only 1 loads ImageNet weights"
@@ -44,7 +51,7 @@ class LocalizerConfig(Strict):
     """Hyper-parameters of one localizer."""
 
     learning_rate: Positive = Field(
-        1e-4, description="peak learning rate of the one-cycle schedule"
+        1e-4, description="highest learning rate; Muon's is 20 times as high"
     )
     weight_decay: NonNegative = Field(1e-4, description="decoupled weight decay")
     dropout: Fraction = Field(0.5, description="dropout before the regressors")
@@ -86,7 +93,7 @@ class TrainingConfig(Strict):
     protocol: Literal["corrected", "published"] = Field(
         "corrected",
         description="`corrected`: frames shuffled, weights chosen on training paths that are held"
-        " out, Euclidean norms, one cycle of the learning rate; `published`, as in the Synfeal"
+        " out, Euclidean norms, Muon, a rate that rises and falls; `published`, as in the Synfeal"
         " authors' code: frames in the order of collection, weights chosen on the test set, mean"
         " squared errors, learning rate halved at intervals",
     )
@@ -106,7 +113,9 @@ class TrainingConfig(Strict):
         description="`corrected`: random rotations of the camera",
     )
     precision: Literal["auto", "float32", "bfloat16"] = Field(
-        "auto", description="what networks compute in; `auto`: bfloat16 on a GPU, else float32"
+        "auto",
+        description="what networks compute in; `auto`: bfloat16 where the device multiplies in it,"
+        " else float32",
     )
     batch_size: Count = Field(32, description="images per step")
     samples_seen: dict[str, Count] = Field(description="images shown in all, by data set size")
@@ -122,7 +131,7 @@ class TrainingConfig(Strict):
         if self.patience is not None and self.protocol == "corrected":
             raise ValueError(
                 "patience: must be left out with `protocol: corrected`, whose learning rate follows"
-                " one cycle of a length known beforehand; lower samples_seen instead"
+                " a course of a length known beforehand; lower samples_seen instead"
             )
         return self
 
@@ -130,15 +139,17 @@ class TrainingConfig(Strict):
 class PretrainingConfig(Strict):
     """What `init: pretrained` starts from."""
 
-    source: Literal["pretext", "imagenet"] = Field(
-        "imagenet", description="`imagenet` downloads weights; `pretext` trains on another scene"
+    source: Literal["shipped", "rooms", "imagenet"] = Field(
+        "shipped",
+        description="`shipped`: weights that come with the package (docs/start.md), of a quarter of"
+        " the width; `rooms` makes such weights anew, on all scenes with `builder: random_room`;"
+        " `imagenet` downloads weights",
     )
-    scene: Slug = Field("pretext_room", description="pretext: the scene to train the backbones on")
-    frames: Count = Field(2000, description="pretext: frames to render (not scaled)")
-    samples_seen: Count = Field(64_000, description="pretext: images shown in all")
-    batch_size: Count = Field(32, description="pretext: images per step")
-    learning_rate: Positive = Field(1e-3, description="pretext: peak learning rate")
+    frames: Count = Field(3000, description="rooms: frames to render of each (not scaled)")
+    samples_seen: Count = Field(64_000, description="rooms: images shown in all")
+    batch_size: Count = Field(64, description="rooms: images per step")
+    learning_rate: Positive = Field(1e-3, description="rooms: peak learning rate")
     augmentation: AugmentationConfig = Field(
-        default_factory=AugmentationConfig, description="pretext: random rotations of the camera"
+        default_factory=AugmentationConfig, description="rooms: random rotations of the camera"
     )
     weights_dir: Path = Field(Path("weights"), description="imagenet: where the files are kept")

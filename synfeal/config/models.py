@@ -25,6 +25,7 @@ from synfeal.config.collection import (
 )
 from synfeal.config.dataset import DatasetConfig
 from synfeal.config.learning import (
+    SHIPPED_WIDTH,
     AugmentationConfig,
     LocalizerConfig,
     NetworkConfig,
@@ -197,22 +198,31 @@ class Config(DatasetConfig):
             raise ValueError(f"localizers: {', '.join(missing)} missing; all five are compared")
         if self.pretraining.source == "imagenet" and self.network.width != 1.0:
             raise ValueError("network.width: must be 1 when pretraining.source is imagenet")
-        if self.pretraining.source == "pretext" and self.pretraining.scene not in self.scenes:
+        if self.pretraining.source == "shipped" and self.network.width != SHIPPED_WIDTH:
             raise ValueError(
-                f"pretraining.scene: '{self.pretraining.scene}' is not one of {sorted(self.scenes)}"
+                f"network.width: must be {SHIPPED_WIDTH} when pretraining.source is shipped"
             )
         unknown = sorted(set(self.datasets or ()) - set(self.scenes))
         if unknown:
             raise ValueError(f"datasets: '{unknown[0]}' is not one of {sorted(self.scenes)}")
+        if self.pretraining.source == "rooms" and not self.rooms:
+            raise ValueError("pretraining.source: rooms needs scenes with `builder: random_room`")
         camera = self.network_camera
-        if min(camera.width, camera.height) <= self.network.input_px:
+        least = self.network.input_px + (self.network.view == "square")
+        if min(camera.width, camera.height) < least:
             raise ValueError(
-                f"network_camera: both sides must exceed network.input_px ({self.network.input_px})"
+                f"network_camera: both sides must be at least {least} pixels for"
+                f" network.input_px {self.network.input_px} and this network.view"
             )
         return self
 
+    @property
+    def rooms(self) -> list[str]:
+        """Scenes that backbones are pretrained on: no table has them."""
+        return [name for name, scene in self.scenes.items() if scene.builder == "random_room"]
+
     def n_largest(self, scene: str, split: str) -> int:
         """Frames planned and rendered for a split: those of the scene's largest size."""
-        if self.pretraining.source == "pretext" and scene == self.pretraining.scene:
+        if scene in self.rooms:
             return self.pretraining.frames if split == "train" else 2
         return max(self.n_frames(scene, size, split) for size in self.scenes[scene].sizes)

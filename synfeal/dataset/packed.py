@@ -8,7 +8,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +35,10 @@ def new_packed(out: Path, n_frames: int, input_px: int) -> Iterator[NDArray[np.u
         frames.flush()
 
 
-def pack_frames(sequences: list[Path], input_px: int, out: Path) -> None:
+def pack_frames(sequences: list[Path], input_px: int, out: Path, view: View = "square") -> None:
     """Write the colour frames of the sequences, in order, as one ``.npy``.
 
-    uint8 (N, input_px, input_px, 3). As in the published code the short side is resized to
-    ``input_px + 1`` and the centre is cut out; the resize averages (no aliasing).
+    uint8 (N, input_px, input_px, 3); see :func:`fit_frame`.
 
     Raises:
         InputError: a sequence has no frames, or a frame cannot be read.
@@ -47,7 +46,7 @@ def pack_frames(sequences: list[Path], input_px: int, out: Path) -> None:
     paths = frame_paths(sequences, "color.png")
     with new_packed(out, len(paths), input_px) as packed:
         for index, path in enumerate(paths):
-            packed[index] = fit_frame(_open(path), input_px)
+            packed[index] = fit_frame(_open(path), input_px, view)
 
 
 def join_packed(parts: list[Path], out: Path) -> None:
@@ -89,6 +88,9 @@ def read_packed(path: Path) -> np.memmap[Any, np.dtype[np.uint8]]:
     return frames
 
 
+View = Literal["square", "whole"]
+
+
 class Crop(NamedTuple):
     """A frame made smaller, and where in it the square lies that localizers see; pixels."""
 
@@ -98,16 +100,22 @@ class Crop(NamedTuple):
     top: int
 
 
-def crop_of(size: tuple[int, int], input_px: int) -> Crop:
-    """Of a frame of ``size`` (width, height): short side ``input_px + 1``, a square amid it."""
+def crop_of(size: tuple[int, int], input_px: int, view: View = "square") -> Crop:
+    """Of a frame of ``size`` (width, height), what of it localizers see.
+
+    ``square``: as in the published code, the short side becomes ``input_px + 1`` and the centre is
+    cut out. ``whole``: all of it, squeezed into the square; nothing the camera saw is lost.
+    """
+    if view == "whole":
+        return Crop(input_px, input_px, 0, 0)
     scale = (input_px + 1) / min(size)
     width, height = (max(input_px + 1, round(side * scale)) for side in size)
     return Crop(width, height, (width - input_px) // 2, (height - input_px) // 2)
 
 
-def fit_frame(image: Image.Image, input_px: int) -> NDArray[np.uint8]:
-    """Pixels (input_px, input_px, 3): short side resized to ``input_px + 1``, then centre crop."""
-    width, height, left, top = crop_of(image.size, input_px)
+def fit_frame(image: Image.Image, input_px: int, view: View = "square") -> NDArray[np.uint8]:
+    """Pixels (input_px, input_px, 3) of a picture as :func:`crop_of` says; resizing averages."""
+    width, height, left, top = crop_of(image.size, input_px, view)
     small = image.resize((width, height), Image.Resampling.BILINEAR)
     return np.asarray(small.crop((left, top, left + input_px, top + input_px)))
 

@@ -8,9 +8,14 @@ from pathlib import Path
 
 from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.dataset.manifest import camera_record, versions
-from synfeal.dataset.packed import read_packed
+from synfeal.dataset.packed import View, read_packed
 from synfeal.errors import InputError
 from synfeal.files import read_json, write_json
+
+FORMATS: dict[View, str] = {
+    "square": "uint8 (N, S, S, 3); short side resized to S + 1 px, then centre crop",
+    "whole": "uint8 (N, S, S, 3); the whole frame resized to S x S px",
+}
 
 
 def write_packed_record(
@@ -19,6 +24,7 @@ def write_packed_record(
     plan: Path,
     camera: CameraConfig,
     render: RenderConfig,
+    view: View = "square",
 ) -> None:
     """Write ``<frames>.json`` in place of ``.npy``.
 
@@ -28,13 +34,14 @@ def write_packed_record(
         plan: pose table of the frames.
         camera: what they were rendered through, before they were made smaller.
         render: how they were rendered.
+        view: what of a frame was packed.
 
     Raises:
         InputError: frames or the record of a shard cannot be read.
     """
     packed = read_packed(frames)
     record = {
-        "format": "uint8 (N, S, S, 3); short side resized to S + 1 px, then centre crop",
+        "format": FORMATS[view],
         "frames": len(packed),
         "input_px": packed.shape[1],
         "camera": camera_record(camera),

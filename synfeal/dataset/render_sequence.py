@@ -13,7 +13,7 @@ from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.dataset.archive import is_archive, write_archive
 from synfeal.dataset.directories import atomic_directory, refuse_existing, writing_to
 from synfeal.dataset.frame_writer import FrameWriter
-from synfeal.dataset.packed import fit_frame, new_packed
+from synfeal.dataset.packed import View, fit_frame, new_packed
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.progress import Progress, Stopwatch
 from synfeal.files import write_json
@@ -105,6 +105,7 @@ def render_packed(
     input_px: int,
     out: Path,
     render: RenderConfig | None = None,
+    view: View = "square",
 ) -> None:
     """Render every pose of the table into one array, as :func:`pack_frames` makes it of files.
 
@@ -122,7 +123,9 @@ def render_packed(
     ):
         watch = Stopwatch()
         for index, world_from_cam in enumerate(poses.world_from_cam):
-            packed[index] = fit_frame(Image.fromarray(renderer.render(world_from_cam)), input_px)
+            packed[index] = fit_frame(
+                Image.fromarray(renderer.render(world_from_cam)), input_px, view
+            )
             progress.update()
         write_json(out.with_suffix(".json"), {"frames": len(poses), "backend": chosen.backend})
     progress.part_done(out.stem, len(poses), watch.seconds)

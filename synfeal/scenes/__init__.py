@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 from synfeal.errors import InputError
 from synfeal.mesh.model import TexturedMesh
-from synfeal.scenes import large_room, pretext_room, sanctuary
+from synfeal.scenes import large_room, random_room, sanctuary
 
 BUILDERS: dict[str, Callable[[int], TexturedMesh]] = {
     "large_room": large_room.build,
     "sanctuary": sanctuary.build,
-    "pretext_room": pretext_room.build,
+    "random_room": random_room.build,
 }
 
 

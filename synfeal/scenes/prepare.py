@@ -71,7 +71,7 @@ def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:
     if scene.source == "procedural":
         from synfeal.scenes import build_scene  # only a procedural scene needs the builders
 
-        return build_scene(str(scene.builder), seed)
+        return build_scene(str(scene.builder), seed if scene.seed is None else scene.seed)
     path = Path(str(scene.path))
     if scene.sha256 is not None:
         check_sha256(path, scene.sha256, name)

@@ -143,6 +143,7 @@ rule render_packed:
         start=lambda w: sequence_named(w, "network").start,
         stop=lambda w: sequence_named(w, "network").stop,
         input_px=CONFIG.network.input_px,
+        view=CONFIG.network.view,
         render=dump(CONFIG.render),
     script:
         "../scripts/render_packed.py"
@@ -168,6 +169,7 @@ rule pack:
     params:
         camera=dump(CONFIG.network_camera),
         render=dump(CONFIG.render),
+        view=CONFIG.network.view,
     script:
         "../scripts/pack.py"
 

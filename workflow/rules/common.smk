@@ -357,12 +357,6 @@ def run_plan(workflow):
 # Of a job that fails or is killed no output stays, and Snakemake does not make a file again that
 # only finished files need: after a change of the configuration the tables of the old one would
 # pass for the new. So the targets ask for an output of every job, not of the last ones alone.
-def pretext_scene():
-    """The scene of the pretext, if a run starts from it."""
-    used = CONFIG.pretraining.source == "pretext"
-    return {CONFIG.pretraining.scene} if used and backbones() else set()
-
-
 def backbones():
     """Backbones that runs start from."""
     return {
@@ -386,12 +380,12 @@ def files_of_labels():
 
 def files_of_runs():
     """An output of every job that runs are made by."""
-    pretext = sorted(pretext_scene())
+    rooms = CONFIG.rooms if backbones() else []
     return [
         *files_of_labels(),
-        *(f"{ROOT}/scenes/{scene}/properties.json" for scene in pretext),
-        *(f"{ROOT}/plans/{scene}/train.csv" for scene in pretext),
-        *(f"{ROOT}/frames/{scene}/train.npy" for scene in pretext),
+        *(f"{ROOT}/scenes/{scene}/properties.json" for scene in rooms),
+        *(f"{ROOT}/plans/{scene}/train.csv" for scene in rooms),
+        *(f"{ROOT}/frames/{scene}/train.npy" for scene in rooms),
         *packed_frames("npy"),
         *(f"{ROOT}/pretrained/{backbone}.pt" for backbone in sorted(backbones())),
         *(m.replace("metrics.json", "predictions.csv") for m in all_metrics()),

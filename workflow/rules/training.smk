@@ -5,16 +5,8 @@ RUN_LOG = "{scene}/{size}/{labels}/{init}/{model}/seed{repetition}"
 
 rule pretrain:
     input:
-        frames=(
-            f"{ROOT}/frames/{CONFIG.pretraining.scene}/train.npy"
-            if CONFIG.pretraining.source == "pretext"
-            else []
-        ),
-        labels=(
-            f"{ROOT}/plans/{CONFIG.pretraining.scene}/train.csv"
-            if CONFIG.pretraining.source == "pretext"
-            else []
-        ),
+        frames=[f"{ROOT}/frames/{room}/train.npy" for room in CONFIG.rooms],
+        labels=[f"{ROOT}/plans/{room}/train.csv" for room in CONFIG.rooms],
     output:
         weights=f"{ROOT}/pretrained/{{backbone}}.pt",
     log:
@@ -27,7 +19,7 @@ rule pretrain:
     resources:
         mem_mb=grown(
             training_mb(
-                CONFIG.pretraining.frames,
+                CONFIG.pretraining.frames * len(CONFIG.rooms),
                 CONFIG.network,
                 CONFIG.pretraining.batch_size,
             )

@@ -14,4 +14,5 @@ with job(snakemake.log[0]):
         Path(snakemake.input.plan),
         CameraConfig(**snakemake.params.camera),
         RenderConfig(**snakemake.params.render),
+        snakemake.params.view,
     )

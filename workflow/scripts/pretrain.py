@@ -5,11 +5,10 @@ from synfeal.config.models import NetworkConfig, PretrainingConfig
 from synfeal.job import job
 
 with job(snakemake.log[0]):
-    pretext = bool(snakemake.input.frames)
+    frames, labels = map(Path, snakemake.input.frames), map(Path, snakemake.input.labels)
     pretrain_backbone(
         snakemake.wildcards.backbone,
-        Path(str(snakemake.input.frames)) if pretext else None,
-        Path(str(snakemake.input.labels)) if pretext else None,
+        list(zip(frames, labels, strict=True)),
         NetworkConfig(**snakemake.params.network),
         PretrainingConfig(**snakemake.params.pretraining),
         snakemake.params.seed,

@@ -13,4 +13,5 @@ with job(snakemake.log[0]):
         snakemake.params.input_px,
         Path(snakemake.output.frames),
         RenderConfig(**snakemake.params.render),
+        snakemake.params.view,
     )

@@ -6,6 +6,7 @@ import hashlib
 import urllib.request
 from pathlib import Path
 
+import safetensors.torch
 import torch
 from torch import Tensor, nn
 
@@ -60,7 +61,7 @@ def load_backbone_weights(backbone: nn.Module, path: Path) -> None:
         InputError: the file cannot be read as a state dict, or belongs to another shape of network.
     """
     try:
-        state: dict[str, Tensor] = torch.load(path, map_location="cpu", weights_only=True)
+        state = _read_state(path)
         state = {k: v for k, v in state.items() if not k.startswith(CLASSIFIERS)}
     except Exception as error:  # torch.load raises whatever the broken file provokes
         raise InputError(f"{path}: cannot be read as backbone weights ({error})") from None
@@ -72,6 +73,13 @@ def load_backbone_weights(backbone: nn.Module, path: Path) -> None:
             f"{path}: does not fit {type(backbone).__name__} of this network.width ({reason}); "
             "train the backbone again, or set the width it was trained with"
         ) from None
+
+
+def _read_state(path: Path) -> dict[str, Tensor]:
+    if path.suffix == ".safetensors":
+        return safetensors.torch.load_file(path)
+    state: dict[str, Tensor] = torch.load(path, map_location="cpu", weights_only=True)
+    return state
 
 
 def _download(url: str, path: Path) -> None:

@@ -164,16 +164,12 @@ def _design(config: Config, experiments: tuple[Experiment, ...]) -> Design:
 
 
 def _scenes(config: Config, experiments: Iterable[Experiment]) -> dict[str, tuple[str, ...]]:
-    """Scenes and the splits of them that are needed: of the pretext's scene just the training."""
+    """Scenes and the splits of them that are needed: of rooms to pretrain on just the training."""
     experiments = tuple(experiments)
     scenes: dict[str, tuple[str, ...]] = {e.scene: SPLITS for e in experiments}
-    if _pretext(config) and any(e.init == "pretrained" for e in experiments):
-        scenes[config.pretraining.scene] = ("train",)
+    if any(e.init == "pretrained" for e in experiments):
+        scenes |= dict.fromkeys(config.rooms, ("train",))
     return dict(sorted(scenes.items()))
-
-
-def _pretext(config: Config) -> bool:
-    return config.pretraining.source == "pretext"
 
 
 def _largest(config: Config, scenes: Iterable[str]) -> dict[str, dict[str, int]]:
@@ -273,8 +269,8 @@ def _trainings(config: Config, runs: Sequence[Run]) -> Iterator[Job]:
     pretrained = {backbone_of(r.model, config.network) for r in runs if r.init == "pretrained"}
     for backbone in sorted(pretrained):
         work = pretext_work(backbone, config.network)
-        samples = config.pretraining.samples_seen if _pretext(config) else 0
-        held = config.pretraining.frames if _pretext(config) else 0
+        samples = config.pretraining.samples_seen if config.rooms else 0
+        held = config.pretraining.frames * len(config.rooms)
         batch = config.pretraining.batch_size
         size = work.size(samples, batch, 0)
         memory = packed_bytes(held, config.network.input_px) + work.held_bytes(batch)

@@ -58,9 +58,9 @@ def training_work(model: str, network: NetworkConfig, hyper: LocalizerConfig) ->
 @lru_cache
 def pretext_work(backbone: BackboneName, network: NetworkConfig) -> Work:
     """The network that a backbone is pretrained in."""
-    from baselines.training.pretrain import PretextLocalizer
+    from baselines.training.pretrain import RoomsNetwork
 
-    return _count(lambda: PretextLocalizer(backbone, network.width), network.input_px)
+    return _count(lambda: RoomsNetwork(backbone, network.width, 1), network.input_px)
 
 
 def _count(build: Callable[[], nn.Module], input_px: int) -> Work:

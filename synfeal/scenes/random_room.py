@@ -1,0 +1,226 @@
+"""Rooms drawn from a seed, on which backbones are pretrained: no two alike, none of the paper's.
+
+Size, walls, floor, what hangs and what stands in a room, its colours and its light are all random,
+so that a backbone trained on several of them learns what rooms have in common.
+"""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from synfeal.mesh.model import TexturedMesh
+from synfeal.scenes import clutter, fronts, furniture, materials, murals, pictures
+from synfeal.scenes.ambient import ambient_corners
+from synfeal.scenes.bake import scanned_mesh
+from synfeal.scenes.canvas import Colour, Painter
+from synfeal.scenes.lighting import Lamp, Lighting
+from synfeal.scenes.patches import Item, joined, paint
+from synfeal.scenes.primitives import box, level, on_wall, upright
+from synfeal.scenes.scan import Scanner, stations
+from synfeal.seeds import generator_of
+
+Generator = np.random.Generator
+CELL_M = 0.1  # nobody compares these rooms with a scan, so they may be coarse
+PX_PER_M = 60  # for images of 100 pixels: a pixel covers 1 cm at 1 m
+GAP_M = (0.15, 0.6)  # between two things along a wall
+
+
+class Wall(NamedTuple):
+    """One wall: its left end as seen from inside, the way it runs, and how an item is turned."""
+
+    start_m: tuple[float, float]
+    along: tuple[float, float]
+    length_m: float
+    yaw_deg: float
+
+    def place(self, item: Item, at_m: float, off_m: float, z_m: float = 0.0) -> Item:
+        """An item ``at_m`` along the wall, ``off_m`` in front of it, its front to the room."""
+        (x, y), (ax, ay) = self.start_m, self.along
+        return item.placed(
+            x + at_m * ax + off_m * ay, y + at_m * ay - off_m * ax, z_m, self.yaw_deg
+        )
+
+
+def build(seed: int) -> TexturedMesh:
+    """A furnished room of 12 to 50 square metres with its corner at the origin."""
+    rng = generator_of("scene", "random_room", seed)
+    size = (rng.uniform(3.4, 6.5), rng.uniform(3.6, 7.5), rng.uniform(2.4, 3.6))
+    walls = _walls(size[0], size[1])
+    parts = [_shell(rng, size, walls), _free_standing(rng, size)]
+    parts += [thing for wall in walls for thing in _along(rng, wall, size[2])]
+    lower = (0.0, 0.0, 0.0)
+    inside = joined(parts).clipped(lower, size)
+    scanner = Scanner(CELL_M, stations(lower, size, (2, 2, 1)), lower, size)
+    return scanned_mesh(rng, inside, _lighting(rng, size), scanner)
+
+
+def _walls(x_m: float, y_m: float) -> tuple[Wall, ...]:
+    return (
+        Wall((0.0, y_m), (1.0, 0.0), x_m, 0.0),
+        Wall((x_m, y_m), (0.0, -1.0), y_m, -90.0),
+        Wall((x_m, 0.0), (-1.0, 0.0), x_m, 180.0),
+        Wall((0.0, 0.0), (0.0, 1.0), y_m, 90.0),
+    )
+
+
+def _colour(rng: Generator, least: float = 0.25, most: float = 0.95) -> Colour:
+    # Mostly pale, sometimes vivid, as rooms are.
+    return colorsys.hsv_to_rgb(rng.random(), 0.85 * rng.random() ** 2, rng.uniform(least, most))
+
+
+def _palette(rng: Generator, count: int) -> tuple[Colour, ...]:
+    return tuple(_colour(rng) for _ in range(count))
+
+
+def _surface(rng: Generator) -> Painter:
+    """What covers a wall, a floor or a ceiling."""
+    palette, colour, other = _palette(rng, int(rng.integers(1, 5))), _colour(rng), _colour(rng)
+    blocks = (rng.uniform(0.1, 0.9), rng.uniform(0.06, 0.3))
+    masonry = partial(materials.masonry, palette=palette, block_m=blocks, joint=_colour(rng))
+    choices: list[Painter] = [
+        masonry,
+        masonry,
+        partial(materials.plaster, colour=colour),
+        partial(materials.damask, colour=colour, motif=other, pitch_m=rng.uniform(0.15, 0.5)),
+        partial(materials.wood, colour=colour, contrast=rng.uniform(0.1, 0.3)),
+        partial(materials.marble, colour=colour, vein=other, scale_m=rng.uniform(0.2, 0.8)),
+        partial(materials.wainscot, colour=colour, lower=other, height_m=rng.uniform(0.5, 1.4)),
+    ]
+    return choices[int(rng.integers(len(choices)))]
+
+
+def _shell(rng: Generator, size: tuple[float, float, float], walls: tuple[Wall, ...]) -> Item:
+    x, y, z = size
+    patches = [
+        paint(rng, level((0, x), (0, y), 0.0), _surface(rng), PX_PER_M),
+        paint(rng, level((0, x), (0, y), z, face_down=True), _surface(rng), PX_PER_M),
+    ]
+    for wall in walls:
+        start = np.array(wall.start_m)
+        end = start + wall.length_m * np.array(wall.along)
+        sheet = upright((start[0], start[1]), (end[0], end[1]), 0.0, z)
+        patches.append(paint(rng, sheet, _surface(rng), PX_PER_M))
+    return Item(tuple(patches))
+
+
+def _along(rng: Generator, wall: Wall, high_m: float) -> list[Item]:
+    """What stands along a wall and hangs above it, from its left end to its right one."""
+    things: list[Item] = []
+    at = rng.uniform(*GAP_M)
+    while True:
+        wide = rng.uniform(0.5, 1.6)
+        if at + wide > wall.length_m - 0.1:
+            return things
+        middle = at + wide / 2
+        if rng.random() < 0.45:
+            item, deep, tall = _standing(rng, wide)
+            things.append(wall.place(item, middle, deep / 2 + 0.01))
+        else:
+            tall = 0.6
+        room_m = high_m - tall - 0.3
+        if room_m > 0.5 and rng.random() < 0.85:
+            hung = rng.uniform(0.4, min(room_m, 1.4))
+            z = tall + 0.15 + rng.uniform(hung / 2, room_m - hung / 2)
+            picture = on_wall(rng, (0, 0, 0), 0, (wide, hung), _picture(rng), 150, 0.03, _glow(rng))
+            things.append(wall.place(picture, middle, 0.0, z))
+        at += wide + rng.uniform(*GAP_M)
+
+
+def _glow(rng: Generator) -> float:
+    return float(rng.uniform(0.4, 0.9)) if rng.random() < 0.2 else 0.0
+
+
+def _picture(rng: Generator) -> Painter:
+    choices: list[Painter] = [
+        partial(pictures.painting, palette=_palette(rng, 4), frame=_colour(rng)),
+        pictures.poster,
+        pictures.whiteboard,
+        partial(pictures.noticeboard, ground=_colour(rng)),
+        partial(pictures.window_view, panes=(int(rng.integers(1, 4)), int(rng.integers(1, 4)))),
+        partial(pictures.stained_glass, palette=_palette(rng, 5), cells=60),
+        partial(murals.mural, ground=_colour(rng), sky=_colour(rng), figures=3),
+        partial(fronts.door, colour=_colour(rng), window=bool(rng.random() < 0.5)),
+        fronts.screen,
+        partial(materials.rug, palette=_palette(rng, 4)),
+    ]
+    return choices[int(rng.integers(len(choices)))]
+
+
+def _standing(rng: Generator, wide_m: float) -> tuple[Item, float, float]:
+    """Something with its back to a wall, its depth and its height."""
+    deep, tall = rng.uniform(0.3, 0.6), rng.uniform(0.5, 2.1)
+    cloth = partial(materials.fabric, colour=_colour(rng), stripe=_colour(rng))
+    doors, rows = int(rng.integers(1, 4)), int(rng.integers(1, 4))
+    shelves = max(2, round(tall / 0.4))
+    makers: list[Callable[[], tuple[Item, float, float]]] = [
+        lambda: (
+            furniture.cabinet(rng, (wide_m, deep, tall), _colour(rng), doors, rows),
+            deep,
+            tall,
+        ),
+        lambda: (furniture.bookshelf(rng, (wide_m, 0.3, tall), shelves), 0.3, tall),
+        lambda: (furniture.sofa(rng, max(wide_m, 1.0), cloth), 0.8, 0.8),
+        lambda: (clutter.plant(rng, min(tall, 1.4), _colour(rng), 30), 0.5, 1.4),
+    ]
+    return makers[int(rng.integers(len(makers)))]()
+
+
+def _free_standing(rng: Generator, size: tuple[float, float, float]) -> Item:
+    """Rugs, tables with what lies on them, and chairs, away from the walls."""
+    things: list[Item] = []
+    for _ in range(int(rng.integers(1, 4))):
+        x, y = rng.uniform((1.1, 1.1), (size[0] - 1.1, size[1] - 1.1))
+        yaw, tall = rng.uniform(0, 360), rng.uniform(0.4, 0.78)
+        wide, deep = rng.uniform(0.7, 1.5), rng.uniform(0.6, 0.9)
+        top = partial(materials.wood, colour=_colour(rng), contrast=0.18)
+        table = [
+            furniture.table(rng, (wide, deep, tall), top, _colour(rng)),
+            clutter.on_table(rng, wide, deep).placed(0, 0, tall),
+        ]
+        seats = [
+            furniture.chair(rng, _colour(rng)).placed(
+                rng.uniform(-0.9, 0.9), rng.uniform(-0.9, 0.9), 0, rng.uniform(0, 360)
+            )
+            for _ in range(int(rng.integers(0, 3)))
+        ]
+        things.append(joined([*table, *seats]).placed(x, y, 0, yaw))
+    half = rng.uniform(0.6, 1.2, 2)
+    middle = rng.uniform((1.2, 1.2), (size[0] - 1.2, size[1] - 1.2))
+    rug = partial(materials.rug, palette=_palette(rng, 4))
+    spread = level(
+        (middle[0] - half[0], middle[0] + half[0]),
+        (middle[1] - half[1], middle[1] + half[1]),
+        0.012,
+    )
+    things.append(Item((paint(rng, spread, rug, PX_PER_M),)))
+    post = box(rng, (0.2, 0.2, size[2]), _surface(rng), PX_PER_M, "fblr")
+    if rng.random() < 0.3:
+        things.append(post.placed(*rng.uniform((1, 1), (size[0] - 1, size[1] - 1))))
+    return joined(things)
+
+
+def _lighting(rng: Generator, size: tuple[float, float, float]) -> Lighting:
+    def tint() -> Colour:
+        warm = rng.uniform(0.75, 1.25)
+        return (warm, 1.0, 2.0 - warm)
+
+    def scaled(share: float) -> Colour:
+        red, green, blue = tint()
+        return (share * red, share * green, share * blue)
+
+    lamps = [
+        Lamp(
+            (*rng.uniform((0.5, 0.5), (size[0] - 0.5, size[1] - 0.5)), size[2] - 0.1),
+            (0, 0, -1),
+            scaled(rng.uniform(0.4, 1.4)),
+        )
+        for _ in range(int(rng.integers(2, 6)))
+    ]
+    a, b, c, d = (scaled(rng.uniform(0.2, 0.55)) for _ in range(4))
+    ambient = ambient_corners(a, b, c, d, top=rng.uniform(0.8, 1.3))
+    return Lighting((0.0, 0.0, 0.0), size, ambient, lamps, None)
