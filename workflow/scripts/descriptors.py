@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from baselines.references.run import write_descriptors
+from baselines.references.descriptors import write_descriptors
 from synfeal.job import job
 
 with job(snakemake.log[0]):
