@@ -12,6 +12,7 @@ from synfeal.dataset.archive import FrameFile, foreign_members, is_archive
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError
 from synfeal.validate.check import Check
+from synfeal.validate.content import Content
 from synfeal.validate.images import Pixels, read_color, read_depth_mm
 from synfeal.validate.listing import COLOR, DEPTH, POSE, Frame, SequenceListing
 
@@ -51,30 +52,38 @@ def check_images(
     sequences: Sequence[SequenceListing],
     camera: CameraConfig | None,
     on_frame: Callable[[], object],
-) -> Check:
-    """Every image decodes to its last row and has the size of the camera, or of the first one."""
+) -> list[Check]:
+    """Every image decodes to its last row, has the size of the camera, and shows something.
+
+    Without a camera all must be of the size of the first one, and depth, which then comes from a
+    sensor, does not tell what is empty.
+    """
     size = (camera.height, camera.width) if camera else None
     readers: dict[str, Callable[[FrameFile], Pixels]] = {COLOR: read_color, DEPTH: read_depth_mm}
     failures: list[str] = []
-    n_images = 0
+    content, n_images = Content(), 0
     for sequence in sequences:
         for frame in sequence.frames:
+            images: dict[str, Pixels] = {}
             for kind, read in readers.items():
                 if frame.number not in sequence.numbers[kind]:
                     continue  # the check of the names says so
                 n_images += 1
                 try:
-                    shape = read(frame.path(kind)).shape[:2]
+                    images[kind] = read(frame.path(kind))
                 except InputError as error:
                     failures.append(str(error))
                     continue
+                shape = images[kind].shape[:2]
                 size = size or shape
                 if shape != size:
                     found, wanted = _size(shape), _size(size)
                     failures.append(f"{frame.path(kind)}: is {found}, must be {wanted}")
+            if COLOR in images:
+                content.add(frame, images[COLOR], images.get(DEPTH) if camera else None)
             on_frame()
     text = f"{n_images} images decoded" + (f", {_size(size)}" if size else "")
-    return Check("images", text, tuple(failures))
+    return [Check("images", text, tuple(failures)), content.check()]
 
 
 def _size(shape: tuple[int, ...]) -> str:

@@ -27,6 +27,7 @@ class Lens:
         self, camera: CameraConfig, step: int, moved: tuple[float, float, float] = (0.0, 0.0, 0.0)
     ) -> None:
         fx, fy, cx, cy = intrinsics_of(camera)
+        self.focal_px = np.array([fx, fy])
         scale = float(np.exp(moved[2]))
         k1, k2, p1, p2, k3 = camera.distortion
         parameters = [fx * scale, fy * scale, cx + moved[0], cy + moved[1], k1, k2, p1, p2, k3]

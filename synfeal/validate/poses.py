@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.dataset.pose_table import read_pose_table
+from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
 from synfeal.validate.check import Check
 from synfeal.validate.frames import Poses
@@ -16,7 +16,8 @@ from synfeal.validate.listing import POSE, Frame, SequenceListing
 
 # Text with ten decimals is exact to 1e-10; 7-Scenes' own poses have eight significant digits.
 ORTHONORMAL_BOUND = 1e-6
-TABLE_BOUND = 1e-8
+TABLE_BOUND = 1e-8  # of a number up to 100; of larger ones the same eleven digits
+TABLE_RATIO = 1e-10
 
 
 def check_rigid(poses: Poses, unreadable: tuple[str, ...]) -> Check:
@@ -56,32 +57,45 @@ def check_tables(
 ) -> Check:
     """The poses of the frames are those of ``train.csv`` and ``test.csv``."""
     failures: list[str] = []
-    n_compared, worst = 0, 0.0
+    n_compared, worst, bound = 0, 0.0, TABLE_BOUND
     for split, sequences in splits.items():
         path = dataset / f"{split}.csv"
         frames = [frame for sequence in sequences for frame in sequence.frames]
         if not path.exists():
             continue
         try:
-            table = read_pose_table(path).world_from_cam
+            table = read_pose_table(path)
         except (InputError, ValueError) as error:
             failures.append(str(error) if isinstance(error, InputError) else f"{path}: {error}")
             continue
         if len(table) != len(frames):
             failures.append(f"{path}: {len(table)} rows for {len(frames)} frames")
             continue
-        difference = _differences(frames, table, poses)
+        difference = _differences(frames, table.world_from_cam, poses)
         n_compared += len(difference)
         worst = max([worst, *difference.values()])
+        bound = max(bound, TABLE_RATIO * float(np.abs(table.position_m).max(initial=0.0)))
         failures += [
             f"{frame.path(POSE)}: differs from {path.name} by {value:.2g}"
             for frame, value in difference.items()
-            if value > TABLE_BOUND
+            if value > bound
         ]
+        failures += _negative(path, table)
     if not n_compared and not failures:
         return Check("tables", "no train.csv or test.csv", skipped=True)
-    text = f"{n_compared} poses, farthest from its row {worst:.1e} (bound {TABLE_BOUND:g})"
+    text = f"{n_compared} poses, farthest from its row {worst:.1e} (bound {bound:.1g})"
     return Check("tables", text, tuple(failures))
+
+
+def _negative(path: Path, table: PoseTable) -> list[str]:
+    """A failure if a quaternion is the one of the two of its rotation that has w < 0."""
+    rows = np.flatnonzero(table.quat_wxyz[:, 0] < 0.0)
+    if not len(rows):
+        return []
+    return [
+        f"{path}: row {rows[0] + 2} and {len(rows) - 1} others hold quaternions with qw < 0; of the"
+        " two of a rotation the one with qw >= 0 belongs here: change the sign of all four numbers"
+    ]
 
 
 def _differences(

@@ -2,13 +2,17 @@
 
 The depth of frame a, lifted and moved by the two poses, predicts for each of its pixels a pixel and
 a depth in frame b. Depth in b is interpolated as 1/z, which is exact on planes, and only where its
-four neighbours lie on one surface.
+neighbours lie on one surface. What may differ is worked out for each pixel: depth is rounded
+to millimetres in both frames; rounding along a ray of a is seen in b magnified where b looks along
+the surface; and between four pixels that are on no plane depth is not known any better than they
+differ from one. Differences are counted in multiples of that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,9 +23,11 @@ from synfeal.validate.lens import Lens
 
 Array = NDArray[np.float64]
 
-SURFACE_RATIO = 1.05  # four neighbouring depths within 5 % are one surface
+BEND = 0.05  # 1/z bends by less, of itself, from pixel to pixel on one surface; planes do not bend
 OCCLUSION_RATIO = 1.05  # a point more than 5 % behind the surface is hidden by it
 MIN_PIXELS = 100
+ROUNDING_M = 0.0005  # of depth stored in millimetres
+POSE_ROUNDING = 1e-10  # of positions stored with eleven digits, of both frames
 GREY_NOISE = 5.0  # of rendered frames, as resampled here: grey levels
 MAX_SHIFT_ERROR_PX = 0.05
 
@@ -40,6 +46,18 @@ class View:
     depth_m: NDArray[Any]
     grey: NDArray[Any]
 
+    @cached_property
+    def is_surface(self) -> NDArray[np.bool_]:
+        """Pixels (H, W) whose neighbours lie on the same surface, however slanted."""
+        with np.errstate(divide="ignore"):
+            inverse = 1.0 / np.pad(self.depth_m, 1, mode="edge")
+        middle = inverse[1:-1, 1:-1]
+        bend = np.maximum(
+            np.abs(inverse[:-2, 1:-1] - 2.0 * middle + inverse[2:, 1:-1]),
+            np.abs(inverse[1:-1, :-2] - 2.0 * middle + inverse[1:-1, 2:]),
+        )
+        return np.asarray((bend < BEND * middle) & np.isfinite(self.depth_m), np.bool_)
+
 
 @dataclass(frozen=True)
 class Residual:
@@ -47,7 +65,8 @@ class Residual:
 
     Attributes:
         overlap: share of the pixels of a with depth that b sees, hidden ones included.
-        depth_mm: median distance in depth.
+        depth_mm: median difference in depth.
+        depth: the same, each difference as a multiple of what may differ there.
         in_front: share of points that lie in front of what b sees, which cannot be.
         grey: median difference of grey levels.
         shift_px: by how much b's image must be moved, turned and zoomed to explain the differences
@@ -56,6 +75,7 @@ class Residual:
 
     overlap: float
     depth_mm: float
+    depth: float
     in_front: float
     grey: float
     shift_px: float
@@ -63,11 +83,16 @@ class Residual:
 
 @dataclass(frozen=True)
 class _Seen:
-    """The pixels of a that b sees: predicted depth, depth and grey of b there, its gradient."""
+    """The pixels of a that b sees: predicted depth, depth and grey of b there, its gradient.
+
+    Attributes:
+        tolerance_m: by how much the two depths may differ.
+    """
 
     mask: NDArray[np.bool_]
     predicted_m: Array
     depth_m: Array
+    tolerance_m: Array
     grey: Array
     gradient: Array
 
@@ -87,6 +112,7 @@ def compare(a: View, b: View, lens: Lens) -> Residual | None:
     return Residual(
         overlap=float(np.sum(seen.mask) / np.sum(np.isfinite(lifted))),
         depth_mm=1000.0 * float(np.median(difference_m)),
+        depth=float(np.median(difference_m / seen.tolerance_m[visible])),
         in_front=float(np.mean(ratio[visible] * OCCLUSION_RATIO < 1.0)),
         grey=float(np.median(np.abs(grey_error))),
         shift_px=_shift_px(grey_error, seen.gradient[visible], lens.places[visible]),
@@ -106,23 +132,53 @@ def _look(a: View, b: View, lens: Lens) -> _Seen:
         mask = np.all((pixels >= 0.0) & (pixels < [width - 1, height - 1]), axis=1)
     corner = np.floor(np.where(mask[:, None], pixels, 0.0)).astype(int)
     fraction = np.where(mask[:, None], pixels - corner, 0.0)
-    near, far = _range(b.depth_m, corner)
+    on_surface = _corners(b.is_surface, corner).all(axis=0)
     with np.errstate(divide="ignore"):
-        inverse = _interpolate(1.0 / b.depth_m, corner, fraction)[0]
-        seen = np.where(mask & (far < SURFACE_RATIO * near), 1.0 / inverse, np.nan)
+        inverse, slope = _interpolate(1.0 / b.depth_m, corner, fraction)
+        seen = np.where(mask & on_surface, 1.0 / inverse, np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        magnified = _magnification(points, lens.rays @ b_from_a[:3, :3].T, inverse, slope, lens)
+        seen[magnified <= 0.0] = np.nan
+        tolerance = ROUNDING_M * (1.0 + np.abs(magnified)) + _unevenness_m(b.depth_m, corner, seen)
+    tolerance += POSE_ROUNDING * max(np.abs(v.world_from_cam[:3, 3]).max() for v in (a, b))
     grey, gradient = _interpolate(b.grey, corner, fraction)
-    return _Seen(mask, points[:, 2], seen, grey, gradient)
+    return _Seen(mask, points[:, 2], seen, tolerance, grey, gradient)
+
+
+def _magnification(
+    points: Array, rays_of_a: Array, inverse: Array, slope: Array, lens: Lens
+) -> Array:
+    """By how much more depth in b changes than depth in a, for points (N, 3) on the surface, (N,).
+
+    On a plane ``normal @ point = offset`` the inverse of depth is linear in x / z and y / z, with
+    ``normal / offset`` as its coefficients. Moved along the ray of a, the plane is met in b nearer
+    or farther by ``normal @ ray_of_a / normal @ ray_of_b``. Below 0, a sees the surface from its
+    other side: it can only be another one, behind a thin wall.
+
+    Args:
+        points: in the frame of b.
+        rays_of_a: (N, 3) at depth 1 in a, in the frame of b.
+        inverse: (N,) of the depth of b.
+        slope: (N, 2) how it changes from pixel to pixel.
+        lens: the camera.
+    """
+    along = slope * lens.focal_px
+    place = points[:, :2] / points[:, 2:]
+    constant = inverse - np.einsum("ni,ni->n", along, place)
+    normal = np.column_stack([along, constant])
+    return np.asarray(np.einsum("ni,ni->n", normal, rays_of_a) / inverse)
+
+
+def _unevenness_m(depth_m: NDArray[Any], corner: NDArray[np.int_], seen_m: Array) -> Array:
+    """By how much the depths (N,) between four pixels may be off because these lie on no plane."""
+    v00, v01, v10, v11 = 1.0 / _corners(depth_m, corner)
+    return np.asarray(seen_m**2 * np.abs(v00 + v11 - v01 - v10) / 2.0)
 
 
 def _corners(image: NDArray[Any], corner: NDArray[np.int_]) -> Array:
     """Values (4, N) at the pixel, its right, lower and lower right neighbour."""
     x, y = corner.T
     return np.stack([image[y, x], image[y, x + 1], image[y + 1, x], image[y + 1, x + 1]])
-
-
-def _range(depth_m: NDArray[Any], corner: NDArray[np.int_]) -> tuple[Array, Array]:
-    values = _corners(depth_m, corner)
-    return values.min(axis=0), np.where(np.isinf(values).any(axis=0), np.inf, values.max(axis=0))
 
 
 def _interpolate(
@@ -155,12 +211,17 @@ def _shift_px(grey_error: Array, gradient: Array, place: Array) -> float:
     if np.linalg.eigvalsh(normal)[0] * MAX_SHIFT_ERROR_PX**2 < GREY_NOISE**2:
         return float("nan")
     solution = np.linalg.solve(normal, columns.T @ (weight * grey_error))
+    left = 1.4826 * float(np.median(np.abs(grey_error - columns @ solution)))
+    if np.linalg.eigvalsh(normal)[0] * MAX_SHIFT_ERROR_PX**2 < left**2:
+        return float("nan")  # seen from elsewhere, a texture differs by more than a shift
     moved = np.einsum("kpn,p->kn", shifts, solution)
     return float(np.sqrt(np.mean(np.sum(moved**2, axis=0))))
 
 
 def camera_normal(a: View, b: View, lens: Lens, moved: Sequence[Lens], delta: Array) -> Array:
     """Normal equations (P, P + 1) of what moving the camera's parameters does to the depths.
+
+    Depths count in multiples of what may differ.
 
     Args:
         a: frame whose depth is lifted.
@@ -172,7 +233,7 @@ def camera_normal(a: View, b: View, lens: Lens, moved: Sequence[Lens], delta: Ar
     here, *there = (_look(a, b, each) for each in (lens, *moved))
     residual = here.predicted_m - here.depth_m
     derivative = np.stack([t.predicted_m - t.depth_m - residual for t in there], axis=1) / delta
-    system = np.column_stack([derivative, -residual])
+    system = np.column_stack([derivative, -residual]) / here.tolerance_m[:, None]
     with np.errstate(invalid="ignore"):
         good = np.isfinite(system).all(axis=1) & (np.abs(residual) < 0.02 * here.depth_m)
         good &= np.all(np.abs(derivative * delta) < 0.02 * here.depth_m[:, None], axis=1)

@@ -39,7 +39,7 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
     with tqdm(total=2 * n_frames, unit="frame", desc="validate", leave=False) as progress:
         checks = [
             check_names(sequences),
-            check_images(sequences, size, progress.update),
+            *check_images(sequences, size, progress.update),
             check_rigid(poses, pose_failures),
             check_tables(dataset, poses, splits),
             check_splits(dataset, sequences, splits, split_failures),
