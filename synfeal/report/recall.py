@@ -15,8 +15,8 @@ from statistics import fmean
 import pandas as pd
 from pydantic import FiniteFloat, TypeAdapter
 
-from synfeal.config import Design, Run
-from synfeal.evaluation.metrics import BOUNDS, MEANS, ORIENTATION, POSITION
+from synfeal.config import MODELS, Design, Run
+from synfeal.evaluation.metrics import BOUNDS, MEANS, POSITION
 from synfeal.evaluation.reprojection import DCRE_BOUNDS
 from synfeal.files import atomic_path
 from synfeal.report.grid import Entry, Grid, Group, Line, Value
@@ -68,9 +68,14 @@ def write_recall_table(design: Design, root: Path, out_csv: Path, out_tex: Path)
 
 def recall_table(design: Design, root: Path) -> pd.DataFrame:
     """Scores of every cell, columns ``KEYS``, ``n_seeds`` and ``COLUMNS``."""
-    cells = groupby(design.runs, lambda run: tuple(getattr(run, key) for key in KEYS))
-    rows = [dict(zip(KEYS, cell, strict=True)) | _cell(list(runs), root) for cell, runs in cells]
+    runs = sorted(design.runs, key=lambda run: (*_key(run)[:-1], MODELS.index(run.model)))
+    cells = groupby(runs, _key)
+    rows = [dict(zip(KEYS, key, strict=True)) | _cell(list(same), root) for key, same in cells]
     return pd.DataFrame(rows, columns=[*KEYS, "n_seeds", *COLUMNS])
+
+
+def _key(run: Run) -> tuple[str, ...]:
+    return tuple(getattr(run, key) for key in KEYS)
 
 
 def _cell(runs: Sequence[Run], root: Path) -> dict[str, float | None]:
@@ -107,7 +112,7 @@ def read_recall_table(path: Path) -> pd.DataFrame:
 def recall_grid(design: Design, table: pd.DataFrame) -> Grid:
     """The rows of Table 4 as printed, a block for each; those of all tables where it has none."""
     headings = [
-        *("Mean error", *(bound.title for bound in BOUNDS)),
+        *("Localizer", "Mean error", *(bound.title for bound in BOUNDS)),
         *("DCRE", f"DCRE < {DCRE_BOUNDS[-1]:.0%}"),
     ]
     groups = []
@@ -116,15 +121,15 @@ def recall_grid(design: Design, table: pd.DataFrame) -> Grid:
         chosen = table[(table[list(keys)] == pd.Series(keys)).all(axis=1)]
         lines = [(_line(record),) for _, record in chosen.iterrows()]
         groups.append(Group(f"{scene_title(row.scene)}, {row.size}", tuple(lines)))
-    return Grid(NAME, CAPTION, ("", "", *headings), tuple(groups), (REMARK,))
+    return Grid(NAME, CAPTION, tuple(headings), tuple(groups), (REMARK,))
 
 
 def _line(record: pd.Series) -> Line:
     """A localizer's scores against the true poses."""
-    cells = [f"{shown(record, MEANS[POSITION])}, {shown(record, MEANS[ORIENTATION])}"]
-    cells += [shown(record, score) for score in (*(b.name for b in BOUNDS), DCRE[0], DCRE[-1])]
-    title = TITLES[record["model"]]
-    return Line("truth", title, "", tuple(Entry((Value(cell),)) for cell in cells))
+    mean = ", ".join(shown(record, score) for score in MEANS.values())
+    scores = (*(bound.name for bound in BOUNDS), DCRE[0], DCRE[-1])
+    entries = tuple(Entry((Value(shown(record, score)),)) for score in scores)
+    return Line("truth", TITLES[record["model"]], mean, entries)
 
 
 def shown(record: pd.Series, score: str, end: str = "_true") -> str:

@@ -13,10 +13,10 @@ from synfeal.report.crossing import crossing_findings
 from synfeal.report.layouts import grid_of
 from synfeal.report.markdown import markdown_of
 from synfeal.report.meshes import meshes_grid, read_mesh_facts
-from synfeal.report.references import NAME as REFERENCES
-from synfeal.report.references import read_references, references_grid
 from synfeal.report.recall import NAME as RECALL
 from synfeal.report.recall import read_recall_table, recall_grid
+from synfeal.report.references import NAME as REFERENCES
+from synfeal.report.references import read_references, references_grid
 
 INTRO = """\
 # Results of profile `{profile}`
