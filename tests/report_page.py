@@ -64,10 +64,11 @@ REFERENCE = {
     **dict.fromkeys(references.COLUMNS, 0.0),
     **{"scene": "large_room", "size": "6k", "labels": "sfm", "method": "nearest-vlad"},
     **{"title": "Nearest image, DenseVLAD", "kind": "reference", "position_m": 0.75},
+}
 RECALL = {
     **{"scene": "large_room", "size": "6k", "labels": "synfeal", "init": "pretrained"},
     **{"model": "posenet", "n_seeds": 1},
-    **{column: 0.375 for column in RECALL_COLUMNS},
+    **dict.fromkeys(RECALL_COLUMNS, 0.375),
 }
 
 
