@@ -128,10 +128,9 @@ class RgbdConfig(DepthConfig):
 
 
 class KinectFusionConfig(DepthConfig):
-    """Frame-to-model tracking with Open3D's dense SLAM."""
+    """Frame-to-model tracking as in KinectFusion."""
 
     voxel_m: Positive = Field(0.02, description="edge of a voxel of the model")
-    max_rmse_m: Positive = Field(0.05, description="tracking with a larger residual is lost")
     min_fitness: Fraction = Field(0.3, description="tracking with less overlap is lost")
 
 

@@ -76,7 +76,6 @@ rule score:
         labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
         truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
         train_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
-        depth=f"{ROOT}/scenes/{{scene}}/test_depth.npy",
     output:
         errors=f"{RUN}/errors.csv",
         metrics=f"{RUN}/metrics.json",
@@ -90,6 +89,6 @@ rule score:
     resources:
         mem_mb=grown(1000),
     params:
-        camera=dump(CONFIG.network_camera),
+        seed=CONFIG.seed,
     script:
         "../scripts/score.py"

@@ -23,11 +23,28 @@ def depth_agreement(
 ) -> tuple[float, float]:
     """Overlap and residual of two depth images (H, W) under a motion (4, 4).
 
-    Points of image j are projected into image i. A point agrees when its depth differs by at most
-    twice ``max_rmse_m`` from the one measured there.
+    A point of image j agrees when its depth differs by at most twice ``max_rmse_m`` from the one
+    measured there in image i.
 
     Returns:
         The share of the points of j that agree, and the RMS of their depth differences in metres.
+    """
+    measured_m, moved_m, n_points = matched_depths(depth_i_m, depth_j_m, i_from_j, camera)
+    difference = np.abs(measured_m - moved_m)
+    agreeing = difference[difference <= 2 * max_rmse_m]
+    if not len(agreeing):
+        return 0.0, np.inf
+    return len(agreeing) / n_points, float(np.sqrt(np.mean(agreeing**2)))
+
+
+def matched_depths(
+    depth_i_m: Depth, depth_j_m: Depth, i_from_j: Array, camera: CameraConfig
+) -> tuple[Array, Array, int]:
+    """Points of image j (H, W) projected into image i (H, W) by a motion (4, 4).
+
+    Returns:
+        For the points inside image i the depth (n,) measured there, inf where there is none, and
+        their own (n,); and the number of all points of j.
     """
     fx, fy, cx, cy = intrinsics_of(camera)
     focal, centre = np.array([fx, fy]), np.array([cx, cy])
@@ -39,11 +56,7 @@ def depth_agreement(
     projected = np.floor(focal * point[:, :2] / point[:, 2:] + centre)
     inside = ((projected >= 0) & (projected < [camera.width, camera.height])).all(axis=1)
     column, row = projected[inside].astype(int).T
-    difference = np.abs(depth_i_m[row, column] - point[inside, 2])
-    agreeing = difference[difference <= 2 * max_rmse_m]
-    if not len(agreeing):
-        return 0.0, np.inf
-    return len(agreeing) / n_points, float(np.sqrt(np.mean(agreeing**2)))
+    return depth_i_m[row, column], point[inside, 2], n_points
 
 
 def points_of(depth_m: Depth, camera: CameraConfig, stride: int, first: float = 0.5) -> Array:

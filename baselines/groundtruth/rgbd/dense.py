@@ -12,7 +12,7 @@ from baselines.groundtruth.rgbd.agreement import constraint, depth_agreement
 from baselines.groundtruth.rgbd.frames import RgbdFrame
 from baselines.groundtruth.rgbd.surface import align
 from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.config.models import CameraConfig, KinectFusionConfig, RgbdConfig
+from synfeal.config.models import CameraConfig, RgbdConfig
 from synfeal.geometry.poses import pose_error
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ def register(
     j: o3d.t.geometry.RGBDImage,
     start: Array,
     camera: CameraConfig,
-    cfg: RgbdConfig | KinectFusionConfig,
+    cfg: RgbdConfig,
     method: str = "point-to-plane",
 ) -> Array | None:
     """Motion ``i_from_j`` (4, 4) near a starting point (4, 4), or None where there is none.
