@@ -91,7 +91,7 @@ def test_jobs_are_those_of_snakemake(tmp_path, name):
     stages = {"labels": 0, "posegraph": 0, "estimate": 0, "tables": 0}
     merged = {
         **dict.fromkeys(("true_labels", "erroneous_labels"), "labels"),
-        **dict.fromkeys(("table1_meshes", "table", "assistance"), "tables"),
+        **dict.fromkeys(("table1_meshes", "table", "recall", "assistance"), "tables"),
         **dict.fromkeys(("label_error", "speed_vs_error", "hard_cases", "document"), "tables"),
         "references_table": "tables",
         **dict.fromkeys(("rgbd-toro", "rgbd-g2o"), "posegraph"),

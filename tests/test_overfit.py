@@ -17,9 +17,9 @@ from baselines.training.checkpoint import TrainedLocalizer
 from baselines.training.data import image_statistics
 from baselines.training.description import ModelDescription
 from baselines.training.predict import predict
-from baselines.training.score import pose_errors
 from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig
 from synfeal.dataset.pose_table import PoseTable
+from synfeal.evaluation.metrics import pose_errors
 
 BATCH, PX = 8, 32
 STEPS, FROZEN_STEPS = 60, 120

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from synfeal.config import MODELS
+from synfeal.evaluation.metrics import cumulative
 from synfeal.report.figures import error_by_noise, error_by_size, speed_vs_error, training_speed
-from synfeal.report.figures.cumulative_error import SceneErrors, cumulative
+from synfeal.report.figures.cumulative_error import SceneErrors
 from synfeal.report.figures.cumulative_error import figure_of as cumulative_figure
 from synfeal.report.figures.localizer_lines import ASIDE, published_value
 from synfeal.report.figures.pareto import pareto_front
@@ -116,12 +117,12 @@ def test_the_cumulative_share_is_a_count():
 
 def test_cumulative_error_draws_a_curve_per_localizer_measure_and_scene():
     rng = np.random.default_rng(4)
-    names = ("position_m_true", "orientation_deg_true")
+    names = ("position_m_true", "orientation_deg_true", "both")
     scenes = [
         SceneErrors(title, {m: {name: rng.gamma(2.0, size=9) for name in names} for m in MODELS})
         for title in ("first", "second")
     ]
-    panels = np.reshape(cumulative_figure(scenes).axes, (2, 2))
+    panels = np.reshape(cumulative_figure(scenes).axes, (3, 2))
     for line, name in enumerate(names):
         for place, scene in enumerate(scenes):
             curves = {c.get_label(): c for c in panels[line, place].lines}

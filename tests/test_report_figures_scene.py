@@ -198,9 +198,12 @@ def test_frames_are_spread_evenly(count):
 
 
 def test_cumulative_error_shows_the_largest_size_whatever_the_order_of_the_rows(results):
-    position, orientation = cumulative_error.draw(results).axes
+    position, orientation, both = cumulative_error.draw(results).axes
     assert position.get_title() == "Large Room, 20k\n12 training, 6 test frames"
-    for axes, errors in ((position, (0.1, 0.2, 0.4)), (orientation, (10, 20, 30))):
+    for axes, errors in (
+        *((position, (0.1, 0.2, 0.4)), (orientation, (10, 20, 30))),
+        (both, (10, 20, 40)),  # the same frames: 10 cm and 10°, 20 cm and 20°, 40 cm and 30°
+    ):
         (curve,) = [line for line in axes.lines if line.get_label() == "PoseNet"]
         # Of four predictions one failed.
         np.testing.assert_allclose(curve.get_xydata().T, [errors, (25, 50, 75)])

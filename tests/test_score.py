@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from baselines.training.score import bootstrap_limits, score_run
+from baselines.training.score import score_run
+from synfeal.bootstrap import limits, medians
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
+from synfeal.evaluation.metrics import draws
 
 N = 40
 
@@ -133,11 +135,15 @@ def test_tables_of_different_frames_are_refused(score):
         score(table.first(10), table, table, table)
 
 
+def bootstrap_limits(values, path):
+    return limits(medians(values, *draws(path)))
+
+
 def test_limits_of_independent_frames_agree_with_order_statistics():
     """The limits of a median are, nearly, the order statistics n/2 +- 0.98 sqrt(n)."""
     count = 400
     values = np.random.default_rng(7).permutation(np.arange(count, dtype=float))
-    low, high = bootstrap_limits({"e": values}, np.arange(count))["e"]
+    low, high = bootstrap_limits(values, np.arange(count))
     half = 0.98 * math.sqrt(count)
     assert low == pytest.approx(count / 2 - half, abs=4)
     assert high == pytest.approx(count / 2 + half, abs=4)
@@ -147,15 +153,15 @@ def test_limits_count_paths_not_frames():
     """Copies of a frame add no information, so they must not narrow the limits."""
     values = np.random.default_rng(8).normal(size=50)
     path = np.arange(50)
-    single = bootstrap_limits({"e": values}, path)["e"]
-    copied = bootstrap_limits({"e": np.repeat(values, 20)}, np.repeat(path, 20))["e"]
+    single = bootstrap_limits(values, path)
+    copied = bootstrap_limits(np.repeat(values, 20), np.repeat(path, 20))
     assert copied[1] - copied[0] > 0.7 * (single[1] - single[0])
 
 
 def test_limits_are_the_same_every_time():
     values = np.random.default_rng(9).normal(size=30)
     path = np.arange(30) // 3
-    assert bootstrap_limits({"e": values}, path) == bootstrap_limits({"e": values}, path)
+    assert bootstrap_limits(values, path) == bootstrap_limits(values, path)
 
 
 def test_scoring_needs_no_torch():

@@ -15,12 +15,12 @@ import pytest
 from numpy.typing import NDArray
 
 from baselines.training.predict import predict_poses
-from baselines.training.score import pose_errors, score_run
+from baselines.training.score import score_run
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
+from synfeal.evaluation.metrics import cumulative, pose_errors
 from synfeal.geometry.rotations import rotation_angle_rad
 from synfeal.report.cells import read_cells
 from synfeal.report.compare.runs import read_run
-from synfeal.report.figures.cumulative_error import cumulative
 from synfeal.report.tables import record_of
 from tests.report_results import design_of, experiment
 from tests.trained_localizers import NETWORK, answering, save

@@ -12,25 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.training.record import check_same_labels
-from synfeal.bootstrap import limits, medians, path_counts
+from synfeal.config.collection import CameraConfig
 from synfeal.dataset.number_table import read_numbers
 from synfeal.dataset.pose_table import (
     HEADER,
-    UNIT_TOLERANCE,
     PoseTable,
     read_pose_table,
     whole_numbers,
 )
 from synfeal.errors import InputError
+from synfeal.evaluation.metrics import finite, pose_errors, summary
+from synfeal.evaluation.reprojection import dcre, dcre_summary, read_cell_depth
 from synfeal.files import atomic_path, write_json
-from synfeal.geometry.poses import position_error_m
-from synfeal.geometry.rotations import rotation_angle_rad
 from synfeal.labels.constant import constant_pose
-from synfeal.seeds import generator_of
 
 Array = NDArray[np.float64]
-
-RESAMPLES = 1000
 
 
 def score_run(
@@ -41,16 +37,18 @@ def score_run(
     out_errors: Path,
     out_metrics: Path,
     info: Mapping[str, Any],
+    depth: tuple[Path, CameraConfig] | None = None,
 ) -> None:
-    """Write the errors of every test frame and their medians.
+    """Write the errors of every test frame, and what is printed of them.
 
     ``position_m`` and ``orientation_deg`` are against ``labels``, which is what the paper reports;
     the names ending in ``_true`` are against ``truth``. ``position_rms_m`` is the published code's
     definition, the root mean square over the three axes. ``baseline_*`` are the median errors of
     always answering the mean training pose, ``floor_*`` those of the true poses against ``labels``:
     what a perfect localizer scores. ``failed`` counts predictions that are no pose, i.e. not finite
-    or without a unit quaternion; their error is infinite. A median that is not finite is ``null``
-    in the JSON.
+    or without a unit quaternion; their error is infinite. Means and recalls are those of
+    :func:`synfeal.evaluation.metrics.summary`, ``dcre`` that of
+    :mod:`synfeal.evaluation.reprojection`. What is not finite is ``null`` in the JSON.
 
     Args:
         predictions: pose table of the test frames; may hold ``nan``.
@@ -60,6 +58,7 @@ def score_run(
         out_errors: CSV to write, one row per frame.
         out_metrics: JSON to write.
         info: further keys of the JSON, e.g. what the run was.
+        depth: what the test frames show, for the DCRE, and their camera.
 
     Raises:
         InputError: a file cannot be read, the tables are not about the same frames, or the labels
@@ -72,15 +71,21 @@ def score_run(
     errors = _both_scores(predicted, label_table, true_table)
     constant = _both_scores(constant_pose(train, label_table), label_table, true_table)
     floor = pose_errors(true_table, label_table)
-    metrics = {
+    metrics: dict[str, Any] = {
         **info,
-        **median_metrics(errors, predicted.path),
+        **summary(errors, predicted.path),
+        "position_rms_m": finite(float(np.median(errors["position_m"])) / math.sqrt(3)),
         "n_train": len(train),
         "n_test": len(predicted),
         "failed": int(np.isinf(errors["position_m"]).sum()),
         **{f"baseline_{name}": float(np.median(e)) for name, e in constant.items()},
         **{f"floor_{name}": float(np.median(e)) for name, e in floor.items()},
     }
+    if depth:
+        depth_m = read_cell_depth(depth[0], len(predicted))
+        for end, reference in {"": label_table, "_true": true_table}.items():
+            found = dcre(predicted, reference, depth_m, depth[1])
+            metrics |= dcre_summary(found, predicted.path, end)
     _write_errors(out_errors, predicted.frame, errors)
     write_json(out_metrics, metrics)
 
@@ -89,56 +94,6 @@ def _both_scores(poses: PoseTable, labels: PoseTable, truth: PoseTable) -> dict[
     """Errors (N,) against the labels, and under names that end in ``_true`` against the truth."""
     true = {f"{name}_true": e for name, e in pose_errors(poses, truth).items()}
     return pose_errors(poses, labels) | true
-
-
-def pose_errors(predicted: PoseTable, reference: PoseTable) -> dict[str, Array]:
-    """``position_m`` and ``orientation_deg`` (N,); infinite where a prediction is no pose."""
-    good = _is_pose(predicted)
-    position, orientation = np.full(len(good), np.inf), np.full(len(good), np.inf)
-    position[good] = position_error_m(predicted.position_m[good], reference.position_m[good])
-    angles = rotation_angle_rad(predicted.quat_wxyz[good], reference.quat_wxyz[good])
-    orientation[good] = np.degrees(angles)
-    return {"position_m": position, "orientation_deg": orientation}
-
-
-def _is_pose(predicted: PoseTable) -> NDArray[np.bool_]:
-    """Which predictions (N,) are finite and have a quaternion of unit length.
-
-    Another length is not mended: a quaternion of zeros, say, has no direction to be brought to.
-    """
-    with np.errstate(over="ignore", invalid="ignore"):
-        off = np.abs(np.linalg.norm(predicted.quat_wxyz, axis=1) - 1.0)
-        position = np.abs(predicted.position_m).max(axis=1)
-    return np.asarray((position < 1e100) & (off <= UNIT_TOLERANCE))
-
-
-def median_metrics(errors: Mapping[str, Array], path: NDArray[np.int64]) -> dict[str, float | None]:
-    """Median of each error with its limits ``_low`` and ``_high``, and ``position_rms_m``."""
-    bounds = bootstrap_limits(errors, path)
-    metrics: dict[str, float | None] = {}
-    for name, values in errors.items():
-        metrics[name] = _finite(float(np.median(values)))
-        metrics[f"{name}_low"], metrics[f"{name}_high"] = map(_finite, bounds[name])
-    metrics["position_rms_m"] = _finite(float(np.median(errors["position_m"])) / math.sqrt(3))
-    return metrics
-
-
-def bootstrap_limits(
-    errors: Mapping[str, Array], path: NDArray[np.int64]
-) -> dict[str, tuple[float, float]]:
-    """95 % percentile limits of the medians of errors (N,) over 1000 seeded resamples.
-
-    Whole paths are drawn, not frames: neighbouring frames of a path are nearly the same image, and
-    treating them as independent would give limits that are too narrow.
-    """
-    _, place = np.unique(path, return_inverse=True)
-    n_paths = int(place.max()) + 1
-    counts = path_counts(n_paths, generator_of("bootstrap", len(path)), RESAMPLES)
-    return {name: limits(medians(values, place, counts)) for name, values in errors.items()}
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _read_predictions(path: Path) -> PoseTable:

@@ -17,10 +17,10 @@ from baselines.training.data import read_images
 from baselines.training.loop import train_localizer
 from baselines.training.predict import BATCH, predict, predict_poses
 from baselines.training.protocol import PROTOCOLS, Protocol
-from baselines.training.score import pose_errors
 from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig, Strict, TrainingConfig
 from synfeal.dataset.packed import read_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
+from synfeal.evaluation.metrics import pose_errors
 from synfeal.seeds import seed_of
 
 # Calls of a prediction that is timed; the first, which builds what is built on demand, is left out.

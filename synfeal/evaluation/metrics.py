@@ -112,8 +112,8 @@ def summary(errors: Mapping[str, Array], path: NDArray[np.int64]) -> Metrics:
     """Median, mean and recalls, each with its limits under ``_low`` and ``_high``.
 
     Args:
-        errors: (N,) by name; ``position_m`` and ``orientation_deg`` with the same ending (``""`` or
-            ``_true``) go together. Other names have a median alone.
+        errors: (N,) by name; ``position_m`` and ``orientation_deg`` with the same ending (``""``,
+            ``_true``) go together.
         path: (N,) what is drawn in the bootstrap: index of each frame's path.
 
     Returns:

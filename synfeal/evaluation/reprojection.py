@@ -18,13 +18,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.bootstrap import medians
 from synfeal.camera.rays import pixels_of_slopes, slopes_of_pixels
 from synfeal.config.collection import CameraConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.sevenscenes import INVALID_MM
 from synfeal.errors import InputError
-from synfeal.evaluation.metrics import is_pose
+from synfeal.evaluation.metrics import Metrics, draws, is_pose, means, with_limits
 from synfeal.files import atomic_path
 from synfeal.geometry.poses import pose_from_quat, relative
 from synfeal.mesh.rays import RayCaster
@@ -79,11 +80,29 @@ def dcre(predicted: PoseTable, reference: PoseTable, depth_m: Array, camera: Cam
     errors = np.full(len(predicted), np.inf)
     good = np.flatnonzero(is_pose(predicted))
     for rows in np.array_split(good, -(-len(good) // BLOCK) or 1):
-        pair = [
-            pose_from_quat(t.position_m[rows], t.quat_wxyz[rows]) for t in (predicted, reference)
-        ]
-        errors[rows] = _moved(relative(*pair), depth_m[rows], camera)
+        estimate, true = (_poses(table, rows) for table in (predicted, reference))
+        errors[rows] = _moved(relative(estimate, true), depth_m[rows], camera)
     return errors
+
+
+def dcre_summary(errors: Array, path: NDArray[np.int64], end: str = "") -> Metrics:
+    """Median of DCREs (N,), and shares below :data:`DCRE_BOUNDS`, with limits.
+
+    Frames that show nothing are left out. Names end in ``end``; ``path`` (N,) is what is drawn.
+    """
+    seen = ~np.isnan(errors)
+    if not seen.any():
+        return {}
+    errors, (place, counts) = errors[seen], draws(path[seen])
+    found = {f"dcre{end}": medians(errors, place, counts)}
+    for bound in DCRE_BOUNDS:
+        below = (errors < bound).astype(np.float64)
+        found[f"dcre_below_{bound:g}{end}"] = means(below, place, counts)
+    return with_limits(found)
+
+
+def _poses(table: PoseTable, rows: NDArray[np.intp]) -> Array:
+    return pose_from_quat(table.position_m[rows], table.quat_wxyz[rows])
 
 
 def _moved(estimate_from_reference: Array, depth_m: Array, camera: CameraConfig) -> Array:

@@ -27,7 +27,7 @@ from synfeal.evaluation.metrics import (
     pose_errors,
     summary,
 )
-from synfeal.evaluation.reprojection import DCRE_BOUNDS, dcre, depth_of_images
+from synfeal.evaluation.reprojection import dcre, dcre_summary, depth_of_images
 from synfeal.geometry.alignment import umeyama_sim3
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.validate.camera import camera_of_dataset
@@ -194,7 +194,10 @@ def _depth(frames: ScoredFrames, camera: CameraConfig) -> Array | None:
 
 def _metrics(errors: Mapping[str, Array], ends: Iterable[str], frames: ScoredFrames) -> Metrics:
     """Medians and recalls of all frames; mean, RMSE and maximum of those that have a pose."""
-    metrics = summary(errors, frames.path)
+    metrics = summary({k: v for k, v in errors.items() if "dcre" not in k}, frames.path)
+    for end in ends:
+        if f"dcre{end}" in errors:
+            metrics |= dcre_summary(errors[f"dcre{end}"], frames.path, end)
     if len(np.unique(frames.path)) < FEWEST_PATHS:
         metrics = {k: v for k, v in metrics.items() if not k.endswith(("_low", "_high"))}
     for end in ends:
@@ -206,7 +209,4 @@ def _metrics(errors: Mapping[str, Array], ends: Iterable[str], frames: ScoredFra
                 f"{name}_rmse{end}": float(np.sqrt((there**2).mean())),
                 f"{name}_max{end}": float(there.max()),
             }
-        if f"dcre{end}" in errors:
-            found = errors[f"dcre{end}"]
-            metrics |= {f"dcre_below_{b:g}{end}": float(np.mean(found < b)) for b in DCRE_BOUNDS}
     return metrics

@@ -13,6 +13,8 @@ from synfeal.report.crossing import crossing_findings
 from synfeal.report.layouts import grid_of
 from synfeal.report.markdown import markdown_of
 from synfeal.report.meshes import meshes_grid, read_mesh_facts
+from synfeal.report.recall import NAME as RECALL
+from synfeal.report.recall import read_recall_table, recall_grid
 from synfeal.report.references import NAME as REFERENCES
 from synfeal.report.references import read_references, references_grid
 
@@ -51,6 +53,9 @@ def write_summary(design: Design, root: Path, out_md: Path) -> str:
         table = read_references(references)
         findings += crossing_findings(table)
         grids.append(references_grid(table))
+    recalls = root / "tables" / f"{RECALL}.csv"
+    if recalls.exists():
+        grids.append(recall_grid(design, read_recall_table(recalls)))
     parts = [
         INTRO.format(profile=root.name),
         "## Do the localizers localize?\n",

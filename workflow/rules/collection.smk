@@ -72,6 +72,28 @@ rule coverage:
         "../scripts/plan_coverage.py"
 
 
+# What test frames show, at a few points of each: for the reprojection error of predicted poses.
+rule cell_depth:
+    input:
+        collision=rules.scene.output.collision,
+        plan=f"{ROOT}/plans/{{scene}}/test.csv",
+    output:
+        depth=f"{ROOT}/scenes/{{scene}}/test_depth.npy",
+    log:
+        f"{ROOT}/logs/cell_depth/{{scene}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/cell_depth/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(1000),
+    params:
+        camera=dump(CONFIG.network_camera),
+    script:
+        "../scripts/cell_depth.py"
+
+
 rule render:
     input:
         mesh=rules.scene.output.mesh,

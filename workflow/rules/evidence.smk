@@ -56,6 +56,31 @@ rule table:
         "../scripts/table.py"
 
 
+rule recall:
+    input:
+        metrics=all_metrics(),
+    output:
+        csv=report(
+            f"{ROOT}/tables/recall.csv",
+            caption="../report/recall.rst",
+            category="Tables",
+        ),
+        tex=f"{ROOT}/tables/recall.tex",
+    log:
+        f"{ROOT}/logs/tables/recall.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/recall.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(1000),
+    params:
+        design=dump(DESIGN),
+    script:
+        "../scripts/recall.py"
+
+
 rule assistance:
     input:
         records=assistance_files(),
@@ -151,7 +176,10 @@ rule hard_cases:
 
 rule document:
     input:
-        tex=expand(f"{ROOT}/tables/{{table}}.tex", table=[*TABLE_NAMES, "references"]),
+        tex=expand(
+            f"{ROOT}/tables/{{table}}.tex",
+            table=[*TABLE_NAMES, "references", "recall"],
+        ),
     output:
         tex=f"{ROOT}/tables/all_tables.tex",
     log:
@@ -217,6 +245,7 @@ rule summary:
     input:
         metrics=all_metrics(),
         references=rules.references_table.output.csv,
+        recall=rules.recall.output.csv,
         properties=rules.table1_meshes.input.properties,
     output:
         page=f"{ROOT}/summary.md",
@@ -270,6 +299,7 @@ rule provenance:
         assistance=rules.assistance.output.csv,
         label_error=rules.label_error.output.csv,
         references=rules.references_table.output.csv,
+        recall=rules.recall.output.csv,
         figures=rules.figures.output.figures,
         summary=rules.summary.output.page,
         claims=rules.claims.output.csv,

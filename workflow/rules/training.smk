@@ -76,6 +76,7 @@ rule score:
         labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
         truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
         train_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
+        depth=f"{ROOT}/scenes/{{scene}}/test_depth.npy",
     output:
         errors=f"{RUN}/errors.csv",
         metrics=f"{RUN}/metrics.json",
@@ -89,6 +90,6 @@ rule score:
     resources:
         mem_mb=grown(1000),
     params:
-        seed=CONFIG.seed,
+        camera=dump(CONFIG.network_camera),
     script:
         "../scripts/score.py"

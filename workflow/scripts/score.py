@@ -1,6 +1,7 @@
 from pathlib import Path
 
 from baselines.training.score import score_run
+from synfeal.config.models import CameraConfig
 from synfeal.job import job
 
 with job(snakemake.log[0]):
@@ -12,4 +13,5 @@ with job(snakemake.log[0]):
         Path(snakemake.output.errors),
         Path(snakemake.output.metrics),
         dict(snakemake.wildcards),
+        (Path(snakemake.input.depth), CameraConfig(**snakemake.params.camera)),
     )

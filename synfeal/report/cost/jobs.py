@@ -58,6 +58,7 @@ STAGES = (
     "external_reference",
     *(
         "coverage",
+        "cell_depth",
         "render_speed",
         "tables",
         "claims",
@@ -69,7 +70,8 @@ STAGES = (
     ),
 )
 SIDE_TABLES = (
-    *("assistance", "label_error", "speed_vs_error", "hard_cases", "references", "document"),
+    *("recall", "assistance", "label_error", "speed_vs_error", "hard_cases"),
+    *("references", "document"),
 )
 LAW_OF = {
     "render": RENDERING,
@@ -319,6 +321,7 @@ def _evidence(
     for name in (*tables, *SIDE_TABLES):
         yield Job("tables", name)
     for scene in sorted({e.scene for e in experiments}):
+        yield Job("cell_depth", scene)
         yield Job("render_speed", scene, (config.render_speed.sizes,))
         for split in SPLITS:
             yield Job("coverage", f"{scene}/{split}")

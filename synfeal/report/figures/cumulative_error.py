@@ -13,7 +13,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from synfeal.config import MODELS, Experiment
 from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
-from synfeal.evaluation.metrics import cumulative
+from synfeal.evaluation.metrics import cumulative, joint_error
 from synfeal.report.compare.runs import ERRORS_HEADER
 from synfeal.report.figures.sources import Array, Results, counted
 from synfeal.report.figures.style import MODEL_STYLES
@@ -23,6 +23,8 @@ MEASURES = {
     "position_m_true": "position error against the true poses (m)",
     "orientation_deg_true": "orientation error against the true poses (°)",
 }
+JOINT = "both"
+AXES = {**MEASURES, JOINT: "both errors against the true poses: at most x cm and x°"}
 MARKED_AT = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 
@@ -66,17 +68,18 @@ def read_errors(results: Results, row: Experiment) -> SceneErrors:
                 raise InputError(f"{path}: needs rows; score that run again")
         values = np.concatenate(parts)
         errors[model] = {m: values[:, ERRORS_HEADER.split(",").index(m)] for m in MEASURES}
+        errors[model][JOINT] = joint_error(errors[model], "_true")
     counts = [len(results.labels(row.scene, row.size, "synfeal", s)) for s in ("train", "test")]
     return SceneErrors(f"{scene_title(row.scene)}, {row.size}\n{counted(*counts)}", errors)
 
 
 def figure_of(scenes: list[SceneErrors]) -> Figure:
     """The figure of some scenes."""
-    figure = Figure(figsize=(1.2 + 4.0 * len(scenes), 7.0), layout="constrained")
-    panels = figure.subplots(2, len(scenes), squeeze=False, sharey=True, sharex="row")
+    figure = Figure(figsize=(1.2 + 4.0 * len(scenes), 10.0), layout="constrained")
+    panels = figure.subplots(len(AXES), len(scenes), squeeze=False, sharey=True, sharex="row")
     for column, scene in enumerate(scenes):
         panels[0, column].set_title(scene.title)
-        for axes, (measure, label) in zip(panels[:, column], MEASURES.items(), strict=True):
+        for axes, (measure, label) in zip(panels[:, column], AXES.items(), strict=True):
             draw_curves(axes, {model: found[measure] for model, found in scene.errors.items()})
             axes.set_xlabel(label)
     for axes in panels[:, 0]:

@@ -84,7 +84,8 @@ FIGURES: dict[str, Entry] = {
     "cumulative_error": Entry(
         cumulative_error.draw,
         "Share of the test frames that each localizer places with at most a given error against "
-        "the true poses, at the largest size of each scene; the grey line is the median.",
+        "the true poses, in position, in orientation and in both (as many degrees as centimetres), "
+        "at the largest size of each scene; the grey line is the median.",
     ),
     "speed_vs_error_collision": Entry(
         partial(speed_vs_error.draw, stage="collision"),

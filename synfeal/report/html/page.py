@@ -22,17 +22,21 @@ from synfeal.report.html.hard_cases import hard_cases_table
 from synfeal.report.html.labels import label_error_table
 from synfeal.report.html.markup import bullets
 from synfeal.report.html.origin import Record, cost_sentence, origin_html, read_origin
+from synfeal.report.html.recall import recall_table
 from synfeal.report.html.references import references_table
 from synfeal.report.html.rooms import room_html
 from synfeal.report.html.side_tables import assistance_table, meshes_table, speed_table
 from synfeal.report.html.skipped import missing_figures, missing_rows, untested_claims
 from synfeal.report.html.tables import score_table
 from synfeal.report.label_error import NAME as LABEL_ERROR
+from synfeal.report.recall import NAME as RECALL
 from synfeal.report.references import NAME as REFERENCES
 from synfeal.report.summary import alive_sentences, runs_sentence
 
 CLAIMS, PROVENANCE = "claims.csv", "provenance.json"
-SIDE_TABLES = (meshes.NAME, REFERENCES, "assistance", LABEL_ERROR, "speed_vs_error", HARD_CASES)
+SIDE_TABLES = (
+    *(meshes.NAME, REFERENCES, RECALL, "assistance", LABEL_ERROR, "speed_vs_error", HARD_CASES),
+)
 
 
 @dataclass(frozen=True)
@@ -145,6 +149,7 @@ def _tables(found: Results) -> Section:
     for name, cells in found.cells.items():
         bodies[name] = (name.split("_")[0].replace("table", "Table "), score_table(name, cells))
     bodies[REFERENCES] = ("References", _side_table(found, REFERENCES, references_table))
+    bodies[RECALL] = ("Recall", _side_table(found, RECALL, recall_table))
     bodies["assistance"] = ("Assistance", _side_table(found, "assistance", assistance_table))
     bodies[LABEL_ERROR] = ("Label errors", _side_table(found, LABEL_ERROR, label_error_table))
     speed = _side_table(found, "speed_vs_error", speed_table)

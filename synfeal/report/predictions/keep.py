@@ -15,7 +15,7 @@ from synfeal.report.predictions.package import write_package
 
 PREDICTIONS = "predictions.csv"
 OF_RUN = (PREDICTIONS, "history.csv", "training.json")
-OF_SCENE = ("properties.json", "collision_curve.csv", "render_speed.csv")
+OF_SCENE = ("properties.json", "collision_curve.csv", "render_speed.csv", "test_depth.npy")
 # Written by the job that estimates labels, so it tells them from labels that are computed.
 ESTIMATED = "assistance.json"
 COLLECTING = ("plan", "render_packed")  # what collecting took, of which a claim speaks
