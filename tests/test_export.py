@@ -9,13 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pycolmap
 import pytest
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 from synfeal.cli import main
 from synfeal.config.models import CameraConfig
-from synfeal.export.colmap import _camera as colmap_camera
+from synfeal.export.colmap import camera_line as colmap_camera
 from tests.damaged_sets import (
     FILES,
     copy_of_first_frames,
@@ -24,7 +26,8 @@ from tests.damaged_sets import (
     write_planar_set,
 )
 
-FORMATS = ("colmap", "nerfstudio", "tum")
+FORMATS = ("ace", "colmap", "hloc", "mstransformer", "nerfstudio", "tum")
+WITH_CAMERA = tuple(name for name in FORMATS if name != "mstransformer")
 LENS = (0.1, -0.05, 0.001, -0.002, 0.01)
 
 
@@ -123,7 +126,71 @@ def read_tum(out: Path) -> Exported:
     return Exported(lambda p: p[:, :2] / p[:, 2:] * scale + offset, poses, colors, depths)
 
 
-READERS = {"colmap": read_colmap, "nerfstudio": read_nerfstudio, "tum": read_tum}
+def read_ace(out: Path) -> Exported:
+    """By the rules of ACE's loader: the files of sorted folders go together, by place."""
+    poses, colors, depths = [], [], []
+    matrix = np.eye(3)
+    for split in ("train", "test"):
+        folders = [sorted((out / split / name).iterdir()) for name in ("rgb", "poses", "depth")]
+        calibrations = sorted((out / split / "calibration").iterdir())
+        assert {len(folder) for folder in folders} == {len(calibrations)}
+        colors += folders[0]
+        poses += [np.linalg.inv(np.loadtxt(path)) for path in folders[1]]
+        depths += [np.asarray(Image.open(path)) / 1000 for path in folders[2]]
+        matrix = np.loadtxt(calibrations[0])
+        assert matrix[0, 0] == matrix[1, 1]  # asserted by test_ace.py
+    return Exported(lambda p: (p @ matrix.T)[:, :2] / p[:, 2:], poses, colors, depths)
+
+
+def read_hloc(out: Path) -> Exported:
+    """By the rules of hloc: binary models by name, the query list with its own camera."""
+    model = pycolmap.Reconstruction(str(out / "model"))
+    assert {path.suffix for path in (out / "model").iterdir()} == {".bin"}
+    by_name = {image.name: image for image in model.images.values()}
+    lines = (out / "queries_with_intrinsics.txt").read_text().splitlines()
+    queries = [line.split() for line in lines]
+    name, kind, width, height, *parameters = queries[0]
+    camera = pycolmap.Camera(
+        model=kind, width=int(width), height=int(height), params=list(map(float, parameters))
+    )
+    reference = pycolmap.Reconstruction(str(out / "sfm_reference"))
+    lists = [(out / f"list_{split}.txt").read_text().split() for split in ("train", "test")]
+    assert sorted(image.name for image in reference.images.values()) == sorted(lists[0])
+    assert [query[0] for query in queries] == lists[1]
+    assert name in by_name
+    names = [name for listed in lists for name in listed]
+    return Exported(
+        lambda points: np.asarray(camera.img_from_cam(points)),
+        [np.vstack([by_name[n].cam_from_world().matrix(), [0, 0, 0, 1]]) for n in names],
+        [out / "images" / name for name in names],
+        None,
+    )
+
+
+def read_mstransformer(out: Path) -> Exported:
+    """By the rules of its loader: columns by name, image paths below the directory."""
+    poses, colors = [], []
+    for split in ("train", "test"):
+        table = pd.read_csv(out / f"{split}.csv")
+        assert set(table["split"]) == {split}
+        assert set(table["scene"]) == {"set"}
+        colors += [out / path for path in table["img_path"]]
+        matrices = np.tile(np.eye(4), (len(table), 1, 1))
+        quat = table[["q1", "q2", "q3", "q4"]].to_numpy()
+        matrices[:, :3, :3] = Rotation.from_quat(quat, scalar_first=True).as_matrix()
+        matrices[:, :3, 3] = table[["t1", "t2", "t3"]]
+        poses += list(np.linalg.inv(matrices))
+    return Exported(lambda points: points[:, :2], poses, colors, None)
+
+
+READERS = {
+    "ace": read_ace,
+    "colmap": read_colmap,
+    "hloc": read_hloc,
+    "mstransformer": read_mstransformer,
+    "nerfstudio": read_nerfstudio,
+    "tum": read_tum,
+}
 
 
 @pytest.mark.parametrize("to", FORMATS)
@@ -143,7 +210,7 @@ def test_poses_images_and_depth_come_back(to: str, planar: Path, tmp_path: Path)
             np.testing.assert_allclose(exported.depth_m[index], expected, atol=1e-4)
 
 
-@pytest.mark.parametrize("to", FORMATS)
+@pytest.mark.parametrize("to", WITH_CAMERA)
 def test_a_point_lands_at_the_pixel_where_it_was_drawn(
     to: str, planar: Path, tmp_path: Path
 ) -> None:
@@ -246,6 +313,27 @@ def test_damaged_data_leaves_nothing(
     assert run(damaged, to, tmp_path / "out") == 1
     assert file in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
+
+
+@pytest.mark.parametrize("to", ["ace", "hloc", "mstransformer"])
+def test_formats_of_two_splits_need_both(
+    to: str, damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("TrainSplit.txt", "TestSplit.txt"):
+        (damaged / name).unlink()
+    assert run(damaged, to, tmp_path / "out") == 1
+    assert "TrainSplit.txt: lists no frame" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_ace_refuses_a_lens(
+    damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lens = tmp_path / "cameras.txt"
+    lens.write_text("1 OPENCV 96 72 80 80 47 37 0.1 -0.05 0.001 -0.002\n")
+    assert run(damaged, "ace", tmp_path / "out", "--camera", str(lens)) == 1
+    assert "no distortion" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_an_unknown_camera_is_not_guessed(

@@ -1,4 +1,4 @@
-"""``synfeal export``: a data set for COLMAP, Nerfstudio or TUM's tools."""
+"""``synfeal export``: a data set in the format of another program."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 from synfeal.cli.options import Command, Options
 
+FORMATS = ("ace", "colmap", "hloc", "mstransformer", "nerfstudio", "tum")
 OPTIONS: Options = (
     (
         "dataset",
@@ -15,7 +16,7 @@ OPTIONS: Options = (
     ),
     (
         "--to",
-        {"choices": ("colmap", "nerfstudio", "tum"), "required": True, "help": "format to write"},
+        {"choices": FORMATS, "required": True, "help": "format to write"},
     ),
     ("--out", {"type": Path, "required": True, "help": "directory to create"}),
     ("--copy", {"action": "store_true", "help": "copy colour images instead of linking to them"}),
@@ -40,7 +41,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 COMMAND = Command(
     "export",
-    "a data set for COLMAP, Nerfstudio or TUM's tools",
+    "a data set for ACE, COLMAP, hloc, Nerfstudio and others",
     "Writes a 7-Scenes data set in the format of another program.",
     "synfeal export mydata --to colmap --out mydata-colmap",
     OPTIONS,

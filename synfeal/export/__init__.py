@@ -1,1 +1,1 @@
-"""A data set in the formats other programs read: COLMAP, Nerfstudio, TUM RGB-D."""
+"""A data set in the formats other programs read."""

@@ -102,6 +102,19 @@ def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
     return ExportSet(dataset, camera.config, frames, has_depth, bool(splits))
 
 
+def need_splits(data: ExportSet) -> None:
+    """Refuse a data set that does not say which frames are for training, and which for test.
+
+    Raises:
+        InputError: it does not, or has no frame of one of them.
+    """
+    for split, name in SPLIT_FILES.items():
+        if next(data.of_split(split), None) is None:
+            raise InputError(
+                f"{data.path / name}: lists no frame; this format needs {split} frames"
+            )
+
+
 def _check_size(path: FrameFile, camera: CameraConfig) -> None:
     height, width = read_color(path).shape[:2]
     if (width, height) != (camera.width, camera.height):

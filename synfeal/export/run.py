@@ -8,15 +8,21 @@ from pathlib import Path
 from tqdm import tqdm
 
 from synfeal.dataset.directories import atomic_directory, refuse_existing
+from synfeal.export.ace import export_ace
 from synfeal.export.colmap import export_colmap
 from synfeal.export.frames import ExportSet, read_export_set
+from synfeal.export.hloc import export_hloc
+from synfeal.export.mstransformer import export_mstransformer
 from synfeal.export.nerfstudio import export_nerfstudio
 from synfeal.export.tum import export_tum
 
 Exporter = Callable[[ExportSet, Path, bool, Callable[[], object]], list[str]]
 
 FORMATS: dict[str, Exporter] = {
+    "ace": export_ace,
     "colmap": export_colmap,
+    "hloc": export_hloc,
+    "mstransformer": export_mstransformer,
     "nerfstudio": export_nerfstudio,
     "tum": export_tum,
 }
