@@ -2,8 +2,6 @@
 
 import csv
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +9,6 @@ import pytest
 
 from baselines.training.device import open_device
 from synfeal.cli import main
-from synfeal.config import load_config, read_experiments
 from synfeal.report.cost import steps
 from synfeal.report.cost.compare import compare_cost
 from synfeal.report.cost.estimate import (
@@ -22,21 +19,14 @@ from synfeal.report.cost.estimate import (
     stage_costs,
     wall_seconds,
 )
-from synfeal.report.cost.jobs import (
-    Job,
-    experiment_jobs,
-    known_jobs,
-    run_jobs,
-    table_keys,
-)
+from synfeal.report.cost.jobs import Job, job_of
 from synfeal.report.cost.laws import Law, fit_laws, fit_seconds
 from synfeal.report.cost.measured import Measured, last_look_s, read_measured, write_measured
 from synfeal.report.cost.networks import training_work
 from synfeal.report.cost.profiles import read_run
 from synfeal.report.cost.run import compare_runs
-from tests.report_results import design_of
+from tests.planned_runs import ROOT, planned, run_jobs
 
-ROOT = Path(__file__).parent.parent
 HEADER = "s\tmax_rss\tcpu_time\n"
 # What the made-up run takes: seconds to start, and per unit of each law.
 START_S = 2.0
@@ -48,16 +38,9 @@ def _at_the_root(monkeypatch):
     monkeypatch.chdir(ROOT)
 
 
-def design(name):
-    config = load_config(Path("config/config.yaml"), Path(f"config/{name}.yaml"))
-    return config, read_experiments(config)
-
-
 @pytest.fixture(scope="module")
-def smoke():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(ROOT)
-        return design("smoke")
+def config():
+    return planned("smoke")[0].config
 
 
 def write_job(benchmarks, job, seconds):
@@ -74,63 +57,61 @@ def true_seconds(job):
 
 
 @pytest.fixture(scope="module")
-def made_up_run(smoke, tmp_path_factory):
+def made_up_run(tmp_path_factory):
     root = tmp_path_factory.mktemp("results") / "smoke"
-    for job in known_jobs(*smoke):
+    for job in run_jobs("smoke"):
         write_job(root / "benchmarks", job, true_seconds(job))
     return root
 
 
-@pytest.mark.parametrize("name", ["smoke", "gpu"])
-def test_jobs_are_those_of_snakemake(tmp_path, name):
-    profile = ["--configfile", f"config/{name}.yaml", "--config", f"results={tmp_path}"]
-    command = [sys.executable, "-m", "snakemake", "--dry-run", "--quiet", "rules", "--cores", "1"]
-    whole = [*command, *profile, "--", "all"]
-    run = subprocess.run(whole, capture_output=True, text=True, check=True)
-    rules = {name: int(n) for name, n in re.findall(r"^(\w+) +(\d+)$", run.stdout, re.MULTILINE)}
-    stages = {"labels": 0, "posegraph": 0, "estimate": 0, "tables": 0}
-    merged = {
-        **dict.fromkeys(("true_labels", "erroneous_labels"), "labels"),
-        **dict.fromkeys(("table1_meshes", "table", "recall", "assistance"), "tables"),
-        **dict.fromkeys(("label_error", "speed_vs_error", "hard_cases", "document"), "tables"),
-        "references_table": "tables",
-        **dict.fromkeys(("rgbd-toro", "rgbd-g2o"), "posegraph"),
-    }
-    for rule, count in rules.items():
-        if rule not in ("all", "total"):
-            stage = merged.get(rule, rule)
-            stages[stage] = stages.get(stage, 0) + count
-    ours = dict.fromkeys(stages, 0)
-    for job in run_jobs(*design(name)):
-        stage = merged.get(job.stage, "estimate" if job.stage == "kinect-fusion" else job.stage)
-        ours[stage] = ours.get(stage, 0) + 1
-    assert ours == stages
-    assert rules["total"] - 1 == len(run_jobs(*design(name)))
-
-
-def test_every_job_has_a_name_of_its_own(smoke):
-    keys = [job.key for job in known_jobs(*smoke)]
-    assert len(keys) == len(set(keys))
+@pytest.mark.parametrize("name", ["smoke", "paper"])
+def test_every_job_of_snakemake_has_a_name_and_a_size_of_its_own(name):
+    jobs, keys = run_jobs(name), planned(name)[1].keys
+    assert len(jobs) == len(keys) == len(set(keys)) > 90
+    assert {job.key for job in jobs} == set(keys)
+    # ImageNet weights are downloaded.
+    assert all(job.size[-1] > 0 for job in jobs if job.size and job.stage != "pretrain")
 
 
 def test_sizes_at_the_papers_scale():
-    jobs = run_jobs(*design("paper"))
+    jobs = run_jobs("paper")
 
     def sums(stage):
         return np.sum([job.size for job in jobs if job.stage == stage], axis=0)
 
     # 80,000 + 20,000 and 95,000 + 20,000 frames; 640 x 480 pixels with 2 x 2 samples.
     frames = 100_000 + 115_000
+    assert sums("plan") == frames
     assert sums("render_packed") == pytest.approx([frames, frames * 640 * 480 * 4 / 1e6])
     assert sums("pack") == pytest.approx(frames * 224 * 224 * 3 / 1e6)
     # 6,000 and 2,500 frames in batches of 250; each shares its first frame with the one before.
     batches = 24 + 10
     assert len([job for job in jobs if job.stage == "sfm"]) == batches
     assert sums("sfm") == pytest.approx((8500 - 2 + batches) * 640 * 480 / 1e6)
+    assert sums("render") == pytest.approx([8500, 8500 * 640 * 480 * 4 / 1e6])
+
+
+@pytest.mark.parametrize(
+    ("stage", "name"),
+    [
+        ("plan", "cellar/train"),
+        ("labels", "large_room/7k/synfeal/train"),
+        ("render_packed", "large_room/seq-99"),
+        ("sfm", "large_room/6k/train/batch-999"),
+        ("train", "large_room/6k/synfeal/pretrained/posenet3/seed0"),
+        ("score", ""),
+    ],
+)
+def test_a_measurement_of_another_design_is_left_out(stage, name):
+    assert job_of(planned("smoke")[0], stage, name) is None
+
+
+def test_a_rule_that_nobody_told_the_planner_of_is_counted_as_jobs_that_are_all_alike():
+    assert job_of(planned("smoke")[0], "weather", "today") == Job("weather", "today")
 
 
 def test_multiply_adds_are_the_published_ones():
-    config, _ = design("paper")
+    config = planned("paper")[0].config
     work = {m: training_work(m, config.network, h) for m, h in config.localizers.items()}
     # He et al. (CVPR 2016, table 1): ResNet-34 takes 3.6e9, its 1000-way classifier included.
     # Szegedy et al. (CVPR 2015, table 1): GoogLeNet takes 1.5e9 with its printed rounding.
@@ -205,7 +186,7 @@ def test_no_part_is_negative():
     assert rates[0] > 0
 
 
-def test_the_made_up_runs_costs_are_predicted(made_up_run, smoke):
+def test_the_made_up_runs_costs_are_predicted(made_up_run):
     rows = compare_runs([made_up_run], made_up_run)[str(made_up_run), str(made_up_run)]
     factors = {row.stage: row.factor for row in rows}
     assert factors.keys() >= {"train", "render_packed", "sfm", "total"}
@@ -255,21 +236,22 @@ def test_longest_jobs_start_first():
     assert wall_seconds([5, 1], 8) == 5
 
 
-def test_tables_add_up_to_the_run(smoke):
-    config, experiments = smoke
-    jobs = run_jobs(config, experiments)
-    laws = fit_laws([])
-    laws |= {job.law: Law(1.0, (0.0,) * len(job.size), (1.0, 1.0), 1, None, None) for job in jobs}
-    costs = job_costs(jobs, laws, Machine(1, 0, 1.0))
-    rows = by_table(costs, table_keys(config, experiments), Machine(1, 0, 1.0))
+def test_tables_add_up_to_the_run():
+    jobs, needed = run_jobs("smoke"), planned("smoke")[1].needed
+    law = {job.law: Law(1.0, (0.0,) * len(job.size), (1.0, 1.0), 1, None, None) for job in jobs}
+    costs = job_costs(jobs, law, Machine(1, 0, 1.0))
+    rows = by_table(costs, needed, Machine(1, 0, 1.0))
     assert sum(row.own.jobs for row in rows) == len(jobs)
     assert sum(row.own.cpu_s.mid for row in rows) == pytest.approx(len(jobs))
     assert run_wall(costs, Machine(1, 0, 1.0)).mid == pytest.approx(len(jobs))
-    alone = {row.name: row.alone.cpu_s.mid for row in rows if row.alone}
-    # By itself a table needs the jobs of its rows and the one that makes it.
-    rows4 = tuple(e for e in experiments if e.table == "table4_size")
-    runs4 = design_of(rows4).runs
-    assert alone["table4_size"] == pytest.approx(len(experiment_jobs(config, rows4, runs4)) + 1)
+    # By itself a table needs the training runs of its own rows, and from the meshes on.
+    rows4 = [e for e in planned("smoke")[0].experiments if e.table == "table4_size"]
+    keys = needed["table4_size"]
+    trained = {name for stage, name in keys if stage == "train"}
+    starts = [f"{e.scene}/{e.size}/{e.label_id}/{e.init}" for e in rows4]
+    assert {name.rsplit("/", 2)[0] for name in trained} == set(starts)
+    assert {("tables", "table4_size"), ("scene", "large_room")} <= keys
+    assert not any(stage in ("claims", "report", "hard_cases") for stage, _ in keys)
 
 
 def read_rows(path):
@@ -277,8 +259,7 @@ def read_rows(path):
         return list(csv.DictReader(file))
 
 
-def test_rates_of_steps_are_found(smoke, monkeypatch):
-    config, _ = smoke
+def test_rates_of_steps_are_found(config, monkeypatch):
     batch = config.training.batch_size
 
     def step_s(name, hyper, *_):
@@ -289,17 +270,16 @@ def test_rates_of_steps_are_found(smoke, monkeypatch):
     assert steps.timed_rates(config).rates == pytest.approx((3e-4, 20))
 
 
-def test_a_step_is_trained_and_timed(smoke):
-    config, _ = smoke
+def test_a_step_is_trained_and_timed(config):
     hyper = config.localizers["posenet2"]
     assert 0 < steps._step_s("posenet2", hyper, config, open_device("cpu")) < 60
 
 
-def test_steps_that_are_timed_tell_what_a_small_run_does_not(smoke):
+def test_steps_that_are_timed_tell_what_a_small_run_does_not():
     """Mini is predicted from a smoke run whose jobs are each 15 % off, one way or the other."""
     mini, _ = read_run(Path("results/published/mini"))
     laws = fit_laws(mini)
-    jobs = [job for job in known_jobs(*smoke) if job.law in laws]
+    jobs = [job for job in run_jobs("smoke") if job.law in laws]
     for seed in range(4):
         rng = np.random.default_rng(seed)
         run = [
@@ -326,7 +306,7 @@ def test_the_command_prints_and_writes_the_plan(made_up_run, tmp_path, capsys):
     assert "Profile smoke on 4 cores: " in text
     assert "GPU" not in text
     rows = {(row["cores"], row["part"], row["name"]): row for row in read_rows(out)}
-    jobs = run_jobs(*design("smoke"))
+    jobs = run_jobs("smoke")
     expected_s = sum(true_seconds(job) for job in jobs if job.stage == "train")
     for cores in ("1", "4"):
         cpu_h = float(rows[cores, "stage", "train"]["cpu_h"])
@@ -343,7 +323,7 @@ def test_runs_are_predicted_from_each_other(made_up_run, tmp_path, capsys):
     out = tmp_path / "check.csv"
     # Twice the time for every job: one direction is twice too high, the other half.
     slow = tmp_path / "smoke"
-    for job in known_jobs(*design("smoke")):
+    for job in run_jobs("smoke"):
         write_job(slow / "benchmarks", job, 2 * true_seconds(job))
     options = ["--measured", str(made_up_run), "--compare", str(slow), "--csv", str(out)]
     assert main(["plan", *options]) == 0

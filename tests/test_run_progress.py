@@ -15,11 +15,11 @@ from rich.console import Console
 
 from synfeal.config import MODELS, Run, load_config, read_experiments
 from synfeal.files import write_json
-from synfeal.report.cost.jobs import known_jobs
 from synfeal.report.progress.first_scores import FirstScores
 from synfeal.report.progress.plan import RunPlan, job_name, plan_run
 from synfeal.report.progress.time_left import TimeLeft
 from synfeal.report.progress.view import RunView
+from tests.planned_runs import planned
 from tests.report_results import failed_metrics, metrics
 
 REPOSITORY = Path(__file__).parent.parent
@@ -62,7 +62,7 @@ def test_every_job_of_a_profile_has_an_expected_time(monkeypatch: pytest.MonkeyP
     monkeypatch.chdir(REPOSITORY)
     config = load_config(REPOSITORY / "config/config.yaml", REPOSITORY / "config/smoke.yaml")
     experiments = read_experiments(config)
-    keys = ["/".join(filter(None, job.key)) for job in known_jobs(config, experiments)]
+    keys = ["/".join(filter(None, key)) for key in planned("smoke")[1].keys]
     plan = plan_run(config, experiments, [f"results/smoke/benchmarks/{k}.tsv" for k in keys], 2)
     assert set(plan.expected_s) == set(keys)
     assert len(set(plan.expected_s.values())) > 10  # laws, not one number for all

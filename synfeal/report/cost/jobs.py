@@ -1,21 +1,19 @@
-"""The jobs of a run and how large each is, from its configuration alone.
+"""How large a job is, from the name of its measurement and the configuration.
 
-Names and counts come from the functions that ``workflow/rules/common.smk`` asks too; a job is named
-like the file below ``<root>/benchmarks`` that its measurement is written to.
+Which jobs there are is Snakemake's to say (``dry_run.py``, or the measurements of a run). A job is
+named like the file below ``<root>/benchmarks`` that its measurement is written to.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from baselines.groundtruth.batches import batches_of
-from baselines.groundtruth.methods import METHODS, frame_methods, graph_methods, stages_of
-from baselines.localizers.names import backbone_of
-from baselines.references.registry import answered_by, data_sets, has_structure
-from synfeal.config import Config, Design, Experiment, Run
-from synfeal.config.experiments import FROM_SCRATCH, INJECTED
-from synfeal.config.models import CameraConfig
+from baselines.groundtruth.methods import METHODS, frame_methods, graph_methods
+from baselines.localizers.names import BackboneName
+from synfeal.config import Config, Design, Experiment
+from synfeal.config.models import CameraConfig, ModelName
 from synfeal.dataset.sequences import sequences_of
 from synfeal.report.cost.disk import (
     packed_bytes,
@@ -24,7 +22,7 @@ from synfeal.report.cost.disk import (
     scene_bytes,
     score_bytes,
 )
-from synfeal.report.cost.networks import pretext_work, training_work
+from synfeal.report.cost.networks import Work, pretext_work, training_work
 
 SPLITS = ("train", "test")
 # What the size of a job counts; stages under one law cost the same per unit.
@@ -50,7 +48,7 @@ UNITS: dict[str, tuple[str, ...]] = {
     "structure_references": ("frames",),
     "claims": ("frames",),
 }
-# Stages from the meshes to the report.
+# Stages from the meshes to the report; others come last.
 STAGES = (
     *("scene", "plan", "render_packed", "pack", "render", "dataset", "labels", "sfm"),
     *("rgbd", *frame_methods(), *graph_methods(), "chain", "pretrain", "train", "score"),
@@ -65,19 +63,12 @@ STAGES = (
         "figures",
         "summary",
         "provenance",
-        "report",
-        "report_document",
     ),
-)
-SIDE_TABLES = (
-    *("recall", "assistance", "label_error", "speed_vs_error", "hard_cases"),
-    *("references", "document"),
+    *("report", "report_document"),
 )
 LAW_OF = {
-    "render": RENDERING,
-    "render_packed": RENDERING,
-    "pretrain": TRAINING,
-    "train": TRAINING,
+    **dict.fromkeys(("render", "render_packed"), RENDERING),
+    **dict.fromkeys(("pretrain", "train"), TRAINING),
 }
 # Bytes of memory per pixel of a batch: what peaks differ by between profiles (docs/cost.md).
 HELD_PER_PX = {"sfm": 10, "rgbd": 26, **dict.fromkeys(frame_methods(), 26)}
@@ -115,121 +106,88 @@ class Job:
         return LAW_OF.get(self.stage, self.stage)
 
 
-def run_jobs(config: Config, experiments: tuple[Experiment, ...]) -> list[Job]:
-    """Every job of the target ``all``, in the order of the stages."""
-    runs = _design(config, experiments).runs
-    jobs = [
-        *experiment_jobs(config, experiments, runs),
-        *_references(config, experiments),
-        *_evidence(config, experiments, runs),
-    ]
-    return sorted(jobs, key=lambda job: STAGES.index(job.stage))
+@dataclass(frozen=True)
+class Profile:
+    """A configuration and its design."""
+
+    config: Config
+    experiments: tuple[Experiment, ...]
 
 
-def known_jobs(config: Config, experiments: tuple[Experiment, ...]) -> list[Job]:
-    """The same, and those that only the target ``datasets`` adds: network frames as image files."""
-    counts = _largest(config, _scenes(config, experiments))
-    extra = [job for scene in counts for job in _image_files(config, scene, "network", counts)]
-    return [*run_jobs(config, experiments), *extra]
+Size = tuple[tuple[float, ...], float, float]  # of a Job: size, disk_bytes, held_bytes
 
 
-def table_keys(
-    config: Config, experiments: tuple[Experiment, ...]
-) -> dict[str, frozenset[tuple[str, str]]]:
-    """The jobs each table needs; table 5 is read against the pretrained runs of the same sizes."""
-    scenes = sorted({e.scene for e in experiments})
-    needed = {"table1_meshes": {("scene", scene) for scene in scenes}}
-    design = _design(config, experiments)
-    for table in design.tables:
-        rows = design.rows_of(table)
-        if table == FROM_SCRATCH:
-            rows += [row.pretrained for row in rows]
-        jobs = experiment_jobs(config, tuple(rows), design.table_runs(table))
-        needed[table] = {job.key for job in jobs}
-    return {table: frozenset(keys | {("tables", table)}) for table, keys in needed.items()}
+def jobs_of(profile: Profile, keys: Iterable[tuple[str, str]]) -> list[Job]:
+    """The jobs of these names that the profile may have, in the order of the stages."""
+    made = [job for key in keys if (job := job_of(profile, *key)) is not None]
+    order = {stage: place for place, stage in enumerate(STAGES)}
+    return sorted(made, key=lambda job: order.get(job.stage, len(order)))
 
 
-def experiment_jobs(
-    config: Config, experiments: tuple[Experiment, ...], runs: Sequence[Run]
-) -> list[Job]:
-    """Every job from the meshes to the scores of some table rows and their runs, each once."""
-    jobs = [
-        *_collection(config, experiments),
-        *_label_sets(config, experiments),
-        *_trainings(config, runs),
-    ]
-    return list({job.key: job for job in jobs}.values())
+def job_of(profile: Profile, stage: str, name: str) -> Job | None:
+    """The job of this name; None if the profile has no such scene, size, sequence or network."""
+    size_of = SIZES.get(stage)
+    if size_of is None:
+        return Job(stage, name)
+    try:
+        return Job(stage, name, *size_of(profile, *name.split("/")))
+    except (KeyError, IndexError, TypeError, ValueError, StopIteration):
+        return None  # the name is of another design, or of an older workflow
 
 
-def _design(config: Config, experiments: tuple[Experiment, ...]) -> Design:
-    return Design(rows=experiments, repetitions=config.training.repetitions)
+def _scene(profile: Profile, scene: str) -> Size:
+    return (), scene_bytes(profile.config.scenes[scene].path), 0.0
 
 
-def _scenes(config: Config, experiments: Iterable[Experiment]) -> dict[str, tuple[str, ...]]:
-    """Scenes and the splits of them that are needed: of rooms to pretrain on just the training."""
-    experiments = tuple(experiments)
-    scenes: dict[str, tuple[str, ...]] = {e.scene: SPLITS for e in experiments}
-    if any(e.init == "pretrained" for e in experiments):
-        scenes |= dict.fromkeys(config.rooms, ("train",))
-    return dict(sorted(scenes.items()))
+def _plan(profile: Profile, scene: str, split: str) -> Size:
+    frames = profile.config.n_largest(scene, split)
+    return (frames,), pose_bytes(frames), 0.0
 
 
-def _largest(config: Config, scenes: Iterable[str]) -> dict[str, dict[str, int]]:
-    """Frames that are rendered for the localizers, by scene and split."""
-    return {s: {split: config.n_largest(s, split) for split in SPLITS} for s in scenes}
+def _pack(profile: Profile, scene: str, split: str) -> Size:
+    frames = profile.config.n_largest(scene, split)
+    n_bytes = packed_bytes(frames, profile.config.network.input_px)
+    return (n_bytes / 1e6,), n_bytes, 0.0
 
 
-def _collection(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[Job]:
-    scenes = _scenes(config, experiments)
-    largest = _largest(config, scenes)
-    for scene, splits in scenes.items():
-        yield Job("scene", scene, (), scene_bytes(config.scenes[scene].path))
-        for split in splits:
-            frames = largest[scene][split]
-            yield Job("plan", f"{scene}/{split}", (frames,), pose_bytes(frames))
-            frame_bytes = packed_bytes(frames, config.network.input_px)
-            yield Job("pack", f"{scene}/{split}", (frame_bytes / 1e6,), frame_bytes)
-        yield from _packed_shards(config, scene, splits, largest[scene])
-    counts = _groundtruth_frames(config, experiments)
-    for scene in counts:
-        yield from _image_files(config, scene, "groundtruth", counts)
-
-
-def _packed_shards(
-    config: Config, scene: str, splits: tuple[str, ...], counts: dict[str, int]
-) -> Iterator[Job]:
+def _render_packed(profile: Profile, scene: str, sequence: str) -> Size:
     """Rendering straight into arrays; the parts are removed once they are joined."""
-    for s in sequences_of(counts["train"], counts["test"], config.shard_frames):
-        if s.split in splits:
-            size = _rendering(config, config.network_camera, len(s))
-            yield Job("render_packed", f"{scene}/{s.name}", size)
+    frames = _frames_of(profile, _largest(profile, scene), sequence)
+    return _rendering(profile.config, profile.config.network_camera, frames), 0.0, 0.0
 
 
-def _groundtruth_frames(
-    config: Config, experiments: Iterable[Experiment]
-) -> dict[str, dict[str, int]]:
-    """Frames of the ground-truth camera by scene and split: those of the largest set estimated."""
-    counts: dict[str, dict[str, int]] = {}
-    for e in experiments:
-        if e.labels in METHODS:
-            frames = counts.setdefault(e.scene, dict.fromkeys(SPLITS, 0))
-            for split in SPLITS:
-                frames[split] = max(frames[split], config.n_frames(e.scene, e.size, split))
-    return counts
-
-
-def _image_files(
-    config: Config, scene: str, camera_name: str, counts: dict[str, dict[str, int]]
-) -> Iterator[Job]:
-    """A data set as image files, with depth from the ground-truth camera."""
+def _render(profile: Profile, scene: str, camera_name: str, sequence: str) -> Size:
+    """Image files, with depth from the ground-truth camera."""
     depth = camera_name == "groundtruth"
-    camera = config.groundtruth_camera if depth else config.network_camera
-    train, test = (counts[scene][split] for split in SPLITS)
-    for s in sequences_of(train, test, config.shard_frames):
-        size = _rendering(config, camera, len(s))
-        disk = picture_bytes(camera, len(s), depth)
-        yield Job("render", f"{scene}/{camera_name}/{s.name}", size, disk)
-    yield Job("dataset", f"{scene}/{camera_name}", (float(train + test),))
+    camera = profile.config.groundtruth_camera if depth else profile.config.network_camera
+    frames = _frames_of(profile, _written(profile, scene, camera_name), sequence)
+    return _rendering(profile.config, camera, frames), picture_bytes(camera, frames, depth), 0.0
+
+
+def _dataset(profile: Profile, scene: str, camera_name: str) -> Size:
+    return (float(sum(_written(profile, scene, camera_name))),), 0.0, 0.0
+
+
+def _largest(profile: Profile, scene: str) -> tuple[int, int]:
+    """Training and test frames of the largest set."""
+    train, test = (profile.config.n_largest(scene, split) for split in SPLITS)
+    return train, test
+
+
+def _written(profile: Profile, scene: str, camera_name: str) -> tuple[int, int]:
+    """The same as image files: of the ground-truth camera those of the largest set estimated."""
+    if camera_name == "network":
+        return _largest(profile, scene)
+    config = profile.config
+    sizes = [e.size for e in profile.experiments if e.scene == scene and e.labels in METHODS]
+    train, test = (max(config.n_frames(scene, s, split) for s in sizes) for split in SPLITS)
+    return train, test
+
+
+def _frames_of(profile: Profile, counts: tuple[int, int], name: str) -> int:
+    return next(
+        len(s) for s in sequences_of(*counts, profile.config.shard_frames) if s.name == name
+    )
 
 
 def _rendering(config: Config, camera: CameraConfig, frames: int) -> tuple[float, float]:
@@ -237,95 +195,113 @@ def _rendering(config: Config, camera: CameraConfig, frames: int) -> tuple[float
     return frames, frames * samples / 1e6
 
 
-def _label_sets(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[Job]:
-    for e in experiments:
-        counts = {split: config.n_frames(e.scene, e.size, split) for split in SPLITS}
-        names = ("synfeal", e.label_id) if e.labels in INJECTED else ("synfeal",)
-        for split, frames in counts.items():
-            for name in names:
-                path = f"{e.scene}/{e.size}/{name}/{split}"
-                # True labels are the first rows of the whole plan.
-                read = config.n_largest(e.scene, split) if name == "synfeal" else frames
-                yield Job("labels", path, (read + frames,), pose_bytes(frames))
-        if e.labels in METHODS:
-            yield from _estimated(config, e, counts)
+def _labels(profile: Profile, scene: str, size: str, labels: str, split: str) -> Size:
+    """True labels are the first rows of the whole plan."""
+    frames = profile.config.n_frames(scene, size, split)
+    read = profile.config.n_largest(scene, split) if labels == "synfeal" else frames
+    return (read + frames,), pose_bytes(frames), 0.0
 
 
-def _estimated(config: Config, e: Experiment, counts: dict[str, int]) -> Iterator[Job]:
-    camera = config.groundtruth_camera
-    for split, n_frames in counts.items():
-        for batch in batches_of(n_frames, config.groundtruth.batch_frames):
-            name = f"{e.scene}/{e.size}/{split}/batch-{batch.index:03d}"
-            pixels = len(batch) * camera.width * camera.height
-            for stage in stages_of(e.labels):
-                size = len(batch) if UNITS[stage] == ("frames",) else pixels / 1e6
-                held = pixels * HELD_PER_PX.get(stage, 0)
-                yield Job(stage, name, (size,), pose_bytes(len(batch)), held)
-    frames = sum(counts.values())
-    # Assisted and unassisted labels.
-    yield Job("chain", f"{e.scene}/{e.size}/{e.labels}", (frames,), 2 * pose_bytes(frames))
+def _batch(stage: str) -> Callable[..., Size]:
+    def size_of(profile: Profile, scene: str, size: str, split: str, batch: str) -> Size:
+        config, camera = profile.config, profile.config.groundtruth_camera
+        frames = config.n_frames(scene, size, split)
+        index = int(batch.removeprefix("batch-"))
+        length = len(batches_of(frames, config.groundtruth.batch_frames)[index])
+        pixels = length * camera.width * camera.height
+        amount = length if UNITS[stage] == ("frames",) else pixels / 1e6
+        return (amount,), pose_bytes(length), pixels * HELD_PER_PX.get(stage, 0)
+
+    return size_of
 
 
-def _trainings(config: Config, runs: Sequence[Run]) -> Iterator[Job]:
-    hypers = {str(name): hyper for name, hyper in config.localizers.items()}
-    pretrained = {backbone_of(r.model, config.network) for r in runs if r.init == "pretrained"}
-    for backbone in sorted(pretrained):
-        work = pretext_work(backbone, config.network)
-        samples = config.pretraining.samples_seen if config.rooms else 0
-        held = config.pretraining.frames * len(config.rooms)
-        batch = config.pretraining.batch_size
-        size = work.size(samples, batch, 0)
-        memory = packed_bytes(held, config.network.input_px) + work.held_bytes(batch)
-        yield Job("pretrain", backbone, size, work.parameter_bytes, memory)
-    for run in runs:
-        train, test = (config.n_frames(run.scene, run.size, split) for split in SPLITS)
-        work = training_work(run.model, config.network, hypers[run.model])
-        batch = config.training.batch_size
-        size = work.size(config.training.samples_seen[run.size], batch, test)
-        memory = packed_bytes(train, config.network.input_px) + work.held_bytes(batch)
-        yield Job("train", run.directory, size, work.parameter_bytes, memory)
-        yield Job("score", run.directory, (test,), score_bytes(test))
+def _chain(profile: Profile, scene: str, size: str, labels: str) -> Size:
+    frames = sum(profile.config.n_frames(scene, size, split) for split in SPLITS)
+    return (frames,), 2 * pose_bytes(frames), 0.0  # assisted and unassisted labels
 
 
-def _references(config: Config, experiments: tuple[Experiment, ...]) -> Iterator[Job]:
-    """What the localizers are compared with: once per scene, per size, and per data set."""
-    external = config.references.external
-    for scene, largest in _largest(config, sorted({e.scene for e in experiments})).items():
-        frames = sum(largest.values())
-        yield Job("descriptors", scene, (frames,), frames * DESCRIPTOR_BYTES)
-    for scene, size in sorted({(e.scene, e.size) for e in experiments}):
-        if has_structure(experiments, scene, size):
-            counts = {split: config.n_frames(scene, size, split) for split in SPLITS}
-            camera = config.groundtruth_camera
-            for split, frames in counts.items():
-                pixels = frames * camera.width * camera.height
-                held = frames * config.references.max_features * FEATURE_BYTES
-                yield Job("features", f"{scene}/{size}/{split}", (pixels / 1e6,), 0, held)
-            matches = counts["test"] * MATCHES_BYTES
-            yield Job("correspondences", f"{scene}/{size}", (counts["test"],), matches)
-    for scene, size, labels in data_sets(experiments):
-        n_test = config.n_frames(scene, size, "test")
-        groups = ["image", *(["structure"] if has_structure(experiments, scene, size) else [])]
-        for group in groups:
-            disk = pose_bytes(n_test) + score_bytes(n_test)
-            yield Job(f"{group}_references", f"{scene}/{size}/{labels}", (n_test,), disk)
-        for name in answered_by(experiments, (scene, size, labels), external):
-            if name in external:
-                yield Job("external_reference", f"{scene}/{size}/{labels}/{name}", (), disk)
+def _pretrain(profile: Profile, backbone: BackboneName) -> Size:
+    config = profile.config
+    samples = config.pretraining.samples_seen if config.rooms else 0
+    frames = config.pretraining.frames * len(config.rooms)
+    work = pretext_work(backbone, config.network)
+    return _learning(config, work, samples, config.pretraining.batch_size, 0, frames)
 
 
-def _evidence(
-    config: Config, experiments: tuple[Experiment, ...], runs: Sequence[Run]
-) -> Iterator[Job]:
-    tables = ["table1_meshes", *sorted({e.table for e in experiments})]
-    for name in (*tables, *SIDE_TABLES):
-        yield Job("tables", name)
-    for scene in sorted({e.scene for e in experiments}):
-        yield Job("cell_depth", scene)
-        yield Job("render_speed", scene, (config.render_speed.sizes,))
-        for split in SPLITS:
-            yield Job("coverage", f"{scene}/{split}")
-    scored = sum(config.n_frames(run.scene, run.size, "test") for run in runs)
-    yield Job("claims", "", (scored,))
-    for stage in ("figures", "summary", "provenance", "report", "report_document"):
-        yield Job(stage, "")
+def _train(profile: Profile, scene: str, size: str, *run: str) -> Size:
+    config, model = profile.config, _model(run)
+    train, test = (config.n_frames(scene, size, split) for split in SPLITS)
+    work = training_work(model, config.network, config.localizers[model])
+    samples, batch = config.training.samples_seen[size], config.training.batch_size
+    return _learning(config, work, samples, batch, test, train)
+
+
+def _model(run: tuple[str, ...]) -> ModelName:
+    _, _, model, _ = run  # labels, init, model, seed
+    return model  # type: ignore[return-value]
+
+
+def _learning(
+    config: Config, work: Work, samples: int, batch: int, predicted: int, frames: int
+) -> Size:
+    held = packed_bytes(frames, config.network.input_px) + work.held_bytes(batch)
+    return work.size(samples, batch, predicted), work.parameter_bytes, held
+
+
+def _score(profile: Profile, scene: str, size: str, *run: str) -> Size:
+    frames = profile.config.n_frames(scene, size, "test")
+    return (frames,), score_bytes(frames), 0.0
+
+
+def _descriptors(profile: Profile, scene: str) -> Size:
+    frames = sum(_largest(profile, scene))
+    return (frames,), frames * DESCRIPTOR_BYTES, 0.0
+
+
+def _features(profile: Profile, scene: str, size: str, split: str) -> Size:
+    config, camera = profile.config, profile.config.groundtruth_camera
+    frames = config.n_frames(scene, size, split)
+    held = frames * config.references.max_features * FEATURE_BYTES
+    return (frames * camera.width * camera.height / 1e6,), 0.0, held
+
+
+def _correspondences(profile: Profile, scene: str, size: str) -> Size:
+    frames = profile.config.n_frames(scene, size, "test")
+    return (frames,), frames * MATCHES_BYTES, 0.0
+
+
+def _reference(profile: Profile, scene: str, size: str, labels: str) -> Size:
+    frames = profile.config.n_frames(scene, size, "test")
+    return (frames,), pose_bytes(frames) + score_bytes(frames), 0.0
+
+
+def _render_speed(profile: Profile, scene: str) -> Size:
+    return (profile.config.render_speed.sizes,), 0.0, 0.0
+
+
+def _claims(profile: Profile, _: str) -> Size:
+    config = profile.config
+    runs = Design(rows=profile.experiments, repetitions=config.training.repetitions).runs
+    return (sum(config.n_frames(run.scene, run.size, "test") for run in runs),), 0.0, 0.0
+
+
+SIZES: dict[str, Callable[..., Size]] = {
+    "scene": _scene,
+    "plan": _plan,
+    "pack": _pack,
+    "render_packed": _render_packed,
+    "render": _render,
+    "dataset": _dataset,
+    "labels": _labels,
+    **{stage: _batch(stage) for stage in ("sfm", "rgbd", *frame_methods(), *graph_methods())},
+    "chain": _chain,
+    "pretrain": _pretrain,
+    "train": _train,
+    "score": _score,
+    "descriptors": _descriptors,
+    "features": _features,
+    "correspondences": _correspondences,
+    **dict.fromkeys(("image_references", "structure_references"), _reference),
+    "render_speed": _render_speed,
+    "claims": _claims,
+}

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import floor
 from pathlib import Path
 from statistics import median
+from typing import Any
+
+import pandas as pd
 
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
@@ -61,16 +63,11 @@ def read_measured(root: Path) -> list[Measured]:
 
 def write_measured(root: Path) -> None:
     """Keep the measurements below ``<root>/benchmarks`` in one file, ``<root>/benchmarks.csv``."""
-    jobs = read_measured(root)
-    with (
-        atomic_path(root / "benchmarks.csv") as temporary,
-        temporary.open("w", encoding="utf-8", newline="") as file,
-    ):
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for job in jobs:
-            peak = "" if job.peak_mb is None else f"{job.peak_mb:.1f}"
-            writer.writerow([*job.key, f"{job.wall_s:.2f}", f"{job.cpu_s:.2f}", peak])
+    rows = [[*job.key, job.wall_s, job.cpu_s, job.peak_mb] for job in read_measured(root)]
+    table = pd.DataFrame(rows, columns=list(COLUMNS)).astype({"peak_mb": float})
+    table = table.round({"wall_s": 2, "cpu_s": 2, "peak_mb": 1})
+    with atomic_path(root / "benchmarks.csv") as temporary:
+        table.to_csv(temporary, index=False, lineterminator="\n")
 
 
 def last_look_s(wall_s: float) -> float:
@@ -84,9 +81,10 @@ def _read_tsv(path: Path, folder: Path) -> tuple[Measured, float | None]:
     """A job, its processor time as it was seen last, and how busy it was; None when unknown."""
     stage, *rest = path.relative_to(folder).with_suffix("").parts
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            row = list(csv.DictReader(file, delimiter="\t"))[-1]
-        wall_s, cpu_s, peak_mb = float(row["s"]), _number(row["cpu_time"]), _number(row["max_rss"])
+        row = pd.read_csv(path, sep="\t", na_values=["-"]).iloc[-1]
+        wall_s, cpu_s, peak_mb = (_number(row[name]) for name in ("s", "cpu_time", "max_rss"))
+        if wall_s is None:
+            raise ValueError("it has no duration")
     except (OSError, IndexError, KeyError, ValueError, TypeError) as error:
         raise InputError(f"{path}: cannot be read as a measurement of a job ({error!r})") from None
     seen_s = last_look_s(wall_s)
@@ -108,22 +106,20 @@ def _completed(jobs: Iterable[tuple[Measured, float | None]]) -> list[Measured]:
 
 
 def _read_table(path: Path) -> list[Measured]:
+    types = {"stage": str, "job": str, "wall_s": float, "cpu_s": float, "peak_mb": float}
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            return [
-                Measured(
-                    row["stage"],
-                    row["job"],
-                    float(row["wall_s"]),
-                    float(row["cpu_s"]),
-                    _number(row["peak_mb"]),
-                )
-                for row in csv.DictReader(file)
-            ]
-    except (OSError, KeyError, ValueError, TypeError) as error:
+        table = pd.read_csv(path, dtype=types, usecols=list(COLUMNS)).fillna({"job": ""})
+    except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read as measurements of jobs ({error!r})") from None
+    if table[["stage", "wall_s", "cpu_s"]].isna().any(axis=None):
+        raise InputError(f"{path}: cannot be read as measurements of jobs (a value is missing)")
+    rows = table[list(COLUMNS)].to_dict("records")
+    return [
+        Measured(row["stage"], row["job"], row["wall_s"], row["cpu_s"], _number(row["peak_mb"]))
+        for row in rows
+    ]
 
 
-def _number(text: str) -> float | None:
+def _number(value: Any) -> float | None:
     """A job that ends before the first look at it has none."""
-    return None if text in ("", "-", "NA") else float(text)
+    return None if pd.isna(value) else float(value)

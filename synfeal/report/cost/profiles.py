@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from baselines.groundtruth.methods import check_sources
-from synfeal.config import Config, Experiment, load_config, read_experiments
+from synfeal.config import load_config, read_experiments
 from synfeal.config.load import read_yaml
 from synfeal.errors import InputError
-from synfeal.report.cost.jobs import known_jobs
+from synfeal.report.cost.jobs import Profile, jobs_of
 from synfeal.report.cost.laws import Pairs, matched
 from synfeal.report.cost.measured import read_measured
 
 FOLDER = Path("config")
 DEFAULT = FOLDER / "config.yaml"
-
-
-@dataclass(frozen=True)
-class Profile:
-    """A configuration and its design."""
-
-    config: Config
-    experiments: tuple[Experiment, ...]
 
 
 def read_profile(name: str) -> Profile:
@@ -32,7 +23,7 @@ def read_profile(name: str) -> Profile:
     Raises:
         InputError: there is none, or it cannot be read.
     """
-    path = Path(name) if name.endswith((".yaml", ".yml")) else _named(name)
+    path = profile_path(name)
     paths = [path] if path.resolve() == DEFAULT.resolve() else [DEFAULT, path]
     config = load_config(*paths)
     experiments = read_experiments(config)
@@ -40,7 +31,14 @@ def read_profile(name: str) -> Profile:
     return Profile(config, experiments)
 
 
-def _named(name: str) -> Path:
+def profile_path(name: str) -> Path:
+    """The file of a profile, by name or path.
+
+    Raises:
+        InputError: no file of ``config/`` has this name.
+    """
+    if name.endswith((".yaml", ".yml")):
+        return Path(name)
     found = {str(read_yaml(p).get("profile")): p for p in sorted(FOLDER.glob("*.yaml"))}
     if name not in found:
         known = ", ".join(sorted(found)) or "none"
@@ -49,7 +47,7 @@ def _named(name: str) -> Path:
 
 
 def read_run(root: Path) -> tuple[Pairs, int]:
-    """Measured jobs of a run beside their sizes, and how many the workflow no longer knows.
+    """Measured jobs of a run beside their sizes, and how many the profile cannot have.
 
     The run's directory is called like its profile, as the workflow calls it.
 
@@ -58,7 +56,7 @@ def read_run(root: Path) -> tuple[Pairs, int]:
     """
     measured = read_measured(root)
     profile = read_profile(root.resolve().name)
-    pairs = matched(known_jobs(profile.config, profile.experiments), measured)
+    pairs = matched(jobs_of(profile, [job.key for job in measured]), measured)
     if not pairs:
         raise InputError(f"{root}: none of its measured jobs is one of the profile's")
     return pairs, len(measured) - len(pairs)

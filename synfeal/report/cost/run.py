@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 from synfeal.config import Config
 from synfeal.report.cost.compare import Comparisons, compare_cost
+from synfeal.report.cost.dry_run import planned_jobs
 from synfeal.report.cost.estimate import Machine, by_table, job_costs, share_of, stage_costs
-from synfeal.report.cost.jobs import run_jobs, table_keys
+from synfeal.report.cost.jobs import jobs_of
 from synfeal.report.cost.laws import fit_laws
 from synfeal.report.cost.plan import Plan
-from synfeal.report.cost.profiles import read_profile, read_run, read_runs
+from synfeal.report.cost.profiles import profile_path, read_profile, read_run, read_runs
 from synfeal.report.cost.text import comparison_table, plan_lines
 
 if TYPE_CHECKING:
@@ -41,8 +42,10 @@ def plan_of(
     pairs, unknown = read_runs(measured)
     timed = _timed(profile.config) if time_steps else None
     laws = fit_laws(pairs, timed.rates if timed and not timed.on_gpu else None)
-    jobs = run_jobs(profile.config, profile.experiments)
-    keys = table_keys(profile.config, profile.experiments)
+    planned = planned_jobs(profile_path(profile_name))
+    jobs = jobs_of(profile, planned.keys)
+    if len(jobs) < len(planned.keys):  # a rule measures jobs under names that jobs.py cannot read
+        raise ValueError(f"no size of {sorted(set(planned.keys) - {job.key for job in jobs})[:3]}")
     origin = f"{len(pairs)} jobs of {', '.join(map(str, measured))}"
     if unknown:
         origin += f" ({unknown} more are of another design or an older workflow)"
@@ -56,7 +59,7 @@ def plan_of(
             machine = Machine(machine.cores, 0, machine.gpu_tflops)
         costs = job_costs(jobs, laws, machine)
         stages = stage_costs(costs, laws, machine)
-        tables = by_table(costs, keys, machine)
+        tables = by_table(costs, planned.needed, machine)
         whole = share_of(costs, machine)
         plans.append(Plan(profile.config.profile, machine, stages, tables, whole, origin))
     return plans

@@ -9,7 +9,8 @@ from statistics import median
 
 from synfeal.config import Config, Design, Experiment, Run
 from synfeal.errors import InputError
-from synfeal.report.cost.jobs import known_jobs
+from synfeal.report.cost.dry_run import key_of
+from synfeal.report.cost.jobs import Profile, jobs_of
 from synfeal.report.cost.laws import fit_laws
 from synfeal.report.cost.profiles import read_run
 
@@ -45,10 +46,10 @@ def plan_run(
         benchmarks: ``<root>/benchmarks/<stage>/<name>.tsv`` of the jobs that are to run.
         cores: jobs at a time.
     """
-    jobs = [job_name(path) for path in benchmarks]
-    known = _laws_of(config, experiments)
+    paths = list(benchmarks)
+    known = _expected_s(Profile(config, experiments), paths)
     usual = median(known.values()) if known else 1.0
-    expected_s = {job: known.get(job, usual) for job in jobs}
+    expected_s = {job: known.get(job, usual) for job in map(job_name, paths)}
     design = Design(rows=experiments, repetitions=config.training.repetitions)
     return RunPlan(config.root, expected_s, tuple(design.runs), cores)
 
@@ -58,7 +59,7 @@ def job_name(benchmark: str) -> str:
     return benchmark.partition("/benchmarks/")[2].removesuffix(".tsv")
 
 
-def _laws_of(config: Config, experiments: tuple[Experiment, ...]) -> dict[str, float]:
+def _expected_s(profile: Profile, benchmarks: Iterable[str]) -> dict[str, float]:
     """Seconds by job from the planner's laws (docs/cost.md); none where no run was published."""
     try:
         laws = fit_laws(read_run(MEASURED)[0])
@@ -66,6 +67,6 @@ def _laws_of(config: Config, experiments: tuple[Experiment, ...]) -> dict[str, f
         return {}
     return {
         "/".join(filter(None, job.key)): laws[job.law].seconds(job.size)
-        for job in known_jobs(config, experiments)
+        for job in jobs_of(profile, filter(None, map(key_of, benchmarks)))
         if job.law in laws
     }

@@ -1,0 +1,118 @@
+"""The jobs of a profile and what each needs, as Snakemake plans them.
+
+Snakemake is asked in a process of its own, ``python -m synfeal.report.cost.dry_run``: it takes over
+logging and the working directory. What it says of a job is the record that its logger plugins get.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from synfeal.errors import InputError
+from synfeal.files import read_json, write_json
+
+Key = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class PlannedJobs:
+    """Jobs of the target ``all`` that are measured.
+
+    Attributes:
+        keys: stage and name of each, as below ``<root>/benchmarks``.
+        needed: by table of the paper, the jobs it needs, that which writes it included.
+    """
+
+    keys: tuple[Key, ...]
+    needed: Mapping[str, frozenset[Key]]
+
+
+def planned_jobs(profile: Path) -> PlannedJobs:
+    """All jobs of a run that begins with nothing.
+
+    Raises:
+        InputError: the workflow is not here, or cannot be planned with this profile.
+    """
+    with tempfile.TemporaryDirectory(prefix="plan-") as folder:
+        out = Path(folder) / "jobs.json"
+        command = [sys.executable, "-m", __spec__.name, str(profile), folder, str(out)]
+        run = subprocess.run(command, capture_output=True, text=True, check=False)
+        if run.returncode != 0 or not out.exists():
+            said = [line for line in run.stderr.splitlines() if line.strip()] or ["it says nothing"]
+            raise InputError(f"{profile}: Snakemake cannot plan a run of it here: {said[-1]}")
+        records = read_json(out)
+    keys = [key_of(record["benchmark"]) for record in records]
+    return PlannedJobs(tuple(filter(None, keys)), _needed(records))
+
+
+def key_of(benchmark: str | None) -> Key | None:
+    """Stage and name of a job from the path of its measurement; None where it has none."""
+    if benchmark is None:
+        return None
+    stage, _, name = benchmark.partition("/benchmarks/")[2].removesuffix(".tsv").partition("/")
+    return stage, name
+
+
+def _needed(records: list[dict[str, Any]]) -> dict[str, frozenset[Key]]:
+    makers = {path: record for record in records for path in record["output"]}
+    tables = [r for r in records if r["rule"] in ("table1_meshes", "table")]
+    needed = {}
+    for table in sorted(tables, key=lambda record: str(record["benchmark"])):
+        seen: dict[str, dict[str, Any]] = {}
+        waiting = [table]
+        while waiting:
+            record = waiting.pop()
+            if record["output"][0] not in seen:
+                seen[record["output"][0]] = record
+                waiting += [makers[path] for path in record["input"] if path in makers]
+        keys = (key_of(record["benchmark"]) for record in seen.values())
+        name = key_of(table["benchmark"])
+        needed[name[1] if name else ""] = frozenset(filter(None, keys))
+    return needed
+
+
+def _dry_run(profile: Path, results: Path, out: Path) -> None:
+    """Write the records of all jobs."""
+    from snakemake.api import SnakemakeApi
+    from snakemake.logging import logger
+    from snakemake.settings.types import (
+        ConfigSettings,
+        DAGSettings,
+        OutputSettings,
+        ResourceSettings,
+        StorageSettings,
+    )
+    from snakemake_interface_logger_plugins.common import LogEvent
+
+    records: list[dict[str, Any]] = []
+
+    class Keep(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            said = record.__dict__
+            if said.get("event") == LogEvent.JOB_INFO:
+                kept = {name: said[name] for name in ("benchmark", "input", "output")}
+                records.append({"rule": said["rule_name"], **kept})
+
+    with SnakemakeApi(OutputSettings(dryrun=True)) as api:
+        workflow = api.workflow(
+            resource_settings=ResourceSettings(cores=1),
+            config_settings=ConfigSettings(config={"results": str(results)}, configfiles=[profile]),
+            storage_settings=StorageSettings(),
+            snakefile=Path("Snakefile"),
+        )
+        dag = workflow.dag(DAGSettings(targets={"all"}, forceall=True))
+        logger.addHandler(Keep())
+        dag.execute_workflow(executor="dryrun")
+    write_json(out, json.loads(json.dumps(records, default=str)))
+
+
+if __name__ == "__main__":
+    _dry_run(*map(Path, sys.argv[1:]))
