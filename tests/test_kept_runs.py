@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from baselines.groundtruth.methods import estimation_parameters
+from baselines.references.registry import answered_by, data_sets
 from baselines.training.record import training_parameters, write_training_record
 from baselines.training.score import score_run
 from synfeal.cli import main
@@ -36,6 +37,21 @@ def smoke_config(folder: Path) -> Config:
     (folder / "design.csv").write_text(DESIGN, encoding="utf-8")
     raw = load_config(REPO / "config/config.yaml", REPO / "config/smoke.yaml")
     return raw.model_copy(update={"results": folder, "experiments": folder / "design.csv"})
+
+
+def write_records(config: Config) -> None:
+    """What tables read of scenes, frames and reference methods."""
+    root = config.root
+    write_json(root / "frames/large_room/train.json", {})
+    write_json(root / "frames/large_room/test.json", {})
+    for name in ("properties.json", "collision_curve.csv", "render_speed.csv", "test_depth.npy"):
+        (root / "scenes/large_room").mkdir(parents=True, exist_ok=True)
+        (root / "scenes/large_room" / name).write_text("{}")
+    design = read_design(config).rows
+    for key in data_sets(design):
+        for method in answered_by(design, key, {}):
+            for name in ("metrics.json", "facts.json"):
+                write_json(root.joinpath("references", *key, method, name), {})
 
 
 def table(count: int) -> PoseTable:
@@ -92,6 +108,7 @@ def contents(root: Path) -> dict[str, bytes]:
 def made(tmp_path_factory: pytest.TempPathFactory) -> Config:
     config = smoke_config(tmp_path_factory.mktemp("made"))
     write_results(config)
+    write_records(config)
     assert main(["keep", str(config.root)]) == 0
     return config
 
@@ -236,6 +253,9 @@ def jobs_of(run: subprocess.CompletedProcess[str]) -> set[str]:
 def test_the_workflow_goes_on_from_restored_runs(package: Path, tmp_path: Path) -> None:
     config = smoke_config(tmp_path)
     assert main(["restore", str(package), str(config.root)]) == 0
+    tables = jobs_of(planned(config, "rescored"))
+    assert {"score", "table", "recall", "claims", "summary"} <= tables
+    assert not {"scene", "plan", "render_packed", "pack", "train", "sfm", "features"} & tables
     everything = jobs_of(planned(config, "all"))
     assert {"scene", "render", "pack", "score"} <= everything  # all of it is made again ...
     assert not {"train", "sfm", "chain"} & everything  # ... but for what was restored

@@ -7,12 +7,11 @@ import re
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from baselines.groundtruth.label_error import share_within
 from baselines.groundtruth.methods import SIMULATOR
 from baselines.references.registry import (
     REFERENCES,
@@ -23,19 +22,19 @@ from baselines.references.registry import (
 )
 from synfeal.config import MODELS, Design
 from synfeal.errors import InputError
+from synfeal.evaluation.metrics import BOUNDS
 from synfeal.files import atomic_path
 from synfeal.report.grid import Entry, Grid, Group, Kind, Line
 from synfeal.report.grid import Value as Printed
 from synfeal.report.latex import write_latex
 from synfeal.report.layouts import SOURCES, TITLES, scene_title
 from synfeal.report.results import read_result
-from synfeal.report.stats import MEASURES, CellScores, Metrics, combine, read_metrics
+from synfeal.report.stats import MEASURES, REMEDY, CellScores, Metrics, combine, read_metrics
 
 NAME, LOCALIZER = "references", "localizer"
 CONSTANT = {"method": "constant", "title": "Mean training pose", "kind": "reference"}
 KEYS = ("scene", "size", "labels", "noise_m", "noise_deg", "method", "title", "kind")
 Record = Mapping[Hashable, Any]
-WITHIN_M, WITHIN_DEG = 0.05, 5.0
 LIMITS = tuple(f"{measure}_{end}" for measure in MEASURES for end in ("low", "high"))
 WITHIN = ("within_5cm_5deg", "within_5cm_5deg_true")
 COLUMNS = (
@@ -134,23 +133,9 @@ def _medians(scores: CellScores) -> dict[str, float | None]:
 
 def _within(folders: Sequence[Path]) -> list[float]:
     """Share of the frames within 5 cm and 5 degrees of their labels, and of their true poses."""
-    shares = []
-    for end in ("", "_true"):
-        found = []
-        for folder in folders:
-            errors = _read_errors(folder / "errors.csv")
-            pair = (errors[f"position_m{end}"], errors[f"orientation_deg{end}"])
-            found.append(share_within(pair, WITHIN_M, WITHIN_DEG))
-        shares.append(float(np.mean(found)))
-    return shares
-
-
-def _read_errors(path: Path) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
-    try:
-        errors = pd.read_csv(path, usecols=list(MEASURES), dtype=np.float64)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read ({error}); score that run again") from None
-    return {name: errors[name].to_numpy() for name in MEASURES}
+    names = [f"{BOUNDS[0].name}{end}" for end in ("", "_true")]
+    every = [read_result(folder / "metrics.json", names, REMEDY) for folder in folders]
+    return [fmean(metrics[name] for metrics in every) for name in names]
 
 
 def references_grid(table: pd.DataFrame) -> Grid:

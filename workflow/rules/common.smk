@@ -2,7 +2,6 @@
 import sys
 from pathlib import Path
 from functools import cache
-from pathlib import Path
 
 from snakemake.logging import logger
 

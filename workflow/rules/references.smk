@@ -157,10 +157,8 @@ rule external_reference:
 rule references_table:
     input:
         metrics=reference_sets("metrics.json"),
-        errors=reference_sets("errors.csv"),
         facts=reference_sets("facts.json"),
         localizers=all_metrics(),
-        localizer_errors=errors_of(RUNS),
     output:
         csv=report(
             f"{ROOT}/tables/references.csv",

@@ -18,6 +18,7 @@ OF_RUN = (PREDICTIONS, "history.csv", "training.json")
 OF_SCENE = ("properties.json", "collision_curve.csv", "render_speed.csv", "test_depth.npy")
 # Written by the job that estimates labels, so it tells them from labels that are computed.
 ESTIMATED = "assistance.json"
+OF_REFERENCE = ("metrics.json", "facts.json")  # their answers take minutes, not hours
 COLLECTING = ("plan", "render_packed")  # what collecting took, of which a claim speaks
 TRUTH = ("train.csv", "test.csv")
 
@@ -71,6 +72,8 @@ def _of_data_set(root: Path, scene: str, size: str) -> Iterable[Path]:
     yield from (root / "groundtruth" / scene / size).glob("*/*/batch-*.*")
     yield from (path for name in OF_SCENE if (path := root / "scenes" / scene / name).is_file())
     yield from (root / "frames" / scene).glob("*.json")
+    for name in OF_REFERENCE:
+        yield from (root / "references" / scene / size).glob(f"*/*/{name}")
     for stage in COLLECTING:
         yield from (root / "benchmarks" / stage / scene).glob("*.tsv")
 
