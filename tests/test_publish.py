@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import subprocess
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from synfeal.errors import InputError
 from synfeal.report.publish import FINISHED, main, publish
 
 REPOSITORY = Path(__file__).parent.parent
-LIMIT_MB = 4.0
+LIMIT_MB, PACKAGE_LIMIT_MB = 4.0, 50.0
 
 
 @pytest.fixture
@@ -50,6 +51,17 @@ def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def files_below(folder: Path) -> set[str]:
     return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_predictions_are_published_as_one_file(root: Path) -> None:
+    run = root / "runs/large_room/6k/synfeal/scratch/posenet/seed0/predictions.csv"
+    labels = root / "labels/large_room/6k/synfeal/test.csv"
+    for path in (run, labels):
+        path.parent.mkdir(parents=True)
+        path.write_text("frame\n")
+    assert main(["--profile", "mini"]) == 0
+    with zipfile.ZipFile(root.parent / "published/mini/predictions.zip") as package:
+        assert run.relative_to(root).as_posix() in package.namelist()
 
 
 def test_a_run_is_published_without_what_no_page_shows(root: Path) -> None:
@@ -103,7 +115,9 @@ def test_tracked_results_are_small_and_of_their_provenance() -> None:
     )
     paths = [REPOSITORY / name for name in listed.stdout.decode().split("\0") if name]
     assert {p.relative_to(REPOSITORY).parts[1] for p in paths} == {"published", "benchmarks"}
-    assert sum(p.stat().st_size for p in paths) <= LIMIT_MB * 1e6
+    packages = [p.stat().st_size for p in paths if p.name == "predictions.zip"]
+    assert sum(p.stat().st_size for p in paths) - sum(packages) <= LIMIT_MB * 1e6
+    assert max(packages, default=0) <= PACKAGE_LIMIT_MB * 1e6
 
 
 @pytest.mark.parametrize("profile", ["mini", "night"])

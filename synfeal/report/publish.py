@@ -1,8 +1,8 @@
 """Copying a finished run to where the pages read it: ``results/published/<profile>``, tracked.
 
-``python -m synfeal.report.publish --profile mini`` takes tables, claims, summary, provenance and
-job times from ``results/mini``, and of its figures those that a page shows. Nothing else of a run
-is tracked, so making results never changes the repository; publishing does.
+``python -m synfeal.report.publish --profile mini`` takes tables, claims, summary, provenance, job
+times and predictions from ``results/mini``, and of its figures those that a page shows. Nothing
+else of a run is tracked, so making results never changes the repository; publishing does.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from pathlib import Path
 from synfeal.dataset.directories import atomic_directory
 from synfeal.errors import InputError
 from synfeal.report.html.provenance import hashes
+from synfeal.report.predictions.keep import PACKAGE, PREDICTIONS, keep
 from synfeal.report.results import read_result, read_text
 
 RESULTS = Path("results")
@@ -40,6 +41,7 @@ def publish(root: Path, target: Path, pages: Iterable[Path]) -> None:
     """
     paths = [*_tables(root), *_records(root), *_shown_figures(root, target, pages)]
     _check_provenance(root, paths)
+    paths += _predictions(root)
     shutil.rmtree(target, ignore_errors=True)
     with atomic_directory(target) as directory:
         for path in paths:
@@ -63,6 +65,14 @@ def _records(root: Path) -> list[Path]:
     if missing:
         raise InputError(f"{root / missing[0]}: missing; finish the run, then publish it")
     return [root / name for name in FINISHED]
+
+
+def _predictions(root: Path) -> list[Path]:
+    """The run's predictions in one file (docs/kept.md); nothing for a run of labels alone."""
+    if not any(root.glob(f"runs/**/{PREDICTIONS}")):
+        return []
+    keep(root, root / PACKAGE)
+    return [root / PACKAGE]
 
 
 def _shown_figures(root: Path, target: Path, pages: Iterable[Path]) -> list[Path]:

@@ -13,7 +13,7 @@ from pathlib import Path
 from synfeal.errors import InputError
 from synfeal.report.predictions.package import write_package
 
-PREDICTIONS = "predictions.csv"
+PACKAGE, PREDICTIONS = "predictions.zip", "predictions.csv"
 OF_RUN = (PREDICTIONS, "history.csv", "training.json")
 OF_SCENE = ("properties.json", "collision_curve.csv", "render_speed.csv", "test_depth.npy")
 # Written by the job that estimates labels, so it tells them from labels that are computed.
