@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from benchmarks.sweep import Picture, Sweep
 from synfeal.files import atomic_path
+from synfeal.report.figures.pareto import pareto_front
 from synfeal.report.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, RC, SKY, VERMILION
 
 COLORS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
@@ -68,7 +70,8 @@ def with_range(values: pd.Series, digits: int) -> str:
 
 def draw(path: Path, sweep: Sweep, picture: Picture, rows: pd.DataFrame) -> None:
     """A mark for every run; the means of one group are joined in the order of the table."""
-    axes, titles = list(sweep.vary), {name: shown.title for name, shown in sweep.show.items()}
+    axes = [name for name in sweep.vary if name not in picture.average]
+    titles = {name: shown.title for name, shown in sweep.show.items()}
     groups = [("", rows)] if picture.group is None else rows.groupby(picture.group, sort=False)
     joined = [name for name in axes if name != picture.group]
     with mpl.rc_context(RC), atomic_path(path) as temporary:
@@ -84,12 +87,46 @@ def draw(path: Path, sweep: Sweep, picture: Picture, rows: pd.DataFrame) -> None
         for panel, measure in zip(panels, picture.y, strict=True):
             panel.set(xlabel=titles[picture.x], ylabel=titles[measure])
             panel.grid(color="0.93", which="both")
+            if picture.chosen:
+                means = rows.groupby(axes, sort=False).mean(numeric_only=True).reset_index()
+                mark_front(panel, means, picture.x, measure, picture.chosen)
             if picture.log:
                 _logarithmic(panel)
         if picture.group is not None:
             handles = panels[0].get_legend_handles_labels()
             figure.legend(*handles, title=picture.group, loc="outside lower center", ncols=4)
         figure.savefig(temporary, dpi=130)
+
+
+def mark_front(panel: Axes, means: pd.DataFrame, x: str, y: str, chosen: Mapping[str, str]) -> None:
+    """Join what nothing beats in both columns, cover what is beaten with grey, ring the choice.
+
+    Args:
+        panel: where to draw.
+        means: a row for each combination of settings.
+        x: column of costs.
+        y: column of errors.
+        chosen: axes and the values in use, as text.
+    """
+    front = pareto_front(means[x], means[y])
+    best = means[front].sort_values(x)
+    panel.plot(best[x], best[y], color="0.3", linestyle=":", linewidth=1.0, zorder=1)
+    beaten: dict[str, Any] = {
+        "linestyle": "",
+        "marker": "o",
+        "markersize": 7,
+        "color": "0.75",
+        "zorder": 4,
+    }
+    panel.plot(means[x][~front], means[y][~front], **beaten)
+    used = means[[all(str(row[k]) == v for k, v in chosen.items()) for _, row in means.iterrows()]]
+    ring: dict[str, Any] = {
+        "linestyle": "",
+        "marker": "o",
+        "markersize": 14,
+        "markerfacecolor": "none",
+    }
+    panel.plot(used[x], used[y], markeredgecolor=BLACK, zorder=5, **ring)
 
 
 def _logarithmic(panel: Axes) -> None:

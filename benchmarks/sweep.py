@@ -41,6 +41,10 @@ class Picture(Strict):
     y: list[str] = Field(description="columns, one panel each")
     group: str | None = Field(None, description="axis whose values differ in colour, if any")
     log: bool = Field(True, description="both axes logarithmic")
+    average: list[str] = Field([], description="axes that a mark is the mean over")
+    chosen: dict[str, str] = Field(
+        {}, description="values in use, by axis: ringed, and what is both slower and worse is grey"
+    )
 
 
 class Sweep(Strict):
@@ -62,8 +66,9 @@ class Sweep(Strict):
             for name in (self.picture.x, *self.picture.y):
                 if name not in self.show:
                     raise ValueError(f"picture: '{name}' must be a column of `show`")
-            if self.picture.group not in (None, *self.vary):
-                raise ValueError(f"picture.group: must be one of {', '.join(self.vary)}")
+            named = (self.picture.group or "", *self.picture.average, *self.picture.chosen)
+            if not {*named} <= {"", *self.vary}:
+                raise ValueError(f"picture: axes must be of {', '.join(self.vary)}")
         return self
 
 

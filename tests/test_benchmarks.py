@@ -8,7 +8,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 import yaml
+from matplotlib.figure import Figure
 
+from benchmarks.page import mark_front
 from tests.coloured_frames import write_split
 
 REPOSITORY = Path(__file__).parent.parent
@@ -97,3 +99,16 @@ def test_a_sweep_that_cannot_be_run_says_why_in_one_line(change, message, swept)
     assert done.returncode == 1
     assert len(done.stderr.splitlines()) == 1
     assert re.search(f"^error: .*{message}", done.stderr)
+
+
+def test_a_picture_rings_the_choice_and_covers_what_is_slower_and_worse():
+    """Four settings: the second is beaten by the third, the first and the last by none."""
+    panel = Figure().subplots()
+    means = pd.DataFrame(
+        {"cost": [1.0, 3.0, 2.0, 4.0], "error": [9.0, 8.0, 5.0, 1.0], "setting": list("abcd")}
+    )
+    mark_front(panel, means, "cost", "error", {"setting": "c"})
+    front, beaten, ring = (list(zip(*line.get_data(), strict=True)) for line in panel.lines)
+    assert front == [(1.0, 9.0), (2.0, 5.0), (4.0, 1.0)]
+    assert beaten == [(3.0, 8.0)]
+    assert ring == [(2.0, 5.0)]

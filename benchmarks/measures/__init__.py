@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from synfeal.config.models import Strict
 
-MEASURES = ("rgbd", "sfm", "training")
+MEASURES = ("kinect_fusion", "rgbd", "sfm", "training")
 
 
 class Measure(NamedTuple):
