@@ -11,9 +11,11 @@ QUALITY := $(VENV)/quality
 # One line that stays and the first scores; what Snakemake says is in .snakemake/log, and on the screen
 # where it is called by itself.
 RUN := PYTHONPATH=workflow/plugins $(BIN)/snakemake --cores $(CORES) --logger synfeal --quiet host
+# A file of tests to a worker: their fixtures are made once, and a worker has one thread.
+PYTEST := OMP_NUM_THREADS=1 $(BIN)/pytest --numprocesses $(CORES) --dist loadfile
 export PYTHONHASHSEED := 0
 
-.PHONY: help reproduce smoke start publish archive plan test test-slurm coverage mutate check format lock clean
+.PHONY: help reproduce smoke start publish archive plan test test-all test-slurm coverage mutate check format lock clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -47,8 +49,11 @@ plan: smoke  ## what paper and gpu cost, and what such plans are worth (results/
 	$(BIN)/synfeal plan --measured results/benchmarks/smoke --compare results/published/mini \
 	  --csv results/benchmarks/plan_check.csv
 
-test: check  ## static checks and the test suite
-	$(BIN)/pytest
+test: check  ## static checks and the test suite, but for what is slow, on CORES cores
+	$(PYTEST) -m "not slow"
+
+test-all: check  ## the same with what is slow, as continuous integration runs it
+	$(PYTEST)
 
 test-slurm: $(SLURM_INSTALLED)  ## the smoke profile here and through a SLURM cluster of one node, which is killed
 	setup/slurm_cluster.sh install
@@ -70,6 +75,7 @@ check: $(INSTALLED)  ## static checks alone: format, lint, types, workflow
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/mypy
+	$(BIN)/lint-imports
 	$(BIN)/python -m synfeal.config.docs --check
 	$(BIN)/snakemake --lint
 

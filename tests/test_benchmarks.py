@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from benchmarks.page import mark_front
 from tests.coloured_frames import write_split
 
+pytestmark = pytest.mark.slow
 REPOSITORY = Path(__file__).parent.parent
 RATE = "localizers.posenet2.learning_rate"
 SWEEP = {

@@ -20,6 +20,7 @@ from synfeal.errors import InputError
 from synfeal.files import atomic_path
 from synfeal.run_lock import begin_run
 
+pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parent.parent
 HOLD = "import sys, time; from pathlib import Path; from synfeal.run_lock import begin_run\n"
 HOLD += "begin_run(Path(sys.argv[1])); print('begun', flush=True); time.sleep(600)"

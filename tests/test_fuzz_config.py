@@ -16,6 +16,7 @@ from tests.mesh_samples import write_obj
 from tests.report_results import design_of
 from tests.test_workflow import snakemake
 
+pytestmark = pytest.mark.slow
 REPOSITORY = Path(__file__).parent.parent
 CONFIG = REPOSITORY / "config"
 PROFILES = (("config.yaml",), ("config.yaml", "smoke.yaml"), ("config.yaml", "paper.yaml"))

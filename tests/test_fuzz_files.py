@@ -29,6 +29,7 @@ from tests.fuzzing import (
 )
 from tests.planar_scene import straight_path
 
+pytestmark = pytest.mark.slow
 REPOSITORY = Path(__file__).parent.parent
 LEAST = 4000  # inputs of all kinds together
 

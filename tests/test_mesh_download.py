@@ -19,6 +19,7 @@ from synfeal.render import open_renderer
 from tests.mesh_conversions import without_alpha, write_coloured_ply, write_obj_scene
 
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.skipif("SYNFEAL_TEST_MESHES" not in os.environ, reason="no downloaded meshes"),
     pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*"),
 ]

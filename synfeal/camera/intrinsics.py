@@ -3,13 +3,34 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from synfeal.config.collection import CameraConfig
+
+class Camera(Protocol):
+    """What this package asks of a camera, whatever configures it."""
+
+    @property
+    def width(self) -> int:
+        """Image width, pixels."""
+
+    @property
+    def height(self) -> int:
+        """Image height, pixels."""
+
+    @property
+    def horizontal_fov_deg(self) -> float:
+        """Of square pixels about the centre; unused where the intrinsics are given."""
+
+    @property
+    def given_intrinsics(self) -> tuple[float, float, float, float] | None:
+        """fx, fy, cx, cy in pixels, if they are known."""
+
+    @property
+    def distortion(self) -> tuple[float, float, float, float, float]:
+        """Brown-Conrady coefficients: k1, k2, p1, p2, k3."""
 
 
 class Intrinsics(NamedTuple):
@@ -32,10 +53,9 @@ class Intrinsics(NamedTuple):
         return np.array([[self.fx, 0.0, cx], [0.0, self.fy, cy], [0.0, 0.0, 1.0]])
 
 
-def intrinsics_of(camera: CameraConfig) -> Intrinsics:
+def intrinsics_of(camera: Camera) -> Intrinsics:
     """The intrinsics given, or those of square pixels with the principal point in the centre."""
-    given = (camera.fx, camera.fy, camera.cx, camera.cy)
-    if None not in given:
-        return Intrinsics(*map(float, given))  # type: ignore[arg-type]
+    if camera.given_intrinsics is not None:
+        return Intrinsics(*camera.given_intrinsics)
     focal = camera.width / 2.0 / math.tan(math.radians(camera.horizontal_fov_deg) / 2.0)
     return Intrinsics(focal, focal, camera.width / 2.0, camera.height / 2.0)

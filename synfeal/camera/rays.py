@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.camera.distortion import distort, undistort
-from synfeal.camera.intrinsics import intrinsics_of
-
-if TYPE_CHECKING:
-    from synfeal.config.collection import CameraConfig
+from synfeal.camera.intrinsics import Camera, intrinsics_of
 
 Array = NDArray[np.float64]
 
 _CHECKED = 33  # points along each side on which a lens is checked, corners of the image included
 
 
-def slopes_of_pixels(camera: CameraConfig, pixel: Array) -> Array:
+def slopes_of_pixels(camera: Camera, pixel: Array) -> Array:
     """Slopes (..., 2), x / z and y / z, of the rays through ``pixel`` (..., 2): columns and rows.
 
     NaN where the lens folds over before it reaches the pixel.
@@ -27,13 +22,13 @@ def slopes_of_pixels(camera: CameraConfig, pixel: Array) -> Array:
     return undistort((pixel - [cx, cy]) / [fx, fy], camera.distortion)
 
 
-def pixels_of_slopes(camera: CameraConfig, slope: Array) -> Array:
+def pixels_of_slopes(camera: Camera, slope: Array) -> Array:
     """The inverse of :func:`slopes_of_pixels`."""
     fx, fy, cx, cy = intrinsics_of(camera)
     return distort(slope, camera.distortion) * [fx, fy] + [cx, cy]
 
 
-def refuse_fold(camera: CameraConfig) -> None:
+def refuse_fold(camera: Camera) -> None:
     """Check that every pixel looks somewhere.
 
     Raises:

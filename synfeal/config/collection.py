@@ -242,6 +242,13 @@ class CameraConfig(Strict):
             refuse_fold(self)
         return self
 
+    @property
+    def given_intrinsics(self) -> tuple[float, float, float, float] | None:
+        """fx, fy, cx, cy in pixels, if they are given."""
+        if self.fx is None or self.fy is None or self.cx is None or self.cy is None:
+            return None
+        return float(self.fx), float(self.fy), float(self.cx), float(self.cy)
+
 
 def _calibrated(values: dict[str, Any]) -> dict[str, Any]:
     """A camera's values with those of its calibration in place of the path."""

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import synfeal
+from synfeal.collect.blank import refuse_blank, refuse_invisible
 from synfeal.config.dataset import DatasetConfig
 from synfeal.dataset.archive import SUFFIX
-from synfeal.dataset.blank import refuse_blank, refuse_invisible
 from synfeal.dataset.finish import finish, origin_of
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.progress import Progress

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import yaml
 
+from synfeal.collect.collect import CollectJob
 from synfeal.config.dataset import DatasetConfig
-from synfeal.dataset.collect import CollectJob
 from synfeal.dataset.render_sequence import resolved
 
 LEAST_INPUT_PX = 32
