@@ -3,6 +3,7 @@
 set -euo pipefail
 echo "# Exact versions of everything installed; written by 'make lock', read by 'make reproduce'."
 # A local build's suffix (torch's "+cpu") is not part of a version that an index offers, and what only
-# torch's CUDA build and `make test-slurm` need stands in requirements-cuda.lock and -slurm.lock.
+# torch's CUDA build and `make test-slurm` need stands in requirements-cuda.lock and -slurm.lock;
+# meshoptimizer, which has to be built, in setup/meshoptimizer.sh.
 "$1" -m pip freeze --exclude-editable --exclude synfeal | sed -E 's/\+[a-z0-9.]+$//' |
-    grep -Ev ' @ |^(nvidia|cuda)-|^triton=|^snakemake-executor-plugin-slurm'
+    grep -Ev ' @ |^(nvidia|cuda)-|^triton=|^meshoptimizer=|^snakemake-executor-plugin-slurm'

@@ -20,6 +20,12 @@ for library in "${!package_of[@]}"; do
 done
 [ -e /usr/share/doc/libgl1-mesa-dri ] || ls /usr/lib/*/dri/*_dri.so >/dev/null 2>&1 || missing+=(libgl1-mesa-dri)
 "$python" -c 'import ensurepip, venv' 2>/dev/null || missing+=(python3-venv)
+# To build meshoptimizer (setup/meshoptimizer.sh); nobody is stopped for lack of it.
+header=$("$python" -c 'import sysconfig; print(sysconfig.get_path("include") + "/Python.h")')
+if { [ "$(id -u)" = 0 ] || sudo -n true 2>/dev/null; } && command -v apt-get >/dev/null; then
+    command -v c++ >/dev/null || missing+=(g++)
+    [ -e "$header" ] || missing+=(python3-dev)
+fi
 [ ${#missing[@]} -gt 0 ] || exit 0
 
 command="apt-get -o DPkg::Lock::Timeout=600 install --yes --no-install-recommends ${missing[*]}"

@@ -19,6 +19,7 @@ from synfeal.errors import InputError
 GLB_MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = b"JSON", b"BIN\0"
 BIN_URI = "synfeal-glb-binary-chunk"  # the name under which a resolver is asked for the BIN chunk
+DECODED_URI = "synfeal-decoded"  # the same for what was decompressed
 SPECULAR_GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 
 Json = dict[str, Any]
@@ -26,10 +27,11 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True)
 class Gltf:
-    """A glTF file: its JSON as stored, and the BIN chunk of a GLB (empty in a .gltf)."""
+    """A glTF file: its JSON, the BIN chunk of a GLB (empty in a .gltf), and what was decoded."""
 
     header: Json
     binary: bytes = b""
+    decoded: bytes = b""
 
 
 def read_gltf(path: Path) -> Gltf:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from synfeal.errors import InputError
 from synfeal.mesh.checks import check_indices, check_mesh
 from synfeal.mesh.colours import part_colours
+from synfeal.mesh.compressed import decoded
 from synfeal.mesh.findings import Findings
 from synfeal.mesh.gltf import Gltf, read_gltf, simplified
 from synfeal.mesh.materials import BaseMaterial, MaterialReader
@@ -90,6 +91,7 @@ def _read_parts(
 ) -> tuple[MeshPart, ...]:
     """All parts that can be seen, in the order of the file's geometry, then of its nodes."""
     if gltf is not None:
+        gltf = decoded(gltf, RecordingResolver(path).get)
         refuse_extensions(path, gltf.header)
     materials = MaterialReader(None if gltf is None else gltf.header, findings)
     with large_images_allowed():
@@ -112,7 +114,7 @@ def _read_parts(
 
 def _read_scene(path: Path, gltf: Gltf | None, findings: Findings) -> Any:
     """The file as a trimesh scene, without merging or reordering vertices."""
-    resolver = RecordingResolver(path, b"" if gltf is None else gltf.binary)
+    resolver = RecordingResolver(path, gltf)
     PARSER_LOG.setLevel(logging.ERROR)  # it prints tracebacks of what the findings name
     try:
         if gltf is None:

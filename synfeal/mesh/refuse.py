@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from synfeal.errors import InputError
-from synfeal.mesh.gltf import Json, base_color
+from synfeal.mesh.compressed import LIBRARIES
+from synfeal.mesh.extensions import listed, primitives_of, stand_alone
+from synfeal.mesh.gltf import Json
 
+EXTRA = "synfeal[meshes]"
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
-FLOAT32 = 5126
 
 # Required extensions that change nothing here, or that are read.
 READ = {
@@ -26,7 +28,6 @@ REMEDIES = {
     " or export it without compression",
     "KHR_texture_basisu": f"turn its KTX2 textures into PNG {TRANSFORM}"
     " gltf-transform ktxdecompress IN OUT.glb (which needs the ktx command of KTX-Software)",
-    "KHR_mesh_quantization": f"decode it {TRANSFORM} gltf-transform dequantize IN OUT.glb",
     "EXT_mesh_gpu_instancing": "export it with one node per instance",
 }
 
@@ -62,13 +63,11 @@ def refuse_extensions(path: Path, header: Json) -> None:
         if name not in READ and not name.startswith("KHR_materials_"):
             raise _refusal(path, name)
     if any(
-        "EXT_mesh_gpu_instancing" in node.get("extensions", {}) for node in _list(header, "nodes")
+        "EXT_mesh_gpu_instancing" in node.get("extensions", {}) for node in listed(header, "nodes")
     ):
         raise _refusal(path, "EXT_mesh_gpu_instancing")
-    for check in (_draco_alone, _meshopt_alone, _basisu_alone, _quantised):
-        name = check(header)
-        if name is not None:
-            raise _refusal(path, name)
+    for name in stand_alone(header):
+        raise _refusal(path, name)
     if any("sparse" in accessor for accessor in _used_accessors(header)):
         raise InputError(
             f"{path}: stores vertices in sparse accessors, which are not read;"
@@ -78,66 +77,16 @@ def refuse_extensions(path: Path, header: Json) -> None:
 
 def _refusal(path: Path, name: str) -> InputError:
     remedy = REMEDIES.get(name, "export it without this extension")
+    if name in LIBRARIES:
+        remedy = f"pip install '{EXTRA}', or {remedy}"
     return InputError(f"{path}: needs the glTF extension {name}, which is not read; {remedy}")
-
-
-def _list(header: Json, key: str) -> list[Json]:
-    found: list[Json] = header.get(key, [])
-    return found
-
-
-def _primitives(header: Json) -> list[Json]:
-    return [primitive for mesh in _list(header, "meshes") for primitive in mesh["primitives"]]
 
 
 def _used_accessors(header: Json) -> list[Json]:
     """Accessors that hold what is read: positions, triangles, colours, texture coordinates."""
     used = []
-    for primitive in _primitives(header):
+    for primitive in primitives_of(header):
         attributes = primitive["attributes"]
         used += [attributes[key] for key in attributes if key.startswith(("POS", "TEX", "COL"))]
         used += [primitive["indices"]] if "indices" in primitive else []
     return [header["accessors"][index] for index in used]
-
-
-def _draco_alone(header: Json) -> str | None:
-    """Draco, if a primitive has no plain positions beside it."""
-    name = "KHR_draco_mesh_compression"
-    for primitive in _primitives(header):
-        positions = header["accessors"][primitive["attributes"]["POSITION"]]
-        if name in primitive.get("extensions", {}) and "bufferView" not in positions:
-            return name
-    return None
-
-
-def _meshopt_alone(header: Json) -> str | None:
-    """Meshopt, if a compressed view points to a buffer that is only a placeholder."""
-    for name in ("EXT_meshopt_compression", "KHR_meshopt_compression"):
-        for view in _list(header, "bufferViews"):
-            buffer = header["buffers"][view["buffer"]]
-            is_placeholder = "uri" not in buffer and name in buffer.get("extensions", {})
-            if name in view.get("extensions", {}) and is_placeholder:
-                return name
-    return None
-
-
-def _basisu_alone(header: Json) -> str | None:
-    """KTX2, if a base colour has no other image."""
-    for material in _list(header, "materials"):
-        slot = base_color(material).get("baseColorTexture")
-        texture = {} if slot is None else header["textures"][slot["index"]]
-        others = "source" in texture or "EXT_texture_webp" in texture.get("extensions", {})
-        if "KHR_texture_basisu" in texture.get("extensions", {}) and not others:
-            return "KHR_texture_basisu"
-    return None
-
-
-def _quantised(header: Json) -> str | None:
-    """Normalised integers: the parser would take 32767 for 32767 metres."""
-    for primitive in _primitives(header):
-        for key, index in primitive["attributes"].items():
-            accessor = header["accessors"][index]
-            scaled = key == "POSITION" and accessor.get("normalized", False)
-            if scaled or (key.startswith("TEXCOORD") and accessor["componentType"] != FLOAT32):
-                return "KHR_mesh_quantization"
-    return None

@@ -8,7 +8,7 @@ from urllib.parse import unquote
 from trimesh.resolvers import FilePathResolver
 
 from synfeal.mesh.findings import Findings
-from synfeal.mesh.gltf import BIN_URI, Gltf, Json, base_color, image_uri
+from synfeal.mesh.gltf import BIN_URI, DECODED_URI, Gltf, Json, base_color, image_uri
 
 
 class RecordingResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is untyped
@@ -17,10 +17,10 @@ class RecordingResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is u
     trimesh passes over missing textures silently; a grey scene should not surprise its user.
     """
 
-    def __init__(self, source: Path, glb_binary: bytes = b"") -> None:
+    def __init__(self, source: Path, gltf: Gltf | None = None) -> None:
         super().__init__(str(source), allow_anywhere=True)  # a user's own file, often ../textures
         self.missing: list[str] = []
-        self._glb_binary = glb_binary
+        self._held = {} if gltf is None else {BIN_URI: gltf.binary, DECODED_URI: gltf.decoded}
 
     def get(self, name: str) -> bytes:
         """Bytes of a file the mesh refers to.
@@ -28,8 +28,8 @@ class RecordingResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is u
         Raises:
             FileNotFoundError: it is nowhere it could be meant to be.
         """
-        if name == BIN_URI:
-            return self._glb_binary
+        if name in self._held:
+            return self._held[name]
         for candidate in _spellings(str(name)):
             path = Path(self.parent) / candidate
             if path.is_file():
