@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from synfeal.errors import InputError
-from synfeal.report.cost.measured import read_measured
+from synfeal.report.cost.measured import read_jobs
 from synfeal.report.layouts import TITLES
 from synfeal.report.results import read_table
 from synfeal.report.tables import Value
@@ -36,7 +37,7 @@ def training_rows(root: Path, scene: str) -> list[dict[str, Value]]:
     shown = [row for row in rows if float(row["n_train"]) == largest and row["position_m_true"]]
     if not shown:
         return []
-    seconds = {job.name: job.cpu_s for job in read_measured(root) if job.stage == "train"}
+    seconds = _processor_seconds(root, [name for row in shown for name in _runs(row)])
     return [_row(row, _seconds_per_image(root, row, seconds)) for row in shown]
 
 
@@ -55,17 +56,26 @@ def _row(row: dict[str, str], seconds_per_image: float) -> dict[str, Value]:
 
 def _seconds_per_image(root: Path, row: dict[str, str], seconds: dict[str, float]) -> float:
     """Processor seconds over images shown, of all seeds."""
-    names = [
-        f"{row['scene']}/{row['size']}/{KIND}/{row['model']}/seed{repetition}"
-        for repetition in range(int(float(row["n_seeds"])))
-    ]
-    for name in names:
+    images = sum(_images_shown(root / "runs" / name / "history.csv") for name in _runs(row))
+    return sum(seconds[name] for name in _runs(row)) / images
+
+
+def _runs(row: dict[str, str]) -> list[str]:
+    """Directories of a cell's training runs, below ``runs``."""
+    stem = f"{row['scene']}/{row['size']}/{KIND}/{row['model']}"
+    return [f"{stem}/seed{repetition}" for repetition in range(int(float(row["n_seeds"])))]
+
+
+def _processor_seconds(root: Path, runs: Sequence[str]) -> dict[str, float]:
+    """Processor seconds by run; no other jobs are looked at, for the rule names no others."""
+    folder = root / "benchmarks"
+    paths = {name: folder / "train" / f"{name}.tsv" for name in runs}
+    measured = read_jobs([path for path in paths.values() if path.exists()], folder)
+    seconds = {job.name: job.cpu_s for job in measured}
+    for name, path in paths.items():
         if not seconds.get(name, 0.0) > 0.0:
-            raise InputError(
-                f"{root}/benchmarks/train/{name}.tsv: missing, or measured no time; train it again"
-            )
-    images = sum(_images_shown(root / "runs" / name / "history.csv") for name in names)
-    return sum(seconds[name] for name in names) / images
+            raise InputError(f"{path}: missing, or measured no time; train it again")
+    return seconds
 
 
 def _images_shown(history: Path) -> float:

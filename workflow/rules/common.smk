@@ -32,6 +32,7 @@ from synfeal.dataset.sequences import sequences_of
 from synfeal.errors import InputError
 from synfeal.labels.errors import seed_names
 from synfeal.provenance import config_hash
+from synfeal.report.cost.jobs import run_jobs
 from synfeal.report.predictions.restored import restored_files
 from synfeal.run_lock import begin_run
 from synfeal.seeds import seed_of
@@ -224,6 +225,20 @@ def pose_labels():
 
 def errors_of(runs):
     return [f"{ROOT}/runs/{run.directory}/errors.csv" for run in runs]
+
+
+def files_of_trainings(folder, ending):
+    """A file of each training run of Table 4."""
+    runs = DESIGN.table_runs("table4_size")
+    return [f"{ROOT}/{folder}/{run.directory}{ending}" for run in runs]
+
+
+def measurements():
+    """What every job before the provenance took; of restored jobs only those that were kept."""
+    after = ("provenance", "report", "report_document")
+    jobs = [job for job in run_jobs(CONFIG, EXPERIMENTS) if job.stage not in after]
+    files = ["/".join(filter(None, job.key)) for job in jobs]
+    return [] if RESTORED else [f"{ROOT}/benchmarks/{file}.tsv" for file in files]
 
 
 def packed_frames(kind, splits=SPLITS):

@@ -141,6 +141,8 @@ rule speed_vs_error:
             f"{ROOT}/tables/{{table}}.csv",
             table=[t for t in TABLE_NAMES if t == "table4_size"],
         ),
+        histories=files_of_trainings("runs", "/history.csv"),
+        measured=files_of_trainings("benchmarks/train", ".tsv"),
     output:
         csv=f"{ROOT}/tables/speed_vs_error.csv",
     log:
@@ -303,6 +305,7 @@ rule provenance:
         figures=rules.figures.output.figures,
         summary=rules.summary.output.page,
         claims=rules.claims.output.csv,
+        measured=measurements(),
     output:
         record=f"{ROOT}/provenance.json",
         jobs=f"{ROOT}/benchmarks.csv",

@@ -7,6 +7,8 @@ rule pretrain:
     input:
         frames=[f"{ROOT}/frames/{room}/train.npy" for room in CONFIG.rooms],
         labels=[f"{ROOT}/plans/{room}/train.csv" for room in CONFIG.rooms],
+        # The camera of packed frames, and their hash, are in the records beside them.
+        records=[f"{ROOT}/frames/{room}/train.json" for room in CONFIG.rooms],
     output:
         weights=f"{ROOT}/pretrained/{{backbone}}.pt",
     log:
@@ -49,6 +51,11 @@ rule train:
             f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
         ),
         weights=unless_restored(f"{RUN}/predictions.csv", backbone_weights),
+        # The camera of packed frames, and their hash, are in the records beside them.
+        records=unless_restored(
+            f"{RUN}/predictions.csv",
+            lambda w: [f"{ROOT}/frames/{w.scene}/{split}.json" for split in SPLITS],
+        ),
     output:
         model=f"{RUN}/model.pt",
         history=f"{RUN}/history.csv",
@@ -73,6 +80,7 @@ rule score:
     input:
         predictions=f"{RUN}/predictions.csv",
         history=f"{RUN}/history.csv",
+        record=f"{RUN}/training.json",
         labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
         truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
         train_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",

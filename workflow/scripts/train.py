@@ -9,7 +9,8 @@ from synfeal.job import job, refuse_restored
 outputs, run = snakemake.output, snakemake.params.run
 with job(snakemake.log[0]):
     model, predictions = Path(outputs.model), Path(outputs.predictions)
-    inputs = {name: Path(str(file)) for name, file in snakemake.input.items() if file}
+    files = {k: file for k, file in snakemake.input.items() if file and k != "records"}
+    inputs = {name: Path(str(file)) for name, file in files.items()}
     refuse_restored(snakemake.input, predictions)
     data = inputs["frames"], inputs["labels"]
     test = inputs["test_frames"], inputs["test_labels"]

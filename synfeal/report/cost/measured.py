@@ -55,10 +55,19 @@ def read_measured(root: Path) -> list[Measured]:
     folder, table = root / "benchmarks", root / "benchmarks.csv"
     paths = sorted(folder.rglob("*.tsv"))
     if paths:
-        return _completed([_read_tsv(path, folder) for path in paths])
+        return read_jobs(paths, folder)
     if table.is_file():
         return _read_table(table)
     raise InputError(f"{root}: holds no benchmarks/**/*.tsv and no benchmarks.csv; name a run")
+
+
+def read_jobs(paths: Iterable[Path], folder: Path) -> list[Measured]:
+    """Jobs by their files below ``folder``, ``<root>/benchmarks``.
+
+    Raises:
+        InputError: a measurement cannot be read.
+    """
+    return _completed([_read_tsv(path, folder) for path in paths])
 
 
 def write_measured(root: Path) -> None:
