@@ -228,9 +228,11 @@ def errors_of(runs):
 
 
 def files_of_trainings(folder, ending):
-    """A file of each training run of Table 4."""
-    runs = DESIGN.table_runs("table4_size")
-    return [f"{ROOT}/{folder}/{run.directory}{ending}" for run in runs]
+    """A file of each training run of Table 4; of restored runs those that were kept."""
+    runs = [run.directory for run in DESIGN.table_runs("table4_size")]
+    made = [run for run in runs if f"{ROOT}/runs/{run}/predictions.csv" not in RESTORED]
+    files = {run: f"{ROOT}/{folder}/{run}{ending}" for run in runs}
+    return [file for run, file in files.items() if run in made or file in RESTORED]
 
 
 def measurements():
