@@ -32,7 +32,6 @@ from synfeal.dataset.sequences import sequences_of
 from synfeal.errors import InputError
 from synfeal.labels.errors import seed_names
 from synfeal.provenance import config_hash
-from synfeal.report.cost.jobs import run_jobs
 from synfeal.report.predictions.restored import restored_files
 from synfeal.run_lock import begin_run
 from synfeal.seeds import seed_of
@@ -233,14 +232,6 @@ def files_of_trainings(folder, ending):
     made = [run for run in runs if f"{ROOT}/runs/{run}/predictions.csv" not in RESTORED]
     files = {run: f"{ROOT}/{folder}/{run}{ending}" for run in runs}
     return [file for run, file in files.items() if run in made or file in RESTORED]
-
-
-def measurements():
-    """What every job before the provenance took; of restored jobs only those that were kept."""
-    after = ("provenance", "report", "report_document")
-    jobs = [job for job in run_jobs(CONFIG, EXPERIMENTS) if job.stage not in after]
-    files = ["/".join(filter(None, job.key)) for job in jobs]
-    return [] if RESTORED else [f"{ROOT}/benchmarks/{file}.tsv" for file in files]
 
 
 def packed_frames(kind, splits=SPLITS):

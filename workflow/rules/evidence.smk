@@ -305,7 +305,6 @@ rule provenance:
         figures=rules.figures.output.figures,
         summary=rules.summary.output.page,
         claims=rules.claims.output.csv,
-        measured=measurements(),
     output:
         record=f"{ROOT}/provenance.json",
         jobs=f"{ROOT}/benchmarks.csv",

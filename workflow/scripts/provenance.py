@@ -6,12 +6,11 @@ from synfeal.report.html.provenance import write_provenance
 
 with job(snakemake.log[0]):
     out_json = Path(snakemake.output.record)
-    measured = set(snakemake.input.measured)
     write_measured(out_json.parent)
     write_provenance(
         snakemake.params.seed,
         snakemake.params.config_hash,
         out_json.parent / "benchmarks",
-        [Path(path) for path in snakemake.input if path not in measured],
+        [Path(path) for path in snakemake.input],
         out_json,
     )
