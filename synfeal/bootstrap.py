@@ -1,13 +1,14 @@
-"""Medians and what is made of them, with 95 % limits from a bootstrap over the test paths.
+"""Medians and what is made of them, with 95 % limits from a bootstrap over test paths and seeds.
 
 The unit drawn is the path, not the frame: neighbouring frames of a path are nearly the same
-picture. All cells with one test set share one set of draws, so whatever is computed from several of
-them, draw by draw, is paired.
+picture. Seeds are drawn across paths (Owen and Eckles, "Bootstrapping data arrays of arbitrary
+order", Ann. Appl. Stat. 2012). All cells with one test set share one set of draws, so whatever is
+computed from several of them, draw by draw, is paired.
 
 A *sample* is an array (1 + RESAMPLES,): first the value that was observed, then its value in each
 resample. Statistics of samples are therefore plain array arithmetic.
 
-The limits say how far the test paths decide; a training with another seed varies beyond them.
+With one seed the limits say how far the test paths decide; another seed varies beyond them.
 """
 
 from __future__ import annotations
@@ -32,6 +33,29 @@ def path_counts(n_paths: int, rng: np.random.Generator, resamples: int = RESAMPL
     """How often each path occurs (1 + resamples, n_paths): once in the first row, then as drawn."""
     drawn = rng.multinomial(n_paths, np.full(n_paths, 1 / n_paths), size=resamples)
     return np.concatenate([np.ones((1, n_paths), dtype=np.int64), drawn])
+
+
+def seed_weights(n_seeds: int, rng: np.random.Generator, resamples: int = RESAMPLES) -> Array:
+    """Weight of each seed (1 + resamples, n_seeds): all alike in the first row, then as drawn.
+
+    One seed fewer is drawn than there are (Rao and Wu, "Resampling inference with complex survey
+    data", JASA 1988): the spread of a mean of ``n - 1`` drawn values is that of a mean of ``n``
+    seeds, where ``n`` drawn values would have ``(n - 1) / n`` of its variance.
+    """
+    drawn = max(n_seeds - 1, 1)
+    counts = rng.multinomial(drawn, np.full(n_seeds, 1 / n_seeds), size=resamples)
+    return np.concatenate([np.full((1, n_seeds), 1 / n_seeds), counts / drawn])
+
+
+def over_seeds(samples: Sequence[Array], weights: Array) -> Array:
+    """Weighted mean of samples, resample by resample; a failed run among those drawn makes it fail.
+
+    Args:
+        samples: medians (1 + resamples,) of each seed.
+        weights: (1 + resamples, K) from :func:`seed_weights`.
+    """
+    weighed = np.where(weights.T > 0, np.asarray(samples), 0.0) * weights.T
+    return np.asarray(weighed.sum(axis=0))
 
 
 def medians(errors: Array, path: Counts, counts: Counts) -> Array:

@@ -26,6 +26,7 @@ PACKAGES = (
     "trimesh",
 )
 UNKNOWN = "unknown"
+CPU_INFO = Path("/proc/cpuinfo")
 
 
 def provenance(seed: int, config_hash: str) -> dict[str, Any]:
@@ -65,6 +66,16 @@ def git_commit(folder: Path) -> str:
     changed = _git(folder, "diff", "--quiet", "HEAD", "--", ":(top)", ":(top,exclude)results")
     clean = changed is not None and changed.returncode == 0
     return commit.stdout.strip() + ("" if clean else "-dirty")
+
+
+def processor_name(cpu_info: Path) -> str:
+    """The model name the kernel gives; elsewhere what Python knows, else ``unknown``."""
+    try:
+        lines = cpu_info.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return next(iter(names), platform.processor() or platform.machine() or UNKNOWN)
 
 
 def _git(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str] | None:

@@ -25,7 +25,7 @@ CLAIM = {
     **{"id": "C2", "section": "4.1", "statement": "A <b>& c", "published": "p -55 %"},
     **{"measured_labels": "p -41.5 %", "measured_true": "p -33.5 %"},
     **{"interval_labels": "p -50.0 % to -9.0 %", "interval_true": "p -44.0 % to +3.0 %"},
-    **{"test": "by a rule", "verdict_labels": "holds", "verdict_true": "undecided at this scale"},
+    **{"test": "by a rule", "verdict_labels": "holds", "verdict_true": "undecided"},
     **{
         "reason": "labels: reaches it; true: stays short",
         "footnote": "",

@@ -13,8 +13,10 @@ from synfeal.bootstrap import (
     limits,
     mean_of,
     medians,
+    over_seeds,
     path_counts,
     relative_change,
+    seed_weights,
 )
 from synfeal.report.stats import kendall_tau, share_limits, sign_test
 
@@ -179,3 +181,51 @@ def test_few_paths_give_limits_that_are_too_narrow_to_decide_on():
 
 def test_drawing_frames_instead_of_paths_would_be_too_sure():
     assert _covered(20, 10, 300, seed=2, by_path=False) < 0.85
+
+
+def test_one_seed_fewer_is_drawn_than_there_are():
+    weights = seed_weights(3, np.random.default_rng(0), 20_000)
+    assert weights[0].tolist() == pytest.approx([1 / 3] * 3)
+    np.testing.assert_allclose(weights.sum(axis=1), 1)
+    values = np.array([1.0, 2.0, 6.0])  # mean 3, variance 7
+    means = over_seeds([np.full(len(weights), v) for v in values], weights)[1:]
+    assert means.mean() == pytest.approx(3, abs=0.05)
+    assert means.var() == pytest.approx(7 / 3, rel=0.05)  # that of a mean of three
+    assert seed_weights(1, np.random.default_rng(0), 5).tolist() == [[1.0]] * 6
+
+
+def test_a_failed_seed_fails_where_it_is_drawn():
+    weights = np.array([[0.5, 0.5], [1.0, 0.0], [0.0, 1.0]])
+    assert over_seeds([np.full(3, INF), np.full(3, 2.0)], weights).tolist() == [INF, INF, 2]
+
+
+def _covered_over_seeds(n_seeds, run_sd, trials, seed):
+    """As ``_covered``, with several runs on either side that vary from seed to seed."""
+    rng = np.random.default_rng(seed)
+    n_paths = 40
+    path = np.repeat(np.arange(n_paths), 6)
+    hits = 0
+    for _ in range(trials):
+        shared = rng.normal(0, 0.5, n_paths)
+        counts = path_counts(n_paths, rng, 400)
+        weights = seed_weights(n_seeds, rng, 400)
+        sides = []
+        for factor in (1 + SHIFT / 100, 1.0):
+            own = shared + rng.normal(0, 0.2, n_paths)
+            runs = [
+                factor * np.exp((own + rng.normal(0, 0.2, n_paths))[path] + rng.normal(0, run_sd))
+                for _ in range(n_seeds)
+            ]
+            sides.append(over_seeds([medians(run, path, counts) for run in runs], weights))
+        low, high = limits(relative_change(*sides))
+        hits += low <= SHIFT <= high
+    return hits / trials
+
+
+@pytest.mark.parametrize("run_sd", [0.0, 0.03, 0.08])
+def test_limits_over_three_seeds_hold_the_truth_in_at_least_94_percent(run_sd):
+    assert _covered_over_seeds(3, run_sd, 200, seed=11) >= 0.94
+
+
+def test_limits_of_one_seed_do_not_know_how_seeds_differ():
+    assert _covered_over_seeds(1, 0.15, 200, seed=12) < 0.85

@@ -147,7 +147,7 @@ def test_claims_carry_both_scores_and_are_escaped(finished):
     assert labels[0].startswith("p -41.5 %<small>95 %: p -50.0 % to -9.0 %")
     assert true[0].startswith("p -33.5 %<small>95 %: p -44.0 % to +3.0 %")
     assert text_of(labels[1]) == "✓ holds reaches it"
-    assert text_of(true[1]) == "? undecided at this scale stays short"
+    assert text_of(true[1]) == "? undecided stays short"
 
 
 def test_an_unknown_verdict_is_refused(root):

@@ -5,8 +5,9 @@ import json
 import pytest
 
 from synfeal.errors import InputError
+from synfeal.provenance import processor_name
 from synfeal.report.html.origin import cost_sentence, duration, origin_html
-from synfeal.report.html.provenance import processor_name, write_provenance
+from synfeal.report.html.provenance import write_provenance
 from synfeal.report.html.stages import Stage, read_stages
 
 HEADER = "s\th:m:s\tmax_rss\tmax_vms\n"

@@ -19,12 +19,6 @@ from synfeal.report.layouts import scene_title
 MEASURES = ("position_m", "orientation_deg")
 HERE, PAPER = "here", "paper"
 COLUMNS = ("group", "change", "spoken", "model", "measure", "source", "factor")
-VERDICTS = {
-    "holds": "hold here",
-    "does not hold": "do not",
-    "undecided at this scale": "are undecided at this scale",
-    "not testable here": "cannot be tested here",
-}
 
 
 def effects(root: Path) -> pd.DataFrame:
@@ -152,9 +146,8 @@ def _claims_sentence(root: Path) -> str:
         verdicts = pd.read_csv(path).verdict_true.value_counts(sort=False)
     except (OSError, ValueError, AttributeError) as error:
         raise InputError(f"{path}: cannot be read ({error}); publish the run again") from None
-    names = sorted(map(str, verdicts.index), key=[*VERDICTS].index)
-    parts = [f"{verdicts[name]} {VERDICTS[name]}" for name in names]
-    return f"Of {verdicts.sum()} claims of the paper, {', '.join(parts)} (against the true poses)."
+    parts = [f"{count} {verdict}" for verdict, count in verdicts.items()]
+    return f"Verdicts on {verdicts.sum()} claims, by the true poses: {', '.join(parts)}."
 
 
 def _group_sentence(found: pd.DataFrame) -> str:

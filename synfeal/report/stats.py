@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,8 @@ COUNTS = ("n_train", "n_test", "failed")
 BASELINES = tuple(f"baseline_{measure}" for measure in MEASURES)
 FLOORS = tuple(f"floor_{measure}" for measure in MEASURES[:2])
 Metrics = Mapping[str, Any]
+# Standard errors that 95 % of a normal distribution lie within.
+NORMAL_95 = 1.96
 REMEDY = "score that run again"
 _COUNTS = TypeAdapter(dict[str, NonNegativeInt])
 _SCORES = TypeAdapter(dict[str, Annotated[FiniteFloat, Field(ge=0)] | None])
@@ -29,7 +32,8 @@ class Score:
 
     Attributes:
         value: the run's median, or the mean of the medians of several runs; None when all failed.
-        low: lower 95 % limit from the test frames (bootstrap), averaged over the runs.
+        low: lower 95 % limit: of one run from its test paths (bootstrap), of several the mean of
+            those, with the spread of the medians over the runs added in quadrature.
         high: upper limit, likewise.
         sd: standard deviation of the medians over the runs; None below two runs.
     """
@@ -99,11 +103,16 @@ def combine(runs: Sequence[Metrics]) -> CellScores:
 def score_of(finished: Sequence[Metrics], measure: str) -> Score:
     """One measure over the runs that finished."""
     values = [run[measure] for run in finished]
+    mean, sd = _mean(finished, measure), stdev(values) if len(values) > 1 else None
+    low, high = (_mean(finished, f"{measure}_{end}") for end in ("low", "high"))
+    if mean is None or sd is None:
+        return Score(mean, low, high, sd)
+    of_seeds = NORMAL_95 * sd / math.sqrt(len(values))
     return Score(
-        value=_mean(finished, measure),
-        low=_mean(finished, f"{measure}_low"),
-        high=_mean(finished, f"{measure}_high"),
-        sd=stdev(values) if len(values) > 1 else None,
+        mean,
+        None if low is None else max(mean - math.hypot(mean - low, of_seeds), 0.0),
+        None if high is None else mean + math.hypot(high - mean, of_seeds),
+        sd,
     )
 
 

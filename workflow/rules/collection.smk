@@ -143,6 +143,31 @@ rule render_speed:
         "../scripts/render_speed.py"
 
 
+rule collection_speed:
+    input:
+        mesh=rules.scene.output.mesh,
+        collision=rules.scene.output.collision,
+        repeat=CONFIG.collection.repeat or [],
+    output:
+        speed=f"{ROOT}/scenes/{{scene}}/collection_speed.json",
+    log:
+        f"{ROOT}/logs/collection_speed/{{scene}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/collection_speed/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(3000),
+    params:
+        scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
+        collection=dump(CONFIG.collection),
+        render=dump(CONFIG.render),
+        seed=lambda w: seed_of(CONFIG.seed, "collection speed", w.scene),
+    script:
+        "../scripts/collection_speed.py"
+
+
 # What the localizers see goes from the renderer straight into an array, not through image files.
 rule render_packed:
     input:

@@ -209,6 +209,22 @@ def all_labels():
     ]
 
 
+def true_labels():
+    """The true poses of every data set."""
+    sets = sorted({(e.scene, e.size) for e in EXPERIMENTS})
+    return [
+        f"{ROOT}/labels/{s}/{z}/synfeal/{split}.csv"
+        for s, z in sets
+        for split in SPLITS
+    ]
+
+
+def histories():
+    """What the runs of Table 5, from scratch and with transfer learning, saw on held-out paths."""
+    runs = DESIGN.table_runs("table5_from_scratch")
+    return [f"{ROOT}/runs/{run.directory}/history.csv" for run in runs]
+
+
 def pose_labels():
     """The true poses of every data set, and those that ground-truth methods estimated."""
     sets = {(e.scene, e.size, "synfeal") for e in EXPERIMENTS}
@@ -234,10 +250,10 @@ def files_of_trainings(folder, ending):
     return [file for run, file in files.items() if run in made or file in RESTORED]
 
 
-def packed_frames(kind, splits=SPLITS):
-    """Frames as the localizers see them (``npy``), or the records of what they are (``json``)."""
+def packed_frames(splits=SPLITS):
+    """Frames as the localizers see them."""
     scenes = sorted({e.scene for e in EXPERIMENTS})
-    return [f"{ROOT}/frames/{s}/{split}.{kind}" for s in scenes for split in splits]
+    return [f"{ROOT}/frames/{s}/{split}.npy" for s in scenes for split in splits]
 
 
 def manifests(camera):
@@ -393,7 +409,7 @@ def files_of_runs():
         *(f"{ROOT}/scenes/{scene}/properties.json" for scene in rooms),
         *(f"{ROOT}/plans/{scene}/train.csv" for scene in rooms),
         *(f"{ROOT}/frames/{scene}/train.npy" for scene in rooms),
-        *packed_frames("npy"),
+        *packed_frames(),
         *(f"{ROOT}/pretrained/{backbone}.pt" for backbone in sorted(backbones())),
         *(m.replace("metrics.json", "predictions.csv") for m in all_metrics()),
         *all_metrics(),

@@ -219,7 +219,7 @@ rule figures:
             f"{ROOT}/scenes/{{scene}}/collision.ply",
             scene=sorted({e.scene for e in EXPERIMENTS}),
         ),
-        frames=packed_frames("npy", ["test"]),
+        frames=packed_frames(["test"]),
     output:
         figures=report(
             directory(f"{ROOT}/figures"),
@@ -269,9 +269,15 @@ rule summary:
 
 rule claims:
     input:
-        tables=expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
-        assistance=rules.assistance.output.csv,
-        frames=packed_frames("json"),
+        errors=errors_of(RUNS),
+        histories=histories(),
+        labels=true_labels(),
+        assistance=assistance_files(),
+        properties=rules.table1_meshes.input.properties,
+        speed=expand(
+            f"{ROOT}/scenes/{{scene}}/collection_speed.json",
+            scene=sorted({e.scene for e in EXPERIMENTS}),
+        ),
     output:
         csv=report(
             f"{ROOT}/claims.csv",

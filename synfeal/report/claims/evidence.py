@@ -1,29 +1,43 @@
 """What a run left behind, as the tests of the claims need it: a median error per cell, resampled.
 
-Only cells of the profile's design are used, so that files of an earlier design in the same place
-decide nothing. What is not there ends in :class:`Missing`; what is there and cannot be read ends in
-an ``InputError``, as everywhere.
+Only what the profile's design makes is read, so that files of an earlier design in the same place
+decide nothing. What the design does not make ends in :class:`Missing`; a file that it makes and
+that is not there, or cannot be read, ends in an ``InputError``, as everywhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from synfeal.bootstrap import Array, Counts, mean_of, medians, path_counts
+from baselines.training.score import pose_errors
+from synfeal.bootstrap import (
+    Array,
+    Counts,
+    limits,
+    medians,
+    over_seeds,
+    path_counts,
+    seed_weights,
+)
 from synfeal.config import Design, Run
 from synfeal.dataset.number_table import read_numbers
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
+from synfeal.labels.constant import constant_pose
 from synfeal.report.claims.model import Missing
+from synfeal.report.layouts import TITLES
 from synfeal.report.stats import MEASURES
 from synfeal.seeds import generator_of
 
 HEADER = ",".join(("frame", *MEASURES))
+# A localizer has learnt where its whole interval lies below this share of the mean pose's error.
+LEARNT = 0.75
+QUANTITIES = ("position", "orientation")
 
 
 class Cell(NamedTuple):
@@ -43,13 +57,22 @@ class Errors(NamedTuple):
     orientation: Array
 
 
+class TestSet(NamedTuple):
+    """The true poses of a test set, which resample draws which paths, and what is no learning."""
+
+    poses: PoseTable
+    path: Counts
+    counts: Counts
+    constant: Errors
+
+
 @dataclass(frozen=True)
 class Evidence:
     """A results directory, read under one of the two scores.
 
     Attributes:
         root: results directory of the profile.
-        runs: by cell of the profile, its runs; their median errors are averaged.
+        runs: by cell of the profile, its runs.
         end: ``""`` for errors against the labels, ``"_true"`` against the true poses.
         used: files read so far, relative to ``root``.
         test_paths: by test set, how many paths it has.
@@ -61,53 +84,103 @@ class Evidence:
     used: dict[str, None] = field(default_factory=dict)
     test_paths: dict[tuple[str, str], int] = field(default_factory=dict)
     _errors: dict[tuple[Cell, str], Errors] = field(default_factory=dict)
-    _tests: dict[tuple[str, str], tuple[PoseTable, Counts]] = field(default_factory=dict)
+    _tests: dict[tuple[str, str], TestSet] = field(default_factory=dict)
 
     def under(self, end: str) -> Evidence:
         """The same results under a score, with nothing read yet."""
         return replace(self, end=end, used={}, test_paths={})
 
     def file(self, relative: str) -> Path:
-        """A result file, noted as used.
+        """A result file that the design makes, noted as used.
 
         Raises:
-            Missing: there is no such file.
+            InputError: there is no such file.
         """
         path = self.root / relative
         if not path.is_file():
-            raise Missing(f"{relative} is missing")
+            raise InputError(f"{path}: missing; make the results again")
         self.used[relative] = None
         return path
 
-    def errors(self, cell: Cell) -> Errors:
-        """Median errors of a cell, observed and resampled, averaged over its repetitions.
+    def need(self, **keys: str) -> None:
+        """Make sure that the profile has cells with some values.
 
         Raises:
-            Missing: the profile does not run the cell, or a file of it is missing.
-            InputError: a file cannot be read, or is about other frames.
+            Missing: it has none.
+        """
+        if not any(all(getattr(c, k) == v for k, v in keys.items()) for c in self.runs):
+            raise Missing(f"this profile has no row {' '.join(keys.values())}")
+
+    def runs_of(self, cell: Cell) -> Sequence[Run]:
+        """The repetitions of a cell.
+
+        Raises:
+            Missing: the profile does not run it.
         """
         if cell not in self.runs:
             raise Missing(f"this profile has no row {_name(cell)}")
-        table, counts = self._test_set(cell)
-        self.test_paths[cell.scene, cell.size] = counts.shape[1]
-        files = [self.file(f"runs/{run.directory}/errors.csv") for run in self.runs[cell]]
+        return self.runs[cell]
+
+    def errors(self, cell: Cell) -> Errors:
+        """Median errors of a cell, observed and resampled over test paths and repetitions.
+
+        Draws of the seeds are shared by the cells that differ in their labels alone: with one
+        number their runs drew the same random numbers.
+
+        Raises:
+            Missing: the profile does not run the cell.
+            InputError: a file is missing, cannot be read, or is about other frames.
+        """
+        runs = self.runs_of(cell)
+        test = self.test_set(cell.scene, cell.size)
+        files = [self.file(f"runs/{run.directory}/errors.csv") for run in runs]
         if (cell, self.end) not in self._errors:
-            path = np.unique(table.path, return_inverse=True)[1]
-            runs = [_read_errors(file, table) for file in files]
+            tables = [_read_errors(file, test.poses) for file in files]
             columns = [HEADER.split(",").index(m + self.end) for m in MEASURES[:2]]
-            means = [mean_of([medians(run[:, c], path, counts) for run in runs]) for c in columns]
-            self._errors[cell, self.end] = Errors(*means)
+            draw = generator_of("claims", "seeds", cell._replace(labels=""), len(runs))
+            weights = seed_weights(len(runs), draw)
+            self._errors[cell, self.end] = Errors(
+                *(
+                    over_seeds([medians(t[:, c], test.path, test.counts) for t in tables], weights)
+                    for c in columns
+                )
+            )
         return self._errors[cell, self.end]
 
-    def _test_set(self, cell: Cell) -> tuple[PoseTable, Counts]:
-        """Frames of a test set, and how often each resample draws their paths."""
-        path = self.file(f"labels/{cell.scene}/{cell.size}/synfeal/test.csv")
-        key = cell.scene, cell.size
+    def test_set(self, scene: str, size: str) -> TestSet:
+        """A test set, and the errors on it of always answering the mean true training pose."""
+        folder = f"labels/{scene}/{size}/synfeal"
+        train, path = self.file(f"{folder}/train.csv"), self.file(f"{folder}/test.csv")
+        key = scene, size
         if key not in self._tests:
-            table = read_pose_table(path)
-            rng = generator_of("claims", *key)
-            self._tests[key] = table, path_counts(len(np.unique(table.path)), rng)
+            poses = read_pose_table(path)
+            paths, place = np.unique(poses.path, return_inverse=True)
+            counts = path_counts(len(paths), generator_of("claims", *key))
+            errors = pose_errors(constant_pose(read_pose_table(train), poses), poses)
+            constant = Errors(*(medians(errors[m], place, counts) for m in MEASURES[:2]))
+            self._tests[key] = TestSet(poses, place, counts, constant)
+        self.test_paths[key] = self._tests[key].counts.shape[1]
         return self._tests[key]
+
+    def not_learnt(self, cells: Iterable[Cell]) -> list[str]:
+        """Which cells, trained on true labels, are not clearly better than the mean pose, and how.
+
+        Raises:
+            Missing: the profile does not run a cell.
+            InputError: a file is missing or cannot be read.
+        """
+        found = []
+        for cell in cells:
+            constant = self.test_set(cell.scene, cell.size).constant
+            pairs = zip(QUANTITIES, self.errors(cell), constant, strict=True)
+            for name, own, mean_pose in pairs:
+                with np.errstate(invalid="ignore", divide="ignore"):
+                    share = 100 * own / mean_pose
+                low, high = limits(share)
+                if not high < 100 * LEARNT:
+                    text = f"{share[0]:.0f} % ({low:.0f} to {high:.0f}) of the mean pose's"
+                    found.append(f"{TITLES[cell.model]}, {cell.size}: {name} error {text}")
+        return found
 
 
 def evidence_of(design: Design, root: Path) -> Evidence:

@@ -9,11 +9,25 @@ from typing import Literal
 
 from synfeal.report.published import FOLDER
 
-Verdict = Literal["holds", "does not hold", "undecided at this scale", "not testable here"]
+Verdict = Literal[
+    "holds",
+    "same direction but smaller",
+    "mixed",
+    "no effect",
+    "opposite",
+    "undecided",
+    "not learnt at this scale",
+    "not testable here",
+]
 HOLDS: Verdict = "holds"
-FAILS: Verdict = "does not hold"
-UNDECIDED: Verdict = "undecided at this scale"
+SMALLER: Verdict = "same direction but smaller"
+MIXED: Verdict = "mixed"
+NO_EFFECT: Verdict = "no effect"
+OPPOSITE: Verdict = "opposite"
+UNDECIDED: Verdict = "undecided"
+NOT_LEARNT: Verdict = "not learnt at this scale"
 NOT_TESTABLE: Verdict = "not testable here"
+DECIDED = (HOLDS, SMALLER, MIXED, NO_EFFECT, OPPOSITE)
 
 
 @dataclass(frozen=True)
@@ -57,7 +71,7 @@ class Outcome:
 
 
 class Missing(Exception):  # noqa: N818 - not an error: it ends in the verdict `not testable here`
-    """This run does not have what a test needs; the message says what."""
+    """The profile does not make what a test needs; the message says what."""
 
 
 @cache

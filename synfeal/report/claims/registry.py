@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from synfeal.bootstrap import FEWEST_PATHS
-from synfeal.report.claims import label_sources, noise, scratch, simulator, size
-from synfeal.report.claims.evidence import Evidence
+from synfeal.config import MODELS
+from synfeal.report.claims import duration, label_sources, noise, scratch, simulator, size
+from synfeal.report.claims.evidence import Cell, Evidence
 from synfeal.report.claims.model import (
-    FAILS,
-    HOLDS,
+    DECIDED,
+    NOT_LEARNT,
     NOT_TESTABLE,
     UNDECIDED,
     Claim,
@@ -30,29 +32,55 @@ JUDGES: Mapping[str, Callable[[Claim, Evidence], Outcome]] = {
     "C10": scratch.worse_when_small,
     "C11": scratch.better_when_large,
     "C12": scratch.best_of_all,
-    "C13": scratch.longer,
+    "C13": duration.longer,
     "C14": simulator.collection_rate,
     "C15": label_sources.kinectfusion_fails,
     "C16": simulator.times_7_scenes,
 }
 
 
+def _cells(*models: str, scene: str = "large_room", sizes: tuple[str, ...] = ("6k",)) -> list[Cell]:
+    return [Cell(model, scene, one) for one in sizes for model in models or MODELS]
+
+
+# What has to have learnt from true labels before a claim about localizers says anything. C9 claims
+# that something is not learnt.
+LEARNT: Mapping[str, list[Cell]] = {
+    "C1": _cells(),
+    "C2": _cells("posenet2"),
+    "C3": _cells("posenet", "posenet2"),
+    "C5": _cells(),
+    "C6": _cells("posenet2"),
+    "C7": _cells(sizes=("80k",)),
+    "C8": _cells(scene="sanctuary", sizes=("95k",)),
+    "C10": _cells(sizes=("6k", "20k")),
+    "C11": _cells(sizes=("80k",)),
+    "C12": _cells(sizes=("80k",)),
+    "C13": _cells(sizes=("80k",)),
+}
+
+
 def judge(claim: Claim, evidence: Evidence) -> Outcome:
     """The verdict of a claim's own rule.
 
-    What is missing makes it ``not testable here``. With fewer than ten paths in a test set nothing
-    is decided, whatever the rule says.
+    What the profile does not make leaves it ``not testable here``. Where the localizers it rests on
+    have not learnt it is ``not learnt at this scale``, and with fewer than ten paths in a test set
+    nothing is decided, whatever the rule says.
 
     Raises:
-        InputError: a result file cannot be read.
+        InputError: a result file is missing or cannot be read.
     """
     try:
         outcome = JUDGES[claim.id](claim, evidence)
+        unlearnt = evidence.not_learnt(LEARNT.get(claim.id, []))
     except Missing as missing:
         evidence.used.clear()  # half of what a test needs is no evidence
         return Outcome(NOT_TESTABLE, reason=str(missing))
+    if unlearnt:
+        more = f" and {len(unlearnt) - 1} more" if len(unlearnt) > 1 else ""
+        return replace(outcome, verdict=NOT_LEARNT, reason=f"{unlearnt[0]}{more}")
     fewest = min(evidence.test_paths.values(), default=FEWEST_PATHS)
-    if fewest < FEWEST_PATHS and outcome.verdict in (HOLDS, FAILS):
+    if fewest < FEWEST_PATHS and outcome.verdict in DECIDED:
         reason = f"a test set has {fewest} paths, fewer than {FEWEST_PATHS}; {outcome.reason}"
-        return Outcome(UNDECIDED, outcome.measured, outcome.interval, reason)
+        return replace(outcome, verdict=UNDECIDED, reason=reason)
     return outcome

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from synfeal.config import Design
 from synfeal.report.claims.evidence import Evidence, evidence_of
-from synfeal.report.claims.model import Claim, published_claims
+from synfeal.report.claims.model import NOT_LEARNT, NOT_TESTABLE, Claim, published_claims
 from synfeal.report.claims.registry import judge
 from synfeal.report.tables import write_rows
 
@@ -32,8 +32,7 @@ def write_claims(design: Design, root: Path, out_csv: Path) -> None:
         out_csv: the table, columns :data:`COLUMNS`.
 
     Raises:
-        InputError: a result file cannot be read. One that is missing makes no error: the claims
-            that need it are not testable.
+        InputError: a result file is missing or cannot be read.
     """
     write_rows(out_csv, COLUMNS, claim_rows(evidence_of(design, root)))
 
@@ -88,5 +87,5 @@ def _without_details(measured: str) -> str:
 
 
 def _remarks(row: Row) -> list[str]:
-    untested = "not testable here" in (row["verdict_labels"], row["verdict_true"])
+    untested = {NOT_TESTABLE, NOT_LEARNT} & {row["verdict_labels"], row["verdict_true"]}
     return [text for text in (row["reason"] if untested else "", row["footnote"]) if text]

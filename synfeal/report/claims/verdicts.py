@@ -1,66 +1,103 @@
 """The rules that turn samples into verdicts. There is no other way to a verdict.
 
-A claim often consists of several conditions, all of which have to be met. It *holds* when the 95 %
-interval of every condition does; it *does not hold* when one condition is refuted, at the level
-corrected for their number (Bonferroni), which keeps the risk of a false refutation near 5 %. No
-correction is needed for *holds*: all conditions have to pass. Everything else is undecided.
+Every condition of a claim is an effect in percent, positive in the direction the paper claims. Its
+95 % interval is compared with four regions, as in equivalence testing (Lakens, "Equivalence Tests",
+Social Psychological and Personality Science 2017): an effect smaller than the smallest of interest
+is none; at least two thirds of the published one is a replication. The verdict is the region the
+whole interval lies in, and *undecided* where it lies in none, so that a narrower interval can only
+be nearer to the right verdict: two one-sided tests at 2.5 % each.
+
+=================================== ====================================================
+interval                            verdict
+=================================== ====================================================
+at or above 2/3 of the published    holds (where no size was published: above `smallest`)
+from `smallest` to that             same direction but smaller
+within ± `smallest`                 no effect
+at or below -`smallest`             opposite
+=================================== ====================================================
+
+A claim of several conditions holds when all do. It is refuted by one that is decided otherwise at
+the level corrected for their number (Bonferroni); then the verdict is that condition's, or *mixed*
+where others hold or are refuted in another way.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from synfeal.bootstrap import Array, limits
-from synfeal.report.claims.model import FAILS, HOLDS, UNDECIDED, Verdict
+from synfeal.report.claims.model import (
+    HOLDS,
+    MIXED,
+    NO_EFFECT,
+    OPPOSITE,
+    SMALLER,
+    UNDECIDED,
+    Verdict,
+)
 
-MARGIN = 0.2
-# Half a unit of the last printed digit of a published percentage.
-ROUNDING = 0.5
-
-
-def all_of(parts: Sequence[Verdict]) -> Verdict:
-    """Of conditions that must all be met: refuted by one, borne out only by all."""
-    if FAILS in parts:
-        return FAILS
-    return HOLDS if all(part == HOLDS for part in parts) else UNDECIDED
-
-
-def below_zero(sample: Array, comparisons: int = 1) -> Verdict:
-    """Holds: interval wholly below 0. Does not hold: wholly above. ``comparisons``: conditions."""
-    if limits(sample)[1] < 0:
-        return HOLDS
-    return FAILS if limits(sample, comparisons)[0] > 0 else UNDECIDED
+# Percent. The paper prints 0.01 m, which is 5 % of its median cell, 0.20 m: it resolves no less.
+SMALLEST = 5.0
+ENOUGH = 2 / 3
+REFUTED = (SMALLER, NO_EFFECT, OPPOSITE)
 
 
-def reaches(change: Array, published: float, comparisons: int = 1) -> Verdict:
-    """Whether a change of the published sign is as large as published, or larger.
+class Condition(NamedTuple):
+    """One effect that a claim asserts.
 
-    Holds: the interval lies wholly on the published side of 0, and reaches the published change or
-    goes beyond it. Does not hold: it ends short of the published change. Undecided: it holds both
-    the published change and none at all. Both in percent; the published one is a whole number, so
-    half a percent short of it still reaches it.
+    Attributes:
+        name: in the reason of the verdict.
+        effect: sample, percent, positive in the claimed direction.
+        published: its size in print, percent; 0 where the paper claims a direction alone.
+        smallest: effect below which there is none; 0 for a mere order.
     """
-    sign = 1 if published > 0 else -1
-    wanted = sign * published - ROUNDING
-    if limits(sign * change, comparisons)[1] < wanted:
-        return FAILS
-    low, high = limits(sign * change)
-    return HOLDS if low > 0 and high >= wanted else UNDECIDED
+
+    name: str
+    effect: Array
+    published: float = 0.0
+    smallest: float = SMALLEST
 
 
-def near(sample: Array, published: float, comparisons: int = 1) -> Verdict:
-    """Holds: interval wholly within 20 % of the published value. Does not hold: wholly outside."""
-    bounds = published * (1 - MARGIN), published * (1 + MARGIN)
-    low, high = limits(sample)
-    if bounds[0] <= low and high <= bounds[1]:
+def verdict_of(condition: Condition, comparisons: int = 1) -> Verdict:
+    """The region an effect's interval lies in; ``comparisons``: conditions it is one of."""
+    low, high = limits(condition.effect, comparisons)
+    smallest = condition.smallest
+    enough = max(ENOUGH * abs(condition.published), smallest)
+    if low >= enough and low > 0:
         return HOLDS
-    low, high = limits(sample, comparisons)
-    return FAILS if high < bounds[0] or bounds[1] < low else UNDECIDED
+    if high <= -smallest and high < 0:
+        return OPPOSITE
+    if -smallest <= low and high <= smallest:
+        return NO_EFFECT
+    return SMALLER if smallest <= low and high <= enough else UNDECIDED
+
+
+def all_of(conditions: Sequence[Condition]) -> tuple[Verdict, str]:
+    """The verdict of a claim that all conditions make, and how each of them came out."""
+    parts = [verdict_of(condition) for condition in conditions]
+    corrected = [verdict_of(condition, len(conditions)) for condition in conditions]
+    refuted = {part for part in corrected if part in REFUTED}
+    if all(part == HOLDS for part in parts):
+        verdict: Verdict = HOLDS
+    elif not refuted:
+        verdict = UNDECIDED
+    else:
+        verdict = MIXED if len(refuted) > 1 or HOLDS in parts else next(iter(refuted))
+    return verdict, _parts_text(conditions, parts)
 
 
 def at_least(sample: Array, number: float) -> Verdict:
-    """Holds: interval starts at ``number`` or above. Does not hold: it ends below it."""
+    """Holds: interval starts at ``number`` or above. Opposite: it ends below it."""
     low, high = limits(sample)
-    if low >= number:
-        return HOLDS
-    return FAILS if high < number else UNDECIDED
+    return HOLDS if low >= number else OPPOSITE if high < number else UNDECIDED
+
+
+def _parts_text(conditions: Sequence[Condition], parts: Sequence[Verdict]) -> str:
+    """Each condition by name where they are few, else how many came out in which way."""
+    if len(conditions) <= 2:
+        texts = [f"{c.name}: {part}" for c, part in zip(conditions, parts, strict=True)]
+        return ", ".join(texts)
+    counts = Counter(parts).most_common()
+    return f"of {len(parts)} conditions " + ", ".join(f"{n} {part}" for part, n in counts)

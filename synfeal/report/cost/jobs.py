@@ -58,6 +58,7 @@ STAGES = (
         "coverage",
         "cell_depth",
         "render_speed",
+        "collection_speed",
         "tables",
         "claims",
         "figures",

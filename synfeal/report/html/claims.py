@@ -9,7 +9,16 @@ from html import escape
 from pathlib import Path
 
 from synfeal.errors import InputError
-from synfeal.report.claims.model import FAILS, HOLDS, NOT_TESTABLE, UNDECIDED
+from synfeal.report.claims.model import (
+    HOLDS,
+    MIXED,
+    NO_EFFECT,
+    NOT_LEARNT,
+    NOT_TESTABLE,
+    OPPOSITE,
+    SMALLER,
+    UNDECIDED,
+)
 from synfeal.report.claims.table import COLUMNS
 from synfeal.report.html.markup import Column, plain_table
 from synfeal.report.html.tables import SCORE_TAGS
@@ -18,8 +27,12 @@ from synfeal.report.results import read_table
 # A sign, a border and the words themselves tell verdicts apart without colour.
 BADGES = {
     HOLDS: ("✓", "holds"),
-    FAILS: ("✗", "fails"),
+    SMALLER: ("↘", "partly"),
+    MIXED: ("±", "partly"),
+    NO_EFFECT: ("=", "fails"),
+    OPPOSITE: ("✗", "fails"),
     UNDECIDED: ("?", "undecided"),
+    NOT_LEARNT: ("–", "untestable"),
     NOT_TESTABLE: ("–", "untestable"),
 }
 SCORES = ("labels", "true")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import platform
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
@@ -13,10 +12,8 @@ from typing import Any
 from torch import cuda
 
 from synfeal.files import write_json
-from synfeal.provenance import UNKNOWN, provenance
+from synfeal.provenance import CPU_INFO, processor_name, provenance
 from synfeal.report.html.stages import read_stages
-
-CPU_INFO = Path("/proc/cpuinfo")
 
 
 def write_provenance(
@@ -60,13 +57,3 @@ def machine() -> dict[str, Any]:
         "memory_gib": round(pages * page_bytes / 2**30, 1),
         "gpu": cuda.get_device_name() if cuda.is_available() else None,
     }
-
-
-def processor_name(cpu_info: Path) -> str:
-    """The model name the kernel gives; elsewhere what Python knows, else ``unknown``."""
-    try:
-        lines = cpu_info.read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return next(iter(names), platform.processor() or platform.machine() or UNKNOWN)

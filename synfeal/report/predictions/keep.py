@@ -15,11 +15,13 @@ from synfeal.report.predictions.package import write_package
 
 PACKAGE, PREDICTIONS = "predictions.zip", "predictions.csv"
 OF_RUN = (PREDICTIONS, "history.csv", "training.json")
-OF_SCENE = ("properties.json", "collision_curve.csv", "render_speed.csv", "test_depth.npy")
+OF_SCENE = (
+    *("properties.json", "collision_curve.csv", "render_speed.csv", "collection_speed.json"),
+    "test_depth.npy",
+)
 # Written by the job that estimates labels, so it tells them from labels that are computed.
 ESTIMATED = "assistance.json"
 OF_REFERENCE = ("metrics.json", "facts.json")  # their answers take minutes, not hours
-COLLECTING = ("plan", "render_packed")  # what collecting took, of which a claim speaks
 TRUTH = ("train.csv", "test.csv")
 
 
@@ -74,8 +76,6 @@ def _of_data_set(root: Path, scene: str, size: str) -> Iterable[Path]:
     yield from (root / "frames" / scene).glob("*.json")
     for name in OF_REFERENCE:
         yield from (root / "references" / scene / size).glob(f"*/*/{name}")
-    for stage in COLLECTING:
-        yield from (root / "benchmarks" / stage / scene).glob("*.tsv")
 
 
 def _beginnings(root: Path, names: Iterable[str]) -> dict[str, str]:

@@ -1,0 +1,75 @@
+"""How fast a scene is collected: planning, rendering and writing frames, on the machine at hand."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from synfeal.config.models import CameraConfig, CollectionConfig, RenderConfig, SceneConfig
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.render_sequence import write_sequence
+from synfeal.files import write_json
+from synfeal.mesh.load import load_mesh
+from synfeal.planning.plan import plan_scene
+from synfeal.provenance import CPU_INFO, processor_name
+from synfeal.render import open_renderer
+
+# What the published code renders.
+CAMERA = CameraConfig(width=640, height=480)
+FRAMES, PARTS = 100, 4
+
+
+def write_collection_speed(
+    mesh: Path,
+    collision: Path,
+    scene: SceneConfig,
+    collection: CollectionConfig,
+    render: RenderConfig,
+    seed: int,
+    out_json: Path,
+) -> None:
+    """Collect 100 frames of 640 x 480 in four parts and write how fast each was.
+
+    A frame is a PNG file and its pose. The mesh is loaded once before, as in a job of any length.
+
+    Args:
+        mesh: textured, in the world frame.
+        collision: mesh that rays are cast against.
+        scene: its sampling box.
+        collection: how paths are planned.
+        render: how frames are drawn.
+        seed: of the plan.
+        out_json: ``width``, ``height``, ``frames_per_s`` of each part, ``processor``, ``cores``.
+
+    Raises:
+        InputError: a mesh cannot be read, or nothing can be collected there.
+    """
+    began = time.perf_counter()
+    plan = plan_scene(collision, scene, collection, FRAMES, np.random.default_rng(seed))
+    planning_s = (time.perf_counter() - began) / PARTS
+    seconds = []
+    with (
+        tempfile.TemporaryDirectory(dir=out_json.parent) as folder,
+        open_renderer(load_mesh(mesh), CAMERA, render) as renderer,
+    ):
+        for part, rows in enumerate(np.array_split(np.arange(FRAMES), PARTS)):
+            poses = PoseTable(
+                plan.frame[rows], plan.path[rows], plan.position_m[rows], plan.quat_wxyz[rows]
+            )
+            began = time.perf_counter()
+            write_sequence(renderer, poses, Path(folder) / f"seq-{part + 1:02d}", with_depth=False)
+            seconds.append(time.perf_counter() - began + planning_s)
+    write_json(
+        out_json,
+        {
+            "width": CAMERA.width,
+            "height": CAMERA.height,
+            "frames_per_s": [round(FRAMES / PARTS / s, 2) for s in seconds],
+            "processor": processor_name(CPU_INFO),
+            "cores": len(os.sched_getaffinity(0)),
+        },
+    )
