@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.training.score import pose_errors
 from synfeal.bootstrap import (
     Array,
     Counts,
@@ -28,6 +27,7 @@ from synfeal.config import Design, Run
 from synfeal.dataset.number_table import read_numbers
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
+from synfeal.evaluation.metrics import pose_errors
 from synfeal.labels.constant import constant_pose
 from synfeal.report.claims.model import Missing
 from synfeal.report.layouts import TITLES
