@@ -44,7 +44,10 @@ def write_records(config: Config) -> None:
     root = config.root
     write_json(root / "frames/large_room/train.json", {})
     write_json(root / "frames/large_room/test.json", {})
-    for name in ("properties.json", "collision_curve.csv", "render_speed.csv", "test_depth.npy"):
+    for name in (
+        *("properties.json", "collision_curve.csv", "render_speed.csv", "test_depth.npy"),
+        "collection_speed.json",
+    ):
         (root / "scenes/large_room").mkdir(parents=True, exist_ok=True)
         (root / "scenes/large_room" / name).write_text("{}")
     design = read_design(config).rows
