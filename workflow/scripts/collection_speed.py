@@ -1,7 +1,7 @@
 from pathlib import Path
 
+from synfeal.collect.speed import write_collection_speed
 from synfeal.config.models import CollectionConfig, RenderConfig, SceneConfig
-from synfeal.dataset.collection_speed import write_collection_speed
 from synfeal.job import job
 
 with job(snakemake.log[0]):
