@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -295,3 +297,19 @@ def test_parts_of_plain_colours_are_a_scene(tmp_path: Path) -> None:
     assert [part.base_color[0] for part in parts] == [22, 255]
     assert (parts[0].faces == FACE).all()
     assert len(parts[0].vertices_m) == len(TRIANGLE)
+
+
+@pytest.mark.parametrize("content", [b"no image at all", b"\x89PNG\r\n\x1a\n" + bytes(30)])
+@pytest.mark.parametrize(("write", "name"), [(write_gltf, "paint.png"), (write_obj, "wall.png")])
+def test_a_texture_that_is_no_image_is_named(
+    write: Callable[..., Path],
+    name: str,
+    content: bytes,
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    (tmp_path / name).write_bytes(content)
+    path = write(tmp_path, textured(), [name]) if write is write_gltf else write(tmp_path)
+    with contextlib.suppress(InputError):  # of a file whose only colour this was
+        load_mesh(path)
+    assert f"'{name}' cannot be read as an image" in caplog.text

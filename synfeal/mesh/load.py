@@ -125,6 +125,8 @@ def _read_scene(path: Path, gltf: Gltf | None, findings: Findings) -> Any:
         )
     finally:
         report_missing(resolver.missing, findings, gltf)
+        for name in dict.fromkeys(resolver.unreadable):
+            findings.warn(f"'{name}' cannot be read as an image; base colours are used instead")
 
 
 def _part_name(name: str) -> str:

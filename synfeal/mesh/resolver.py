@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote
 
+from PIL import Image
 from trimesh.resolvers import FilePathResolver
 
 from synfeal.mesh.findings import Findings
 from synfeal.mesh.gltf import BIN_URI, DECODED_URI, Gltf, Json, base_color, image_uri
+
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tga", ".tif", ".tiff")
 
 
 class RecordingResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is untyped
@@ -20,6 +24,7 @@ class RecordingResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is u
     def __init__(self, source: Path, gltf: Gltf | None = None) -> None:
         super().__init__(str(source), allow_anywhere=True)  # a user's own file, often ../textures
         self.missing: list[str] = []
+        self.unreadable: list[str] = []
         self._held = {} if gltf is None else {BIN_URI: gltf.binary, DECODED_URI: gltf.decoded}
 
     def get(self, name: str) -> bytes:
@@ -33,9 +38,18 @@ class RecordingResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is u
         for candidate in _spellings(str(name)):
             path = Path(self.parent) / candidate
             if path.is_file():
-                return path.read_bytes()
+                return self._checked(str(name), path.read_bytes())
         self.missing.append(str(name))
         raise FileNotFoundError(f"'{name}' is missing")
+
+    def _checked(self, name: str, content: bytes) -> bytes:
+        """The content, its name remembered if it should be an image and is none."""
+        if PurePosixPath(name).suffix.lower() in IMAGE_SUFFIXES:
+            try:
+                Image.open(io.BytesIO(content)).close()
+            except (OSError, SyntaxError, ValueError):
+                self.unreadable.append(name)
+        return content
 
 
 def _spellings(name: str) -> dict[str, None]:
