@@ -15,16 +15,24 @@ from baselines.references.correspondences import match_test_frames, mutual_match
 from baselines.references.descriptors import Vlad, dense_sift, residuals, thumbnails
 from baselines.references.evidence import Evidence
 from baselines.references.external import read_answers, run_external, score_external
-from baselines.references.features import find_features, read_features, write_features
+from baselines.references.features import Features, find_features, read_features, write_features
 from baselines.references.oracle import METRES_PER_RADIAN, nearest_rows
 from baselines.references.registry import REFERENCES, in_group
 from baselines.references.run import answer_and_score
 from baselines.references.structure import on_depth
+from baselines.references.tracks import Tracks, join_matches
+from baselines.references.triangulation import triangulate
 from baselines.references.vectors import most_alike
 from synfeal.config.models import ReferencesConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.errors import InputError
-from synfeal.geometry.poses import pose_error, pose_from_quat, pose_matrix, position_error_m
+from synfeal.geometry.poses import (
+    inverse,
+    pose_error,
+    pose_from_quat,
+    pose_matrix,
+    position_error_m,
+)
 from synfeal.geometry.rotations import quat_wxyz_from_matrix, rotation_angle_rad, rotation_from_rpy
 from tests.room_scene import CAMERA, pose_at, write_room
 
@@ -148,6 +156,42 @@ def test_answers_move_with_the_labels(room):
     other.__dict__["correspondences"] = room.correspondences
     other.__dict__["train"] = room.train.with_poses(moved @ room.train.world_from_cam)
     np.testing.assert_allclose(on_depth(other), moved @ on_depth(room), atol=2e-3)
+
+
+def test_tracks_join_the_matches_of_a_point():
+    """Features 0 1 | 2 3 | 4 5 of three frames; the last two matches make a frame see one twice."""
+    features = Features(np.array([0, 2, 4, 6]), np.zeros((6, 2)), np.zeros(6), np.zeros((6, 128)))
+    tracks = join_matches(features, np.array([[0, 2], [2, 4]]))
+    assert tracks.of_feature.tolist() == [0, -1, 0, -1, 0, -1]
+    assert tracks.frame.tolist() == [0, 1, 2]
+    assert tracks.count == 1
+    tracks = join_matches(features, np.array([[0, 2], [2, 4], [1, 3], [3, 5], [1, 2]]))
+    assert tracks.count == 0
+    assert (tracks.of_feature == -1).all()
+
+
+BESIDE = [pose_at([0.02 * i**2, 0.3 * i - 0.9, 1.3], yaw_deg=3 * i - 9) for i in range(7)]
+
+
+def seen(poses, point_m):
+    """Tracks of points (T, 3) that every frame sees exactly, whatever stands between."""
+    point = inverse(poses)[:, None] @ np.append(point_m, np.ones((len(point_m), 1)), 1)[..., None]
+    slope = point[..., :2, 0] / point[..., 2:3, 0]
+    frame = np.repeat(np.arange(len(poses)), len(point_m))
+    track = np.tile(np.arange(len(point_m)), len(poses))
+    return Tracks(frame, slope.reshape(-1, 2), track, track)
+
+
+def test_exact_rays_meet_in_their_points_and_one_wrong_ray_is_outvoted():
+    poses, rng = np.stack(BESIDE), np.random.default_rng(0)
+    point_m = np.array([3.0, 0, 1.3]) + rng.uniform(-1, 1, (20, 3))
+    exact = seen(poses, point_m)
+    np.testing.assert_allclose(triangulate(exact, poses), point_m, atol=1e-9)
+    wrong = replace(exact, slope=exact.slope.copy())
+    wrong.slope[3 * len(point_m)] += 0.2  # frame 3's ray to point 0
+    np.testing.assert_allclose(triangulate(wrong, poses)[0], point_m[0], atol=0.02)
+    behind = seen(poses, point_m - [10, 0, 0])  # the same slopes, but behind the cameras
+    assert np.isnan(triangulate(behind, poses)).all()
 
 
 def test_a_frame_without_matches_fails_and_is_counted(room, tmp_path):

@@ -73,13 +73,16 @@ def test_the_table_has_a_row_per_data_set_and_method(table):
 
 
 def test_the_finding_counts_the_localizers_that_are_closer(table):
-    """0.20 and 0.21 m are below 0.215 m; all five are below 0.5 m, none below 1 cm."""
+    """0.20 and 0.21 m are below 0.215 m; all five are below 0.5 m, none below 1 cm.
+
+    Structure is off by 0.1, 2.15 and 5 degrees, all localizers by 12.
+    """
     finding = crossing_finding(table)
-    assert "structure-based poses are off by 1 cm, the best localizer by 20 cm" in finding
-    assert "2 of 5 at 0.1 m and 5°, 5 of 5 at 0.3 m and 20°" in finding
+    assert "structure-based poses are off by 1 cm and 0.1°, the best localizer by 20 cm" in finding
+    assert "2 in position and 0 in orientation at 0.1 m and 5°, 5 in position" in finding
     failed = table.copy()
-    failed.loc[failed.method == "structure-depth", "position_m_true"] = None
-    assert "5 of 5 at 0.1 m and 5°" in crossing_finding(failed)
+    failed.loc[failed.method == "structure-depth", "orientation_deg_true"] = None
+    assert "2 in position and 5 in orientation at 0.1 m and 5°" in crossing_finding(failed)
     assert crossing_finding(table[table.noise_m == 0]) == ""
 
 

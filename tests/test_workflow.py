@@ -38,7 +38,7 @@ def test_default_profile_plans_the_papers_design(tmp_path: Path) -> None:
     assert jobs["image_references"] == 27
     assert jobs["structure_references"] == 20
     assert jobs["descriptors"] == jobs["features"] == 2
-    assert jobs["correspondences"] == jobs["references_table"] == 1
+    assert jobs["correspondences"] == jobs["tracks"] == jobs["references_table"] == 1
     assert jobs["table"] + jobs["table1_meshes"] == 6
 
 

@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 
 from baselines.references.correspondences import Correspondences, read_correspondences
+from baselines.references.tracks import Tracks, read_tracks
 from baselines.references.vectors import Described, read_described
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
@@ -63,3 +64,8 @@ class Evidence:
     def correspondences(self) -> Correspondences:
         """Features of the test images matched with those of the training images."""
         return read_correspondences(self.files["correspondences"])
+
+    @cached_property
+    def tracks(self) -> Tracks:
+        """Features of the training images that show the same point."""
+        return read_tracks(self.files["tracks"])

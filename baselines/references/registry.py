@@ -48,6 +48,9 @@ REFERENCES: dict[str, Reference] = {
     "structure-depth": Reference(
         "Structure, points from depth", "structure", f"{_PACKAGE}.structure:on_depth"
     ),
+    "structure-rays": Reference(
+        "Structure, points triangulated", "structure", f"{_PACKAGE}.triangulation:triangulated"
+    ),
 }
 
 

@@ -11,7 +11,7 @@ from synfeal.config import MODELS
 from synfeal.report.layouts import scene_title
 
 STRUCTURE = "structure-depth"
-TRUE_M = "position_m_true"
+TRUE = ("position_m_true", "orientation_deg_true")
 
 
 def crossing_findings(table: pd.DataFrame) -> list[str]:
@@ -35,30 +35,41 @@ def crossing_finding(table: pd.DataFrame) -> str:
     if len(levels) < 2 or not {STRUCTURE, *MODELS} <= set(noisy.method):
         return ""
     first, *later = [_level(noisy, *level) for level in levels.itertuples(index=False)]
-    parts = [f"{level.better} of {level.localizers} {level.name}" for level in later]
+    parts = [f"{_of(level.better)} {level.name}" for level in later]
+    structure_m, structure_deg = first.structure
+    best_m, best_deg = first.best
     return (
         f"{scene_title(str(noisy.scene.iloc[0]))}, {noisy['size'].iloc[0]}: with exact labels"
-        f" structure-based poses are off by {100 * first.structure_m:.2g} cm, the best localizer by"
-        f" {100 * first.best_m:.2g} cm; with noise in the labels the localizers that are closer to"
-        f" the truth than they are: {', '.join(parts)}."
+        f" structure-based poses are off by {100 * structure_m:.2g} cm and {structure_deg:.2g}°,"
+        f" the best localizer by {100 * best_m:.2g} cm and {best_deg:.2g}°; of the {len(MODELS)}"
+        f" localizers are closer to the truth than structure on the same noisy labels"
+        f" {', '.join(parts)}."
     )
 
 
+def _of(better: tuple[int, int]) -> str:
+    return f"{better[0]} in position and {better[1]} in orientation"
+
+
 class _Level(NamedTuple):
-    """One level of noise: localizers better than structure, of how many, and both errors."""
+    """One level of noise: position (m) and orientation (degrees) of structure, of the best."""
 
     name: str
-    better: int
-    localizers: int
-    structure_m: float
-    best_m: float
+    better: tuple[int, int]
+    structure: tuple[float, float]
+    best: tuple[float, float]
 
 
 def _level(table: pd.DataFrame, noise_m: float, noise_deg: float) -> _Level:
-    """Median position errors against the truth at a level; infinite where structure failed."""
+    """Median errors against the truth at a level; infinite where structure failed."""
     level = table[(table.noise_m == noise_m) & (table.noise_deg == noise_deg)]
-    structure_m = float(level[level.method == STRUCTURE][TRUE_M].fillna(np.inf).iloc[0])
-    localizers = level[level.method.isin(MODELS)][TRUE_M].fillna(np.inf)
-    better = int((localizers < structure_m).sum())
-    name = f"at {noise_m:g} m and {noise_deg:g}°"
-    return _Level(name, better, len(localizers), structure_m, float(localizers.min()))
+    errors = level.set_index("method")[list(TRUE)].fillna(np.inf)
+    structure = errors.loc[[STRUCTURE]].to_numpy(dtype=float)[0]
+    localizers = errors.loc[list(MODELS)].to_numpy(dtype=float)
+    better, best = (localizers < structure).sum(axis=0), localizers.min(axis=0)
+    return _Level(
+        f"at {noise_m:g} m and {noise_deg:g}°",
+        (int(better[0]), int(better[1])),
+        (float(structure[0]), float(structure[1])),
+        (float(best[0]), float(best[1])),
+    )

@@ -317,8 +317,9 @@ def files_of_references():
     return [
         *(f"{ROOT}/references/{scene}/descriptors.npz" for scene in scenes),
         *(
-            f"{ROOT}/references/{s}/{z}/correspondences.npz"
+            f"{ROOT}/references/{s}/{z}/{file}.npz"
             for s, z in sizes
+            for file in ("correspondences", "tracks")
             if has_structure(EXPERIMENTS, s, z)
         ),
         *reference_sets("metrics.json"),

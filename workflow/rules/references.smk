@@ -75,6 +75,25 @@ rule correspondences:
         "../scripts/correspondences.py"
 
 
+rule tracks:
+    input:
+        descriptors=rules.descriptors.output.descriptors,
+        train=f"{ROOT}/references/{{scene}}/{{size}}/features-train.npz",
+    output:
+        tracks=f"{ROOT}/references/{{scene}}/{{size}}/tracks.npz",
+    log:
+        f"{ROOT}/logs/tracks/{{scene}}/{{size}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tracks/{{scene}}/{{size}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(3000),
+    script:
+        "../scripts/tracks.py"
+
+
 rule image_references:
     input:
         descriptors=rules.descriptors.output.descriptors,
@@ -104,6 +123,7 @@ rule image_references:
 rule structure_references:
     input:
         correspondences=rules.correspondences.output.matches,
+        tracks=rules.tracks.output.tracks,
         train=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
         test=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
         train_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",

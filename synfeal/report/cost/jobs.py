@@ -44,6 +44,7 @@ UNITS: dict[str, tuple[str, ...]] = {
     "descriptors": ("frames",),
     "features": ("Mpx",),
     "correspondences": ("frames",),
+    "tracks": ("frames",),
     "image_references": ("frames",),
     "structure_references": ("frames",),
     "claims": ("frames",),
@@ -52,7 +53,8 @@ UNITS: dict[str, tuple[str, ...]] = {
 STAGES = (
     *("scene", "plan", "render_packed", "pack", "render", "dataset", "labels", "sfm"),
     *("rgbd", *frame_methods(), *graph_methods(), "chain", "pretrain", "train", "score"),
-    *("descriptors", "features", "correspondences", "image_references", "structure_references"),
+    *("descriptors", "features", "correspondences", "tracks"),
+    *("image_references", "structure_references"),
     "external_reference",
     *(
         "coverage",
@@ -74,8 +76,9 @@ LAW_OF = {
 # Bytes of memory per pixel of a batch: what peaks differ by between profiles (docs/cost.md).
 HELD_PER_PX = {"sfm": 10, "rgbd": 26, **dict.fromkeys(frame_methods(), 26)}
 
-# Of a frame's global descriptors, of one SIFT feature, of a test frame's matches (measured: 800).
-DESCRIPTOR_BYTES, FEATURE_BYTES, MATCHES_BYTES = 4 * (256 + 192), 128 + 24, 800 * 56
+# Of a frame: global descriptors, one of its SIFT features, its matches, its observations.
+DESCRIPTOR_BYTES, FEATURE_BYTES = 4 * (256 + 192), 128 + 24
+MATCHES_BYTES, TRACKS_BYTES = 800 * 56, 200 * 32 + 520 * 8
 
 
 @dataclass(frozen=True)
@@ -271,6 +274,11 @@ def _correspondences(profile: Profile, scene: str, size: str) -> Size:
     return (frames,), frames * MATCHES_BYTES, 0.0
 
 
+def _tracks(profile: Profile, scene: str, size: str) -> Size:
+    frames = profile.config.n_frames(scene, size, "train")
+    return (frames,), frames * TRACKS_BYTES, 0.0
+
+
 def _reference(profile: Profile, scene: str, size: str, labels: str) -> Size:
     frames = profile.config.n_frames(scene, size, "test")
     return (frames,), pose_bytes(frames) + score_bytes(frames), 0.0
@@ -302,6 +310,7 @@ SIZES: dict[str, Callable[..., Size]] = {
     "descriptors": _descriptors,
     "features": _features,
     "correspondences": _correspondences,
+    "tracks": _tracks,
     **dict.fromkeys(("image_references", "structure_references"), _reference),
     "render_speed": _render_speed,
     "claims": _claims,

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from synfeal.config import MODELS, Experiment
-from synfeal.report.crossing import crossing_finding
+from synfeal.report.crossing import STRUCTURE, crossing_finding
 from synfeal.report.figures.sources import Results
 from synfeal.report.figures.style import MODEL_STYLES, reference_styles
 from synfeal.report.references import NAME, label_title, read_references, titles_in
@@ -57,7 +57,7 @@ def figure_of(table: pd.DataFrame, rows: Sequence[Experiment]) -> Figure:
         names = [name.replace(", ", "\n").replace(" w/ ", "\n") for name in names]
         panels[1, column].set_xticks(range(len(labels)), names, rotation=30 if not block else 0)
         for axes, measure in zip(panels[:, column], UNITS, strict=True):
-            _draw_methods(axes, table, labels, measure)
+            _draw_methods(axes, table, labels, measure, joined=bool(block))
     for axes, title in zip(panels[:, 0], UNITS.values(), strict=True):
         axes.set_ylabel(title)
     handles, titles = panels[0, 0].get_legend_handles_labels()
@@ -66,16 +66,18 @@ def figure_of(table: pd.DataFrame, rows: Sequence[Experiment]) -> Figure:
 
 
 def _ordered(labels: Sequence[str] | dict[str, None], table: pd.DataFrame) -> list[str]:
-    """Noise as the design has it; label sources by the oracle's error, which is theirs."""
+    """Noise as the design has it; label sources by the error of structure that is built on them."""
     names = list(labels)
     if any("-p" in name for name in names):  # injected
         return names
-    oracle = table[table.method == "nearest-pose"].set_index("labels")["position_m_true"]
-    return sorted(names, key=lambda name: float(oracle.get(name, np.nan)))
+    structure = table[table.method == STRUCTURE].set_index("labels")["position_m_true"]
+    return sorted(names, key=lambda name: float(structure.fillna(np.inf).get(name, np.inf)))
 
 
-def _draw_methods(axes: Axes, table: pd.DataFrame, labels: list[str], measure: str) -> None:
-    """One line per method: localizers in their colours, references in greys."""
+def _draw_methods(
+    axes: Axes, table: pd.DataFrame, labels: list[str], measure: str, joined: bool
+) -> None:
+    """Marks per method, joined where labels are levels: localizers in colour, others in grey."""
     titles = titles_in(table)
     references = [name for name in titles if name not in MODELS]
     styles = {**reference_styles(references), **MODEL_STYLES}
@@ -87,7 +89,7 @@ def _draw_methods(axes: Axes, table: pd.DataFrame, labels: list[str], measure: s
             label=titles[name],
             linewidth=1.4,
             markersize=4.5,
-            **styles[name],
+            **(styles[name] if joined else {**styles[name], "linestyle": "none"}),
         )
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")

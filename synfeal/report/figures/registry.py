@@ -73,7 +73,7 @@ FIGURES: dict[str, Entry] = {
         references_by_noise.draw,
         "Median error against the true poses over the errors of the labels that a method learns or "
         "builds its map from: localizers in colour, reference methods in grey; labels from images "
-        "stand in the order of their own error.",
+        "stand in the order of the error of structure on depth.",
     ),
     "error_by_size": Entry(
         error_by_size.draw,
