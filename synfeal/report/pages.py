@@ -9,6 +9,7 @@ results of that profile; ``headline`` is the largest profile that is published.
 from __future__ import annotations
 
 import argparse
+import math
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -166,9 +167,11 @@ def _localizer_table(rows: Sequence[Row], heading: str, label: Callable[[Row], s
 
 
 def _cell(row: Row) -> str:
+    """Both errors in the paper's unit, positions as root mean squares over the axes."""
     own = "failed"
     if row["position_m_true"]:
-        own = f"{float(row['position_m_true']):.2f} m, {float(row['orientation_deg_true']):.1f}°"
+        position_rms_m = float(row["position_m_true"]) / math.sqrt(3)
+        own = f"{position_rms_m:.2f} m, {float(row['orientation_deg_true']):.1f}°"
     if not row["published_position_m"]:  # a row the paper has not
         return own
     printed = float(row["published_position_m"]), float(row["published_orientation_deg"])
