@@ -24,7 +24,10 @@ class InputError(Exception):
 
 
 def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
-    """Carry out ``action``: 0, or 1 with ``error: ...`` for what a person can mend.
+    """Carry out ``action``: 0, or 1 with ``error: ...`` for what a person can fix.
+
+    That is an :class:`InputError`, and what the system refuses: a full or read-only disk, a name
+    that is too long, links that lead in a circle.
 
     Args:
         action: what a command does.
@@ -35,6 +38,12 @@ def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
         action()
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
+        return 1
+    except OSError as error:
+        if error.strerror is None:  # of no system call: a defect
+            raise
+        place = f"{error.filename}: " if error.filename else ""
+        print(f"error: {InputError(f'{place}{error.strerror}; {if_interrupted}')}", file=sys.stderr)
         return 1
     except KeyboardInterrupt as interrupt:
         print(f"error: interrupted; {str(interrupt) or if_interrupted}", file=sys.stderr)

@@ -54,6 +54,8 @@ def _in(directory: Path) -> list[Path]:
         files = sorted(path for path in directory.iterdir() if path.is_file())
     except OSError as error:
         raise InputError(f"{directory}: cannot be listed ({error.strerror})") from None
+    if any(directory.glob("seq-[0-9]*")):
+        raise InputError(f"{directory}: is a data set; name its sequences, {directory}/seq-01")
     found = [path for path in files if _is_picture(path.name.lower())]
     if not found:
         raise InputError(f"{directory}: holds no {', '.join(SUFFIXES)}; name another directory")

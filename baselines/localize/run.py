@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import logging
+import os
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -141,6 +142,17 @@ def _check_out(out: Path, inputs: Sequence[Path]) -> None:
         raise InputError(f"{out}: is a directory; name a file with --out")
     if out.exists() and any(path.exists() and out.samefile(path) for path in inputs):
         raise InputError(f"{out}: is one of the inputs; choose another file with --out")
+    if os.path.lexists(out) and not _holds_poses(out):
+        raise InputError(f"{out}: is there and holds no poses; choose another file with --out")
+
+
+def _holds_poses(out: Path) -> bool:
+    """Whether an earlier command wrote it."""
+    try:
+        with out.open("rb") as file:
+            return file.readline(200).strip() == ",".join(HEADER).encode()
+    except OSError:
+        return False
 
 
 def _write(out: Path, pictures: Sequence[Path], poses: Array) -> None:

@@ -85,10 +85,9 @@ def _read(path: Path, device: torch.device) -> dict[str, Any]:
         raise InputError(f"{path}: there is no such file; name the model.pt of a training")
     try:
         content = torch.load(path, map_location=device, weights_only=True)
-    except Exception as error:  # torch.load raises whatever the broken file provokes
-        reason = str(error).strip().splitlines() or [type(error).__name__]
+    except Exception:  # torch.load raises whatever the broken file provokes, with unsafe advice
         raise InputError(
-            f"{path}: cannot be read as a trained localizer ({reason[0][:200]})"
+            f"{path}: is damaged or no trained localizer; name the model.pt of a training run"
         ) from None
     if not isinstance(content, dict) or not {"localizer", "images"} <= content.keys():
         raise InputError(f"{path}: holds no trained localizer; name the model.pt of a training")

@@ -1,7 +1,8 @@
-"""The mesh files a configuration asks for, before anything is built on them."""
+"""The files a configuration asks for, before anything is built on them."""
 
 from __future__ import annotations
 
+import os
 import stat
 from collections.abc import Mapping
 from pathlib import Path
@@ -40,3 +41,17 @@ def check_mesh_file(path: Path, field: str) -> None:
     if not stat.S_ISREG(mode):
         kind = "a directory" if stat.S_ISDIR(mode) else "no plain file"
         raise InputError(f"{field}: {path} is {kind}; name the mesh file itself")
+
+
+def check_results(root: Path) -> None:
+    """Check that results can lie in the directory ``root``, which need not exist.
+
+    Raises:
+        InputError: it or a directory above it is a file.
+    """
+    try:
+        place = next(path for path in (root, *root.absolute().parents) if os.path.lexists(path))
+    except OSError as error:
+        raise InputError(f"results: {root}: {error.strerror}; choose another directory") from None
+    if not place.is_dir():
+        raise InputError(f"results: {place} is no directory; choose another one")

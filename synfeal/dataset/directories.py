@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
 from collections.abc import Callable, Collection, Iterator
@@ -15,8 +16,10 @@ def refuse_existing(path: Path) -> None:
     """Refuse to write where there is something already.
 
     Raises:
-        InputError: ``path`` is a file or a directory that is not empty.
+        InputError: ``path`` is a file, a directory that is not empty, or a link to nothing.
     """
+    if path.is_symlink() and not path.exists():
+        raise InputError(f"{path}: is a link that leads nowhere; choose another directory")
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise InputError(f"{path}: exists and is not empty; delete it or choose another directory")
 
@@ -32,7 +35,7 @@ def refuse_foreign(out: Path, own: Collection[str], origin: str) -> None:
     Raises:
         InputError: ``out`` is a file or holds other files.
     """
-    if out.exists() and not out.is_dir():
+    if os.path.lexists(out) and not out.is_dir():
         raise InputError(f"{out}: is a file; choose another directory with --out")
     others = sorted(path.name for path in out.glob("*") if path.name not in own)
     if others:

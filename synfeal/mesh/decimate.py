@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import open3d as o3d
 
 from synfeal.mesh.triangles import Triangles
 
@@ -15,6 +14,8 @@ def simplify(mesh: Triangles, n_faces: int) -> Triangles:
     sheet retracts within its plane at no cost: a column of four sheets without lids is the first
     thing to vanish, and cameras fly through it.
     """
+    import open3d as o3d  # a second to load, and needed by the workflow alone
+
     centre_m = mesh.vertices_m.mean(axis=0)  # far from the origin quadrics lose their digits
     full = o3d.geometry.TriangleMesh(
         o3d.utility.Vector3dVector(mesh.vertices_m - centre_m),

@@ -1,6 +1,5 @@
 # What the rules share: the checked configuration, and which files a target needs. No rules here.
 import sys
-from pathlib import Path
 from functools import cache
 
 from snakemake.logging import logger
@@ -24,6 +23,8 @@ from baselines.references.registry import (
 from baselines.training.memory import training_mb
 from baselines.training.record import training_parameters
 from synfeal.config import Run, check_mesh_files, parse_config, read_design
+from synfeal.config.load import read_yaml
+from synfeal.config.mesh_files import check_results
 from synfeal.config.experiments import INJECTED
 from synfeal.config.models import MODELS
 from synfeal.dataset.archive import SUFFIX
@@ -37,10 +38,13 @@ from synfeal.run_lock import begin_run
 from synfeal.seeds import seed_of
 
 try:
+    for path in workflow.configfiles:
+        read_yaml(Path(path))  # Snakemake takes the last of keys that are there twice
     CONFIG = parse_config(
         config, " + ".join(map(str, workflow.configfiles)) or "config"
     )
     check_mesh_files(CONFIG.scenes)
+    check_results(CONFIG.root)
     DESIGN = read_design(CONFIG)
     EXPERIMENTS = DESIGN.rows
     check_sources(EXPERIMENTS, CONFIG.experiments)

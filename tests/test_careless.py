@@ -1,0 +1,73 @@
+"""Whatever is typed: no traceback, one line that says what is wrong, and nothing lost."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import pytest
+
+from synfeal.cli import main
+from tests.careless import TABLE, arguments_of, make_folder
+from tests.collected import collect, save_room
+from tests.fuzz_files import _checkpoint
+from tests.fuzzing import TooSlow, at_most
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
+SECONDS = 20.0
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("made")
+    mesh = save_room(made / "room.glb")
+    assert collect(mesh, made / "set", "--depth") == 0
+    folder = tmp_path_factory.mktemp("folder")
+    make_folder(folder, mesh, made / "set", _checkpoint(made))
+    return folder
+
+
+def tree(folder: Path) -> dict[str, tuple[int, int]]:
+    found = ((path, path.lstat()) for path in folder.rglob("*"))
+    return {str(path): (at.st_size, at.st_mtime_ns) for path, at in found}
+
+
+def problem_with(arguments: list[str], capfd: pytest.CaptureFixture[str]) -> str | None:
+    """What is wrong with how a command took its arguments; None if nothing is."""
+    capfd.readouterr()
+    try:
+        with at_most(SECONDS), warnings.catch_warnings():
+            status = main(arguments)
+    except SystemExit as ended:
+        status = int(ended.code or 0)
+    except TooSlow:
+        return f"took more than {SECONDS:g} s"
+    except Exception as error:
+        return f"{type(error).__name__}: {str(error)[:120]}"
+    lines = capfd.readouterr().err.strip().splitlines()
+    errors = [line for line in lines if "error: " in line]
+    if status == 2 and "usage: " in lines[0] and len(errors) == 1:
+        return None  # no number where one is needed
+    if arguments[0] == "validate" and status == 1 and len(errors) == len(lines):
+        return None  # a line for each check that fails
+    if status != 1 or len(lines) != 1 or len(errors) != 1 or not lines[0].startswith("error: "):
+        return f"status {status}, {lines[:3]}"
+    return None
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_a_careless_command_ends_in_one_line_and_nothing_is_lost(
+    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(folder)
+    before, failures = tree(folder), []
+    for value in TABLE[name][2]:
+        problem = problem_with(arguments_of(name, value), capfd)
+        if tree(folder) != before:
+            problem = f"{problem or ''} something was written or lost"
+        failures += [f"{value[:20]!r}: {problem}"] if problem else []
+    assert not failures, "\n".join(failures)
+
+
+def test_the_table_is_long() -> None:
+    assert sum(len(values) for _, _, values in TABLE.values()) >= 200
