@@ -99,7 +99,7 @@ $(INSTALLED): $(LOCK) pyproject.toml setup/system_packages.sh
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --requirement $(LOCK)
 	setup/meshoptimizer.sh $(BIN)/python
-	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable . --editable ./baselines
 	touch $@
 
 $(QUALITY): $(INSTALLED)

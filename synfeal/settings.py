@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from synfeal.config.dataset import DatasetConfig
 from synfeal.config.load import describe
 from synfeal.config.mesh_files import check_mesh_file
-from synfeal.config.models import SceneConfig
+from synfeal.config.models import CameraConfig, RenderConfig, SceneConfig
 from synfeal.errors import InputError
 
 SCENE, SIZE = "scan", "all"  # as the configuration of a collection calls its scene and its size
@@ -89,6 +89,25 @@ def scene_config(options: Mapping[str, Any]) -> SceneConfig:
             return SceneConfig.model_validate({"source": "mesh", **scene})
         except ValidationError as error:
             raise InputError(f"scenes.{SCENE}.{describe(error)}") from None
+
+
+def render_configs(options: Mapping[str, Any]) -> tuple[CameraConfig, RenderConfig]:
+    """The camera and how it draws, of the options that say so.
+
+    Raises:
+        InputError: naming the option that is wrong.
+    """
+    values = _nested(options)
+    with _options_named():
+        found: list[Any] = []
+        for key, model in (("network_camera", CameraConfig), ("render", RenderConfig)):
+            try:
+                found.append(model.model_validate(values.pop(key, {})))
+            except ValidationError as error:
+                raise InputError(f"{key}.{describe(error, model)}") from None
+        if values:
+            raise InputError(f"{next(iter(options))}: is no option of a renderer")
+    return found[0], found[1]
 
 
 def in_words_of_options(message: str) -> str:

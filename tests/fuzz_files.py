@@ -68,9 +68,9 @@ from synfeal.report.speed_vs_error import collision_rows, label_rows
 from synfeal.report.stats import combine, read_metrics
 from synfeal.report.tables import Value, columns_of, write_rows
 from synfeal.scenes.collision import CURVE_HEADER
-from synfeal.validate.camera import camera_of_dataset
-from synfeal.validate.images import read_color, read_depth_mm
-from synfeal.validate.run import validate
+from synfeal.validation.camera import camera_of_dataset
+from synfeal.validation.images import read_color, read_depth_mm
+from synfeal.validation.run import validate
 from tests.mesh_samples import UV, box_mesh, store_gltf, textured, triangle_gltf, write_obj
 from tests.planar_scene import straight_path
 from tests.report_results import design_of, experiment

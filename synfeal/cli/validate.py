@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> None:
     Raises:
         InputError: a check failed; the message is the last ``error:`` line.
     """
-    from synfeal.validate.run import error_lines, report, validate
+    from synfeal.validation.run import error_lines, report, validate
 
     checks = validate(arguments.dataset, arguments.camera, arguments.all)
     print(report(arguments.dataset, checks), end="", flush=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Mapping
-from importlib.metadata import version
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +65,11 @@ def camera_record(camera: CameraConfig) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """The versions that decide what frames look like."""
-    return {"synfeal": synfeal.__version__, **{name: version(name) for name in LIBRARIES}}
+    found = {"synfeal": synfeal.__version__}
+    for name in LIBRARIES:
+        with suppress(PackageNotFoundError):  # not every renderer has to be installed
+            found[name] = version(name)
+    return found
 
 
 def verify_manifest(dataset_dir: Path) -> None:

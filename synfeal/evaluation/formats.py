@@ -25,8 +25,8 @@ from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError
 from synfeal.evaluation.estimates import Convention, Estimates
 from synfeal.geometry.poses import quat_wxyz_of
-from synfeal.validate.listing import POSE, list_sequences
-from synfeal.validate.poses import rigid_defects
+from synfeal.validation.listing import POSE, list_sequences
+from synfeal.validation.poses import rigid_defects
 
 Array = NDArray[np.float64]
 

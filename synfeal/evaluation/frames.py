@@ -14,10 +14,10 @@ from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.errors import InputError
 from synfeal.evaluation.estimates import Estimates
-from synfeal.validate.frames import read_poses
-from synfeal.validate.listing import Frame, SequenceListing, list_sequences
-from synfeal.validate.poses import check_rigid
-from synfeal.validate.splits import read_splits
+from synfeal.validation.frames import read_poses
+from synfeal.validation.listing import Frame, SequenceListing, list_sequences
+from synfeal.validation.poses import check_rigid
+from synfeal.validation.splits import read_splits
 
 Array = NDArray[np.float64]
 

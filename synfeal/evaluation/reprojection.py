@@ -29,7 +29,7 @@ from synfeal.evaluation.metrics import Metrics, draws, is_pose, means, with_limi
 from synfeal.files import atomic_path
 from synfeal.geometry.poses import pose_from_quat, relative
 from synfeal.mesh.rays import RayCaster
-from synfeal.validate.images import read_depth_mm
+from synfeal.validation.images import read_depth_mm
 
 Array = NDArray[np.float64]
 

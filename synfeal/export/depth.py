@@ -9,7 +9,7 @@ from PIL import Image
 
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.sevenscenes import INVALID_MM
-from synfeal.validate.images import read_depth_mm
+from synfeal.validation.images import read_depth_mm
 
 
 def rewrite_depth(source: FrameFile, target: Path, units_per_m: int) -> float:

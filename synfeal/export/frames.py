@@ -14,12 +14,12 @@ from synfeal.config.collection import CameraConfig
 from synfeal.dataset.archive import FrameFile, link_or_unpack
 from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.errors import InputError
-from synfeal.validate.camera import camera_of_dataset
-from synfeal.validate.frames import check_names, kinds_of, read_poses
-from synfeal.validate.images import read_color
-from synfeal.validate.listing import COLOR, DEPTH, Frame, list_sequences
-from synfeal.validate.poses import check_rigid
-from synfeal.validate.splits import check_splits, read_splits
+from synfeal.validation.camera import camera_of_dataset
+from synfeal.validation.frames import check_names, kinds_of, read_poses
+from synfeal.validation.images import read_color
+from synfeal.validation.listing import COLOR, DEPTH, Frame, list_sequences
+from synfeal.validation.poses import check_rigid
+from synfeal.validation.splits import check_splits, read_splits
 
 
 @dataclass(frozen=True)

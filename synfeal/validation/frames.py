@@ -11,10 +11,10 @@ from synfeal.config.collection import CameraConfig
 from synfeal.dataset.archive import FrameFile, foreign_members, is_archive
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError
-from synfeal.validate.check import Check
-from synfeal.validate.content import Content
-from synfeal.validate.images import Pixels, read_color, read_depth_mm
-from synfeal.validate.listing import COLOR, DEPTH, POSE, Frame, SequenceListing
+from synfeal.validation.check import Check
+from synfeal.validation.content import Content
+from synfeal.validation.images import Pixels, read_color, read_depth_mm
+from synfeal.validation.listing import COLOR, DEPTH, POSE, Frame, SequenceListing
 
 Poses = dict[Frame, NDArray[np.float64]]
 

@@ -8,9 +8,9 @@ from typing import Any
 
 from synfeal.dataset.manifest import MANIFEST, sequence_sha256
 from synfeal.errors import InputError
-from synfeal.validate.camera import read_manifest
-from synfeal.validate.check import Check
-from synfeal.validate.listing import SequenceListing
+from synfeal.validation.camera import read_manifest
+from synfeal.validation.check import Check
+from synfeal.validation.listing import SequenceListing
 
 
 def check_manifest(

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.geometry.poses import relative
-from synfeal.validate.lens import Lens
+from synfeal.validation.lens import Lens
 
 Array = NDArray[np.float64]
 

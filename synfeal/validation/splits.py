@@ -7,9 +7,9 @@ from pathlib import Path
 
 from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
 from synfeal.errors import InputError
-from synfeal.validate.check import Check
-from synfeal.validate.frames import Poses
-from synfeal.validate.listing import POSE, SequenceListing
+from synfeal.validation.check import Check
+from synfeal.validation.frames import Poses
+from synfeal.validation.listing import POSE, SequenceListing
 
 Splits = dict[str, list[SequenceListing]]
 

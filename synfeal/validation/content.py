@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.validate.check import Check
-from synfeal.validate.images import Pixels
-from synfeal.validate.listing import COLOR, Frame
+from synfeal.validation.check import Check
+from synfeal.validation.images import Pixels
+from synfeal.validation.listing import COLOR, Frame
 
 EVERY = 4  # rows and columns that are looked at
 SAME = 2  # grey levels

@@ -18,13 +18,13 @@ from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.collection import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
-from synfeal.validate.camera import KnownCamera
-from synfeal.validate.check import Check
-from synfeal.validate.frames import Poses
-from synfeal.validate.images import read_color, read_depth_mm
-from synfeal.validate.lens import Lens
-from synfeal.validate.listing import COLOR, DEPTH, Frame, SequenceListing
-from synfeal.validate.reprojection import Residual, View, camera_normal, compare
+from synfeal.validation.camera import KnownCamera
+from synfeal.validation.check import Check
+from synfeal.validation.frames import Poses
+from synfeal.validation.images import read_color, read_depth_mm
+from synfeal.validation.lens import Lens
+from synfeal.validation.listing import COLOR, DEPTH, Frame, SequenceListing
+from synfeal.validation.reprojection import Residual, View, camera_normal, compare
 
 GAPS = (1, 5, 20)  # frames apart: neighbours see the most, distant ones tell angles and lengths
 PAIRS_PER_GAP = 200  # evenly spread over larger sets

@@ -9,14 +9,14 @@ import numpy as np
 from tqdm import tqdm
 
 from synfeal.errors import InputError
-from synfeal.validate.camera import KnownCamera, camera_of_dataset
-from synfeal.validate.check import Check
-from synfeal.validate.consistency import check_consistency, choose_pairs
-from synfeal.validate.frames import Poses, check_images, check_names, kinds_of, read_poses
-from synfeal.validate.listing import DEPTH, SequenceListing, list_sequences
-from synfeal.validate.manifest import check_manifest
-from synfeal.validate.poses import ORTHONORMAL_BOUND, check_rigid, check_tables, rigid_defects
-from synfeal.validate.splits import check_leaks, check_splits, read_splits
+from synfeal.validation.camera import KnownCamera, camera_of_dataset
+from synfeal.validation.check import Check
+from synfeal.validation.consistency import check_consistency, choose_pairs
+from synfeal.validation.frames import Poses, check_images, check_names, kinds_of, read_poses
+from synfeal.validation.listing import DEPTH, SequenceListing, list_sequences
+from synfeal.validation.manifest import check_manifest
+from synfeal.validation.poses import ORTHONORMAL_BOUND, check_rigid, check_tables, rigid_defects
+from synfeal.validation.splits import check_leaks, check_splits, read_splits
 
 
 def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[Check]:

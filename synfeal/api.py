@@ -1,0 +1,203 @@
+"""Synfeal from Python: what the commands do, as a handful of functions.
+
+Keywords ``**options`` are the options of ``synfeal collect`` with underscores (``spacing=0.1``,
+``yaw=(0, 90)``, ``box=[(x0, x1, y0, y1, z0, z1)]``), with the same bounds and defaults; what is
+wrong with one is an :class:`synfeal.errors.InputError` that names it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.config.dataset import DatasetConfig
+from synfeal.config.models import CameraConfig, SceneConfig
+from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.collect import CollectJob
+from synfeal.dataset.collect import collect as run_collection
+from synfeal.dataset.configuration import with_backend
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.sevenscenes import frame_paths, read_split
+from synfeal.errors import InputError
+from synfeal.mesh import load
+from synfeal.mesh.model import TexturedMesh
+from synfeal.mesh.triangles import merge_vertices
+from synfeal.planning.plan import plan_mesh
+from synfeal.planning.repeat import read_poses
+from synfeal.render import open_renderer
+from synfeal.render.base import Depth, Rgb
+from synfeal.seeds import generator_of
+from synfeal.settings import SCENE, dataset_config, in_words_of_options, render_configs
+from synfeal.validation.camera import camera_of_dataset
+
+if TYPE_CHECKING:
+    from synfeal.evaluation.run import Evaluation
+
+AnyPath = str | Path
+
+
+def load_mesh(path: AnyPath, up_axis: str = "auto", unit_m: float = 1.0) -> TexturedMesh:
+    """A textured mesh in the world frame: z up, metres.
+
+    Args:
+        path: .glb, .gltf, .obj or .ply.
+        up_axis: ``auto``, ``y`` or ``z``: what is up in the file.
+        unit_m: metres per unit of the file.
+    """
+    scene = SceneConfig.model_validate(
+        {"source": "mesh", "path": path, "up_axis": up_axis, "unit_m": unit_m}
+    )
+    return load.load_mesh(Path(path), scene.up_axis, scene.unit_m)
+
+
+class Renderer:
+    """Unlit images of a mesh; a context manager.
+
+    Keywords: ``camera``, ``width``, ``height``, ``fov``, ``backend``, ``supersampling``,
+    ``background``.
+    """
+
+    def __init__(self, mesh: TexturedMesh, **options: Any) -> None:
+        camera, render = render_configs(options)
+        self._opened = open_renderer(mesh, camera, render)
+        self.camera: CameraConfig = camera
+
+    def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
+        """Colours (H, W, 3), uint8, seen from a pose (4, 4)."""
+        return self._opened.render(world_from_cam)
+
+    def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
+        """Colours, and depth (H, W): metres along the optical axis, inf for nothing."""
+        return self._opened.render_rgbd(world_from_cam)
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._opened.close()
+
+
+def plan(mesh: AnyPath, frames: int, **options: Any) -> PoseTable:
+    """The poses of the training frames that :func:`collect` would make of the same options."""
+    config = _config(mesh, frames, options)
+    scene = config.scenes[SCENE]
+    loaded = load_mesh(mesh, scene.up_axis, scene.unit_m)
+    triangles, rng = (
+        merge_vertices(*loaded.merged()),
+        generator_of(config.seed, "plan", SCENE, "train"),
+    )
+    try:
+        return plan_mesh(triangles, str(mesh), scene, config.collection, frames, rng, "train")
+    except InputError as error:
+        raise InputError(in_words_of_options(str(error))) from None
+
+
+def collect(
+    mesh: AnyPath,
+    out: AnyPath,
+    frames: int,
+    *,
+    workers: int = 1,
+    packed: int | None = None,
+    **options: Any,
+) -> Dataset:
+    """Make a data set, or go on with one that was interrupted; what ``synfeal collect`` does.
+
+    Args:
+        mesh: .glb, .gltf, .obj or .ply.
+        out: directory to create.
+        frames: training frames.
+        workers: processes that render.
+        packed: side of packed frames that are written too, pixels.
+        options: see the top of this module.
+    """
+    config = _config(mesh, frames, options, Path(out))
+    try:
+        run_collection(CollectJob(with_backend(config), packed, Path(out)), workers)
+    except InputError as error:
+        raise InputError(in_words_of_options(str(error))) from None
+    return open_dataset(out)
+
+
+def _config(
+    mesh: AnyPath, frames: int, options: dict[str, Any], out: Path | None = None
+) -> DatasetConfig:
+    return dataset_config({"test_frames": 0, "mesh": mesh, "frames": frames, **options}, out)
+
+
+@dataclass(frozen=True)
+class Split:
+    """The frames of a split, in order.
+
+    Attributes:
+        poses: their poses as a table; ``poses.path`` tells which straight path each is on.
+        images: files of the colour images; ``read_bytes()`` gives what one holds.
+    """
+
+    poses: PoseTable
+    images: list[FrameFile]
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    @property
+    def world_from_cam(self) -> NDArray[np.float64]:
+        """Poses (N, 4, 4)."""
+        return self.poses.world_from_cam
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A data set in the format of 7-Scenes.
+
+    Attributes:
+        path: its directory.
+        camera: intrinsics; of 7-Scenes where nothing says.
+        train, test: its splits.
+    """
+
+    path: Path
+    camera: CameraConfig
+    train: Split
+    test: Split
+
+
+def open_dataset(path: AnyPath) -> Dataset:
+    """Poses, images and camera of a data set; images are read when they are asked for."""
+    path = Path(path)
+    splits = {split: _split(path, split) for split in ("train", "test")}
+    return Dataset(path, camera_of_dataset(path, None).config, splits["train"], splits["test"])
+
+
+def _split(path: Path, split: str) -> Split:
+    sequences = read_split(path, split)
+    if not sequences:
+        nothing = np.empty(0, np.int64)
+        return Split(PoseTable(nothing, nothing, np.empty((0, 3)), np.empty((0, 4))), [])
+    return Split(read_poses(path, split), list(frame_paths(sequences, "color.png")))
+
+
+def validate(path: AnyPath, camera: AnyPath | None = None, every_pair: bool = False) -> list[str]:
+    """What is wrong with a data set, a sentence each; an empty list if nothing is."""
+    from synfeal.validation.run import error_lines
+    from synfeal.validation.run import validate as run_checks
+
+    return error_lines(run_checks(Path(path), Path(camera) if camera else None, every_pair))
+
+
+def evaluate(path: AnyPath, poses: AnyPath, **settings: Any) -> Evaluation:
+    """How good poses are, in the field's measures; what ``synfeal evaluate`` does.
+
+    Args:
+        path: a data set.
+        poses: in any of the formats that the command reads.
+        settings: of :class:`synfeal.evaluation.run.Settings`.
+    """
+    from synfeal.evaluation.run import Settings
+    from synfeal.evaluation.run import evaluate as score
+
+    return score(Path(path), Path(poses), Settings(**settings))

@@ -1,0 +1,71 @@
+"""Synfeal from Python: the quick start runs, plans are those of the command, nothing loads early."""
+
+from __future__ import annotations
+
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import synfeal
+from synfeal.errors import InputError
+from synfeal.validation.run import report
+from tests.collected import collect, save_room
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
+QUICKSTART = Path(__file__).parent.parent / "docs" / "quickstart.py"
+
+
+def test_the_quick_start_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    made = runpy.run_path(str(QUICKSTART))
+    printed = capsys.readouterr().out
+    assert "40 training frames, 10 test frames, camera 160" in printed
+    assert "wrong with it: nothing" in printed
+    np.testing.assert_array_equal(made["plan"].position_m, made["data"].train.poses.position_m)
+    assert made["rgb"].shape == (120, 160, 3)
+    metrics = synfeal.evaluate("mydata", "estimates.csv").metrics
+    assert "0.1" in str(metrics)
+
+
+def test_the_functions_make_what_the_command_makes(tmp_path: Path) -> None:
+    mesh = save_room(tmp_path / "room.glb")
+    assert collect(mesh, tmp_path / "typed") == 0
+    options = {"width": 40, "height": 33, "spacing": 0.2, "sequence_frames": 10}
+    data = synfeal.collect(mesh, tmp_path / "called", 24, test_frames=8, **options)
+    for name in ("train.csv", "manifest.json", "seq-02/frame-000003.color.png"):
+        assert (data.path / name).read_bytes() == (tmp_path / "typed" / name).read_bytes()
+    assert (
+        data.test.images[0].read_bytes()
+        == (tmp_path / "typed" / "seq-04" / "frame-000000.color.png").read_bytes()
+    )
+    with pytest.raises(InputError, match="^--spacing: "):
+        synfeal.plan(mesh, 10, spacing=-1)
+    with pytest.raises(InputError, match="^colour: no such option"):
+        synfeal.plan(mesh, 10, colour="red")
+
+
+def test_validate_is_a_function_whatever_was_loaded_before() -> None:
+    assert callable(report)
+    assert callable(synfeal.validate)
+
+
+def test_importing_synfeal_loads_nothing_else() -> None:
+    heavy = "numpy|torch|scipy|pydantic|trimesh|pandas|open3d"
+    code = "import synfeal, sys; print([m for m in sys.modules if m in '" + heavy + "'.split('|')])"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"
+
+
+def test_collecting_loads_neither_networks_nor_the_workflow() -> None:
+    code = (
+        "import synfeal.api, synfeal.inspect.run, synfeal.validation.run, synfeal.export.run, sys\n"
+    )
+    code += "print(sorted({'torch', 'gtsam', 'open3d', 'snakemake', 'baselines', 'cv2'} & set(sys.modules)))"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"
