@@ -189,7 +189,9 @@ def _depth(frames: ScoredFrames, camera: CameraConfig) -> Array | None:
     if not all(path.is_file() for path in paths):
         return None
     read = depth_of_images(paths, camera)
-    return np.stack(list(tqdm(read, total=len(paths), unit="frame", desc="depth", leave=False)))
+    return np.stack(
+        list(tqdm(read, total=len(paths), unit="frame", desc="depth", leave=False, disable=None))
+    )
 
 
 def _metrics(errors: Mapping[str, Array], ends: Iterable[str], frames: ScoredFrames) -> Metrics:

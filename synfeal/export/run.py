@@ -47,7 +47,9 @@ def export(
     data = read_export_set(dataset, camera_file)
     with (
         atomic_directory(out) as directory,
-        tqdm(total=len(data.frames), unit="frame", desc="export", leave=False) as progress,
+        tqdm(
+            total=len(data.frames), unit="frame", desc="export", leave=False, disable=None
+        ) as progress,
     ):
         warnings = FORMATS[to](data, directory, copy, progress.update)
     return len(data.frames), warnings

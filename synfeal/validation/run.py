@@ -36,7 +36,9 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
     n_frames = sum(len(sequence.frames) for sequence in sequences)
     size = None if camera is None or camera.assumed else camera.config
     poses, pose_failures = read_poses(sequences)
-    with tqdm(total=2 * n_frames, unit="frame", desc="validate", leave=False) as progress:
+    with tqdm(
+        total=2 * n_frames, unit="frame", desc="validate", leave=False, disable=None
+    ) as progress:
         checks = [
             check_names(sequences),
             *check_images(sequences, size, progress.update),
@@ -71,7 +73,7 @@ def _geometry(
     pairs = choose_pairs(sequences, rigid, every_pair)
     if not pairs:
         return [Check("pairs", "no two frames of a sequence to compare", skipped=True)]
-    with tqdm(total=len(pairs), unit="pair", desc="compare", leave=False) as progress:
+    with tqdm(total=len(pairs), unit="pair", desc="compare", leave=False, disable=None) as progress:
         return check_consistency(pairs, rigid, camera, progress.update)
 
 

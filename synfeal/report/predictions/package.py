@@ -72,7 +72,7 @@ def write_package(root: Path, paths: Mapping[str, str], out: Path) -> None:
     """
     resources = []
     with atomic_path(out) as temporary, zipfile.ZipFile(temporary, "w") as package:
-        for path in tqdm(sorted(paths), unit="file", desc="keep", leave=False):
+        for path in tqdm(sorted(paths), unit="file", desc="keep", leave=False, disable=None):
             data = (root / path).read_bytes()
             resources.append(_described(path, paths[path], data))
             if paths[path] == path:
