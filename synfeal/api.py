@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.collection.collect import CollectJob
+from synfeal.collection.collect import collect as run_collection
+from synfeal.collection.configuration import with_backend
 from synfeal.config.dataset import DatasetConfig
 from synfeal.config.models import CameraConfig, SceneConfig
 from synfeal.dataset.archive import FrameFile
-from synfeal.dataset.collect import CollectJob
-from synfeal.dataset.collect import collect as run_collection
-from synfeal.dataset.configuration import with_backend
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.sevenscenes import frame_paths, read_split
 from synfeal.errors import InputError

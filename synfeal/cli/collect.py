@@ -91,8 +91,8 @@ RENDER_OPTIONS: Options = (
 def run(arguments: argparse.Namespace) -> None:
     """Carry out the command."""
     config = dataset_config(options_among(arguments, KEYS), arguments.out)
-    from synfeal.collect.collect import CollectJob, collect
-    from synfeal.collect.configuration import configuration_text, with_backend
+    from synfeal.collection.collect import CollectJob, collect
+    from synfeal.collection.configuration import configuration_text, with_backend
 
     job = CollectJob(with_backend(config), arguments.packed, arguments.out)
     if arguments.print_config:

@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from synfeal.collect.speed import write_collection_speed
+from synfeal.collection.speed import write_collection_speed
 from synfeal.config.models import CollectionConfig, RenderConfig, SceneConfig
 from synfeal.job import job
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import yaml
 
-from synfeal.collect.collect import CollectJob
+from synfeal.collection.collect import CollectJob
 from synfeal.config.dataset import DatasetConfig
 from synfeal.dataset.render_sequence import resolved
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import synfeal
-from synfeal.collect.blank import refuse_blank, refuse_invisible
+from synfeal.collection.blank import refuse_blank, refuse_invisible
 from synfeal.config.dataset import DatasetConfig
 from synfeal.dataset.archive import SUFFIX
 from synfeal.dataset.finish import finish, origin_of
