@@ -47,6 +47,7 @@ rule all:
         f"{ROOT}/provenance.json",
         expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
         rules.speed_vs_error.input,
+        rules.claims.input.speed,
         coverages(),
         manifests("groundtruth"),
         files_of_runs(),

@@ -10,6 +10,7 @@ from scipy.stats import norm
 
 from synfeal.config import MODELS
 from synfeal.errors import InputError
+from synfeal.report.claims import label_sources
 from synfeal.report.claims.evidence import Cell, evidence_of
 from synfeal.report.claims.model import (
     HOLDS,
@@ -39,6 +40,14 @@ AXES = 3**0.5
 TABLE3 = "table3_inconsistencies"
 MEASURES = ("position_m", "orientation_deg")
 IDS = [f"C{i}" for i in range(1, 17)]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _tracker_that_reaches_metres():
+    """Frames of these results lie metres apart."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(label_sources, "FARTHEST_M", np.inf)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +124,9 @@ def test_evidence_names_files_that_exist_and_are_all_of_the_test(paper, paper_ro
     assert len(paper_rows["C1"]["evidence"].split(";")) == 22  # 20 cells and their true labels
     assert len(paper_rows["C12"]["evidence"].split(";")) == 48  # 40 cells, 4 data sets
     assert paper_rows["C15"]["evidence"].split(";") == [
-        "labels/large_room/6k/kinect-fusion/assistance.json"
+        "labels/large_room/6k/kinect-fusion/assistance.json",
+        "labels/large_room/6k/synfeal/train.csv",
+        "labels/large_room/6k/synfeal/test.csv",
     ]
 
 
@@ -247,6 +258,14 @@ def test_kinectfusion_copes_when_most_batches_need_no_assistance(results, assist
     row = results.rows()["C15"]
     assert verdicts(row) == (verdict, verdict)
     assert row["measured_labels"] == f"{assisted} of 17 batches assisted"
+
+
+def test_kinectfusion_is_not_judged_by_frames_that_no_tracker_follows(results, monkeypatch):
+    monkeypatch.setattr(label_sources, "FARTHEST_M", 0.04)
+    fill_assistance(results.root, {"kinect-fusion": 17}, batches=(17, 0))
+    row = results.rows()["C15"]
+    assert verdicts(row) == (UNTESTED, UNTESTED)
+    assert "cm apart" in row["reason"]
 
 
 @pytest.mark.parametrize(

@@ -415,6 +415,10 @@ def files_of_runs():
         *(f"{ROOT}/plans/{scene}/train.csv" for scene in rooms),
         *(f"{ROOT}/frames/{scene}/train.npy" for scene in rooms),
         *packed_frames(),
+        *(
+            f"{ROOT}/scenes/{scene}/test_depth.npy"
+            for scene in sorted({e.scene for e in EXPERIMENTS})
+        ),
         *(f"{ROOT}/pretrained/{backbone}.pt" for backbone in sorted(backbones())),
         *(m.replace("metrics.json", "predictions.csv") for m in all_metrics()),
         *all_metrics(),
