@@ -440,14 +440,6 @@ def _job(folder: Path) -> Path:
     return folder / WORK / "settings.json"
 
 
-def _go_on(path: Path) -> None:
-    try:
-        check_settings(path.parents[1], SETTINGS)
-    finally:
-        if path.is_file() and not path.read_bytes().strip():
-            path.unlink()
-
-
 def table_of(name: str, columns: Sequence_[str], **cells: Value) -> Callable[[Path], Path]:
     """A table of two like rows: 1 but for ``cells``."""
 
@@ -625,7 +617,7 @@ KINDS: tuple[Kind, ...] = (
         ",",
     ),
     Kind("properties", _properties, _meshes_table, form="json"),
-    Kind("unfinished job", _job, _go_on, form="json"),
+    Kind("unfinished job", _job, lambda p: check_settings(p.parents[1], SETTINGS), form="json"),
     Kind("claims", _claims, lambda p: claims_table(read_claims(p)), form=","),
     Kind("provenance", _provenance, _origin, form="json"),
     Kind(

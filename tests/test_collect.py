@@ -278,6 +278,34 @@ def test_other_settings_and_commands_do_not_go_on_with_it(
     assert sorted(part.rglob("*")) == before
 
 
+FOREIGN: dict[str, str | None] = {
+    "cut": '{"seed": 0',
+    "a list": "[]",
+    "of another version": '{"synfeal": "0.0"}',
+    "a directory": None,
+}
+
+
+@pytest.mark.parametrize("case", FOREIGN)
+def test_a_damaged_record_of_settings_is_named_and_nothing_is_touched(
+    case: str, mesh: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    part = tmp_path / "set.part"
+    record = part / ".work" / "settings.json"
+    (part / ".work" / "scene").mkdir(parents=True)  # prepared, and nothing planned yet
+    (part / ".work" / "lock").touch()
+    if (text := FOREIGN[case]) is None:
+        record.mkdir()
+    else:
+        record.write_text(text)
+    before = sorted(tmp_path.rglob("*"))
+    assert collect(mesh, tmp_path / "set") == 1
+    assert f"{record}: " in (message := only_error(capfd))
+    assert f"delete {part} to start anew" in message
+    assert sorted(tmp_path.rglob("*")) == before
+    assert text is None or record.read_text() == text
+
+
 def test_print_config_and_manifest_say_the_same(calm: Path) -> None:
     manifest = json.loads((calm / "manifest.json").read_text())
     assert manifest["frames"] == {"train": 24, "test": 8}

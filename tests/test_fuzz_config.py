@@ -19,7 +19,8 @@ from tests.test_workflow import snakemake
 pytestmark = pytest.mark.slow
 REPOSITORY = Path(__file__).parent.parent
 CONFIG = REPOSITORY / "config"
-PROFILES = (("config.yaml",), ("config.yaml", "smoke.yaml"), ("config.yaml", "paper.yaml"))
+EXTERNAL = "../examples/external.yaml"  # no profile has a localizer of somebody else's
+PROFILES = (("config.yaml", EXTERNAL), ("config.yaml", "smoke.yaml"), ("config.yaml", "paper.yaml"))
 LEAST = 2500  # inputs of all kinds together
 VALUES: tuple[Any, ...] = (
     *(None, True, False, 0, -1, 0.5, 1e30, -1e30, 10**30, 10**400, 1e-320),
@@ -248,7 +249,8 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     "--spacing": ("nan", "inf", "0", "-1"),
     "--packed": ("0", "-5", "100000"),
     "--workers": ("0", "-3"),
-    "--shard": ("", "0/2", "3/2", "1/0", "x", "1/2/3", "9" * 5000 + "/1"),
+    "--sequence-frames": ("0", "-1"),
+    "--supersampling": ("0", "-1", "5", "9" * 400),
     "--poses": ("absent.csv", ".", "plan.txt"),
     "--min-view-distance": ("nan", "-1", "inf"),
     "--min-path": ("nan", "-1", "inf"),

@@ -50,7 +50,7 @@ def check_results(root: Path) -> None:
         InputError: it or a directory above it is a file.
     """
     try:
-        place = next(path for path in (root, *root.absolute().parents) if os.path.lexists(path))
+        place = next(path for path in (root, *root.parents) if os.path.lexists(path))
     except OSError as error:
         raise InputError(f"results: {root}: {error.strerror}; choose another directory") from None
     if not place.is_dir():

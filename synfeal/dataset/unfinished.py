@@ -7,6 +7,7 @@ is renamed, and then ``.work`` goes.
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -37,16 +38,16 @@ def growing(out: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
     """
     refuse_existing(out)
     part = out.with_name(f"{out.name}.part")
-    if part.is_dir() and not (part / WORK / SETTINGS).is_file() and _holds_files(part):
+    if part.is_dir() and not os.path.lexists(part / WORK / SETTINGS) and _holds_files(part):
         raise InputError(f"{part}: is no unfinished data set; delete it or choose another --out")
     try:
         with writing_to(part, lambda: _kept(part)):
             (part / WORK).mkdir(parents=True, exist_ok=True)
             with only_command(part, part / WORK / LOCK):
+                check_settings(part, settings)
                 try:
                     refuse_existing(out)  # by a command that has just ended
                     remove_unfinished(part)
-                    check_settings(part, settings)
                     yield part
                     part.replace(out)
                 finally:
@@ -99,7 +100,7 @@ def check_settings(part: Path, settings: Mapping[str, Any]) -> None:
         InputError: names what differs.
     """
     path = part / WORK / SETTINGS
-    if not path.is_file():
+    if not os.path.lexists(path):
         write_json(path, settings)
     try:
         found = read_json(path)
@@ -110,8 +111,8 @@ def check_settings(part: Path, settings: Mapping[str, Any]) -> None:
     differing = differences(found, settings)
     if differing:
         raise InputError(
-            f"{part}: belongs to another data set ({'; '.join(differing)}); go on with the options"
-            f" of that one, or delete {part} to start anew"
+            f"{path}: is of another data set ({'; '.join(differing)}); go on with the options of"
+            f" that one, or delete {part} to start anew"
         )
 
 

@@ -78,7 +78,7 @@ def read_table(
         path: the file.
         needed: columns it must have.
         numbers: those of them whose cells hold finite numbers.
-        optional: those whose cells hold finite numbers or nothing.
+        optional: columns whose cells, where the file has them, hold finite numbers or nothing.
 
     Raises:
         InputError: it cannot be read, lacks a column of ``needed``, has a row of another length, or
@@ -100,7 +100,7 @@ def read_table(
         where = f"{path}: row {place} below the header"
         if None in row or None in row.values():
             raise InputError(f"{where} has more or fewer cells than it; make that table again")
-        filled = [*numbers, *(column for column in optional if row[column])]
+        filled = [*numbers, *(column for column in optional if row.get(column))]
         bad = [column for column in filled if not is_number(row[column])]
         if bad:
             raise InputError(f"{where}: {bad[0]} must be a number; make that table again")

@@ -69,7 +69,8 @@ class Results:
         speeds = name == speed_vs_error.NAME
         columns = speed_vs_error.COLUMNS if speeds else columns_of(name)
         numbers = ("items_per_s", "error") if speeds else ("n_train", "n_test")
-        optional = [column for column in columns if column not in TEXTS]
+        every = columns if speeds else columns_of(name, repeated=True)
+        optional = [column for column in every if column not in TEXTS]
         return read_table(self.root / "tables" / f"{name}.csv", columns, numbers, optional)
 
     def labels(self, scene: str, size: str, labels: str, split: str) -> PoseTable:
