@@ -99,7 +99,7 @@ class Intruder:
 
 def test_reading_a_checkpoint_runs_nothing_from_it(model: Path, tmp_path: Path) -> None:
     torch.save({"localizer": Intruder(tmp_path / "done"), "images": {}}, model)
-    with pytest.raises(InputError, match="cannot be read as a trained localizer"):
+    with pytest.raises(InputError, match="is damaged or no trained localizer"):
         read_checkpoint(model, CPU)
     assert not (tmp_path / "done").exists()
 
@@ -107,7 +107,7 @@ def test_reading_a_checkpoint_runs_nothing_from_it(model: Path, tmp_path: Path) 
 @pytest.mark.parametrize("content", [b"", b"not a model", b"PK\x03\x04" + bytes(99)])
 def test_what_is_no_checkpoint_is_refused(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "model.pt").write_bytes(content)
-    with pytest.raises(InputError, match=r"model\.pt: cannot be read as a trained localizer"):
+    with pytest.raises(InputError, match=r"model\.pt: is damaged or no trained localizer"):
         read_checkpoint(tmp_path / "model.pt", CPU)
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from baselines.localize.pictures import find_pictures, read_picture
+from baselines.localize.run import HEADER
 from baselines.training.description import frame_camera
 from baselines.training.predict import predict, predict_poses
 from synfeal.cli import main
@@ -163,12 +164,13 @@ def test_one_bad_picture_stops_all_and_leaves_what_there_was(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
 ) -> None:
     out = tmp_path / "poses.csv"
-    out.write_text("earlier")
+    earlier = ",".join(HEADER) + "\n"
+    out.write_text(earlier)
     bad, good = broken(tmp_path, kind), run / "seq-01/frame-000000.color.png"
     before = sorted(tmp_path.iterdir())
     assert main(["localize", str(run / "model.pt"), str(good), str(bad), "--out", str(out)]) == 1
     assert f"{bad}: " in only_error(capsys)
-    assert out.read_text() == "earlier"
+    assert out.read_text() == earlier
     assert sorted(tmp_path.iterdir()) == before
 
 

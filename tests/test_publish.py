@@ -129,6 +129,6 @@ def test_published_results_are_those_of_a_recorded_run(profile: str) -> None:
     assert len(record["commit"]) >= 40
     assert record["stages"]
     paths = [root / "claims.csv", root / "summary.md", *(root / "tables").glob("*.csv")]
-    for path in [*paths, *(root / "figures").iterdir()]:
+    for path in [*paths, *(root / "figures").glob("*")]:
         sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
         assert record["files"][path.relative_to(root).as_posix()] == sha256
