@@ -246,11 +246,11 @@ def errors_of(runs):
     return [f"{ROOT}/runs/{run.directory}/errors.csv" for run in runs]
 
 
-def files_of_trainings(folder, ending):
-    """A file of each training run of Table 4; of restored runs those that were kept."""
+def files_of_trainings(pattern):
+    """A file of each training run (``{run}``) of Table 4; of restored runs those that were kept."""
     runs = [run.directory for run in DESIGN.table_runs("table4_size")]
     made = [run for run in runs if f"{ROOT}/runs/{run}/predictions.csv" not in RESTORED]
-    files = {run: f"{ROOT}/{folder}/{run}{ending}" for run in runs}
+    files = {run: f"{ROOT}/{pattern.format(run=run)}" for run in runs}
     return [file for run, file in files.items() if run in made or file in RESTORED]
 
 

@@ -141,8 +141,8 @@ rule speed_vs_error:
             f"{ROOT}/tables/{{table}}.csv",
             table=[t for t in TABLE_NAMES if t == "table4_size"],
         ),
-        histories=files_of_trainings("runs", "/history.csv"),
-        measured=files_of_trainings("benchmarks/train", ".tsv"),
+        histories=files_of_trainings("runs/{run}/history.csv"),
+        measured=files_of_trainings("benchmarks/train/{run}.tsv"),
     output:
         csv=f"{ROOT}/tables/speed_vs_error.csv",
     log:
