@@ -10,7 +10,9 @@ import pytest
 import yaml
 from matplotlib.figure import Figure
 
+from benchmarks.__main__ import SWEEPS
 from benchmarks.page import mark_front
+from benchmarks.sweep import read_sweep, runs_of
 from tests.coloured_frames import write_split
 
 pytestmark = pytest.mark.slow
@@ -113,3 +115,8 @@ def test_a_picture_rings_the_choice_and_covers_what_is_slower_and_worse():
     assert front == [(1.0, 9.0), (2.0, 5.0), (4.0, 1.0)]
     assert beaten == [(3.0, 8.0)]
     assert ring == [(2.0, 5.0)]
+
+
+@pytest.mark.parametrize("path", sorted(SWEEPS.glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_setting_of_a_sweep_exists_and_its_value_is_allowed(path):
+    assert runs_of(read_sweep(path), Path("results/mini"), 1)
