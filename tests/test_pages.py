@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import re
 import shutil
 from pathlib import Path
 
@@ -35,6 +37,16 @@ DIFFICULTY = "results/benchmarks/scene_difficulty"
 def test_the_pages_show_the_published_results(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(REPOSITORY)
     assert main(["--check"]) == 0
+
+
+def test_the_four_ways_through_the_code_are_there() -> None:
+    page = (REPOSITORY / "docs/architecture.md").read_text()
+    ways = page.split("## Four ways")[1].split("\n## ")[0]
+    names = re.findall(r"`((?:synfeal|baselines)\.[\w.]+)`", ways)
+    assert len(names) > 20
+    for name in names:
+        module, _, function = name.rpartition(".")
+        assert callable(getattr(importlib.import_module(module), function)), name
 
 
 def changed_in(path: Path, column: str, value: str) -> None:
