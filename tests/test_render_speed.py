@@ -24,7 +24,7 @@ from synfeal.report.render_speed import render_rows
 from synfeal.report.speed_vs_error import COLUMNS as TABLE_COLUMNS
 from synfeal.report.tables import write_rows
 from synfeal.scenes import render_speed as speed
-from synfeal.scenes.render_speed_table import COLUMNS, Measured, read_speed, write_speed
+from synfeal.scenes.render_speed_table import SCHEMA, Measured, read_speed, write_speed
 from tests.render_backends import BACKENDS, PYOPENGL_WARNS, camera_of
 from tests.report_results import design_of, read
 from tests.small_room import furnished_room, room_poses
@@ -177,8 +177,8 @@ def test_a_scene_is_measured_from_its_files(tmp_path: Path) -> None:
     [
         None,
         "a,b\n1,2\n",
-        ",".join(COLUMNS) + "\nopengl,wide,96,2,1.0,9,1,1,1,0,0,1\n",
-        ",".join(COLUMNS) + "\nopengl,128\n",
+        ",".join(SCHEMA) + "\nopengl,wide,96,2,1.0,9,1,1,1,0,0,1\n",
+        ",".join(SCHEMA) + "\nopengl,128\n",
     ],
 )
 def test_a_file_that_is_no_measurement_is_named_in_one_line(

@@ -36,7 +36,7 @@ def test_jobs_are_summed_by_stage(benchmarks):
 
 def test_a_broken_measurement_is_named(benchmarks):
     (benchmarks / "summary.tsv").write_text("s\tmax_rss\nfast\t1\n")
-    with pytest.raises(InputError, match=r"summary\.tsv: cannot be read as a measurement"):
+    with pytest.raises(InputError, match=r"summary\.tsv: row 2: s must be a number"):
         read_stages(benchmarks)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import logging
 import os
 import time
@@ -12,6 +11,7 @@ from statistics import median
 from typing import Literal, NamedTuple
 
 import numpy as np
+import pandas as pd
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
@@ -25,7 +25,7 @@ from synfeal.dataset.directories import writing_to
 from synfeal.dataset.pose_table import COLUMNS
 from synfeal.dataset.progress import Progress, Stopwatch
 from synfeal.errors import InputError
-from synfeal.files import atomic_path
+from synfeal.frames import write_frame
 
 log = logging.getLogger(__name__)
 
@@ -157,11 +157,7 @@ def _holds_poses(out: Path) -> bool:
 
 def _write(out: Path, pictures: Sequence[Path], poses: Array) -> None:
     """Numbers with enough digits to read back the same values; names as the bytes they are."""
-    with (
-        writing_to(out, lambda: "choose another file with --out"),
-        atomic_path(out) as temporary,
-        temporary.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file,
-    ):
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(HEADER)
-        writer.writerows([path, *pose] for path, pose in zip(pictures, poses.tolist(), strict=True))
+    frame = pd.DataFrame(poses, columns=list(HEADER[1:]))
+    frame.insert(0, HEADER[0], pd.Series([str(path) for path in pictures], dtype=object))
+    with writing_to(out, lambda: "choose another file with --out"):
+        write_frame(out, frame, float_format=None, na_rep="nan")

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 import logging
 import math
 import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import pandas as pd
 import torch
 from torch import Tensor
 
 from baselines.training.selection import HeldOutErrors
-from synfeal.files import atomic_path
+from synfeal.frames import write_frame
 
 log = logging.getLogger(__name__)
 
@@ -104,8 +104,5 @@ class Progress:
 
 
 def write_history(path: Path, rows: list[HistoryRow]) -> None:
-    """Write the history as CSV, one column per field of a row; what was not looked at is empty."""
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(HistoryRow._fields)
-        writer.writerows(rows)
+    """Write the history as CSV, a column per field; empty: not looked at, or no number."""
+    write_frame(path, pd.DataFrame(rows, columns=HistoryRow._fields), float_format=None)

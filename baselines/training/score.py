@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from baselines.training.record import check_same_labels
@@ -23,7 +23,8 @@ from synfeal.dataset.pose_table import (
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import finite, pose_errors, summary
 from synfeal.evaluation.reprojection import dcre, dcre_summary, read_cell_depth
-from synfeal.files import atomic_path, write_json
+from synfeal.files import write_json
+from synfeal.frames import write_frame
 from synfeal.labels.constant import constant_pose
 
 Array = NDArray[np.float64]
@@ -86,7 +87,8 @@ def score_run(
         for end, reference in {"": label_table, "_true": true_table}.items():
             found = dcre(predicted, reference, depth_m, depth[1])
             metrics |= dcre_summary(found, predicted.path, end)
-    _write_errors(out_errors, predicted.frame, errors)
+    table = pd.DataFrame({"frame": predicted.frame, **errors})
+    write_frame(out_errors, table, float_format=None, na_rep="nan")
     write_json(out_metrics, metrics)
 
 
@@ -113,10 +115,3 @@ def _read_like(path: Path, predicted: PoseTable) -> PoseTable:
             f"{len(predicted)} rows); predict again for these labels"
         )
     return table
-
-
-def _write_errors(path: Path, frame: NDArray[np.int64], errors: Mapping[str, Array]) -> None:
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["frame", *errors])
-        writer.writerows(zip(frame.tolist(), *(e.tolist() for e in errors.values()), strict=True))

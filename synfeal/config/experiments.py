@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -13,6 +12,7 @@ from synfeal.config.load import describe
 from synfeal.config.models import MODELS, Config, NonNegative, Strict
 from synfeal.config.tables import KEYS, Repetitions, TableName
 from synfeal.errors import InputError
+from synfeal.frames import read_records
 from synfeal.seeds import seed_of
 
 Init = Literal["pretrained", "scratch"]
@@ -107,19 +107,13 @@ def read_experiments(config: Config) -> tuple[Experiment, ...]:
         InputError: naming file, row and column of the first problem.
     """
     path = config.experiments
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:  # spreadsheets add a mark
-            reader = csv.DictReader(file)
-            header = tuple(reader.fieldnames or ())
-            rows = [(f"{path}: row {reader.line_num}", row) for row in reader]
-    except (OSError, ValueError, csv.Error) as error:
-        raise InputError(f"{path}: cannot be read as CSV ({error})") from None
-    if header != COLUMNS:
-        raise InputError(f"{path}: the header must be {','.join(COLUMNS)}")
-    experiments = tuple(_parse(row, where, config) for where, row in rows)
+    rows = read_records(path, COLUMNS, f"the header must be {','.join(COLUMNS)}")
+    places = [f"{path}: row {line}" for line, _ in rows]
+    experiments = tuple(
+        _parse(row, where, config) for (_, row), where in zip(rows, places, strict=True)
+    )
     if not experiments:
         raise InputError(f"{path}: has no rows; nothing would be run")
-    places = [where for where, _ in rows]
     _refuse_repeats(experiments, places)
     if any(config.groundtruth_camera.distortion):
         _refuse_depth_methods(experiments, places)
@@ -150,8 +144,6 @@ def _refuse_depth_methods(experiments: Sequence[Experiment], places: Sequence[st
 
 
 def _parse(row: dict[str, str], where: str, config: Config) -> Experiment:
-    if None in row:
-        raise InputError(f"{where}: has more cells than the {len(COLUMNS)} columns of the header")
     try:
         experiment = Experiment.model_validate(row)
     except ValidationError as error:

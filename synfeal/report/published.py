@@ -8,15 +8,26 @@ impossible and is left out of comparisons) and ``suspect`` (probably a copy of i
 
 from __future__ import annotations
 
-import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from pathlib import Path
 
+import pandas as pd
+
 from synfeal.config import Experiment
+from synfeal.frames import COUNT, EXTRA, NUMBER, TEXT, frame_of, read_frame, records_of
 
 FOLDER = Path(__file__).parent / "published"
 Key = tuple[str, str, str, str, float, float, str, str]
+KEY = ("block", "scene", "size", "labels", "noise_m", "noise_deg", "init", "model")
+SCHEMA = {
+    **dict.fromkeys(KEY, TEXT) | dict.fromkeys(("noise_m", "noise_deg"), NUMBER),
+    **dict.fromkeys(("n_train", "n_test"), COUNT),
+    **dict.fromkeys(("position_m", "orientation_deg"), NUMBER),
+    **dict.fromkeys(("position_change_percent", "orientation_change_percent"), EXTRA),
+    **dict.fromkeys(("flag", "printed_row", "row_note", "cell_note"), TEXT),
+}
+MESHES = {"scene": TEXT, "vertices": COUNT, "faces": COUNT, "volume_m3": NUMBER}
 
 
 @dataclass(frozen=True)
@@ -66,44 +77,22 @@ def key_of(row: Experiment, model: str) -> Key:
 @cache
 def published_cells(table: str) -> dict[Key, PublishedCell]:
     """All cells of one of the tables 2 to 5; none of one that the paper does not have."""
-    rows = _read(table) if (FOLDER / f"{table}.csv").is_file() else []
-    return {_key_in(row): _cell_in(row) for row in rows}
+    names = [field.name for field in fields(PublishedCell)]
+    return {
+        tuple(row[key] for key in KEY): PublishedCell(**{name: row[name] for name in names})
+        for row in records_of(published_frame(table))
+    }
+
+
+@cache
+def published_frame(table: str) -> pd.DataFrame:
+    """Columns ``SCHEMA`` of one of the tables 2 to 5; no rows of one that the paper has not."""
+    path = FOLDER / f"{table}.csv"
+    return read_frame(path, SCHEMA) if path.is_file() else frame_of((), SCHEMA)
 
 
 @cache
 def published_meshes() -> dict[str, MeshFacts]:
     """Table 1 by scene."""
-    return {
-        row["scene"]: MeshFacts(int(row["vertices"]), int(row["faces"]), float(row["volume_m3"]))
-        for row in _read("table1_meshes")
-    }
-
-
-def _read(table: str) -> list[dict[str, str]]:
-    with (FOLDER / f"{table}.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def _key_in(row: dict[str, str]) -> Key:
-    noise = (float(row["noise_m"]), float(row["noise_deg"]))
-    names = (row["block"], row["scene"], row["size"], row["labels"])
-    return (*names, *noise, row["init"], row["model"])
-
-
-def _cell_in(row: dict[str, str]) -> PublishedCell:
-    return PublishedCell(
-        n_train=int(row["n_train"]),
-        n_test=int(row["n_test"]),
-        position_m=float(row["position_m"]),
-        orientation_deg=float(row["orientation_deg"]),
-        position_change_percent=_optional(row.get("position_change_percent")),
-        orientation_change_percent=_optional(row.get("orientation_change_percent")),
-        flag=row["flag"],
-        printed_row=row["printed_row"],
-        row_note=row["row_note"],
-        cell_note=row["cell_note"],
-    )
-
-
-def _optional(text: str | None) -> float | None:
-    return float(text) if text else None
+    frame = read_frame(FOLDER / "table1_meshes.csv", MESHES)
+    return {row.pop("scene"): MeshFacts(**row) for row in records_of(frame)}

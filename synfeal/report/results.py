@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Collection, Iterable
@@ -13,6 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from synfeal.errors import InputError
 from synfeal.files import read_json
+from synfeal.frames import REMEDY, read_records
 
 
 def read_text(path: Path) -> str:
@@ -84,27 +84,13 @@ def read_table(
         InputError: it cannot be read, lacks a column of ``needed``, has a row of another length, or
             holds something else where a number belongs.
     """
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            reader = csv.DictReader(file, strict=True)
-            found = tuple(reader.fieldnames or ())
-            rows = list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(
-            f"{path}: cannot be read as CSV ({error}); make that table again"
-        ) from None
-    absent = [column for column in needed if column not in found]
-    if absent:
-        raise InputError(f"{path}: column {', '.join(absent)} missing; make that table again")
-    for place, row in enumerate(rows, start=1):
-        where = f"{path}: row {place} below the header"
-        if None in row or None in row.values():
-            raise InputError(f"{where} has more or fewer cells than it; make that table again")
+    lines = read_records(path, needed)
+    for line, row in lines:
         filled = [*numbers, *(column for column in optional if row.get(column))]
         bad = [column for column in filled if not is_number(row[column])]
         if bad:
-            raise InputError(f"{where}: {bad[0]} must be a number; make that table again")
-    return rows
+            raise InputError(f"{path}: row {line}: {bad[0]} must be a number; {REMEDY}")
+    return [row for _, row in lines]
 
 
 def is_number(text: str) -> bool:

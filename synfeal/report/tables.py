@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+
+import pandas as pd
 
 from synfeal.config import Design
 from synfeal.config.experiments import FROM_SCRATCH
 from synfeal.config.tables import KEYS
-from synfeal.files import atomic_path
+from synfeal.frames import write_frame
 from synfeal.report.cells import Cell, read_cells
 from synfeal.report.latex import write_latex
 from synfeal.report.layouts import grid_of
@@ -91,13 +92,8 @@ def _published_record(cell: Cell) -> dict[str, Value]:
 
 def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Mapping[str, Value]]) -> None:
     """Write a CSV of some columns: floats with six significant digits, None as an empty cell."""
-    with (
-        atomic_path(path) as temporary,
-        temporary.open("w", encoding="utf-8", newline="") as file,
-    ):
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows([_text(row.get(column)) for column in columns] for row in rows)
+    texts = [[_text(row.get(column)) for column in columns] for row in rows]
+    write_frame(path, pd.DataFrame(texts, columns=list(columns)))
 
 
 def _text(value: Value) -> str:

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from pydantic import TypeAdapter, ValidationError
-
-from synfeal.errors import InputError
-from synfeal.files import atomic_path
+from synfeal.frames import COUNT, NUMBER, TEXT, frame_of, read_frame, records_of, write_frame
 
 
 @dataclass(frozen=True)
@@ -46,33 +42,20 @@ class Measured:
     chosen: int
 
 
-COLUMNS = [field.name for field in fields(Measured)]
-LINE = TypeAdapter(Measured)
+KINDS = {"str": TEXT, "int": COUNT, "float": NUMBER}
+SCHEMA = {name: KINDS[str(kind)] for name, kind in Measured.__annotations__.items()}
 
 
 def write_speed(path: Path, lines: Iterable[Measured]) -> None:
     """Write one line per camera and variant; the times differ between runs."""
-    with (
-        atomic_path(path) as temporary,
-        temporary.open("w", encoding="utf-8", newline="") as file,
-    ):
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(map(asdict, lines))
+    write_frame(path, frame_of(map(asdict, lines), SCHEMA), float_format=None)
 
 
 def read_speed(path: Path) -> list[Measured]:
     """Read what :func:`write_speed` wrote.
 
     Raises:
-        InputError: the file is missing, has other columns, or holds what is not a measurement.
+        InputError: the file is missing, lacks a column, or holds what is not a measurement.
     """
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            reader = csv.DictReader(file)
-            if reader.fieldnames != COLUMNS:
-                raise InputError(f"{path}: columns must be {','.join(COLUMNS)}; measure again")
-            return [LINE.validate_python(row) for row in reader]
-    except (OSError, UnicodeDecodeError, csv.Error, ValidationError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{path}: cannot be read as speeds of rendering ({reason})") from None
+    frame = read_frame(path, SCHEMA, "measure again")
+    return [Measured(**row) for row in records_of(frame)]

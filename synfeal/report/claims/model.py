@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal
 
+from synfeal.frames import read_records
 from synfeal.report.published import FOLDER
 
 Verdict = Literal[
@@ -77,8 +77,7 @@ class Missing(Exception):  # noqa: N818 - not an error: it ends in the verdict `
 @cache
 def published_claims() -> tuple[Claim, ...]:
     """The claims of the paper, in its order."""
-    with (FOLDER / "claims.csv").open(encoding="utf-8", newline="") as file:
-        return tuple(_claim(row) for row in csv.DictReader(file))
+    return tuple(_claim(row) for _, row in read_records(FOLDER / "claims.csv"))
 
 
 def _claim(row: dict[str, str]) -> Claim:

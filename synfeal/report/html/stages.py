@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import math
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
 
-from synfeal.errors import InputError
+import pandas as pd
+
+from synfeal.frames import MAYBE, NUMBER, read_frame, records_of
+
+# A job that ends before Snakemake's first look at it has no memory.
+JOB = {"s": NUMBER, "max_rss": MAYBE}
 
 
 @dataclass(frozen=True)
@@ -36,38 +38,28 @@ def read_stages(benchmarks: Path) -> list[Stage]:
     Raises:
         InputError: a measurement cannot be read.
     """
-    jobs: dict[str, list[tuple[float, float | None]]] = {}
-    for path in sorted(benchmarks.rglob("*.tsv")):
-        name = path.relative_to(benchmarks).parts[0].removesuffix(".tsv")
-        jobs.setdefault(name, []).extend(_read(path))
-    stages = [_stage(name, measured) for name, measured in jobs.items() if measured]
-    return sorted(stages, key=lambda stage: (-stage.seconds, stage.stage))
+    jobs = [_read(path, benchmarks) for path in sorted(benchmarks.rglob("*.tsv"))]
+    if not jobs:
+        return []
+    stages = (
+        pd.concat(jobs)
+        .groupby("stage")
+        .agg(
+            jobs=("s", "size"),
+            seconds=("s", "sum"),
+            median_seconds=("s", "median"),
+            peak_mb=("max_rss", "max"),
+        )
+        .reset_index()
+        .sort_values(["seconds", "stage"], ascending=[False, True])
+    )
+    return [
+        Stage(**row | {"peak_mb": None if pd.isna(row["peak_mb"]) else row["peak_mb"]})
+        for row in records_of(stages)
+    ]
 
 
-def _stage(name: str, measured: list[tuple[float, float | None]]) -> Stage:
-    seconds = [job[0] for job in measured]
-    peaks = [job[1] for job in measured if job[1] is not None]
-    return Stage(name, len(measured), sum(seconds), median(seconds), max(peaks, default=None))
-
-
-def _read(path: Path) -> list[tuple[float, float | None]]:
+def _read(path: Path, benchmarks: Path) -> pd.DataFrame:
     """Seconds and peak memory (MB) of each time a job ran."""
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.DictReader(file, delimiter="\t"))
-        if not rows:
-            raise ValueError("it has no rows")
-        return [(_finite(row["s"]), _number(row["max_rss"])) for row in rows]
-    except (OSError, KeyError, ValueError, TypeError, csv.Error) as error:
-        raise InputError(f"{path}: cannot be read as a measurement of a job ({error!r})") from None
-
-
-def _number(text: str) -> float | None:
-    """Memory; a job that ends before the first look at it has none."""
-    return None if text in ("", "-", "NA") else _finite(text)
-
-
-def _finite(text: str) -> float:
-    if not 0 <= float(text) < math.inf:
-        raise ValueError(f"{text} is no amount")
-    return float(text)
+    stage = path.relative_to(benchmarks).parts[0].removesuffix(".tsv")
+    return read_frame(path, JOB, "run that job again", sep="\t").assign(stage=stage)

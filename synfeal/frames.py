@@ -1,0 +1,156 @@
+"""Tables as files: every CSV with a header is read, checked and written here.
+
+A schema says what the cells of each column hold, in the order of the file::
+
+    SCHEMA = {"scene": TEXT, "frames": COUNT, "position_m_median": NUMBER}
+
+A column more is a line more. In memory a table is a :class:`pandas.DataFrame` of those columns,
+whose types the schema fixes; pandas is imported by what needs one, for it takes half a second.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from synfeal.errors import InputError
+from synfeal.files import atomic_path
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+REMEDY = "make that table again"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What the cells of a column hold.
+
+    Attributes:
+        dtype: of the column in memory.
+        optional: cells may be empty; in memory they are missing values.
+        expected: files must have the column; without it, all its cells are missing.
+    """
+
+    dtype: str
+    optional: bool = False
+    expected: bool = True
+
+
+TEXT = Kind("str")
+COUNT = Kind("int64")
+NUMBER = Kind("float64")  # finite
+MAYBE_COUNT = Kind("Int64", optional=True)
+MAYBE = Kind("float64", optional=True)
+EXTRA = Kind("float64", optional=True, expected=False)
+Schema = Mapping[str, Kind]
+
+
+def read_frame(path: Path, schema: Schema, remedy: str = REMEDY, sep: str = ",") -> pd.DataFrame:
+    """The columns of a schema from a file, which may have others.
+
+    Args:
+        path: the file.
+        schema: kinds by column, in the order of the result.
+        remedy: what to do where it cannot be used.
+        sep: what separates cells.
+
+    Raises:
+        InputError: the file is missing or no CSV, lacks a column, has a row of another length, or
+            a cell does not hold what its column does.
+    """
+    import pandas as pd
+
+    needed = [name for name, kind in schema.items() if kind.expected]
+    records = read_records(path, needed, remedy, sep)
+    columns: dict[str, Any] = {}
+    for name, kind in schema.items():
+        cells = [row.get(name, "") for _, row in records]
+        values = [_value(cell, kind) for cell in cells]
+        bad = next((i for i, value in enumerate(values) if value is _BAD), None)
+        if bad is not None:
+            expected = "a whole number" if kind.dtype.lower() == "int64" else "a number"
+            where = f"{path}: row {records[bad][0]}: {name}"
+            raise InputError(f"{where} must be {expected}, found '{cells[bad][:40]}'; {remedy}")
+        columns[name] = pd.Series(values, dtype=kind.dtype)
+    return pd.DataFrame(columns)
+
+
+def read_records(
+    path: Path, needed: Iterable[str] = (), remedy: str = REMEDY, sep: str = ","
+) -> list[tuple[int, dict[str, str]]]:
+    """Rows of a file, each with its line: cells by column, as text.
+
+    Raises:
+        InputError: as :func:`read_frame`, but for what cells hold.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:  # spreadsheets add a mark
+            reader = csv.reader(file, strict=True, delimiter=sep)
+            header = next(reader, [])
+            rows = [(reader.line_num, row) for row in reader if row]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: cannot be read as CSV ({error}); {remedy}") from None
+    absent = [name for name in needed if name not in header]
+    if absent:
+        raise InputError(f"{path}: column {', '.join(absent)} missing; {remedy}")
+    for line, row in rows:
+        if len(row) != len(header):
+            found = f"has {len(row)} cells where the header has {len(header)}"
+            raise InputError(f"{path}: row {line}: {found}; {remedy}")
+    return [(line, dict(zip(header, row, strict=True))) for line, row in rows]
+
+
+def frame_of(records: Iterable[Mapping[str, Any]], schema: Schema) -> pd.DataFrame:
+    """Rows as a frame with the columns and types of a schema; what a row lacks is missing."""
+    import pandas as pd
+
+    frame = pd.DataFrame.from_records(
+        [{name: record.get(name) for name in schema} for record in records], columns=list(schema)
+    )
+    return frame.astype({name: kind.dtype for name, kind in schema.items()})
+
+
+def records_of(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """The rows of a frame, by column."""
+    return [{str(name): value for name, value in row.items()} for row in frame.to_dict("records")]
+
+
+def write_frame(
+    path: Path, frame: pd.DataFrame, float_format: str | None = "%.6g", na_rep: str = ""
+) -> None:
+    """Write a frame: floats with six significant digits, or all of them with None."""
+    with atomic_path(path) as temporary:
+        frame.to_csv(
+            temporary,
+            index=False,
+            float_format=float_format,
+            na_rep=na_rep,
+            lineterminator="\n",
+            errors="surrogateescape",  # paths are bytes that need not be UTF-8
+        )
+
+
+_BAD = object()
+_EMPTY: Sequence[str] = ("", "-", "NA")  # Snakemake's for what a job was too short to measure
+
+
+def _value(cell: str, kind: Kind) -> object:
+    """A cell as its column holds it; ``_BAD`` where it does not."""
+    if kind.dtype == "str":
+        return cell
+    if kind.optional and cell in _EMPTY:
+        return None
+    try:
+        number = float(cell)
+    except ValueError:
+        return _BAD
+    if not math.isfinite(number):
+        return _BAD
+    if kind.dtype == "float64":
+        return number
+    return int(number) if number.is_integer() else _BAD
