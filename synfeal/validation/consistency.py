@@ -1,6 +1,6 @@
 """Pairs of frames of one sequence compared by reprojection, and what the worst of them show.
 
-Bounds hold for rendered frames: faultless sets of many kinds pass (``tests/test_validate_right.py``).
+Bounds hold for rendered frames; ``tests/test_validate_right.py`` has faultless sets that pass.
 """
 
 from __future__ import annotations
