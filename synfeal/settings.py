@@ -16,7 +16,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from synfeal.config.dataset import DatasetConfig
-from synfeal.config.load import describe
+from synfeal.config.load import describe, read_yaml
 from synfeal.config.mesh_files import check_mesh_file
 from synfeal.config.models import CameraConfig, RenderConfig, SceneConfig
 from synfeal.errors import InputError
@@ -45,6 +45,7 @@ KEYS: Mapping[str, str] = {
     "backend": "render.backend",
     "supersampling": "render.supersampling",
     "background": "render.background_rgb",
+    "effects": "render.effects",
     "sequence_frames": "shard_frames",
     "archive": "archive_sequences",
     "seed": "seed",
@@ -97,6 +98,8 @@ def render_configs(options: Mapping[str, Any]) -> tuple[CameraConfig, RenderConf
     Raises:
         InputError: naming the option that is wrong.
     """
+    if options.get("effects") is not None:
+        raise InputError("effects: act on the frames of paths; use collect for them")
     values = _nested(options)
     with _options_named():
         found: list[Any] = []
@@ -148,6 +151,9 @@ def _nested(options: Mapping[str, Any]) -> dict[str, Any]:
     if unknown:
         raise InputError(f"{unknown[0]}: no such option; there are {', '.join(KEYS)}")
     given = {KEYS[name]: value for name, value in options.items() if value is not None}
+    effects = given.get(KEYS["effects"])
+    if isinstance(effects, Path | str):
+        given[KEYS["effects"]] = read_yaml(Path(effects))
     boxes = given.pop(KEYS["box"], None)
     if boxes is not None:
         first, *others = ({"x": b[0:2], "y": b[2:4], "z": b[4:6]} for b in boxes)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from synfeal.config.models import Strict
 
-MEASURES = ("kinect_fusion", "rgbd", "sfm", "training")
+MEASURES = ("effects", "kinect_fusion", "rgbd", "sfm", "training")
 
 
 class Measure(NamedTuple):

@@ -8,13 +8,25 @@ import sys
 from collections.abc import Sequence
 
 from synfeal import __version__
-from synfeal.cli import collect, compare, evaluate, export, inspect, keep, localize, plan, validate
+from synfeal.cli import (
+    collect,
+    compare,
+    evaluate,
+    export,
+    inspect,
+    keep,
+    localize,
+    plan,
+    preview,
+    validate,
+)
 from synfeal.cli.options import numbers_apart
 from synfeal.errors import exit_status
 
 COMMANDS = (
     collect.COMMAND,
     inspect.COMMAND,
+    preview.COMMAND,
     validate.COMMAND,
     export.COMMAND,
     evaluate.COMMAND,

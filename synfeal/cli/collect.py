@@ -70,6 +70,14 @@ RENDER_OPTIONS: Options = (
             "help": "colour where nothing is, 0 - 255 each (0 0 0)",
         },
     ),
+    (
+        "--effects",
+        {
+            "type": Path,
+            "metavar": "FILE",
+            "help": "YAML: light, motion blur, exposure, noise and more (docs/variation.md)",
+        },
+    ),
     ("--workers", {"type": int, "default": 1, "help": "processes that render (1)"}),
     (
         "--sequence-frames",

@@ -269,26 +269,3 @@ def _calibrated(values: dict[str, Any]) -> dict[str, Any]:
         raise ValueError(f"calibration: {error}") from None
     kept = {name: value for name, value in values.items() if name not in fixed}
     return {**kept, **asdict(calibration), "calibration": None}
-
-
-class RenderConfig(Strict):
-    """How images are drawn."""
-
-    backend: Literal["auto", "opengl", "pyrender", "raycast"] = Field(
-        "auto", description="`auto` takes the fastest that works on this machine, and says which"
-    )
-    supersampling: Annotated[int, Field(ge=1, le=4)] = Field(
-        2, description="samples per pixel along each axis; 1 is fastest and aliases"
-    )
-    background_rgb: tuple[Channel, Channel, Channel] = Field(
-        (0, 0, 0), description="colour where nothing is: red, green, blue, each 0 to 255"
-    )
-
-
-class RenderSpeedConfig(Strict):
-    """How speed and error of rendering are measured, for `speed_vs_error.csv`."""
-
-    poses: Count = Field(6, description="views of each scene; half as many at the larger sizes")
-    sizes: Annotated[int, Field(ge=1, le=3)] = Field(
-        3, description="of network_camera, groundtruth_camera and 640 x 480, the smallest first"
-    )

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from synfeal.config.collection import (
     CameraConfig,
     CollectionConfig,
     Count,
-    RenderConfig,
     SceneConfig,
     Slug,
     Strict,
 )
+from synfeal.config.rendering import RenderConfig
 
 
 class DatasetConfig(Strict):
@@ -40,6 +40,22 @@ class DatasetConfig(Strict):
         False, description="depth images of that camera too, where image files are written"
     )
     render: RenderConfig = Field(default_factory=RenderConfig, description="how images are drawn")
+
+    @model_validator(mode="after")
+    def _check_exposure(self) -> Self:
+        effects = self.render.effects
+        if effects is None or effects.motion_blur is None or self.collection.mode == "repeat":
+            return self
+        if self.collection.mode == "random":
+            raise ValueError("render.effects.motion_blur: independent frames have no motion")
+        exposure_s = effects.motion_blur.exposure_s
+        frame_s = self.collection.frame_spacing_m / effects.speed_m_s
+        if exposure_s > frame_s:
+            raise ValueError(
+                f"render.effects.motion_blur.exposure_s: {exposure_s:g} s is longer than the"
+                f" {frame_s:.3g} s between frames (collection.frame_spacing_m by speed_m_s)"
+            )
+        return self
 
     @property
     def root(self) -> Path:

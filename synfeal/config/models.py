@@ -16,8 +16,6 @@ from synfeal.config.collection import (
     Fraction,
     NonNegative,
     Positive,
-    RenderConfig,
-    RenderSpeedConfig,
     SceneConfig,
     SizeConfig,
     Slug,
@@ -33,6 +31,7 @@ from synfeal.config.learning import (
     TrainingConfig,
 )
 from synfeal.config.references import ExternalConfig, ReferencesConfig
+from synfeal.config.rendering import EffectsConfig, RenderConfig, RenderSpeedConfig
 
 __all__ = [
     "MODELS",
@@ -44,6 +43,7 @@ __all__ = [
     "Config",
     "DatasetConfig",
     "DepthConfig",
+    "EffectsConfig",
     "ExternalConfig",
     "GroundTruthConfig",
     "KinectFusionConfig",

@@ -7,14 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from synfeal.config.dataset import DatasetConfig
-from synfeal.config.models import CameraConfig
+from synfeal.config.models import CameraConfig, EffectsConfig
 from synfeal.dataset.archive import sequence_at
 from synfeal.dataset.contact_sheet import write_contact_sheet
 from synfeal.dataset.manifest import write_manifest
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.packed_record import file_sha256
+from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.sequences import Split, sequences_of
 from synfeal.dataset.sevenscenes import frame_paths, write_splits
+from synfeal.frames import write_frame
 
 
 def finish(
@@ -45,8 +47,25 @@ def finish(
             chosen = [path for s, path in paths.items() if s.split == split]
             pack_frames(chosen, packed_px, directory / f"{split}.npy")
     write_contact_sheet(frame_paths(list(paths.values()), "color.png"), directory / "preview.png")
-    about = {"mesh_sha256": file_sha256(mesh), **origin}
+    about = {"mesh_sha256": file_sha256(mesh), **origin, **_write_effects(directory, origin)}
     write_manifest(directory, sequences, camera, about)
+
+
+def _write_effects(directory: Path, origin: Mapping[str, Any]) -> dict[str, Any]:
+    """Write ``<split>.effects.csv`` where there are effects; their hashes for the manifest."""
+    settings = origin["render"].get("effects")
+    if settings is None:
+        return {}
+    from synfeal.effects.table import effects_table  # pandas takes time to load
+
+    hashes = {}
+    for plan in sorted(directory / f"{split}.csv" for split in ("test", "train")):
+        if plan.is_file():
+            table = effects_table(EffectsConfig(**settings), read_pose_table(plan))
+            path = plan.with_suffix(".effects.csv")
+            write_frame(path, table)
+            hashes[path.name] = file_sha256(path)
+    return {"effects_sha256": hashes}
 
 
 def origin_of(config: DatasetConfig, scene: str) -> dict[str, Any]:

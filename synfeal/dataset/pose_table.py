@@ -30,12 +30,14 @@ class PoseTable:
         path: (N,) index of the straight path.
         position_m: (N, 3) camera centres in the world.
         quat_wxyz: (N, 4) unit quaternions of ``world_from_cam``, w >= 0.
+        whole: the paths that the frames are of, all of their frames, where these are but a part.
     """
 
     frame: NDArray[np.int64]
     path: NDArray[np.int64]
     position_m: NDArray[np.float64]
     quat_wxyz: NDArray[np.float64]
+    whole: PoseTable | None = None
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -55,10 +57,13 @@ class PoseTable:
         """Frames ``start`` to ``stop`` (exclusive), which must all exist."""
         if not 0 <= start <= stop <= len(self):
             raise ValueError(f"asked for frames {start} to {stop} of a table of {len(self)}")
-        part = slice(start, stop)
-        return PoseTable(
-            self.frame[part], self.path[part], self.position_m[part], self.quat_wxyz[part]
-        )
+        edges = np.concatenate([[0], np.flatnonzero(np.diff(self.path)) + 1, [len(self)]])
+        around = slice(edges[edges <= start].max(), edges[edges >= stop].min())
+        return self._rows(slice(start, stop), None if self.whole else self._rows(around))
+
+    def _rows(self, part: slice, whole: PoseTable | None = None) -> PoseTable:
+        rows = (self.frame[part], self.path[part], self.position_m[part], self.quat_wxyz[part])
+        return PoseTable(*rows, whole or self.whole)
 
     def first(self, count: int) -> PoseTable:
         """The first ``count`` frames: smaller data sets are prefixes of larger ones."""

@@ -17,7 +17,7 @@ from typing import Any
 from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.progress import Progress, Stopwatch
-from synfeal.dataset.render_sequence import write_sequence
+from synfeal.dataset.render_sequence import effects_of, write_sequence
 from synfeal.errors import InputError
 from synfeal.mesh.load import load_mesh
 from synfeal.render import open_renderer
@@ -50,7 +50,8 @@ class Studio:
     def carry_out(self, renderer: Renderer, task: Task, on_frame: Callable[[], object]) -> float:
         """Render a sequence; seconds it took."""
         watch = Stopwatch()
-        write_sequence(renderer, task.poses, task.out, self.with_depth, on_frame)
+        effects = effects_of(self.camera, self.render)
+        write_sequence(renderer, task.poses, task.out, self.with_depth, on_frame, effects)
         return watch.seconds
 
 

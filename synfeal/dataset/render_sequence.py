@@ -7,21 +7,24 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
-from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
 from synfeal.dataset.archive import is_archive, write_archive
 from synfeal.dataset.directories import atomic_directory, refuse_existing, writing_to
 from synfeal.dataset.frame_writer import FrameWriter
 from synfeal.dataset.packed import View, fit_frame, new_packed
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.progress import Progress, Stopwatch
+from synfeal.effects.apply import Frame, varied_frames
 from synfeal.files import write_json
 from synfeal.mesh.load import load_mesh
 from synfeal.render import open_renderer
 from synfeal.render.base import Renderer
 from synfeal.render.choose import fastest_working
 
+Effects = tuple[CameraConfig, EffectsConfig]
 REMEDY = "nothing was kept; mend that and render again"
 
 
@@ -48,7 +51,9 @@ def render_sequence(
         open_renderer(load_mesh(mesh_path), camera, render) as renderer,
         Progress(len(poses), out.name) as progress,
     ):
-        write_sequence(renderer, poses, out, with_depth, progress.update)
+        write_sequence(
+            renderer, poses, out, with_depth, progress.update, effects_of(camera, render)
+        )
     progress.part_done(out.name, len(poses), watch.seconds)
 
 
@@ -58,6 +63,7 @@ def write_sequence(
     out: Path,
     with_depth: bool,
     on_frame: Callable[[], object] = lambda: None,
+    effects: Effects | None = None,
 ) -> None:
     """Render every pose of the table; files are written while the next frames are rendered.
 
@@ -65,12 +71,34 @@ def write_sequence(
         OSError: a file cannot be written.
     """
     with _new_sequence(out) as directory, FrameWriter(on_frame) as writer:
-        for number, world_from_cam in enumerate(poses.world_from_cam):
-            stem = directory / f"frame-{number:06d}"
-            if with_depth:
-                writer.add(stem, world_from_cam, *renderer.render_rgbd(world_from_cam))
-            else:
-                writer.add(stem, world_from_cam, renderer.render(world_from_cam), None)
+        frames = drawn(renderer, poses, with_depth, effects)
+        for number, (pose, frame) in enumerate(zip(poses.world_from_cam, frames, strict=True)):
+            writer.add(directory / f"frame-{number:06d}", pose, *frame)
+
+
+def drawn(
+    renderer: Renderer, poses: PoseTable, with_depth: bool, effects: Effects | None
+) -> Iterator[Frame]:
+    """Colours, and depth if it is asked for, of every pose: all frames of data sets come from here.
+
+    Args:
+        renderer: of the scene.
+        poses: what is drawn, as a part of the whole paths.
+        with_depth: whether depth is asked for.
+        effects: what is added to ideal frames, and through which camera; None draws them ideal.
+    """
+    if effects is None:
+        for pose in poses.world_from_cam:
+            yield renderer.render_rgbd(pose) if with_depth else (renderer.render(pose), None)
+        return
+    whole = poses.whole or poses
+    begin = int(np.searchsorted(whole.frame, poses.frame[0]))
+    yield from varied_frames(renderer, *effects, whole, begin, begin + len(poses), with_depth)
+
+
+def effects_of(camera: CameraConfig, render: RenderConfig | None) -> Effects | None:
+    """What :func:`drawn` takes."""
+    return (camera, render.effects) if render and render.effects else None
 
 
 @contextmanager
@@ -122,10 +150,9 @@ def render_packed(
         Progress(len(poses), out.stem) as progress,
     ):
         watch = Stopwatch()
-        for index, world_from_cam in enumerate(poses.world_from_cam):
-            packed[index] = fit_frame(
-                Image.fromarray(renderer.render(world_from_cam)), input_px, view
-            )
+        frames = drawn(renderer, poses, False, effects_of(camera, chosen))
+        for index, (rgb, _) in enumerate(frames):
+            packed[index] = fit_frame(Image.fromarray(rgb), input_px, view)
             progress.update()
         write_json(out.with_suffix(".json"), {"frames": len(poses), "backend": chosen.backend})
     progress.part_done(out.stem, len(poses), watch.seconds)

@@ -11,7 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from synfeal.config.collection import CameraConfig, RenderConfig
+from synfeal.config.collection import CameraConfig
+from synfeal.config.rendering import RenderConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render.base import Renderer

@@ -1,0 +1,128 @@
+"""Typed configuration of how frames are drawn, and what a camera and its world add to them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+
+from synfeal.config.collection import Channel, Count, NonNegative, Positive, Strict
+
+Kelvin = Annotated[float, Field(ge=2000, le=25000)]
+Stops = Annotated[float, Field(ge=-10, le=10)]
+
+
+class LightConfig(Strict):
+    """The light of a path: drawn once for each, the same for all of its frames."""
+
+    ev: tuple[Stops, Stops] = Field(
+        (0.0, 0.0), description="brightness of all light: drawn between these, stops"
+    )
+    temperature_k: tuple[Kelvin, Kelvin] = Field(
+        (6500.0, 6500.0),
+        description="its colour temperature: drawn between these, kelvin, uniform in mired; a mesh"
+        " shows itself as it is at 6500",
+    )
+    field_ev: Annotated[float, Field(ge=0, le=5)] = Field(
+        0.0, description="smooth change across the scene, standard deviation in stops"
+    )
+    field_m: Positive = Field(3.0, description="shortest wavelength of that change, metres")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for name in ("ev", "temperature_k"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise ValueError(f"{name}: the first number must not be above the second")
+        return self
+
+
+class MotionBlurConfig(Strict):
+    """The path of the camera during one exposure, centred on the pose of the frame."""
+
+    exposure_s: Positive = Field(0.02, description="exposure time, seconds")
+    subframes: Annotated[int, Field(ge=2, le=64)] = Field(
+        8, description="frames, evenly spaced in time, whose light is averaged"
+    )
+
+
+class ExposureConfig(Strict):
+    """How much light makes a pixel white."""
+
+    ev: Stops = Field(0.0, description="compensation, stops: 1 doubles the light")
+    time_constant_s: Positive | None = Field(
+        None,
+        description="auto-exposure follows the mean light of the frames before with this lag,"
+        " seconds; a path begins settled. Null: no auto-exposure",
+    )
+    target: Annotated[float, Field(gt=0, lt=1)] = Field(
+        0.18, description="auto-exposure: mean light aimed at, white is 1"
+    )
+    most_ev: Annotated[float, Field(ge=0, le=10)] = Field(
+        3.0, description="auto-exposure: largest correction either way, stops"
+    )
+
+
+class NoiseConfig(Strict):
+    """Photon-transfer model: variance in electrons is the signal plus that of reading out."""
+
+    full_well_e: Annotated[float, Field(ge=1, le=1e7)] = Field(
+        10_000.0, description="electrons of a white pixel"
+    )
+    read_e: NonNegative = Field(5.0, description="noise of reading out, electrons rms")
+
+
+class EffectsConfig(Strict):
+    """What is added to ideal frames, in the order of the keys; what is absent is not added."""
+
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = Field(
+        0, description="of noise, lights and which paths an effect acts on"
+    )
+    share: Annotated[float, Field(gt=0, le=1)] = Field(
+        1.0, description="share of the paths that each effect acts on, drawn by path and effect"
+    )
+    speed_m_s: Positive = Field(
+        0.5, description="of the camera along its path: time between frames is distance by speed"
+    )
+    light: LightConfig | None = Field(None, description="light that differs from path to path")
+    motion_blur: MotionBlurConfig | None = Field(None, description="movement while exposing")
+    exposure: ExposureConfig | None = Field(None, description="exposure, fixed or automatic")
+    noise: NoiseConfig | None = Field(None, description="shot and read noise")
+    white_balance_k: Kelvin | None = Field(
+        None,
+        description="colour temperature the camera takes for white, kelvin, in light of 6500:"
+        " below is bluish, above reddish",
+    )
+    jpeg_quality: Annotated[int, Field(ge=1, le=95)] | None = Field(
+        None, description="JPEG compression, libjpeg's scale, before frames are written"
+    )
+
+
+class RenderConfig(Strict):
+    """How images are drawn."""
+
+    backend: Literal["auto", "opengl", "pyrender", "raycast"] = Field(
+        "auto", description="`auto` takes the fastest that works on this machine, and says which"
+    )
+    supersampling: Annotated[int, Field(ge=1, le=4)] = Field(
+        2, description="samples per pixel along each axis; 1 is fastest and aliases"
+    )
+    background_rgb: tuple[Channel, Channel, Channel] = Field(
+        (0, 0, 0), description="colour where nothing is: red, green, blue, each 0 to 255"
+    )
+    effects: EffectsConfig | None = Field(None, description="what is added to ideal frames")
+
+    @model_serializer(mode="wrap")
+    def _without_absent(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without the key where there are none: what is recorded of ideal frames stays the same."""
+        values: dict[str, Any] = handler(self)
+        return {k: v for k, v in values.items() if k != "effects" or v is not None}
+
+
+class RenderSpeedConfig(Strict):
+    """How speed and error of rendering are measured, for `speed_vs_error.csv`."""
+
+    poses: Count = Field(6, description="views of each scene; half as many at the larger sizes")
+    sizes: Annotated[int, Field(ge=1, le=3)] = Field(
+        3, description="of network_camera, groundtruth_camera and 640 x 480, the smallest first"
+    )

@@ -1,0 +1,202 @@
+"""Frames of a camera's paths with effects, the same whatever shard of the paths is drawn.
+
+What depends on time is worked out along whole paths: a shard that begins in the middle of one looks
+at the frames before it, and with auto-exposure draws them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.camera.rays import slopes_of_pixels
+from synfeal.config.models import CameraConfig, EffectsConfig
+from synfeal.effects.camera import AutoExposure, channel_gains, compressed, with_noise
+from synfeal.effects.light import LightState, drawn_light
+from synfeal.effects.transfer import Light, light_of, rgb_of
+from synfeal.geometry.poses import interpolate
+from synfeal.render.base import Depth, Renderer, Rgb
+from synfeal.seeds import generator_of
+
+EFFECTS = ("light", "motion_blur", "exposure", "noise", "white_balance_k", "jpeg_quality")
+Frame = tuple[Rgb, Depth | None]
+
+
+class Poses(Protocol):
+    """Poses of consecutive frames, as :class:`synfeal.dataset.pose_table.PoseTable` holds them."""
+
+    @property
+    def frame(self) -> NDArray[np.int64]:
+        """(N,) index within the split."""
+
+    @property
+    def path(self) -> NDArray[np.int64]:
+        """(N,) index of the straight path."""
+
+    @property
+    def position_m(self) -> NDArray[np.float64]:
+        """(N, 3) camera centres."""
+
+    @property
+    def world_from_cam(self) -> NDArray[np.float64]:
+        """(N, 4, 4) poses."""
+
+
+def path_effects(config: EffectsConfig, poses: Poses, first: int) -> EffectsConfig:
+    """What acts on the path that begins at row ``first``."""
+    rng = _generator("path", config, poses, first)
+    acts = dict(zip(EFFECTS, rng.random(len(EFFECTS)) < config.share, strict=True))
+    return config.model_copy(update={name: None for name in EFFECTS if not acts[name]})
+
+
+def path_light(config: EffectsConfig, poses: Poses, first: int) -> LightState | None:
+    """The light of the path that begins at row ``first``, if it has one of its own."""
+    if config.light is None:
+        return None
+    return drawn_light(config.light, _generator("light", config, poses, first))
+
+
+def paths_of(poses: Poses) -> list[tuple[int, int]]:
+    """First row of every path and the row after its last."""
+    edges = (np.flatnonzero(np.diff(poses.path)) + 1).tolist()
+    return list(zip([0, *edges], [*edges, len(poses.path)], strict=True))
+
+
+def _generator(what: str, config: EffectsConfig, poses: Poses, row: int) -> np.random.Generator:
+    """Seeded by the frame: its number and place tell it from those of other splits and scenes."""
+    return generator_of(what, config.seed, poses.frame[row], *poses.position_m[row].tolist())
+
+
+def varied_frames(
+    renderer: Renderer,
+    camera: CameraConfig,
+    config: EffectsConfig,
+    poses: Poses,
+    begin: int,
+    end: int,
+    with_depth: bool,
+) -> Iterator[Frame]:
+    """Draw the rows ``begin`` to ``end`` (exclusive) of ``poses`` with effects.
+
+    Args:
+        renderer: of the scene, through ``camera``.
+        camera: whose frames they are.
+        config: what is added.
+        poses: whole paths.
+        begin: first row that is asked for.
+        end: row after the last.
+        with_depth: whether depth is asked for; it is that of the middle of the exposure.
+    """
+    for first, last in paths_of(poses):
+        if first < end and last > begin:
+            path = _Path(renderer, camera, config, poses, first, last)
+            yield from path.frames(max(begin, first), min(end, last), with_depth)
+
+
+@dataclass(frozen=True)
+class _Path:
+    """The rows ``first`` to ``last`` (exclusive) of poses, and what draws them."""
+
+    renderer: Renderer
+    camera: CameraConfig
+    whole: EffectsConfig
+    poses: Poses
+    first: int
+    last: int
+
+    def frames(self, begin: int, end: int, with_depth: bool) -> Iterator[Frame]:
+        """The frames of some rows, with those before them for auto-exposure alone."""
+        config = path_effects(self.whole, self.poses, self.first)
+        light = path_light(config, self.poses, self.first)
+        meter = AutoExposure(config.exposure) if config.exposure else None
+        lagging = meter is not None and meter.lags
+        world_from_cam = self.poses.world_from_cam
+        for row in range(self.first if lagging else begin, end):
+            seen, depth_m = self._seen(world_from_cam, row, config, light, with_depth)
+            if meter is not None:
+                seen *= np.float32(2.0 ** meter.next_ev(seen, self._seconds(row, config)))
+            if row >= begin:
+                yield self._taken(seen, row, config), depth_m
+
+    def _seen(
+        self,
+        world_from_cam: NDArray[np.float64],
+        row: int,
+        config: EffectsConfig,
+        light: LightState | None,
+        with_depth: bool,
+    ) -> tuple[Light, Depth | None]:
+        """Light (H, W, 3) that reaches the sensor, and depth where it is needed."""
+        pose, depth_m = world_from_cam[row], None
+        if with_depth or (light is not None and light.amplitude_ev):
+            rgb, depth_m = self.renderer.render_rgbd(pose)
+        seconds = self._seconds(row, config)
+        if config.motion_blur is None or not seconds:
+            seen = light_of(rgb if depth_m is not None else self.renderer.render(pose))
+        else:
+            seen = self._blurred(world_from_cam, row, config)
+        if light is not None:
+            seen *= light.gains
+            if light.amplitude_ev and depth_m is not None:
+                seen *= light.field(self._points_m(pose, depth_m))[..., None]
+        return seen, depth_m if with_depth else None
+
+    def _blurred(
+        self, world_from_cam: NDArray[np.float64], row: int, config: EffectsConfig
+    ) -> Light:
+        """The mean light of sub-frames, midpoints of equal parts of the exposure."""
+        blur = config.motion_blur
+        assert blur is not None
+        count, before = blur.subframes, self._neighbour(row)
+        share = min(1.0, blur.exposure_s / self._seconds(row, config))
+        ends = world_from_cam[before], world_from_cam[row]
+        at = share * ((np.arange(count) + 0.5) / count - 0.5)
+        # From the frame before to this one is 0 to 1; on a path's first frame, 0 to -1.
+        moved = interpolate(*ends, 1 + at)
+        total: Light = light_of(self.renderer.render(moved[0]))
+        for pose in moved[1:]:
+            total += light_of(self.renderer.render(pose))
+        total *= np.float32(1 / count)
+        return total
+
+    def _neighbour(self, row: int) -> int:
+        """The row of the path that movement is measured from."""
+        return row - 1 if row > self.first else min(row + 1, self.last - 1)
+
+    def _seconds(self, row: int, config: EffectsConfig) -> float:
+        """Time between a frame and its neighbour; 0 where the camera does not move."""
+        position_m = self.poses.position_m
+        step_m = np.linalg.norm(position_m[row] - position_m[self._neighbour(row)])
+        return float(step_m) / config.speed_m_s
+
+    def _points_m(self, pose: NDArray[np.float64], depth_m: Depth) -> NDArray[np.float32]:
+        """Where pixels look (H, W, 3); beyond the far plane nothing is."""
+        ray = self._rays_cam @ pose[:3, :3].T.astype(np.float32)
+        near = np.minimum(depth_m, np.float32(self.camera.far_m))[..., None]
+        return np.asarray(pose[:3, 3].astype(np.float32) + near * ray)
+
+    @cached_property
+    def _rays_cam(self) -> NDArray[np.float32]:
+        """Of all pixels (H, W, 3), 1 m along the optical axis."""
+        column, row = np.meshgrid(
+            np.arange(self.camera.width) + 0.5, np.arange(self.camera.height) + 0.5
+        )
+        slopes = slopes_of_pixels(self.camera, np.stack([column, row], axis=-1))
+        return np.concatenate([slopes, np.ones_like(slopes[..., :1])], axis=-1, dtype=np.float32)
+
+    def _taken(self, light: Light, row: int, config: EffectsConfig) -> Rgb:
+        """What the camera makes of light (H, W, 3) that reaches its sensor."""
+        if config.noise is not None:
+            rng = _generator("noise", config, self.poses, row)
+            light = with_noise(light, config.noise, rng)
+        if config.white_balance_k is not None:
+            light /= channel_gains(config.white_balance_k)
+        rgb = rgb_of(light)
+        if config.jpeg_quality is not None:
+            rgb = compressed(rgb, config.jpeg_quality)
+        return rgb

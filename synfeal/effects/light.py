@@ -1,0 +1,57 @@
+"""The light of a path: brightness, colour temperature, and a smooth change across the scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.config.rendering import LightConfig
+from synfeal.effects.camera import channel_gains
+from synfeal.effects.transfer import Light
+
+WAVES = 6
+
+
+@dataclass(frozen=True)
+class LightState:
+    """What the light of a path is.
+
+    Attributes:
+        ev: brightness beside the scene's own, stops.
+        temperature_k: colour temperature; the scene's own is 6500.
+        wave_vectors: (K, 3) of the smooth change, radians per metre.
+        phases: (K,) radians.
+        amplitude_ev: of each of its waves, stops.
+    """
+
+    ev: float
+    temperature_k: float
+    wave_vectors: NDArray[np.float64]
+    phases: NDArray[np.float64]
+    amplitude_ev: float
+
+    @property
+    def gains(self) -> Light:
+        """Factors (3,) on red, green and blue everywhere."""
+        return np.asarray(np.exp2(self.ev) * channel_gains(self.temperature_k), np.float32)
+
+    def field(self, points_m: NDArray[np.float32]) -> Light:
+        """Factors (...) at points (..., 3) of the world."""
+        waves = points_m @ self.wave_vectors.T.astype(np.float32)
+        waves += self.phases.astype(np.float32)
+        return np.asarray(np.exp2(np.float32(self.amplitude_ev) * np.cos(waves).sum(-1)))
+
+
+def drawn_light(config: LightConfig, rng: np.random.Generator) -> LightState:
+    """The light of one path."""
+    ev = rng.uniform(*config.ev)
+    coldest, warmest = config.temperature_k
+    mired = rng.uniform(1e6 / warmest, 1e6 / coldest)
+    ways = rng.standard_normal((WAVES, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    lengths_m = config.field_m * rng.uniform(1, 2, WAVES)
+    amplitude = config.field_ev * np.sqrt(2 / WAVES)
+    phases = rng.uniform(0, 2 * np.pi, WAVES)
+    return LightState(ev, 1e6 / mired, ways * (2 * np.pi / lengths_m[:, None]), phases, amplitude)
