@@ -70,32 +70,46 @@ def with_range(values: pd.Series, digits: int) -> str:
 
 def draw(path: Path, sweep: Sweep, picture: Picture, rows: pd.DataFrame) -> None:
     """A mark for every run; the means of one group are joined in the order of the table."""
-    axes = [name for name in sweep.vary if name not in picture.average]
-    titles = {name: shown.title for name, shown in sweep.show.items()}
-    groups = [("", rows)] if picture.group is None else rows.groupby(picture.group, sort=False)
-    joined = [name for name in axes if name != picture.group]
+    columns = list(rows.groupby(picture.across, sort=False)) if picture.across else [("", rows)]
+    # Measures stand side by side, or below one another where an axis goes across.
+    shape = (len(picture.y), len(columns)) if picture.across else (1, len(picture.y))
+    size = (2.4 * shape[1], 2.5 * shape[0]) if picture.across else (4.3 * shape[1], 3.9)
     with mpl.rc_context(RC), atomic_path(path) as temporary:
-        figure = Figure(figsize=(4.3 * len(picture.y), 3.9), layout="constrained")
-        panels = figure.subplots(1, len(picture.y), squeeze=False)[0]
-        for place, (label, runs) in enumerate(groups):
-            style = {"color": COLORS[place % len(COLORS)], "marker": MARKERS[place // len(COLORS)]}
-            means = runs.groupby(joined or axes, sort=False).mean(numeric_only=True)
-            for panel, measure in zip(panels, picture.y, strict=True):
-                marks = style | {"linestyle": "", "markersize": 3.5, "alpha": 0.5}
-                panel.plot(runs[picture.x], runs[measure], **marks)
-                panel.plot(means[picture.x], means[measure], label=str(label), **style)
-        for panel, measure in zip(panels, picture.y, strict=True):
-            panel.set(xlabel=titles[picture.x], ylabel=titles[measure])
-            panel.grid(color="0.93", which="both")
-            if picture.chosen:
-                means = rows.groupby(axes, sort=False).mean(numeric_only=True).reset_index()
-                mark_front(panel, means, picture.x, measure, picture.chosen)
-            if picture.log:
-                _logarithmic(panel)
+        figure = Figure(figsize=size, layout="constrained")
+        panels = figure.subplots(*shape, squeeze=False, sharey="row" if picture.across else False)
+        panels = panels if picture.across else panels.T
+        for column, (title, runs) in enumerate(columns):
+            panels[0, column].set_title(str(title))
+            for row, measure in enumerate(picture.y):
+                _draw_panel(panels[row, column], sweep, picture, runs, measure)
         if picture.group is not None:
-            handles = panels[0].get_legend_handles_labels()
+            handles = panels[0, 0].get_legend_handles_labels()
             figure.legend(*handles, title=picture.group, loc="outside lower center", ncols=4)
         figure.savefig(temporary, dpi=130)
+
+
+def _draw_panel(
+    panel: Axes, sweep: Sweep, picture: Picture, rows: pd.DataFrame, measure: str
+) -> None:
+    """One measure against the column of costs."""
+    axes = [name for name in sweep.vary if name not in (*picture.average, picture.across)]
+    joined = [name for name in axes if name != picture.group]
+    groups = [("", rows)] if picture.group is None else rows.groupby(picture.group, sort=False)
+    for place, (label, runs) in enumerate(groups):
+        style = {"color": COLORS[place % len(COLORS)], "marker": MARKERS[place // len(COLORS)]}
+        means = runs.groupby(joined or axes, sort=False).mean(numeric_only=True)
+        marks = style | {"linestyle": "", "markersize": 3.5, "alpha": 0.5}
+        panel.plot(runs[picture.x], runs[measure], **marks)
+        panel.plot(means[picture.x], means[measure], label=str(label), **style)
+    panel.set(xlabel=sweep.show[picture.x].title, ylabel=sweep.show[measure].title)
+    if picture.across:
+        panel.label_outer()
+    panel.grid(color="0.93", which="both")
+    if picture.chosen:
+        means = rows.groupby(axes, sort=False).mean(numeric_only=True).reset_index()
+        mark_front(panel, means, picture.x, measure, picture.chosen)
+    if picture.log:
+        _logarithmic(panel)
 
 
 def mark_front(panel: Axes, means: pd.DataFrame, x: str, y: str, chosen: Mapping[str, str]) -> None:

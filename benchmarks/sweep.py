@@ -40,6 +40,7 @@ class Picture(Strict):
     x: str = Field(description="column along the horizontal axis")
     y: list[str] = Field(description="columns, one panel each")
     group: str | None = Field(None, description="axis whose values differ in colour, if any")
+    across: str | None = Field(None, description="axis with a column of panels for each value")
     log: bool = Field(True, description="both axes logarithmic")
     average: list[str] = Field([], description="axes that a mark is the mean over")
     chosen: dict[str, str] = Field(
@@ -66,8 +67,9 @@ class Sweep(Strict):
             for name in (self.picture.x, *self.picture.y):
                 if name not in self.show:
                     raise ValueError(f"picture: '{name}' must be a column of `show`")
-            named = (self.picture.group or "", *self.picture.average, *self.picture.chosen)
-            if not {*named} <= {"", *self.vary}:
+            single = {self.picture.group, self.picture.across} - {None}
+            named = (*single, *self.picture.average, *self.picture.chosen)
+            if not {*named} <= {*self.vary}:
                 raise ValueError(f"picture: axes must be of {', '.join(self.vary)}")
         return self
 
