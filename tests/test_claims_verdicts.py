@@ -97,9 +97,20 @@ def test_conditions_together(conditions, verdict):
     assert all_of(conditions)[0] == verdict
 
 
-def test_reasons_name_few_conditions_and_count_many():
+def test_reasons_name_conditions_and_count_those_without_a_name():
     assert all_of([GOOD, OPEN])[1] == "effect: holds, effect: undecided"
-    assert all_of([GOOD, OPEN, GOOD])[1] == "of 3 conditions 2 holds, 1 undecided"
+    assert all_of([GOOD, OPEN, GOOD])[1] == "holds: effect, effect; undecided: effect"
+    unnamed = [condition._replace(name="") for condition in (GOOD, OPEN, GOOD)]
+    assert all_of(unnamed)[1] == "of 3 conditions 2 holds, 1 undecided"
+
+
+def test_a_mean_that_holds_is_refuted_by_a_single_one_that_is_decided_otherwise_and_only_by_that():
+    against = effect(-60, -50, 55)._replace(name="PoseNet")
+    assert all_of([GOOD], each=[GOOD, OPEN])[0] == HOLDS
+    verdict, reason = all_of([GOOD], each=[GOOD, against])
+    assert verdict == MIXED
+    assert reason.endswith("; single ones opposite: PoseNet")
+    assert all_of([OPEN], each=[GOOD, GOOD])[0] == UNDECIDED
 
 
 def test_counts():

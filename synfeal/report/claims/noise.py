@@ -26,14 +26,15 @@ def kind_of_noise(claim: Claim, evidence: Evidence) -> Outcome:
     """C5: each block raises the error it names, and by more than the other; both raise both."""
     increases = {block: _increase(evidence, block) for block in LEVELS}
     orientation, position, both = (increases[b] for b in ("orientation", "position", "both"))
-    conditions = [
-        orientation.orientation,
-        difference(orientation.orientation, orientation.position),
-        position.position,
-        difference(position.position, position.orientation),
-        *both,
-    ]
-    verdict, reason = all_of([Condition("", condition) for condition in conditions])
+    conditions = {
+        "orientation noise on orientation": orientation.orientation,
+        "more than on position": difference(orientation.orientation, orientation.position),
+        "position noise on position": position.position,
+        "more than on orientation": difference(position.position, position.orientation),
+        "both on position": both.position,
+        "both on orientation": both.orientation,
+    }
+    verdict, reason = all_of([Condition(*condition) for condition in conditions.items()])
     measured = [
         f"{block}: {values_text(PERCENT, found)} ({_tau_text(evidence, block)})"
         for block, found in increases.items()

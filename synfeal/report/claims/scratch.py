@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
-from synfeal.bootstrap import limits, relative_change
+from synfeal.bootstrap import limits, mean_of, relative_change
 from synfeal.config import MODELS
-from synfeal.report.claims.evidence import Cell, Errors, Evidence
+from synfeal.report.claims.evidence import QUANTITIES, Cell, Errors, Evidence
 from synfeal.report.claims.label_sources import changes
 from synfeal.report.claims.model import Claim, Outcome
 from synfeal.report.claims.size import SIZES, in_print
@@ -19,9 +21,22 @@ SCENE = "large_room"
 
 
 def worse_when_small(claim: Claim, evidence: Evidence) -> Outcome:
-    """C10: every change from transfer learning to scratch is above 0 at the two smallest sizes."""
-    found = [c for size in ("6k", "20k") for cell in _changes(evidence, size) for c in cell]
-    verdict, reason = all_of([Condition("", change) for change in found])
+    """C10: the changes from transfer learning to scratch are above 0 at the two smallest sizes."""
+    by_size = {size: _changes(evidence, size) for size in ("6k", "20k")}
+    found = [change for cells in by_size.values() for cell in cells for change in cell]
+    verdict, reason = all_of(
+        [
+            Condition(f"{size} {name}", mean_of(sample))
+            for size, cells in by_size.items()
+            for name, sample in zip(QUANTITIES, zip(*cells, strict=True), strict=True)
+        ],
+        each=[
+            Condition(f"{TITLES[model]} {size} {name}", change)
+            for (size, model, name), change in zip(
+                product(by_size, MODELS, QUANTITIES), found, strict=True
+            )
+        ],
+    )
     worse = np.sum([change > 0 for change in found], axis=0).astype(float)
     low, high = limits(worse)
     measured = f"{worse[0]:.0f} of {len(found)} worse from scratch"

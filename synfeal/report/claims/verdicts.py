@@ -19,6 +19,11 @@ at or below -`smallest`             opposite
 A claim of several conditions holds when all do. It is refuted by one that is decided otherwise at
 the level corrected for their number (Bonferroni); then the verdict is that condition's, or *mixed*
 where others hold or are refuted in another way.
+
+A claim about every localizer is judged by the mean effect over the localizers, which a few runs
+can settle; that of a single localizer can refute the claim, at the corrected level, and only that.
+Asking all of 30 single intervals to exclude no effect would leave true and false claims undecided
+alike at any number of runs that somebody can pay for.
 """
 
 from __future__ import annotations
@@ -74,18 +79,23 @@ def verdict_of(condition: Condition, comparisons: int = 1) -> Verdict:
     return SMALLER if smallest <= low and high <= enough else UNDECIDED
 
 
-def all_of(conditions: Sequence[Condition]) -> tuple[Verdict, str]:
-    """The verdict of a claim that all conditions make, and how each of them came out."""
+def all_of(conditions: Sequence[Condition], each: Sequence[Condition] = ()) -> tuple[Verdict, str]:
+    """The verdict of a claim that all conditions make, and how each of them came out.
+
+    Args:
+        conditions: all of them have to hold.
+        each: what the conditions are means of: none of them may be decided otherwise.
+    """
     parts = [verdict_of(condition) for condition in conditions]
     corrected = [verdict_of(condition, len(conditions)) for condition in conditions]
-    refuted = {part for part in corrected if part in REFUTED}
-    if all(part == HOLDS for part in parts):
-        verdict: Verdict = HOLDS
-    elif not refuted:
-        verdict = UNDECIDED
+    single = [verdict_of(condition, len(each)) for condition in each]
+    refuted = {part for part in (*corrected, *single) if part in REFUTED}
+    if refuted:
+        one = len(refuted) == 1 and HOLDS not in (*parts, *single)
+        verdict: Verdict = next(iter(refuted)) if one else MIXED
     else:
-        verdict = MIXED if len(refuted) > 1 or HOLDS in parts else next(iter(refuted))
-    return verdict, _parts_text(conditions, parts)
+        verdict = HOLDS if all(part == HOLDS for part in parts) else UNDECIDED
+    return verdict, _parts_text(conditions, parts) + _singles_text(each, single)
 
 
 def at_least(sample: Array, number: float) -> Verdict:
@@ -95,9 +105,25 @@ def at_least(sample: Array, number: float) -> Verdict:
 
 
 def _parts_text(conditions: Sequence[Condition], parts: Sequence[Verdict]) -> str:
-    """Each condition by name where they are few, else how many came out in which way."""
+    """How the conditions came out: by name, or how many of them where they have none."""
     if len(conditions) <= 2:
         texts = [f"{c.name}: {part}" for c, part in zip(conditions, parts, strict=True)]
         return ", ".join(texts)
-    counts = Counter(parts).most_common()
-    return f"of {len(parts)} conditions " + ", ".join(f"{n} {part}" for part, n in counts)
+    if not all(condition.name for condition in conditions):
+        counts = Counter(parts).most_common()
+        return f"of {len(parts)} conditions " + ", ".join(f"{n} {part}" for part, n in counts)
+    return "; ".join(f"{part}: {', '.join(names)}" for part, names in _by_part(conditions, parts))
+
+
+def _singles_text(each: Sequence[Condition], parts: Sequence[Verdict]) -> str:
+    """Those of single localizers that are decided against the claim."""
+    against = [(part, names) for part, names in _by_part(each, parts) if part in REFUTED]
+    return "".join(f"; single ones {part}: {', '.join(names)}" for part, names in against)
+
+
+def _by_part(
+    conditions: Sequence[Condition], parts: Sequence[Verdict]
+) -> list[tuple[Verdict, list[str]]]:
+    """The names of the conditions that came out in each way."""
+    pairs = list(zip(conditions, parts, strict=True))
+    return [(part, [c.name for c, own in pairs if own == part]) for part in dict.fromkeys(parts)]
