@@ -96,9 +96,12 @@ def _draw_panel(
     joined = [name for name in axes if name != picture.group]
     groups = [("", rows)] if picture.group is None else rows.groupby(picture.group, sort=False)
     for place, (label, runs) in enumerate(groups):
-        style = {"color": COLORS[place % len(COLORS)], "marker": MARKERS[place // len(COLORS)]}
+        style: dict[str, Any] = {
+            "color": COLORS[place % len(COLORS)],
+            "marker": MARKERS[place // len(COLORS)],
+        }
         means = runs.groupby(joined or axes, sort=False).mean(numeric_only=True)
-        marks = style | {"linestyle": "", "markersize": 3.5, "alpha": 0.5}
+        marks: dict[str, Any] = style | {"linestyle": "", "markersize": 3.5, "alpha": 0.5}
         panel.plot(runs[picture.x], runs[measure], **marks)
         panel.plot(means[picture.x], means[measure], label=str(label), **style)
     panel.set(xlabel=sweep.show[picture.x].title, ylabel=sweep.show[measure].title)
