@@ -49,6 +49,13 @@ def test_the_four_ways_through_the_code_are_there() -> None:
         assert callable(getattr(importlib.import_module(module), function)), name
 
 
+def test_the_index_names_files_that_are_there() -> None:
+    page = (REPOSITORY / "docs/README.md").read_text()
+    paths = re.findall(r"`([\w.]+/[\w./]+)`", page)
+    assert len(paths) > 15
+    assert [path for path in paths if not (REPOSITORY / path).exists()] == []
+
+
 def changed_in(path: Path, column: str, value: str) -> None:
     """Set a column of the first row of a CSV."""
     head, first, *rest = path.read_text().splitlines()

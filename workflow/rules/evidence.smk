@@ -44,7 +44,7 @@ rule table:
     benchmark:
         f"{ROOT}/benchmarks/tables/{{table}}.tsv"
     wildcard_constraints:
-        table="table[2-6]_[a-z_]+",
+        table="table[2-9]_[a-z_]+",
     conda:
         "../envs/synfeal.yaml"
     threads: 1
