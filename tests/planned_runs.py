@@ -6,8 +6,10 @@ import contextlib
 from functools import cache
 from pathlib import Path
 
+import pandas as pd
+
 from synfeal.report.cost.dry_run import PlannedJobs, planned_jobs
-from synfeal.report.cost.jobs import Job, Profile, jobs_of
+from synfeal.report.cost.jobs import Profile, jobs_of
 from synfeal.report.cost.profiles import profile_path, read_profile
 
 ROOT = Path(__file__).parent.parent
@@ -20,7 +22,7 @@ def planned(name: str) -> tuple[Profile, PlannedJobs]:
         return read_profile(name), planned_jobs(profile_path(name))
 
 
-def run_jobs(name: str) -> list[Job]:
+def run_jobs(name: str) -> pd.DataFrame:
     """The jobs with their sizes."""
     profile, jobs = planned(name)
     return jobs_of(profile, jobs.keys)

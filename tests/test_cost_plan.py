@@ -5,26 +5,31 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from baselines.training.device import open_device
 from synfeal.cli import main
 from synfeal.report.cost import steps
-from synfeal.report.cost.compare import compare_cost
 from synfeal.report.cost.estimate import (
+    ALONE,
+    CPU,
+    GPU,
+    OWN,
     Machine,
-    by_table,
+    compare_cost,
     job_costs,
-    run_wall,
     stage_costs,
+    summed,
+    table_costs,
     wall_seconds,
 )
-from synfeal.report.cost.jobs import Job, job_of
-from synfeal.report.cost.laws import Law, fit_laws, fit_seconds
-from synfeal.report.cost.measured import Measured, last_look_s, read_measured, write_measured
+from synfeal.report.cost.jobs import COLUMNS, job_of
+from synfeal.report.cost.laws import LAW, fit_laws, fit_seconds, matched, seconds_of
+from synfeal.report.cost.measured import last_look_s, read_measured, write_measured
 from synfeal.report.cost.networks import training_work
+from synfeal.report.cost.plan import compare_runs
 from synfeal.report.cost.profiles import read_run
-from synfeal.report.cost.run import compare_runs
 from tests.planned_runs import ROOT, planned, run_jobs
 
 HEADER = "s\tmax_rss\tcpu_time\n"
@@ -43,9 +48,22 @@ def config():
     return planned("smoke")[0].config
 
 
+def a_law(name, **values):
+    """One law, as :func:`fit_laws` gives it."""
+    law = {"fixed_s": 0.0, "rate_other": 0.0, "rate": 0.0, "low": 1.0, "high": 1.0, **values}
+    return pd.DataFrame(law, index=[name], columns=list(LAW), dtype=float)
+
+
+def alike(count, stage, law, **values):
+    """Jobs that differ in their names alone."""
+    job = {"stage": stage, "law": law, "unit": "", "disk_bytes": 0.0, "held_bytes": 0.0, **values}
+    jobs = pd.DataFrame([{"job": str(i), **job} for i in range(count)], columns=list(COLUMNS))
+    return jobs.astype({"other": float, "size": float})
+
+
 def write_job(benchmarks, job, seconds):
-    path = benchmarks / job.stage / f"{job.name}.tsv"
-    path = path if job.name else benchmarks / f"{job.stage}.tsv"
+    path = benchmarks / job.stage / f"{job.job}.tsv"
+    path = path if job.job else benchmarks / f"{job.stage}.tsv"
     path.parent.mkdir(parents=True, exist_ok=True)
     # Busy all the time; what Snakemake knows of it is where it looked last.
     peak_mb = 200 + job.held_bytes / 1e6
@@ -53,13 +71,15 @@ def write_job(benchmarks, job, seconds):
 
 
 def true_seconds(job):
-    return START_S + sum(r * x for r, x in zip(RATES.get(job.law, ()), job.size, strict=False))
+    *other, rate = RATES.get(job.law, (0.0,))
+    sizes = np.nan_to_num([job.other, job.size])
+    return START_S + sizes @ [*other, rate][-2:] if other else START_S + rate * sizes[1]
 
 
 @pytest.fixture(scope="module")
 def made_up_run(tmp_path_factory):
     root = tmp_path_factory.mktemp("results") / "smoke"
-    for job in run_jobs("smoke"):
+    for job in run_jobs("smoke").itertuples():
         write_job(root / "benchmarks", job, true_seconds(job))
     return root
 
@@ -68,16 +88,17 @@ def made_up_run(tmp_path_factory):
 def test_every_job_of_snakemake_has_a_name_and_a_size_of_its_own(name):
     jobs, keys = run_jobs(name), planned(name)[1].keys
     assert len(jobs) == len(keys) == len(set(keys)) > 90
-    assert {job.key for job in jobs} == set(keys)
+    assert set(zip(jobs.stage, jobs.job, strict=True)) == set(keys)
     # ImageNet weights are downloaded.
-    assert all(job.size[-1] > 0 for job in jobs if job.size and job.stage != "pretrain")
+    assert (jobs["size"][jobs.stage != "pretrain"].dropna() > 0).all()
 
 
 def test_sizes_at_the_papers_scale():
     jobs = run_jobs("paper")
 
     def sums(stage):
-        return np.sum([job.size for job in jobs if job.stage == stage], axis=0)
+        sizes = jobs.loc[jobs.stage == stage, ["other", "size"]]
+        return sizes.sum().tolist() if sizes.other.notna().any() else sizes["size"].sum()
 
     # 80,000 + 20,000 and 95,000 + 20,000 frames; 640 x 480 pixels with 2 x 2 samples.
     frames = 100_000 + 115_000
@@ -86,7 +107,7 @@ def test_sizes_at_the_papers_scale():
     assert sums("pack") == pytest.approx(frames * 224 * 224 * 3 / 1e6)
     # 6,000 and 2,500 frames in batches of 250; each shares its first frame with the one before.
     batches = 24 + 10
-    assert len([job for job in jobs if job.stage == "sfm"]) == batches
+    assert (jobs.stage == "sfm").sum() == batches
     assert sums("sfm") == pytest.approx((8500 - 2 + batches) * 640 * 480 / 1e6)
     assert sums("render") == pytest.approx([8500, 8500 * 640 * 480 * 4 / 1e6])
 
@@ -107,7 +128,7 @@ def test_a_measurement_of_another_design_is_left_out(stage, name):
 
 
 def test_a_rule_that_nobody_told_the_planner_of_is_counted_as_jobs_that_are_all_alike():
-    assert job_of(planned("smoke")[0], "weather", "today") == Job("weather", "today")
+    assert "size" not in job_of(planned("smoke")[0], "weather", "today")
 
 
 def test_multiply_adds_are_the_published_ones():
@@ -135,7 +156,7 @@ def test_processor_time_is_completed(tmp_path):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f"{HEADER}{wall_s}\t100\t{cpu_s}\n")
     # Half a core when last seen, after 15 s and 4 s; the shortest is taken to have had that too.
-    assert [job.cpu_s for job in read_measured(root)] == pytest.approx([20, 2.2, 0.2])
+    assert read_measured(root).cpu_s.tolist() == pytest.approx([20, 2.2, 0.2])
 
 
 def test_one_file_keeps_the_measurements(made_up_run, tmp_path):
@@ -145,8 +166,8 @@ def test_one_file_keeps_the_measurements(made_up_run, tmp_path):
     (tmp_path / "benchmarks.csv").write_bytes(kept.read_bytes())
     kept.unlink()
     after = read_measured(tmp_path)
-    assert [job.key for job in after] == [job.key for job in before]
-    assert [j.cpu_s for j in after] == pytest.approx([j.cpu_s for j in before], abs=0.006)
+    pd.testing.assert_frame_equal(after, before, rtol=0, atol=0.06)
+    assert after.cpu_s.tolist() == pytest.approx(before.cpu_s.tolist(), abs=0.006)
 
 
 def test_a_law_is_found_and_outliers_are_not_followed():
@@ -188,46 +209,61 @@ def test_no_part_is_negative():
 
 def test_the_made_up_runs_costs_are_predicted(made_up_run):
     rows = compare_runs([made_up_run], made_up_run)[str(made_up_run), str(made_up_run)]
-    factors = {row.stage: row.factor for row in rows}
+    factors = dict(zip(rows.stage, rows.factor, strict=True))
     assert factors.keys() >= {"train", "render_packed", "sfm", "total"}
     assert list(factors.values()) == pytest.approx([1.0] * len(factors), abs=0.05)
 
 
 def test_rendering_scales_with_samples():
-    law = {"rendering": Law(5.0, (0.01, 0.1), (0.5, 2.0), 9, 100.0, 700.0)}
-    jobs = [Job("render_packed", str(i), (1000.0, 1228.8), 0, 5e6) for i in range(3)]
+    law = a_law(
+        "rendering",
+        fixed_s=5.0,
+        rate_other=0.01,
+        rate=0.1,
+        low=0.5,
+        high=2.0,
+        largest=100,
+        base_mb=700,
+    )
+    sizes = {"other": 1000.0, "size": 1228.8, "held_bytes": 5e6}
     machine = Machine(cores=2, gpus=0, gpu_tflops=1.0)
-    costs = job_costs(jobs, law, machine)
-    [stage] = stage_costs(costs, law, machine)
+    [stage] = stage_costs(
+        job_costs(alike(3, "render_packed", "rendering", **sizes), law, machine), machine
+    )
     seconds = 5 + 10 + 122.88
-    assert stage.cpu_s == pytest.approx((1.5 * seconds, 3 * seconds, 6 * seconds))
-    assert stage.wall_s.mid == pytest.approx(2 * seconds)  # three equal jobs on two cores
-    assert stage.wall_s.high == pytest.approx(4 * seconds)
-    assert stage.beyond == pytest.approx(12.288)
-    assert stage.peak_mb == pytest.approx(705)
+    assert [stage[c] for c in CPU] == pytest.approx([1.5 * seconds, 3 * seconds, 6 * seconds])
+    assert stage["wall_mid"] == pytest.approx(2 * seconds)  # three equal jobs on two cores
+    assert stage["wall_high"] == pytest.approx(4 * seconds)
+    assert stage["beyond"] == pytest.approx(12.288)
+    assert stage["peak_mb"] == pytest.approx(705)
 
 
-def test_trainings_on_a_gpu_take_the_assumed_throughput():
-    law = {"training": Law(3.0, (1e-4, 8.0), (0.9, 1.1), 9, 1.0, 400.0)}
-    jobs = [Job("train", str(i), (1e5, 7200.0)) for i in range(4)]
-    [on_gpu] = stage_costs(job_costs(jobs, law, Machine(8, 2, 10.0)), law, Machine(8, 2, 10.0))
+def test_training_on_a_gpu_takes_the_assumed_throughput():
+    law = a_law("training", fixed_s=3.0, rate_other=1e-4, rate=8.0, low=0.9, high=1.1)
+    jobs = alike(4, "train", "training", other=1e5, size=7200.0)
+    machine = Machine(8, 2, 10.0)
+    [on_gpu] = stage_costs(job_costs(jobs, law, machine), machine)
     # 4 x 7200 TFLOP at 20, 10 and 5 TFLOP/s; a core drives each, and starts it.
-    assert on_gpu.gpu_s == pytest.approx((1440, 2880, 5760))
-    assert on_gpu.cpu_s.mid == pytest.approx(2880 + 4 * 3)
-    assert on_gpu.wall_s.mid == pytest.approx(2 * (720 + 3))
+    assert [on_gpu[c] for c in GPU] == pytest.approx([1440, 2880, 5760])
+    assert on_gpu["cpu_mid"] == pytest.approx(2880 + 4 * 3)
+    assert on_gpu["wall_mid"] == pytest.approx(2 * (720 + 3))
     # Starting ten million layers, at 0.1 ms each, takes longer than the arithmetic.
-    [cost] = job_costs([Job("train", "a", (1e7, 7200.0))], law, Machine(8, 2, 10.0))
-    assert cost.gpu_s.mid == pytest.approx(1000)
-    [on_cpu] = stage_costs(job_costs(jobs, law, Machine(4, 0, 10.0)), law, Machine(4, 0, 10.0))
-    assert on_cpu.gpu_s.mid == 0
-    assert on_cpu.cpu_s.mid == pytest.approx(4 * (3 + 10 + 57_600))
+    cost = job_costs(alike(1, "train", "training", other=1e7, size=7200.0), law, machine)
+    assert cost.gpu_mid.tolist() == pytest.approx([1000])
+    on_cores = Machine(4, 0, 10.0)
+    [on_cpu] = stage_costs(job_costs(jobs, law, on_cores), on_cores)
+    assert on_cpu["gpu_mid"] == 0
+    assert on_cpu["cpu_mid"] == pytest.approx(4 * (3 + 10 + 57_600))
 
 
 def test_unmeasured_stages_are_said_to_be():
-    jobs = [Job("sfm", "a", (1.0,), 10)]
-    [stage] = stage_costs(job_costs(jobs, {}, Machine(1, 0, 1.0)), {}, Machine(1, 0, 1.0))
-    assert not stage.known
-    assert (stage.cpu_s.mid, stage.disk_bytes) == (0, 10)
+    machine, laws = Machine(1, 0, 1.0), a_law("other", fixed_s=1.0)
+    costs = job_costs(alike(1, "sfm", "sfm", size=1.0, disk_bytes=10.0), laws, machine)
+    [stage] = stage_costs(costs, machine)
+    assert stage["measured"] == "no"
+    assert np.isnan(stage["cpu_mid"])
+    whole = summed(costs, machine)
+    assert (whole["cpu_mid"], whole["wall_mid"], whole["disk_bytes"]) == (0, 0, 10)
 
 
 def test_longest_jobs_start_first():
@@ -238,12 +274,15 @@ def test_longest_jobs_start_first():
 
 def test_tables_add_up_to_the_run():
     jobs, needed = run_jobs("smoke"), planned("smoke")[1].needed
-    law = {job.law: Law(1.0, (0.0,) * len(job.size), (1.0, 1.0), 1, None, None) for job in jobs}
-    costs = job_costs(jobs, law, Machine(1, 0, 1.0))
-    rows = by_table(costs, needed, Machine(1, 0, 1.0))
-    assert sum(row.own.jobs for row in rows) == len(jobs)
-    assert sum(row.own.cpu_s.mid for row in rows) == pytest.approx(len(jobs))
-    assert run_wall(costs, Machine(1, 0, 1.0)).mid == pytest.approx(len(jobs))
+    laws = pd.concat([a_law(name, fixed_s=1.0) for name in jobs.law.unique()])
+    machine = Machine(1, 0, 1.0)
+    costs = job_costs(jobs, laws, machine)
+    rows = pd.DataFrame(table_costs(costs, needed, machine))
+    own, alone = rows[rows.part == OWN], rows[rows.part == ALONE]
+    assert own.jobs.sum() == len(jobs)
+    assert own.cpu_mid.sum() == pytest.approx(len(jobs))
+    assert alone.set_index("name").jobs.to_dict() == {t: len(keys) for t, keys in needed.items()}
+    assert summed(costs, machine)["wall_mid"] == pytest.approx(len(jobs))
     # By itself a table needs the training runs of its own rows, and from the meshes on.
     rows4 = [e for e in planned("smoke")[0].experiments if e.table == "table4_size"]
     keys = needed["table4_size"]
@@ -279,22 +318,22 @@ def test_steps_that_are_timed_tell_what_a_small_run_does_not():
     """Mini is predicted from a smoke run whose jobs are each 15 % off, one way or the other."""
     mini, _ = read_run(Path("results/published/mini"))
     laws = fit_laws(mini)
-    jobs = [job for job in run_jobs("smoke") if job.law in laws]
+    jobs = run_jobs("smoke")
+    jobs = jobs[jobs.law.isin(laws.index)]
+    rates = tuple(laws.loc["training", ["rate_other", "rate"]])
     for seed in range(4):
-        rng = np.random.default_rng(seed)
-        run = [
-            (job, Measured(*job.key, 0.0, laws[job.law].seconds(job.size) * factor, None))
-            for job, factor in zip(jobs, np.exp(rng.normal(0, 0.15, len(jobs))), strict=True)
-        ]
-        *_, total = compare_cost(fit_laws(run, laws["training"].rates), mini)
+        factor = np.exp(np.random.default_rng(seed).normal(0, 0.15, len(jobs)))
+        run = jobs[["stage", "job"]].assign(cpu_s=seconds_of(jobs, laws) * factor, peak_mb=np.nan)
+        total = compare_cost(fit_laws(matched(jobs, run), rates), mini).iloc[-1]
+        assert total.stage == "total"
         assert 1 / 1.5 < total.factor < 1.5
 
 
 def test_timed_steps_of_a_gpu_replace_the_assumption():
-    law = {"training": Law(3.0, (1e-4, 8.0), (0.9, 1.1), 9, 1.0, 400.0)}
+    law = a_law("training", fixed_s=3.0, rate_other=1e-4, rate=8.0)
     machine = Machine(8, 2, 10.0, gpu_rates=(1e-5, 0.05))
-    [cost] = job_costs([Job("train", "a", (1e6, 7200.0))], law, machine)
-    assert cost.gpu_s.mid == pytest.approx(1e6 * 1e-5 + 7200 * 0.05)
+    cost = job_costs(alike(1, "train", "training", other=1e6, size=7200.0), law, machine)
+    assert cost.gpu_mid.tolist() == pytest.approx([1e6 * 1e-5 + 7200 * 0.05])
 
 
 def test_the_command_prints_and_writes_the_plan(made_up_run, tmp_path, capsys):
@@ -306,7 +345,7 @@ def test_the_command_prints_and_writes_the_plan(made_up_run, tmp_path, capsys):
     assert "Profile smoke on 4 cores: " in text
     assert "GPU" not in text
     rows = {(row["cores"], row["part"], row["name"]): row for row in read_rows(out)}
-    jobs = run_jobs("smoke")
+    jobs = list(run_jobs("smoke").itertuples())
     expected_s = sum(true_seconds(job) for job in jobs if job.stage == "train")
     for cores in ("1", "4"):
         cpu_h = float(rows[cores, "stage", "train"]["cpu_h"])
@@ -323,7 +362,7 @@ def test_runs_are_predicted_from_each_other(made_up_run, tmp_path, capsys):
     out = tmp_path / "check.csv"
     # Twice the time for every job: one direction is twice too high, the other half.
     slow = tmp_path / "smoke"
-    for job in run_jobs("smoke"):
+    for job in run_jobs("smoke").itertuples():
         write_job(slow / "benchmarks", job, 2 * true_seconds(job))
     options = ["--measured", str(made_up_run), "--compare", str(slow), "--csv", str(out)]
     assert main(["plan", *options]) == 0

@@ -67,8 +67,8 @@ OPTIONS: Options = (
 def run(arguments: argparse.Namespace) -> None:
     """Carry out the command."""
     # Above this module, as in architecture.md.
-    from synfeal.report.cost.plan import write_check, write_plans
-    from synfeal.report.cost.run import compare_runs, comparison_text, plan_of, plan_text
+    from synfeal.report.cost.plan import compare_runs, plan_of, write_check, write_plans
+    from synfeal.report.cost.text import comparison_text, plan_text
 
     machines = _machines(arguments)
     if arguments.compare is None:

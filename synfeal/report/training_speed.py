@@ -71,7 +71,7 @@ def _processor_seconds(root: Path, runs: Sequence[str]) -> dict[str, float]:
     folder = root / "benchmarks"
     paths = {name: folder / "train" / f"{name}.tsv" for name in runs}
     measured = read_jobs([path for path in paths.values() if path.exists()], folder)
-    seconds = {job.name: job.cpu_s for job in measured}
+    seconds = dict(zip(measured["job"], measured["cpu_s"], strict=True))
     for name, path in paths.items():
         if not seconds.get(name, 0.0) > 0.0:
             raise InputError(f"{path}: missing, or measured no time; train it again")

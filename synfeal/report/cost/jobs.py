@@ -6,312 +6,235 @@ named like the file below ``<root>/benchmarks`` that its measurement is written 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple
+
+import pandas as pd
 
 from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.methods import METHODS, frame_methods, graph_methods
-from baselines.localizers.names import BackboneName
 from synfeal.config import Config, Design, Experiment
-from synfeal.config.models import CameraConfig, ModelName
 from synfeal.dataset.sequences import sequences_of
-from synfeal.report.cost.disk import (
-    packed_bytes,
-    picture_bytes,
-    pose_bytes,
-    scene_bytes,
-    score_bytes,
-)
 from synfeal.report.cost.networks import Work, pretext_work, training_work
 
-SPLITS = ("train", "test")
-# What the size of a job counts; stages under one law cost the same per unit.
-RENDERING, TRAINING = "rendering", "training"
-UNITS: dict[str, tuple[str, ...]] = {
-    RENDERING: ("frames", "Msamples"),
-    TRAINING: ("layer steps", "TFLOP"),
-    "render_speed": ("image sizes",),
-    "plan": ("frames",),
-    "pack": ("MB",),
-    "dataset": ("frames",),
-    "labels": ("rows",),
-    "sfm": ("Mpx",),
-    "rgbd": ("Mpx",),
-    **dict.fromkeys(frame_methods(), ("Mpx",)),
-    **dict.fromkeys(graph_methods(), ("frames",)),
-    "chain": ("frames",),
-    "score": ("frames",),
-    "descriptors": ("frames",),
-    "features": ("Mpx",),
-    "correspondences": ("frames",),
-    "tracks": ("frames",),
-    "image_references": ("frames",),
-    "structure_references": ("frames",),
-    "claims": ("frames",),
-}
-# Stages from the meshes to the report; others come last.
-STAGES = (
-    *("scene", "plan", "render_packed", "pack", "render", "dataset", "labels", "sfm"),
-    *("rgbd", *frame_methods(), *graph_methods(), "chain", "pretrain", "train", "score"),
-    *("descriptors", "features", "correspondences", "tracks"),
-    *("image_references", "structure_references"),
-    "external_reference",
-    *(
-        "coverage",
-        "cell_depth",
-        "render_speed",
-        "collection_speed",
-        "tables",
-        "claims",
-        "figures",
-        "summary",
-        "provenance",
-    ),
-    *("report", "report_document"),
-)
-LAW_OF = {
-    **dict.fromkeys(("render", "render_packed"), RENDERING),
-    **dict.fromkeys(("pretrain", "train"), TRAINING),
-}
-# Bytes of memory per pixel of a batch: what peaks differ by between profiles (docs/cost.md).
-HELD_PER_PX = {"sfm": 10, "rgbd": 26, **dict.fromkeys(frame_methods(), 26)}
+# Stages under one law cost the same per unit.
+TRAINING = "training"
+LAW_OF_UNIT = {"Msamples": "rendering", "TFLOP": TRAINING}
+COLUMNS = ("stage", "job", "law", "unit", "other", "size", "disk_bytes", "held_bytes")
+NUMBERS = ("other", "size", "disk_bytes", "held_bytes")
 
-# Of a frame: global descriptors, one of its SIFT features, its matches, its observations.
-DESCRIPTOR_BYTES, FEATURE_BYTES = 4 * (256 + 192), 128 + 24
-MATCHES_BYTES, TRACKS_BYTES = 800 * 56, 200 * 32 + 520 * 8
+# Bytes on disk, of the published small run (docs/cost.md): of a pose in a table, a scored frame, a
+# frame's descriptors, matches and observations; per pixel of an image; of a procedural scene.
+POSE, SCORED, DESCRIPTORS = 160, 360, 4 * (256 + 192)
+MATCHES, TRACKS = 800 * 56, 200 * 32 + 520 * 8
+COLOUR_PER_PX, DEPTH_PER_PX, POSE_FILE = 1.6, 0.5, 275
+SCENE = 50e6
+# Bytes of memory per pixel of a batch: what peaks differ by between profiles; of a SIFT feature.
+SFM_PER_PX, RGBD_PER_PX, FEATURE = 10, 26, 128 + 24
+
+Key = tuple[str, str]
+Part = Mapping[str, str]
+BATCH, RUN = "scene/size/split/batch", "scene/size/labels/init/model/seed"
 
 
-@dataclass(frozen=True)
-class Job:
-    """One job.
-
-    Attributes:
-        stage: folder or file of ``<root>/benchmarks`` that measures it.
-        name: path below that, without ``.tsv``; empty where the stage is a file.
-        size: in the units of its law, the main one last; empty where all jobs are alike.
-        disk_bytes: what it leaves behind.
-        held_bytes: data it holds in memory at once.
-    """
-
-    stage: str
-    name: str
-    size: tuple[float, ...] = ()
-    disk_bytes: float = 0.0
-    held_bytes: float = 0.0
-
-    @property
-    def key(self) -> tuple[str, str]:
-        """Stage and name."""
-        return self.stage, self.name
-
-    @property
-    def law(self) -> str:
-        """The law that its cost follows."""
-        return LAW_OF.get(self.stage, self.stage)
-
-
-@dataclass(frozen=True)
-class Profile:
+class Profile(NamedTuple):
     """A configuration and its design."""
 
     config: Config
     experiments: tuple[Experiment, ...]
 
 
-Size = tuple[tuple[float, ...], float, float]  # of a Job: size, disk_bytes, held_bytes
+class Stage(NamedTuple):
+    """How the jobs of a stage are named, and what they count.
+
+    Attributes:
+        parts: of a job's name; None where all jobs are alike, whatever their names.
+        unit: of the size.
+        splits: whose frames count where the name says no split.
+        disk: bytes that a frame leaves behind.
+        held_per_px: bytes of memory for each pixel of the frames.
+    """
+
+    parts: str | None = None
+    unit: str = ""
+    splits: tuple[str, ...] = ("train", "test")
+    disk: float = 0.0
+    held_per_px: float = 0.0
 
 
-def jobs_of(profile: Profile, keys: Iterable[tuple[str, str]]) -> list[Job]:
-    """The jobs of these names that the profile may have, in the order of the stages."""
+_FRAME_STAGE = Stage(BATCH, "Mpx", disk=POSE, held_per_px=RGBD_PER_PX)
+_REFERENCE = Stage("scene/size/labels", "frames", ("test",), disk=POSE + SCORED)
+# From the meshes to the report; others come last.
+STAGES: dict[str, Stage] = {
+    "scene": Stage("scene"),
+    "plan": Stage("scene/split", "frames", disk=POSE),
+    "render_packed": Stage("scene/sequence", "Msamples"),
+    "pack": Stage("scene/split", "MB"),
+    "render": Stage("scene/camera/sequence", "Msamples"),
+    "dataset": Stage("scene/camera", "frames"),
+    "labels": Stage("scene/size/labels/split", "rows", disk=POSE),
+    "sfm": _FRAME_STAGE._replace(held_per_px=SFM_PER_PX),
+    "rgbd": _FRAME_STAGE,
+    **dict.fromkeys(frame_methods(), _FRAME_STAGE),
+    **dict.fromkeys(graph_methods(), Stage(BATCH, "frames", disk=POSE)),
+    "chain": Stage("scene/size/labels", "frames", disk=2 * POSE),  # with and without assistance
+    "pretrain": Stage("backbone", "TFLOP"),
+    "train": Stage(RUN, "TFLOP"),
+    "score": Stage(RUN, "frames", ("test",), disk=SCORED),
+    "descriptors": Stage("scene", "frames", disk=DESCRIPTORS),
+    "features": Stage("scene/size/split", "Mpx"),
+    "correspondences": Stage("scene/size", "frames", ("test",), disk=MATCHES),
+    "tracks": Stage("scene/size", "frames", ("train",), disk=TRACKS),
+    "image_references": _REFERENCE,
+    "structure_references": _REFERENCE,
+    **dict.fromkeys(("external_reference", "coverage", "cell_depth"), Stage()),
+    "render_speed": Stage("scene", "image sizes"),
+    **dict.fromkeys(("collection_speed", "tables"), Stage()),
+    "claims": Stage("", "frames"),
+    **dict.fromkeys(("figures", "summary", "provenance", "report", "report_document"), Stage()),
+}
+
+
+def jobs_of(profile: Profile, keys: Iterable[Key]) -> pd.DataFrame:
+    """The jobs of these names that the profile may have, in the order of the stages.
+
+    Columns are ``stage`` and ``job``, folder or file of ``<root>/benchmarks`` and path below that;
+    ``law``; ``size`` in ``unit``, and ``other`` in a second one (frames of a rendering, layer steps
+    of a training run), NaN where there is none; ``disk_bytes`` left behind; ``held_bytes`` of data
+    in memory at once.
+    """
     made = [job for key in keys if (job := job_of(profile, *key)) is not None]
     order = {stage: place for place, stage in enumerate(STAGES)}
-    return sorted(made, key=lambda job: order.get(job.stage, len(order)))
+    made.sort(key=lambda job: order.get(job["stage"], len(order)))
+    jobs = pd.DataFrame.from_records(made, columns=list(COLUMNS))
+    return jobs.astype(dict.fromkeys(NUMBERS, float)).fillna({"disk_bytes": 0.0, "held_bytes": 0.0})
 
 
-def job_of(profile: Profile, stage: str, name: str) -> Job | None:
+def job_of(profile: Profile, stage: str, name: str) -> dict[str, Any] | None:
     """The job of this name; None if the profile has no such scene, size, sequence or network."""
-    size_of = SIZES.get(stage)
-    if size_of is None:
-        return Job(stage, name)
+    kind = STAGES.get(stage, Stage())
+    law = LAW_OF_UNIT.get(kind.unit, stage)
+    job: dict[str, Any] = {"stage": stage, "job": name, "law": law, "unit": kind.unit}
+    if kind.parts is None:
+        return job
     try:
-        return Job(stage, name, *size_of(profile, *name.split("/")))
-    except (KeyError, IndexError, TypeError, ValueError, StopIteration):
+        part = dict(zip(kind.parts.split("/"), name.split("/"), strict=True))
+        return job | OWN_SIZES.get(stage, _of_frames)(profile, part, kind)
+    except (KeyError, IndexError, ValueError, StopIteration):
         return None  # the name is of another design, or of an older workflow
 
 
-def _scene(profile: Profile, scene: str) -> Size:
-    return (), scene_bytes(profile.config.scenes[scene].path), 0.0
+def _of_frames(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
+    """Size by the frames that a job goes through."""
+    config, frames = profile.config, _frames(profile, part, kind)
+    with_depth = kind.unit == "Mpx" or part.get("camera") == "groundtruth"
+    camera = config.groundtruth_camera if with_depth else config.network_camera
+    pixels = frames * camera.width * camera.height
+    sizes = {
+        "frames": float(frames),
+        "rows": float(frames + _read_rows(config, part, frames)),
+        "Mpx": pixels / 1e6,
+        "Msamples": pixels * config.render.supersampling**2 / 1e6,
+        "MB": 3 * frames * config.network.input_px**2 / 1e6,
+    }
+    job = {"size": sizes[kind.unit], "disk_bytes": kind.disk * frames}
+    job["held_bytes"] = pixels * kind.held_per_px
+    if kind.unit == "Msamples":
+        job["other"] = float(frames)
+    if kind.unit == "MB":  # packed frames
+        job["disk_bytes"] = 1e6 * job["size"]
+    if "camera" in part and "sequence" in part:  # as image files; other parts are joined in arrays
+        per_px = COLOUR_PER_PX + DEPTH_PER_PX * with_depth
+        job["disk_bytes"] = pixels * per_px + frames * POSE_FILE
+    return job
 
 
-def _plan(profile: Profile, scene: str, split: str) -> Size:
-    frames = profile.config.n_largest(scene, split)
-    return (frames,), pose_bytes(frames), 0.0
+def _frames(profile: Profile, part: Part, kind: Stage) -> int:
+    """Frames of a batch, a sequence, a split or several."""
+    config, scene = profile.config, part["scene"]
+    sizes = [part["size"]] if "size" in part else list(config.scenes[scene].sizes)
+    if part.get("camera") == "groundtruth":
+        estimated = {
+            e.size for e in profile.experiments if (e.scene, e.labels in METHODS) == (scene, True)
+        }
+        sizes = [size for size in sizes if size in estimated]
+
+    def count(split: str) -> int:
+        if scene in config.rooms:
+            return config.n_largest(scene, split)
+        return max(config.n_frames(scene, size, split) for size in sizes)
+
+    counts = [count(split) for split in ([part["split"]] if "split" in part else kind.splits)]
+    if "batch" in part:
+        index = int(part["batch"].removeprefix("batch-"))
+        return len(batches_of(counts[0], config.groundtruth.batch_frames)[index])
+    if "sequence" in part:
+        sequences = sequences_of(counts[0], counts[1], config.shard_frames)
+        return next(len(s) for s in sequences if s.name == part["sequence"])
+    return sum(counts)
 
 
-def _pack(profile: Profile, scene: str, split: str) -> Size:
-    frames = profile.config.n_largest(scene, split)
-    n_bytes = packed_bytes(frames, profile.config.network.input_px)
-    return (n_bytes / 1e6,), n_bytes, 0.0
+def _read_rows(config: Config, part: Part, frames: int) -> int:
+    """Rows read for a set of labels: true ones are the first of the whole plan."""
+    if part.get("labels") != "synfeal" or "split" not in part:
+        return frames
+    return config.n_largest(part["scene"], part["split"])
 
 
-def _render_packed(profile: Profile, scene: str, sequence: str) -> Size:
-    """Rendering straight into arrays; the parts are removed once they are joined."""
-    frames = _frames_of(profile, _largest(profile, scene), sequence)
-    return _rendering(profile.config, profile.config.network_camera, frames), 0.0, 0.0
+def _scene(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
+    """A prepared scene takes as much as the user's mesh, or as a procedural one."""
+    path = profile.config.scenes[part["scene"]].path
+    known = path is not None and path.is_file()
+    return {"disk_bytes": path.stat().st_size if path is not None and known else SCENE}
 
 
-def _render(profile: Profile, scene: str, camera_name: str, sequence: str) -> Size:
-    """Image files, with depth from the ground-truth camera."""
-    depth = camera_name == "groundtruth"
-    camera = profile.config.groundtruth_camera if depth else profile.config.network_camera
-    frames = _frames_of(profile, _written(profile, scene, camera_name), sequence)
-    return _rendering(profile.config, camera, frames), picture_bytes(camera, frames, depth), 0.0
-
-
-def _dataset(profile: Profile, scene: str, camera_name: str) -> Size:
-    return (float(sum(_written(profile, scene, camera_name))),), 0.0, 0.0
-
-
-def _largest(profile: Profile, scene: str) -> tuple[int, int]:
-    """Training and test frames of the largest set."""
-    train, test = (profile.config.n_largest(scene, split) for split in SPLITS)
-    return train, test
-
-
-def _written(profile: Profile, scene: str, camera_name: str) -> tuple[int, int]:
-    """The same as image files: of the ground-truth camera those of the largest set estimated."""
-    if camera_name == "network":
-        return _largest(profile, scene)
-    config = profile.config
-    sizes = [e.size for e in profile.experiments if e.scene == scene and e.labels in METHODS]
-    train, test = (max(config.n_frames(scene, s, split) for s in sizes) for split in SPLITS)
-    return train, test
-
-
-def _frames_of(profile: Profile, counts: tuple[int, int], name: str) -> int:
-    return next(
-        len(s) for s in sequences_of(*counts, profile.config.shard_frames) if s.name == name
-    )
-
-
-def _rendering(config: Config, camera: CameraConfig, frames: int) -> tuple[float, float]:
-    samples = camera.width * camera.height * config.render.supersampling**2
-    return frames, frames * samples / 1e6
-
-
-def _labels(profile: Profile, scene: str, size: str, labels: str, split: str) -> Size:
-    """True labels are the first rows of the whole plan."""
-    frames = profile.config.n_frames(scene, size, split)
-    read = profile.config.n_largest(scene, split) if labels == "synfeal" else frames
-    return (read + frames,), pose_bytes(frames), 0.0
-
-
-def _batch(stage: str) -> Callable[..., Size]:
-    def size_of(profile: Profile, scene: str, size: str, split: str, batch: str) -> Size:
-        config, camera = profile.config, profile.config.groundtruth_camera
-        frames = config.n_frames(scene, size, split)
-        index = int(batch.removeprefix("batch-"))
-        length = len(batches_of(frames, config.groundtruth.batch_frames)[index])
-        pixels = length * camera.width * camera.height
-        amount = length if UNITS[stage] == ("frames",) else pixels / 1e6
-        return (amount,), pose_bytes(length), pixels * HELD_PER_PX.get(stage, 0)
-
-    return size_of
-
-
-def _chain(profile: Profile, scene: str, size: str, labels: str) -> Size:
-    frames = sum(profile.config.n_frames(scene, size, split) for split in SPLITS)
-    return (frames,), 2 * pose_bytes(frames), 0.0  # assisted and unassisted labels
-
-
-def _pretrain(profile: Profile, backbone: BackboneName) -> Size:
+def _pretrain(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
     config = profile.config
     samples = config.pretraining.samples_seen if config.rooms else 0
     frames = config.pretraining.frames * len(config.rooms)
-    work = pretext_work(backbone, config.network)
+    work = pretext_work(part["backbone"], config.network)
     return _learning(config, work, samples, config.pretraining.batch_size, 0, frames)
 
 
-def _train(profile: Profile, scene: str, size: str, *run: str) -> Size:
-    config, model = profile.config, _model(run)
-    train, test = (config.n_frames(scene, size, split) for split in SPLITS)
-    work = training_work(model, config.network, config.localizers[model])
+def _train(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
+    config, size = profile.config, part["size"]
+    train, test = (config.n_frames(part["scene"], size, split) for split in ("train", "test"))
+    hyper = config.localizers[part["model"]]  # type: ignore[index]
+    work = training_work(part["model"], config.network, hyper)
     samples, batch = config.training.samples_seen[size], config.training.batch_size
     return _learning(config, work, samples, batch, test, train)
 
 
-def _model(run: tuple[str, ...]) -> ModelName:
-    _, _, model, _ = run  # labels, init, model, seed
-    return model  # type: ignore[return-value]
-
-
 def _learning(
     config: Config, work: Work, samples: int, batch: int, predicted: int, frames: int
-) -> Size:
-    held = packed_bytes(frames, config.network.input_px) + work.held_bytes(batch)
-    return work.size(samples, batch, predicted), work.parameter_bytes, held
+) -> dict[str, float]:
+    layer_steps, tflop = work.size(samples, batch, predicted)
+    held = 3.0 * frames * config.network.input_px**2 + work.held_bytes(batch)
+    disk = work.parameter_bytes
+    return {"other": layer_steps, "size": tflop, "disk_bytes": disk, "held_bytes": held}
 
 
-def _score(profile: Profile, scene: str, size: str, *run: str) -> Size:
-    frames = profile.config.n_frames(scene, size, "test")
-    return (frames,), score_bytes(frames), 0.0
+def _features(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
+    job = _of_frames(profile, part, kind)
+    features = profile.config.references.max_features
+    return job | {"held_bytes": _frames(profile, part, kind) * features * FEATURE}
 
 
-def _descriptors(profile: Profile, scene: str) -> Size:
-    frames = sum(_largest(profile, scene))
-    return (frames,), frames * DESCRIPTOR_BYTES, 0.0
+def _render_speed(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
+    return {"size": profile.config.render_speed.sizes}
 
 
-def _features(profile: Profile, scene: str, size: str, split: str) -> Size:
-    config, camera = profile.config, profile.config.groundtruth_camera
-    frames = config.n_frames(scene, size, split)
-    held = frames * config.references.max_features * FEATURE_BYTES
-    return (frames * camera.width * camera.height / 1e6,), 0.0, held
-
-
-def _correspondences(profile: Profile, scene: str, size: str) -> Size:
-    frames = profile.config.n_frames(scene, size, "test")
-    return (frames,), frames * MATCHES_BYTES, 0.0
-
-
-def _tracks(profile: Profile, scene: str, size: str) -> Size:
-    frames = profile.config.n_frames(scene, size, "train")
-    return (frames,), frames * TRACKS_BYTES, 0.0
-
-
-def _reference(profile: Profile, scene: str, size: str, labels: str) -> Size:
-    frames = profile.config.n_frames(scene, size, "test")
-    return (frames,), pose_bytes(frames) + score_bytes(frames), 0.0
-
-
-def _render_speed(profile: Profile, scene: str) -> Size:
-    return (profile.config.render_speed.sizes,), 0.0, 0.0
-
-
-def _claims(profile: Profile, _: str) -> Size:
+def _claims(profile: Profile, _: Part, __: Stage) -> dict[str, float]:
     config = profile.config
     runs = Design(rows=profile.experiments, repetitions=config.training.repetitions).runs
-    return (sum(config.n_frames(run.scene, run.size, "test") for run in runs),), 0.0, 0.0
+    return {"size": sum(config.n_frames(run.scene, run.size, "test") for run in runs)}
 
 
-SIZES: dict[str, Callable[..., Size]] = {
+OWN_SIZES: dict[str, Callable[[Profile, Part, Stage], dict[str, float]]] = {
     "scene": _scene,
-    "plan": _plan,
-    "pack": _pack,
-    "render_packed": _render_packed,
-    "render": _render,
-    "dataset": _dataset,
-    "labels": _labels,
-    **{stage: _batch(stage) for stage in ("sfm", "rgbd", *frame_methods(), *graph_methods())},
-    "chain": _chain,
     "pretrain": _pretrain,
     "train": _train,
-    "score": _score,
-    "descriptors": _descriptors,
     "features": _features,
-    "correspondences": _correspondences,
-    "tracks": _tracks,
-    **dict.fromkeys(("image_references", "structure_references"), _reference),
     "render_speed": _render_speed,
     "claims": _claims,
 }

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from statistics import fmean, median
-
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from synfeal.report.cost.jobs import TRAINING, Job
-from synfeal.report.cost.measured import Measured
+from synfeal.report.cost.jobs import TRAINING
 
 # Least ratio of the largest to the smallest job that tells the fixed part from the part per unit.
 LEAST_RATIO = 1.5
@@ -20,52 +16,38 @@ OUTLIER = 0.15
 # A range needs this many jobs.
 LEAST_JOBS = 3
 QUANTILES = (0.1, 0.9)
+# A law: seconds of a job are ``fixed_s + rate_other * other + rate * size``, and 10 and 90 % of the
+# measured ones are below ``low`` and ``high`` times that (1 for under three jobs). ``largest`` of
+# the measured sizes, NaN where all jobs are alike; ``base_mb``, peak memory without the data a job
+# holds, NaN where it was not measured.
+LAW = ("fixed_s", "rate_other", "rate", "low", "high", "largest", "base_mb")
 
 
-@dataclass(frozen=True)
-class Law:
-    """Seconds of a job: ``fixed_s + rates . size``.
+def matched(jobs: pd.DataFrame, measured: pd.DataFrame) -> pd.DataFrame:
+    """Measured jobs with what is known of those of the same name."""
+    return measured.merge(jobs, on=["stage", "job"])
 
-    Attributes:
-        fixed_s: start of the program, imports, reading the mesh.
-        rates: seconds per unit, one per unit of the size.
-        spread: 10 and 90 % quantiles of measured over fitted seconds; (1, 1) for under three jobs.
-        n_jobs: measured.
-        largest: of the measured jobs, in the main unit; None where all jobs are alike.
-        base_mb: peak memory without the data a job holds; None where it was not measured.
+
+def fit_laws(pairs: pd.DataFrame, training: tuple[float, ...] | None = None) -> pd.DataFrame:
+    """A law (columns :data:`LAW`) by its name, for everything that was measured.
+
+    Args:
+        pairs: what :func:`matched` gives.
+        training: parts per unit of training runs, where they are known better.
     """
-
-    fixed_s: float
-    rates: tuple[float, ...]
-    spread: tuple[float, float]
-    n_jobs: int
-    largest: float | None
-    base_mb: float | None
-
-    def seconds(self, size: Sequence[float]) -> float:
-        """Of one job."""
-        return self.fixed_s + sum(r * x for r, x in zip(self.rates, size, strict=True))
-
-
-Pairs = list[tuple[Job, Measured]]
-
-
-def matched(jobs: Iterable[Job], measured: Iterable[Measured]) -> Pairs:
-    """Measured jobs beside those of the same name."""
-    known = {job.key: job for job in jobs}
-    return [(known[m.key], m) for m in measured if m.key in known]
-
-
-def fit_laws(pairs: Pairs, training: tuple[float, ...] | None = None) -> dict[str, Law]:
-    """A law for everything that was measured; parts per unit of trainings may be known better."""
     start_s = _start(pairs)
-    by_law: dict[str, Pairs] = {}
-    for job, measured in pairs:
-        by_law.setdefault(job.law, []).append((job, measured))
-    return {
+    laws = {
         name: _law(group, start_s, training if name == TRAINING else None)
-        for name, group in by_law.items()
+        for name, group in pairs.groupby("law", sort=False)
     }
+    return pd.DataFrame.from_dict(laws, orient="index", columns=list(LAW), dtype=float)
+
+
+def seconds_of(jobs: pd.DataFrame, laws: pd.DataFrame) -> pd.Series[float]:
+    """Seconds of every job by its law; NaN where there is none."""
+    law = jobs[["law"]].join(laws, on="law")
+    work = law["rate_other"] * jobs["other"].fillna(0.0) + law["rate"] * jobs["size"].fillna(0.0)
+    return law["fixed_s"] + work
 
 
 def fit_seconds(
@@ -79,7 +61,7 @@ def fit_seconds(
     """
     n_units = sizes.shape[1]
     if n_units == 0:
-        return fmean(seconds), ()
+        return float(np.mean(seconds)), ()
     varied = max(np.ptp(np.log(np.maximum(column, 1e-12))) for column in sizes.T)
     if len(sizes) >= 2 * (n_units + 1) and varied >= np.log(LEAST_RATIO):
         return _regression(sizes, seconds, min(start_s, float(seconds.min())))
@@ -107,9 +89,9 @@ def _regression(
     return float(fixed_s), tuple(float(rate) for rate in rates)
 
 
-def _law(pairs: Pairs, start_s: float, known: tuple[float, ...] | None) -> Law:
-    sizes = np.array([job.size for job, _ in pairs], dtype=float).reshape(len(pairs), -1)
-    seconds = np.array([max(measured.cpu_s, 1e-3) for _, measured in pairs])
+def _law(pairs: pd.DataFrame, start_s: float, known: tuple[float, ...] | None) -> list[float]:
+    sizes = pairs[["other", "size"]].dropna(axis="columns").to_numpy()
+    seconds = np.maximum(pairs["cpu_s"].to_numpy(), 1e-3)
     if known is None:
         fixed_s, rates = fit_seconds(sizes, seconds, start_s)
         # Scenes differ, and a robust fit follows most jobs: the sum of all is what is asked for.
@@ -118,24 +100,15 @@ def _law(pairs: Pairs, start_s: float, known: tuple[float, ...] | None) -> Law:
     else:
         rates = known
         fixed_s = max(start_s, float(np.median(seconds - sizes @ np.array(rates))))
-    fitted = fixed_s + sizes @ np.array(rates)
-    low, high = np.quantile(seconds / fitted, QUANTILES)
-    spread = (float(low), float(high)) if len(pairs) >= LEAST_JOBS else (1.0, 1.0)
-    bases = [m.peak_mb - job.held_bytes / 1e6 for job, m in pairs if m.peak_mb is not None]
-    return Law(
-        fixed_s,
-        rates,
-        spread,
-        len(pairs),
-        float(sizes[:, -1].max()) if sizes.shape[1] else None,
-        max(bases, default=None),
-    )
+    spread = np.ones(2)
+    if len(pairs) >= LEAST_JOBS:
+        spread = np.quantile(seconds / (fixed_s + sizes @ np.array(rates)), QUANTILES)
+    base_mb = (pairs["peak_mb"] - pairs["held_bytes"] / 1e6).max()
+    return [fixed_s, *(0.0, 0.0, *rates)[-2:], *spread, pairs["size"].max(), base_mb]
 
 
-def _start(pairs: Pairs) -> float:
+def _start(pairs: pd.DataFrame) -> float:
     """Seconds to start a program: the median of the stage where it is least."""
-    groups: dict[str, list[float]] = {}
-    for job, measured in pairs:
-        groups.setdefault(job.stage, []).append(measured.cpu_s)
-    enough = [median(group) for group in groups.values() if len(group) >= LEAST_JOBS]
-    return min(enough or [median(group) for group in groups.values()] or [0.0])
+    stages = pairs.groupby("stage")["cpu_s"].agg(["median", "size"])
+    enough = stages[stages["size"] >= LEAST_JOBS]
+    return float((enough if len(enough) else stages)["median"].min())

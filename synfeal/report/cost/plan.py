@@ -1,15 +1,34 @@
-"""What a plan is made of, and the files that keep plans and checks of plans."""
+"""The plan of a profile, from its files to a table of costs; and a check of such predictions."""
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from synfeal.files import atomic_path
-from synfeal.report.cost.compare import Comparisons
-from synfeal.report.cost.estimate import Machine, Share, Span, StageCost, TableCost
+import pandas as pd
+
+from synfeal.config import Config
+from synfeal.frames import write_frame
+from synfeal.report.cost.dry_run import planned_jobs
+from synfeal.report.cost.estimate import (
+    ALONE,
+    OWN,
+    RUN,
+    Machine,
+    compare_cost,
+    job_costs,
+    stage_costs,
+    summed,
+    table_costs,
+)
+from synfeal.report.cost.jobs import jobs_of
+from synfeal.report.cost.laws import fit_laws
+from synfeal.report.cost.profiles import profile_path, read_profile, read_run, read_runs
+
+if TYPE_CHECKING:
+    from synfeal.report.cost.steps import StepRates
 
 PLAN_COLUMNS = (
     *("profile", "cores", "gpus", "gpu_tflops", "part", "name", "jobs", "work", "unit"),
@@ -17,10 +36,8 @@ PLAN_COLUMNS = (
     *("wall_h", "wall_h_low", "wall_h_high", "disk_gb", "peak_memory_gb", "times_measured_size"),
     "measured",
 )
-CHECK_COLUMNS = (
-    *("predicted_from", "predicted", "stage", "jobs"),
-    *("predicted_cpu_s", "predicted_low_cpu_s", "predicted_high_cpu_s", "measured_cpu_s", "factor"),
-)
+# By the runs that were predicted from and the run that was predicted.
+Comparisons = dict[tuple[str, str], pd.DataFrame]
 
 
 @dataclass(frozen=True)
@@ -30,88 +47,124 @@ class Plan:
     Attributes:
         profile: its name.
         machine: what it is planned for.
-        stages: in their order.
-        tables: what each table of the paper needs.
-        whole: all jobs.
+        costs: a row for each stage, for each table, and last for the run; see ``estimate.py``.
         origin: what the laws were fitted to.
     """
 
     profile: str
     machine: Machine
-    stages: list[StageCost]
-    tables: list[TableCost]
-    whole: Share
+    costs: pd.DataFrame
     origin: str
 
-    @property
-    def disk_bytes(self) -> float:
-        """What the run leaves behind."""
-        return sum(stage.disk_bytes for stage in self.stages)
 
-    @property
-    def peak_mb(self) -> float:
-        """Memory of the largest job."""
-        return max((stage.peak_mb or 0.0 for stage in self.stages), default=0.0)
+def plan_of(
+    profile_name: str,
+    measured: Sequence[Path],
+    machines: Sequence[Machine],
+    time_steps: bool = False,
+) -> list[Plan]:
+    """What a run of a profile costs on each machine, stage by stage and table by table.
+
+    Args:
+        profile_name: a profile of ``config/``, or the path of its file.
+        measured: results of runs that the prediction is made from.
+        machines: what it is planned for.
+        time_steps: time some training steps here, on the GPU if there is one, and use these.
+
+    Raises:
+        InputError: a profile or a run cannot be read.
+    """
+    profile = read_profile(profile_name)
+    pairs, unknown = read_runs(measured)
+    timed = _timed(profile.config) if time_steps else None
+    laws = fit_laws(pairs, timed.rates if timed and not timed.on_gpu else None)
+    planned = planned_jobs(profile_path(profile_name))
+    jobs = jobs_of(profile, planned.keys)
+    if len(jobs) < len(planned.keys):  # a rule measures jobs under names that jobs.py cannot read
+        known = set(zip(jobs["stage"], jobs["job"], strict=True))
+        raise ValueError(f"no size of {sorted(set(planned.keys) - known)[:3]}")
+    origin = f"{len(pairs)} jobs of {', '.join(map(str, measured))}"
+    if unknown:
+        origin += f" ({unknown} more are of another design or an older workflow)"
+    if timed:
+        origin += f"; training steps timed here, on a {'GPU' if timed.on_gpu else 'core'}"
+    plans = []
+    for machine in machines:
+        if timed and timed.on_gpu:
+            machine = replace(machine, gpu_rates=timed.rates)
+        if profile.config.training.device == "cpu":
+            machine = Machine(machine.cores, 0, machine.gpu_tflops)
+        costs = job_costs(jobs, laws, machine)
+        rows = [*stage_costs(costs, machine), *table_costs(costs, planned.needed, machine)]
+        rows.append({"part": RUN, "name": "total", **summed(costs, machine)})
+        plans.append(Plan(profile.config.profile, machine, pd.DataFrame(rows), origin))
+    return plans
+
+
+def compare_runs(measured: Sequence[Path], compared: Path, time_steps: bool = False) -> Comparisons:
+    """What the measured runs predict for another beside what it took, and the other way round.
+
+    With ``time_steps`` training steps of the run that is predicted are timed here, on a core.
+
+    Raises:
+        InputError: a profile or a run cannot be read.
+    """
+    named, name = ", ".join(map(str, measured)), str(compared)
+    pairs, _ = read_runs(measured)
+    others, _ = read_run(compared)
+    return {
+        (named, name): compare_cost(fit_laws(pairs, _rates(compared, time_steps)), others),
+        (name, named): compare_cost(fit_laws(others, _rates(measured[0], time_steps)), pairs),
+    }
+
+
+def _rates(run: Path, time_steps: bool) -> tuple[float, float] | None:
+    """Of the networks of a measured run, on a core as those of all measured runs were."""
+    if not time_steps:
+        return None
+    config = read_profile(run.resolve().name).config
+    training = config.training.model_copy(update={"device": "cpu"})
+    return _timed(config.model_copy(update={"training": training})).rates
+
+
+def _timed(config: Config) -> StepRates:
+    from synfeal.report.cost.steps import timed_rates  # torch takes a second to load
+
+    return timed_rates(config)
 
 
 def write_plans(path: Path, plans: Sequence[Plan]) -> None:
     """Plans as one table: hours, 10^9 bytes; a row per stage, per table alone, and for all."""
-    _write(path, PLAN_COLUMNS, (row for plan in plans for row in _plan_rows(plan)))
+    table = pd.concat([_rows(plan) for plan in plans])
+    write_frame(path, table.reindex(columns=list(PLAN_COLUMNS)), "%.4g")
+
+
+def _rows(plan: Plan) -> pd.DataFrame:
+    machine, costs = plan.machine, plan.costs[plan.costs["part"] != OWN]
+    columns: dict[str, Any] = {"profile": plan.profile, "cores": machine.cores}
+    columns |= {"gpus": machine.gpus}
+    columns |= {"gpu_tflops": f"{machine.gpu_tflops:g}" if machine.gpus else ""}
+    columns["work"] = costs["work"].map("{:.6g}".format, na_action="ignore")
+    for what in ("cpu", "gpu", "wall"):
+        for end, name in (("mid", "h"), ("low", "h_low"), ("high", "h_high")):
+            columns[f"{what}_{name}"] = costs[f"{what}_{end}"] / 3600
+    is_whole = costs["part"] != ALONE  # what a table leaves behind others share
+    columns["disk_gb"] = (costs["disk_bytes"] / 1e9).where(is_whole)
+    columns["peak_memory_gb"] = (costs["peak_mb"] / 1e3).where(is_whole)
+    return costs.assign(**columns, times_measured_size=costs["beyond"])
 
 
 def write_check(path: Path, comparisons: Comparisons) -> None:
     """Predictions beside measurements, processor seconds."""
-    _write(
-        path,
-        CHECK_COLUMNS,
-        (
-            [*names, r.stage, str(r.jobs)]
-            + [f"{s:.4g}" for s in (r.predicted_s, r.low_s, r.high_s, r.measured_s)]
-            + [f"{r.factor:.3g}"]
-            for names, rows in comparisons.items()
-            for r in rows
-        ),
-    )
-
-
-def _write(path: Path, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(rows)
-
-
-def _plan_rows(plan: Plan) -> Iterator[list[str]]:
-    machine = plan.machine
-    tflops = f"{machine.gpu_tflops:g}" if machine.gpus else ""
-    start = [plan.profile, str(machine.cores), str(machine.gpus), tflops]
-    for stage in plan.stages:
-        yield [*start, "stage", stage.stage, *_stage_cells(stage)]
-    for table in plan.tables:
-        if table.alone is not None:
-            yield [*start, "table alone", table.name, *_share_cells(table.alone), "", "", "", ""]
-    disk_gb, peak_gb = f"{plan.disk_bytes / 1e9:.4g}", f"{plan.peak_mb / 1e3:.4g}"
-    yield [*start, "run", "total", *_share_cells(plan.whole), disk_gb, peak_gb, "", ""]
-
-
-def _stage_cells(stage: StageCost) -> list[str]:
-    work = [f"{stage.work[0]:.6g}", stage.work[1]] if stage.work else ["", ""]
-    times = [h for span in (stage.cpu_s, stage.gpu_s, stage.wall_s) for h in _hours(span)]
-    return [
-        str(stage.jobs),
-        *work,
-        *(times if stage.known else [""] * len(times)),
-        f"{stage.disk_bytes / 1e9:.4g}",
-        "" if stage.peak_mb is None else f"{stage.peak_mb / 1e3:.4g}",
-        "" if stage.beyond is None else f"{stage.beyond:.4g}",
-        "yes" if stage.known else "no",
+    tables = [
+        rows.assign(predicted_from=source, predicted=predicted)
+        for (source, predicted), rows in comparisons.items()
     ]
-
-
-def _share_cells(share: Share) -> list[str]:
-    times = [h for span in (share.cpu_s, share.gpu_s, share.wall_s) for h in _hours(span)]
-    return [str(share.jobs), "", "", *times]
-
-
-def _hours(span: Span) -> list[str]:
-    return [f"{seconds / 3600:.4g}" for seconds in (span.mid, span.low, span.high)]
+    table = pd.concat(tables)
+    table["factor"] = table["factor"].map("{:.3g}".format)
+    names = {"mid": "predicted", "low": "predicted_low", "high": "predicted_high"}
+    table = table.rename(columns={end: f"{name}_cpu_s" for end, name in names.items()})
+    table = table.rename(columns={"cpu_s": "measured_cpu_s"})
+    predicted = ("predicted_cpu_s", "predicted_low_cpu_s", "predicted_high_cpu_s")
+    columns = ["predicted_from", "predicted", "stage", "jobs", *predicted]
+    write_frame(path, table[[*columns, "measured_cpu_s", "factor"]], "%.4g")

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import pandas as pd
+
 from baselines.groundtruth.methods import check_sources
 from synfeal.config import load_config, read_experiments
 from synfeal.config.load import read_yaml
 from synfeal.errors import InputError
 from synfeal.report.cost.jobs import Profile, jobs_of
-from synfeal.report.cost.laws import Pairs, matched
+from synfeal.report.cost.laws import matched
 from synfeal.report.cost.measured import read_measured
 
 FOLDER = Path("config")
@@ -46,8 +48,8 @@ def profile_path(name: str) -> Path:
     return found[name]
 
 
-def read_run(root: Path) -> tuple[Pairs, int]:
-    """Measured jobs of a run beside their sizes, and how many the profile cannot have.
+def read_run(root: Path) -> tuple[pd.DataFrame, int]:
+    """Measured jobs of a run with their sizes, and how many the profile cannot have.
 
     The run's directory is called like its profile, as the workflow calls it.
 
@@ -56,13 +58,14 @@ def read_run(root: Path) -> tuple[Pairs, int]:
     """
     measured = read_measured(root)
     profile = read_profile(root.resolve().name)
-    pairs = matched(jobs_of(profile, [job.key for job in measured]), measured)
-    if not pairs:
+    keys = zip(measured["stage"], measured["job"], strict=True)
+    pairs = matched(jobs_of(profile, keys), measured)
+    if pairs.empty:
         raise InputError(f"{root}: none of its measured jobs is one of the profile's")
     return pairs, len(measured) - len(pairs)
 
 
-def read_runs(roots: Sequence[Path]) -> tuple[Pairs, int]:
+def read_runs(roots: Sequence[Path]) -> tuple[pd.DataFrame, int]:
     """The same of several runs together."""
     runs = [read_run(root) for root in roots]
-    return [pair for pairs, _ in runs for pair in pairs], sum(left for _, left in runs)
+    return pd.concat([pairs for pairs, _ in runs]), sum(left for _, left in runs)

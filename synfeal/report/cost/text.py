@@ -3,85 +3,97 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
-from synfeal.report.cost.compare import Comparison
-from synfeal.report.cost.estimate import LAUNCH_S, Span, StageCost, TableCost
-from synfeal.report.cost.plan import Plan
+import pandas as pd
+
+from synfeal.report.aligned import aligned
+from synfeal.report.cost.estimate import ALONE, LAUNCH_S, OWN, RUN, STAGE
+from synfeal.report.cost.plan import Comparisons, Plan
 
 # The largest unit of which there are at least so many.
 DURATIONS = ((48 * 3600.0, 86400.0, "d"), (5400.0, 3600.0, "h"), (90.0, 60.0, "min"), (0, 1.0, "s"))
 SIZES = ((1e9, 1e9, "GB"), (0, 1e6, "MB"))
 
 
-def plan_lines(plan: Plan) -> Iterator[str]:
-    """The whole plan: one line that sums it up, stages, tables, and what the numbers rest on."""
-    machine, whole = plan.machine, plan.whole
+def plan_text(plans: Sequence[Plan]) -> str:
+    """Plans: one line that sums each up, stages, tables, and what the numbers rest on."""
+    return "\n".join("\n".join(_plan_lines(plan)) + "\n" for plan in plans)
+
+
+def comparison_text(comparisons: Comparisons) -> str:
+    """Predictions beside measurements."""
+    head = ["stage", "jobs", "predicted CPU", "range", "measured CPU", "predicted/measured"]
+    parts = []
+    for (source, predicted), table in comparisons.items():
+        rows = [head]
+        for r in table.to_dict("records"):
+            span = _span(r["low"], r["mid"], r["high"])
+            factor = f"{r['factor']:.2f}"
+            rows.append([r["stage"], str(r["jobs"]), *span, duration(r["cpu_s"]), factor])
+        parts.append(f"{predicted} predicted from {source}\n\n{aligned(rows)}")
+    return "\n".join(parts)
+
+
+def _plan_lines(plan: Plan) -> Iterator[str]:
+    machine, whole = plan.machine, plan.costs[plan.costs["part"] == RUN].iloc[0]
     on = counted(machine.cores, "core")
     on += f" and {counted(machine.gpus, 'GPU')}" if machine.gpus else ""
-    yield f"Profile {plan.profile} on {on}: {spoken(whole.wall_s)}"
-    parts = [f"processor time {spoken(whole.cpu_s)}"]
+    yield f"Profile {plan.profile} on {on}: {_spoken(whole, 'wall')}"
+    parts = [f"processor time {_spoken(whole, 'cpu')}"]
     if machine.gpus:
-        parts.append(f"GPU time {spoken(whole.gpu_s)}")
-    parts.append(f"disk {scaled(plan.disk_bytes, SIZES)}")
-    parts.append(f"memory of the largest job {scaled(plan.peak_mb * 1e6, SIZES)}")
+        parts.append(f"GPU time {_spoken(whole, 'gpu')}")
+    parts.append(f"disk {scaled(whole['disk_bytes'], SIZES)}")
+    parts.append(f"memory of the largest job {_memory(whole['peak_mb'])}")
     yield "; ".join(parts)
     yield ""
-    yield stage_table(plan)
-    yield table_table(plan.tables, bool(machine.gpus))
-    yield from notes(plan)
+    yield _stage_table(plan)
+    yield _table_table(plan)
+    yield from _notes(plan)
 
 
-def stage_table(plan: Plan) -> str:
+def _stage_table(plan: Plan) -> str:
     """One line per stage, and the sum."""
     on_gpu = bool(plan.machine.gpus)
     gpu = ["GPU time", "range"] if on_gpu else []
     head = ["stage", "jobs", "work", "", "CPU time", "range", *gpu, "wall time"]
     rows = [[*head, "disk", "memory", "x measured"]]
-    rows += [_stage_row(stage, on_gpu) for stage in plan.stages]
-    whole = plan.whole
-    spans = [*_span(whole.cpu_s), *(_span(whole.gpu_s) if on_gpu else [])]
-    tail = [duration(whole.wall_s.mid), scaled(plan.disk_bytes, SIZES)]
-    peak = scaled(plan.peak_mb * 1e6, SIZES)
-    rows.append(["total", f"{whole.jobs:,}", "", "", *spans, *tail, peak, ""])
-    return aligned(rows, left=(0, 3))
+    shown = plan.costs[plan.costs["part"].isin([STAGE, RUN])]
+    return aligned(rows + [_row(r, on_gpu) for r in shown.to_dict("records")], left=(0, 3))
 
 
-def _stage_row(stage: StageCost, on_gpu: bool) -> list[str]:
-    work, unit = stage.work or (0.0, "")
-    row = [stage.stage, f"{stage.jobs:,}", number(work) if unit else "", unit]
-    disk = scaled(stage.disk_bytes, SIZES) if stage.disk_bytes else ""
-    if not stage.known:
+def _row(r: dict[Any, Any], on_gpu: bool) -> list[str]:
+    is_stage, unknown = r["part"] == STAGE, r["measured"] == "no"
+    work = [number(r["work"]), r["unit"]] if is_stage and r["unit"] else ["", ""]
+    row = [r["name"], f"{r['jobs']:,}", *work]
+    disk = scaled(r["disk_bytes"], SIZES) if r["disk_bytes"] or not is_stage else ""
+    if unknown:
         return [*row, "not measured", "", *([""] * 2 * on_gpu), "", disk, "", ""]
-    peak = "" if stage.peak_mb is None else scaled(stage.peak_mb * 1e6, SIZES)
-    beyond = "" if stage.beyond is None else number(stage.beyond)
-    gpu = (_span(stage.gpu_s) if stage.gpu_s.mid else ["", ""]) if on_gpu else []
-    return [*row, *_span(stage.cpu_s), *gpu, duration(stage.wall_s.mid), disk, peak, beyond]
+    gpu = _time(r, "gpu") if r["gpu_mid"] or not is_stage else ["", ""]
+    times = [*_time(r, "cpu"), *(gpu if on_gpu else []), duration(r["wall_mid"])]
+    peak = "" if pd.isna(r["peak_mb"]) and is_stage else _memory(r["peak_mb"])
+    return [*row, *times, disk, peak, "" if pd.isna(r["beyond"]) else number(r["beyond"])]
 
 
-def table_table(tables: Sequence[TableCost], on_gpu: bool) -> str:
+def _table_table(plan: Plan) -> str:
     """One line per table of the paper: its own jobs, and all it needs."""
+    on_gpu = bool(plan.machine.gpus)
     gpu = ["GPU time"] if on_gpu else []
     rows = [["needed by", "jobs", "CPU time", *gpu, "alone: CPU time", *gpu, "wall time", "range"]]
-    for table in tables:
-        row = [table.name, f"{table.own.jobs:,}"]
-        for share in (table.own, table.alone):
-            row += [""] * (1 + on_gpu) if share is None else [duration(share.cpu_s.mid)]
-            row += [duration(share.gpu_s.mid)] if on_gpu and share is not None else []
-        row += ["", ""] if table.alone is None else _span(table.alone.wall_s)
-        rows.append(row)
+    alone = plan.costs[plan.costs["part"] == ALONE].set_index("name").to_dict("index")
+    for r in plan.costs[plan.costs["part"] == OWN].to_dict("records"):
+        row = [r["name"], f"{r['jobs']:,}"]
+        for share in (r, alone.get(r["name"])):
+            times = (
+                [""] * 2 if share is None else [duration(share[c]) for c in ("cpu_mid", "gpu_mid")]
+            )
+            row += times[: 1 + on_gpu]
+        whole = alone.get(r["name"])
+        rows.append([*row, *(["", ""] if whole is None else _time(whole, "wall"))])
     return aligned(rows)
 
 
-def comparison_table(rows: Sequence[Comparison]) -> str:
-    """Prediction beside measurement."""
-    cells = [["stage", "jobs", "predicted CPU", "range", "measured CPU", "predicted/measured"]]
-    for r in rows:
-        span = _span(Span(r.low_s, r.predicted_s, r.high_s))
-        cells.append([r.stage, str(r.jobs), *span, duration(r.measured_s), f"{r.factor:.2f}"])
-    return aligned(cells)
-
-
-def notes(plan: Plan) -> Iterator[str]:
+def _notes(plan: Plan) -> Iterator[str]:
     """What the numbers rest on."""
     machine = plan.machine
     yield f"measured    {plan.origin}"
@@ -103,22 +115,9 @@ def notes(plan: Plan) -> Iterator[str]:
             f" {LAUNCH_S * 1e3:g} ms for each layer and step; range half to double;"
             " a core is busy too"
         )
-    unknown = [stage.stage for stage in plan.stages if not stage.known]
-    if unknown:
+    unknown = plan.costs.loc[plan.costs["measured"] == "no", "name"]
+    if len(unknown):
         yield f"missing     {', '.join(unknown)}: in no measured run, left out of the sums"
-
-
-def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
-    """Columns two spaces apart; those in ``left`` start at their left edge, others end right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "".join(
-        "  ".join(
-            cell.ljust(width) if i in left else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        + "\n"
-        for row in rows
-    )
 
 
 def number(value: float) -> str:
@@ -141,19 +140,27 @@ def duration(seconds: float) -> str:
     return scaled(seconds, DURATIONS)
 
 
-def spoken(span: Span) -> str:
-    """As in ``3.5 h (2 h to 7 h)``."""
-    low, mid, high = map(duration, span)
-    return mid if low == high else f"{mid} ({low} to {high})"
-
-
 def counted(n: int, what: str) -> str:
     """As in ``1 core``, ``16 cores``."""
     return f"{n} {what}" + "s" * (n != 1)
 
 
-def _span(span: Span) -> list[str]:
+def _memory(peak_mb: float) -> str:
+    return scaled(0.0 if pd.isna(peak_mb) else peak_mb * 1e6, SIZES)
+
+
+def _spoken(costs: Any, what: str) -> str:
+    """As in ``3.5 h (2 h to 7 h)``."""
+    low, mid, high = (duration(costs[f"{what}_{end}"]) for end in ("low", "mid", "high"))
+    return mid if low == high else f"{mid} ({low} to {high})"
+
+
+def _time(costs: Any, what: str) -> list[str]:
+    return _span(*(costs[f"{what}_{end}"] for end in ("low", "mid", "high")))
+
+
+def _span(low: float, mid: float, high: float) -> list[str]:
     """The middle, and both ends in the unit of the upper one."""
-    _, unit, name = next(u for u in DURATIONS if span.high >= u[0])
-    low, high = number(span.low / unit), number(span.high / unit)
-    return [duration(span.mid), "" if low == high else f"{low} - {high} {name}"]
+    _, unit, name = next(u for u in DURATIONS if high >= u[0])
+    ends = number(low / unit), number(high / unit)
+    return [duration(mid), "" if ends[0] == ends[1] else f"{ends[0]} - {ends[1]} {name}"]

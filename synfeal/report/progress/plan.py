@@ -11,7 +11,7 @@ from synfeal.config import Config, Design, Experiment, Run
 from synfeal.errors import InputError
 from synfeal.report.cost.dry_run import key_of
 from synfeal.report.cost.jobs import Profile, jobs_of
-from synfeal.report.cost.laws import fit_laws
+from synfeal.report.cost.laws import fit_laws, seconds_of
 from synfeal.report.cost.profiles import read_run
 
 MEASURED = Path("results/published/mini")
@@ -65,8 +65,6 @@ def _expected_s(profile: Profile, benchmarks: Iterable[str]) -> dict[str, float]
         laws = fit_laws(read_run(MEASURED)[0])
     except InputError:
         return {}
-    return {
-        "/".join(filter(None, job.key)): laws[job.law].seconds(job.size)
-        for job in jobs_of(profile, filter(None, map(key_of, benchmarks)))
-        if job.law in laws
-    }
+    jobs = jobs_of(profile, filter(None, map(key_of, benchmarks)))
+    names = jobs["stage"].str.cat(jobs["job"], sep="/").str.rstrip("/")
+    return dict(seconds_of(jobs, laws).set_axis(names).dropna())
