@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from PIL import Image
 
@@ -16,7 +16,7 @@ from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.files import write_json
 from synfeal.report.compare.run import OUTPUTS
 from synfeal.report.compare.summary import groups_of, remarks_of, summarise
-from synfeal.report.compare.trees import Comparison, compare_trees
+from synfeal.report.compare.trees import Comparison, compare_trees, one_yardstick
 from synfeal.report.stats import MEASURES
 from tests.compare_trees import (
     BETTER,
@@ -53,8 +53,9 @@ def pair(tmp_path: Path, error_m: np.ndarray) -> tuple[Path, Path]:
     )
 
 
-def by_model(comparison: Comparison, labels: str) -> Iterator[tuple[str, dict]]:
-    return ((r.key.model, r.differences) for r in comparison.runs if r.key.labels == labels)
+def by_run(comparison: Comparison) -> pd.DataFrame:
+    """Rows of the table by label source, model and measure."""
+    return comparison.table.set_index(["labels", "model", "measure"])
 
 
 def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
@@ -70,22 +71,23 @@ def test_known_changes_are_found_against_both_yardsticks(
     trees: tuple[Path, Path], error_m: np.ndarray
 ) -> None:
     comparison = compare_trees(*trees)
-    assert all(run.paired and run.labels == "same" for run in comparison.runs)
-    assert [run.one_yardstick for run in comparison.runs] == [False] * 3 + [True] * 3
+    assert (comparison.table[["test_frames", "test_labels"]] == "same").all(axis=None)
+    runs = [run for _, run in comparison.table.groupby(["labels", "model"], sort=False)]
+    assert [one_yardstick(run) for run in runs] == [False] * 3 + [True] * 3
+    found = by_run(comparison)
     for labels, offset_m in zip(LABELS, (0, LABEL_OFFSET_M), strict=True):
-        found = dict(by_model(comparison, labels))
         for measure, extra_m in (("position_m", offset_m), ("position_m_true", 0)):
-            better = found[BETTER][measure]
+            better = found.loc[labels, BETTER, measure]
             assert better.a == pytest.approx(np.median(error_m) + extra_m)
-            assert [better.low, better.value, better.high] == pytest.approx([-0.5] * 3)
-            verdicts = [found[model][measure].verdict for model in MODELS]
+            assert [better.low, better.difference, better.high] == pytest.approx([-0.5] * 3)
+            verdicts = [found.loc[labels, model, measure].verdict for model in MODELS]
             assert verdicts == ["better", "no difference seen", "worse"]
-        assert found[SAME]["position_m"].value == 0
+        assert found.loc[labels, SAME, "position_m"].difference == 0
 
 
 def test_summary_counts_runs_and_signs(trees: tuple[Path, Path]) -> None:
-    summary = {s.measure: s for s in summarise(compare_trees(*trees).runs)}
-    position, orientation = summary["position_m"], summary["orientation_deg"]
+    summary = summarise(compare_trees(*trees).table).set_index("measure")
+    position, orientation = summary.loc["position_m"], summary.loc["orientation_deg"]
     assert (position.better, position.worse, position.unseen) == (2, 2, 2)
     assert (position.lower, position.higher, position.p_sign) == (2, 2, 1.0)
     assert (orientation.lower, orientation.higher) == (0, 2)
@@ -93,43 +95,43 @@ def test_summary_counts_runs_and_signs(trees: tuple[Path, Path]) -> None:
 
 
 def test_group_means_are_of_relative_changes(trees: tuple[Path, Path], error_m: np.ndarray) -> None:
-    groups = {(g.grouping, g.name): g for g in groups_of(compare_trees(*trees).runs)}
-    assert {g: n.n_runs for g, n in groups.items() if g[0] != "model"} == {
+    groups = groups_of(compare_trees(*trees).table).set_index(["grouping", "name"])
+    assert {g: n for g, n in groups.n_runs.items() if g[0] != "model"} == {
         ("scene", "room"): 6,
         ("labels", "synfeal"): 3,
         ("labels", "sfm"): 3,
     }
     median = float(np.median(error_m))
     shares = [-50 / median, -50 / (median + LABEL_OFFSET_M)]
-    better = groups["model", BETTER].percent
+    better = groups.loc["model", BETTER]
     assert better["position_m"] == pytest.approx(np.mean(shares))
     assert better["position_m_true"] == pytest.approx(shares[0])
-    assert groups["model", FAILED].percent["position_m"] == np.inf
-    assert groups["model", SAME].percent == dict.fromkeys(MEASURES, 0.0)
+    assert groups.loc["model", FAILED]["position_m"] == np.inf
+    assert (groups.loc["model", SAME][list(MEASURES)] == 0).all()
 
 
 def test_other_test_paths_are_not_paired(pair: tuple[Path, Path]) -> None:
     plan = pair[1] / "plans/room/test.csv"
     write_pose_table(plan, poses(0.5))
     comparison = compare_trees(*pair)
-    assert {run.plans for run in comparison.runs} == {"differ"}
-    widths = [run.differences["position_m"] for run in comparison.runs]
-    assert all(d.low < 0 < d.high for d in widths)
+    assert set(comparison.runs.test_frames) == {"differ"}
+    assert (comparison.runs.low < 0).all()
+    assert (comparison.runs.high > 0).all()
     assert "in 2 the test frames differ" in remarks_of(comparison)[1]
 
 
 def test_a_missing_plan_is_said_and_not_paired(pair: tuple[Path, Path]) -> None:
     (pair[0] / "plans/room/test.csv").unlink()
     comparison = compare_trees(*pair)
-    assert not any(run.paired for run in comparison.runs)
+    assert not (comparison.runs.test_frames == "same").any()
     assert "paired in 0 of 2 runs" in remarks_of(comparison)[1]
 
 
 def test_other_labels_are_said_and_frames_still_paired(pair: tuple[Path, Path]) -> None:
     write_pose_table(pair[1] / "labels/room/6k/sfm/test.csv", poses(-3.0))
     comparison = compare_trees(*pair)
-    assert [run.labels for run in comparison.runs] == ["differ", "same"]
-    assert all(run.paired for run in comparison.runs)
+    assert comparison.runs.test_labels.tolist() == ["differ", "same"]
+    assert (comparison.runs.test_frames == "same").all()
     assert any(
         text.startswith("Runs with other test labels in B: 1;") for text in remarks_of(comparison)
     )
@@ -138,10 +140,10 @@ def test_other_labels_are_said_and_frames_still_paired(pair: tuple[Path, Path]) 
 def test_several_seeds_are_averaged(tmp_path: Path, error_m: np.ndarray) -> None:
     a = write_tree(tmp_path / "a", {BETTER: error_m}, seeds=3)
     b = write_tree(tmp_path / "b", {BETTER: error_m}, seeds=1)
-    run = compare_trees(a, b).runs[0]
-    assert run.n_seeds == (3, 1)
-    assert run.differences["position_m_true"].value == pytest.approx(-0.01)
-    assert run.differences["position_m_true"].sd_a == pytest.approx(0.01)
+    found = by_run(compare_trees(a, b)).loc["sfm", BETTER, "position_m_true"]
+    assert (found.n_seeds_a, found.n_seeds_b) == (3, 1)
+    assert found.difference == pytest.approx(-0.01)
+    assert found.sd_a == pytest.approx(0.01)
 
 
 def test_runs_of_one_tree_only_are_counted(tmp_path: Path, error_m: np.ndarray) -> None:

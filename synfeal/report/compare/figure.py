@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from synfeal.report.compare.stats import Difference, Verdict
-from synfeal.report.compare.trees import Comparison, RunComparison
+from synfeal.report.compare.runs import KEY
+from synfeal.report.compare.stats import Verdict
+from synfeal.report.compare.trees import Comparison, one_yardstick
 
 # Okabe and Ito's colour-blind-safe colours; markers say the same in grey.
 STYLES: dict[Verdict, tuple[str, str]] = {
@@ -32,14 +34,15 @@ def comparison_figure(comparison: Comparison) -> Figure:
     Filled markers are errors against the labels (the paper's protocol), open ones against the true
     poses where these differ. An infinite difference sits at the edge with the word *failed*.
     """
-    runs = sorted(comparison.runs, key=lambda run: run.differences["position_m_true"].value)
-    figure = Figure(figsize=(11.0, 1.9 + 0.2 * len(runs)), layout="constrained")
+    rows = _placed(comparison.table)
+    names = rows.drop_duplicates("place").sort_values("place")["name"]
+    figure = Figure(figsize=(11.0, 1.9 + 0.2 * len(names)), layout="constrained")
     axes = figure.subplots(1, len(PANELS), sharey=True)
     for axis, (measure, title) in zip(axes, PANELS.items(), strict=True):
-        _panel(axis, runs, measure, title)
-    axes[0].set_yticks(range(len(runs)), [run.key.name for run in runs], fontsize=7)
-    axes[0].set_ylim(len(runs) - 0.5, -0.5)
-    handles = _handles(any(not run.one_yardstick for run in runs))
+        _panel(axis, rows[rows["measure"].isin([measure, f"{measure}_true"])], title)
+    axes[0].set_yticks(range(len(names)), names, fontsize=7)
+    axes[0].set_ylim(len(names) - 0.5, -0.5)
+    handles = _handles(bool(rows["measure"].str.endswith("_true").any()))
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     figure.suptitle(
         f"A = {comparison.names[0]}\nB = {comparison.names[1]}", fontsize=8, x=0.01, ha="left"
@@ -47,18 +50,32 @@ def comparison_figure(comparison: Comparison) -> Figure:
     return figure
 
 
-def edge_of(differences: Sequence[Difference]) -> float:
-    """Half the width of an axis that is symmetric about zero and holds what is finite."""
-    values = [abs(v) for d in differences for v in (d.low, d.value, d.high)]
-    return MARGIN * max((v for v in values if math.isfinite(v)), default=0.0) or 1.0
+def _placed(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows that say something of their own, with the name, place and height of each run."""
+    runs = [run for _, run in table.groupby(list(KEY), sort=False)]
+    runs.sort(key=_true_change)
+    parts = []
+    for place, run in enumerate(runs):
+        truth = run["measure"].str.endswith("_true")
+        height = np.where(truth, YARDSTICK_APART, -YARDSTICK_APART)
+        if one_yardstick(run):
+            run, height = run[~truth], np.zeros(2)
+        name = "/".join(run[list(KEY)].iloc[0])
+        parts.append(run.assign(name=name, place=place, height=place + height))
+    return pd.concat(parts)
 
 
-def _panel(axis: Axes, runs: Sequence[RunComparison], measure: str, title: str) -> None:
-    shown = [(place, *yardstick) for place, run in enumerate(runs) for yardstick in _both(run)]
-    edge = edge_of([run.differences[measure + end] for run in runs for _, end in _both(run)])
+def _true_change(run: pd.DataFrame) -> Any:
+    return run.set_index("measure").at["position_m_true", "difference"]
+
+
+def _panel(axis: Axes, rows: pd.DataFrame, title: str) -> None:
+    # Symmetric about zero, and wide enough for what is finite.
+    ends = rows[["low", "difference", "high"]].abs().to_numpy(dtype=float)
+    edge = MARGIN * float(ends[np.isfinite(ends)].max(initial=0.0)) or 1.0
     axis.axvline(0, color="0.6", linewidth=0.8, zorder=1)
-    for place, shift, end in shown:
-        _dot(axis, runs[place].differences[measure + end], place + shift, edge, bool(end))
+    for row in rows.itertuples():
+        _dot(axis, row, edge)
     axis.set_xlim(-edge * MARGIN, edge * MARGIN)
     axis.set_xlabel(f"{title}\n← better          worse →", fontsize=9)
     axis.grid(axis="y", color="0.93", linewidth=0.6)
@@ -66,24 +83,15 @@ def _panel(axis: Axes, runs: Sequence[RunComparison], measure: str, title: str) 
     axis.spines[["top", "right", "left"]].set_visible(False)
 
 
-def _both(run: RunComparison) -> list[tuple[float, str]]:
-    """Shift and measure ending of each yardstick that says something of its own."""
-    if run.one_yardstick:
-        return [(0.0, "")]
-    return [(-YARDSTICK_APART, ""), (YARDSTICK_APART, "_true")]
-
-
-def _dot(axis: Axes, difference: Difference, place: float, edge: float, is_open: bool) -> None:
-    color, marker = STYLES[difference.verdict]
-    low, value, high = (
-        min(max(v, -edge), edge) for v in (difference.low, difference.value, difference.high)
-    )
-    axis.plot([low, high], [place, place], color=color, linewidth=1.1, zorder=2)
-    face = "white" if is_open else color
-    axis.plot(value, place, marker, color=color, markerfacecolor=face, markersize=5, zorder=3)
-    if math.isinf(difference.value):
+def _dot(axis: Axes, row: Any, edge: float) -> None:
+    color, marker = STYLES[row.verdict]
+    low, value, high = np.clip([row.low, row.difference, row.high], -edge, edge)
+    axis.plot([low, high], [row.height] * 2, color=color, linewidth=1.1, zorder=2)
+    face = "white" if row.measure.endswith("_true") else color
+    axis.plot(value, row.height, marker, color=color, markerfacecolor=face, markersize=5, zorder=3)
+    if np.isinf(row.difference):
         text, side = ("failed in B ", "right") if value > 0 else (" failed in A", "left")
-        axis.text(0.93 * value, place, text, color=color, fontsize=7, ha=side, va="center")
+        axis.text(0.93 * value, row.height, text, color=color, fontsize=7, ha=side, va="center")
 
 
 def _handles(two_yardsticks: bool) -> list[Line2D]:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from synfeal.report.compare.sheet import Row, Sheet
-from synfeal.report.compare.stats import Difference
+import pandas as pd
+
+from synfeal.bootstrap import FEWEST_PATHS
+from synfeal.report.aligned import aligned, aligned_sections, markdown
+from synfeal.report.compare.runs import KEY
 from synfeal.report.compare.summary import groups_of, remarks_of, summarise
-from synfeal.report.compare.trees import Comparison, RunComparison
+from synfeal.report.compare.trees import Comparison, one_yardstick
 from synfeal.report.stats import MEASURES
 
 TITLES = {
@@ -26,6 +30,7 @@ LEGEND = (
 )
 # Keys of provenance that are printed, and letters of their values.
 MOST_CHANGES, WIDEST_VALUE = 30, 40
+Sheet = tuple[tuple[str, ...], dict[str, list[tuple[str, ...]]], int]  # headings, sections, n_left
 
 
 def text_of(comparison: Comparison) -> str:
@@ -33,13 +38,13 @@ def text_of(comparison: Comparison) -> str:
     parts = [
         f"A = {comparison.names[0]}\nB = {comparison.names[1]}\n",
         LEGEND.replace("`", "") + "\n",
-        runs_sheet(comparison).text(),
-        summary_sheet(comparison).text(),
-        groups_sheet(comparison).text(),
+        aligned_sections(*runs_sheet(comparison)),
+        _plain(summary_sheet(comparison)),
+        aligned_sections(*groups_sheet(comparison)),
         "".join(f"- {remark}\n" for remark in remarks_of(comparison)),
     ]
-    if comparison.changes:
-        parts.append(changes_sheet(comparison).text())
+    if comparison.changes is not None and len(comparison.changes):
+        parts.append(_plain(changes_sheet(comparison.changes)))
     return "\n".join(parts)
 
 
@@ -48,65 +53,63 @@ def markdown_of(comparison: Comparison) -> str:
     name_a, name_b = comparison.names
     parts = [
         f"# Comparison\n\nA = `{name_a}`  \nB = `{name_b}`\n",
-        summary_sheet(comparison).markdown(),
+        markdown(*summary_sheet(comparison)),
         "".join(f"- {remark}\n" for remark in remarks_of(comparison)),
         "## Mean relative change\n",
-        groups_sheet(comparison).markdown(),
+        markdown(*groups_sheet(comparison)),
         f"## Runs\n\n{LEGEND}\n",
-        runs_sheet(comparison).markdown(),
+        markdown(*runs_sheet(comparison)),
         "![B−A of every run with its 95 % limits](compare.png)\n",
     ]
-    if comparison.changes:
-        parts += ["## What differs in provenance\n", changes_sheet(comparison).markdown()]
+    if comparison.changes is not None and len(comparison.changes):
+        parts += ["## What differs in provenance\n", markdown(*changes_sheet(comparison.changes))]
     return "\n".join(parts)
+
+
+def _plain(sheet: Sheet) -> str:
+    """A table of one section for the terminal."""
+    headings, sections, n_left = sheet
+    return aligned([headings, *sections[""]], range(n_left))
 
 
 def runs_sheet(comparison: Comparison) -> Sheet:
     """One row per run and yardstick, in sections of one data set each."""
     errors = ("position A", "B", "B−A", "95 %", "", "orientation A", "B", "B−A", "95 %", "")
-    sections: dict[str, list[Row]] = {}
-    for run in comparison.runs:
-        sections.setdefault("/".join(run.key[:-1]), []).extend(_run_rows(run))
-    return Sheet(
-        ("model", "against", *errors, "paths"),
-        tuple((title, tuple(rows)) for title, rows in sections.items()),
-        n_left=2,
-    )
+    sections: dict[str, list[tuple[str, ...]]] = {}
+    for key, run in comparison.table.groupby(list(KEY), sort=False):
+        sections.setdefault("/".join(map(str, key[:-1])), []).extend(_run_rows(run))
+    return ("model", "against", *errors, "paths"), sections, 2
 
 
 def summary_sheet(comparison: Comparison) -> Sheet:
     """One row per measure: verdicts, signs and the mean relative change."""
-    rows = [
-        (
-            *(TITLES[s.measure], str(s.better), str(s.worse), str(s.unseen)),
-            *(str(s.lower), str(s.higher)),
-            *(f"{s.p_sign:.2g}", percent_text(s.percent)),
-        )
-        for s in summarise(comparison.runs)
-    ]
+    rows = []
+    for s in summarise(comparison.table).to_dict("records"):
+        counts = (str(s[name]) for name in ("better", "worse", "unseen", "lower", "higher"))
+        tests = f"{s['p_sign']:.2g}", percent_text(s["percent"])
+        rows.append((TITLES[s["measure"]], *counts, *tests))
     headings = ("runs", "better", "worse", "no difference seen", "lower", "higher", "sign test p")
-    return Sheet((*headings, "mean change"), (("", tuple(rows)),))
+    return (*headings, "mean change"), {"": rows}, 1
 
 
 def groups_sheet(comparison: Comparison) -> Sheet:
     """Mean relative changes by scene, label source and model."""
-    sections: dict[str, list[Row]] = {}
-    for group in groups_of(comparison.runs):
-        changes = (percent_text(group.percent[m]) for m in MEASURES)
-        row = (group.name, str(group.n_runs), *changes)
-        sections.setdefault(f"mean change by {group.grouping}", []).append(row)
-    return Sheet(
-        ("", "runs", *SHORT), tuple((title, tuple(rows)) for title, rows in sections.items())
-    )
+    groups = groups_of(comparison.table)
+    sections: dict[str, list[tuple[str, ...]]] = {}
+    for group in groups.to_dict("records"):
+        changes = (percent_text(group[measure]) for measure in MEASURES)
+        section = sections.setdefault(f"mean change by {group['grouping']}", [])
+        section.append((group["name"], str(group["n_runs"]), *changes))
+    return ("", "runs", *SHORT), sections, 1
 
 
-def changes_sheet(comparison: Comparison) -> Sheet:
+def changes_sheet(changes: pd.DataFrame) -> Sheet:
     """Keys of ``provenance.json`` that differ, the first of them."""
-    changes = comparison.changes or ()
-    rows = [(c.key, _value_text(c.a), _value_text(c.b)) for c in changes[:MOST_CHANGES]]
+    shown = changes[["key", "a", "b"]].head(MOST_CHANGES).itertuples(index=False)
+    rows = [(key, *map(_value_text, values)) for key, *values in shown]
     if len(changes) > MOST_CHANGES:
         rows.append((f"… and {len(changes) - MOST_CHANGES} more", "", ""))
-    return Sheet(("provenance.json", "A", "B"), (("", tuple(rows)),), n_left=3)
+    return ("provenance.json", "A", "B"), {"": rows}, 3
 
 
 def percent_text(percent: float) -> str:
@@ -116,32 +119,30 @@ def percent_text(percent: float) -> str:
     return f"{percent:+.1f} %" if percent else "0"
 
 
-def _run_rows(run: RunComparison) -> list[Row]:
+def _run_rows(run: pd.DataFrame) -> list[tuple[str, ...]]:
     """Against labels and against true poses; a single row where these are the same numbers."""
-    yardsticks = {"both": ""} if run.one_yardstick else {"labels": "", "true": "_true"}
-    doubt = "?" if run.few_paths else ""
+    yardsticks = {"both": ""} if one_yardstick(run) else {"labels": "", "true": "_true"}
+    first, by_measure = run.iloc[0], {row.measure: row for row in run.itertuples()}
+    paths = min(first["n_paths_a"], first["n_paths_b"])
+    doubt = "?" if paths < FEWEST_PATHS else ""
     return [
         (
-            *(run.key.model if i == 0 else "", against),
-            *_cells(run.differences[f"position_m{end}"], 3, doubt),
-            *_cells(run.differences[f"orientation_deg{end}"], 2, doubt),
-            str(min(run.n_paths)),
+            *(first["model"] if i == 0 else "", against),
+            *_cells(by_measure[f"position_m{end}"], 3, doubt),
+            *_cells(by_measure[f"orientation_deg{end}"], 2, doubt),
+            str(paths),
         )
         for i, (against, end) in enumerate(yardsticks.items())
     ]
 
 
-def _cells(difference: Difference, digits: int, doubt: str) -> Row:
-    spread = "" if difference.se_seeds is None else f" ± {difference.se_seeds:.{digits}f}"
-    limits = f"[{_signed(difference.low, digits)}, {_signed(difference.high, digits)}]"
-    seen = difference.verdict != "no difference seen"
-    return (
-        _error(difference.a, digits),
-        _error(difference.b, digits),
-        _signed(difference.value, digits) + spread,
-        limits,
-        difference.verdict + doubt if seen else UNSEEN,
-    )
+def _cells(row: Any, digits: int, doubt: str) -> tuple[str, ...]:
+    spread = "" if math.isnan(row.se_seeds) else f" ± {row.se_seeds:.{digits}f}"
+    limits = f"[{_signed(row.low, digits)}, {_signed(row.high, digits)}]"
+    seen = row.verdict != "no difference seen"
+    difference = _signed(row.difference, digits) + spread
+    verdict = row.verdict + doubt if seen else UNSEEN
+    return _error(row.a, digits), _error(row.b, digits), difference, limits, verdict
 
 
 def _error(value: float, digits: int) -> str:
@@ -154,7 +155,8 @@ def _signed(value: float, digits: int) -> str:
     return f"{value:+.{digits}f}" if value else "0"
 
 
-def _value_text(value: str | None) -> str:
-    if value is None:
+def _value_text(value: Any) -> str:
+    if pd.isna(value):
         return "(none)"
-    return value if len(value) <= WIDEST_VALUE else f"{value[: WIDEST_VALUE - 1]}…"
+    text = str(value)
+    return text if len(text) <= WIDEST_VALUE else f"{text[: WIDEST_VALUE - 1]}…"

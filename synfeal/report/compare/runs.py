@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,25 +14,12 @@ from numpy.typing import NDArray
 from synfeal.dataset.number_table import read_numbers
 from synfeal.dataset.pose_table import HEADER, whole_numbers
 from synfeal.errors import InputError
-from synfeal.report.stats import MEASURES, read_metrics
+from synfeal.report.run_errors import read_errors
+from synfeal.report.stats import MEASURES, REMEDY, read_metrics
 
-ERRORS_HEADER = ",".join(("frame", *MEASURES))
-REMEDY = "score that run again"
-
-
-class RunKey(NamedTuple):
-    """What a run is, apart from its seed; the directories below ``runs``, in order."""
-
-    scene: str
-    size: str
-    labels: str
-    init: str
-    model: str
-
-    @property
-    def name(self) -> str:
-        """As printed, e.g. ``large_room/6k/synfeal/pretrained/posenet``."""
-        return "/".join(self)
+# What a run is, apart from its seed: the directories below ``runs``, in order.
+KEY = ("scene", "size", "labels", "init", "model")
+RunKey = tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -50,10 +37,11 @@ class RunErrors:
     path: NDArray[np.int64]
     errors: NDArray[np.float64]
 
-    @property
-    def failed(self) -> int:
-        """Predictions that were not finite, over all seeds."""
-        return int(np.isinf(self.errors[:, 0]).sum())
+    def counts(self) -> dict[str, int]:
+        """Test frames, the paths these belong to, seeds, and predictions that were not finite."""
+        paths, seeds = len(np.unique(self.path)), len(self.errors)
+        failed = int(np.isinf(self.errors[:, 0]).sum())
+        return {"n_test": len(self.frame), "n_paths": paths, "n_seeds": seeds, "failed": failed}
 
 
 def find_runs(root: Path) -> dict[RunKey, list[Path]]:
@@ -64,7 +52,7 @@ def find_runs(root: Path) -> dict[RunKey, list[Path]]:
     """
     found: dict[RunKey, list[Path]] = {}
     for path in sorted(root.glob("runs/*/*/*/*/*/seed*/metrics.json")):
-        key = RunKey(*path.parent.relative_to(root / "runs").parts[:-1])
+        key = path.parent.relative_to(root / "runs").parts[:-1]
         found.setdefault(key, []).append(path.parent)
     if not found:
         raise InputError(
@@ -85,7 +73,7 @@ def read_run(seeds: Sequence[Path]) -> RunErrors:
     for seed, found in zip(seeds, index, strict=True):
         if not np.array_equal(found, index[0]):
             raise InputError(f"{seed}: was tested on other frames than {seeds[0]}; run both again")
-    errors = np.stack([_read_errors(seed, index[0][:, 0]) for seed in seeds])
+    errors = np.stack([_read_seed(seed, index[0][:, 0]) for seed in seeds])
     return RunErrors(index[0][:, 0], index[0][:, 1], errors)
 
 
@@ -98,13 +86,13 @@ def _read_index(seed: Path) -> NDArray[np.int64]:
     return whole_numbers(values, path)
 
 
-def _read_errors(seed: Path, frame: NDArray[np.int64]) -> NDArray[np.float64]:
+def _read_seed(seed: Path, frame: NDArray[np.int64]) -> NDArray[np.float64]:
     """Errors (4, N) of one seed."""
     path = seed / "errors.csv"
-    values = read_numbers(path, ERRORS_HEADER, "table of errors", finite=False)
-    if not np.array_equal(values[:, 0], frame):
+    table = read_errors(path)
+    if not np.array_equal(table["frame"], frame):
         raise InputError(f"{path}: its frames are not those of predictions.csv; {REMEDY}")
-    errors = values[:, 1:].T
+    errors = table[list(MEASURES)].to_numpy().T
     if (errors < 0).any():
         raise InputError(f"{path}: holds an error below zero; {REMEDY}")
     errors = np.where(np.isnan(errors), np.inf, errors)

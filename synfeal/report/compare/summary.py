@@ -2,71 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from statistics import fmean
+import pandas as pd
 
 from synfeal.bootstrap import CONFIDENCE, FEWEST_PATHS
-from synfeal.report.compare.trees import Comparison, RunComparison
+from synfeal.report.compare.trees import Comparison
 from synfeal.report.stats import MEASURES, sign_test
 
 GROUPINGS = ("scene", "labels", "model")
 
 
-@dataclass(frozen=True)
-class MeasureSummary:
-    """One measure over all runs.
+def summarise(table: pd.DataFrame) -> pd.DataFrame:
+    """Runs by measure: how many are ``better``, ``worse`` or ``unseen`` by their intervals.
 
-    Attributes:
-        measure: which.
-        better: runs whose interval lies below zero.
-        worse: runs whose interval lies above zero.
-        unseen: the others.
-        lower: runs whose median fell, by however little.
-        higher: runs whose median rose.
-        p_sign: two-sided p of a sign test of ``lower`` against ``higher``; 1 without either.
-        percent: mean relative change, percent.
+    And how many are ``lower`` or ``higher``, by however little, with ``p_sign`` of a two-sided sign
+    test of these (1 without either); and ``percent``, the mean relative change.
     """
-
-    measure: str
-    better: int
-    worse: int
-    unseen: int
-    lower: int
-    higher: int
-    p_sign: float
-    percent: float
+    return pd.DataFrame([_summary(rows) for _, rows in table.groupby("measure", sort=False)])
 
 
-@dataclass(frozen=True)
-class GroupSummary:
-    """Mean relative changes, percent, of the runs that share one part of their name."""
-
-    grouping: str
-    name: str
-    n_runs: int
-    percent: dict[str, float]
-
-
-def summarise(runs: Sequence[RunComparison]) -> list[MeasureSummary]:
-    """One summary per measure."""
-    return [_summary(measure, runs) for measure in MEASURES]
-
-
-def groups_of(runs: Sequence[RunComparison]) -> list[GroupSummary]:
-    """Mean relative changes per scene, per label source and per model, in order of appearance."""
-    return [
-        GroupSummary(grouping, name, len(members), mean_percent(members))
-        for grouping in GROUPINGS
-        for name in dict.fromkeys(getattr(run.key, grouping) for run in runs)
-        for members in [[run for run in runs if getattr(run.key, grouping) == name]]
-    ]
+def _summary(rows: pd.DataFrame) -> dict[str, object]:
+    verdicts = rows["verdict"].tolist()
+    lower, signed, p_sign = sign_test(rows["difference"].tolist())
+    return {
+        "measure": rows["measure"].iloc[0],
+        "better": verdicts.count("better"),
+        "worse": verdicts.count("worse"),
+        "unseen": verdicts.count("no difference seen"),
+        "lower": lower,
+        "higher": signed - lower,
+        "p_sign": p_sign,
+        "percent": rows["change_percent"].mean(),
+    }
 
 
-def mean_percent(runs: Iterable[RunComparison]) -> dict[str, float]:
-    """Mean relative change of each measure; infinite when a run failed in B only."""
-    runs = list(runs)
-    return {m: fmean(run.differences[m].percent for run in runs) for m in MEASURES}
+def groups_of(table: pd.DataFrame) -> pd.DataFrame:
+    """Mean relative changes by scene, label source and model, in order of appearance.
+
+    Columns are ``grouping``, ``name``, ``n_runs``, and a mean for each measure, infinite where a
+    run of the group failed in B only.
+    """
+    parts = []
+    for grouping in GROUPINGS:
+        groups = table.groupby([grouping, "measure"], sort=False)["change_percent"]
+        means = groups.mean().unstack("measure", sort=False)
+        means.insert(0, "n_runs", groups.size().unstack("measure")[MEASURES[0]])
+        parts.append(means.rename_axis("name").reset_index().assign(grouping=grouping))
+    return pd.concat(parts, ignore_index=True)
 
 
 def remarks_of(comparison: Comparison) -> list[str]:
@@ -74,43 +55,32 @@ def remarks_of(comparison: Comparison) -> list[str]:
     runs = comparison.runs
     only_a, only_b = comparison.only
     by_chance = (1 - CONFIDENCE) * len(runs)
-    found = [
-        f"Runs in both trees: {len(runs)}; only in A: {only_a}; only in B: {only_b}.",
-        _pairing(runs),
-        *_labels(runs),
-        *_paths(runs),
-        _seeds(runs),
-        *_failures(runs),
+    few = int((runs[["n_paths_a", "n_paths_b"]].min(axis="columns") < FEWEST_PATHS).sum())
+    failed_a, failed_b = runs["failed_a"].sum(), runs["failed_b"].sum()
+    changes = comparison.changes
+    found = {
+        f"Runs in both trees: {len(runs)}; only in A: {only_a}; only in B: {only_b}.": True,
+        _pairing(runs): True,
+        **_labels(runs),
+        f"Runs with fewer than {FEWEST_PATHS} test paths: {few}; their intervals are too narrow,"
+        " hence the question marks.": few,
+        _seeds(runs): True,
+        f"Failed predictions: {failed_a} in A, {failed_b} in B; each counts as an infinite"
+        " error.": failed_a + failed_b,
         f"Were both trees equally good on all views, about {by_chance:.1f} of the {len(runs)}"
         " intervals of a measure would still miss zero by the choice of test paths. Runs share test"
-        " frames, so the sign test is a guide, not a proof.",
-    ]
-    if comparison.changes is not None:
-        found.append(f"Keys of provenance.json that differ: {len(comparison.changes)}.")
-    return found
+        " frames, so the sign test is a guide, not a proof.": True,
+        f"Keys of provenance.json that differ: {0 if changes is None else len(changes)}.": (
+            changes is not None
+        ),
+    }
+    return [sentence for sentence, applies in found.items() if applies]
 
 
-def _summary(measure: str, runs: Sequence[RunComparison]) -> MeasureSummary:
-    found = [run.differences[measure] for run in runs]
-    verdicts = [difference.verdict for difference in found]
-    lower, signed, p_sign = sign_test([difference.value for difference in found])
-    return MeasureSummary(
-        measure=measure,
-        better=verdicts.count("better"),
-        worse=verdicts.count("worse"),
-        unseen=verdicts.count("no difference seen"),
-        lower=lower,
-        higher=signed - lower,
-        p_sign=p_sign,
-        percent=mean_percent(runs)[measure],
-    )
-
-
-def _pairing(runs: Sequence[RunComparison]) -> str:
-    if all(run.paired for run in runs):
+def _pairing(runs: pd.DataFrame) -> str:
+    differ, unknown = ((runs["test_frames"] == found).sum() for found in ("differ", "unknown"))
+    if not differ + unknown:
         return "Frames are paired: both trees test on the same paths and true poses (plans)."
-    differ = sum(run.plans == "differ" for run in runs)
-    unknown = sum(run.plans == "unknown" for run in runs)
     reasons = [f"in {differ} the test frames differ"] if differ else []
     reasons += [f"for {unknown} a tree lacks plans/<scene>/test.csv"] if unknown else []
     return (
@@ -119,35 +89,19 @@ def _pairing(runs: Sequence[RunComparison]) -> str:
     )
 
 
-def _labels(runs: Sequence[RunComparison]) -> list[str]:
-    differ = sum(run.labels == "differ" for run in runs)
-    unknown = sum(run.labels == "unknown" for run in runs)
-    found = []
-    if differ:
-        found.append(
-            f"Runs with other test labels in B: {differ}; against the labels, their yardstick"
-            " changed too."
-        )
-    if unknown:
-        found.append(
-            f"Runs whose test labels a tree lacks (labels/…/test.csv): {unknown}; whether their"
-            " yardstick changed is unknown."
-        )
-    return found
+def _labels(runs: pd.DataFrame) -> dict[str, bool]:
+    """Sentences on the test labels, and whether they apply."""
+    differ, unknown = ((runs["test_labels"] == found).sum() for found in ("differ", "unknown"))
+    return {
+        f"Runs with other test labels in B: {differ}; against the labels, their yardstick changed"
+        " too.": bool(differ),
+        f"Runs whose test labels a tree lacks (labels/…/test.csv): {unknown}; whether their"
+        " yardstick changed is unknown.": bool(unknown),
+    }
 
 
-def _paths(runs: Sequence[RunComparison]) -> list[str]:
-    few = sum(run.few_paths for run in runs)
-    if not few:
-        return []
-    return [
-        f"Runs with fewer than {FEWEST_PATHS} test paths: {few}; their intervals are too"
-        " narrow, hence the question marks."
-    ]
-
-
-def _seeds(runs: Sequence[RunComparison]) -> str:
-    single = sum(min(run.n_seeds) < 2 for run in runs)
+def _seeds(runs: pd.DataFrame) -> str:
+    single = (runs[["n_seeds_a", "n_seeds_b"]].min(axis="columns") < 2).sum()
     if single:
         return (
             f"Runs with one seed in a tree: {single}. Their intervals say how far the test frames"
@@ -158,12 +112,3 @@ def _seeds(runs: Sequence[RunComparison]) -> str:
         "Intervals say how far the test frames decide; ± is the standard error from the spread over"
         " seeds. They are different uncertainties and are not merged."
     )
-
-
-def _failures(runs: Sequence[RunComparison]) -> list[str]:
-    failed_a, failed_b = (sum(run.failed[i] for run in runs) for i in (0, 1))
-    if not failed_a + failed_b:
-        return []
-    return [
-        f"Failed predictions: {failed_a} in A, {failed_b} in B; each counts as an infinite error."
-    ]

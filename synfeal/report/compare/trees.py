@@ -3,71 +3,33 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
-from synfeal.bootstrap import FEWEST_PATHS
+from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
-from synfeal.report.compare.frames import FrameComparer, Sameness
-from synfeal.report.compare.runs import RunErrors, RunKey, find_runs, read_run
-from synfeal.report.compare.stats import Difference, compare_errors
+from synfeal.report.compare.runs import KEY, RunErrors, find_runs, read_run
+from synfeal.report.compare.stats import compare_errors
 from synfeal.report.results import read_result
+from synfeal.report.stats import MEASURES
 
 PROVENANCE = "provenance.json"
 OUTCOMES = ("files", "stages", "time_utc")  # differ between any two runs; no reason for anything
-
-
-@dataclass(frozen=True)
-class RunComparison:
-    """One run in both trees; pairs are of tree A and tree B.
-
-    Attributes:
-        key: what was run.
-        differences: by measure (:data:`~synfeal.report.stats.MEASURES`).
-        plans: whether both saw the same test frames; only then are frames paired.
-        labels: whether the test sets carry the same labels.
-        n_test: test frames.
-        n_paths: straight paths these belong to.
-        n_seeds: repetitions.
-        failed: predictions that were not finite, over all seeds.
-    """
-
-    key: RunKey
-    differences: dict[str, Difference]
-    plans: Sameness
-    labels: Sameness
-    n_test: tuple[int, int]
-    n_paths: tuple[int, int]
-    n_seeds: tuple[int, int]
-    failed: tuple[int, int]
-
-    @property
-    def paired(self) -> bool:
-        """Whether the intervals are of paired frames."""
-        return self.plans == "same"
-
-    @property
-    def few_paths(self) -> bool:
-        """Whether the test set has too few paths for a bootstrap over them."""
-        return min(self.n_paths) < FEWEST_PATHS
-
-    @property
-    def one_yardstick(self) -> bool:
-        """Whether the labels are the true poses, so that both scores are the same numbers."""
-        d = self.differences
-        return all(d[m] == d[f"{m}_true"] for m in ("position_m", "orientation_deg"))
-
-
-@dataclass(frozen=True)
-class ConfigChange:
-    """A key of ``provenance.json`` whose values differ; None where a tree lacks it."""
-
-    key: str
-    a: str | None
-    b: str | None
+Sameness = Literal["same", "differ", "unknown"]
+# Trees of two machines may differ in the last digits of a pose; no picture shows that.
+TOLERANCE = 1e-6
+ORDER = (
+    *(*KEY, "measure", "a", "b", "difference", "low", "high", "change_percent", "verdict"),
+    *("sd_a", "sd_b", "se_seeds", "test_frames", "test_labels"),
+    *(f"{count}_{tree}" for count in ("n_test", "n_paths", "n_seeds", "failed") for tree in "ab"),
+)
 
 
 @dataclass(frozen=True)
@@ -76,15 +38,30 @@ class Comparison:
 
     Attributes:
         names: the directories as they were given.
-        runs: those in both trees.
+        table: a row per run in both trees and measure. Columns are those of a run's directory, of
+            :func:`~synfeal.report.compare.stats.compare_errors`, ``test_frames`` and
+            ``test_labels``, which say whether both trees have the same, and counts of either.
         only: how many runs are in A only and in B only.
-        changes: what differs between the provenance of the trees; None where either has none.
+        changes: keys of the provenance of the trees that differ, with the value in each, NaN where
+            one lacks it; None where either has no provenance.
     """
 
     names: tuple[str, str]
-    runs: tuple[RunComparison, ...]
+    table: pd.DataFrame
     only: tuple[int, int]
-    changes: tuple[ConfigChange, ...] | None
+    changes: pd.DataFrame | None
+
+    @property
+    def runs(self) -> pd.DataFrame:
+        """One row per run: what is said of all its measures."""
+        return self.table[self.table["measure"] == MEASURES[0]]
+
+
+def one_yardstick(run: pd.DataFrame) -> bool:
+    """Whether the labels of a run are the true poses, so that both scores are the same numbers."""
+    values = run.set_index("measure")[["a", "b", "low", "high", "sd_a", "sd_b"]]
+    labels, truth = (values.loc[[f"{m}{end}" for m in MEASURES[:2]]] for end in ("", "_true"))
+    return labels.reset_index(drop=True).equals(truth.reset_index(drop=True))
 
 
 def compare_trees(root_a: Path, root_b: Path) -> Comparison:
@@ -100,49 +77,76 @@ def compare_trees(root_a: Path, root_b: Path) -> Comparison:
             f"{root_b}: has no run in common with {root_a} (of {len(found_b)} and {len(found_a)});"
             " compare trees of the same experiments"
         )
-    frames = FrameComparer(root_a, root_b)
-    runs = [_compare_run(key, found_a[key], found_b[key], frames) for key in shared]
+
+    @cache
+    def poses(path: Path) -> PoseTable | None:
+        return read_pose_table(path) if path.exists() else None
+
+    def sameness(place: str, count: int) -> Sameness:
+        return _sameness(poses(root_a / place), poses(root_b / place), count)
+
+    runs = [_compare_run(key, found_a[key], found_b[key], sameness) for key in shared]
     return Comparison(
         names=(str(root_a), str(root_b)),
-        runs=tuple(runs),
+        table=pd.concat(runs, ignore_index=True)[list(ORDER)],
         only=(len(found_a) - len(shared), len(found_b) - len(shared)),
         changes=_changes(root_a / PROVENANCE, root_b / PROVENANCE),
     )
 
 
 def _compare_run(
-    key: RunKey, seeds_a: list[Path], seeds_b: list[Path], frames: FrameComparer
-) -> RunComparison:
+    key: tuple[str, ...],
+    seeds_a: list[Path],
+    seeds_b: list[Path],
+    sameness: Callable[[str, int], Sameness],
+) -> pd.DataFrame:
+    """The differences of one run, and what both trees tested it on."""
     a, b = read_run(seeds_a), read_run(seeds_b)
-    plans = frames.plans(key, a, b)
-    return RunComparison(
-        key=key,
-        differences=compare_errors(a, b, paired=plans == "same"),
-        plans=plans,
-        labels=frames.labels(key, a, b),
-        n_test=(len(a.frame), len(b.frame)),
-        n_paths=(_n_paths(a), _n_paths(b)),
-        n_seeds=(len(seeds_a), len(seeds_b)),
-        failed=(a.failed, b.failed),
+    scene, size, labels, *_ = key
+    plans, carried = f"plans/{scene}/test.csv", f"labels/{scene}/{size}/{labels}/test.csv"
+    frames: Sameness = sameness(plans, len(a.frame)) if _same_views(a, b) else "differ"
+    alike = len(a.frame) == len(b.frame)
+    counts = {f"{name}_a": count for name, count in a.counts().items()}
+    counts |= {f"{name}_b": count for name, count in b.counts().items()}
+    return compare_errors(a, b, paired=frames == "same").assign(
+        **dict(zip(KEY, key, strict=True)),
+        test_frames=frames,
+        test_labels=sameness(carried, len(a.frame)) if alike else "differ",
+        **counts,
     )
 
 
-def _n_paths(run: RunErrors) -> int:
-    return len(np.unique(run.path))
+def _same_views(a: RunErrors, b: RunErrors) -> bool:
+    return np.array_equal(a.frame, b.frame) and np.array_equal(a.path, b.path)
 
 
-def _changes(path_a: Path, path_b: Path) -> tuple[ConfigChange, ...] | None:
+def _sameness(a: PoseTable | None, b: PoseTable | None, count: int) -> Sameness:
+    """Whether the first ``count`` poses of two tables are the same."""
+    if a is None or b is None:
+        return "unknown"
+    if min(len(a), len(b)) < count:
+        return "differ"
+    a_rows, b_rows = (_rows(table.first(count)) for table in (a, b))
+    return "same" if np.allclose(a_rows, b_rows, rtol=0, atol=TOLERANCE) else "differ"
+
+
+def _rows(table: PoseTable) -> NDArray[np.float64]:
+    """A table as it stands in its file (N, 9)."""
+    return np.column_stack([table.frame, table.path, table.position_m, table.quat_wxyz])
+
+
+def _changes(path_a: Path, path_b: Path) -> pd.DataFrame | None:
     if not (path_a.exists() and path_b.exists()):
         return None
-    a, b = (_flat(_causes(path)) for path in (path_a, path_b))
-    keys = [key for key in sorted({*a, *b}) if a.get(key) != b.get(key)]
-    return tuple(ConfigChange(key, a.get(key), b.get(key)) for key in keys)
+    causes = {tree: _causes(path) for tree, path in (("a", path_a), ("b", path_b))}
+    table = pd.DataFrame(causes, dtype=object).sort_index()
+    return table[table["a"].ne(table["b"])].rename_axis("key").reset_index()
 
 
-def _causes(path: Path) -> dict[str, Any]:
-    """What a run was made from, without what came out of it."""
+def _causes(path: Path) -> dict[str, str]:
+    """What a run was made from, without what came out of it: JSON by dotted key."""
     record = read_result(path, (), "delete it or run again")
-    return {key: value for key, value in record.items() if key not in OUTCOMES}
+    return _flat({key: value for key, value in record.items() if key not in OUTCOMES})
 
 
 def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, str]:
