@@ -1,18 +1,20 @@
 """Figures of tables: what is drawn is what is given."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from synfeal.config import MODELS
 from synfeal.evaluation.metrics import cumulative
-from synfeal.report.figures import error_by_noise, error_by_size, speed_vs_error, training_speed
+from synfeal.report.figures import Results, speed_vs_error
 from synfeal.report.figures.cumulative_error import SceneErrors
 from synfeal.report.figures.cumulative_error import figure_of as cumulative_figure
-from synfeal.report.figures.localizer_lines import ASIDE, published_value
+from synfeal.report.figures.error_by_design import by_noise, by_size
+from synfeal.report.figures.localizer_lines import ASIDE, published_values
 from synfeal.report.figures.pareto import pareto_front
 from synfeal.report.figures.style import METHOD_STYLES, MODEL_STYLES, PUBLISHED, SPLIT_STYLES
 from synfeal.report.layouts import TITLES
-from tests.report_results import ROWS, complete_results, read
+from tests.report_results import ROWS, complete_results, design_of
 
 MODEL_OF = {title: model for model, title in TITLES.items()}
 
@@ -20,7 +22,7 @@ MODEL_OF = {title: model for model, title in TITLES.items()}
 @pytest.fixture(scope="module")
 def tables(tmp_path_factory):
     root = complete_results(tmp_path_factory.mktemp("results") / "mini")
-    return {name: read(root / "tables" / f"{name}.csv") for name in ROWS}
+    return {name: Results(root, design_of(())).table(name) for name in ROWS}
 
 
 def drawn(axes):
@@ -41,8 +43,7 @@ def published(axes):
 
 
 def column(rows, name, **keys):
-    chosen = [row for row in rows if all(row[key] == value for key, value in keys.items())]
-    return [float(row[name]) for row in chosen]
+    return rows.loc[(rows[list(keys)] == pd.Series(keys)).all(axis=1), name].tolist()
 
 
 def check_panel(axes, rows, measure, **keys):
@@ -62,7 +63,7 @@ def check_panel(axes, rows, measure, **keys):
 
 def test_error_by_size_draws_the_true_errors_their_limits_and_the_published_ones(tables):
     rows = tables["table4_size"]
-    figure = error_by_size.figure_of(rows)
+    figure = by_size(rows)
     panels = np.reshape(figure.axes, (2, 2))
     for line, measure in enumerate(("position_m_true", "orientation_deg_true")):
         for place, scene in enumerate(("large_room", "sanctuary")):
@@ -78,7 +79,7 @@ def test_error_by_size_draws_the_true_errors_their_limits_and_the_published_ones
 
 def test_error_by_noise_draws_both_scores_and_the_published_only_beside_the_papers(tables):
     rows = tables["table3_inconsistencies"]
-    figure = error_by_noise.figure_of(rows, "title")
+    figure = by_noise(rows, "title")
     halves = [np.reshape(half.axes, (2, 3)) for half in figure.subfigs]
     for end, panels in zip(("", "_true"), halves, strict=True):
         for line, measure in enumerate(("position_m", "orientation_deg")):
@@ -91,15 +92,15 @@ def test_error_by_noise_draws_both_scores_and_the_published_only_beside_the_pape
 
 def test_a_misprint_and_a_failed_run_leave_a_gap(tables):
     rows = tables["table3_inconsistencies"]
-    figure = error_by_noise.figure_of(rows, "title")
+    figure = by_noise(rows, "title")
     both = np.reshape(figure.subfigs[0].axes, (2, 3))[1, 2]
     assert np.isnan(published(both)[MODELS.index("posenet2")][1])
-    flagged = {"published_flag": "misprint", "published_orientation_deg": "1"}
-    assert np.isnan(published_value(flagged, "orientation_deg"))
-    failed = [dict(row) for row in tables["table4_size"]]
-    failed[0] |= dict.fromkeys(("position_m_true", "position_m_true_low"), "")
-    failed[0]["position_m_true_high"] = ""
-    _, values, _ = drawn(error_by_size.figure_of(failed).axes[0])["posenet"]
+    flagged = pd.DataFrame({"published_flag": ["misprint", ""], "published_orientation_deg": 1.0})
+    assert np.isnan(published_values(flagged, "orientation_deg")).tolist() == [True, False]
+    failed = tables["table4_size"].copy()
+    measures = [f"position_m_true{end}" for end in ("", "_low", "_high")]
+    failed.loc[failed.index[0], measures] = np.nan
+    _, values, _ = drawn(by_size(failed).axes[0])["posenet"]
     assert np.isnan(values).tolist() == [True, False, False, False]
 
 
@@ -149,17 +150,8 @@ def test_the_pareto_front_is_what_nothing_dominates(seed):
 
 def test_speed_vs_error_joins_the_front_and_rings_the_choice():
     measured = ((1e6, 0.0, 0), (1.5e6, 0.004, 0), (1.2e6, 0.005, 1), (3e6, 0.2, 0))
-    rows = [
-        {
-            "stage": "collision",
-            "scene": "large_room",
-            "faces": str(1000 - 10 * i),
-            "items_per_s": str(speed),
-            "error": str(error),
-            "chosen": str(chosen),
-        }
-        for i, (speed, error, chosen) in enumerate(measured)
-    ]
+    rows = pd.DataFrame(measured, columns=["items_per_s", "error", "chosen"])
+    rows = rows.assign(scene="large_room", faces=[1000, 990, 980, 970])
     (axes,) = speed_vs_error.figure_of(rows, speed_vs_error.STAGES["collision"]).axes
     open_marks, front, ring = axes.lines
     np.testing.assert_allclose(open_marks.get_xydata(), [[1.2, 0.5]])
@@ -170,12 +162,8 @@ def test_speed_vs_error_joins_the_front_and_rings_the_choice():
 
 def test_trainings_are_filled_where_no_other_is_faster_and_better():
     measured = (("PoseNet", 500, 0.5), ("Hourglass", 200, 0.6), ("PoseNet2", 400, 0.4))
-    keys = ("scene", "variant", "items_per_s", "error")
-    rows = [
-        dict(zip(keys, ("sanctuary", name, str(speed), str(error)), strict=True))
-        for name, speed, error in measured
-    ]
-    (axes,) = training_speed.figure_of(rows).axes
+    rows = pd.DataFrame(measured, columns=["variant", "items_per_s", "error"])
+    (axes,) = speed_vs_error.training_figure(rows.assign(scene="sanctuary")).axes
     assert axes.get_title() == "Sanctuary"
     drawn = {line.get_label(): line for line in axes.lines}
     for name, speed, error in measured:

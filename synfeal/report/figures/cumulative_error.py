@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from synfeal.config import MODELS, Experiment
-from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import cumulative, joint_error
-from synfeal.report.compare.runs import ERRORS_HEADER
 from synfeal.report.figures.sources import Array, Results, counted
 from synfeal.report.figures.style import MODEL_STYLES
 from synfeal.report.layouts import TITLES, scene_title
+from synfeal.report.run_errors import read_errors
 
 MEASURES = {
     "position_m_true": "position error against the true poses (m)",
@@ -49,10 +48,10 @@ def draw(results: Results) -> Figure | None:
         return None
     scenes = list(dict.fromkeys(row.scene for row in rows))
     largest = [_largest(results, [row for row in rows if row.scene == scene]) for scene in scenes]
-    return figure_of([read_errors(results, row) for row in largest])
+    return figure_of([scene_errors(results, row) for row in largest])
 
 
-def read_errors(results: Results, row: Experiment) -> SceneErrors:
+def scene_errors(results: Results, row: Experiment) -> SceneErrors:
     """The errors of the five localizers on one data set.
 
     Raises:
@@ -63,11 +62,11 @@ def read_errors(results: Results, row: Experiment) -> SceneErrors:
         parts = []
         for run in results.design.runs_of(row, model):
             path = results.root / "runs" / run.directory / "errors.csv"
-            parts.append(read_numbers(path, ERRORS_HEADER, "table of errors", finite=False))
-            if not len(parts[-1]):
+            parts.append(read_errors(path))
+            if parts[-1].empty:
                 raise InputError(f"{path}: needs rows; score that run again")
-        values = np.concatenate(parts)
-        errors[model] = {m: values[:, ERRORS_HEADER.split(",").index(m)] for m in MEASURES}
+        values = pd.concat(parts)
+        errors[model] = {measure: values[measure].to_numpy() for measure in MEASURES}
         errors[model][JOINT] = joint_error(errors[model], "_true")
     counts = [len(results.labels(row.scene, row.size, "synfeal", s)) for s in ("train", "test")]
     return SceneErrors(f"{scene_title(row.scene)}, {row.size}\n{counted(*counts)}", errors)

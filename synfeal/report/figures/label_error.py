@@ -81,11 +81,11 @@ def _draw_batches(axes: Axes, methods: Mapping[str, LabelledSplit]) -> None:
     for place, (method, part) in enumerate(methods.items()):
         colour = METHOD_STYLES[method]["color"]
         for batch in part.batches:
-            face = {"facecolor": colour if batch.assisted else "white"}
-            span = (batch.start, batch.stop - 1 - batch.start)
+            face = {"facecolor": colour if batch["assisted"] else "white"}
+            span = (batch["start"], batch["stop"] - 1 - batch["start"])
             axes.broken_barh(
                 *([span], (place - 0.35, 0.7)),
-                **(LOST if batch.lost else face),
+                **(LOST if batch["lost"] else face),
                 edgecolor="black",
                 linewidth=0.8,
             )
@@ -97,7 +97,7 @@ def _draw_batches(axes: Axes, methods: Mapping[str, LabelledSplit]) -> None:
 
 def _draw_borders(axes: Axes, part: LabelledSplit) -> None:
     """Where batches meet; all methods are cut at the same frames."""
-    for frame in sorted({batch.start for batch in part.batches} - {0}):
+    for frame in sorted({batch["start"] for batch in part.batches} - {0}):
         axes.axvline(frame, color="0.82", linewidth=0.7, zorder=0)
     axes.set_xlim(0, len(part.labels) - 1)
 

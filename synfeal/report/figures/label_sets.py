@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,28 +15,19 @@ from synfeal.report.figures.sources import SPLITS, Array, Results
 
 
 @dataclass(frozen=True)
-class BatchMark:
-    """A batch as figures mark it: its frames ``start`` to ``stop`` (exclusive)."""
-
-    start: int
-    stop: int
-    assisted: bool
-    lost: bool
-
-
-@dataclass(frozen=True)
 class LabelledSplit:
     """One split with the labels of one method.
 
     Attributes:
         labels: the poses the method found, chained and assisted.
         truth: the true poses of the same frames.
-        batches: in the order of their frames; each begins with the last frame of the one before.
+        batches: records of assistance in the order of their frames ``start`` to ``stop``
+            (exclusive); each begins with the last frame of the one before.
     """
 
     labels: PoseTable
     truth: PoseTable
-    batches: tuple[BatchMark, ...]
+    batches: Sequence[Mapping[str, Any]]
 
     @property
     def errors(self) -> tuple[Array, Array]:
@@ -71,10 +64,7 @@ def _read(results: Results, scene: str, size: str, method: str) -> dict[str, Lab
         split: LabelledSplit(
             results.labels(scene, size, method, split),
             results.labels(scene, size, "synfeal", split),
-            tuple(
-                BatchMark(batch["start"], batch["stop"], batch["assisted"], batch["lost"])
-                for batch in batch_records(results.root, method, scene, size, split)
-            ),
+            batch_records(results.root, method, scene, size, split),
         )
         for split in SPLITS
     }

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from synfeal.config import MODELS
-from synfeal.report.figures.sources import Array, Row, number
+from synfeal.report.figures.sources import Array
 from synfeal.report.figures.style import MODEL_STYLES, PUBLISHED
 from synfeal.report.layouts import TITLES
 
@@ -17,7 +18,7 @@ from synfeal.report.layouts import TITLES
 ASIDE = dict(zip(MODELS, np.linspace(-0.16, 0.16, len(MODELS)), strict=True))
 
 
-def draw_localizers(axes: Axes, rows: Sequence[Row], measure: str, published: bool) -> None:
+def draw_localizers(axes: Axes, rows: pd.DataFrame, measure: str, published: bool) -> None:
     """One line per localizer over the places 0, 1, ... of its rows.
 
     Args:
@@ -27,17 +28,19 @@ def draw_localizers(axes: Axes, rows: Sequence[Row], measure: str, published: bo
         published: also draw the paper's values of that error.
     """
     for model in MODELS:
-        chosen = [row for row in rows if row["model"] == model]
+        chosen = rows[rows["model"] == model]
         places = np.arange(len(chosen)) + ASIDE[model]
         style = MODEL_STYLES[model]
         if published:
-            paper = [published_value(row, measure.removesuffix("_true")) for row in chosen]
+            paper = published_values(chosen, measure.removesuffix("_true"))
             axes.plot(places, paper, **{**style, **PUBLISHED})
-        values = np.array([number(row[measure]) for row in chosen])
+        values = chosen[measure].to_numpy()
+        # Limits enclose a median.
+        reach = [values - chosen[f"{measure}_low"], chosen[f"{measure}_high"] - values]
         axes.errorbar(
             places,
             values,
-            yerr=_reach(chosen, measure, values),
+            yerr=np.nan_to_num(np.clip(np.stack(reach), 0, None)),
             label=TITLES[model],
             linewidth=1.5,
             markersize=4.5,
@@ -55,10 +58,12 @@ def start_at_zero(panels: Iterable[Axes]) -> None:
         axes.set_ylim(bottom=0)
 
 
-def published_value(row: Row, measure: str) -> float:
-    """The paper's value, left out where it is a misprint."""
-    misprint = measure == "orientation_deg" and row["published_flag"] == "misprint"
-    return float("nan") if misprint else number(row[f"published_{measure}"])
+def published_values(rows: pd.DataFrame, measure: str) -> Array:
+    """The paper's values (N,), left out where they are misprints."""
+    values = rows[f"published_{measure}"]
+    if measure == "orientation_deg":
+        values = values.mask(rows["published_flag"] == "misprint")
+    return values.to_numpy()
 
 
 def add_legend(figure: Figure | SubFigure, axes: Axes, columns: int, published: bool) -> None:
@@ -68,11 +73,3 @@ def add_legend(figure: Figure | SubFigure, axes: Axes, columns: int, published: 
         (reference,) = axes.plot([], [], linestyle="-", **PUBLISHED)
         handles, labels = [*handles, reference], [*labels, "published (grey)"]
     figure.legend(handles, labels, loc="outside lower center", ncols=columns)
-
-
-def _reach(rows: Sequence[Row], measure: str, values: Array) -> Array:
-    """Distances (2, N) of the limits below and above the values; the limits enclose a median."""
-    low = np.array([number(row[f"{measure}_low"]) for row in rows])
-    high = np.array([number(row[f"{measure}_high"]) for row in rows])
-    reach: Array = np.clip(np.stack([values - low, high - values]), 0, None)
-    return np.nan_to_num(reach)

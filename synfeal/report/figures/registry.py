@@ -10,15 +10,13 @@ from matplotlib.figure import Figure
 
 from synfeal.report.figures import (
     cumulative_error,
-    error_by_noise,
-    error_by_size,
+    error_by_design,
     frames,
     label_error,
     poses,
     references_by_noise,
     render_speed,
     speed_vs_error,
-    training_speed,
     trajectories,
 )
 from synfeal.report.figures.sources import Results
@@ -64,7 +62,7 @@ FIGURES: dict[str, Entry] = {
         "which batches were assisted.",
     ),
     "error_by_noise": Entry(
-        error_by_noise.draw,
+        error_by_design.draw_by_noise,
         "Median localization error against the noise in the labels, with 95 % limits: above "
         "against the noisy labels of the test set, the paper's protocol, beside the published "
         "values in grey; below the same predictions against the true poses.",
@@ -76,7 +74,7 @@ FIGURES: dict[str, Entry] = {
         "stand in the order of the error of structure on depth.",
     ),
     "error_by_size": Entry(
-        error_by_size.draw,
+        error_by_design.draw_by_size,
         "Median localization error against the size of the data set, with 95 % limits, against the "
         "true poses, beside the published values in grey, which come from the paper's own meshes "
         "and numbers of frames.",
@@ -105,7 +103,7 @@ FIGURES: dict[str, Entry] = {
         "median position error of its labels after assistance; filled marks form the Pareto front.",
     ),
     "speed_vs_error_training": Entry(
-        training_speed.draw,
+        speed_vs_error.draw_training,
         "Images that each localizer learns from per second of processor time, and its median "
         "position error against the true poses, at the largest size of each scene; filled marks "
         "form the Pareto front.",

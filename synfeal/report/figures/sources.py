@@ -6,32 +6,24 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from synfeal.config import Design, Experiment
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
+from synfeal.frames import COUNT, MAYBE, NUMBER, TEXT, read_frame
 from synfeal.report import speed_vs_error
-from synfeal.report.results import read_table
 from synfeal.report.tables import columns_of
 
 Array = NDArray[np.float64]
-Row = dict[str, str]
 SPLITS = ("train", "test")
-# Columns of tables that hold no numbers.
-TEXTS = frozenset(
-    [
-        "scene",
-        "size",
-        "labels",
-        "block",
-        "model",
-        "published_flag",
-        "stage",
-        "variant",
-        "error_unit",
-        "backend",
-    ]
-)
+# What the columns of tables hold where that is not a number or nothing.
+KINDS = {
+    **dict.fromkeys(("scene", "size", "labels", "block", "model", "published_flag"), TEXT),
+    **dict.fromkeys(("stage", "variant", "error_unit", "backend"), TEXT),
+    **dict.fromkeys(("items_per_s", "error"), NUMBER),
+    **dict.fromkeys(("n_train", "n_test"), COUNT),
+}
 
 
 @dataclass(frozen=True)
@@ -60,18 +52,25 @@ class Results:
         """The rows of one table of the design."""
         return self.design.rows_of(table)
 
-    def table(self, name: str) -> list[Row]:
-        """Rows of ``tables/<name>.csv``.
+    def table(self, name: str) -> pd.DataFrame:
+        """``tables/<name>.csv``.
 
         Raises:
             InputError: the table is missing or unreadable.
         """
         speeds = name == speed_vs_error.NAME
         columns = speed_vs_error.COLUMNS if speeds else columns_of(name)
-        numbers = ("items_per_s", "error") if speeds else ("n_train", "n_test")
-        every = columns if speeds else columns_of(name, repeated=True)
-        optional = [column for column in every if column not in TEXTS]
-        return read_table(self.root / "tables" / f"{name}.csv", columns, numbers, optional)
+        schema = {column: KINDS.get(column, MAYBE) for column in columns}
+        return read_frame(self.root / "tables" / f"{name}.csv", schema)
+
+    def speeds(self, stage: str) -> pd.DataFrame:
+        """The rows of ``speed_vs_error.csv`` of one stage.
+
+        Raises:
+            InputError: the table is missing or unreadable.
+        """
+        table = self.table(speed_vs_error.NAME)
+        return table[table["stage"] == stage]
 
     def labels(self, scene: str, size: str, labels: str, split: str) -> PoseTable:
         """The poses a data set carries; those of ``synfeal`` are the true ones.
@@ -91,11 +90,6 @@ class Results:
         return sorted(names, key=lambda size: len(self.labels(scene, size, "synfeal", "train")))
 
 
-def number(text: str) -> float:
-    """A value of a table; an empty cell is not a number and leaves a gap."""
-    return float(text) if text else float("nan")
-
-
-def counted(n_train: int | str, n_test: int | str) -> str:
+def counted(n_train: int, n_test: int) -> str:
     """Frames of a data set as figures say it."""
-    return f"{float(n_train):,.0f} training, {float(n_test):,.0f} test frames"
+    return f"{n_train:,} training, {n_test:,} test frames"

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import cycle
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from baselines.groundtruth.methods import METHODS
 from synfeal.report.figures.pareto import pareto_front
-from synfeal.report.figures.sources import Results, Row
-from synfeal.report.figures.style import METHOD_STYLES, SCENE_STYLES, Style
-from synfeal.report.layouts import scene_title
+from synfeal.report.figures.sources import Array, Results
+from synfeal.report.figures.style import METHOD_STYLES, MODEL_STYLES, SCENE_STYLES, Style
+from synfeal.report.layouts import TITLES, scene_title
 
-TABLE = "speed_vs_error"
+# The style of what has a name of its own, by title.
+NAMED = {method.title: METHOD_STYLES[name] for name, method in METHODS.items()}
+NAMED |= {TITLES[model]: style for model, style in MODEL_STYLES.items()}
 
 
 @dataclass(frozen=True)
@@ -65,30 +68,29 @@ STAGES = {
 
 def draw(results: Results, stage: str) -> Figure | None:
     """One line per scene; nothing when the table has no rows of the stage."""
-    rows = [row for row in results.table(TABLE) if row["stage"] == stage]
-    return figure_of(rows, STAGES[stage]) if rows else None
+    rows = results.speeds(stage)
+    return figure_of(rows, STAGES[stage]) if len(rows) else None
 
 
-def figure_of(rows: Sequence[Row], stage: Stage) -> Figure:
+def figure_of(rows: pd.DataFrame, stage: Stage) -> Figure:
     """The figure of one stage's rows of ``speed_vs_error.csv``."""
     figure = Figure(figsize=(6.4, 4.6), layout="constrained")
     axes = figure.subplots()
-    for scene, style in zip(dict.fromkeys(r["scene"] for r in rows), cycle(SCENE_STYLES)):
-        draw_scene(axes, [row for row in rows if row["scene"] == scene], stage, style)
+    for (_, scene), style in zip(rows.groupby("scene", sort=False), cycle(SCENE_STYLES)):
+        draw_scene(axes, scene, stage, style)
     axes.set_title(stage.title)
     axes.set_yscale("symlog", linthresh=stage.linear_below)
     axes.set_ylim(bottom=-0.2 * stage.linear_below)  # marks at 0 are seen whole
     axes.yaxis.set_major_formatter("{x:g}")
     axes.set_xlabel(stage.speed)
     axes.set_ylabel(stage.error)
-    axes.grid(color="0.94")
-    axes.set_axisbelow(True)
+    _add_grid(axes)
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3 if stage.named else 1)
     return figure
 
 
-def draw_scene(axes: Axes, rows: Sequence[Row], stage: Stage, style: Style) -> None:
+def draw_scene(axes: Axes, rows: pd.DataFrame, stage: Stage, style: Style) -> None:
     """All variants small and open, those on the Pareto front filled and joined, the choice ringed.
 
     Args:
@@ -97,48 +99,67 @@ def draw_scene(axes: Axes, rows: Sequence[Row], stage: Stage, style: Style) -> N
         stage: axes and their units.
         style: colour, marker and dashes of the scene.
     """
-    speed = np.array([float(row["items_per_s"]) / stage.per for row in rows])
-    error = np.array([float(row["error"]) * stage.factor for row in rows])
-    front = pareto_front(1.0 / speed, error)
+    speed, error = (rows["items_per_s"] / stage.per).to_numpy(), rows["error"].to_numpy()
+    error = error * stage.factor
     if stage.named:
-        for place, row in enumerate(rows):
-            _named_mark(axes, speed[place], error[place], row["variant"], bool(front[place]))
+        _draw_named(axes, speed, error, rows["variant"])
         return
+    front = pareto_front(1.0 / speed, error)
     order = np.argsort(speed[front], kind="stable")
     colour = style["color"]
     open_marks = {"marker": style["marker"], "markerfacecolor": "none", "markeredgecolor": colour}
     axes.plot(speed[~front], error[~front], linestyle="", markersize=4, alpha=0.6, **open_marks)
+    scene = scene_title(rows["scene"].iloc[0])
     axes.plot(
         *(speed[front][order], error[front][order]),
-        label=f"{scene_title(rows[0]['scene'])}: Pareto front (open: dominated)",
+        label=f"{scene}: Pareto front (open: dominated)",
         linewidth=1.2,
         markersize=5,
         **style,
     )
-    for place, row in enumerate(rows):
-        if row["chosen"] == "1":
-            _ring(axes, speed[place], error[place], _used(row, rows[0]), colour)
+    full = rows["faces"].iloc[0]
+    ring: Style = {"marker": "o", "markerfacecolor": "none", "markersize": 13, "linestyle": ""}
+    for place in np.flatnonzero(rows["chosen"] == 1).tolist():
+        label = f"{scene}: used, {rows['faces'].iloc[place]:,.0f} of {full:,.0f} faces"
+        axes.plot(speed[place], error[place], label=label, markeredgecolor=colour, **ring)
 
 
-def _named_mark(axes: Axes, speed: float, error: float, title: str, on_front: bool) -> None:
-    """The mark of a method, in the style it has in all figures; filled on the Pareto front."""
-    (name,) = (name for name, method in METHODS.items() if method.title == title)
-    style: Style = METHOD_STYLES[name] | {"linestyle": "", "markersize": 8}
-    face = style["color"] if on_front else "none"
-    edge: Style = {"markerfacecolor": face, "markeredgecolor": style["color"]}
-    axes.plot(speed, error, label=title, **style, **edge)
+def draw_training(results: Results) -> Figure | None:
+    """A panel for every scene; nothing when the table has no rows of training runs."""
+    rows = results.speeds("training")
+    return training_figure(rows) if len(rows) else None
 
 
-def _used(row: Row, full: Row) -> str:
-    faces = f"{int(row['faces']):,} of {int(full['faces']):,} faces"
-    return f"{scene_title(row['scene'])}: used, {faces}"
+def training_figure(rows: pd.DataFrame) -> Figure:
+    """The figure of the rows of ``speed_vs_error.csv`` whose stage is ``training``."""
+    scenes = dict(list(rows.groupby("scene", sort=False)))
+    figure = Figure(figsize=(1.0 + 3.4 * len(scenes), 3.6), layout="constrained")
+    panels = figure.subplots(1, len(scenes), squeeze=False, sharey=True)[0]
+    for axes, (scene, part) in zip(panels, scenes.items(), strict=True):
+        speed = part["items_per_s"].to_numpy()
+        _draw_named(axes, speed, part["error"].to_numpy(), part["variant"])
+        axes.set_xlim(0, 1.15 * speed.max())
+        _add_grid(axes)
+        axes.set(title=scene_title(str(scene)), xlabel="images per second of processor time")
+    # Set once for all: a limit set by the first panel would cut off marks of the next.
+    panels[0].set_ylim(0, 1.1 * rows["error"].max())
+    panels[0].set_ylabel("median position error (m)")
+    handles, labels = max(
+        (axes.get_legend_handles_labels() for axes in panels), key=lambda found: len(found[1])
+    )
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return figure
 
 
-def _ring(axes: Axes, speed: float, error: float, label: str, colour: str) -> None:
-    ring: Style = {
-        "marker": "o",
-        "markerfacecolor": "none",
-        "markeredgecolor": colour,
-        "markersize": 13,
-    }
-    axes.plot(speed, error, label=label, linestyle="", **ring)
+def _draw_named(axes: Axes, speed: Array, error: Array, titles: pd.Series[Any]) -> None:
+    """A mark for each title, in the style it has in all figures; filled on the Pareto front."""
+    front = pareto_front(1.0 / speed, error)
+    for x, y, title, on_front in zip(speed, error, titles, front, strict=True):
+        style: Style = NAMED[title] | {"linestyle": "", "markersize": 8}
+        face = style["color"] if on_front else "none"
+        axes.plot(x, y, label=title, **style, markerfacecolor=face, markeredgecolor=style["color"])
+
+
+def _add_grid(axes: Axes) -> None:
+    axes.grid(color="0.94")
+    axes.set_axisbelow(True)

@@ -60,7 +60,7 @@ def _draw_split(
 
 def title_of(part: LabelledSplit, method: str) -> str:
     """The method, and how many of its batches were assisted."""
-    assisted = sum(batch.assisted for batch in part.batches)
+    assisted = sum(batch["assisted"] for batch in part.batches)
     return f"{SOURCES[method]}\n{assisted} of {len(part.batches)} batches assisted"
 
 
@@ -76,13 +76,13 @@ def draw_paths(axes: Axes, part: LabelledSplit, method: str) -> None:
     axes.plot(*truth.T, label="true path", zorder=2, **TRUTH)
     colour = METHOD_STYLES[method]["color"]
     axes.plot(*labels.T, label="estimated path", zorder=4, color=colour, linewidth=1.0)
-    assisted = [batch for batch in part.batches if batch.assisted]
-    wide = LineCollection([labels[batch.start : batch.stop] for batch in assisted])
+    assisted = [batch for batch in part.batches if batch["assisted"]]
+    wide = LineCollection([labels[batch["start"] : batch["stop"]] for batch in assisted])
     wide.set(color=colour, linewidth=4.0, alpha=0.3, zorder=3.5, label="assisted batch")
     axes.add_collection(wide)
-    starts = [batch.start for batch in part.batches]
+    starts = [batch["start"] for batch in part.batches]
     _mark(axes, labels[starts], "first frame of a batch", 3, colour)
-    ends = [batch.stop - 1 for batch in assisted]
+    ends = [batch["stop"] - 1 for batch in assisted]
     _mark(axes, labels[ends], "assisted: replaced by the true pose", 6, "white")
 
 
