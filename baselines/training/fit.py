@@ -1,7 +1,8 @@
-"""The one optimisation that every training goes through."""
+"""The one optimisation that every training run goes through."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol as Interface
 
 import torch
@@ -10,7 +11,7 @@ from torch import Tensor
 from baselines.localizers.base import Localizer
 from baselines.training.data import ImageStatistics, LabelledFrames
 from baselines.training.device import Precision, autocast
-from baselines.training.optimizer import Schedule, optimisation_of
+from baselines.training.optimizer import Optimisation, Schedule, optimisation_of
 from baselines.training.order import BatchOrder
 from baselines.training.progress import HistoryRow, Progress
 from baselines.training.protocol import PROTOCOLS, Protocol
@@ -26,6 +27,64 @@ class Augmentation(Restorable, Interface):
 
     def __call__(self, images: Tensor, quat_wxyz: Tensor) -> tuple[Tensor, Tensor]:
         """Other images (B, 3, H, W), normalised, and their unit quaternions (B, 4)."""
+
+
+@dataclass
+class Fitting:
+    """A training run between two steps: what it is made of, and how a step is taken.
+
+    Attributes:
+        localizer: on the device of the frames.
+        frames: to learn from.
+        statistics: of the images.
+        optimisation: updates the weights.
+        order: of the frames.
+        progress: losses and history so far.
+        selection: which weights are kept.
+        evaluations: steps after which these are chosen among.
+        precision: of the network; losses and weights are float32.
+        augment: applied to each batch of normalised images.
+    """
+
+    localizer: Localizer
+    frames: LabelledFrames
+    statistics: ImageStatistics
+    optimisation: Optimisation
+    order: BatchOrder
+    progress: Progress
+    selection: Selection
+    evaluations: frozenset[int]
+    precision: Precision
+    augment: Augmentation | None
+
+    @property
+    def parts(self) -> dict[str, Restorable]:
+        """Everything that a later process needs to go on from here."""
+        parts: dict[str, Restorable] = {
+            "localizer": self.localizer,
+            "optimisation": self.optimisation,
+            "order": self.order,
+            "progress": self.progress,
+            "selection": self.selection,
+            "random": RandomState(self.frames.images.device),
+        }
+        return parts if self.augment is None else parts | {"augment": self.augment}
+
+    def step(self) -> None:
+        """Learn from the next batch, and look how good the weights are where that is due."""
+        device = self.frames.images.device
+        images, position_m, quat_wxyz = self.frames.batch(self.order.next_batch().to(device))
+        normalised = self.statistics.normalise(images)
+        if self.augment is not None:
+            normalised, quat_wxyz = self.augment(normalised, quat_wxyz)
+        with autocast(device, self.precision):
+            predictions = self.localizer(normalised)
+        loss = self.localizer.loss(predictions, position_m, quat_wxyz)
+        rate = self.optimisation.learning_rate
+        self.optimisation.step(loss)
+        self.progress.add(loss)
+        due = self.progress.done in self.evaluations
+        self.progress.end_step(rate, self.selection.evaluate() if due else None)
 
 
 def fit(
@@ -44,11 +103,12 @@ def fit(
 ) -> list[HistoryRow]:
     """Train in place and return the history.
 
-    Stops when the loss is no longer finite. Such a training has failed: all its weights become NaN,
-    also where weights from before would do, because a good one is not one that was stopped in time.
+    Stops when the loss is no longer finite. Such a run has failed: all its weights become NaN, also
+    where weights from before would do, because a good one is not one that was stopped in time.
 
     Args:
-        localizer: on the device of the frames.
+        localizer: see :class:`Fitting`, as for ``frames``, ``statistics``, ``precision`` and
+            ``augment``.
         frames: to learn from.
         statistics: of the images.
         schedule: how long and how fast.
@@ -56,49 +116,36 @@ def fit(
         protocol: how.
         held_out: frames that decide which weights are kept; without any it is the last ones.
         patience: evaluations without a new best after which training stops.
-        precision: of the network; losses and weights are float32.
-        augment: applied to each batch of normalised images.
-        resume: where the state is kept; a training that finds its own there goes on with it.
+        precision: of the network.
+        augment: of the images.
+        resume: where the state is kept; a run that finds its own there goes on with it.
     """
-    device, steps = frames.images.device, schedule.steps
-    optimisation = optimisation_of(protocol.optimiser, localizer, schedule)
-    order = BatchOrder(len(frames), schedule.batch_size, seed, protocol.order == "shuffled")
-    progress = Progress(steps, schedule.batch_size, device)
     selection = Selection(protocol.selection, localizer, statistics, held_out, precision)
-    evaluations = selection.due_after(steps, schedule.samples_seen)
+    run = Fitting(
+        localizer,
+        frames,
+        statistics,
+        optimisation_of(protocol.optimiser, localizer, schedule),
+        BatchOrder(len(frames), schedule.batch_size, seed, protocol.order == "shuffled"),
+        Progress(schedule.steps, schedule.batch_size, frames.images.device),
+        selection,
+        selection.due_after(schedule.steps, schedule.samples_seen),
+        precision,
+        augment,
+    )
     localizer.criterion.distance = protocol.distance
-    parts: dict[str, Restorable] = {
-        "localizer": localizer,
-        "optimisation": optimisation,
-        "order": order,
-        "progress": progress,
-        "selection": selection,
-        "random": RandomState(device),
-    }
-    if augment is not None:
-        parts["augment"] = augment
+    parts = run.parts
     resume.load(parts)
     localizer.train()
     with stop_signals() as stopped:
-        while not (stopped() or progress.ended or selection.stale(patience)):
-            images, position_m, quat_wxyz = frames.batch(order.next_batch().to(device))
-            normalised = statistics.normalise(images)
-            if augment is not None:
-                normalised, quat_wxyz = augment(normalised, quat_wxyz)
-            with autocast(device, precision):
-                predictions = localizer(normalised)
-            loss = localizer.loss(predictions, position_m, quat_wxyz)
-            rate = optimisation.learning_rate
-            optimisation.step(loss)
-            progress.add(loss)
-            errors = selection.evaluate() if progress.done in evaluations else None
-            progress.end_step(rate, errors)
+        while not (stopped() or run.progress.ended or selection.stale(patience)):
+            run.step()
             resume.save_if_due(parts, now=stopped())
-    if progress.diverged:
+    if run.progress.diverged:
         _spoil(localizer)
     else:
         selection.restore()
-    return progress.rows
+    return run.progress.rows
 
 
 @torch.no_grad()

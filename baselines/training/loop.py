@@ -1,9 +1,10 @@
-"""Training of one localizer on one labelled set."""
+"""Training one localizer on one labelled set."""
 
 from __future__ import annotations
 
 import logging
 from pathlib import Path
+from typing import NamedTuple
 
 import torch
 
@@ -22,7 +23,7 @@ from baselines.training.device import memory_errors, open_device, precision_on
 from baselines.training.fit import Augmentation, fit
 from baselines.training.optimizer import Schedule
 from baselines.training.order import held_out_paths
-from baselines.training.progress import write_history
+from baselines.training.progress import HistoryRow, write_history
 from baselines.training.protocol import HALVE_EVERY, PROTOCOLS, Protocol
 from baselines.training.resume import ResumeFile, digest
 from baselines.training.rotation import random_rotation
@@ -30,8 +31,35 @@ from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig, Tra
 
 log = logging.getLogger(__name__)
 
-# Images that tell this training's frames from others, beside the statistics of all of them.
+# Images that tell the frames of this run from others, beside the statistics of all of them.
 FINGERPRINT_IMAGES = 64
+
+
+class Material(NamedTuple):
+    """What a training run begins with: a network, and frames that it learns from.
+
+    Attributes:
+        localizer: with its first weights, on the device of the frames.
+        statistics: of all images.
+        learned: frames to learn from.
+        held_out: frames that decide which weights are kept, if any.
+    """
+
+    localizer: Localizer
+    statistics: ImageStatistics
+    learned: LabelledFrames
+    held_out: LabelledFrames | None
+
+    def fingerprints(self) -> list[object]:
+        """All that a run depends on beside its settings; of its images, samples."""
+        learned = self.learned
+        values: list[object] = [torch.__version__, self.localizer.state_dict()]
+        values += [self.statistics.mean, self.statistics.deviation, learned.images.device.type]
+        for part in (learned, self.held_out):
+            if part is not None:
+                some = torch.arange(0, len(part), max(1, len(part) // FINGERPRINT_IMAGES))
+                values += [*part.batch(some.to(part.rows.device)), part.position_m, part.quat_wxyz]
+        return values
 
 
 @memory_errors()
@@ -54,7 +82,7 @@ def train_localizer(
 ) -> None:
     """Train ``name`` and write its checkpoint and its history (columns of ``HistoryRow``).
 
-    Beside the checkpoint lies ``resume.pt`` until the training is finished.
+    Beside the checkpoint lies ``resume.pt`` until the run is finished.
 
     Args:
         name: a key of ``LOCALIZERS``.
@@ -80,45 +108,49 @@ def train_localizer(
     protocol = protocol or PROTOCOLS[training.protocol]
     device = open_device(training.device)
     data = read_labelled_frames(frames, labels, network.input_px, device)
-    statistics = image_statistics(data.images)
     learned, held_out = _split(data, protocol, training.validation_share, seed, test)
-    localizer = _initial(name, network, hyper, backbone_weights, seed)
-    localizer.place_on(device)
-    localizer.set_pose_prior(learned.position_m.mean(0))
-    _log_start(name, learned, held_out, protocol, samples_seen, device)
-    settings = (name, network, hyper, training, protocol, samples_seen, seed)
+    localizer = _initial(name, network, hyper, backbone_weights, seed, learned)
+    material = Material(localizer, image_statistics(data.images), learned, held_out)
+    log.info("%s: %d frames, %d samples, on %s", name, len(learned), samples_seen, device)
     if augment is None and protocol.images == "turned":
         augment = random_rotation(frames, network, training.augmentation, seed)
-    state = augment.state_dict() if augment else None
-    resume = ResumeFile(
-        out_model.with_name("resume.pt"),
-        digest(*settings, state, *_fingerprints(localizer, statistics, learned, held_out)),
-    )
-    rows = fit(
-        localizer,
-        learned,
-        statistics,
-        Schedule(
-            samples_seen,
-            training.batch_size,
-            hyper.learning_rate,
-            hyper.weight_decay,
-            HALVE_EVERY[name],
-        ),
-        seed,
+    settings = (name, network, hyper, training, protocol, samples_seen, seed)
+    identity = digest(*settings, augment and augment.state_dict(), *material.fingerprints())
+    resume = ResumeFile(out_model.with_name("resume.pt"), identity)
+    rates = hyper.learning_rate, hyper.weight_decay, HALVE_EVERY[name]
+    schedule = Schedule(samples_seen, training.batch_size, *rates)
+    rows = _fit(material, schedule, seed, training, protocol, augment, resume)
+    camera = frame_camera(frames)
+    description = ModelDescription(localizer=name, network=network, hyper=hyper, camera=camera)
+    save_checkpoint(out_model, localizer, material.statistics, description)
+    write_history(out_history, rows)
+    resume.remove()
+
+
+def _fit(
+    material: Material,
+    schedule: Schedule,
+    seed: int,
+    training: TrainingConfig,
+    protocol: Protocol,
+    augment: Augmentation | None,
+    resume: ResumeFile,
+) -> list[HistoryRow]:
+    """Train the network in place; the history."""
+    localizer, statistics, learned, held_out = material
+    if held_out is None:
+        log.info("no frames are held out: the last weights are kept")
+    else:
+        log.info("weights are chosen on %d frames (%s)", len(held_out), protocol.selection)
+    return fit(
+        *(localizer, learned, statistics, schedule, seed),
         protocol=protocol,
         held_out=held_out,
         patience=training.patience,
-        precision=precision_on(device, training.precision),
+        precision=precision_on(learned.images.device, training.precision),
         augment=augment,
         resume=resume,
     )
-    description = ModelDescription(
-        localizer=name, network=network, hyper=hyper, camera=frame_camera(frames)
-    )
-    save_checkpoint(out_model, localizer, statistics, description)
-    write_history(out_history, rows)
-    resume.remove()
 
 
 def _initial(
@@ -127,12 +159,18 @@ def _initial(
     hyper: LocalizerConfig,
     backbone_weights: Path | None,
     seed: int,
+    learned: LabelledFrames,
 ) -> Localizer:
-    """The localizer that training starts from; seeds the generator that dropout draws from too."""
+    """The localizer that training starts from, on the device of the frames it learns from.
+
+    Seeds the generator that dropout draws from too.
+    """
     torch.manual_seed(seed)
     localizer = build_localizer(name, network, hyper)
     if backbone_weights is not None:
         load_backbone_weights(localizer.backbone, backbone_weights)
+    localizer.place_on(learned.images.device)
+    localizer.set_pose_prior(learned.position_m.mean(0))
     return localizer
 
 
@@ -152,34 +190,3 @@ def _split(
     share = validation_share if protocol.selection == "validation" else 0.0
     mask = held_out_paths(data.path, share, seed)
     return (data.part(~mask), data.part(mask)) if mask.any() else (data, None)
-
-
-def _log_start(
-    name: str,
-    learned: LabelledFrames,
-    held_out: LabelledFrames | None,
-    protocol: Protocol,
-    samples_seen: int,
-    device: torch.device,
-) -> None:
-    log.info("%s: %d frames, %d samples, on %s", name, len(learned), samples_seen, device)
-    if held_out is None:
-        log.info("no frames are held out: the last weights are kept")
-    else:
-        log.info("weights are chosen on %d frames (%s)", len(held_out), protocol.selection)
-
-
-def _fingerprints(
-    localizer: Localizer,
-    statistics: ImageStatistics,
-    learned: LabelledFrames,
-    held_out: LabelledFrames | None,
-) -> list[object]:
-    """All that a training depends on beside its settings; of its images, samples."""
-    values: list[object] = [torch.__version__, localizer.state_dict()]
-    values += [statistics.mean, statistics.deviation, learned.images.device.type]
-    for part in (learned, held_out):
-        if part is not None:
-            some = torch.arange(0, len(part), max(1, len(part) // FINGERPRINT_IMAGES))
-            values += [*part.batch(some.to(part.rows.device)), part.position_m, part.quat_wxyz]
-    return values
