@@ -224,6 +224,8 @@ def test_filled_frames_are_counted():
     )
     record = assistance.records[0]
     assert (record.registered, record.filled, record.lost) == (4, 1, False)
+    assert record.assisted  # its first registered frame was placed by the truth
+    assert record.error_before_m < 1e-12
     np.testing.assert_allclose(labels.position_m, truth.position_m, atol=1e-12)
 
 

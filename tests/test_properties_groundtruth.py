@@ -113,7 +113,8 @@ def test_no_batch_starts_farther_off_than_the_thresholds_allow(seed, n_frames, s
         np.testing.assert_allclose(record.error_after_deg, off_deg[last], atol=1e-5)
         beyond = record.error_before_m > 0.2 or record.error_before_deg > 10.0
         assert record.lost == (not estimate.registered[1:].any())
-        assert record.assisted == (record.lost or beyond)
+        # Where the first frame is not registered, the truth placed another one.
+        assert record.assisted == (record.lost or beyond or not estimate.registered[0])
         if record.assisted:
             np.testing.assert_allclose(off_m[last], 0.0, atol=1e-12)
         else:

@@ -9,6 +9,9 @@ Frames that a method did not register are filled in. Between two registered fram
 interpolated (straight line, constant angular velocity); after the last one its pose is held. The
 first frame always counts as known, since it is shared with the batch before.
 
+A batch whose first frame was not registered is assisted whatever its error: where its first
+registered frame stands was taken from the true poses (``sfm/scale.py``).
+
 A batch with no registered frame besides the first is lost. It is assisted whatever its error, and
 its frames are interpolated between its start and the true last pose, so that no frame is ever
 dropped.
@@ -158,7 +161,8 @@ def _place(
     lost = not trajectory.registered[1:].any()
     poses = world_from_first @ fill_gaps(trajectory)
     before_m, before_deg = _error(poses[-1], true_world_from_last)
-    assisted = lost or before_m > cfg.assist_position_m or before_deg > cfg.assist_orientation_deg
+    off = before_m > cfg.assist_position_m or before_deg > cfg.assist_orientation_deg
+    assisted = lost or off or not trajectory.registered[0]
     if lost:
         poses = interpolate(world_from_first, true_world_from_last, np.linspace(0, 1, len(batch)))
     if assisted:

@@ -4,6 +4,7 @@ An SfM model has no scale and no place in the world, so two things are taken fro
 the batch, as the published code does: the metric scale, from distances to the first frame, and the
 pose of the first registered camera. Its full pose is used, and not a similarity fitted to the
 camera centres, because the centres of a straight path leave the rotation about its line free.
+Where that camera is not the batch's first, the chain counts the batch as assisted.
 
 A wrong scale over the first frames and a first camera that few others share points with grow with
 the distance, so the placed error of a long path is larger than that after a similarity fit
