@@ -5,10 +5,9 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Sequence
-from html import escape
-from importlib.resources import files
-from string import Template
 from typing import Any
+
+from jinja2 import Environment, PackageLoader
 
 from synfeal.inspect.text import Section
 from synfeal.inspect.viewer_mesh import viewer_js
@@ -32,28 +31,14 @@ def page_html(
         picture_png: the picture.
         scene: what :meth:`synfeal.inspect.viewer_mesh.ViewerMesh.scene` returns.
     """
-    template = files("synfeal.inspect").joinpath("page.html").read_text(encoding="utf-8")
-    return Template(template).substitute(
-        title=escape(title),
-        doubts=_doubts(doubts),
-        sections="\n".join(_section(section) for section in sections),
-        snippet=escape(snippet),
+    loader = PackageLoader("synfeal.inspect", ".")
+    pages = Environment(loader=loader, autoescape=True, keep_trailing_newline=True)
+    return pages.get_template("page.html").render(
+        title=title,
+        doubts=doubts,
+        sections=sections,
+        snippet=snippet,
         picture=base64.b64encode(picture_png).decode("ascii"),
         scene=json.dumps(scene, allow_nan=False).replace("<", "\\u003c"),
         viewer=viewer_js(),
     )
-
-
-def _doubts(doubts: Sequence[str]) -> str:
-    if not doubts:
-        return ""
-    items = "".join(f"<li>{escape(doubt)}</li>" for doubt in doubts)
-    return f'<div class="doubts">Look at this first:<ul>{items}</ul></div>'
-
-
-def _section(section: Section) -> str:
-    rows = "".join(
-        f"<tr><th>{escape(label)}</th><td>{escape(value)}</td></tr>"
-        for label, value in section.rows
-    )
-    return f"<section><h2>{escape(section.title)}</h2><table>{rows}</table></section>"
