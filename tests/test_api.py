@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import runpy
+import copy
+import re
 import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
+import nbformat
 import pytest
+from nbclient import NotebookClient
 
 import synfeal
 from synfeal.errors import InputError
@@ -16,21 +18,28 @@ from synfeal.validation.run import report
 from tests.collected import collect, save_room
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-QUICKSTART = Path(__file__).parent.parent / "docs" / "quickstart.py"
+QUICKSTART = Path(__file__).parent.parent / "docs" / "quickstart.ipynb"
 
 
-def test_the_quick_start_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    made = runpy.run_path(str(QUICKSTART))
-    printed = capsys.readouterr().out
-    assert "40 training frames, 10 test frames, camera 160" in printed
-    assert "wrong with it: nothing" in printed
-    np.testing.assert_array_equal(made["plan"].position_m, made["data"].train.poses.position_m)
-    assert made["rgb"].shape == (120, 160, 3)
-    metrics = synfeal.evaluate("mydata", "estimates.csv").metrics
-    assert "0.1" in str(metrics)
+def texts(notebook: nbformat.NotebookNode) -> list[str]:
+    """What each cell of code says: printed, or its value."""
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    said = [[o.get("text") or o.data.get("text/plain", "") for o in c.outputs] for c in cells]
+    return ["".join(parts).split(" at 0x")[0] for parts in said]
+
+
+def test_the_quick_start_runs(tmp_path: Path) -> None:
+    shown = nbformat.read(QUICKSTART, as_version=4)
+    ran = copy.deepcopy(shown)
+    client = NotebookClient(ran, timeout=600, resources={"metadata": {"path": tmp_path}})
+    client.create_kernel_manager().transport = "ipc"
+    client.execute()
+    for notebook in (shown, ran):  # what stands in the file, and what comes of it now
+        _, seen, made, scored = texts(notebook)
+        assert "(120, 160, 3) nearest surface at" in seen
+        assert "40 training frames, 10 test frames, camera 160\nwrong with it: nothing" in made
+        assert re.search(r"position_m +0\.080", scored)
+    assert synfeal.open_dataset(tmp_path / "mydata").train.poses.position_m.shape == (40, 3)
 
 
 def test_the_functions_make_what_the_command_makes(tmp_path: Path) -> None:
