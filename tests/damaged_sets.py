@@ -121,20 +121,25 @@ def depth_along_the_ray(folder: Path) -> None:
     _change_depth(folder, lambda depth: depth * np.sqrt(1.0 + x**2 + y**2))
 
 
+def _swap_middle(folder: Path, *kinds: str) -> None:
+    for kind in kinds:
+        files = frame_files(folder, kind)
+        middle = len(files) // 2
+        first, second = files[middle].read_bytes(), files[middle + 1].read_bytes()
+        files[middle].write_bytes(second)
+        files[middle + 1].write_bytes(first)
+
+
 def swapped_colours(folder: Path) -> None:
-    colours = frame_files(folder, "color.png")
-    middle = len(colours) // 2
-    first, second = colours[middle].read_bytes(), colours[middle + 1].read_bytes()
-    colours[middle].write_bytes(second)
-    colours[middle + 1].write_bytes(first)
+    _swap_middle(folder, "color.png")
 
 
 def swapped_depths(folder: Path) -> None:
-    depths = frame_files(folder, "depth.png")
-    middle = len(depths) // 2
-    first, second = depths[middle].read_bytes(), depths[middle + 1].read_bytes()
-    depths[middle].write_bytes(second)
-    depths[middle + 1].write_bytes(first)
+    _swap_middle(folder, "depth.png")
+
+
+def swapped_frames(folder: Path) -> None:
+    _swap_middle(folder, "color.png", "depth.png")
 
 
 HIDDEN_ERRORS = (

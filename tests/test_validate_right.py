@@ -15,7 +15,11 @@ from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from tests.damaged_sets import (
     copy_of_first_frames,
+    depth_in_centimetres,
+    depth_in_metres,
     frame_files,
+    swapped_colours,
+    swapped_frames,
     without_manifest_hashes,
     write_planar_set,
 )
@@ -75,6 +79,44 @@ def test_a_faultless_set_passes(
     assert " ok " in found["depth"]
     assert " ok " in found["tables"]
     assert " ok " in found["camera"]
+
+
+@pytest.fixture(scope="module")
+def small_random(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Independent poses, 64 x 48: few pairs of frames see the same, and few pixels of it."""
+    folder = tmp_path_factory.mktemp("random")
+    save_glb(folder / "room.glb", furnished_room(PAINT_TEXELS))
+    out, box = folder / "set", [f"{value:.2f}" for value in BOX_M]
+    arguments = ["collect", "--mesh", str(folder / "room.glb"), "--out", str(out), "--depth"]
+    size = ["--frames", "60", "--width", "64", "--height", "48"]
+    assert main([*arguments, *size, "--mode", "random", "--box", *box]) == 0
+    without_manifest_hashes(out)
+    return out
+
+
+@pytest.mark.parametrize(
+    ("change", "failing"),
+    [
+        (None, set()),
+        (depth_in_metres, {"images", "pairs"}),
+        (depth_in_centimetres, {"pairs"}),
+        (swapped_frames, {"depth", "surfaces"}),
+        (swapped_colours, {"colours"}),
+    ],
+)
+def test_independent_poses_are_told_right_from_wrong_in_small_images(
+    change: Callable[[Path], object] | None,
+    failing: set[str],
+    small_random: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    copied = Path(shutil.copytree(small_random, tmp_path / "set"))
+    if change is not None:
+        change(copied)
+    found = verdicts(copied, capsys)
+    del found["manifest"]  # without its hashes, so that only geometry can tell
+    assert {name for name, line in found.items() if " FAILED " in line} == failing
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.collection import CameraConfig
@@ -27,6 +28,7 @@ from synfeal.validation.listing import COLOR, DEPTH, Frame, SequenceListing
 from synfeal.validation.reprojection import Residual, View, camera_normal, compare
 
 GAPS = (1, 5, 20)  # frames apart: neighbours see the most, distant ones tell angles and lengths
+N_NEAREST = 2  # frames of the most similar pose, which of independent poses see the most
 PAIRS_PER_GAP = 200  # evenly spread over larger sets
 GRID_PIXELS = 5000  # of each frame are moved to the other one
 MIN_OVERLAP = 0.2
@@ -92,22 +94,48 @@ class Pair:
 def choose_pairs(
     sequences: Iterable[SequenceListing], usable: Poses, every: bool
 ) -> list[tuple[Frame, Frame]]:
-    """Pairs ``GAPS`` frames apart, at most ``PAIRS_PER_GAP`` of each unless ``every``."""
-    chosen: list[tuple[Frame, Frame]] = []
+    """Pairs ``GAPS`` frames apart, and each frame with those of the most similar poses.
+
+    Of a sequence each; at most ``PAIRS_PER_GAP`` of each kind unless ``every``.
+    """
     sequences = list(sequences)
-    for gap in GAPS:
-        pairs = [
+    kinds = [
+        [
             (frame, Frame(frame.sequence, frame.number + gap))
             for sequence in sequences
             for frame in sequence.frames
             if frame in usable and Frame(frame.sequence, frame.number + gap) in usable
         ]
+        for gap in GAPS
+    ]
+    kinds.append([pair for sequence in sequences for pair in _nearest(sequence, usable)])
+    chosen: set[tuple[Frame, Frame]] = set()
+    for pairs in kinds:
+        index = np.arange(len(pairs))
         if not every and len(pairs) > PAIRS_PER_GAP:
             index = np.linspace(0, len(pairs) - 1, PAIRS_PER_GAP).round().astype(int)
-            pairs = [pairs[i] for i in index]
-        chosen += pairs
+        chosen.update(pairs[i] for i in index)
     order = {sequence.path: index for index, sequence in enumerate(sequences)}
     return sorted(chosen, key=lambda p: (order[p[0].sequence], p[0].number, p[1].number))
+
+
+def _nearest(sequence: SequenceListing, usable: Poses) -> list[tuple[Frame, Frame]]:
+    """Each frame with the ``N_NEAREST`` of the most similar poses, the earlier frame first.
+
+    A turn by a radian counts as much as a step across the space that the cameras are in.
+    """
+    frames = [frame for frame in sequence.frames if frame in usable]
+    if len(frames) <= N_NEAREST:
+        return []
+    poses = np.array([usable[frame] for frame in frames])
+    position, axes = poses[:, :3, 3], poses[:, :3, [0, 2]].reshape(-1, 6)
+    extent_m = max(float(np.linalg.norm(np.ptp(position, axis=0))), 1e-6)
+    features = np.column_stack([position / extent_m, axes])
+    _, found = KDTree(features).query(features, k=N_NEAREST + 1)
+    numbers = {
+        (min(i, j), max(i, j)) for i, row in enumerate(found.tolist()) for j in row if i != j
+    }
+    return [(frames[i], frames[j]) for i, j in sorted(numbers)]
 
 
 def check_consistency(
@@ -146,10 +174,10 @@ def _compare_all(
         residual = None
         if view_a and view_b:
             residual = compare(view_a, view_b, lens)
-        if view_a and view_b and residual and residual.overlap >= MIN_OVERLAP:
-            normal = camera_normal(view_a, view_b, lens, moved, DELTA)
-        else:
+        if residual and residual.overlap < MIN_OVERLAP:
             residual = None
+        if view_a and view_b and residual and not residual.hidden:
+            normal = camera_normal(view_a, view_b, lens, moved, DELTA)
         yield Pair(a, b, residual), normal
 
 
@@ -168,24 +196,31 @@ def _view(frame: Frame, world_from_cam: NDArray[np.float64], camera: CameraConfi
 
 
 def _overlap_check(pairs: list[Pair], poses: Poses, camera: CameraConfig) -> Check:
-    """Most neighbours must see the same surfaces, or nothing below means anything.
+    """Most pairs must see the same surfaces, or nothing below means anything.
 
-    Neighbours are frames that follow each other and hardly moved; those of random poses did.
+    That is, frames that hardly moved must see each other's points at all, and of frames that have
+    them in their views most must not have all of them hidden behind what they see.
     """
-    seen = sum(pair.residual is not None for pair in pairs)
-    apart = ", ".join(map(str, GAPS[:-1])) + f" and {GAPS[-1]}"
-    text = f"{seen} of {len(pairs)} pairs {apart} frames apart share {MIN_OVERLAP:.0%} of the view"
+    seen = [pair for pair in pairs if pair.residual]
+    hidden = [pair for pair in seen if pair.residual and pair.residual.hidden]
+    text = (
+        f"{len(seen) - len(hidden)} of {len(pairs)} pairs of frames see {MIN_OVERLAP:.0%} of each"
+        " other's view"
+    )
     near = [pair for pair in pairs if _are_neighbours(pair, poses, camera)]
     lost = [pair for pair in near if pair.residual is None]
-    if 2 * len(lost) <= len(near):
-        return Check("pairs", text)
-    failure = f"{lost[0].a.path(DEPTH)}: puts next to nothing into the view of the next frame"
-    return Check("pairs", text, (f"{failure}, and so do {len(lost) - 1} others of {len(near)}",))
+    if 2 * len(lost) > len(near):
+        failure = f"{lost[0].a.path(DEPTH)}: puts next to nothing into the view of a frame near it"
+        others = f"and so do {len(lost) - 1} others of {len(near)}"
+        return Check("pairs", text, (f"{failure}, {others}",))
+    if 2 * len(hidden) > len(seen):
+        failure = f"{hidden[0].a.path(DEPTH)}: all of it is hidden in frame {hidden[0].b.number}"
+        others = f"and so it is in {len(hidden) - 1} others of {len(seen)} pairs"
+        return Check("pairs", text, (f"{failure}, {others}; is depth in millimetres?",))
+    return Check("pairs", text)
 
 
 def _are_neighbours(pair: Pair, poses: Poses, camera: CameraConfig) -> bool:
-    if pair.b.number - pair.a.number != GAPS[0]:
-        return False
     step_m, turn_rad = pose_error(poses[pair.a], poses[pair.b])
     view_rad = 2.0 * math.atan(camera.width / 2.0 / intrinsics_of(camera).fx)
     return bool(step_m <= SMALL_STEP_M and turn_rad <= SMALL_TURN * view_rad)

@@ -79,11 +79,24 @@ def check_images(
                 if shape != size:
                     found, wanted = _size(shape), _size(size)
                     failures.append(f"{frame.path(kind)}: is {found}, must be {wanted}")
+                elif kind == DEPTH and camera:
+                    failures += _before_camera(images[kind], camera, str(frame.path(kind)))
             if COLOR in images:
                 content.add(frame, images[COLOR], images.get(DEPTH) if camera else None)
             on_frame()
     text = f"{n_images} images decoded" + (f", {_size(size)}" if size else "")
     return [Check("images", text, tuple(failures)), content.check()]
+
+
+def _before_camera(depth_mm: Pixels, camera: CameraConfig, path: str) -> list[str]:
+    """What is wrong where most of a frame is nearer than its camera draws anything."""
+    known = depth_mm[(depth_mm > 0) & (depth_mm < 65535)]
+    if not known.size or np.median(known) >= 1000.0 * camera.near_m - 1.0:
+        return []
+    return [
+        f"{path}: shows surfaces {np.median(known) / 1000.0:.3g} m away, before the near plane of"
+        f" the camera at {camera.near_m:g} m; store depth in millimetres"
+    ]
 
 
 def _size(shape: tuple[int, ...]) -> str:

@@ -10,6 +10,7 @@ differ from one. Differences are counted in multiples of that.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -65,6 +66,7 @@ class Residual:
 
     Attributes:
         overlap: share of the pixels of a with depth that b sees, hidden ones included.
+        hidden: whether so many of them are behind what b sees that all that follows is NaN.
         depth_mm: median difference in depth.
         depth: the same, each difference as a multiple of what may differ there.
         in_front: share of points that lie in front of what b sees, which cannot be.
@@ -74,11 +76,12 @@ class Residual:
     """
 
     overlap: float
-    depth_mm: float
-    depth: float
-    in_front: float
-    grey: float
-    shift_px: float
+    hidden: bool = True
+    depth_mm: float = math.nan
+    depth: float = math.nan
+    in_front: float = math.nan
+    grey: float = math.nan
+    shift_px: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -98,19 +101,23 @@ class _Seen:
 
 
 def compare(a: View, b: View, lens: Lens) -> Residual | None:
-    """The residuals of a pair, None if they share fewer than ``MIN_PIXELS`` of the lens's grid."""
+    """The residuals of a pair, None if b sees fewer than ``MIN_PIXELS`` of a's grid."""
     lifted = a.depth_m[lens.rows, lens.columns]
     seen = _look(a, b, lens)
+    if np.count_nonzero(seen.mask) < MIN_PIXELS:
+        return None
+    overlap = float(np.sum(seen.mask) / np.sum(np.isfinite(lifted)))
     on_surface = np.isfinite(seen.depth_m)
     ratio = seen.predicted_m / seen.depth_m
     visible = on_surface & (ratio < OCCLUSION_RATIO)
     if np.count_nonzero(visible) < MIN_PIXELS:
-        return None
+        return Residual(overlap)
     difference_m = np.abs(seen.predicted_m - seen.depth_m)[visible]
     grey_a = a.grey[lens.rows, lens.columns].astype(np.float64)[visible]
     grey_error = seen.grey[visible] - grey_a
     return Residual(
-        overlap=float(np.sum(seen.mask) / np.sum(np.isfinite(lifted))),
+        overlap,
+        hidden=False,
         depth_mm=1000.0 * float(np.median(difference_m)),
         depth=float(np.median(difference_m / seen.tolerance_m[visible])),
         in_front=float(np.mean(ratio[visible] * OCCLUSION_RATIO < 1.0)),
