@@ -61,6 +61,12 @@ def test_collect_makes_a_complete_data_set(calm: Path) -> None:
     assert len(list((calm / "seq-01").iterdir())) == 30
     verify_manifest(calm)
     table = read_pose_table(calm / "train.csv")
+    header, first, *_ = (calm / "train.csv").read_text().splitlines()
+    assert header.endswith(",qz,image")
+    assert first.endswith(",seq-01/frame-000000.color.png")
+    images = [line.rpartition(",")[2] for line in (calm / "test.csv").read_text().splitlines()[1:]]
+    assert images == [f"seq-04/frame-{number:06d}.color.png" for number in range(8)]
+    assert main(["evaluate", str(calm), str(calm / "test.csv")]) == 0
     last = read_pose(frame_paths([calm / "seq-03"], "pose.txt")[-1])
     np.testing.assert_allclose(last, table.world_from_cam[-1], atol=1e-9)
     assert not np.array_equal(table.position_m[:5], read_pose_table(calm / "test.csv").position_m)

@@ -13,7 +13,7 @@ from synfeal.dataset.contact_sheet import write_contact_sheet
 from synfeal.dataset.manifest import write_manifest
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.packed_record import file_sha256
-from synfeal.dataset.pose_table import read_pose_table
+from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.dataset.sequences import Split, sequences_of
 from synfeal.dataset.sevenscenes import frame_paths, write_splits
 from synfeal.frames import write_frame
@@ -30,6 +30,8 @@ def finish(
 ) -> None:
     """Write split files, contact sheet and manifest beside the sequences of a data set.
 
+    Its tables of poses name the images from then on.
+
     Args:
         directory: where the sequences lie.
         counts: frames of each split.
@@ -42,6 +44,10 @@ def finish(
     sequences = sequences_of(counts["train"], counts["test"], shard_frames)
     paths = {s: sequence_at(directory / s.name) for s in sequences}
     write_splits(directory, sequences)
+    for split in dict.fromkeys(sequence.split for sequence in sequences):
+        table = directory / f"{split}.csv"
+        images = [image for s in sequences if s.split == split for image in s.images]
+        write_pose_table(table, read_pose_table(table), images)
     if packed_px is not None:
         for split in {sequence.split for sequence in sequences}:
             chosen = [path for s, path in paths.items() if s.split == split]

@@ -1,11 +1,13 @@
 """Tables of poses: plans, label sets and predictions are all one CSV format.
 
 Columns ``frame,path,tx,ty,tz,qw,qx,qy,qz``: frame index in its split, index of the straight path
-the frame belongs to, position in metres and unit quaternion of ``world_from_cam``.
+the frame belongs to, position in metres and unit quaternion of ``world_from_cam``. Where the frames
+are files, a last column ``image`` names them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +20,7 @@ from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
 
 COLUMNS = ("frame", "path", "tx", "ty", "tz", "qw", "qx", "qy", "qz")
 HEADER = ",".join(COLUMNS)
+IMAGE = "image"
 UNIT_TOLERANCE = 1e-2
 
 
@@ -70,10 +73,18 @@ class PoseTable:
         return self.between(0, count)
 
 
-def write_pose_table(path: Path, table: PoseTable) -> None:
-    """Write the table with enough digits to read back the same float64 values."""
-    columns = [table.frame, table.path, *table.position_m.T, *table.quat_wxyz.T]
-    write_numbers(path, HEADER, zip(*(c.tolist() for c in columns), strict=True))
+def write_pose_table(path: Path, table: PoseTable, images: Sequence[str] = ()) -> None:
+    """Write the table with enough digits to read back the same float64 values.
+
+    Args:
+        path: the file.
+        table: the poses.
+        images: names of the frames' images, if they are files.
+    """
+    arrays = [table.frame, table.path, *table.position_m.T, *table.quat_wxyz.T]
+    columns = [*(array.tolist() for array in arrays), *([images] if images else [])]
+    header = f"{HEADER},{IMAGE}" if images else HEADER
+    write_numbers(path, header, zip(*columns, strict=True))
 
 
 def read_pose_table(path: Path) -> PoseTable:
@@ -83,7 +94,7 @@ def read_pose_table(path: Path) -> PoseTable:
         InputError: the file is missing, has another header, or holds anything but finite numbers,
             whole ones for frame and path, and unit quaternions.
     """
-    values = read_numbers(path, HEADER, "pose table")
+    values = read_numbers(path, HEADER, "pose table", passed_over=IMAGE)
     frame, straight_path = whole_numbers(values[:, :2], path).T
     check_unit(values[:, 5:9], path, np.arange(len(values)) + 2)
     return PoseTable(frame, straight_path, values[:, 2:5], values[:, 5:9])

@@ -21,6 +21,11 @@ class Sequence:
         return self.stop - self.start
 
     @property
+    def images(self) -> list[str]:
+        """Its colour images, as the data set's directory has them."""
+        return [f"{self.name}/frame-{number:06d}.color.png" for number in range(len(self))]
+
+    @property
     def number(self) -> int:
         """Number of the sequence, from 1, train and test counted together."""
         return int(self.name.removeprefix("seq-"))

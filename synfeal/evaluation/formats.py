@@ -20,9 +20,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from synfeal.dataset.pose_table import COLUMNS
+from synfeal.dataset.pose_table import COLUMNS, IMAGE
 from synfeal.dataset.sevenscenes import read_pose
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.evaluation.estimates import Convention, Estimates
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.validation.listing import POSE, list_sequences
@@ -64,7 +64,7 @@ def _text(path: Path) -> str:
     except FileNotFoundError:
         raise InputError(f"{path}: missing; give a file of poses, or a directory") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as poses ({error})") from None
+        raise InputError(f"{path}: cannot be read as poses ({why(error)})") from None
 
 
 def _from_directory(path: Path) -> Estimates:
@@ -130,8 +130,7 @@ def read_colmap(path: Path) -> Estimates:
         images = sorted(model.images.values(), key=lambda image: image.name)
         poses = [image.cam_from_world() for image in images if image.has_pose]
     except (RuntimeError, ValueError, IndexError, KeyError, MemoryError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{path}: cannot be read as a COLMAP model ({reason})") from None
+        raise InputError(f"{path}: cannot be read as a COLMAP model ({why(error)})") from None
     if not poses:
         raise InputError(f"{path}: this COLMAP model has no image with a pose")
     names = tuple(image.name for image in images if image.has_pose)
@@ -150,9 +149,9 @@ def read_csv(path: Path, text: str) -> Estimates:
     try:
         table = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
     except (pd.errors.ParserError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as CSV ({error})") from None
+        raise InputError(f"{path}: cannot be read as CSV ({why(error)})") from None
     header = tuple(table.columns)
-    if header not in (COLUMNS, ("image", *COLUMNS[2:])):
+    if header not in (COLUMNS, (*COLUMNS, IMAGE), (IMAGE, *COLUMNS[2:])):
         raise InputError(
             f"{path}: the header must be {','.join(COLUMNS)} or image,{','.join(COLUMNS[2:])},"
             f" found '{','.join(header)[:80]}'"
@@ -161,7 +160,7 @@ def read_csv(path: Path, text: str) -> Estimates:
     values = _numbers(path, places, table[list(COLUMNS[2:])].to_numpy().tolist())
     if not len(table):
         raise InputError(f"{path}: holds no poses below its header")
-    ordered = header == COLUMNS
+    ordered = header[0] == COLUMNS[0]
     return Estimates(
         "a pose table" if ordered else "poses of synfeal localize",
         OURS,
