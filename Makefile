@@ -8,9 +8,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
 SLURM_INSTALLED := $(VENV)/installed-slurm
 QUALITY := $(VENV)/quality
-# One line that stays and the first scores; what Snakemake says is in .snakemake/log, and on the screen
-# where it is called by itself.
-RUN := PYTHONPATH=workflow/plugins $(BIN)/snakemake --cores $(CORES) --logger synfeal --quiet host
+RUN := $(BIN)/synfeal run --cores $(CORES)
 # A file of tests to a worker: their fixtures are made once, and a worker has one thread.
 PYTEST := OMP_NUM_THREADS=1 $(BIN)/pytest --numprocesses $(CORES) --dist loadfile
 export PYTHONHASHSEED := 0
@@ -22,13 +20,13 @@ help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
 
 reproduce: $(INSTALLED)  ## install everything, then make every table (results/mini)
-	$(RUN) all
+	$(RUN)
 
 smoke: $(INSTALLED)  ## every rule and every model at toy size (results/smoke)
-	$(RUN) --configfile config/smoke.yaml -- all
+	$(RUN) --profile smoke
 
 start: $(INSTALLED)  ## train the backbones anew that pretrained runs start from (docs/start.md)
-	$(BIN)/snakemake --cores $(CORES) --configfile config/start.yaml -- start
+	$(RUN) --profile start -- start
 	$(BIN)/python -m baselines.localizers.backbones.shipped results/start
 
 publish: $(INSTALLED)  ## track what PROFILE's run made (results/published), and the pages' numbers from it

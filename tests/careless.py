@@ -12,8 +12,26 @@ PLACES = ("", "absent", "notes.txt/x", "loop", "loop/x", "x" * 300)
 NUMBERS = ("-1", "0", "nan", "inf", "-inf", "1e30")
 WHOLE = ("-1", "0", "99999999999", "9" * 400)
 DATA_SETS = (*PLACES, "notes.txt", "empty", "photos", "text.glb")
-MESHES = (*PLACES, "notes.txt", "empty", "text.glb", "cut.glb", "nothing.obj", "latin.txt")
+MESHES = (
+    *PLACES,
+    ".",
+    "x" * 5000,
+    "notes.txt",
+    "empty",
+    "text.glb",
+    "cut.glb",
+    "nothing.obj",
+    "latin.txt",
+    "image.glb",
+    "list.gltf",
+    "short.ply",
+)
 OUTS = ("/", ".", "notes.txt", "notes.txt/x", "loop", "loop/x", "x" * 300, "photos")
+
+CONFIGURATION_FILES = tuple(
+    f"{name}.yaml"
+    for name in "absent folder loop deep dup latin list empty broken image alias".split()
+)
 
 COLLECT = "collect --mesh room.glb --frames 2 --out new --width 40 --height 33"
 # A command that works, an option of it (or the place of an argument), and values that do not.
@@ -31,19 +49,24 @@ TABLE: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "collect pitch": (COLLECT, "--pitch", ("-90 90", "1 1")),
     "collect yaw": (COLLECT, "--yaw", ("180 -180",)),
     "collect seed": (COLLECT, "--seed", ("-1", "9" * 400)),
-    "collect width": (COLLECT, "--width", ("0", "-1", "8193", "9" * 400)),
+    "collect width": (COLLECT, "--width", ("0", "-1", "8193", "100000", "9" * 400)),
+    "collect height": (COLLECT, "--height", ("0", "8193")),
     "collect fov": (COLLECT, "--fov", (*NUMBERS, "180")),
-    "collect camera": (COLLECT, "--camera", (*PLACES, "empty", "notes.txt", "latin.txt")),
+    "collect camera": (
+        COLLECT,
+        "--camera",
+        (*PLACES, ".", "empty", "notes.txt", "latin.txt", "x" * 5000),
+    ),
     "collect poses": (
         f"{COLLECT} --mode repeat",
         "--poses",
-        (*PLACES[1:], "empty", "notes.txt", "latin.txt", "room.glb"),
+        (*PLACES[1:], ".", "empty", "notes.txt", "latin.txt", "room.glb"),
     ),
     "collect effects": (COLLECT, "--effects", (*PLACES, "empty", "notes.txt", "latin.txt")),
     "collect background": (COLLECT, "--background", ("0 0 256", "-1 0 0")),
-    "collect supersampling": (COLLECT, "--supersampling", ("0", "9")),
+    "collect supersampling": (COLLECT, "--supersampling", ("0", "-1", "5", "9" * 400)),
     "collect workers": (COLLECT, "--workers", ("0", "-3")),
-    "collect packed": (COLLECT, "--packed", ("0", "-5", "33", "9" * 400)),
+    "collect packed": (COLLECT, "--packed", ("0", "-5", "33", "100000", "9" * 400)),
     "collect sequences": (COLLECT, "--sequence-frames", WHOLE),
     "inspect mesh": ("inspect {}", "", MESHES),
     "inspect out": ("inspect room.glb", "--out", OUTS),
@@ -65,13 +88,31 @@ TABLE: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
     "localize images": ("localize model.pt {}", "", (*PLACES, "empty", "set", "latin.txt")),
     "localize out": ("localize model.pt photos", "--out", (*OUTS[:7], "model.pt")),
-    "plan profile": ("plan", "--profile", (*PLACES, "empty", "notes.txt", "deep.yaml", "dup.yaml")),
+    "plan profile": ("plan", "--profile", (*PLACES, "empty", "notes.txt", *CONFIGURATION_FILES)),
+    "run profile": ("run", "--profile", (*CONFIGURATION_FILES, "x")),
+    "run cores": ("run", "--cores", ("0", "-1")),
     "plan measured": ("plan", "--measured", PLACES[1:]),
     "plan cores": ("plan", "--cores", ("0", "-1")),
     "plan gpus": ("plan", "--gpus", ("-1",)),
     "compare": ("compare {} empty", "", DATA_SETS),
     "keep": ("keep {}", "", (*PLACES, "empty", "notes.txt")),
     "restore": ("restore {} new", "", (*PLACES, "empty", "notes.txt", "room.glb")),
+}
+
+
+# Files that Snakemake reads before the Snakefile can refuse them, a clone's Snakefile, and meshes.
+FILES: dict[str, bytes] = {
+    "Snakefile": b"",
+    "deep.yaml": b"{a: " * 5000,
+    "dup.yaml": b"seed: 1\nseed: 2\n",
+    "latin.yaml": b"profile: caf\xe9\n",
+    "list.yaml": b"- 1\n",
+    "empty.yaml": b"# nothing yet\n",
+    "broken.yaml": b"seed: [1\nscale: {",
+    "image.yaml": b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR",
+    "alias.yaml": b"scenes: &all {a: *all}\n",
+    "list.gltf": b'{"asset": {"version": "2.0"}, "scenes": "all", "nodes": 3}',
+    "short.ply": b"ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nend_header\n1\n",
 }
 
 
@@ -88,8 +129,11 @@ def make_folder(folder: Path, mesh: Path, data_set: Path, model: Path) -> None:
     (folder / "text.glb").write_text("no mesh")
     (folder / "cut.glb").write_bytes(mesh.read_bytes()[:500])
     (folder / "nothing.obj").write_text("# empty\n")
-    (folder / "deep.yaml").write_text("{a: " * 5000)
-    (folder / "dup.yaml").write_text("seed: 1\nseed: 2\n")
+    (folder / "image.glb").write_bytes((folder / "photos" / "a.png").read_bytes())
+    for name, content in FILES.items():
+        (folder / name).write_bytes(content)
+    (folder / "folder.yaml").mkdir()
+    (folder / "loop.yaml").symlink_to("loop.yaml")
     (folder / "loop").symlink_to("loop")
 
 

@@ -11,7 +11,7 @@ from synfeal.cli import main
 from tests.careless import TABLE, arguments_of, make_folder
 from tests.collected import collect, save_room
 from tests.fuzz_files import _checkpoint
-from tests.fuzzing import TooSlow, at_most
+from tests.fuzzing import JARGON, TooSlow, at_most
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 SECONDS = 20.0
@@ -46,6 +46,8 @@ def problem_with(arguments: list[str], capfd: pytest.CaptureFixture[str]) -> str
         return f"{type(error).__name__}: {str(error)[:120]}"
     lines = capfd.readouterr().err.strip().splitlines()
     errors = [line for line in lines if "error: " in line]
+    if jargon := JARGON.search("\n".join(lines)):
+        return f"says {jargon.group()!r}: {lines[:3]}"
     if status == 2 and "usage: " in lines[0] and len(errors) == 1:
         return None  # no number where one is needed
     if arguments[0] == "validate" and status == 1 and len(errors) == len(lines):

@@ -18,6 +18,7 @@ from synfeal.cli import (
     localize,
     plan,
     preview,
+    run,
     validate,
 )
 from synfeal.cli.options import numbers_apart
@@ -32,6 +33,7 @@ COMMANDS = (
     evaluate.COMMAND,
     localize.COMMAND,
     plan.COMMAND,
+    run.COMMAND,
     compare.COMMAND,
     *keep.COMMANDS,
 )

@@ -11,7 +11,7 @@ from synfeal.dataset.render_sequence import resolved
 LEAST_INPUT_PX = 32
 HEADER = """\
 # The data set of `synfeal collect` with the same options, made by the workflow:
-#   snakemake --cores 2 --configfile THIS_FILE -- datasets
+#   synfeal run --profile THIS_FILE -- datasets
 # It appears in {directory}
 """
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -26,11 +27,16 @@ def read_profile(name: str) -> Profile:
         InputError: there is none, or it cannot be read.
     """
     path = profile_path(name)
-    paths = [path] if path.resolve() == DEFAULT.resolve() else [DEFAULT, path]
+    paths = [path] if is_default(path) else [DEFAULT, path]
     config = load_config(*paths)
     experiments = read_experiments(config)
     check_sources(experiments, config.experiments)
     return Profile(config, experiments)
+
+
+def is_default(path: Path) -> bool:
+    """Whether it is the file that all others go over."""
+    return os.path.realpath(path) == os.path.realpath(DEFAULT)  # of links in a circle, too
 
 
 def profile_path(name: str) -> Path:

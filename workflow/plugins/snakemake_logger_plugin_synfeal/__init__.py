@@ -1,6 +1,6 @@
 """Shows a run as a person wants to see it.
 
-``PYTHONPATH=workflow/plugins snakemake --logger synfeal --cores 2 all``, as ``make`` calls it.
+``synfeal run`` calls it: ``PYTHONPATH=workflow/plugins snakemake --logger synfeal --cores 2 all``.
 
 Everything that Snakemake says is in its own log file; here it says what went wrong and no more.
 """

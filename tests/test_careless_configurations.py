@@ -1,0 +1,211 @@
+"""Whatever a configuration file holds: one line that names the file, the key, and what to do."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from synfeal.cli import main
+from synfeal.config.mesh_files import check_mesh_files, check_results
+from synfeal.report.cost.profiles import read_profile
+from tests.careless import CONFIGURATION_FILES, FILES
+from tests.fuzzing import problem_with
+
+ROOT = Path(__file__).parent.parent
+DIGITS = "9" * 5000
+BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{after}: &{after} [{', '.join(9 * [f'*{before}'])}]\n"
+    for before, after in zip("abcdefgh", "bcdefghi", strict=True)
+)
+
+# What the file holds, and what the message has to say besides the file's name.
+TABLE: tuple[tuple[str, str], ...] = (
+    # unknown keys, and keys at the wrong place
+    ("profle: mine", "profle: unknown key; allowed here: archive_sequences, collection, dataset"),
+    ("scale: 0.1\nframes: 300", "frames: unknown key"),
+    ("collection: {spacing: 0.1}", "collection.spacing: unknown key; allowed here: candidates"),
+    ("camera: {width: 64}", "camera: unknown key"),
+    ("scenes: {large_room: {colour: red}}", "scenes.large_room.colour: unknown key"),
+    ("training: {epochs: 9}", "training.epochs: unknown key"),
+    ("localizers: {posenet3: {}}", "localizers.posenet3: Input should be 'posenet'"),
+    ("references: {external: {mine: {file: a.csv}}}", "references.external.mine.title: missing"),
+    ('"": 1', "'': unknown key"),
+    ("1: 2", "1: Keys should be strings"),
+    ("null: 2", "None: Keys should be strings"),
+    # values of another kind
+    ("seed: one", "seed: Input should be a valid integer"),
+    ("seed: 1.5", "seed: Input should be a valid integer"),
+    ("seed: true", "seed: Input should not be true or false"),
+    ("seed: [1]", "seed: Input should be a valid integer"),
+    ("seed: 2026-11-22", "seed: Input should be a valid integer"),
+    ("seed: ~", "seed: Input should be a valid integer"),
+    ("scale: half", "scale: Input should be a valid number"),
+    ("scale: {train: 0.5}", "scale: Input should be a valid number"),
+    ("profile: 5", "profile: Input should be a valid string"),
+    ("profile: [mini]", "profile: Input should be a valid string"),
+    ("scenes: large_room", "scenes: Input should be a valid dictionary"),
+    ("scenes: {large_room: 3}", "scenes.large_room: must hold a mapping of keys"),
+    ("scenes: {large_room: {sizes: [6k]}}", "scenes.large_room.sizes: Input should be a valid"),
+    ("scenes: {large_room: {sizes: {6k: 1500}}}", "scenes.large_room.sizes.6k: must hold a map"),
+    ("network_camera: 640x480", "network_camera: must hold a mapping of keys"),
+    ("network_camera: {width: 64 px}", "network_camera.width: Input should be a valid integer"),
+    ("network_camera: {distortion: 0.1}", "network_camera.distortion: Input should be a valid"),
+    ("network_camera: {distortion: [0.1, 0]}", "network_camera.distortion"),
+    ("datasets: large_room", "datasets: Input should be a valid tuple"),
+    ("archive_sequences: 2", "archive_sequences: Input should be a valid boolean"),
+    ("render: {background_rgb: black}", "render.background_rgb: Input should be a valid tuple"),
+    ("training: {samples_seen: 9}", "training.samples_seen"),
+    ("training: {repetitions: twice}", "training.repetitions"),
+    ("localizers: {posenet: fast}", "localizers.posenet: must hold a mapping of keys"),
+    # numbers out of range: negative, none at all, huge
+    ("seed: -1", "seed: Input should be greater than or equal to 0"),
+    (f"seed: {DIGITS}", "cannot be read as YAML"),
+    ("seed: 99999999999999999999", "seed: "),
+    ("scale: 0", "scale: Input should be greater than 0"),
+    ("scale: -0.5", "scale: Input should be greater than 0"),
+    ("scale: 1.5", "scale: Input should be less than or equal to 1"),
+    ("scale: .nan", "scale: "),
+    ("scale: .inf", "scale: Input should be less than or equal to 1"),
+    ("shard_frames: 0", "shard_frames: Input should be greater than or equal to 1"),
+    ("collection: {frame_spacing_m: 1e-9}", "collection.frame_spacing_m: "),
+    ("collection: {frame_spacing_m: .nan}", "collection.frame_spacing_m: "),
+    ("collection: {candidates: 0}", "collection.candidates: Input should be greater"),
+    ("collection: {max_tries: 1e30}", "collection.max_tries: Input should be"),
+    ("network_camera: {width: 0}", "network_camera.width: Input should be greater"),
+    ("network_camera: {height: 100000}", "network_camera.height: Input should be less"),
+    ("network_camera: {near_m: 5, far_m: 1}", "near_m: must be below far_m"),
+    ("network_camera: {fx: 500}", "fx: fx, fy, cx and cy are given together"),
+    ("network: {input_px: 4096}", "network.input_px: Input should be less"),
+    ("training: {batch_size: -32}", "training.batch_size: Input should be greater"),
+    ("training: {samples_seen: {6k: -1}}", "training.samples_seen.6k: Input should be greater"),
+    ("render: {background_rgb: [0, 0, 256]}", "render.background_rgb.2: Input should be less"),
+    ("render: {supersampling: 16}", "render.supersampling: Input should be less"),
+    ("localizers: {posenet: {learning_rate: -1}}", "localizers.posenet.learning_rate: Input"),
+    ("scenes: {large_room: {sizes: {6k: {train: 1e12, test: 1}}}}", "sizes.6k.train: Input"),
+    # units
+    ("collection: {frame_spacing_m: 3 cm}", "collection.frame_spacing_m: Input should be a valid"),
+    ("network_camera: {horizontal_fov_deg: 0.9}", "horizontal_fov_deg: Input should be greater"),
+    ("network_camera: {horizontal_fov_deg: 60°}", "horizontal_fov_deg: Input should be a valid"),
+    ("scenes: {large_room: {unit_m: mm}}", "scenes.large_room.unit_m: Input should be a valid"),
+    ("scenes: {large_room: {angles: {pitch_deg: [-90, 90]}}}", "pitch_deg: must lie within"),
+    ("scenes: {large_room: {angles: {yaw_deg: [360, 0]}}}", "yaw_deg: the first number must be"),
+    ("scenes: {large_room: {sampling_box: [0, 5, 0, 5]}}", "sampling_box: must hold a mapping"),
+    ("scenes: {large_room: {sampling_box: {x: [5, 0], y: [0, 1], z: [0, 1]}}}", "x: the first"),
+    ("scenes: {attic: {source: mesh, path: a.glb, sampling_box: {x: [0, 5]}}}", "box.y: missing"),
+    # what does not go together
+    ("collection: {mode: repeat}", "repeat: mode `repeat` needs the poses"),
+    ("network: {width: 1.0}", "network.width: must be 0.25 when pretraining.source is shipped"),
+    ("network_camera: {width: 20, height: 20}", "network_camera: both sides must be at least"),
+    ("training: {patience: 3}", "patience: must be left out with `protocol: corrected`"),
+    ("datasets: [attic]", "datasets: 'attic' is not one of ['large_room', 'sanctuary']"),
+    ("scenes: {attic: {source: mesh}}", "path: a scene with `source: mesh` needs the path"),
+    ("scenes: {attic: {source: procedural}}", "builder: a procedural scene needs one of"),
+    ("scenes: {Attic Room: {source: mesh, path: a.glb}}", "String should match pattern"),
+    ("references: {external: {mine: {title: Mine}}}", "give either `poses` or `command`"),
+    # paths
+    ("experiments: absent.csv", "absent.csv: cannot be read as CSV (No such file or directory)"),
+    ("experiments: config", "config: cannot be read as CSV (Is a directory)"),
+    ("experiments: README.md", "README.md: "),
+    ("results: README.md", "results: README.md is no directory; choose another one"),
+    ("results: README.md/mine", "results: README.md is no directory"),
+    ('results: "a\\0b"', "results: Input should not hold the character NUL"),
+    ("profile: ../mini", "profile: String should match pattern"),
+    ("profile: Mini Run", "profile: String should match pattern"),
+    ('profile: ""', "profile: String should match pattern"),
+    ("scenes: {attic: {source: mesh, path: absent.glb}}", "scenes.attic.path: absent.glb does not"),
+    ("scenes: {attic: {source: mesh, path: config}}", "scenes.attic.path: config is a directory"),
+    ("scenes: {large_room: {sha256: abc}}", "scenes.large_room.sha256: String should match"),
+    ("network_camera: {calibration: absent.yaml}", "calibration: absent.yaml: cannot be read as"),
+    ("network_camera: {calibration: README.md}", "calibration: README.md: is no calibration"),
+    # YAML that is more than plain values, or none
+    ("scenes: &a {x: *a}", "aliases (*name) are not read"),
+    ("a: &a {x: 1}\nb: {<<: *a}", "aliases (*name) are not read"),
+    ("seed: 1\nseed: 2", "the key 'seed' is there twice"),
+    ("network:\n  width: 1\n  width: 2", "line 2: the key 'width' is there twice"),
+    ("seed:\n\t1", "line 2: found character '\\t' that cannot start any token"),
+    ("seed: !!python/object/apply:os.getcwd []", "could not determine a constructor for the tag"),
+    ("seed: !mine 1", "could not determine a constructor for the tag"),
+    (
+        "profile: !!python/object/apply:os.mkdir [made]",
+        "could not determine a constructor",
+    ),
+    ("profile: !!python/object:pathlib.Path {}", "could not determine a constructor"),
+    ("profile: !!python/name:os.system", "could not determine a constructor"),
+    ("seed: !!binary aGVsbG8=", "seed: Input should be a valid integer"),
+    ("scenes: !!set {a, b}", "scenes: Input should be a valid dictionary"),
+    ("seed: !!int x", "'x' is no number"),
+    ("profile: 2026-13-45", "month"),
+    ("profile: &a mini\nseed: *a", "aliases (*name) are not read"),
+    (BOMB, "aliases (*name) are not read"),
+    (f"profile: {'x' * 1_000_000}", "profile: String should"),
+    ("profile", "must hold a mapping of keys, found 'profile'"),
+    ("- 1", "must hold a mapping of keys, found [1]"),
+    ("# nothing yet", "must hold a mapping of keys, found nothing"),
+    ("[" * 5000, "it is nested too deeply"),
+    ("seed: 1\n---\nseed: 2", "expected a single document in the stream"),
+    ("seed 1", "must hold a mapping of keys, found 'seed 1'"),
+    ("? [a, b]\n: 1", "line 1: its parts do not fit together"),
+)
+
+
+def read(path: Path) -> None:
+    """What the workflow asks of a profile before it plans a run."""
+    config = read_profile(str(path)).config
+    check_mesh_files(config.scenes)
+    check_results(config.root)
+
+
+@pytest.mark.parametrize(("text", "words"), TABLE, ids=[words[:40] for _, words in TABLE])
+def test_a_careless_configuration_ends_in_one_line(
+    text: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(ROOT)
+    path = tmp_path / "mine.yaml"
+    path.write_text(f"{text}\n", encoding="utf-8")
+    assert problem_with(lambda: read(path), lambda _: False, (words,), tmp_path) is None
+
+
+def test_run_hands_a_sound_profile_to_snakemake(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[tuple[list[str], str]] = []
+    monkeypatch.setattr(
+        os, "execve", lambda _, command, env: started.append((command, env["PYTHONPATH"]))
+    )
+    monkeypatch.chdir(ROOT)
+    path = tmp_path / "mine.yaml"
+    path.write_text("profile: mine\n")
+    assert main(["run", "--profile", str(path), "smoke", "--cores", "3", "--", "runs", "-n"]) == 0
+    assert main(["run", "--cores", "1"]) == 0
+    (command, paths), (default, _) = started
+    files = ["--configfile", str(path), "config/smoke.yaml"]
+    display = ["snakemake", "--logger", "synfeal", "--quiet", "host"]
+    assert command[2:] == [*display, *files, "--cores", "3", "runs", "-n"]
+    assert default[2:] == [*display, "--cores", "1"]
+    assert paths.split(os.pathsep)[0] == str(ROOT / "workflow/plugins")
+
+
+@pytest.mark.parametrize("name", ["absent.yaml", "deep.yaml", "latin.yaml", "profile.yaml"])
+def test_run_ends_in_one_line_where_snakemake_has_a_traceback(name: str, tmp_path: Path) -> None:
+    """The command as it is typed; the last file only Snakemake itself comes to."""
+    path = tmp_path / name
+    if name in FILES:
+        path.write_bytes(FILES[name])
+    if name == "profile.yaml":
+        path.write_text("profile: ../mini\n")
+    command = [sys.executable, "-m", "synfeal.cli", "run", "--profile", str(path), "--cores", "1"]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    (line,) = [line for line in run.stderr.splitlines() if line.strip() and "profiles/" not in line]
+    assert run.returncode == 1
+    assert line.startswith("error: ")
+    assert str(path) in line
+    assert not run.stdout
+
+
+def test_every_kind_of_file_is_in_the_table_of_commands() -> None:
+    assert set(CONFIGURATION_FILES) >= {name for name in FILES if name.endswith(".yaml")}
+    assert len(TABLE) >= 110
