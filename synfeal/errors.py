@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable
 
 LONGEST = 900  # characters of a message
+
+# What parsers say of their own insides, which helps nobody with a file.
+INSIDES = re.compile(
+    r"__|magic string|inhomogeneous|broadcast|unpack|not aligned|concatenat|itemsize"
+    r"|index-sized|dimension|mmap|unhashable|object (has|is)|set_int_max_str|^[\s\d.+-]*$"
+)
+OBJECT = re.compile(r" ?<[^<>]* at 0x[0-9a-f]+>|, line \d+, column \d+: .*| in \"<[a-z ]+>\"")
+TOKEN = re.compile(r"<([a-z ]+)>")  # of YAML
+NO_NUMBER = re.compile(r"(could not convert string to float|invalid literal for int\(\).*?): (.*)")
+UNFIT = "its parts do not fit together"
 
 
 class InputError(Exception):
@@ -49,3 +60,37 @@ def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
         print(f"error: interrupted; {str(interrupt) or if_interrupted}", file=sys.stderr)
         return 130
     return 0
+
+
+def why(error: BaseException) -> str:
+    """Why something could not be read, for the brackets of a message.
+
+    Without the names of classes, addresses and codecs in which Python says it.
+    """
+    inner = getattr(error, "reason", None)  # of a download
+    if isinstance(inner, OSError):
+        return why(inner)
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    if isinstance(error, UnicodeError):
+        return "it is not UTF-8 text"
+    if isinstance(error, RecursionError):
+        return "it is nested too deeply"
+    if isinstance(error, KeyError) and error.args and isinstance(error.args[0], str):
+        return f"'{error.args[0]}' is missing"
+    if isinstance(error, AssertionError | AttributeError | LookupError | TypeError):
+        return UNFIT
+    mark = getattr(error, "problem_mark", None)  # of YAML, counted from 0
+    line = getattr(error, "lineno", None) if mark is None else mark.line + 1  # JSON's from 1
+    said = getattr(error, "problem", None) or getattr(error, "msg", None) or str(error)
+    if hasattr(error, "errors"):  # of pydantic
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"]))
+        said = f"{key}: {first['msg']}" if key else first["msg"]
+    said = OBJECT.sub("", str(said).strip().partition("\n")[0])
+    said = TOKEN.sub(r"\1", NO_NUMBER.sub(r"\2 is no number", said))
+    if said.startswith("but "):  # the second half of a sentence of YAML's
+        said = f"{getattr(error, 'context', '')}, {said}"
+    if INSIDES.search(said):
+        said = UNFIT
+    return f"line {line}: {said[0].lower()}{said[1:]}" if line else said

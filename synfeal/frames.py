@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import atomic_path
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def read_records(
             header = next(reader, [])
             rows = [(reader.line_num, row) for row in reader if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: cannot be read as CSV ({error}); {remedy}") from None
+        raise InputError(f"{path}: cannot be read as CSV ({why(error)}); {remedy}") from None
     absent = [name for name in needed if name not in header]
     if absent:
         raise InputError(f"{path}: column {', '.join(absent)} missing; {remedy}")

@@ -28,9 +28,23 @@ MESHES = (
 )
 OUTS = ("/", ".", "notes.txt", "notes.txt/x", "loop", "loop/x", "x" * 300, "photos")
 
-CONFIGURATION_FILES = tuple(
-    f"{name}.yaml"
-    for name in "absent folder loop deep dup latin list empty broken image alias".split()
+# Files that Snakemake reads before the Snakefile can refuse them, a clone's Snakefile, and meshes.
+FILES: dict[str, bytes] = {
+    "Snakefile": b"",
+    "deep.yaml": b"{a: " * 5000,
+    "dup.yaml": b"seed: 1\nseed: 2\n",
+    "latin.yaml": b"profile: caf\xe9\n",
+    "list.yaml": b"- 1\n",
+    "empty.yaml": b"# nothing yet\n",
+    "broken.yaml": b"seed: [1\nscale: {",
+    "image.yaml": b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR",
+    "alias.yaml": b"scenes: &all {a: *all}\n",
+    "list.gltf": b'{"asset": {"version": "2.0"}, "scenes": "all", "nodes": 3}',
+    "short.ply": b"ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nend_header\n1\n",
+}
+CONFIGURATION_FILES = (
+    *("absent.yaml", "folder.yaml", "loop.yaml"),
+    *(name for name in FILES if name.endswith(".yaml")),
 )
 
 COLLECT = "collect --mesh room.glb --frames 2 --out new --width 40 --height 33"
@@ -97,22 +111,6 @@ TABLE: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "compare": ("compare {} empty", "", DATA_SETS),
     "keep": ("keep {}", "", (*PLACES, "empty", "notes.txt")),
     "restore": ("restore {} new", "", (*PLACES, "empty", "notes.txt", "room.glb")),
-}
-
-
-# Files that Snakemake reads before the Snakefile can refuse them, a clone's Snakefile, and meshes.
-FILES: dict[str, bytes] = {
-    "Snakefile": b"",
-    "deep.yaml": b"{a: " * 5000,
-    "dup.yaml": b"seed: 1\nseed: 2\n",
-    "latin.yaml": b"profile: caf\xe9\n",
-    "list.yaml": b"- 1\n",
-    "empty.yaml": b"# nothing yet\n",
-    "broken.yaml": b"seed: [1\nscale: {",
-    "image.yaml": b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR",
-    "alias.yaml": b"scenes: &all {a: *all}\n",
-    "list.gltf": b'{"asset": {"version": "2.0"}, "scenes": "all", "nodes": 3}',
-    "short.ply": b"ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nend_header\n1\n",
 }
 
 

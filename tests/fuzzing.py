@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import copy
 import json
+import re
 import resource
 import shutil
 import signal
@@ -261,7 +262,7 @@ def problem_with(
     except InputError as refusal:
         if _tree(folder) != before:
             return "refused, but something was written"
-        return _problem_with_message(str(refusal), names)
+        return problem_with_message(str(refusal), names)
     except TooSlow:
         return f"took more than {SECONDS:g} s"
     except Exception as error:
@@ -275,11 +276,21 @@ def problem_with(
         return f"accepted what cannot be used: {type(error).__name__} {str(error)[:90]}"
 
 
-def _problem_with_message(message: str, names: tuple[str, ...]) -> str | None:
+# What only a programmer says: classes, addresses, codecs, an empty reason, a name said twice.
+JARGON = re.compile(
+    r"<\w+[. ]| at 0x[0-9a-f]{4}|[A-Z]\w+Error\b|Errno|NoneType|codec|object (has|is)\b"
+    r"|convert string|invalid literal|inhomogeneous|indices|unhashable|operand|instance of|\(\)|: :"
+    r"|\b(\w+): \1: "
+)
+
+
+def problem_with_message(message: str, names: tuple[str, ...]) -> str | None:
     if "\n" in message or len(message.splitlines()) > 1:
         return f"more than one line: {message[:90]!r}"
     if len(message) > LONGEST_MESSAGE:
         return f"a line of {len(message)} characters: {message[:90]!r}"
+    if jargon := JARGON.search(message):
+        return f"says {jargon.group()!r}: {message[:200]!r}"
     if not any(name in message for name in names):
         return f"names none of {names}: {message[:90]!r}"
     return None

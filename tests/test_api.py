@@ -31,9 +31,8 @@ def texts(notebook: nbformat.NotebookNode) -> list[str]:
 def test_the_quick_start_runs(tmp_path: Path) -> None:
     shown = nbformat.read(QUICKSTART, as_version=4)
     ran = copy.deepcopy(shown)
-    client = NotebookClient(ran, timeout=600, resources={"metadata": {"path": tmp_path}})
-    client.create_kernel_manager().transport = "ipc"
-    client.execute()
+    place = {"metadata": {"path": tmp_path}}
+    NotebookClient(ran, timeout=600, startup_timeout=600, resources=place).execute()
     for notebook in (shown, ran):  # what stands in the file, and what comes of it now
         _, seen, made, scored = texts(notebook)
         assert "(120, 160, 3) nearest surface at" in seen

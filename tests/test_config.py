@@ -122,10 +122,11 @@ def test_a_scene_may_be_called_like_a_key(raw):
 
 BROKEN_FILES = {
     "missing": (None, "No such file"),
-    "list": (b"- 1\n- 2\n", "mapping of keys, found list"),
-    "empty": (b"", "mapping of keys, found NoneType"),
-    "latin-1": ("profile: caf\u00e9".encode("latin-1"), "utf-8"),
-    "not YAML": (b"a: [1, 2\nb: {", "cannot be read as YAML"),
+    "list": (b"- 1\n- 2\n", "mapping of keys, found [1, 2]"),
+    "empty": (b"", "mapping of keys, found nothing"),
+    "latin-1": ("profile: caf\u00e9".encode("latin-1"), "not UTF-8"),
+    "not YAML": (b"a: [1, 2\nb: {", "cannot be read as YAML (line 2: expected ',' or ']'"),
+    "deep": (b"{a: " * 5000, "nested too deeply"),
 }
 
 

@@ -1,17 +1,22 @@
 """What every stage leans on: whole files or none, seeds by name, one line for a person."""
 
+import io
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+from PIL import Image
 
 from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table, write_pose_table
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import atomic_path, write_json
 from synfeal.seeds import generator_of, seed_of
+from tests.fuzzing import JARGON
 
 
 def random_table(n: int) -> PoseTable:
@@ -55,6 +60,41 @@ def test_broken_pose_table_is_named_in_one_line(tmp_path: Path, text: str, words
     assert str(path) in message
     assert words in message
     assert "\n" not in message
+
+
+def raised(action: Callable[[], object]) -> Exception:
+    try:
+        action()
+    except Exception as error:
+        return error
+    raise AssertionError("nothing was wrong")
+
+
+@pytest.mark.parametrize(
+    ("action", "words"),
+    [
+        (lambda: Image.open(io.BytesIO(b"no image")), "cannot identify image file"),
+        (lambda: Path("absent").read_text(), "No such file or directory"),
+        (lambda: b"caf\xe9".decode(), "it is not UTF-8 text"),
+        (lambda: {}["camera"], "'camera' is missing"),
+        (lambda: {}[0], "its parts do not fit together"),
+        (lambda: (_ for _ in ()).throw(AssertionError), "its parts do not fit together"),
+        (lambda: "text".get("key"), "its parts do not fit together"),
+        (lambda: np.array([[1], [1, 2]]), "its parts do not fit together"),
+        (lambda: float("x"), "'x' is no number"),
+        (lambda: int("1.5"), "'1.5' is no number"),
+        (lambda: json.loads("[\n1,"), "line 2: expecting value"),
+        (lambda: yaml.safe_load("a: 1\n\tb: 2"), "line 2: found character '\\t' that cannot"),
+        (lambda: yaml.safe_load("a: b\0"), "unacceptable character"),
+        (lambda: yaml.safe_load("a: [1"), "line 1: expected ',' or ']', but got 'stream end'"),
+    ],
+)
+def test_a_reason_is_in_words_and_not_in_those_of_python(
+    action: Callable[[], object], words: str
+) -> None:
+    said = why(raised(action))
+    assert said.startswith(words)
+    assert not JARGON.search(said)
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_other(tmp_path: Path) -> None:

@@ -247,7 +247,7 @@ def edge_line(i, j, w=1):
         ("", "numbered 0 to n-1"),
         ("FIX 0\n", "line 1 is no"),
         ("VERTEX_SE3:QUAT 0 0 0 0 0 0 0\n", "line 1: needs 8 finite numbers, found 7"),
-        ("VERTEX_SE3:QUAT 0 0 0 zero 0 0 0 1\n", "line 1: could not convert"),
+        ("VERTEX_SE3:QUAT 0 0 0 zero 0 0 0 1\n", "line 1: 'zero' is no number"),
         ("VERTEX_SE3:QUAT 1 0 0 0 0 0 0 1\n", "numbered 0 to n-1"),
         (
             "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nEDGE_SE3:QUAT 0 1 0 0 0 0 0 0 1" + 21 * " 1" + "\n",

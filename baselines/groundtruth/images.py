@@ -12,7 +12,7 @@ from PIL import Image
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.png import IMAGE_DAMAGE
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 
 
 def read_image(path: FrameFile, camera: CameraConfig, mode: str | None = None) -> NDArray[Any]:
@@ -25,7 +25,7 @@ def read_image(path: FrameFile, camera: CameraConfig, mode: str | None = None) -
         with Image.open(io.BytesIO(path.read_bytes())) as image:
             pixels = np.asarray(image.convert(mode) if mode else image)
     except IMAGE_DAMAGE as error:
-        raise InputError(f"{path}: cannot be read as an image ({error})") from None
+        raise InputError(f"{path}: cannot be read as an image ({why(error)})") from None
     if pixels.shape[:2] != (camera.height, camera.width):
         raise InputError(
             f"{path}: is {pixels.shape[1]}x{pixels.shape[0]}, the camera of the configuration"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps
 
 from synfeal.dataset.packed import View, fit_frame
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
 # Modes of eight bits or fewer per channel; what else there is has no scale that is known.
@@ -45,7 +45,7 @@ def read_picture(path: Path, input_px: int, view: View = "square") -> NDArray[np
             if not problem:
                 return fit_frame(_rgb(ImageOps.exif_transpose(image)), input_px, view)
     except Exception as error:  # a damaged file is refused in every way there is
-        problem = f"cannot be read as a PNG or JPEG picture ({error})"
+        problem = f"cannot be read as a PNG or JPEG picture ({why(error)})"
     raise InputError(f"{path}: {problem}; leave it out or mend it")
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import atomic_path
 
 Arrays = dict[str, NDArray[Any]]
@@ -33,4 +33,6 @@ def read_arrays(path: Path, names: Iterable[str]) -> Arrays:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             return {name: stored[name] for name in names}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: cannot be read as arrays ({error}); make it again") from None
+        raise InputError(
+            f"{path}: cannot be read as arrays ({why(error)}); make it again"
+        ) from None

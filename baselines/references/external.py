@@ -18,7 +18,7 @@ import pandas as pd
 
 from baselines.references.run import score_answers
 from synfeal.dataset.pose_table import COLUMNS, PoseTable, read_pose_table
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 
 NEEDED = ("frame", *COLUMNS[2:])
 
@@ -61,12 +61,13 @@ def run_external(
         subprocess.run(words, check=True)
     except (KeyError, ValueError, IndexError) as error:
         raise InputError(
-            f"references.external: command '{command}' cannot be filled ({error!r}); placeholders"
-            f" are {', '.join(values)}"
+            f"references.external: command '{command}' cannot be filled ({why(error)});"
+            f" placeholders are {', '.join(values)}"
         ) from None
     except (OSError, subprocess.CalledProcessError) as error:
         raise InputError(
-            f"references.external: command '{command}' failed ({error}); the job's log has the rest"
+            f"references.external: command '{command}' failed ({why(error)});"
+            " the job's log has the rest"
         ) from None
     if not out.is_file():
         raise InputError(f"references.external: command '{command}' wrote no {out}")
@@ -100,7 +101,9 @@ def read_answers(path: Path, frames: PoseTable) -> PoseTable:
     try:
         found = pd.read_csv(path, usecols=list(NEEDED)).astype(np.float64)
     except (OSError, ValueError) as error:
-        message = f"{path}: cannot be read as answers with columns {','.join(NEEDED)} ({error})"
+        message = (
+            f"{path}: cannot be read as answers with columns {','.join(NEEDED)} ({why(error)})"
+        )
         raise InputError(message) from None
     twice = found.frame[found.frame.duplicated()]
     if len(twice):

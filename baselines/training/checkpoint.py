@@ -74,9 +74,9 @@ def read_checkpoint(path: Path, device: torch.device) -> TrainedLocalizer:
         network.place_on(device)
         network.load_state_dict(content["localizer"])
         statistics = _checked(ImageStatistics(**content["images"]))
-    except Exception as error:  # damaged values are refused in every way there is
+    except Exception:  # damaged values are refused in every way there is
         message = f"{path}: its weights are not those of the {description.localizer} it describes"
-        raise InputError(f"{message} ({str(error)[:200]}); train it again") from None
+        raise InputError(f"{message}; train it again") from None
     return TrainedLocalizer(description, network.eval(), statistics)
 
 

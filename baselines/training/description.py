@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 from synfeal.config.collection import Count, Finite, Positive, Strict
 from synfeal.config.load import describe
 from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import read_json
 
 
@@ -79,5 +79,6 @@ def frame_camera(frames: Path) -> FrameCamera | None:
         return FrameCamera.model_validate({key: camera[key] for key in FrameCamera.model_fields})
     except (OSError, ValueError, TypeError, LookupError) as error:
         raise InputError(
-            f"{record}: cannot be read as the record of packed frames ({error!r}); pack them again"
+            f"{record}: cannot be read as the record of packed frames ({why(error)});"
+            " pack them again"
         ) from None

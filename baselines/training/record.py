@@ -13,7 +13,7 @@ from typing import Any, cast
 from synfeal.config import Config, Run
 from synfeal.config.models import ModelName
 from synfeal.dataset.packed_record import file_sha256
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import read_json, write_json
 from synfeal.provenance import provenance
 
@@ -71,10 +71,10 @@ def read_training_record(path: Path) -> dict[str, Any]:
     try:
         record = read_json(path)
         if not isinstance(record["parameters"], dict) or not isinstance(record["sha256"], dict):
-            raise TypeError("parameters and sha256 must be mappings")
+            raise ValueError("parameters and sha256 must be mappings")
     except (OSError, ValueError, TypeError, LookupError) as error:
         raise InputError(
-            f"{path}: cannot be read as the record of a training run ({error!r}); train it again"
+            f"{path}: cannot be read as the record of a training run ({why(error)}); train it again"
         ) from None
     return dict(record)
 

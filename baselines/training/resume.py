@@ -17,6 +17,7 @@ import torch
 from torch import Tensor
 
 from baselines.training.serial import serialised
+from synfeal.errors import why
 from synfeal.files import atomic_path
 
 log = logging.getLogger(__name__)
@@ -87,7 +88,7 @@ class ResumeFile:
             if found["fingerprint"] != self._fingerprint:
                 raise ValueError("it is of another training")
         except Exception as error:  # torch.load raises whatever the broken file provokes
-            log.warning("%s: ignored, %s; training starts anew", self._path, str(error)[:200])
+            log.warning("%s: ignored, %s; training starts anew", self._path, why(error)[:200])
             return None
         return found
 

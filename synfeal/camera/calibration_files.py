@@ -15,7 +15,7 @@ from typing import Any
 import yaml
 
 from synfeal.camera.calibration import Calibration, Distortion
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 
 # Names under which the same thing is found; the first is the one that messages give.
 MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "mtx")
@@ -90,10 +90,16 @@ def read_calibration(path: Path) -> Calibration:
         if path.suffix.lower() not in readers:
             raise ValueError(_unknown(path))
         return readers[path.suffix.lower()](path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-        raise InputError(f"{path}: cannot be read as a calibration ({error})") from None
+    except (
+        OSError,
+        UnicodeDecodeError,
+        yaml.YAMLError,
+        RecursionError,
+        json.JSONDecodeError,
+    ) as error:
+        raise InputError(f"{path}: cannot be read as a calibration ({why(error)})") from None
     except ValueError as error:
-        raise InputError(f"{path}: {error}") from None
+        raise InputError(f"{path}: {why(error)}") from None
 
 
 def _unknown(path: Path) -> str:
@@ -122,7 +128,7 @@ def _from_json(text: str) -> Calibration:
 def _from_mapping(values: Any) -> Calibration:
     """What OpenCV and ROS write, as plain values."""
     if not isinstance(values, Mapping):
-        raise ValueError(f"must hold a mapping of keys, found {type(values).__name__}")
+        raise ValueError(f"must hold a mapping of keys, found {_shortened(values)}")
     model = values.get("distortion_model", MODELS[0])
     if model not in MODELS:
         raise ValueError(

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from synfeal.camera.calibration_files import PlainLoader
 from synfeal.config.models import Config
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 
 
 def parse_config(raw: Mapping[str, Any], origin: str = "config") -> Config:
@@ -44,9 +44,10 @@ def read_yaml(path: Path) -> dict[str, Any]:
     try:
         value = yaml.load(path.read_text(encoding="utf-8"), PlainLoader)
     except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: cannot be read as YAML ({error})") from None
+        raise InputError(f"{path}: cannot be read as YAML ({why(error)})") from None
     if not isinstance(value, dict):
-        raise InputError(f"{path}: must hold a mapping of keys, found {type(value).__name__}")
+        found = "nothing" if value is None else _shortened(reprlib.repr(value))
+        raise InputError(f"{path}: must hold a mapping of keys, found {found}")
     return value
 
 
@@ -67,17 +68,20 @@ def describe(error: ValidationError, model: type[BaseModel] = Config) -> str:
         model: whose keys are named where one is unknown.
     """
     first = error.errors()[0]
-    key = ".".join(str(part) for part in first["loc"] if part != "[key]")
+    key = ".".join(str(part) or "''" for part in first["loc"] if part != "[key]")
     if first["type"] == "extra_forbidden":
         return f"{key}: unknown key; allowed here: {', '.join(_siblings(model, first['loc']))}"
     if first["type"] == "missing":
         return f"{key}: missing; it has no default"
     message = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "model_type":
+        message = "must hold a mapping of keys"
     if first["type"] == "value_error":
         return f"{key}.{message}" if key else message
     more = len(error.errors()) - 1
     found = _shortened(reprlib.repr(first["input"]))
-    return f"{key}: {message}, found {found}" + (f" (and {more} more)" if more else "")
+    where = f"{key}: " if key else ""
+    return f"{where}{message}, found {found}" + (f" (and {more} more)" if more else "")
 
 
 def _shortened(text: str, length: int = 60) -> str:

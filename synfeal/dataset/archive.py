@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePath
 
+from synfeal.errors import why
 from synfeal.files import atomic_path
 
 SUFFIX = ".zip"
@@ -177,7 +178,7 @@ def reading(archive: Path) -> Iterator[zipfile.ZipFile]:
         status = archive.stat()
         yield _opened(archive, status.st_ino, status.st_size, status.st_mtime_ns)
     except ARCHIVE_DAMAGE as error:
-        raise OSError(f"{archive}: is damaged ({error})") from None
+        raise OSError(f"{archive}: is damaged ({why(error)})") from None
 
 
 @lru_cache(MOST_OPEN)

@@ -15,7 +15,7 @@ from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.archive import frame_file, sequence_at, sequence_names
 from synfeal.dataset.sequences import Sequence
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import read_json, write_json
 
 MANIFEST = "manifest.json"
@@ -85,7 +85,7 @@ def verify_manifest(dataset_dir: Path) -> None:
         if unknown:
             raise ValueError(f"'{unknown[0]}' is no name of a sequence")
     except (OSError, ValueError, TypeError, LookupError) as error:
-        raise InputError(f"{path}: cannot be read as a manifest ({error!r})") from None
+        raise InputError(f"{path}: cannot be read as a manifest ({why(error)})") from None
     bad = [name for name, found in entries if _sha256_or_none(dataset_dir / name) != found]
     if bad:
         raise InputError(f"{path}: {', '.join(bad)} differ from what was written; copy them again")

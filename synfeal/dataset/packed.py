@@ -17,7 +17,7 @@ from PIL import Image
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.png import IMAGE_DAMAGE
 from synfeal.dataset.sevenscenes import frame_paths
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import atomic_path
 
 COPIED_BYTES = 2**24  # at a time
@@ -80,7 +80,7 @@ def read_packed(path: Path) -> np.memmap[Any, np.dtype[np.uint8]]:
         frames: np.memmap[Any, np.dtype[np.uint8]] = np.lib.format.open_memmap(path, mode="r")
     except Exception as error:  # a damaged header is refused in every way there is
         raise InputError(
-            f"{path}: cannot be read as packed frames ({error}); render it again"
+            f"{path}: cannot be read as packed frames ({why(error)}); render it again"
         ) from None
     side = frames.shape[1] if frames.ndim == 4 else 0
     if frames.dtype != np.uint8 or frames.shape[1:] != (side, side, 3) or np.isfortran(frames):
@@ -125,4 +125,4 @@ def _open(path: FrameFile) -> Image.Image:
         with Image.open(io.BytesIO(path.read_bytes())) as image:
             return image.convert("RGB")
     except IMAGE_DAMAGE as error:
-        raise InputError(f"{path}: cannot be read as an image ({error})") from None
+        raise InputError(f"{path}: cannot be read as an image ({why(error)})") from None

@@ -9,7 +9,7 @@ from pathlib import Path
 from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.dataset.manifest import camera_record, versions
 from synfeal.dataset.packed import View, read_packed
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import read_json, write_json
 
 FORMATS: dict[View, str] = {
@@ -59,11 +59,11 @@ def _read_shard(path: Path) -> dict[str, object]:
         record = read_json(path)
         frames, backend = record["frames"], record["backend"]
         if type(frames) is not int or type(backend) is not str:
-            raise TypeError("frames must be a whole number, backend a name")
+            raise ValueError("frames must be a whole number, backend a name")
         return {"frames": frames, "backend": backend}
     except (OSError, ValueError, TypeError, LookupError) as error:
         raise InputError(
-            f"{path}: cannot be read as the record of a shard ({error!r}); render it again"
+            f"{path}: cannot be read as the record of a shard ({why(error)}); render it again"
         ) from None
 
 

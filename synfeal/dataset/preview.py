@@ -12,7 +12,7 @@ from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.png import IMAGE_DAMAGE
 from synfeal.dataset.sequences import Split
 from synfeal.dataset.sevenscenes import frame_paths, read_split
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import atomic_path
 
 TILE_WIDTH_PX = 320
@@ -66,4 +66,4 @@ def _tile(file: FrameFile) -> Image.Image:
             height = max(1, round(frame.height * TILE_WIDTH_PX / frame.width))
             return frame.convert("RGB").resize((TILE_WIDTH_PX, height), Image.Resampling.LANCZOS)
     except IMAGE_DAMAGE as error:
-        raise InputError(f"{file}: cannot be read as an image ({error})") from None
+        raise InputError(f"{file}: cannot be read as an image ({why(error)})") from None

@@ -18,7 +18,7 @@ from PIL import Image
 from synfeal.dataset.archive import FrameFile, frame_file, sequence_at, sequence_names
 from synfeal.dataset.png import IMAGE_DAMAGE
 from synfeal.dataset.sequences import Sequence
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import atomic_path
 
 INVALID_MM = 65535
@@ -42,7 +42,7 @@ def read_depth_m(path: FrameFile) -> NDArray[np.float32]:
         with Image.open(io.BytesIO(path.read_bytes())) as image:
             depth_mm = np.asarray(image)
     except IMAGE_DAMAGE as error:
-        raise InputError(f"{path}: cannot be read as a depth image ({error})") from None
+        raise InputError(f"{path}: cannot be read as a depth image ({why(error)})") from None
     if depth_mm.ndim != 2 or depth_mm.dtype == np.uint8:
         raise InputError(f"{path}: must be a 16-bit grey image, millimetres")
     depth_m = (depth_mm / 1000.0).astype(np.float32)
@@ -65,7 +65,7 @@ def read_pose(path: FrameFile) -> NDArray[np.float64]:
         rows = [line.split() for line in path.read_text(encoding="utf-8").splitlines() if line]
         pose = np.array(rows, np.float64)
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as a pose ({error})") from None
+        raise InputError(f"{path}: cannot be read as a pose ({why(error)})") from None
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise InputError(f"{path}: a pose is four rows of four finite numbers")
     return pose
@@ -82,7 +82,7 @@ def frame_paths(sequences: Iterable[Path], kind: str) -> list[FrameFile]:
         try:
             names = sequence_names(sequence)
         except OSError as error:
-            raise InputError(f"{sequence}: cannot be read as a sequence ({error})") from None
+            raise InputError(f"{sequence}: cannot be read as a sequence ({why(error)})") from None
         found = [name for name in names if name.startswith("frame-") and name.endswith(f".{kind}")]
         if not found:
             raise InputError(f"{sequence}: holds no frame-XXXXXX.{kind}; render it again")
@@ -111,7 +111,7 @@ def read_split(dataset_dir: Path, split: str) -> list[Path]:
     except FileNotFoundError:
         raise InputError(f"{path}: missing; a 7-Scenes data set has one") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a list of sequences ({error})") from None
+        raise InputError(f"{path}: cannot be read as a list of sequences ({why(error)})") from None
     bad = [line for line in lines if not SEQUENCE.fullmatch(line)]
     if bad:
         raise InputError(f"{path}: '{bad[0][:40]}' names no sequence; lines look like 'sequence1'")

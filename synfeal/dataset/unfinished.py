@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from synfeal.dataset.directories import refuse_existing, writing_to
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import read_json, write_json
 from synfeal.run_lock import only_command, remove_unfinished
 
@@ -107,7 +107,9 @@ def check_settings(part: Path, settings: Mapping[str, Any]) -> None:
         if not isinstance(found, dict):
             raise ValueError("holds no mapping")
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read ({error}); delete {part} to start anew") from None
+        raise InputError(
+            f"{path}: cannot be read ({why(error)}); delete {part} to start anew"
+        ) from None
     differing = differences(found, settings)
     if differing:
         raise InputError(

@@ -14,7 +14,7 @@ from tqdm import tqdm
 from synfeal.bootstrap import FEWEST_PATHS
 from synfeal.config.collection import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.evaluation.convention import checked_convention
 from synfeal.evaluation.estimates import CONVENTIONS, Convention, Estimates
 from synfeal.evaluation.formats import read_estimates
@@ -169,7 +169,7 @@ def aligned(poses: Array, reference: Array, align: Align, path: Path) -> tuple[A
     try:
         scale, rotation, translation = umeyama_sim3(*pair, with_scale=align == "sim3")
     except ValueError as error:
-        raise InputError(f"{path}: cannot be aligned ({error}); give --align none") from None
+        raise InputError(f"{path}: cannot be aligned ({why(error)}); give --align none") from None
     moved = poses.copy()
     moved[:, :3, :3] = rotation @ poses[:, :3, :3]
     moved[:, :3, 3] = scale * poses[:, :3, 3] @ rotation.T + translation

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 
 GLB_MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = b"JSON", b"BIN\0"
@@ -77,7 +77,7 @@ def _parse_json(path: Path, text: bytes) -> Json:
         header = json.loads(text)
     except (ValueError, RecursionError) as error:  # also what is not UTF-8
         raise InputError(
-            f"{path}: cannot be read as a mesh (its JSON is broken: {error}); export it again"
+            f"{path}: cannot be read as a mesh (its JSON is broken: {why(error)}); export it again"
         ) from None
     if not isinstance(header, dict) or not isinstance(header.get("asset"), dict):
         raise InputError(f"{path}: cannot be read as a mesh (its JSON is not that of a glTF)")

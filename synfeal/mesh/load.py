@@ -13,7 +13,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.mesh.checks import check_indices, check_mesh
 from synfeal.mesh.colours import part_colours
 from synfeal.mesh.compressed import decoded
@@ -58,8 +58,7 @@ def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> Text
     except InputError:
         raise
     except Exception as error:  # parsers of foreign files fail in every way there is
-        reason = str(error) or type(error).__name__
-        raise InputError(f"{path}: cannot be read as a mesh ({reason})") from None
+        raise InputError(f"{path}: cannot be read as a mesh ({why(error)})") from None
     mesh = TexturedMesh(parts, findings.sentences)
     check_mesh(mesh, path)
     return mesh

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from synfeal.errors import why
 from synfeal.mesh.findings import Findings
 
 Pixels = NDArray[np.uint8]
@@ -49,7 +50,7 @@ def decode(image: Image.Image, owner: str, findings: Findings) -> Pixels | None:
     try:
         pixels = to_rgb(image)
     except (OSError, SyntaxError, ValueError) as error:  # Pillow raises all three on damaged files
-        findings.warn(f"{owner}: texture cannot be decoded ({error}); its base colour is used")
+        findings.warn(f"{owner}: texture cannot be decoded ({why(error)}); its base colour is used")
         return None
     if image.mode not in ("RGB", "RGBA") or pixels.shape[2] != len(image.getbands()):
         kind = "RGBA" if pixels.shape[2] == 4 else "RGB"

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import atomic_path
 
 PLY_HEADER = """\
@@ -77,4 +77,4 @@ def load_collision_mesh(path: Path) -> Triangles:
             raise ValueError("its faces or vertices are damaged; make the scene again")
         return found
     except Exception as error:  # parsers of foreign files fail in every way there is
-        raise InputError(f"{path}: cannot be read as a collision mesh ({error})") from None
+        raise InputError(f"{path}: cannot be read as a collision mesh ({why(error)})") from None

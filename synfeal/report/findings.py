@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.report.layouts import scene_title
 
 MEASURES = ("position_m", "orientation_deg")
@@ -137,7 +137,7 @@ def _table(root: Path, name: str) -> pd.DataFrame:
     try:
         return pd.read_csv(path, dtype={"size": str, "labels": str, "model": str})
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read ({error}); publish the run again") from None
+        raise InputError(f"{path}: cannot be read ({why(error)}); publish the run again") from None
 
 
 def _claims_sentence(root: Path) -> str:
@@ -145,7 +145,7 @@ def _claims_sentence(root: Path) -> str:
     try:
         verdicts = pd.read_csv(path).verdict_true.value_counts(sort=False)
     except (OSError, ValueError, AttributeError) as error:
-        raise InputError(f"{path}: cannot be read ({error}); publish the run again") from None
+        raise InputError(f"{path}: cannot be read ({why(error)}); publish the run again") from None
     parts = [f"{count} {verdict}" for verdict, count in verdicts.items()]
     return f"Verdicts on {verdicts.sum()} claims, by the true poses: {', '.join(parts)}."
 

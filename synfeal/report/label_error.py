@@ -20,7 +20,7 @@ from baselines.groundtruth.label_error import (
 from baselines.groundtruth.methods import METHODS, stages_of
 from synfeal.config import Experiment
 from synfeal.dataset.pose_table import read_pose_table
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import read_json
 from synfeal.report.assistance import SPLITS, TOTAL, batch_records, estimated_sets
 from synfeal.report.grid import Entry, Grid, Group, Line
@@ -171,7 +171,9 @@ def _read_facts(path: Path) -> dict[str, float]:
         facts: dict[str, float] = _FACTS.validate_python(read_json(path), strict=True)
         facts["peak_memory_mb"]
     except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"{path}: cannot be read ({error}); estimate that batch again") from None
+        raise InputError(
+            f"{path}: cannot be read ({why(error)}); estimate that batch again"
+        ) from None
     return facts
 
 

@@ -21,7 +21,7 @@ from baselines.references.registry import (
     titles_of,
 )
 from synfeal.config import MODELS, Design
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.evaluation.metrics import BOUNDS
 from synfeal.files import atomic_path
 from synfeal.report.grid import Entry, Grid, Group, Kind, Line
@@ -98,7 +98,7 @@ def read_references(path: Path) -> pd.DataFrame:
     try:
         return pd.read_csv(path, usecols=list(COLUMNS), dtype=texts)
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read ({error}); make that table again") from None
+        raise InputError(f"{path}: cannot be read ({why(error)}); make that table again") from None
 
 
 def _constant_record(metrics: Metrics) -> dict[str, Any]:

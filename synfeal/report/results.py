@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import read_json
 from synfeal.frames import REMEDY, read_records
 
@@ -26,7 +26,7 @@ def read_text(path: Path) -> str:
     except FileNotFoundError:
         raise InputError(f"{path}: missing; make the results first") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read ({error}); make it again") from None
+        raise InputError(f"{path}: cannot be read ({why(error)}); make it again") from None
 
 
 def read_result(path: Path, needed: Iterable[str], remedy: str) -> dict[str, Any]:
@@ -43,7 +43,7 @@ def read_result(path: Path, needed: Iterable[str], remedy: str) -> dict[str, Any
     try:
         value = read_json(path)
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as JSON ({error}); {remedy}") from None
+        raise InputError(f"{path}: cannot be read as JSON ({why(error)}); {remedy}") from None
     if not isinstance(value, dict):
         raise InputError(f"{path}: must hold a mapping of keys; {remedy}")
     absent = [key for key in needed if key not in value]
@@ -61,9 +61,7 @@ def check_result(path: Path, value: Any, shape: TypeAdapter[Any], remedy: str) -
     try:
         shape.validate_json(json.dumps(value), strict=True)
     except ValidationError as error:
-        first = error.errors(include_input=False)[0]
-        key = ".".join(map(str, first["loc"]))
-        raise InputError(f"{path}: {key}: {first['msg']}; {remedy}") from None
+        raise InputError(f"{path}: {why(error)}; {remedy}") from None
 
 
 def read_table(

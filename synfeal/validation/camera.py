@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from synfeal.config.collection import CameraConfig
 from synfeal.config.load import describe
 from synfeal.dataset.manifest import MANIFEST
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import read_json
 
 # Depth and colour of 7-Scenes come from a Kinect; its authors give this for both.
@@ -72,7 +72,7 @@ def read_manifest(dataset: Path) -> dict[str, Any]:
     try:
         manifest = read_json(path)
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as a manifest ({error})") from None
+        raise InputError(f"{path}: cannot be read as a manifest ({why(error)})") from None
     if not isinstance(manifest, dict):
         raise InputError(f"{path}: cannot be read as a manifest (no JSON object)")
     return manifest

@@ -11,7 +11,7 @@ from PIL import Image
 
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.png import IMAGE_DAMAGE
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 
 Pixels = NDArray[Any]
 
@@ -45,7 +45,6 @@ def read_depth_mm(path: FrameFile) -> NDArray[np.uint16]:
 
 def _decoded(path: FrameFile) -> Image.Image:
     """A PNG with every checksum verified and every row decoded."""
-    content = b""
     try:
         content = path.read_bytes()
         with Image.open(io.BytesIO(content), formats=["PNG"]) as image:
@@ -55,6 +54,5 @@ def _decoded(path: FrameFile) -> Image.Image:
     except FileNotFoundError:
         raise InputError(f"{path}: missing") from None
     except IMAGE_DAMAGE as error:
-        detail = str(error).replace(f"{content!r}", "") if path.is_file() else str(error)
-        raise InputError(f"{path}: cannot be decoded ({detail})") from None
+        raise InputError(f"{path}: cannot be decoded ({why(error)})") from None
     return decoded

@@ -15,7 +15,7 @@ from synfeal.dataset.archive import (
     sequence_at,
     sequence_names,
 )
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 
 COLOR, DEPTH, POSE = "color.png", "depth.png", "pose.txt"
 KINDS = (COLOR, DEPTH, POSE)
@@ -77,7 +77,7 @@ def _list(path: Path) -> SequenceListing:
     try:
         names = sequence_names(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read as a sequence ({error})") from None
+        raise InputError(f"{path}: cannot be read as a sequence ({why(error)})") from None
     for name in names:
         match = _FRAME.fullmatch(name)
         if match:

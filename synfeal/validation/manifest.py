@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from synfeal.dataset.manifest import MANIFEST, sequence_sha256
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.validation.camera import read_manifest
 from synfeal.validation.check import Check
 from synfeal.validation.listing import SequenceListing
@@ -31,7 +31,7 @@ def check_manifest(
     except InputError as error:
         return Check("manifest", "unreadable", (str(error),))
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        problem = f"{path}: sequences: each needs name, split, frames and sha256 ({error!r})"
+        problem = f"{path}: sequences: each needs name, split, frames and sha256 ({why(error)})"
         return Check("manifest", "unreadable", (problem,))
     failures = [f"{path}: does not list {name}" for name in listings if name not in entries]
     for name, entry in entries.items():
@@ -66,7 +66,7 @@ def _differences(
         if sequence_sha256(listing.path) != sha256:
             yield f"{listing.path}: differs from what was written ({path.name}: sha256)"
     except OSError as error:
-        yield f"{listing.path}: cannot be read ({error})"
+        yield f"{listing.path}: cannot be read ({why(error)})"
 
 
 def _wrong_counts(

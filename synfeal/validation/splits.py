@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.validation.check import Check
 from synfeal.validation.frames import Poses
 from synfeal.validation.listing import POSE, SequenceListing
@@ -28,7 +28,7 @@ def read_splits(
             failures.append(str(error))
             continue
         except (OSError, ValueError) as error:
-            failures.append(f"{dataset / name}: cannot be read ({error})")
+            failures.append(f"{dataset / name}: cannot be read ({why(error)})")
             continue
         failures += [
             f"{dataset / name}: lists {path.name}, which is not there"

@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
 from synfeal.dataset.pose_table import check_unit, whole_numbers
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import atomic_path
 from synfeal.geometry.poses import inverse, pose_from_quat, quat_wxyz_of, relative
 
@@ -127,7 +127,7 @@ def read_g2o(path: Path) -> PoseGraph:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a g2o file ({error})") from None
+        raise InputError(f"{path}: cannot be read as a g2o file ({why(error)})") from None
     vertices: dict[int, Array] = {}
     edges: list[Edge] = []
     for number, line in enumerate(text.splitlines(), start=1):
@@ -165,7 +165,7 @@ def _numbers(cells: Sequence[str], count: int, where: str) -> Array:
     try:
         values = np.array([float(cell) for cell in cells])
     except ValueError as error:
-        raise InputError(f"{where}: {error}") from None
+        raise InputError(f"{where}: {why(error)}") from None
     if len(values) != count or not np.isfinite(values).all():
         raise InputError(f"{where}: needs {count} finite numbers, found {len(values)}")
     return values

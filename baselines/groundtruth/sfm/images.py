@@ -11,7 +11,7 @@ from PIL import Image
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.archive import FrameFile, link_or_unpack
 from synfeal.dataset.png import IMAGE_DAMAGE
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 
 
 def link_images(color_paths: Sequence[FrameFile], camera: CameraConfig, images: Path) -> None:
@@ -37,7 +37,7 @@ def _check(path: FrameFile, camera: CameraConfig) -> None:
             size = image.size
     except IMAGE_DAMAGE as error:
         raise InputError(
-            f"{path}: cannot be read as an image ({error}); collect the data set again"
+            f"{path}: cannot be read as an image ({why(error)}); collect the data set again"
         ) from None
     if size != (camera.width, camera.height):
         raise InputError(

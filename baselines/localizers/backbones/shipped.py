@@ -16,7 +16,7 @@ import safetensors.torch
 import torch
 
 from baselines.localizers.names import BackboneName
-from synfeal.errors import InputError, exit_status
+from synfeal.errors import InputError, exit_status, why
 from synfeal.files import atomic_path, read_json, write_json
 
 SHIPPED = Path(__file__).parent / "shipped"
@@ -40,7 +40,9 @@ def shipped_weights_path(name: BackboneName, directory: Path = SHIPPED) -> Path:
         expected = read_json(directory / "record.json")["sha256"][name]
         found = hashlib.sha256(path.read_bytes()).hexdigest()
     except (OSError, ValueError, LookupError) as error:
-        raise InputError(f"{path}: cannot be read ({error}); install the package again") from None
+        raise InputError(
+            f"{path}: cannot be read ({why(error)}); install the package again"
+        ) from None
     if found != expected:
         raise InputError(f"{path}: is not the file that was shipped; install the package again")
     return path
@@ -65,7 +67,9 @@ def _ship(trained: Path, name: BackboneName, directory: Path) -> str:
     try:
         state = torch.load(trained, map_location="cpu", weights_only=True)
     except Exception as error:  # torch.load raises whatever the file provokes
-        raise InputError(f"{trained}: cannot be read ({error}); run `make start` first") from None
+        raise InputError(
+            f"{trained}: cannot be read ({why(error)}); run `make start` first"
+        ) from None
     half = {k: v.half() if v.is_floating_point() else v for k, v in state.items()}
     content = safetensors.torch.save({k: v.contiguous() for k, v in half.items()})
     with atomic_path(directory / f"{name}.safetensors") as temporary:

@@ -16,7 +16,7 @@ from baselines.localizers.backbones.inception_v3 import InceptionV3
 from baselines.localizers.backbones.resnet import ResNet34
 from baselines.localizers.names import BackboneName
 from synfeal.config.learning import InceptionName
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import atomic_path
 
 Backbone = InceptionBackbone | ResNet34
@@ -64,13 +64,14 @@ def load_backbone_weights(backbone: nn.Module, path: Path) -> None:
         state = _read_state(path)
         state = {k: v for k, v in state.items() if not k.startswith(CLASSIFIERS)}
     except Exception as error:  # torch.load raises whatever the broken file provokes
-        raise InputError(f"{path}: cannot be read as backbone weights ({error})") from None
+        problem = why(error) if isinstance(error, OSError) else "torch did not save it, or as code"
+        raise InputError(f"{path}: cannot be read as backbone weights ({problem})") from None
     try:
         backbone.load_state_dict(state)
     except RuntimeError as error:
-        reason = str(error).splitlines()[1]
+        unfit = str(error).splitlines()[1].strip()
         raise InputError(
-            f"{path}: does not fit {type(backbone).__name__} of this network.width ({reason}); "
+            f"{path}: does not fit {type(backbone).__name__} of this network.width ({unfit}); "
             "train the backbone again, or set the width it was trained with"
         ) from None
 
@@ -89,7 +90,7 @@ def _download(url: str, path: Path) -> None:
             content = response.read()
     except OSError as error:
         raise InputError(
-            f"{path}: ImageNet weights are missing and {url} cannot be downloaded ({error}); "
+            f"{path}: ImageNet weights are missing and {url} cannot be downloaded ({why(error)}); "
             f"fetch it on a machine with a network and put it at {path}"
         ) from None
     found = hashlib.sha256(content).hexdigest()

@@ -18,7 +18,7 @@ import pandas as pd
 
 from synfeal.bootstrap import Array, limits
 from synfeal.config import MODELS
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.report.claims.evidence import Cell, Evidence
 from synfeal.report.claims.model import Claim, Missing, Outcome
 from synfeal.report.claims.size import SIZES
@@ -81,6 +81,8 @@ def read_history(path: Path) -> pd.DataFrame:
     try:
         table = pd.read_csv(path, usecols=["samples_seen", *HELD_OUT], dtype=float)
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as a history ({error}); train it again") from None
+        raise InputError(
+            f"{path}: cannot be read as a history ({why(error)}); train it again"
+        ) from None
     table["error"] = table[HELD_OUT].prod(axis=1, skipna=False)
     return table.dropna()[["samples_seen", "error"]]

@@ -20,7 +20,7 @@ from typing import Any
 from tqdm import tqdm
 
 from synfeal.dataset.archive import ARCHIVE_DAMAGE, EPOCH, PLAIN_FILE, UNIX
-from synfeal.errors import InputError
+from synfeal.errors import InputError, why
 from synfeal.files import atomic_path
 
 DESCRIPTOR, SCHEMA = "datapackage.json", "schemas/poses.json"
@@ -117,7 +117,7 @@ def read_resources(package: Path) -> list[Resource]:
         resources = [_parsed(entry) for entry in entries]
     except DAMAGE as error:
         raise InputError(
-            f"{package}: cannot be read as what synfeal keep writes ({error!r})"
+            f"{package}: cannot be read as what synfeal keep writes ({why(error)})"
         ) from None
     for resource in resources:
         path = PurePosixPath(resource.path)
@@ -144,7 +144,9 @@ def read_contents(package: Path, resources: list[Resource]) -> Iterator[tuple[Re
                 if resource.member != member:
                     member, data = resource.member, opened.read(resource.member)
             except DAMAGE as error:
-                raise InputError(f"{package}: {resource.member}: is damaged ({error!r})") from None
+                raise InputError(
+                    f"{package}: {resource.member}: is damaged ({why(error)})"
+                ) from None
             content = data[: resource.n_bytes]
             if hashlib.sha256(content).hexdigest() != resource.sha256:
                 raise InputError(f"{package}: {resource.path}: differs from its hash; copy it anew")
