@@ -52,7 +52,7 @@ def read_json(path: Path) -> Any:
 
 def _finite(text: str) -> float:
     if not math.isfinite(float(text)):
-        raise ValueError(f"{text[:20]} is no finite number")
+        raise ValueError(f"{text[:20]} is not a finite number")
     return float(text)
 
 

@@ -17,7 +17,7 @@ from synfeal.errors import InputError
 def job(log: str | Path) -> Iterator[None]:
     """Send everything the block prints, native libraries included, to the file ``log``.
 
-    What a person can mend becomes one line on the real standard error and exit status 1: an
+    What a person can fix becomes one line on the real standard error and exit status 1: an
     :class:`InputError`, a full disk, too little memory. Every exception but the first keeps its
     traceback, in the log.
     """
@@ -70,4 +70,4 @@ def _sentence(error: InputError | MemoryError | OSError) -> InputError:
             " at once (--cores), or on a machine with more"
         )
     where = f"{error.filename}: " if error.filename else ""
-    return InputError(f"{where}{error.strerror or error}; mend that and start again")
+    return InputError(f"{where}{error.strerror or error}; fix that and start again")

@@ -109,7 +109,7 @@ def render_configs(options: Mapping[str, Any]) -> tuple[CameraConfig, RenderConf
             except ValidationError as error:
                 raise InputError(f"{key}.{describe(error, model)}") from None
         if values:
-            raise InputError(f"{next(iter(options))}: is no option of a renderer")
+            raise InputError(f"{next(iter(options))}: is not an option of a renderer")
     return found[0], found[1]
 
 

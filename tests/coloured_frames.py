@@ -44,7 +44,7 @@ def write_split(folder: Path, name: str, count: int, seed: int, spare: int = 0) 
 
 
 def read_split(split: Split) -> LabelledFrames:
-    """A split as trainings read it."""
+    """A split as training runs read it."""
     return read_labelled_frames(*split, PX, CPU)
 
 

@@ -15,7 +15,7 @@ from synfeal.dataset.pose_table import PoseTable
 # Of a mutant (docs/testing.md) any failing example will do: it need not be the simplest.
 SIMPLEST = () if "MUTANT_UNDER_TEST" in os.environ else (Phase.shrink, Phase.explain)
 PHASES = (Phase.explicit, Phase.generate, *SIMPLEST)
-# The same examples in every run: a test that fails once fails until it is mended.
+# The same examples in every run: a test that fails once fails until it is fixed.
 few = settings(derandomize=True, deadline=None, max_examples=25, database=None, phases=PHASES)
 fewer = settings(few, max_examples=6)
 

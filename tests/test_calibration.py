@@ -15,7 +15,7 @@ import yaml
 
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.calibration_files import read_calibration
-from synfeal.camera.rays import pixels_of_slopes
+from synfeal.camera.rays import pixels_of_normalised
 from synfeal.cli import main
 from synfeal.config import load_config, parse_config, read_experiments
 from synfeal.config.load import merge, read_yaml
@@ -111,9 +111,9 @@ def test_a_colmap_camera_projects_as_in_colmap(tmp_path: Path, model: str) -> No
     model_dir.write_text(str(tmp_path))
     found = CameraConfig(calibration=tmp_path / "cameras.txt")
 
-    slope = np.random.default_rng(0).uniform(-0.6, 0.6, (30, 2))
-    expected = camera.img_from_cam(np.column_stack([slope, np.ones(30)]))
-    np.testing.assert_allclose(pixels_of_slopes(found, slope), expected, atol=1e-9)
+    normalised = np.random.default_rng(0).uniform(-0.6, 0.6, (30, 2))
+    expected = camera.img_from_cam(np.column_stack([normalised, np.ones(30)]))
+    np.testing.assert_allclose(pixels_of_normalised(found, normalised), expected, atol=1e-9)
 
 
 def test_scaling_keeps_every_ray() -> None:

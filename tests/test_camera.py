@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from baselines.groundtruth.sfm.features import colmap_parameters
 from synfeal.camera.distortion import distort, fold_radius, undistort
 from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.camera.rays import pixels_of_slopes, slopes_of_pixels
+from synfeal.camera.rays import normalised_of_pixels, pixels_of_normalised
 from synfeal.config.models import CameraConfig
 
 LENSES = {
@@ -35,10 +35,10 @@ def points_within(radius: float, count: int = 500) -> np.ndarray:
 
 @pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
 def test_distortion_is_opencvs(lens: tuple[float, ...]) -> None:
-    slope = points_within(min(1.2, fold_radius(lens)))
-    rays = np.column_stack([slope, np.ones(len(slope))])
+    normalised = points_within(min(1.2, fold_radius(lens)))
+    rays = np.column_stack([normalised, np.ones(len(normalised))])
     expected, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), np.eye(3), np.array(lens))
-    np.testing.assert_allclose(distort(slope, lens), expected[:, 0], atol=1e-14)
+    np.testing.assert_allclose(distort(normalised, lens), expected[:, 0], atol=1e-14)
 
 
 @pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
@@ -53,12 +53,12 @@ def test_undistortion_is_opencvs(lens: tuple[float, ...]) -> None:
 @settings(deadline=None, max_examples=100, derandomize=True)
 def test_pixels_return_within_1e_10(k1: float, k2: float, p1: float, p2: float, k3: float) -> None:
     lens = (k1, k2, p1, p2, k3)
-    slope = points_within(min(1.5, 0.9 * fold_radius(lens)), 50)
-    seen = distort(slope, lens)
+    normalised = points_within(min(1.5, 0.9 * fold_radius(lens)), 50)
+    seen = distort(normalised, lens)
     back = undistort(seen, lens)
     kept = ~np.isnan(back).any(axis=-1)
     np.testing.assert_allclose(500 * distort(back, lens)[kept], 500 * seen[kept], atol=1e-10)
-    np.testing.assert_allclose(back[kept], slope[kept], atol=1e-10)
+    np.testing.assert_allclose(back[kept], normalised[kept], atol=1e-10)
     if (p1, p2) == (0.0, 0.0):
         assert kept.all()
 
@@ -93,10 +93,10 @@ def test_pixels_of_points_are_opencvs_but_for_half_a_pixel() -> None:
     expected, _ = cv2.projectPoints(
         points, np.zeros(3), np.zeros(3), matrix, np.array(camera.distortion)
     )
-    slope = points[:, :2] / points[:, 2:]
-    pixel = pixels_of_slopes(camera, slope)
+    normalised = points[:, :2] / points[:, 2:]
+    pixel = pixels_of_normalised(camera, normalised)
     np.testing.assert_allclose(pixel, expected[:, 0] + 0.5, atol=1e-10)
-    np.testing.assert_allclose(slopes_of_pixels(camera, pixel), slope, atol=1e-13)
+    np.testing.assert_allclose(normalised_of_pixels(camera, pixel), normalised, atol=1e-13)
 
 
 def test_a_lens_that_folds_inside_the_image_is_refused() -> None:
@@ -116,6 +116,6 @@ def test_structure_from_motion_is_told_the_same_camera(lens: tuple[float, ...]) 
         height=480,
         params=colmap_parameters(camera),
     )
-    slope = np.random.default_rng(0).uniform(-0.3, 0.3, (30, 2))
-    seen = told.img_from_cam(np.column_stack([slope, np.ones(30)]))
-    np.testing.assert_allclose(pixels_of_slopes(camera, slope), seen, atol=1e-9)
+    normalised = np.random.default_rng(0).uniform(-0.3, 0.3, (30, 2))
+    seen = told.img_from_cam(np.column_stack([normalised, np.ones(30)]))
+    np.testing.assert_allclose(pixels_of_normalised(camera, normalised), seen, atol=1e-9)

@@ -70,7 +70,7 @@ def test_of_a_divided_room_the_larger_part_is_the_scene() -> None:
     # Seen: an end, four sides 2.5 m deep, the wall's near face. All: the cube, the wall's surface.
     visible, whole = 16 + 4 * 2.5 * 4 + 16, 6 * 16 + 2 * 16 + 4 * 0.1 * 4
     assert found["surface"]["visible_share"] == pytest.approx(visible / whole, abs=SAMPLED)
-    # Rays end a little before the surface: a strip beyond the wall's foot passes for visible.
+    # Rays end a little in front of the surface: a strip beyond the wall's foot passes for visible.
     assert found["surface"]["seen_share"] == pytest.approx(1.0, abs=5e-3)
     assert found["free_space"]["voxels"] == 10 * 16 * 16  # of 16 x 16 x 16
 

@@ -9,7 +9,7 @@ import trimesh
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.camera.rays import slopes_of_pixels
+from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_matrix
@@ -51,7 +51,7 @@ def pixel_centres(camera: CameraConfig) -> np.ndarray:
 
 
 class Analytic:
-    """A scene in closed form: colour and depth as functions of the slopes of a ray."""
+    """A scene in closed form: colour and depth as functions of normalised image coordinates."""
 
     def __init__(self, camera, colour=None, depth=None, samples=4):
         self.camera, self.colour, self.depth, self.samples = camera, colour, depth, samples
@@ -60,17 +60,21 @@ class Analytic:
         steps = (np.arange(self.samples) + 0.5) / self.samples - 0.5
         centre, total = pixel_centres(self.camera), 0.0
         for offset in np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2):
-            total = total + self.colour(slopes_of_pixels(self.camera, centre + offset))
+            total = total + self.colour(normalised_of_pixels(self.camera, centre + offset))
         grey = np.rint(total / self.samples**2).astype(np.uint8)
         return np.repeat(grey[..., None], 3, axis=2)
 
     def render_rgbd(self, world_from_cam):
-        slope = slopes_of_pixels(self.camera, pixel_centres(self.camera))
-        return np.zeros((*slope.shape[:2], 3), np.uint8), self.depth(slope).astype(np.float32)
+        normalised = normalised_of_pixels(self.camera, pixel_centres(self.camera))
+        return np.zeros((*normalised.shape[:2], 3), np.uint8), self.depth(normalised).astype(
+            np.float32
+        )
 
 
-def noise_colour(slope: np.ndarray) -> np.ndarray:
-    return map_coordinates(NOISE, [slope[..., 1] * 240, slope[..., 0] * 240], order=1, mode="wrap")
+def noise_colour(normalised: np.ndarray) -> np.ndarray:
+    return map_coordinates(
+        NOISE, [normalised[..., 1] * 240, normalised[..., 0] * 240], order=1, mode="wrap"
+    )
 
 
 def _noise() -> np.ndarray:
@@ -111,8 +115,8 @@ def test_points_appear_where_opencv_projects_them(lens) -> None:
 def test_a_straight_line_bends_as_it_must(lens) -> None:
     camera = camera_of(lens)
 
-    def line(slope):
-        return 255.0 * (np.abs(slope[..., 0] - 0.45) < 0.02)
+    def line(normalised):
+        return 255.0 * (np.abs(normalised[..., 0] - 0.45) < 0.02)
 
     grey = DistortedRenderer(lambda pinhole: Analytic(pinhole, line), camera).render(AHEAD)[..., 0]
     y = np.linspace(-0.8, 0.8, 400)
@@ -139,13 +143,13 @@ def test_colours_are_nearly_those_of_64_rays(lens) -> None:
 def test_depth_of_a_plane_is_exact(lens) -> None:
     camera = camera_of(lens)
 
-    def depth(slope):
-        return 1.0 / (slope @ SLANT[:2] + SLANT[2])
+    def depth(normalised):
+        return 1.0 / (normalised @ SLANT[:2] + SLANT[2])
 
     renderer = DistortedRenderer(lambda pinhole: Analytic(pinhole, depth=depth), camera)
     found = renderer.render_rgbd(AHEAD)[1]
     assert found.dtype == np.float32
-    expected = depth(slopes_of_pixels(camera, pixel_centres(camera)))
+    expected = depth(normalised_of_pixels(camera, pixel_centres(camera)))
     assert np.ptp(expected) > 0.5
     np.testing.assert_allclose(found, expected, atol=1e-5)
 
@@ -155,17 +159,17 @@ def test_depth_is_never_between_two_surfaces(lens) -> None:
     """A wall at 4 m before nothing, and before it a board at 2 m."""
     camera = camera_of(lens)
 
-    def depth(slope):
-        wall = np.where(slope[..., 0] < 0.3, 4.0, np.inf)
-        return np.where(np.abs(slope).max(axis=-1) < 0.2, 2.0, wall)
+    def depth(normalised):
+        wall = np.where(normalised[..., 0] < 0.3, 4.0, np.inf)
+        return np.where(np.abs(normalised).max(axis=-1) < 0.2, 2.0, wall)
 
     renderer = DistortedRenderer(lambda pinhole: Analytic(pinhole, depth=depth), camera)
     found = renderer.render_rgbd(AHEAD)[1].round(5)
     assert set(np.unique(found)) == {2.0, 4.0, np.inf}
-    expected = depth(slopes_of_pixels(camera, pixel_centres(camera)))
+    expected = depth(normalised_of_pixels(camera, pixel_centres(camera)))
     differs = found != expected
     assert differs.mean() < 0.01
-    near = slopes_of_pixels(camera, pixel_centres(camera))[differs]
+    near = normalised_of_pixels(camera, pixel_centres(camera))[differs]
     edges = np.abs(np.abs(near).max(axis=-1) - 0.2), np.abs(near[:, 0] - 0.3)
     assert (np.minimum(*edges) < 0.5 / 120).all()  # half a pixel
 
@@ -180,7 +184,9 @@ def test_a_closed_room_fills_the_image(lens) -> None:
         np.testing.assert_array_equal(renderer.render(AHEAD), seen)
     assert (seen.shape, seen.dtype) == ((120, 160, 3), np.uint8)
     assert (np.abs(seen.astype(int) - 200) <= 1).all()
-    ahead = np.abs(slopes_of_pixels(camera_of(lens), pixel_centres(camera_of(lens)))).max(-1) < 0.95
+    ahead = (
+        np.abs(normalised_of_pixels(camera_of(lens), pixel_centres(camera_of(lens)))).max(-1) < 0.95
+    )
     np.testing.assert_allclose(depth[ahead], 2.0, atol=1e-3)  # the wall that faces the camera
 
 

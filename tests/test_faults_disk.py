@@ -127,7 +127,7 @@ def test_a_job_tells_of_a_full_disk_where_its_log_lies_too(disk: Path) -> None:
     )
     assert run.returncode == 1
     place = disk / "facts.json"
-    assert run.stderr == f"error: {place}: No space left on device; mend that and start again\n"
+    assert run.stderr == f"error: {place}: No space left on device; fix that and start again\n"
     assert not place.exists()
     for path in disk.iterdir():
         path.unlink()

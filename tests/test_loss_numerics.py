@@ -1,4 +1,4 @@
-"""Losses in float32: finite wherever a training can lead them, and right to the last digits.
+"""Losses in float32: finite wherever a training run can lead them, and right to the last digits.
 
 The reference is written down anew in double precision, and differentiated by an imaginary step.
 """
@@ -27,7 +27,7 @@ from baselines.localizers.losses import (
 
 Array = NDArray[Any]
 BATCH = 2
-# Every loss by a number that says how it weighs: the extremes are those a training may meet.
+# Every loss by a number that says how it weighs: the extremes are those a training run may meet.
 LOSSES: dict[type[PoseLoss], tuple[Callable[[float], PoseLoss], tuple[float, float]]] = {
     BetaLoss: (lambda x: BetaLoss(10.0**x), (-3.0, 5.0)),
     LearnedWeightLoss: (lambda x: LearnedWeightLoss(x, -x / 2), (-20.0, 20.0)),

@@ -197,9 +197,9 @@ def test_poses_outside_the_mesh_are_a_warning(
         ("poses.txt", "0 0 0 nan 0 0 0 1\n", "line 1 must hold eight finite numbers"),
         ("poses.csv", "frame,path,tx,ty,tz,qw,qx,qy,qz\n0,0,0,0,0,0,0,0,0\n", "line 2 .* length 0"),
         ("poses.json", "[]", "must be a directory, a .csv pose table or a .txt"),
-        ("frame-000000.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n", "no rigid pose"),
-        ("frame-000000.pose.txt", "2 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n", "no rigid pose"),
-        ("frame-000000.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n1 0 0 1\n", "no rigid pose"),
+        ("frame-000000.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n", "not a rigid pose"),
+        ("frame-000000.pose.txt", "2 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n", "not a rigid pose"),
+        ("frame-000000.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n1 0 0 1\n", "not a rigid pose"),
     ],
 )
 def test_what_is_no_pose_is_named(name: str, content: str, message: str, tmp_path: Path) -> None:

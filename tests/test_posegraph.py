@@ -259,7 +259,10 @@ def edge_line(i, j, w=1):
             f"{VERTEX} 0 0 0 0 0 0 0 1\n{VERTEX} 1 0 0 0 0 0 0 1\n",
             "node 1 is not connected to node 0 by edges; is the file cut short",
         ),
-        (f"{VERTEX} 0 0 0 0 0 0 0 1\n\n", "line 2 is no VERTEX_SE3:QUAT or EDGE_SE3:QUAT record"),
+        (
+            f"{VERTEX} 0 0 0 0 0 0 0 1\n\n",
+            "line 2 is not a VERTEX_SE3:QUAT or EDGE_SE3:QUAT record",
+        ),
         (f"{VERTEX} 0 0 0 inf 0 0 0 1\n", "line 1: needs 8 finite numbers, found 8"),
         (f"{VERTEX} 0 0 0 0 0 0 0 2\n", "line 1 holds a quaternion of length 2"),
         (f"{VERTEX} 0 0 0 0 0 0 0 1\n{edge_line(0, 1)[:-2]}", "line 2: needs 30 .* found 29"),

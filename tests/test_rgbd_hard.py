@@ -154,7 +154,7 @@ def test_a_damaged_image_is_named(method, kind, damage, tmp_path):
 @METHODS
 def test_depth_of_another_kind_is_named(method, tmp_path):
     color, depth = write_room(tmp_path, [pose_at([-1.0, 0, 1.4])] * 2)
-    with pytest.raises(InputError, match=r"color\.png: is no 16-bit depth image"):
+    with pytest.raises(InputError, match=r"color\.png: is not a 16-bit depth image"):
         method((color, [depth[0], color[1]]))
 
 

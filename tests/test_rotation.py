@@ -1,4 +1,4 @@
-"""Turned training images are those that the turned camera takes."""
+"""Rotated training images are those that the rotated camera takes."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_a_turned_image_is_what_the_turned_camera_sees() -> None:
         vectors = torch.tensor(turn_rad, dtype=torch.float32).expand(len(poses), 3)
 
         def level_error(vectors: Tensor, truth: Tensor = truth) -> float:
-            found = rotation().turned(originals, vectors)[:, :, INSIDE, INSIDE]
+            found = rotation().rotated(originals, vectors)[:, :, INSIDE, INSIDE]
             return float((found - truth).abs().mean())
 
         right = level_error(vectors)
@@ -86,7 +86,7 @@ def test_a_turned_image_is_what_the_turned_camera_sees() -> None:
 
 def test_no_turn_changes_nothing() -> None:
     images = torch.rand(2, 3, PX, PX)
-    same = rotation().turned(images, torch.zeros(2, 3))
+    same = rotation().rotated(images, torch.zeros(2, 3))
     torch.testing.assert_close(same, images, atol=1e-4, rtol=0)
 
 
@@ -100,7 +100,7 @@ def test_labels_turn_with_the_images() -> None:
     expected = Rotation.from_quat(quat, scalar_first=True) * Rotation.from_rotvec(vectors)
     off_rad = (expected.inv() * Rotation.from_quat(labels, scalar_first=True)).magnitude()
     assert off_rad.max() < 1e-6
-    assert torch.equal(turned, rotation().turned(images, vectors))
+    assert torch.equal(turned, rotation().rotated(images, vectors))
     assert turned.is_contiguous(memory_format=torch.channels_last)
 
 

@@ -34,7 +34,7 @@ def poses_at(position_m, yaw_deg):
 
 
 def sideways(n_frames, step_m=0.1, turn_deg=0.0):
-    """Poses that move along y before the wall x = 5 m."""
+    """Poses that move along y in front of the wall x = 5 m."""
     centre = np.arange(n_frames) - (n_frames - 1) / 2
     position_m = np.column_stack([2.2 + 0.02 * centre, 3 + step_m * centre, 1.5 + 0.01 * centre])
     return poses_at(position_m, turn_deg * centre)

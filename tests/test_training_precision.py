@@ -1,4 +1,4 @@
-"""What trainings learn, in either precision."""
+"""What training runs learn, in either precision."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def split(tmp_path_factory):
 
 @pytest.fixture(scope="module", params=["float32", "bfloat16"])
 def learned(request, split, tmp_path_factory):
-    """Truth and predictions of other frames, and the history, of a training in either precision."""
+    """Truth and predictions of other frames, and the history, of a run in either precision."""
     folder = tmp_path_factory.mktemp(request.param)
     training = TRAINING.model_copy(update={"precision": request.param})
     model, history = train(split, folder, samples=2400, training=training)

@@ -1,4 +1,4 @@
-"""A training that is stopped, in whatever way, and started again ends as an undisturbed one."""
+"""A training run that is stopped, in whatever way, and started again ends as an undisturbed one."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def test_the_file_of_another_training_is_ignored(
     with pytest.raises(RuntimeError, match="stopped here"):
         run(splits, tmp_path, Jitter(3, fail), seed=2)
     assert_same(run(splits, tmp_path, Jitter()), undisturbed["corrected"])
-    assert "it is of another training" in caplog.text
+    assert "it is of another training run" in caplog.text
 
 
 def test_a_digest_tells_any_change():

@@ -46,7 +46,7 @@ def read_picture(path: Path, input_px: int, view: View = "square") -> NDArray[np
                 return fit_frame(_rgb(ImageOps.exif_transpose(image)), input_px, view)
     except Exception as error:  # a damaged file is refused in every way there is
         problem = f"cannot be read as a PNG or JPEG picture ({why(error)})"
-    raise InputError(f"{path}: {problem}; leave it out or mend it")
+    raise InputError(f"{path}: {problem}; leave it out or repair it")
 
 
 def _in(directory: Path) -> list[Path]:

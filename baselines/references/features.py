@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from baselines.groundtruth.images import read_image
 from baselines.references.arrays import read_arrays, write_arrays
-from synfeal.camera.rays import slopes_of_pixels
+from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig, ReferencesConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.sevenscenes import read_depth_m
@@ -90,7 +90,7 @@ def find_features(
         if depth_paths is not None:
             column, row = pixel.astype(int).T
             depth_m = read_depth_m(depth_paths[index])[row, column].astype(np.float64)
-        found.append((slopes_of_pixels(camera, pixel), depth_m, descriptor))
+        found.append((normalised_of_pixels(camera, pixel), depth_m, descriptor))
     slope, depth, descriptors = (np.concatenate(part) for part in zip(*found, strict=True))
     start = np.cumsum([0, *(len(part[1]) for part in found)])
     return Features(start, slope, depth, descriptors)

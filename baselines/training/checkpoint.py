@@ -82,7 +82,7 @@ def read_checkpoint(path: Path, device: torch.device) -> TrainedLocalizer:
 
 def _read(path: Path, device: torch.device) -> dict[str, Any]:
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file; name the model.pt of a training")
+        raise InputError(f"{path}: there is no such file; name the model.pt of a training run")
     try:
         content = torch.load(path, map_location=device, weights_only=True)
     except Exception:  # torch.load raises whatever the broken file provokes, with unsafe advice
@@ -90,7 +90,7 @@ def _read(path: Path, device: torch.device) -> dict[str, Any]:
             f"{path}: is damaged or no trained localizer; name the model.pt of a training run"
         ) from None
     if not isinstance(content, dict) or not {"localizer", "images"} <= content.keys():
-        raise InputError(f"{path}: holds no trained localizer; name the model.pt of a training")
+        raise InputError(f"{path}: holds no trained localizer; name the model.pt of a training run")
     return content
 
 

@@ -19,7 +19,7 @@ CPU_MEMORY_IS_OUT = ("DefaultCPUAllocator", "could not create a memory", "std::b
 def open_device(wanted: Literal["auto", "cpu", "cuda"]) -> torch.device:
     """The device to work on; ``auto`` takes the GPU if there is one.
 
-    On the CPU one thread is used: two trainings side by side are faster than one on two threads,
+    On the CPU one thread is used: two runs side by side are faster than one on two threads,
     and one thread adds up in one order, so the same seed gives the same network. Denormal numbers
     are flushed to zero; they carry no information and take many times as long.
 

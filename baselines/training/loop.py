@@ -93,7 +93,7 @@ def train_localizer(
         training: protocol, batch size, precision and device.
         samples_seen: images shown in all.
         backbone_weights: state dict the backbone starts from; None trains from scratch.
-        seed: of the initial weights, the paths held out, the order of the frames, their turns and
+        seed: of the initial weights, the paths held out, the order of frames, their rotations and
             dropout.
         out_model: checkpoint to write.
         out_history: CSV to write.
@@ -112,7 +112,7 @@ def train_localizer(
     localizer = _initial(name, network, hyper, backbone_weights, seed, learned)
     material = Material(localizer, image_statistics(data.images), learned, held_out)
     log.info("%s: %d frames, %d samples, on %s", name, len(learned), samples_seen, device)
-    if augment is None and protocol.images == "turned":
+    if augment is None and protocol.images == "rotated":
         augment = random_rotation(frames, network, training.augmentation, seed)
     settings = (name, network, hyper, training, protocol, samples_seen, seed)
     identity = digest(*settings, augment and augment.state_dict(), *material.fingerprints())

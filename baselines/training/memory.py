@@ -1,4 +1,4 @@
-"""Memory that a training asks a cluster for; free of torch, so that a workflow may import it."""
+"""Memory a training run asks a cluster for; free of torch, so that a workflow may import it."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ class Schedule(NamedTuple):
         batch_size: images per step.
         learning_rate: the highest one; Muon's is ``MUON_RATE`` times it.
         weight_decay: decoupled, but with ``halving`` of the loss.
-        halve_every: share of the training after which the rate is halved (``halving``).
+        halve_every: share of the training run after which the rate is halved (``halving``).
     """
 
     samples_seen: int

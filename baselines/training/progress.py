@@ -1,4 +1,4 @@
-"""The history of a training, and what its log says."""
+"""The history of a training run, and what its log says."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from synfeal.frames import write_frame
 
 log = logging.getLogger(__name__)
 
-# Seconds between progress lines, and rows of the history of a training (evaluations add rows).
+# Seconds between progress lines, and rows of the history of a training run (evaluations add rows).
 LOG_EVERY_S = 5.0
 HISTORY_ROWS = 50
 
@@ -37,7 +37,7 @@ class HistoryRow(NamedTuple):
 
 
 class Progress:
-    """Collects the history and says every few seconds how far the training is."""
+    """Collects the history and says every few seconds how far the training run is."""
 
     def __init__(self, steps: int, batch_size: int, device: torch.device) -> None:
         self.rows: list[HistoryRow] = []

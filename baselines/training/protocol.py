@@ -9,7 +9,7 @@ from synfeal.config.models import ModelName
 
 
 class Protocol(NamedTuple):
-    """The parts of a training that decide what its score means.
+    """The parts of a training run that decide what its score means.
 
     Attributes:
         order: ``shuffled`` draws a new order for every epoch, ``collected`` shows the frames of one
@@ -21,25 +21,25 @@ class Protocol(NamedTuple):
         optimiser: ``muon`` for kernels and AdamW for the rest, or ``adamw`` for all: the rate
             rises, then falls to nothing. ``halving``: Adam with L2 regularisation of all
             parameters, the rate is halved at regular intervals.
-        images: ``turned``: by ``training.augmentation``; ``plain``: as they were collected.
+        images: ``rotated``: by ``training.augmentation``; ``plain``: as they were collected.
     """
 
     order: Literal["shuffled", "collected"]
     selection: Literal["validation", "test", "last"]
     distance: Literal["norm", "mse"]
     optimiser: OptimiserName
-    images: Literal["turned", "plain"]
+    images: Literal["rotated", "plain"]
 
 
 # ``published`` is what the paper's authors published as code, in these parts. Their loss on
 # the test set is looked at after every epoch or every tenth one, here as often as the validation
 # paths; regressors start at the mean training position and incomplete batches are filled in both.
 PROTOCOLS: dict[Literal["corrected", "published"], Protocol] = {
-    "corrected": Protocol("shuffled", "validation", "norm", "muon", "turned"),
+    "corrected": Protocol("shuffled", "validation", "norm", "muon", "rotated"),
     "published": Protocol("collected", "test", "mse", "halving", "plain"),
 }
 
-# After which share of a training the rate is halved: step over epochs in the authors' read-me.
+# After which share of a training run the rate is halved: step over epochs in the authors' read-me.
 HALVE_EVERY: dict[ModelName, float] = {
     "posenet": 60 / 300,
     "poselstm": 150 / 500,

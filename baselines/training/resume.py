@@ -1,4 +1,4 @@
-"""A training that was killed goes on where it stood, and ends as if nothing had happened."""
+"""A training run that was killed goes on where it stood, and ends as if nothing had happened."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ UNTOUCHED = (signal.SIG_IGN, None)
 
 
 class Restorable(Protocol):
-    """Part of a training whose state is tensors and plain values."""
+    """Part of a training run whose state is tensors and plain values."""
 
     def state_dict(self) -> Mapping[str, Any]:
         """The state as it is now."""
@@ -39,9 +39,9 @@ class Restorable(Protocol):
 
 
 class ResumeFile:
-    """The state of a training on disk; without ``path`` nothing is kept.
+    """The state of a training run on disk; without ``path`` nothing is kept.
 
-    A damaged file, or one of another training, is ignored and said so. Its last bytes are the
+    A damaged file, or one of another training run, is ignored and said so. Its last bytes are the
     SHA-256 of the others, because ``torch.load`` does not notice changed values.
     """
 
@@ -50,13 +50,13 @@ class ResumeFile:
         self._saved = time.monotonic()
 
     def load(self, parts: Mapping[str, Restorable]) -> None:
-        """Give every part the state it had, if the file is about this training."""
+        """Give every part the state it had, if the file is about this training run."""
         content = self._read()
         if content is None:
             return
         for name, part in parts.items():
             part.load_state_dict(content["parts"][name])
-        log.info("%s: the training goes on where it was stopped", self._path)
+        log.info("%s: the training run goes on where it was stopped", self._path)
 
     def save_if_due(self, parts: Mapping[str, Restorable], now: bool = False) -> None:
         """Write the state, if the last time is ``RESUME_EVERY_S`` ago, or ``now``."""
@@ -86,7 +86,7 @@ class ResumeFile:
                 raise ValueError("its checksum is wrong")
             found: dict[str, Any] = torch.load(io.BytesIO(state), "cpu", weights_only=True)
             if found["fingerprint"] != self._fingerprint:
-                raise ValueError("it is of another training")
+                raise ValueError("it is of another training run")
         except Exception as error:  # torch.load raises whatever the broken file provokes
             log.warning("%s: ignored, %s; training starts anew", self._path, why(error)[:200])
             return None

@@ -1,7 +1,7 @@
-"""Training images as the camera would have seen them, had it been turned a little where it was.
+"""Rotation augmentation: images as the camera would have seen them, rotated about its centre.
 
 The image of a camera that turns about its centre changes by a homography, whatever the scene: with
-the intrinsics ``K`` and the turned camera's axes ``R`` in the old camera's frame, the new pixel
+the intrinsics ``K`` and the rotated camera's axes ``R`` in the old camera's frame, the new pixel
 ``x`` shows what the old pixel ``K R K^-1 x`` showed (Hartley and Zisserman, Multiple View Geometry,
 2nd ed., section 8.4.2). The position of the label stays, its rotation is multiplied by ``R``: exact
 new poses for nothing but a resampling, so that few paths teach more orientations than they have.
@@ -22,7 +22,7 @@ from synfeal.config.models import AugmentationConfig, NetworkConfig
 from synfeal.dataset.packed import crop_of
 from synfeal.errors import InputError
 
-# Rays beyond this slope, of very wide cameras turned far, look sideways and see no pixel.
+# Least depth of a ray: those of very wide cameras rotated far look sideways and see no pixel.
 LEAST_DEPTH = 1e-3
 
 
@@ -42,18 +42,18 @@ class RandomRotation:
     ) -> None:
         tilt, roll = math.radians(augmentation.tilt_deg), math.radians(augmentation.roll_deg)
         self._largest_rad = torch.tensor([tilt, tilt, roll])
-        # Drawn on the processor, so that one seed gives one training wherever it runs.
+        # Drawn on the processor, so that one seed gives one training run wherever it runs.
         self._generator = torch.Generator().manual_seed(seed)
         self._rays = _rays(intrinsics, input_px)
         self._grid_from_ray = _grid_from_ray(intrinsics, input_px)
 
     def __call__(self, images: Tensor, quat_wxyz: Tensor) -> tuple[Tensor, Tensor]:
-        """Turned images (B, 3, S, S), channels last, and their quaternions (B, 4)."""
+        """Rotated images (B, 3, S, S), channels last, and their quaternions (B, 4)."""
         draws = torch.rand(len(images), 3, generator=self._generator)
         rotvec_rad = ((2 * draws - 1) * self._largest_rad).to(images.device)
-        return self.turned(images, rotvec_rad), quat_product(quat_wxyz, quat_of(rotvec_rad))
+        return self.rotated(images, rotvec_rad), quat_product(quat_wxyz, quat_of(rotvec_rad))
 
-    def turned(self, images: Tensor, old_from_new_rad: Tensor) -> Tensor:
+    def rotated(self, images: Tensor, old_from_new_rad: Tensor) -> Tensor:
         """Images (B, 3, S, S) after rotations about the camera's axes, as rotation vectors (B, 3).
 
         A positive turn about y looks further right, one about x further up, one about z rolls the
@@ -81,7 +81,7 @@ class RandomRotation:
 def random_rotation(
     frames: Path, network: NetworkConfig, augmentation: AugmentationConfig, seed: int
 ) -> RandomRotation | None:
-    """For packed frames, by the record beside them; None where nothing is to be turned.
+    """For packed frames, by the record beside them; None where nothing is to be rotated.
 
     Raises:
         InputError: there is no record, or the lens of its camera bends lines.
@@ -92,7 +92,7 @@ def random_rotation(
     if camera is None or any(camera.distortion):
         reason = "says nothing of the camera" if camera is None else "names a lens with distortion"
         raise InputError(
-            f"{frames.with_suffix('.json')}: {reason}; images can only be turned through a known "
+            f"{frames.with_suffix('.json')}: {reason}; images can only be rotated through a known "
             "pinhole camera, so set training.augmentation to 0"
         )
     return RandomRotation(packed_intrinsics(camera, network), network.input_px, augmentation, seed)

@@ -1,4 +1,4 @@
-"""Which weights of a training are kept: those with the smallest errors on held-out frames."""
+"""Which weights of a training run are kept: those with the smallest errors on held-out frames."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from baselines.training.device import Precision, autocast
 
 log = logging.getLogger(__name__)
 
-# Evaluations of a training. Validation takes at most this share of its time, if predicting takes
+# Evaluations of a run. Validation takes at most this share of its time, if predicting takes
 # a third of the time of learning, and is looked at less often where that is not enough.
 EVALUATIONS = 20
 TIME_SHARE = 0.05
@@ -37,7 +37,7 @@ class HeldOutErrors(NamedTuple):
 
         ``test``: the loss, as the paper's authors do. ``validation``: the product of the two median
         errors. No unit and no weight enters, so losses whose weights are learned can be compared
-        over a training; it is smallest where the sum of logarithms is, which is what the loss with
+        over a run; it is smallest where the sum of logarithms is, which is what the loss with
         learned weights comes to at its best weights (Kendall and Cipolla, CVPR 2017, eq. 4).
         """
         return self.loss if selection == "test" else self.position_m * self.orientation_deg

@@ -13,8 +13,8 @@ Array = NDArray[np.float64]
 _CHECKED = 33  # points along each side on which a lens is checked, corners of the image included
 
 
-def slopes_of_pixels(camera: Camera, pixel: Array) -> Array:
-    """Slopes (..., 2), x / z and y / z, of the rays through ``pixel`` (..., 2): columns and rows.
+def normalised_of_pixels(camera: Camera, pixel: Array) -> Array:
+    """Normalised image coordinates (..., 2), x / z and y / z, of ``pixel`` (..., 2): column, row.
 
     NaN where the lens folds over before it reaches the pixel.
     """
@@ -22,10 +22,10 @@ def slopes_of_pixels(camera: Camera, pixel: Array) -> Array:
     return undistort((pixel - [cx, cy]) / [fx, fy], camera.distortion)
 
 
-def pixels_of_slopes(camera: Camera, slope: Array) -> Array:
-    """The inverse of :func:`slopes_of_pixels`."""
+def pixels_of_normalised(camera: Camera, normalised: Array) -> Array:
+    """The inverse of :func:`normalised_of_pixels`."""
     fx, fy, cx, cy = intrinsics_of(camera)
-    return distort(slope, camera.distortion) * [fx, fy] + [cx, cy]
+    return distort(normalised, camera.distortion) * [fx, fy] + [cx, cy]
 
 
 def refuse_fold(camera: Camera) -> None:
@@ -38,7 +38,7 @@ def refuse_fold(camera: Camera) -> None:
         np.linspace(0.0, camera.width, _CHECKED), np.linspace(0.0, camera.height, _CHECKED)
     )
     pixel = np.stack([column, row], axis=-1)
-    folded = pixel[np.isnan(slopes_of_pixels(camera, pixel)).any(axis=-1)]
+    folded = pixel[np.isnan(normalised_of_pixels(camera, pixel)).any(axis=-1)]
     if len(folded):
         _, _, cx, cy = intrinsics_of(camera)
         x, y = folded[np.argmin(np.hypot(*(folded - [cx, cy]).T))]

@@ -58,7 +58,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point: 0, 1 for what a person can mend, 2 for wrong usage, 130 after Ctrl-C."""
+    """Entry point: 0, 1 for what a person can fix, 2 for wrong usage, 130 after Ctrl-C."""
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
     every = tuple(option for command in COMMANDS for option in command.options)
     given = sys.argv[1:] if argv is None else argv

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 OPTIONS: Options = (
     (
         "model",
-        {"type": Path, "metavar": "MODEL", "help": "model.pt of a training in this place"},
+        {"type": Path, "metavar": "MODEL", "help": "model.pt of a training run in this place"},
     ),
     (
         "images",
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> None:
     out: Path = arguments.out
     done = localize(arguments.model, arguments.images, out, arguments.device)
     if done.n_failed:
-        message = "%d of %d poses are not finite: the training of %s has diverged"
+        message = "%d of %d poses are not finite: the training of %s diverged"
         log.warning(message, done.n_failed, done.n_images, arguments.model)
     print(f"{arguments.model}: {model_text(done.description)}")
     print(f"{out}: {poses_text(done)}")

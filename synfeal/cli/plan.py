@@ -31,12 +31,12 @@ OPTIONS: Options = (
             "nargs": "+",
             "default": [0],
             "metavar": "N",
-            "help": "GPUs, one training each (0: train on cores); as many as --cores, or one",
+            "help": "GPUs, one training run each (0: train on cores); as many as --cores, or one",
         },
     ),
     (
         "--gpu-tflops",
-        {"type": float, "default": 10.0, "help": "assumed of a training on a GPU, TFLOP/s (10)"},
+        {"type": float, "default": 10.0, "help": "assumed throughput of a GPU, TFLOP/s (10)"},
     ),
     (
         "--measured",

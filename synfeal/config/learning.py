@@ -68,7 +68,7 @@ class LocalizerConfig(Strict):
 
 
 class AugmentationConfig(Strict):
-    """New poses from old images: each is turned as if its camera had been, and its label with it.
+    """Rotation augmentation: each image as if its camera had been rotated, and its label with it.
 
     Angles are drawn anew whenever an image is shown. Exact for pinhole cameras; what the frame did
     not see is filled with its border.
@@ -104,7 +104,7 @@ class TrainingConfig(Strict):
     )
     patience: Count | None = Field(
         None,
-        description="`published`: evaluations (20 in a training) without a new best after which"
+        description="`published`: evaluations (20 in a training run) without a new best after which"
         " training stops; not with `corrected`, whose cycle makes most of its gain at the end,"
         " when the rate falls",
     )

@@ -54,4 +54,4 @@ def check_results(root: Path) -> None:
     except OSError as error:
         raise InputError(f"results: {root}: {error.strerror}; choose another directory") from None
     if not place.is_dir():
-        raise InputError(f"results: {place} is no directory; choose another one")
+        raise InputError(f"results: {place} is not a directory; choose another one")

@@ -83,7 +83,7 @@ def verify_manifest(dataset_dir: Path) -> None:
         entries = [(str(e["name"]), e["sha256"]) for e in read_json(path)["sequences"]]
         unknown = [name for name, _ in entries if not NAME.fullmatch(name)]
         if unknown:
-            raise ValueError(f"'{unknown[0]}' is no name of a sequence")
+            raise ValueError(f"'{unknown[0]}' is not the name of a sequence")
     except (OSError, ValueError, TypeError, LookupError) as error:
         raise InputError(f"{path}: cannot be read as a manifest ({why(error)})") from None
     bad = [name for name, found in entries if _sha256_or_none(dataset_dir / name) != found]

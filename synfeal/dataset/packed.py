@@ -1,4 +1,4 @@
-"""Frames at network resolution in one array: read by memory map, decoded once for all trainings."""
+"""Frames at network resolution in one array: read by memory map, decoded once for all runs."""
 
 from __future__ import annotations
 

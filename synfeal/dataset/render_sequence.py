@@ -25,7 +25,7 @@ from synfeal.render.base import Renderer
 from synfeal.render.choose import fastest_working
 
 Effects = tuple[CameraConfig, EffectsConfig]
-REMEDY = "nothing was kept; mend that and render again"
+REMEDY = "nothing was kept; fix that and render again"
 
 
 def render_sequence(

@@ -39,7 +39,9 @@ def growing(out: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
     refuse_existing(out)
     part = out.with_name(f"{out.name}.part")
     if part.is_dir() and not os.path.lexists(part / WORK / SETTINGS) and _holds_files(part):
-        raise InputError(f"{part}: is no unfinished data set; delete it or choose another --out")
+        raise InputError(
+            f"{part}: is not an unfinished data set; delete it or choose another --out"
+        )
     try:
         with writing_to(part, lambda: _kept(part)):
             (part / WORK).mkdir(parents=True, exist_ok=True)

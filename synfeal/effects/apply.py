@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.camera.rays import slopes_of_pixels
+from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig, EffectsConfig
 from synfeal.effects.camera import AutoExposure, channel_gains, compressed, with_noise
 from synfeal.effects.light import LightState, drawn_light
@@ -186,8 +186,10 @@ class _Path:
         column, row = np.meshgrid(
             np.arange(self.camera.width) + 0.5, np.arange(self.camera.height) + 0.5
         )
-        slopes = slopes_of_pixels(self.camera, np.stack([column, row], axis=-1))
-        return np.concatenate([slopes, np.ones_like(slopes[..., :1])], axis=-1, dtype=np.float32)
+        normalised = normalised_of_pixels(self.camera, np.stack([column, row], axis=-1))
+        return np.concatenate(
+            [normalised, np.ones_like(normalised[..., :1])], axis=-1, dtype=np.float32
+        )
 
     def _taken(self, light: Light, row: int, config: EffectsConfig) -> Rgb:
         """What the camera makes of light (H, W, 3) that reaches its sensor."""

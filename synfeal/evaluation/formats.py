@@ -231,5 +231,5 @@ def _numbers(path: Path, places: Sequence[str], cells: Sequence[Sequence[str]]) 
     for place, row in zip(places, cells, strict=True):
         bad = [cell for cell in row if not _is_number(cell)]
         if bad:
-            raise InputError(f"{path}: {place}: '{bad[0][:40]}' is no number")
+            raise InputError(f"{path}: {place}: '{bad[0][:40]}' is not a number")
     return np.array(cells, np.float64)

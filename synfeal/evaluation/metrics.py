@@ -82,7 +82,7 @@ def pose_errors(predicted: PoseTable, reference: PoseTable) -> dict[str, Array]:
 def is_pose(predicted: PoseTable) -> NDArray[np.bool_]:
     """Which predictions (N,) are finite and have a quaternion of unit length.
 
-    Another length is not mended: a quaternion of zeros, say, has no direction to be brought to.
+    Another length is not normalised: a quaternion of zeros, say, has no direction to be brought to.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(np.linalg.norm(predicted.quat_wxyz, axis=1) - 1.0)

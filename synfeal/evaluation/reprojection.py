@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.bootstrap import medians
-from synfeal.camera.rays import pixels_of_slopes, slopes_of_pixels
+from synfeal.camera.rays import normalised_of_pixels, pixels_of_normalised
 from synfeal.config.collection import CameraConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.pose_table import PoseTable
@@ -49,8 +49,8 @@ def cell_pixels(camera: CameraConfig) -> Array:
 
 def _directions(camera: CameraConfig) -> Array:
     """Camera coordinates (48, 3), z = 1, of the points that the cells' middles show."""
-    slopes = slopes_of_pixels(camera, cell_pixels(camera))
-    return np.concatenate([slopes, np.ones((len(slopes), 1))], axis=1)
+    normalised = normalised_of_pixels(camera, cell_pixels(camera))
+    return np.concatenate([normalised, np.ones((len(normalised), 1))], axis=1)
 
 
 def cell_depth_m(caster: RayCaster, camera: CameraConfig, world_from_cam: Array) -> Array:
@@ -112,8 +112,8 @@ def _moved(estimate_from_reference: Array, depth_m: Array, camera: CameraConfig)
     points = np.einsum("nij,nkj->nki", estimate_from_reference[:, :3, :3], points)
     points += estimate_from_reference[:, None, :3, 3]
     ahead = points[..., 2] > 0
-    slopes = points[..., :2] / np.where(ahead, points[..., 2], 1.0)[..., None]
-    offset = pixels_of_slopes(camera, slopes) - cell_pixels(camera)
+    normalised = points[..., :2] / np.where(ahead, points[..., 2], 1.0)[..., None]
+    offset = pixels_of_normalised(camera, normalised) - cell_pixels(camera)
     share = np.linalg.norm(offset, axis=-1) / np.hypot(camera.width, camera.height)
     share = np.where(ahead, np.fmin(share, 1.0), 1.0)  # fmin: a lens may fold over far outside
     with np.errstate(invalid="ignore"):

@@ -107,8 +107,8 @@ def _read_parts(
                 part = _part(_part_name(name), geometry, materials, findings)
                 check_indices(part, path)
                 parts.append(_placed(part, file_from_part, world_from_file))
-    mended = [repaired(part, findings) for part in parts]
-    return tuple(part for part in mended if len(part.faces) and _is_seen(part, findings))
+    kept = [repaired(part, findings) for part in parts]
+    return tuple(part for part in kept if len(part.faces) and _is_seen(part, findings))
 
 
 def _read_scene(path: Path, gltf: Gltf | None, findings: Findings) -> Any:

@@ -1,7 +1,7 @@
 """What is taken out of a mesh because it can neither be seen nor hit: each removal is a finding.
 
 Open edges, non-manifold edges, slivers and faces that overlap are kept: a renderer and a ray caster
-need none of them mended, and a scan without them is the exception.
+need none of them repaired, and a scan without them is the exception.
 """
 
 from __future__ import annotations

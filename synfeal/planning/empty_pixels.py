@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.camera.rays import slopes_of_pixels
+from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.mesh.rays import RayCaster
@@ -62,8 +62,10 @@ def empty_shares(caster: RayCaster, world_from_cam: Array, camera: CameraConfig)
         ),
         axis=-1,
     ).reshape(-1, 2)
-    slope = slopes_of_pixels(camera, pixel)
-    ray = np.column_stack([slope, np.ones(len(slope))])  # one metre along the optical axis
+    normalised = normalised_of_pixels(camera, pixel)
+    ray = np.column_stack(
+        [normalised, np.ones(len(normalised))]
+    )  # one metre along the optical axis
     shares = np.empty(len(world_from_cam))
     for index, pose in enumerate(world_from_cam):
         direction = ray @ pose[:3, :3].T

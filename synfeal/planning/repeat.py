@@ -99,7 +99,7 @@ def _rigid(path: FrameFile) -> NDArray[np.float64]:
     orthonormal = np.allclose(rotation @ rotation.T, np.eye(3), rtol=0.0, atol=TOLERANCE)
     last_row = np.allclose(pose[3], [0.0, 0.0, 0.0, 1.0], rtol=0.0, atol=TOLERANCE)
     if not (orthonormal and last_row and np.linalg.det(rotation) > 0.0):
-        raise InputError(f"{path}: is no rigid pose; its upper left 3x3 must be a rotation")
+        raise InputError(f"{path}: is not a rigid pose; its upper left 3x3 must be a rotation")
     return pose
 
 

@@ -9,7 +9,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from synfeal.camera.distortion import fold_radius
-from synfeal.camera.rays import pixels_of_slopes
+from synfeal.camera.rays import pixels_of_normalised
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.mesh.rays import RayCaster
@@ -21,7 +21,7 @@ N_POINTS = 20_000  # a share of one half is then known to 0.4 % (standard error)
 MAX_FRAMES = 1_000
 OFTEN = 3  # frames
 FARTHEST_M = 5.0
-LIFT_M = 0.01  # rays stop this far before the surface they are to reach
+LIFT_M = 0.01  # rays stop this far in front of the surface they are to reach
 
 
 class SeenSurface(NamedTuple):
@@ -92,9 +92,9 @@ def in_image(camera: CameraConfig, world_from_cam: Array, points_m: Array) -> ND
     at = offset @ world_from_cam[:3, :3]
     reached = np.einsum("ni,ni->n", at, at) <= FARTHEST_M**2
     inside: NDArray[np.bool_] = reached & (at[:, 2] > camera.near_m)
-    slope = at[inside, :2] / at[inside, 2:]
-    pixel = pixels_of_slopes(camera, slope)
+    normalised = at[inside, :2] / at[inside, 2:]
+    pixel = pixels_of_normalised(camera, normalised)
     within = ((pixel >= 0.0) & (pixel <= [camera.width, camera.height])).all(axis=1)
     # Beyond its fold a lens model maps what is far outside back into the image.
-    inside[inside] = within & (np.linalg.norm(slope, axis=1) < fold_radius(camera.distortion))
+    inside[inside] = within & (np.linalg.norm(normalised, axis=1) < fold_radius(camera.distortion))
     return inside

@@ -107,7 +107,7 @@ _FACING = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
 def _red_square() -> TexturedMesh:
-    """A square 1 m before a camera at the origin that looks along x; it fills the image."""
+    """A square 1 m in front of a camera at the origin that looks along x; it fills the image."""
     corners = np.array([[1.0, 9, -9], [1, -9, -9], [1, -9, 9], [1, 9, 9]])
     faces = np.array([[0, 1, 2], [0, 2, 3]])
     red = np.array([255, 0, 0, 255], np.uint8)

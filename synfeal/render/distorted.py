@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.camera.rays import slopes_of_pixels
+from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.render.base import Depth, Renderer, Rgb
@@ -69,7 +69,7 @@ def covering_camera(camera: CameraConfig) -> CameraConfig:
     Raises:
         InputError: the view is so wide that the pinhole image would exceed 8192 pixels.
     """
-    edge = _edge_slopes(camera)
+    edge = _edge_normalised(camera)
     fx, fy, _, _ = intrinsics_of(camera)
     extent = np.ptp(edge, axis=0) * [fx, fy]
     scale = min(_OVERSAMPLING, (_LONGEST_SIDE_PX - 2 * _MARGIN_PX - 2) / extent.max())
@@ -122,12 +122,12 @@ def _bent(inverse: NDArray[np.floating]) -> NDArray[np.bool_]:
     return bent
 
 
-def _edge_slopes(camera: CameraConfig) -> Array:
-    """Slopes (n, 2) along the edge of the image."""
+def _edge_normalised(camera: CameraConfig) -> Array:
+    """Normalised coordinates (n, 2) along the edge of the image."""
     x, y = np.arange(camera.width + 1.0), np.arange(camera.height + 1.0)
     sides = [np.column_stack([x, 0.0 * x + edge]) for edge in (0.0, camera.height)]
     sides += [np.column_stack([0.0 * y + edge, y]) for edge in (0.0, camera.width)]
-    return slopes_of_pixels(camera, np.concatenate(sides))
+    return normalised_of_pixels(camera, np.concatenate(sides))
 
 
 def _seen_at(
@@ -139,9 +139,9 @@ def _seen_at(
 ) -> Array:
     """Where rows ``start`` to ``stop`` of the image lie in the pinhole image: (rows, W, 2)."""
     column, row = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(start, stop) + 0.5)
-    slope = slopes_of_pixels(camera, np.stack([column, row], axis=-1) + offset)
+    normalised = normalised_of_pixels(camera, np.stack([column, row], axis=-1) + offset)
     fx, fy, cx, cy = intrinsics_of(pinhole)
-    return slope * [fx, fy] + [cx, cy]
+    return normalised * [fx, fy] + [cx, cy]
 
 
 def _taps(pixel: Array, width: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

@@ -11,7 +11,7 @@ from synfeal.report.layouts import TITLES
 from synfeal.report.results import read_table
 from synfeal.report.tables import Value
 
-# The table whose trainings are shown, and the part of their names that all of them share.
+# The table whose training runs are shown, and the part of their names that all of them share.
 TABLE = "table4_size"
 KIND = "synfeal/pretrained"
 
@@ -25,7 +25,7 @@ def training_rows(root: Path, scene: str) -> list[dict[str, Value]]:
     design has no Table 4, and none for a localizer of which all seeds failed.
 
     Raises:
-        InputError: the table, the history of a training or its measurement cannot be read.
+        InputError: the table, the history of a training run or its measurement cannot be read.
     """
     path = root / "tables" / f"{TABLE}.csv"
     if not path.exists():

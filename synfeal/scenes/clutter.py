@@ -102,7 +102,7 @@ def pinned_page(rng: Generator) -> Item:
 
 
 def coat(rng: Generator, colour: Colour) -> Item:
-    """A coat on a hook: a folded, drooping sheet before a wall at y = 0, hook at z = 0."""
+    """A coat on a hook: a folded, drooping sheet in front of a wall at y = 0, hook at z = 0."""
     down, across = np.meshgrid(np.linspace(0, 1, 19), np.linspace(-1, 1, 15), indexing="ij")
     half = 0.07 + 0.2 * np.sqrt(down) + 0.05 * down
     folds = np.sin(across * rng.uniform(7, 10) + rng.uniform(0, 6) + 1.5 * down)

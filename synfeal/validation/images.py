@@ -26,7 +26,7 @@ def read_color(path: FrameFile) -> NDArray[np.uint8]:
     """
     image = _decoded(path)
     if image.mode not in _COLOR_MODES:
-        raise InputError(f"{path}: is no 8-bit colour image but of mode {image.mode}")
+        raise InputError(f"{path}: is not an 8-bit colour image but of mode {image.mode}")
     return np.asarray(image.convert("RGB"))
 
 
@@ -39,7 +39,7 @@ def read_depth_mm(path: FrameFile) -> NDArray[np.uint16]:
     image = _decoded(path)
     depth = np.asarray(image)
     if not image.mode.startswith("I") or depth.min() < 0 or depth.max() > 65535:
-        raise InputError(f"{path}: is no 16-bit grey image but of mode {image.mode}")
+        raise InputError(f"{path}: is not a 16-bit grey image but of mode {image.mode}")
     return depth.astype(np.uint16)
 
 

@@ -57,10 +57,10 @@ def list_sequences(dataset: Path) -> list[SequenceListing]:
     """The sequences of a data set, in order of their numbers.
 
     Raises:
-        InputError: ``dataset`` is no directory, holds no ``seq-XX``, or an archive is damaged.
+        InputError: ``dataset`` is not a directory, holds no ``seq-XX``, or an archive is damaged.
     """
     if not dataset.is_dir():
-        raise InputError(f"{dataset}: is no directory; give the directory that holds seq-01")
+        raise InputError(f"{dataset}: is not a directory; give the directory that holds seq-01")
     names = {path.name.removesuffix(SUFFIX) for path in dataset.glob("seq-*")}
     paths = [sequence_at(dataset / name) for name in names if name[4:].isdecimal()]
     found = [path for path in paths if path.is_dir() or is_archive(path)]

@@ -2,7 +2,7 @@
 
 ``python -m tests.slurm_run --work DIR`` starts a cluster of one node on this machine
 (``setup/slurm_cluster.sh``), runs the workflow with ``workflow/profiles/slurm`` through it, kills
-the node once trainings are under way, lets it come back, and sets the files beside those of
+the node once training runs are under way, lets it come back, and sets the files beside those of
 ``snakemake --cores 2``; it ends with exit status 1 where they differ. What either run has made is
 kept: the same command goes on there.
 """

@@ -116,7 +116,7 @@ def run_on_cluster(work: Path) -> tuple[float, Crash]:
     """Seconds of the run through SLURM, and the crash in it.
 
     Raises:
-        InputError: the run failed, or no training was left during which to kill the node.
+        InputError: the run failed, or no training run was left during which to kill the node.
     """
     begin, crash = time.monotonic(), None
     process = snakemake(work, "slurm", (*SLURM, "--slurm-logdir", str(work / "slurm_logs")))

@@ -331,7 +331,7 @@ def files_of_references():
 
 
 def label_figures():
-    """The figures of a design that draws nothing of trainings."""
+    """The figures of a design that draws nothing of training runs."""
     return [] if set(TABLE_NAMES) & set(DRAWN_TABLES) else [f"{ROOT}/figures"]
 
 

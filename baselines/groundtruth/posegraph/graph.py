@@ -133,7 +133,7 @@ def read_g2o(path: Path) -> PoseGraph:
     for number, line in enumerate(text.splitlines(), start=1):
         kind, *cells = line.split() or [""]
         if kind not in _CELLS:
-            raise InputError(f"{path}: line {number} is no {_VERTEX} or {_EDGE} record")
+            raise InputError(f"{path}: line {number} is not a {_VERTEX} or {_EDGE} record")
         values = _numbers(cells, _CELLS[kind], f"{path}: line {number}")
         n_ids = 1 if kind == _VERTEX else 2
         whole_numbers(values[None, :n_ids], path)

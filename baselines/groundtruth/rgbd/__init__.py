@@ -3,7 +3,7 @@
 RTAB-Map is replaced by the same steps. Each frame is registered to the one before by Open3D's dense
 odometry, which starts from the motion of the pair before. Where that does not make most of the
 depth agree, because the camera turned or changed its direction, features give a second starting
-point. Before a single surface, along which depth slides, features alone give the motion.
+point. In front of a single surface, along which depth slides, features alone give the motion.
 Keyframes that view the same place are joined by loop closures.
 
 A motion is accepted when the depth images agree under it and when the odometry stays near its

@@ -81,7 +81,7 @@ def constraint(depth_m: Depth, camera: CameraConfig) -> float:
     Distances to the tangent planes change under a small motion by ``normal . (v + w x point)``. The
     result is the smallest eigenvalue of the mean of the outer products of those rows, points
     measured in their RMS length. Their trace is 2 at the most, so the result is 1/3 at the most; it
-    is 0 before a plane, a cylinder or a sphere (Gelfand et al., 3DIM 2003).
+    is 0 in front of a plane, a cylinder or a sphere (Gelfand et al., 3DIM 2003).
     """
     height, width = (side // _BLOCK for side in depth_m.shape)
     blocks = depth_m[: height * _BLOCK, : width * _BLOCK].reshape(height, _BLOCK, width, _BLOCK)

@@ -66,7 +66,7 @@ def read_depth(
     """Depth (H, W) in metres as the sensor of the configuration measures it, inf where nothing."""
     depth_mm = read_image(path, camera)
     if depth_mm.ndim != 2 or depth_mm.dtype not in (np.uint16, np.int32):
-        raise InputError(f"{path}: is no 16-bit depth image; collect the data set again")
+        raise InputError(f"{path}: is not a 16-bit depth image; collect the data set again")
     invalid = (depth_mm == _INVALID_MM[0]) | (depth_mm == _INVALID_MM[1])
     depth_m = np.where(invalid, np.float32(np.inf), depth_mm.astype(np.float32) / np.float32(1000))
     if cfg.sensor == "kinect":

@@ -76,7 +76,7 @@ def _with_features(i: View, j: View, previous: Array, best: Motion | None) -> tu
 
 
 def _by_features(i: View, j: View, previous: Array) -> tuple[Array, bool]:
-    """Before a surface that depth slides along, features alone give the motion.
+    """In front of a surface that depth slides along, features alone give the motion.
 
     Open3D compares colours at whole pixels and would move it away again.
     """

@@ -9,7 +9,7 @@ from synfeal.config.models import SfmConfig
 # Rendered images have exact intrinsics and no blur: half of COLMAP's thresholds for photographs.
 _MAX_ERROR_PX = 2.0
 
-# Bundle adjustment of neighbours follows every image, and the global one mends what it leaves.
+# Bundle adjustment of neighbours follows every image, and the global one corrects what it leaves.
 # COLMAP's tolerances of zero spend half of the time on digits that the next image changes: a
 # model that came out bent was bent with them too, and adjusting finished models to convergence left
 # their errors as they were.

@@ -33,7 +33,7 @@ class Machine:
     Attributes:
         cores: jobs at a time.
         gpus: training runs at a time; 0 trains on the processor.
-        gpu_tflops: sustained by a training run on a GPU, in 10^12 operations per second: an
+        gpu_tflops: sustained by a run on a GPU, in 10^12 operations per second: an
             assumption.
         gpu_rates: seconds of a training run on a GPU per layer and step, and per TFLOP, if timed.
     """

@@ -1,6 +1,6 @@
 """What a training step takes on this machine, timed: a small measured run tells next to nothing.
 
-In ``smoke`` a training is all start: its steps are a fiftieth of it, and what they take is lost in
+In ``smoke`` a run is all start: its steps are a fiftieth of it, and what they take is lost in
 what a start takes now and then. Some steps of every network tell it in a minute.
 """
 
@@ -30,7 +30,7 @@ class StepRates:
     """How fast networks are trained.
 
     Attributes:
-        rates: seconds of a training per layer and step, and per TFLOP.
+        rates: seconds of a training run per layer and step, and per TFLOP.
         on_gpu: seconds from start to end on a GPU, else of processor time.
     """
 

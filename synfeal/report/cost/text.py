@@ -102,7 +102,7 @@ def _notes(plan: Plan) -> Iterator[str]:
     )
     yield (
         "wall time   stage after stage, one job for each core"
-        + (", one training for each GPU" if machine.gpus else "")
+        + (", one training run for each GPU" if machine.gpus else "")
         + ", longest first, no waiting for disks"
     )
     yield "memory      of one job; several run at a time"
