@@ -15,6 +15,7 @@ from synfeal.planning import candidates
 from synfeal.planning.path import path_poses
 from synfeal.planning.plan import plan_split
 from synfeal.planning.sampling import pose_bounds, sample_poses, view_directions
+from synfeal.planning.space import PoseSpace
 from synfeal.planning.start import sample_start
 from synfeal.planning.target import admissible
 
@@ -36,7 +37,7 @@ def furnished() -> RayCaster:
 def round_by_round(caster: RayCaster, k: int, n_frames: int, rng: np.random.Generator) -> Array:
     """Positions (n_frames, 3) planned as the paper describes it, without any look-ahead."""
     bounds = pose_bounds(ROOM, Angles())
-    start = sample_start(caster, bounds, VIEW_M, 100, rng)
+    start = sample_start(PoseSpace(caster, bounds, VIEW_M, rng), 100)
     found: list[Array] = []
     while len(found) < n_frames:
         poses = sample_poses(bounds, k, rng)
@@ -67,9 +68,8 @@ def test_plan_is_that_of_one_round_at_a_time(
 def test_no_more_rounds_are_tried_than_allowed(tries: int) -> None:
     room = trimesh.creation.box(bounds=ROOM)
     bounds = pose_bounds(ROOM, Angles())
-    stream = candidates.CandidateStream(
-        RayCaster(room.vertices, room.faces), bounds, 2, VIEW_M, np.random.default_rng(0)
-    )
+    caster, rng = RayCaster(room.vertices, room.faces), np.random.default_rng(0)
+    stream = candidates.CandidateStream(PoseSpace(caster, bounds, VIEW_M, rng), 2)
     start = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     assert stream.next_target(start, 50.0, tries) is None
     found = stream.next_target(start, 0.0, 1)

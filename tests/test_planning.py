@@ -17,6 +17,7 @@ from synfeal.mesh.rays import RayCaster
 from synfeal.planning.path import n_frames_of, path_poses, path_vectors, poses_of
 from synfeal.planning.plan import plan_split, sampling_box_of
 from synfeal.planning.sampling import pose_bounds, sample_poses, view_directions
+from synfeal.planning.space import PoseSpace
 from synfeal.planning.start import sample_start
 from synfeal.planning.target import admissible, farthest_admissible, has_free_view
 
@@ -200,7 +201,7 @@ def test_start_is_in_the_room_and_not_in_the_cupboard() -> None:
     caster = caster_of(room(), cupboard)
     bounds = pose_bounds(ROOM, Angles())
     for seed in range(10):
-        start = sample_start(caster, bounds, 0.5, 100, np.random.default_rng(seed))
+        start = sample_start(PoseSpace(caster, bounds, 0.5, np.random.default_rng(seed)), 100)
         assert start[0] < 1.0
 
 

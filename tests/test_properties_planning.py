@@ -21,6 +21,7 @@ from synfeal.planning.plan import (
     sampling_boxes_of,
 )
 from synfeal.planning.questions import Questions, draw_questions
+from synfeal.planning.space import PoseSpace
 from synfeal.planning.start import largest_group, sample_start, seeing_groups
 from synfeal.planning.target import admissible, farthest_admissible, has_free_view
 from tests.empty_room import (
@@ -95,7 +96,7 @@ def test_target_is_what_trying_one_after_the_other_finds(seed, n_rounds, k, min_
 @few
 @given(seeds, st.integers(1, 9), st.floats(0.0, 2.0), st.floats(0.0, 2.0))
 def test_targets_of_the_stream_are_far_enough_and_have_a_view(seed, k, view_m, min_path_m):
-    stream = CandidateStream(EMPTY, BOUNDS, k, view_m, np.random.default_rng(seed))
+    stream = CandidateStream(PoseSpace(EMPTY, BOUNDS, view_m, np.random.default_rng(seed)), k)
     start = np.array([0.0, 0, 1.2, 0, 0, 0])
     for _ in range(3):
         target = stream.next_target(start, min_path_m, 500)
@@ -112,13 +113,17 @@ def test_targets_of_the_stream_are_far_enough_and_have_a_view(seed, k, view_m, m
 @given(seeds, walls, st.floats(0.0, 1.0))
 def test_of_a_divided_room_the_larger_part_is_the_space(seed, wall, view_m):
     caster = divided(wall)
-    group = largest_group(caster, BOUNDS, view_m, 100, 200, np.random.default_rng(seed))
+
+    def sampled() -> PoseSpace:
+        return PoseSpace(caster, BOUNDS, view_m, np.random.default_rng(seed))
+
+    group = largest_group(sampled(), 100, 200)
     assert (group[:, 0] < wall).all()
     assert has_free_view(caster, group, view_m).all()
-    start = sample_start(caster, BOUNDS, view_m, 100, np.random.default_rng(seed))
+    start = sample_start(sampled(), 100)
     assert ((start >= BOUNDS[0]) & (start <= BOUNDS[1])).all()
     assert has_free_view(caster, start[None], view_m).all()
-    space = connected_space(caster, BOUNDS, view_m, 100, np.random.default_rng(seed))
+    space = connected_space(sampled(), 100)
     points = inside_poses(seed, 50)[:, :3]
     points = points[np.abs(points[:, 0] - wall) > 0.2]
     groups = seeing_groups(caster, points)
@@ -148,8 +153,8 @@ def test_independent_poses_fill_the_larger_part_and_fewer_are_a_prefix(seed, wal
     caster = divided(wall)
 
     def drawn(n):
-        rng = np.random.default_rng(seed)
-        return independent_poses(caster, BOUNDS, 0.5, CollectionConfig(mode="random"), n, rng)
+        space = PoseSpace(caster, BOUNDS, 0.5, np.random.default_rng(seed))
+        return independent_poses(space, CollectionConfig(mode="random"), n)
 
     found = drawn(count)
     assert found.shape == (count, 6)

@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.mesh.rays import RayCaster
-from synfeal.planning.sampling import PoseVectors, sample_poses
-from synfeal.planning.target import farthest_admissible, has_free_view
+from synfeal.planning.sampling import PoseVectors
+from synfeal.planning.space import PoseSpace
+from synfeal.planning.target import farthest_admissible
 
 BLOCK = 4096  # candidates drawn at once; more gain nothing
 FIRST_WINDOW = 8  # candidates tested at once for a path; doubled while none is admissible
@@ -23,17 +23,9 @@ FIRST_WINDOW = 8  # candidates tested at once for a path; doubled while none is 
 class CandidateStream:
     """Rounds of candidates in the order they are drawn."""
 
-    def __init__(
-        self,
-        caster: RayCaster,
-        bounds: NDArray[np.float64],
-        candidates: int,
-        min_view_distance_m: float,
-        rng: np.random.Generator,
-    ) -> None:
-        """Draw rounds of ``candidates`` poses within ``bounds`` (2, 6)."""
-        self._caster, self._bounds, self._rng = caster, bounds, rng
-        self._candidates, self._view_m = candidates, min_view_distance_m
+    def __init__(self, space: PoseSpace, candidates: int) -> None:
+        """Draw rounds of ``candidates`` poses."""
+        self._space, self._candidates = space, candidates
         self._poses = np.empty((0, candidates, 6))
         self._has_view = np.empty((0, candidates), np.bool_)
         self._at = 0
@@ -49,7 +41,7 @@ class CandidateStream:
         tried, window = 0, max(1, FIRST_WINDOW // self._candidates)
         while tried < max_rounds:
             poses, has_view = self._ahead(min(window, max_rounds - tried))
-            found = farthest_admissible(self._caster, start, poses, has_view, min_path_m)
+            found = farthest_admissible(self._space.caster, start, poses, has_view, min_path_m)
             if found is not None:
                 self._at += found[0] + 1
                 target: NDArray[np.float64] = poses[found]
@@ -69,8 +61,8 @@ class CandidateStream:
     def _draw(self) -> None:
         """Replace the block, which is used up, by the next."""
         rounds = max(1, BLOCK // self._candidates)
-        poses = sample_poses(self._bounds, rounds * self._candidates, self._rng)
-        has_view = has_free_view(self._caster, poses, self._view_m)
+        poses = self._space.sample(rounds * self._candidates)
+        has_view = self._space.has_free_view(poses)
         self._poses = poses.reshape(rounds, self._candidates, 6)
         self._has_view = has_view.reshape(rounds, self._candidates)
         self._at = 0

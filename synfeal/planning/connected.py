@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.mesh.rays import RayCaster
+from synfeal.planning.space import PoseSpace
 from synfeal.planning.start import largest_group
 
 N_POSES = 256  # enough that a free place that sees none of their largest group is a rare nook
@@ -37,17 +38,10 @@ class ConnectedSpace:
         return found
 
 
-def connected_space(
-    caster: RayCaster,
-    bounds: NDArray[np.float64],
-    min_view_distance_m: float,
-    max_tries: int,
-    rng: np.random.Generator,
-) -> ConnectedSpace:
+def connected_space(space: PoseSpace, max_tries: int) -> ConnectedSpace:
     """The space in which :func:`synfeal.planning.start.sample_start` starts a path.
 
     Raises:
         InputError: no pose with a free view was found; says what to relax.
     """
-    group = largest_group(caster, bounds, min_view_distance_m, max_tries, N_POSES, rng)
-    return ConnectedSpace(caster, group[:, :3])
+    return ConnectedSpace(space.caster, largest_group(space, max_tries, N_POSES)[:, :3])

@@ -21,6 +21,7 @@ from synfeal.planning.plan import sampling_boxes_of
 from synfeal.planning.sampling import pose_bounds
 from synfeal.planning.seen_surface import FARTHEST_M, OFTEN, seen_surface, shown_frames
 from synfeal.planning.seen_surface import N_POINTS as N_SURFACE_POINTS
+from synfeal.planning.space import PoseSpace
 
 Array = NDArray[np.float64]
 
@@ -96,7 +97,7 @@ def plan_coverage(
 def _hubs(caster: RayCaster, box_m: Array, scene: SceneConfig) -> Array:
     """Places (H, 3) of the largest free space in a box."""
     bounds, rng = pose_bounds(box_m, scene.angles), np.random.default_rng(0)
-    return connected_space(caster, bounds, 0.0, MAX_TRIES, rng).hubs_m
+    return connected_space(PoseSpace(caster, bounds, 0.0, rng), MAX_TRIES).hubs_m
 
 
 def scene_coverage(

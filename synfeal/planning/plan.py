@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from synfeal.planning.candidates import CandidateStream
 from synfeal.planning.independent import independent_poses
 from synfeal.planning.path import path_poses, poses_of
 from synfeal.planning.repeat import repeated_poses
-from synfeal.planning.sampling import pose_bounds
+from synfeal.planning.space import PoseSpace
 from synfeal.planning.start import sample_start
 
 Array = NDArray[np.float64]
@@ -111,60 +112,42 @@ def plan_split(
     if collection.repeat is not None:
         return repeated_poses(collection.repeat, split, n_frames, caster.bounds_m)
     boxes = np.reshape(boxes, (-1, 2, 3))
+    # One generator for each box, so that none shifts another's numbers.
+    generators = [rng] if len(boxes) == 1 else rng.spawn(len(boxes))
+    spaces = [
+        PoseSpace.of_scene(caster, box, scene, own)
+        for box, own in zip(boxes, generators, strict=True)
+    ]
     if collection.mode == "random":
-        vectors = _independent(caster, boxes, scene, collection, n_frames, rng)
+        vectors = _independent(spaces, _Turns(boxes), collection, n_frames)
         return _table(list(poses_of(vectors)[:, None]), n_frames)
-    return _table(_paths(caster, boxes, scene, collection, n_frames, rng), n_frames)
+    return _table(_paths(spaces, _Turns(boxes), collection, n_frames), n_frames)
 
 
 def _independent(
-    caster: RayCaster,
-    boxes: Array,
-    scene: SceneConfig,
-    collection: CollectionConfig,
-    n_frames: int,
-    rng: np.random.Generator,
+    spaces: Sequence[PoseSpace], turns: _Turns, collection: CollectionConfig, n_frames: int
 ) -> Array:
-    """Pose vectors (n_frames, 6); the boxes (B, 2, 3) take turns."""
-    turns = _Turns(boxes)
+    """Pose vectors (n_frames, 6); the spaces take turns."""
     owner = np.array([turns.next(1) for _ in range(n_frames)])
     vectors = np.empty((n_frames, 6))
-    for index, (box, own) in enumerate(zip(boxes, _generators(rng, len(boxes)), strict=True)):
+    for index, space in enumerate(spaces):
         count = int((owner == index).sum())
-        if not count:
-            continue
-        bounds = pose_bounds(box, scene.angles)
-        view_m = scene.min_view_distance_m
-        vectors[owner == index] = independent_poses(caster, bounds, view_m, collection, count, own)
+        if count:
+            vectors[owner == index] = independent_poses(space, collection, count)
     return vectors
 
 
 def _paths(
-    caster: RayCaster,
-    boxes: Array,
-    scene: SceneConfig,
-    collection: CollectionConfig,
-    n_frames: int,
-    rng: np.random.Generator,
+    spaces: Sequence[PoseSpace], turns: _Turns, collection: CollectionConfig, n_frames: int
 ) -> list[Array]:
-    """Poses (n, 4, 4) of paths that have at least ``n_frames`` between them, box after box."""
-    generators = _generators(rng, len(boxes))
-    walks = [
-        _Walk(caster, pose_bounds(box, scene.angles), scene, collection, own)
-        for box, own in zip(boxes, generators, strict=True)
-    ]
-    turns = _Turns(boxes)
+    """Poses (n, 4, 4) of paths that have at least ``n_frames`` between them, space after space."""
+    walks = [_Walk(space, collection) for space in spaces]
     paths: list[Array] = []
     while turns.total < n_frames:
         index = turns.next(0)
         paths.append(walks[index].next_path())
         turns.made[index] += len(paths[-1])
     return paths
-
-
-def _generators(rng: np.random.Generator, count: int) -> list[np.random.Generator]:
-    """One for each box, so that none shifts another's numbers."""
-    return [rng] if count == 1 else rng.spawn(count)
 
 
 class _Turns:
@@ -190,19 +173,10 @@ class _Turns:
 class _Walk:
     """Connected paths through one box: where one ends the next begins."""
 
-    def __init__(
-        self,
-        caster: RayCaster,
-        bounds: Array,
-        scene: SceneConfig,
-        collection: CollectionConfig,
-        rng: np.random.Generator,
-    ) -> None:
-        self._scene, self._collection = scene, collection
-        view_m = scene.min_view_distance_m
-        # Itself no frame.
-        self._at = sample_start(caster, bounds, view_m, collection.max_tries, rng)
-        self._stream = CandidateStream(caster, bounds, collection.candidates, view_m, rng)
+    def __init__(self, space: PoseSpace, collection: CollectionConfig) -> None:
+        self._space, self._collection = space, collection
+        self._at = sample_start(space, collection.max_tries)  # itself no frame
+        self._stream = CandidateStream(space, collection.candidates)
 
     def next_path(self) -> Array:
         """Poses (n, 4, 4) of the next path.
@@ -213,19 +187,19 @@ class _Walk:
         asked = self._collection
         target = self._stream.next_target(self._at, asked.min_path_m, asked.max_tries)
         if target is None:
-            raise InputError(_no_target(self._at, self._scene, asked))
+            raise InputError(_no_target(self._at, self._space, asked))
         path = path_poses(self._at, target, asked.frame_spacing_m, asked.interpolation)
         self._at = target
         return path
 
 
-def _no_target(start: Array, scene: SceneConfig, collection: CollectionConfig) -> str:
+def _no_target(start: Array, space: PoseSpace, collection: CollectionConfig) -> str:
     """What to relax when no path leads on from ``start`` (6,)."""
     where = ", ".join(f"{value:.2f}" for value in start[:3])
     return (
         f"plan: no admissible target from ({where}) in {collection.max_tries} rounds of"
         f" {collection.candidates} candidates; lower min_path_m ({collection.min_path_m} m) or"
-        f" min_view_distance_m ({scene.min_view_distance_m} m), or widen sampling_box"
+        f" min_view_distance_m ({space.min_view_distance_m} m), or widen sampling_box"
     )
 
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from synfeal.config.models import SceneConfig
 from synfeal.mesh.rays import RayCaster
-from synfeal.planning.sampling import PoseVectors, pose_bounds, sample_poses
+from synfeal.planning.sampling import PoseVectors
+from synfeal.planning.space import PoseSpace
 from synfeal.planning.start import sample_start
 from synfeal.planning.target import admissible
 
@@ -59,11 +60,10 @@ def draw_questions(
     Raises:
         InputError: the scene has no pose with a free view.
     """
-    bounds = pose_bounds(box_m, scene.angles)
-    view_m = scene.min_view_distance_m
-    starts = np.tile(sample_start(caster, bounds, view_m, MAX_TRIES, rng), (count, 1))
+    space = PoseSpace.of_scene(caster, box_m, scene, rng)
+    starts = np.tile(sample_start(space, MAX_TRIES), (count, 1))
     for _ in range(N_MOVES):
-        candidates = sample_poses(bounds, count, rng)
-        moves = admissible(caster, starts, candidates, view_m)
+        candidates = space.sample(count)
+        moves = space.admissible(starts, candidates)
         starts[moves] = candidates[moves]
-    return Questions(starts, sample_poses(bounds, count, rng), view_m)
+    return Questions(starts, space.sample(count), scene.min_view_distance_m)

@@ -9,20 +9,14 @@ from scipy.sparse.csgraph import connected_components
 
 from synfeal.errors import InputError
 from synfeal.mesh.rays import RayCaster
-from synfeal.planning.sampling import PoseVectors, sample_poses
-from synfeal.planning.target import has_free_view
+from synfeal.planning.sampling import PoseVectors
+from synfeal.planning.space import PoseSpace
 
 N_POSES = 64
 
 
-def sample_start(
-    caster: RayCaster,
-    bounds: NDArray[np.float64],
-    min_view_distance_m: float,
-    max_tries: int,
-    rng: np.random.Generator,
-) -> NDArray[np.float64]:
-    """A pose vector (6,) with a free view in the largest free space within ``bounds`` (2, 6).
+def sample_start(space: PoseSpace, max_tries: int) -> NDArray[np.float64]:
+    """A pose vector (6,) with a free view in the largest free part of a space.
 
     The paper does not say where the camera starts. Inside a cupboard it would stay there, since
     every path must be free of collisions. Normals cannot tell inside from outside in a scan, but
@@ -31,19 +25,11 @@ def sample_start(
     Raises:
         InputError: ``max_tries`` rounds gave no pose with a free view; says what to relax.
     """
-    group = largest_group(caster, bounds, min_view_distance_m, max_tries, N_POSES, rng)
-    start: NDArray[np.float64] = group[0]
+    start: NDArray[np.float64] = largest_group(space, max_tries, N_POSES)[0]
     return start
 
 
-def largest_group(
-    caster: RayCaster,
-    bounds: NDArray[np.float64],
-    min_view_distance_m: float,
-    max_tries: int,
-    n_poses: int,
-    rng: np.random.Generator,
-) -> PoseVectors:
+def largest_group(space: PoseSpace, max_tries: int, n_poses: int) -> PoseVectors:
     """The largest group (M, 6) among ``n_poses`` sampled poses with a free view.
 
     Those that see each other are joined. Samples are uniform in volume, so the group is in the
@@ -54,16 +40,16 @@ def largest_group(
     """
     found = np.empty((0, 6))
     for _ in range(max_tries):
-        poses = sample_poses(bounds, n_poses, rng)
-        found = np.vstack([found, poses[has_free_view(caster, poses, min_view_distance_m)]])
+        poses = space.sample(n_poses)
+        found = np.vstack([found, poses[space.has_free_view(poses)]])
         if len(found) >= n_poses:
             break
     if not len(found):
         raise InputError(
             f"plan: no pose in the sampling box looks farther than min_view_distance_m"
-            f" ({min_view_distance_m} m); lower it, or check sampling_box, unit_m and up_axis"
+            f" ({space.min_view_distance_m} m); lower it, or check sampling_box, unit_m and up_axis"
         )
-    group = seeing_groups(caster, found[:, :3])
+    group = seeing_groups(space.caster, found[:, :3])
     largest: PoseVectors = found[group == np.bincount(group).argmax()]
     return largest
 
