@@ -9,9 +9,10 @@ from synfeal.evaluation.metrics import cumulative
 from synfeal.report.figures import Results, speed_vs_error
 from synfeal.report.figures.cumulative_error import SceneErrors
 from synfeal.report.figures.cumulative_error import figure_of as cumulative_figure
-from synfeal.report.figures.error_by_design import by_noise, by_size
+from synfeal.report.figures.error_by_design import LEVEL, by_noise, by_size
 from synfeal.report.figures.localizer_lines import ASIDE, published_values
 from synfeal.report.figures.pareto import pareto_front
+from synfeal.report.figures.reference_lines import SHOWN
 from synfeal.report.figures.style import METHOD_STYLES, MODEL_STYLES, PUBLISHED, SPLIT_STYLES
 from synfeal.report.layouts import TITLES
 from tests.report_results import ROWS, complete_results, design_of
@@ -42,6 +43,32 @@ def published(axes):
     return [line.get_ydata() for line in lines]
 
 
+def reference_rows(keys):
+    """Rows of ``references.csv``: the k-th method is off by k hundredths and n thousandths at the
+    n-th data set, but the mean pose, which is off by 100 at all of them; in degrees ten times so.
+    """
+    rows = []
+    for n, key in enumerate(keys):
+        for k, method in enumerate(SHOWN):
+            error = 100.0 if method == "constant" else 0.01 * k + 0.001 * n
+            scores = {"position_m": error, "orientation_deg": 10 * error}
+            scores |= {f"{name}_true": value for name, value in scores.items()}
+            rows.append({**key, **scores, "method": method, "title": f"title of {method}"})
+    return pd.DataFrame(rows)
+
+
+def check_references(axes, places, degrees):
+    """The lines of the methods, and what is said of the one that is above everything."""
+    lines = {line.get_label(): line.get_ydata() for line in axes.lines}
+    for k, method in enumerate(SHOWN):
+        expected = [100.0 if method == "constant" else 0.01 * k + 0.001 * n for n in places]
+        factor = 10 if degrees else 1
+        np.testing.assert_allclose(lines[f"title of {method}"], factor * np.array(expected))
+    (text,) = axes.texts
+    assert text.get_text() == f"↑ title of constant: {'1000°' if degrees else '100.00 m'}"
+    assert axes.get_ylim()[1] < 100
+
+
 def column(rows, name, **keys):
     return rows.loc[(rows[list(keys)] == pd.Series(keys)).all(axis=1), name].tolist()
 
@@ -62,8 +89,10 @@ def check_panel(axes, rows, measure, **keys):
 
 
 def test_error_by_size_draws_the_true_errors_their_limits_and_the_published_ones(tables):
+    """Published positions are distances over the root of three; the figure's are distances."""
     rows = tables["table4_size"]
-    figure = by_size(rows)
+    sets = list(rows.groupby(["scene", "size"], sort=False).groups)
+    figure = by_size(rows, reference_rows([{"scene": scene, "size": size} for scene, size in sets]))
     panels = np.reshape(figure.axes, (2, 2))
     for line, measure in enumerate(("position_m_true", "orientation_deg_true")):
         for place, scene in enumerate(("large_room", "sanctuary")):
@@ -71,7 +100,13 @@ def test_error_by_size_draws_the_true_errors_their_limits_and_the_published_ones
             check_panel(axes, rows, measure, scene=scene)
             name = f"published_{measure.removesuffix('_true')}"
             expected = [column(rows, name, scene=scene, model=model) for model in MODELS]
-            np.testing.assert_allclose(published(axes), expected)
+            factor = 3**0.5 if measure == "position_m_true" else 1
+            np.testing.assert_allclose(published(axes), factor * np.array(expected))
+            own = [n for n, (name, _) in enumerate(sets) if name == scene]
+            check_references(axes, own, degrees=line == 1)
+    titles = " ".join(text.get_text() for text in figure.legends[0].get_texts())
+    assert "× √3" in titles
+    assert "title of structure-depth" in titles
     labels = [label.get_text() for label in panels[1, 1].get_xticklabels()]
     assert labels[0] == "6k\n300 frames"
     assert labels[-1] == "95k\n4,750 frames"
@@ -79,12 +114,16 @@ def test_error_by_size_draws_the_true_errors_their_limits_and_the_published_ones
 
 def test_error_by_noise_draws_both_scores_and_the_published_only_beside_the_papers(tables):
     rows = tables["table3_inconsistencies"]
-    figure = by_noise(rows, "title")
+    levels = {b: part[LEVEL].drop_duplicates() for b, part in rows.groupby("block")}
+    sets = pd.concat(levels.values()).drop_duplicates().to_dict("records")
+    figure = by_noise(rows, reference_rows(sets), "title")
     halves = [np.reshape(half.axes, (2, 3)) for half in figure.subfigs]
     for end, panels in zip(("", "_true"), halves, strict=True):
         for line, measure in enumerate(("position_m", "orientation_deg")):
             for place, block in enumerate(("orientation", "position", "both")):
                 check_panel(panels[line, place], rows, measure + end, block=block)
+                own = [sets.index(level) for level in levels[block].to_dict("records")]
+                check_references(panels[line, place], own, degrees=line == 1)
                 assert len(published(panels[line, place])) == (0 if end else 5)
     assert "paper's protocol" in figure.subfigs[0].get_suptitle()
     assert "true poses" in figure.subfigs[1].get_suptitle()
@@ -92,7 +131,8 @@ def test_error_by_noise_draws_both_scores_and_the_published_only_beside_the_pape
 
 def test_a_misprint_and_a_failed_run_leave_a_gap(tables):
     rows = tables["table3_inconsistencies"]
-    figure = by_noise(rows, "title")
+    none = reference_rows([{"scene": "", "size": "", "noise_m": -1.0, "noise_deg": -1.0}])
+    figure = by_noise(rows, none, "title")
     both = np.reshape(figure.subfigs[0].axes, (2, 3))[1, 2]
     assert np.isnan(published(both)[MODELS.index("posenet2")][1])
     flagged = pd.DataFrame({"published_flag": ["misprint", ""], "published_orientation_deg": 1.0})
@@ -100,7 +140,7 @@ def test_a_misprint_and_a_failed_run_leave_a_gap(tables):
     failed = tables["table4_size"].copy()
     measures = [f"position_m_true{end}" for end in ("", "_low", "_high")]
     failed.loc[failed.index[0], measures] = np.nan
-    _, values, _ = drawn(by_size(failed).axes[0])["posenet"]
+    _, values, _ = drawn(by_size(failed, none).axes[0])["posenet"]
     assert np.isnan(values).tolist() == [True, False, False, False]
 
 

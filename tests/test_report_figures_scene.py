@@ -25,6 +25,7 @@ from synfeal.report.figures.label_sets import read_labelled_set
 from synfeal.report.figures.plan_view import floor_m, plan_of
 from synfeal.report.figures.style import METHOD_STYLES, RC
 from synfeal.report.layouts import SOURCES
+from synfeal.report.references import COLUMNS as REFERENCE_COLUMNS
 from synfeal.report.speed_vs_error import COLUMNS as SPEED_COLUMNS
 from synfeal.report.tables import write_rows
 from tests.figure_results import (
@@ -61,6 +62,9 @@ def results(tmp_path_factory):
     speeds = [dict(zip(SPEED_KEYS, row, strict=True)) for row in SPEEDS]
     speeds[-1] |= RENDERED | {"width": 64, "height": 48}
     write_rows(root / "tables" / "speed_vs_error.csv", SPEED_COLUMNS, speeds)
+    nearest = dict.fromkeys(REFERENCE_COLUMNS, 0.5) | {"scene": "large_room", "size": "6k"}
+    nearest |= {"labels": "synfeal", "method": "nearest-vlad", "title": "Nearest image"}
+    write_rows(root / "tables" / "references.csv", REFERENCE_COLUMNS, [nearest])
     return Results(root, design_of(design()))
 
 

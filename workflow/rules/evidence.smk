@@ -206,11 +206,11 @@ rule figures:
             f"{ROOT}/tables/{{table}}.csv",
             table=[t for t in TABLE_NAMES if t in DRAWN_TABLES],
         ),
-        references=[
-            f"{ROOT}/tables/references.csv"
-            for t in TABLE_NAMES
-            if t == "table3_inconsistencies"
-        ],
+        references=(
+            [f"{ROOT}/tables/references.csv"]
+            if set(TABLE_NAMES) & set(DRAWN_TABLES)
+            else []
+        ),
         speed=rules.speed_vs_error.output.csv,
         labels=pose_labels(),
         assistance=assistance_files(),

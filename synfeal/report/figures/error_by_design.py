@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import pandas as pd
 from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
+from baselines.groundtruth.methods import SIMULATOR
 from synfeal.report.figures.localizer_lines import add_legend, draw_localizers, start_at_zero
+from synfeal.report.figures.reference_lines import draw_references
 from synfeal.report.figures.sources import Results, counted
 from synfeal.report.layouts import scene_title
+from synfeal.report.references import NAME, read_references
 
 NOISE, SIZE = "table3_inconsistencies", "table4_size"
 BLOCKS = {
@@ -18,6 +21,7 @@ BLOCKS = {
     "position": "position noise",
     "both": "noise in both",
 }
+LEVEL = ["noise_m", "noise_deg"]
 UNITS = {"position_m": "position error (m)", "orientation_deg": "orientation error (°)"}
 TRUE_UNITS = {
     "position_m_true": "position error against\nthe true poses (m)",
@@ -37,11 +41,21 @@ def draw_by_noise(results: Results) -> Figure | None:
     rows = results.table(NOISE)
     names = dict.fromkeys(f"{scene_title(row.scene)}, {row.size}" for row in design)
     frames = counted(rows["n_train"].iloc[0], rows["n_test"].iloc[0])
-    return by_noise(rows, f"{'; '.join(names)}: {frames}")
+    table = read_references(results.root / "tables" / f"{NAME}.csv")
+    data_sets = {(row.scene, row.size, row.label_id) for row in design}
+    keys = zip(table["scene"], table["size"], table["labels"], strict=True)
+    references = table[[key in data_sets for key in keys]]
+    return by_noise(rows, references, f"{'; '.join(names)}: {frames}")
 
 
-def by_noise(rows: pd.DataFrame, title: str) -> Figure:
-    """The figure of the rows of ``table3_inconsistencies.csv``."""
+def by_noise(rows: pd.DataFrame, references: pd.DataFrame, title: str) -> Figure:
+    """The figure of the rows of ``table3_inconsistencies.csv``.
+
+    Args:
+        rows: of that table.
+        references: rows of ``references.csv`` on its data sets.
+        title: of the figure.
+    """
     blocks = {block: rows[rows["block"] == block] for block in BLOCKS}
     blocks = {block: chosen for block, chosen in blocks.items() if len(chosen)}
     figure = Figure(figsize=(1.6 + 2.9 * len(blocks), 9.0), layout="constrained")
@@ -51,9 +65,10 @@ def by_noise(rows: pd.DataFrame, title: str) -> Figure:
         half.suptitle(title, weight="bold", fontsize=10)
         units = {f"{measure}{end}": unit for measure, unit in UNITS.items()}
         panels = _draw_panels(half, blocks, units, published=not end)
+        _draw_references(panels, blocks, units, references, LEVEL)
         for column, (block, chosen) in enumerate(blocks.items()):
-            levels = chosen[["noise_m", "noise_deg"]].drop_duplicates()
-            labels = [f"{metres:g} m\n{degrees:g}°" for metres, degrees in levels.to_numpy()]
+            levels = chosen[LEVEL].drop_duplicates().to_numpy()
+            labels = [f"{metres:g} m\n{degrees:g}°" for metres, degrees in levels]
             panels[0, column].set_title(BLOCKS[block], fontsize=9)
             panels[1, column].set_xticks(range(len(labels)), labels)
     add_legend(figure, halves[0].axes[0], 3, published=True)
@@ -62,14 +77,18 @@ def by_noise(rows: pd.DataFrame, title: str) -> Figure:
 
 def draw_by_size(results: Results) -> Figure | None:
     """Measures down, scenes across; nothing when the design has no rows of Table 4."""
-    return by_size(results.table(SIZE)) if results.rows_of(SIZE) else None
+    if not results.rows_of(SIZE):
+        return None
+    references = read_references(results.root / "tables" / f"{NAME}.csv")
+    return by_size(results.table(SIZE), references[references["labels"] == SIMULATOR])
 
 
-def by_size(rows: pd.DataFrame) -> Figure:
-    """The figure of the rows of ``table4_size.csv``."""
+def by_size(rows: pd.DataFrame, references: pd.DataFrame) -> Figure:
+    """The figure of the rows of ``table4_size.csv``, and of ``references.csv`` on true labels."""
     scenes = {str(scene): chosen for scene, chosen in rows.groupby("scene", sort=False)}
     figure = Figure(figsize=(1.4 + 3.9 * len(scenes), 6.6), layout="constrained")
     panels = _draw_panels(figure, scenes, TRUE_UNITS, published=True)
+    _draw_references(panels, scenes, TRUE_UNITS, references, ["scene", "size"])
     for column, (scene, chosen) in enumerate(scenes.items()):
         sizes = chosen.drop_duplicates("size")
         labels = [f"{row.size}\n{row.n_train:,} frames" for row in sizes.itertuples()]
@@ -97,3 +116,18 @@ def _draw_panels(
     for axes, label in zip(panels[:, 0], units.values(), strict=True):
         axes.set_ylabel(label)
     return panels
+
+
+def _draw_references(
+    panels: NDArray,  # type: ignore[type-arg]
+    parts: Mapping[str, pd.DataFrame],
+    measures: Iterable[str],
+    references: pd.DataFrame,
+    keys: list[str],
+) -> None:
+    """Lines of ``references`` into panels; data sets are told apart by the columns ``keys``."""
+    for column, rows in enumerate(parts.values()):
+        places = rows[keys].drop_duplicates()
+        same = [references.merge(places.iloc[[place]], on=keys) for place in range(len(places))]
+        for axes, measure in zip(panels[:, column], measures, strict=True):
+            draw_references(axes, same, measure)

@@ -1,7 +1,8 @@
-"""Panels with one line per localizer, 95 % limits, and the published line in grey."""
+"""Panels with one line per localizer, 95 % limits, and the published line in light grey."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -14,6 +15,7 @@ from synfeal.report.figures.sources import Array
 from synfeal.report.figures.style import MODEL_STYLES, PUBLISHED
 from synfeal.report.layouts import TITLES
 
+PUBLISHED_TITLE = "published (light grey; positions × √3,\nsince print has RMS over the axes)"
 # Localizers stand side by side so that their limits can be told apart; in widths of a place.
 ASIDE = dict(zip(MODELS, np.linspace(-0.16, 0.16, len(MODELS)), strict=True))
 
@@ -59,11 +61,14 @@ def start_at_zero(panels: Iterable[Axes]) -> None:
 
 
 def published_values(rows: pd.DataFrame, measure: str) -> Array:
-    """The paper's values (N,), left out where they are misprints."""
+    """The paper's values (N,) in the unit of ours, left out where they are misprints.
+
+    Its positions are RMS over the axes: distances over the root of three.
+    """
     values = rows[f"published_{measure}"]
     if measure == "orientation_deg":
-        values = values.mask(rows["published_flag"] == "misprint")
-    return values.to_numpy()
+        return values.mask(rows["published_flag"] == "misprint").to_numpy()
+    return math.sqrt(3) * values.to_numpy()
 
 
 def add_legend(figure: Figure | SubFigure, axes: Axes, columns: int, published: bool) -> None:
@@ -71,5 +76,5 @@ def add_legend(figure: Figure | SubFigure, axes: Axes, columns: int, published: 
     handles, labels = axes.get_legend_handles_labels()
     if published:
         (reference,) = axes.plot([], [], linestyle="-", **PUBLISHED)
-        handles, labels = [*handles, reference], [*labels, "published (grey)"]
+        handles, labels = [*handles, reference], [*labels, PUBLISHED_TITLE]
     figure.legend(handles, labels, loc="outside lower center", ncols=columns)

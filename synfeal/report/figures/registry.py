@@ -65,7 +65,8 @@ FIGURES: dict[str, Entry] = {
         error_by_design.draw_by_noise,
         "Median localization error against the noise in the labels, with 95 % limits: above "
         "against the noisy labels of the test set, the paper's protocol, beside the published "
-        "values in grey; below the same predictions against the true poses.",
+        "values in light grey; below the same predictions against the true poses; dark grey lines "
+        "are the mean training pose, the nearest training image and structure on depth.",
     ),
     "references_by_noise": Entry(
         references_by_noise.draw,
@@ -76,8 +77,9 @@ FIGURES: dict[str, Entry] = {
     "error_by_size": Entry(
         error_by_design.draw_by_size,
         "Median localization error against the size of the data set, with 95 % limits, against the "
-        "true poses, beside the published values in grey, which come from the paper's own meshes "
-        "and numbers of frames.",
+        "true poses, beside the published values in light grey, which come from the paper's own "
+        "meshes and numbers of frames; dark grey lines are the mean training pose, the nearest "
+        "training image and, where frames have depth, structure on depth.",
     ),
     "cumulative_error": Entry(
         cumulative_error.draw,
