@@ -37,7 +37,9 @@ def test_default_profile_plans_the_papers_design(tmp_path: Path) -> None:
     # Each data set once; structure where frames with depth are rendered: all but the larger sizes.
     assert jobs["image_references"] == 27
     assert jobs["structure_references"] == 20
-    assert jobs["descriptors"] == jobs["features"] == 2
+    assert jobs["adjusted_references"] == 14  # those of Tables 2 and 3
+    assert jobs["coordinate_references"] == 4  # simulator, largest noise of each block
+    assert jobs["descriptors"] == jobs["features"] == jobs["views"] == 2
     assert jobs["correspondences"] == jobs["tracks"] == jobs["references_table"] == 1
     assert jobs["table"] + jobs["table1_meshes"] == 6
 

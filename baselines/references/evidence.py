@@ -9,6 +9,7 @@ from pathlib import Path
 from baselines.references.correspondences import Correspondences, read_correspondences
 from baselines.references.tracks import Tracks, read_tracks
 from baselines.references.vectors import Described, read_described
+from baselines.references.views import Views, read_views
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 
@@ -26,6 +27,7 @@ class Evidence:
         files: what the methods of a group need, by name.
         camera: of the frames that features were found in.
         seed: of whatever is random.
+        samples_seen: images that a method that learns is shown.
     """
 
     labels: Path
@@ -33,6 +35,7 @@ class Evidence:
     files: dict[str, Path]
     camera: CameraConfig
     seed: int
+    samples_seen: int = 0
 
     @cached_property
     def train(self) -> PoseTable:
@@ -69,3 +72,8 @@ class Evidence:
     def tracks(self) -> Tracks:
         """Features of the training images that show the same point."""
         return read_tracks(self.files["tracks"])
+
+    @cached_property
+    def views(self) -> tuple[Views, Views]:
+        """Small training images with depth, and small test images."""
+        return read_views(self.files["train_views"]), read_views(self.files["test_views"])

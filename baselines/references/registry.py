@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from baselines.groundtruth.methods import METHODS
+from baselines.groundtruth.methods import METHODS, SIMULATOR
 from synfeal.config import Experiment
 from synfeal.config.models import ExternalConfig
 
-Group = Literal["images", "structure"]
+Group = Literal["images", "structure", "adjusted", "coordinates"]
 DataSet = tuple[str, str, str]  # scene, size, label set
 Externals = Mapping[str, ExternalConfig]
 
@@ -23,7 +23,8 @@ class Reference:
         title: as tables and figures call it.
         group: which methods are answered by one job: ``images`` looks at the frames that localizers
             see, of every data set; ``structure`` at frames with depth, where some label set of the
-            data set is estimated from them.
+            data set is estimated from them. ``adjusted`` and ``coordinates`` do, too, for
+            label sets of the paper alone, the latter for those of :func:`worst`: they take longer.
         answer: place of its function, ``module:name``, from
             :class:`~baselines.references.evidence.Evidence` to poses (N, 4, 4) of the test frames,
             NaN where it finds none. By place, so that a table of titles loads no estimator.
@@ -51,7 +52,14 @@ REFERENCES: dict[str, Reference] = {
     "structure-rays": Reference(
         "Structure, points triangulated", "structure", f"{_PACKAGE}.triangulation:triangulated"
     ),
+    "structure-adjusted": Reference(
+        "Structure, bundle-adjusted", "adjusted", f"{_PACKAGE}.adjustment:adjusted"
+    ),
+    "scene-coordinates": Reference(
+        "Scene coordinates", "coordinates", f"{_PACKAGE}.scene_coordinates:by_coordinates"
+    ),
 }
+PAPERS = ("table2_ground_truth", "table3_inconsistencies")
 
 
 def in_group(group: Group) -> list[str]:
@@ -72,9 +80,27 @@ def has_structure(rows: Iterable[Experiment], scene: str, size: str) -> bool:
 def answered_by(rows: Iterable[Experiment], data_set: DataSet, external: Externals) -> list[str]:
     """The methods that answer for a data set: those of the registry, then somebody else's."""
     rows, (scene, size, labels) = list(rows), data_set
-    groups = ["images", *(["structure"] if has_structure(rows, scene, size) else [])]
+    groups: list[Group] = ["images"]
+    if has_structure(rows, scene, size):
+        groups.append("structure")
+        same = [row for row in rows if (row.scene, row.size) == (scene, size)]
+        papers = [row for row in same if row.table in PAPERS]
+        groups += ["adjusted"] if any(row.label_id == labels for row in papers) else []
+        groups += ["coordinates"] if labels in worst(papers) else []
     own = [name for name, reference in REFERENCES.items() if reference.group in groups]
     return [*own, *(n for n, e in external.items() if not e.labels or labels in e.labels)]
+
+
+def worst(rows: Iterable[Experiment]) -> set[str]:
+    """The simulator's label set, and the one with the largest noise of each block of Table 3."""
+    rows = list(rows)
+    blocks = {row.block for row in rows if row.block}
+    noisy = [max((r for r in rows if r.block == b), key=_noise) for b in blocks]
+    return {SIMULATOR} | {row.label_id for row in noisy}
+
+
+def _noise(row: Experiment) -> tuple[float, float]:
+    return row.noise_m, row.noise_deg
 
 
 def titles_of(external: Externals) -> dict[str, str]:

@@ -55,12 +55,18 @@ def localize(evidence: Evidence, point_m: Array) -> Array:
     return poses
 
 
-def absolute_pose(pixel: Array, point_m: Array, camera: pycolmap.Camera, seed: int) -> Array | None:
+def absolute_pose(
+    pixel: Array,
+    point_m: Array,
+    camera: pycolmap.Camera,
+    seed: int,
+    max_error_px: float = MAX_ERROR_PX,
+) -> Array | None:
     """``world_from_cam`` (4, 4) from points (n, 3) and where they are seen (n, 2), or None."""
     if len(pixel) < MIN_INLIERS:
         return None
     options = pycolmap.AbsolutePoseEstimationOptions()
-    options.ransac.max_error = MAX_ERROR_PX
+    options.ransac.max_error = max_error_px
     options.ransac.confidence = CONFIDENCE
     options.ransac.max_num_trials = MAX_TRIALS
     options.ransac.random_seed = seed % 2**31

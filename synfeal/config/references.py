@@ -47,6 +47,9 @@ class ReferencesConfig(Strict):
     retrieved: Count = Field(
         20, description="structure: training images that a test image is matched with"
     )
+    coordinate_samples: Count = Field(
+        2000, description="scene coordinates: images shown to the network in all"
+    )
     external: dict[Slug, ExternalConfig] = Field(
         default_factory=dict, description="localizers of somebody else's, by name"
     )

@@ -10,7 +10,7 @@ import pandas as pd
 from synfeal.config import MODELS
 from synfeal.report.layouts import scene_title
 
-STRUCTURE = "structure-depth"
+STRUCTURE, ADJUSTED = "structure-depth", "structure-adjusted"
 TRUE = ("position_m_true", "orientation_deg_true")
 
 
@@ -43,7 +43,20 @@ def crossing_finding(table: pd.DataFrame) -> str:
         f" structure-based poses are off by {100 * structure_m:.2g} cm and {structure_deg:.2g}°,"
         f" the best localizer by {100 * best_m:.2g} cm and {best_deg:.2g}°; of the {len(MODELS)}"
         f" localizers are closer to the truth than structure on the same noisy labels"
-        f" {', '.join(parts)}."
+        f" {', '.join(parts)}.{_adjusted(noisy, *levels.iloc[-1])}"
+    )
+
+
+def _adjusted(table: pd.DataFrame, noise_m: float, noise_deg: float) -> str:
+    """What bundle adjustment of the map makes of a level; empty where it was not asked."""
+    level = table[(table.noise_m == noise_m) & (table.noise_deg == noise_deg)]
+    found = level.loc[level.method == ADJUSTED, list(TRUE)].dropna()
+    if found.empty:
+        return ""
+    off_m, off_deg = found.iloc[0]
+    return (
+        f" On a map that was bundle-adjusted from labels with {noise_m:g} m and {noise_deg:g}°,"
+        f" structure-based poses are off by {100 * off_m:.2g} cm and {off_deg:.2g}°."
     )
 
 

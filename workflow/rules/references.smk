@@ -48,7 +48,7 @@ rule features:
     params:
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
         camera=dump(CONFIG.groundtruth_camera),
-        references=dump(CONFIG.references),
+        references=dump(CONFIG.references, exclude={"coordinate_samples"}),
     script:
         "../scripts/features.py"
 
@@ -143,6 +143,71 @@ rule structure_references:
         group="structure",
         camera=dump(CONFIG.groundtruth_camera),
         seed=lambda w: seed_of(CONFIG.seed, "references", w.scene, w.size, w.labels),
+    script:
+        "../scripts/references.py"
+
+
+# In jobs of their own, as these take longer and are asked of fewer label sets.
+use rule structure_references as adjusted_references with:
+    output:
+        reference_files(REFERENCE, in_group("adjusted")),
+    log:
+        f"{ROOT}/logs/adjusted_references/{REFERENCE_LOG}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/adjusted_references/{REFERENCE_LOG}.tsv"
+    params:
+        group="adjusted",
+        camera=dump(CONFIG.groundtruth_camera),
+        seed=lambda w: seed_of(CONFIG.seed, "references", w.scene, w.size, w.labels),
+
+
+rule views:
+    input:
+        sequences=rules.features.input.sequences,
+    output:
+        views=temp(f"{ROOT}/references/{{scene}}/{{size}}/views-{{split}}.npz"),
+    log:
+        f"{ROOT}/logs/views/{{scene}}/{{size}}/{{split}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/views/{{scene}}/{{size}}/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(2000),
+    params:
+        n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
+        camera=dump(CONFIG.groundtruth_camera),
+        side=(CONFIG.network_camera.width, CONFIG.network_camera.height),
+    script:
+        "../scripts/views.py"
+
+
+rule coordinate_references:
+    input:
+        train_views=f"{ROOT}/references/{{scene}}/{{size}}/views-train.npz",
+        test_views=f"{ROOT}/references/{{scene}}/{{size}}/views-test.npz",
+        train=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
+        test=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
+        train_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
+        test_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
+    output:
+        reference_files(REFERENCE, in_group("coordinates")),
+    log:
+        f"{ROOT}/logs/coordinate_references/{REFERENCE_LOG}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/coordinate_references/{REFERENCE_LOG}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(3000),
+    params:
+        group="coordinates",
+        camera=dump(CONFIG.groundtruth_camera),
+        samples_seen=CONFIG.references.coordinate_samples,
+        # One seed for all label sets: what is drawn does not depend on them.
+        seed=lambda w: seed_of(CONFIG.seed, "scene coordinates", w.scene, w.size),
     script:
         "../scripts/references.py"
 

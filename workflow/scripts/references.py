@@ -10,6 +10,7 @@ params = snakemake.params
 with job(snakemake.log[0]):
     files = {name: Path(str(path)) for name, path in snakemake.input.items()}
     labels, truth = files["train"].parent, files["train_truth"].parent
-    evidence = Evidence(labels, truth, files, CameraConfig(**params.camera), params.seed)
+    camera, samples = CameraConfig(**params.camera), params.get("samples_seen", 0)
+    evidence = Evidence(labels, truth, files, camera, params.seed, samples)
     out_dir = Path(snakemake.output[0]).parents[1]
     answer_and_score(evidence, in_group(params.group), out_dir, dict(snakemake.wildcards))

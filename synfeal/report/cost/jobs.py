@@ -87,6 +87,9 @@ STAGES: dict[str, Stage] = {
     "tracks": Stage("scene/size", "frames", ("train",), disk=TRACKS),
     "image_references": _REFERENCE,
     "structure_references": _REFERENCE,
+    "adjusted_references": _REFERENCE,
+    "views": Stage("scene/size/split", "Mpx"),
+    "coordinate_references": _REFERENCE._replace(unit="images"),
     **dict.fromkeys(("external_reference", "coverage", "cell_depth"), Stage()),
     "render_speed": Stage("scene", "image sizes"),
     **dict.fromkeys(("collection_speed", "tables"), Stage()),
@@ -220,6 +223,11 @@ def _features(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
     return job | {"held_bytes": _frames(profile, part, kind) * features * FEATURE}
 
 
+def _coordinates(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
+    disk = _of_frames(profile, part, kind._replace(unit="frames"))["disk_bytes"]
+    return {"size": profile.config.references.coordinate_samples, "disk_bytes": disk}
+
+
 def _render_speed(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
     return {"size": profile.config.render_speed.sizes}
 
@@ -235,6 +243,7 @@ OWN_SIZES: dict[str, Callable[[Profile, Part, Stage], dict[str, float]]] = {
     "pretrain": _pretrain,
     "train": _train,
     "features": _features,
+    "coordinate_references": _coordinates,
     "render_speed": _render_speed,
     "claims": _claims,
 }

@@ -40,5 +40,6 @@ def draw_references(axes: Axes, data_sets: Sequence[pd.DataFrame], measure: str)
             form = "{:.2f} m" if measure.startswith("position_m") else "{:.0f}°"
             ends = [form.format(end) for end in (np.nanmin(values), np.nanmax(values))]
             above.append(f"↑ {titles[name]}: {' – '.join(dict.fromkeys(ends))}")
-    words = "\n".join(above)
-    axes.text(0.02, 0.99, words, transform=axes.transAxes, va="top", fontsize=7, color="0.35")
+    behind = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
+    place = {"transform": axes.transAxes, "va": "top", "bbox": behind}
+    axes.text(0.02, 0.99, "\n".join(above), None, fontsize=7, color="0.35", **place)

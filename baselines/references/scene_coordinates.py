@@ -1,0 +1,118 @@
+"""Poses by scene-coordinate regression: a network says where every cell's point is, then PnP.
+
+As in DSAC* with depth (Brachmann and Rother, PAMI 2021), without its end-to-end stage: exact depth
+gives the points of the training images in their cameras, the labels put them into the world, and
+from the points that are predicted for a test image its pose is found as structure-based poses are.
+Errors of the labels become errors of the points to learn, which the network averages over.
+"""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from baselines.references.coordinate_network import CoordinateNetwork, distance_m
+from baselines.references.evidence import Evidence
+from baselines.references.structure import absolute_pose, pinhole
+from baselines.references.views import Views
+from baselines.training.data import ImageStatistics, image_statistics
+from baselines.training.device import autocast, open_device, precision_on
+from baselines.training.optimizer import Schedule, optimisation_of
+
+log = logging.getLogger(__name__)
+Array = NDArray[np.float64]
+
+BATCH, LEARNING_RATE = 8, 2e-3
+# Points are off by decimetres where features are off by a pixel: a twentieth of the image's width.
+MAX_ERROR_OF_WIDTH = 0.05
+LOGGED = 50  # steps
+
+
+def by_coordinates(evidence: Evidence) -> Array:
+    """Poses (N, 4, 4) of the test frames, NaN where none is found."""
+    device = open_device("auto")
+    train, test = evidence.views
+    points = torch.from_numpy(world_points(train, evidence.train.world_from_cam[: len(train)]))
+    images = torch.from_numpy(train.images).permute(0, 3, 1, 2)
+    statistics = image_statistics(images)
+    network = learn(images, points, statistics, evidence.samples_seen, evidence.seed, device)
+    return poses_of(test, predict(network, test, statistics, device), evidence)
+
+
+def world_points(views: Views, world_from_cam: Array) -> NDArray[np.float32]:
+    """Points (N, 3, R, C) of the cells in the world of the labels; not finite without depth."""
+    with np.errstate(invalid="ignore"):  # no depth
+        turned = np.einsum("nij,nrcj->nirc", world_from_cam[:, :3, :3], views.point_m)
+    return np.asarray(turned + world_from_cam[:, :3, 3, None, None], dtype=np.float32)
+
+
+def learn(
+    images: Tensor,
+    points: Tensor,
+    statistics: ImageStatistics,
+    samples_seen: int,
+    seed: int,
+    device: torch.device,
+) -> CoordinateNetwork:
+    """A network trained by the mean distance of points, with the localizers' optimiser.
+
+    Args:
+        images: (N, 3, h, w) uint8.
+        points: (N, 3, R, C) in metres; not finite where they are not known.
+        statistics: of the images.
+        samples_seen: images shown in all.
+        seed: of the initial weights and the order of the images.
+        device: where to learn.
+    """
+    torch.manual_seed(seed)
+    known = points.movedim(1, -1)[points.isfinite().all(dim=1)]
+    network = CoordinateNetwork(known.mean(dim=0))
+    network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+    schedule = Schedule(samples_seen, BATCH, LEARNING_RATE, weight_decay=0.0)
+    optimisation = optimisation_of("muon", network, schedule)
+    epochs = -(-schedule.steps * BATCH // len(images))
+    order = torch.cat([torch.randperm(len(images)) for _ in range(epochs)])
+    for step, rows in enumerate(torch.split(order, BATCH)[: schedule.steps]):
+        found = _answer(network, images[rows], statistics, device)
+        loss = distance_m(found, points[rows].to(device))
+        optimisation.step(loss)
+        if step % LOGGED == 0 or step == schedule.steps - 1:
+            log.info("step %d of %d: %.3f m", step + 1, schedule.steps, loss.item())
+    return network
+
+
+@torch.no_grad()
+def predict(
+    network: CoordinateNetwork, views: Views, statistics: ImageStatistics, device: torch.device
+) -> Array:
+    """Points (N, R, C, 3) of the cells of every image."""
+    images = torch.from_numpy(views.images).permute(0, 3, 1, 2)
+    parts = torch.split(images, BATCH)
+    found = torch.cat([_answer(network, part, statistics, device).cpu() for part in parts])
+    return found.movedim(1, -1).double().numpy()
+
+
+def _answer(
+    network: CoordinateNetwork, images: Tensor, statistics: ImageStatistics, device: torch.device
+) -> Tensor:
+    normal = statistics.normalise(images).to(device, memory_format=torch.channels_last)
+    with autocast(device, precision_on(device, "auto")):
+        found: Tensor = network(normal)
+    return found
+
+
+def poses_of(views: Views, points: Array, evidence: Evidence) -> Array:
+    """Poses (N, 4, 4) from points (N, R, C, 3) of the cells; NaN where none is found."""
+    camera = pinhole(evidence.camera)
+    pixel = views.slope.reshape(-1, 2) * camera.params[:2]
+    error_px = MAX_ERROR_OF_WIDTH * camera.width
+    poses = np.full((len(views), 4, 4), np.nan)
+    for frame, point_m in enumerate(points.reshape(len(views), -1, 3)):
+        pose = absolute_pose(pixel, point_m, camera, evidence.seed, error_px)
+        if pose is not None:
+            poses[frame] = pose
+    return poses

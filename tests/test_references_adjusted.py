@@ -1,0 +1,104 @@
+"""Bundle adjustment of a map against images that are exact."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from baselines.references.adjustment import adjust, adjusted, errors_px, placed_on
+from baselines.references.correspondences import Correspondences
+from baselines.references.evidence import Evidence
+from baselines.references.structure import pinhole
+from baselines.references.triangulation import triangulate, triangulated
+from synfeal.geometry.alignment import umeyama_sim3
+from synfeal.geometry.poses import pose_error, pose_matrix
+from synfeal.labels.noise import add_noise
+from tests.room_scene import CAMERA, pose_at
+from tests.test_references import BESIDE, seen, table_of
+
+POSES = np.stack(BESIDE)
+TEST = np.stack([pose_at([0.1, -0.4, 1.2], 4.0), pose_at([0.2, 0.3, 1.4], -3.0), POSES[0]])
+
+
+def points(count=60):
+    rng = np.random.default_rng(0)
+    return np.array([3.0, 0, 1.3]) + rng.uniform(-1, 1, (count, 3))
+
+
+def noisy(noise_m, noise_deg):
+    return add_noise(table_of(POSES), noise_m, noise_deg, np.random.default_rng(1))
+
+
+def slopes(poses, point_m):
+    """Slopes (N, T, 2) under which poses see points."""
+    return seen(poses, point_m).slope.reshape(len(poses), -1, 2)
+
+
+def off_px(tracks, poses):
+    """Root mean square over all observations of how far the points they meet in are off."""
+    point_m = triangulate(tracks, poses)
+    found = slopes(poses, point_m).reshape(-1, 2)
+    off = pinhole(CAMERA).params[0] * np.linalg.norm(found - tracks.slope, axis=1)
+    np.testing.assert_allclose(errors_px(tracks, poses, point_m, pinhole(CAMERA)), off, atol=1e-9)
+    return np.sqrt(np.square(off).mean())
+
+
+@pytest.mark.parametrize(("noise_m", "noise_deg"), [(0.02, 0.5), (0.1, 5.0)])
+def test_adjustment_takes_noise_back(noise_m, noise_deg):
+    """Noisy poses of exact images fit them again, up to where, how turned and how large."""
+    tracks, labels = seen(POSES, points()), noisy(noise_m, noise_deg).world_from_cam
+    found = adjust(tracks, labels, triangulate(tracks, labels), pinhole(CAMERA))
+    assert off_px(tracks, found) < 0.05 < 1 < off_px(tracks, labels)
+    position_m, angle_rad = pose_error(placed_on(found, POSES), POSES)
+    assert position_m.max() < 0.05 * noise_m
+    assert np.degrees(angle_rad).max() < 0.2 * noise_deg  # the centres are nearly on a line
+
+
+def test_the_map_stays_where_the_labels_are():
+    """Labels of another world give the adjusted poses of that world; exact ones stay exact."""
+    tracks = seen(POSES, points())
+    moved = pose_at([4.0, -7.0, 0.5], 70.0, 20.0)
+    for world in (np.eye(4), moved):
+        labels = world @ POSES
+        found = adjust(tracks, labels, triangulate(tracks, labels), pinhole(CAMERA))
+        np.testing.assert_allclose(placed_on(found, labels), labels, atol=1e-4)
+        lost = labels.copy()
+        lost[5, :3, 3] += 3.0  # one label that is wrong by metres has no say
+        np.testing.assert_allclose(placed_on(found, lost), labels, atol=1e-3)
+
+
+def test_a_frame_that_sees_nothing_keeps_its_label():
+    labels = noisy(0.02, 0.5).world_from_cam
+    tracks = seen(POSES, points())
+    blind = tracks.frame == 3
+    tracks = replace(tracks, **{n: getattr(tracks, n)[~blind] for n in ("frame", "slope", "track")})
+    found = adjust(tracks, labels, triangulate(tracks, labels), pinhole(CAMERA))
+    np.testing.assert_array_equal(found[3], labels[3])
+    assert np.abs(found[4] - labels[4]).max() > 1e-3
+    nothing = np.full((60, 3), np.nan)
+    np.testing.assert_array_equal(adjust(tracks, labels, nothing, pinhole(CAMERA)), labels)
+
+
+def test_answers_are_closer_than_on_the_labels_as_they_are_and_no_match_is_no_answer():
+    point_m = points()
+    count, matched = len(point_m), len(TEST) - 1
+    evidence = Evidence(None, None, {}, CAMERA, 0)
+    evidence.__dict__["train"] = noisy(0.05, 2.0)
+    tracks = seen(POSES, point_m)
+    evidence.__dict__["tracks"] = replace(tracks, of_feature=np.arange(count))
+    evidence.__dict__["correspondences"] = Correspondences(
+        np.array([0, count, 2 * count, 2 * count]),
+        slopes(TEST[:matched], point_m).reshape(-1, 2),
+        np.tile(np.arange(count), matched),
+        np.zeros(matched * count, np.int64),
+        np.full((matched * count, 3), np.nan),
+    )
+    before, after = triangulated(evidence), adjusted(evidence)
+    assert np.isnan(after[2]).all()
+    # What is left is how the labels as a whole lie in the world.
+    placed = placed_on(POSES, evidence.train.world_from_cam)
+    scale, rotation, offset = umeyama_sim3(POSES[:, :3, 3], placed[:, :3, 3])
+    position_m = scale * TEST[:matched, :3, 3] @ rotation.T + offset
+    expected = pose_matrix(rotation @ TEST[:matched, :3, :3], position_m)
+    assert pose_error(after[:matched], expected)[0].max() < 0.005
+    assert pose_error(before[:matched], expected)[0].min() > 0.02
