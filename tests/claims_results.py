@@ -10,9 +10,10 @@ from synfeal.dataset.number_table import write_numbers
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.files import write_json
 from synfeal.geometry.rotations import canonical_quat_wxyz
-from synfeal.report.claims.evidence import HEADER, evidence_of
+from synfeal.report.claims.evidence import evidence_of
 from synfeal.report.claims.table import claim_rows
 from synfeal.report.published import key_of, published_cells
+from synfeal.report.run_errors import COLUMNS
 from tests.report_results import design_of, fill_assistance, shipped_design
 
 N_PATHS, FRAMES_OF_PATH = 12, 3
@@ -44,7 +45,7 @@ class Results:
         columns = [self.table.frame[:, None], both[0], both[-1]]
         name = f"{row.scene}/{row.size}/{row.label_id}/{row.init}/{model}/seed{repetition}"
         rows = np.concatenate(columns, axis=1).tolist()
-        write_numbers(self.root / "runs" / name / "errors.csv", HEADER, rows)
+        write_numbers(self.root / "runs" / name / "errors.csv", ",".join(COLUMNS), rows)
 
     def rows(self):
         """``claims.csv`` by claim."""

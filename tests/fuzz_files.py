@@ -49,10 +49,10 @@ from synfeal.planning.repeat import read_poses
 from synfeal.report import assistance, label_error, meshes, speed_vs_error
 from synfeal.report.assistance import assistance_record
 from synfeal.report.claims import table as claims
-from synfeal.report.claims.duration import read_history
 from synfeal.report.claims.evidence import Cell, evidence_of
 from synfeal.report.claims.model import Missing, published_claims
 from synfeal.report.claims.simulator import collection_rate
+from synfeal.report.claims.training import read_history
 from synfeal.report.compare.runs import read_run
 from synfeal.report.figures.cumulative_error import read_errors
 from synfeal.report.figures.sources import TEXTS, Results, number

@@ -24,19 +24,19 @@ from synfeal.bootstrap import (
     seed_weights,
 )
 from synfeal.config import Design, Run
-from synfeal.dataset.number_table import read_numbers
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import pose_errors
 from synfeal.labels.constant import constant_pose
 from synfeal.report.claims.model import Missing
 from synfeal.report.layouts import TITLES
+from synfeal.report.run_errors import read_errors
 from synfeal.report.stats import MEASURES
 from synfeal.seeds import generator_of
 
-HEADER = ",".join(("frame", *MEASURES))
 # A localizer has learnt where its whole interval lies below this share of the mean pose's error.
 LEARNT = 0.75
+# Errors of a cell are two samples (2, 1 + RESAMPLES) of medians: metres and degrees.
 QUANTITIES = ("position", "orientation")
 
 
@@ -50,20 +50,13 @@ class Cell(NamedTuple):
     init: str = "pretrained"
 
 
-class Errors(NamedTuple):
-    """Samples of the two median errors of a cell: metres and degrees."""
-
-    position: Array
-    orientation: Array
-
-
 class TestSet(NamedTuple):
     """The true poses of a test set, which resample draws which paths, and what is no learning."""
 
     poses: PoseTable
     path: Counts
     counts: Counts
-    constant: Errors
+    constant: Array
 
 
 @dataclass(frozen=True)
@@ -83,7 +76,7 @@ class Evidence:
     end: str = ""
     used: dict[str, None] = field(default_factory=dict)
     test_paths: dict[tuple[str, str], int] = field(default_factory=dict)
-    _errors: dict[tuple[Cell, str], Errors] = field(default_factory=dict)
+    _errors: dict[tuple[Cell, str], Array] = field(default_factory=dict)
     _tests: dict[tuple[str, str], TestSet] = field(default_factory=dict)
 
     def under(self, end: str) -> Evidence:
@@ -121,30 +114,29 @@ class Evidence:
             raise Missing(f"this profile has no row {_name(cell)}")
         return self.runs[cell]
 
-    def errors(self, cell: Cell) -> Errors:
-        """Median errors of a cell, observed and resampled over test paths and repetitions.
+    def errors(self, *cells: Cell) -> Array:
+        """Median errors (N, 2, 1 + RESAMPLES) of cells, resampled over test paths and repetitions.
 
         Draws of the seeds are shared by the cells that differ in their labels alone: with one
         number their runs drew the same random numbers.
 
         Raises:
-            Missing: the profile does not run the cell.
+            Missing: the profile does not run a cell.
             InputError: a file is missing, cannot be read, or is about other frames.
         """
+        return np.array([self._errors_of(cell) for cell in cells])
+
+    def _errors_of(self, cell: Cell) -> Array:
         runs = self.runs_of(cell)
         test = self.test_set(cell.scene, cell.size)
         files = [self.file(f"runs/{run.directory}/errors.csv") for run in runs]
         if (cell, self.end) not in self._errors:
-            tables = [_read_errors(file, test.poses) for file in files]
-            columns = [HEADER.split(",").index(m + self.end) for m in MEASURES[:2]]
             draw = generator_of("claims", "seeds", cell._replace(labels=""), len(runs))
             weights = seed_weights(len(runs), draw)
-            self._errors[cell, self.end] = Errors(
-                *(
-                    over_seeds([medians(t[:, c], test.path, test.counts) for t in tables], weights)
-                    for c in columns
-                )
-            )
+            columns = [f"{measure}{self.end}" for measure in MEASURES[:2]]
+            seeds = [_medians(file, columns, test) for file in files]
+            samples = [over_seeds(of_seeds, weights) for of_seeds in zip(*seeds, strict=True)]
+            self._errors[cell, self.end] = np.array(samples)
         return self._errors[cell, self.end]
 
     def test_set(self, scene: str, size: str) -> TestSet:
@@ -157,7 +149,7 @@ class Evidence:
             paths, place = np.unique(poses.path, return_inverse=True)
             counts = path_counts(len(paths), generator_of("claims", *key))
             errors = pose_errors(constant_pose(read_pose_table(train), poses), poses)
-            constant = Errors(*(medians(errors[m], place, counts) for m in MEASURES[:2]))
+            constant = np.array([medians(errors[m], place, counts) for m in MEASURES[:2]])
             self._tests[key] = TestSet(poses, place, counts, constant)
         self.test_paths[key] = self._tests[key].counts.shape[1]
         return self._tests[key]
@@ -172,7 +164,7 @@ class Evidence:
         found = []
         for cell in cells:
             constant = self.test_set(cell.scene, cell.size).constant
-            pairs = zip(QUANTITIES, self.errors(cell), constant, strict=True)
+            pairs = zip(QUANTITIES, self._errors_of(cell), constant, strict=True)
             for name, own, mean_pose in pairs:
                 with np.errstate(invalid="ignore", divide="ignore"):
                     share = 100 * own / mean_pose
@@ -201,9 +193,9 @@ def _name(cell: Cell) -> str:
     return f"{cell.scene} {cell.size} {cell.labels} {cell.init}"
 
 
-def _read_errors(path: Path, table: PoseTable) -> Array:
-    """Columns of ``HEADER`` of one run (N, 5), about the frames of a test set."""
-    values = read_numbers(path, HEADER, "table of errors", finite=False)
-    if not np.array_equal(values[:, 0], table.frame):
+def _medians(path: Path, columns: Sequence[str], test: TestSet) -> list[Array]:
+    """Samples of the median of some columns of one run's errors on the frames of a test set."""
+    table = read_errors(path)
+    if not np.array_equal(table["frame"], test.poses.frame):
         raise InputError(f"{path}: its frames are not those of the test set; score that run again")
-    return values
+    return [medians(table[column].to_numpy(), test.path, test.counts) for column in columns]

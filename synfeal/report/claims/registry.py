@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from synfeal.bootstrap import FEWEST_PATHS
 from synfeal.config import MODELS
-from synfeal.report.claims import duration, label_sources, noise, scratch, simulator, size
+from synfeal.report.claims import labels, simulator, training
 from synfeal.report.claims.evidence import Cell, Evidence
 from synfeal.report.claims.model import (
     DECIDED,
@@ -20,21 +20,21 @@ from synfeal.report.claims.model import (
 )
 
 JUDGES: Mapping[str, Callable[[Claim, Evidence], Outcome]] = {
-    "C1": label_sources.lowest_of_all,
-    "C2": label_sources.gain_over_sfm,
-    "C3": label_sources.labels_against_models,
-    "C4": label_sources.few_assisted,
-    "C5": noise.kind_of_noise,
-    "C6": noise.highest_noise,
-    "C7": size.large_room_grows,
-    "C8": size.sanctuary_grows,
-    "C9": size.sanctuary_at_6k,
-    "C10": scratch.worse_when_small,
-    "C11": scratch.better_when_large,
-    "C12": scratch.best_of_all,
-    "C13": duration.longer,
+    "C1": labels.lowest_of_all,
+    "C2": labels.gain_over_sfm,
+    "C3": labels.labels_against_models,
+    "C4": labels.few_assisted,
+    "C5": labels.kind_of_noise,
+    "C6": labels.highest_noise,
+    "C7": training.large_room_grows,
+    "C8": training.sanctuary_grows,
+    "C9": training.sanctuary_at_6k,
+    "C10": training.worse_when_small,
+    "C11": training.better_when_large,
+    "C12": training.best_of_all,
+    "C13": training.longer,
     "C14": simulator.collection_rate,
-    "C15": label_sources.kinectfusion_fails,
+    "C15": labels.kinectfusion_fails,
     "C16": simulator.times_7_scenes,
 }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from synfeal.bootstrap import Array, limits
 
@@ -12,12 +12,12 @@ PERCENT = ("p {:+.1f} %", "o {:+.1f} %")
 ERRORS = ("p {:.2f} m RMS", "o {:.2f}°")
 
 
-def values_text(forms: Sequence[str], samples: Sequence[Array]) -> str:
+def values_text(forms: Sequence[str], samples: Iterable[Array]) -> str:
     """Observed values, e.g. ``p -55.0 %, o -60.0 %``."""
     return ", ".join(_print(form, float(s[0])) for form, s in zip(forms, samples, strict=True))
 
 
-def limits_text(forms: Sequence[str], samples: Sequence[Array]) -> str:
+def limits_text(forms: Sequence[str], samples: Iterable[Array]) -> str:
     """95 % limits, e.g. ``p -60.1 % to -40.2 %, o -70.0 % to -50.0 %``."""
     pairs = [limits(sample) for sample in samples]
     ends = [
