@@ -16,6 +16,7 @@ include: "workflow/rules/groundtruth.smk"
 include: "workflow/rules/training.smk"
 include: "workflow/rules/references.smk"
 include: "workflow/rules/evidence.smk"
+include: "workflow/rules/robustness.smk"
 
 
 localrules:
@@ -32,6 +33,7 @@ localrules:
 rule all:
     default_target: True
     input:
+        robustness_files,
         f"{ROOT}/summary.md",
         f"{ROOT}/report.html",
         f"{ROOT}/tables/all_tables.tex",

@@ -15,7 +15,7 @@ from synfeal.config.collection import (
     Slug,
     Strict,
 )
-from synfeal.config.rendering import RenderConfig
+from synfeal.config.rendering import EffectsConfig, RenderConfig
 
 
 class DatasetConfig(Strict):
@@ -42,19 +42,9 @@ class DatasetConfig(Strict):
     render: RenderConfig = Field(default_factory=RenderConfig, description="how images are drawn")
 
     @model_validator(mode="after")
-    def _check_exposure(self) -> Self:
-        effects = self.render.effects
-        if effects is None or effects.motion_blur is None or self.collection.mode == "repeat":
-            return self
-        if self.collection.mode == "random":
-            raise ValueError("render.effects.motion_blur: independent frames have no motion")
-        exposure_s = effects.motion_blur.exposure_s
-        frame_s = self.collection.frame_spacing_m / effects.speed_m_s
-        if exposure_s > frame_s:
-            raise ValueError(
-                f"render.effects.motion_blur.exposure_s: {exposure_s:g} s is longer than the"
-                f" {frame_s:.3g} s between frames (collection.frame_spacing_m by speed_m_s)"
-            )
+    def _check_effects(self) -> Self:
+        if self.render.effects is not None:
+            refuse_long_exposure(self.render.effects, self.collection, "render.effects")
         return self
 
     @property
@@ -66,3 +56,22 @@ class DatasetConfig(Strict):
         """Frames of a split at this profile's scale: at least 2, where there are as many."""
         full: int = getattr(self.scenes[scene].sizes[size], split)
         return max(min(2, full), round(full * self.scale))
+
+
+def refuse_long_exposure(effects: EffectsConfig, collection: CollectionConfig, key: str) -> None:
+    """Refuse to expose for longer than there is between two frames.
+
+    Raises:
+        ValueError: naming what stands under ``key``.
+    """
+    blur = effects.motion_blur
+    if blur is None or collection.mode == "repeat":
+        return
+    if collection.mode == "random":
+        raise ValueError(f"{key}.motion_blur: independent frames have no motion; leave it out")
+    frame_s = collection.frame_spacing_m / effects.speed_m_s
+    if blur.exposure_s > frame_s:
+        raise ValueError(
+            f"{key}.motion_blur.exposure_s: {blur.exposure_s:g} s is longer than the"
+            f" {frame_s:.3g} s between frames (collection.frame_spacing_m by speed_m_s)"
+        )

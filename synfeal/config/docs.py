@@ -98,15 +98,26 @@ def documents(folder: Path) -> dict[str, str]:
     return {"schema.json": schema, "README.md": "\n".join(parts)}
 
 
-def key_rows(model: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, ...]]:
-    """Dotted key, type, default and meaning of every key below a model, depth first."""
+def key_rows(
+    model: type[BaseModel], prefix: str = "", told: dict[type[BaseModel], str] | None = None
+) -> Iterator[tuple[str, ...]]:
+    """Dotted key, type, default and meaning of every key below a model, depth first.
+
+    Keys of a model that is told already are told by where; ``told`` collects these places.
+    """
+    told = {} if told is None else told
     for name, field in model.model_fields.items():
         inner, key = _model_below(field.annotation, f"{prefix}{name}")
         if inner is None:
             yield f"`{key}`", type_name(field), _default(field), str(field.description)
+            continue
+        default = "required" if field.is_required() else ""
+        if inner in told:
+            yield f"`{key}`", f"mapping, keys as under `{told[inner]}`", default, _text(field)
         else:
-            yield f"`{key}`", "mapping", "required" if field.is_required() else "", _text(field)
-            yield from key_rows(inner, f"{key}.")
+            told[inner] = key
+            yield f"`{key}`", "mapping", default, _text(field)
+            yield from key_rows(inner, f"{key}.", told)
 
 
 def experiment_rows() -> Iterator[tuple[str, ...]]:

@@ -32,6 +32,7 @@ from synfeal.config.learning import (
 )
 from synfeal.config.references import ExternalConfig, ReferencesConfig
 from synfeal.config.rendering import EffectsConfig, RenderConfig, RenderSpeedConfig
+from synfeal.config.robustness import RobustnessConfig
 
 __all__ = [
     "MODELS",
@@ -180,6 +181,9 @@ class Config(DatasetConfig):
     )
     references: ReferencesConfig = Field(
         default_factory=ReferencesConfig, description="what localizers are compared with"
+    )
+    robustness: RobustnessConfig = Field(
+        default_factory=RobustnessConfig, description="tests with effects of camera and light"
     )
     network: NetworkConfig = Field(default_factory=NetworkConfig, description="network shape")
     training: TrainingConfig = Field(description="training protocol")

@@ -25,6 +25,7 @@ from baselines.training.record import training_parameters
 from synfeal.config import Run, check_mesh_files, parse_config, read_design
 from synfeal.config.load import read_yaml
 from synfeal.config.mesh_files import check_results
+from synfeal.config.dataset import refuse_long_exposure
 from synfeal.config.experiments import INJECTED
 from synfeal.config.models import MODELS
 from synfeal.dataset.archive import SUFFIX
@@ -75,6 +76,7 @@ wildcard_constraints:
     error_kind="|".join(INJECTED),
     reconstructed="|".join(RECONSTRUCTED),
     external="|".join(EXTERNAL) or "none",
+    effects="|".join([*CONFIG.robustness.effects, "mixed"]),
     frame_method="|".join(frame_methods()),
     graph_method="|".join(graph_methods()),
 
@@ -328,6 +330,21 @@ def files_of_references():
         ),
         *reference_sets("metrics.json"),
     ]
+
+
+def robustness_files(wildcards):
+    """The robustness table, where it has rows and its data set is trained on here."""
+    robust = CONFIG.robustness
+    wanted = (robust.scene, robust.size, "synfeal", "pretrained")
+    made = any((r.scene, r.size, r.labels, r.init) == wanted for r in RUNS)
+    if not (robust.effects and made) or RESTORED:
+        return []
+    try:
+        for name, effects in {**robust.effects, "mixed": robust.mixed}.items():
+            refuse_long_exposure(effects, CONFIG.collection, f"robustness: {name}")
+    except ValueError as error:
+        sys.exit(f"error: {error}")
+    return [f"{ROOT}/tables/robustness.csv"]
 
 
 def label_figures():

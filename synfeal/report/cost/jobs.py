@@ -91,6 +91,10 @@ STAGES: dict[str, Stage] = {
     "views": Stage("scene/size/split", "Mpx"),
     "coordinate_references": _REFERENCE._replace(unit="images"),
     **dict.fromkeys(("external_reference", "coverage", "cell_depth"), Stage()),
+    "light_shares": Stage(),
+    "render_varied": Stage("effects/split", "Msamples"),
+    "pack_varied": Stage("effects/split", "MB"),
+    "train_varied": Stage("model", "TFLOP"),
     "render_speed": Stage("scene", "image sizes"),
     **dict.fromkeys(("collection_speed", "tables"), Stage()),
     "claims": Stage("", "frames"),
@@ -228,6 +232,21 @@ def _coordinates(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
     return {"size": profile.config.references.coordinate_samples, "disk_bytes": disk}
 
 
+def _varied(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
+    """Frames with effects; motion blur draws each several times."""
+    robust = profile.config.robustness
+    job = _of_frames(profile, {**part, "scene": robust.scene, "size": robust.size}, kind)
+    effects = {**robust.effects, "mixed": robust.mixed}[part["effects"]]
+    more = effects.motion_blur.subframes - 1 if effects.motion_blur else 0
+    drawn = 1 + effects.share * more if kind.unit == "Msamples" else 1
+    return {**job, **{name: job[name] * drawn for name in ("size", "other") if name in job}}
+
+
+def _train_varied(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
+    robust = profile.config.robustness
+    return _train(profile, {**part, "scene": robust.scene, "size": robust.size}, kind)
+
+
 def _render_speed(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
     return {"size": profile.config.render_speed.sizes}
 
@@ -244,6 +263,8 @@ OWN_SIZES: dict[str, Callable[[Profile, Part, Stage], dict[str, float]]] = {
     "train": _train,
     "features": _features,
     "coordinate_references": _coordinates,
+    **dict.fromkeys(("render_varied", "pack_varied"), _varied),
+    "train_varied": _train_varied,
     "render_speed": _render_speed,
     "claims": _claims,
 }

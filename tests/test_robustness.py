@@ -1,0 +1,60 @@
+"""The robustness table, of answers that are known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.references.robustness import NEAREST, SCHEMA, robustness_table
+from synfeal.dataset.packed import new_packed
+from synfeal.dataset.pose_table import PoseTable, write_pose_table
+from synfeal.frames import read_frame
+from synfeal.report.robustness import CLEAN, MIXED, robustness_grid, write_robustness
+from tests.trained_localizers import answering, save
+
+PX = 32
+
+
+def packed(path: Path, frames: np.ndarray) -> Path:
+    with new_packed(path, len(frames), PX) as array:
+        array[:] = frames
+    return path
+
+
+def test_errors_are_those_of_known_answers(tmp_path: Path) -> None:
+    frames = np.random.default_rng(0).integers(0, 256, (4, PX, PX, 3), np.uint8)
+    index, upright = np.arange(4), np.tile([1.0, 0.0, 0.0, 0.0], (4, 1))
+    train = PoseTable(index, index, np.column_stack([index, 0 * index, 0 * index]) * 1.0, upright)
+    shown = np.array([1, 3])  # the test frames are these training frames
+    test = PoseTable(index[:2], index[:2], train.position_m[shown], upright[:2])
+    for name, table in (("train", train), ("test", test)):
+        write_pose_table(tmp_path / f"{name}.csv", table)
+    known = packed(tmp_path / "train.npy", frames)
+    tests = {
+        CLEAN: packed(tmp_path / "clean.npy", frames[shown]),
+        "dark_2": packed(tmp_path / "dark.npy", frames[shown] // 2),
+        "swapped_1": packed(tmp_path / "swapped.npy", frames[shown[::-1]]),
+    }
+    # Always at the origin, turned by a right angle about z: 1 m and 3 m away.
+    constant = save(tmp_path / "m.pt", answering([0, 0, 0], [np.sqrt(0.5), 0, 0, np.sqrt(0.5)]))
+    models = {CLEAN: {"posenet": constant}, MIXED: {"posenet": constant}}
+    table = robustness_table(models, dict.fromkeys(models, known), tests, tmp_path, "cpu")
+
+    found = table.set_index(["trained_on", "method", "effects"]).position_m
+    for trained_on in models:
+        nearest = found[trained_on, NEAREST]
+        # Half the light changes nothing for vectors without mean and length; a swap is 2 m off.
+        assert nearest.to_dict() == pytest.approx({CLEAN: 0, "dark_2": 0, "swapped_1": 2}, abs=1e-6)
+        assert found[trained_on, "posenet"].tolist() == pytest.approx([2, 2, 2], abs=1e-4)
+    turned = table[table.method == "posenet"].orientation_deg
+    assert turned.tolist() == pytest.approx([90] * 6, abs=1e-3)
+
+    write_robustness(table, tmp_path / "r.csv", tmp_path / "r.tex")
+    again = read_frame(tmp_path / "r.csv", SCHEMA)
+    assert again.n_test.tolist() == [2] * 12
+    grid = robustness_grid(again)
+    assert [len(group.rows) for group in grid.groups] == [3, 3]
+    assert grid.groups[0].rows[1][0].label == "dark, strength 2"
+    assert "swapped, strength 1" in (tmp_path / "r.tex").read_text()

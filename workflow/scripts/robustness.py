@@ -1,0 +1,19 @@
+from pathlib import Path
+
+from baselines.references.robustness import robustness_table
+from synfeal.config.models import MODELS
+from synfeal.job import job
+from synfeal.report.robustness import CLEAN, MIXED, write_robustness
+
+inputs, outputs = snakemake.input, snakemake.output
+with job(snakemake.log[0]):
+    models = {
+        CLEAN: dict(zip(MODELS, map(Path, inputs.clean), strict=True)),
+        MIXED: dict(zip(MODELS, map(Path, inputs.mixed), strict=True)),
+    }
+    train = {CLEAN: Path(inputs.train), MIXED: Path(inputs.mixed_train)}
+    varied = zip(snakemake.params.effects, map(Path, inputs.varied), strict=True)
+    test = {CLEAN: Path(inputs.test), **dict(varied)}
+    labels = Path(inputs.labels[0]).parent
+    table = robustness_table(models, train, test, labels, snakemake.params.device)
+    write_robustness(table, Path(outputs.csv), Path(outputs.tex))
