@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +17,23 @@ from synfeal.config.load import read_yaml
 from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
 from synfeal.dataset.packed_record import file_sha256
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
-from synfeal.dataset.render_sequence import drawn
+from synfeal.dataset.render_sequence import drawn, effects_of
 from synfeal.dataset.sevenscenes import frame_paths, read_split
 from synfeal.effects.camera import AutoExposure, channel_gains, with_noise
-from synfeal.effects.light import drawn_light
+from synfeal.effects.light import GROUPS, drawn_light
+from synfeal.effects.relight import open_scene
 from synfeal.effects.transfer import light_of, rgb_of
 from synfeal.errors import InputError
 from synfeal.files import read_json
+from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
+from synfeal.geometry.rotations import rotation_from_rpy
+from synfeal.mesh.save import save_glb
+from synfeal.scenes.bake import light_shares, scanned_mesh
+from synfeal.scenes.grids import surface_of
+from synfeal.scenes.lighting import Lamp, Lighting, received
+from synfeal.scenes.patches import Item, Patch
+from synfeal.scenes.primitives import level, upright
+from synfeal.scenes.scan import Scanner
 from tests.collected import collect, save_room
 
 CAMERA = CameraConfig(width=120, height=16, horizontal_fov_deg=60.0)
@@ -141,6 +151,48 @@ def test_light_differs_from_path_to_path_and_stays_within_its_bounds() -> None:
     assert np.std(field) == pytest.approx(0.5, rel=0.12)
 
 
+def test_lights_add_up_in_linear_light(tmp_path: Path) -> None:
+    corners = ((4, 0), (0, 0), (0, 4), (4, 4), (4, 0))
+    walls = [upright(a, b, 0, 3) for a, b in pairwise(corners)]
+    grey = np.full((8, 8, 3), 230, np.uint8)
+    patches = [Patch(points, grey) for points in [*walls, level((0, 4), (0, 4), 0)]]
+    lamps = [
+        Lamp((1.0, 2.0, 2.9), (0, 0, -1), (1.0, 0.8, 0.5)),
+        Lamp((0.1, 2.0, 1.5), (1, 0, 0), (0.4, 0.6, 1.0), "daylight"),
+    ]
+    ambient = np.full((2, 2, 2, 3), 0.2, np.float32)
+    lighting = Lighting((0, 0, 0), (4, 4, 3), ambient, lamps, None)
+    surface = surface_of(np.random.default_rng(0), patches, 0.4)
+    count = len(surface.points_m)
+    dull = np.full((count, 3), 0.5, np.float32), np.zeros(count, np.float32)
+    parts = [received(surface, *dull, lighting.of_group(group)) for group in GROUPS]
+    np.testing.assert_allclose(sum(parts), received(surface, *dull, lighting), rtol=1e-5)
+    assert all(part.max() > 0.05 for part in parts)
+
+    scanner = Scanner(0.4, np.array([[2.0, 2.0, 1.5]]), (0, 0, 0), (4, 4, 3))
+    ingredients = Item(tuple(patches)), lighting, scanner
+    save_glb(tmp_path / "mesh.glb", scanned_mesh(np.random.default_rng(0), *ingredients))
+    for group, mesh in light_shares(np.random.default_rng(0), *ingredients).items():
+        save_glb(tmp_path / f"light_{group}.glb", mesh)
+    pose = pose_matrix(rotation_from_rpy([0, 0.3, 2.0]), [2.5, 1.5, 1.5])
+    poses = PoseTable(np.array([0]), np.array([0]), pose[None, :3, 3], quat_wxyz_of(pose)[None])
+
+    def light(state: str) -> np.ndarray:
+        settings = {"light": {"states": [state]}}
+        render = RenderConfig.model_validate({"backend": "raycast", "effects": settings})
+        with open_scene(tmp_path / "mesh.glb", CAMERA, render) as renderer:
+            ((rgb, _),) = drawn(renderer, poses, False, effects_of(CAMERA, render))
+        return light_of(rgb)
+
+    whole, lamp, day = (light(state) for state in ("all", "lamps", "daylight"))
+    # Half a level of 8 bits in each, where a level is at most a hundredth of white.
+    np.testing.assert_allclose(lamp + day, whole, atol=0.012)
+    assert (lamp - day).max() > 0.05 < (day - lamp).max()
+    (tmp_path / "light_ambient.glb").unlink()
+    with pytest.raises(InputError, match=r"light_ambient.glb: missing.*temperature_k"):
+        light("night")
+
+
 ALL = {
     "share": 0.7,
     "light": {"ev": [-1, 1], "temperature_k": [3000, 8000], "field_ev": 0.4},
@@ -156,7 +208,7 @@ ALL = {
 def test_shards_agree_to_the_byte(cuts: list[int]) -> None:
     poses = along_x(30, per_path=11)
     whole = frames(Wall(brighter_at=15), poses, **ALL)
-    parts = [poses.between(a, b) for a, b in itertools.pairwise(cuts)]
+    parts = [poses.between(a, b) for a, b in pairwise(cuts)]
     again = [rgb for part in parts for rgb in frames(Wall(brighter_at=15), part, **ALL)]
     np.testing.assert_array_equal(whole, again)
     assert len({rgb.tobytes() for rgb in whole}) == 30
@@ -181,6 +233,7 @@ def test_without_effects_nothing_is_recorded_or_drawn_anew() -> None:
         ({"noise": {"full_well_e": 0}}, "noise.full_well_e"),
         ({"white_balance_k": 500}, "white_balance_k"),
         ({"light": {"ev": [1, -1]}}, "light.ev: the first number"),
+        ({"light": {"states": ["disco"]}}, "light.states.0.*'night'"),
         ({"vignette": 1}, "vignette: unknown key; allowed here: exposure"),
     ],
 )
@@ -208,7 +261,7 @@ def test_collected_with_effects_the_same_in_other_shards_and_workers(tmp_path: P
     table = pd.read_csv(one / "train.effects.csv")
     poses = read_pose_table(one / "train.csv")
     assert table.frames.sum() == len(poses)
-    assert (table.light_ev.abs() <= 1).all()
+    assert (table.ev.abs() <= 1).all()
     manifest = read_json(one / "manifest.json")
     assert manifest["render"]["effects"]["motion_blur"]["subframes"] == 3
     assert manifest["effects_sha256"]["train.effects.csv"] == file_sha256(one / "train.effects.csv")

@@ -1,4 +1,4 @@
-"""What an effect costs a frame, beside ideal frames drawn in turn with it."""
+"""What effects cost a frame, beside ideal frames drawn in turn with theirs."""
 
 from __future__ import annotations
 
@@ -23,29 +23,30 @@ class Case(Strict):
     plan: Path = Field(description="pose table")
     frames: int = Field(40, ge=2, description="frames to draw, from the first")
     camera: CameraConfig = Field(description="camera of the frames")
-    effects: EffectsConfig = Field(description="what is added")
+    effects: dict[str, EffectsConfig] = Field(description="what is added, by name")
 
 
 def run(case: Case, seed: int) -> dict[str, float]:
-    """Seconds of the processor a frame, ideal and with effects, and their quotient.
+    """Seconds of the processor an ideal frame, and how many of them one with each effect takes.
 
     Raises:
         InputError: mesh or plan cannot be used.
     """
     poses = read_frames(case.plan, 0, case.frames)
-    render = RenderConfig(effects=case.effects)
-    with open_renderer(load_mesh(case.mesh), case.camera, render) as renderer:
-        ideal = _timed(renderer, poses, None)
-        varied = _timed(renderer, poses, (case.camera, case.effects))
-        next(ideal), next(varied)  # what the first frame alone costs
-        pairs = list(zip(ideal, varied, strict=True))
-    ideal_s, effect_s = (sum(column) / len(pairs) for column in zip(*pairs, strict=True))
-    return {"ideal_s": ideal_s, "effect_s": effect_s, "ratio": effect_s / ideal_s}
+    with open_renderer(load_mesh(case.mesh), case.camera, RenderConfig()) as renderer:
+        columns = {"ideal_s": _timed(renderer, poses, None)}
+        for name, effects in case.effects.items():
+            columns[name] = _timed(renderer, poses, (case.camera, effects))
+        rows = list(zip(*columns.values(), strict=True))[1:]  # the first loads what all use
+    ideal_s, *others_s = (sum(column) / len(rows) for column in zip(*rows, strict=True))
+    quotients = (other_s / ideal_s for other_s in others_s)
+    return {"ideal_s": ideal_s, **dict(zip(case.effects, quotients, strict=True))}
 
 
 def _timed(renderer: Renderer, poses: PoseTable, effects: Effects | None) -> Iterator[float]:
     """Seconds of the processor that each frame takes."""
-    frames, began = drawn(renderer, poses, False, effects), time.process_time()
-    for _ in frames:
-        yield time.process_time() - began
+    frames = drawn(renderer, poses, False, effects)
+    for _ in range(len(poses)):
         began = time.process_time()
+        next(frames)
+        yield time.process_time() - began

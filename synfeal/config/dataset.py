@@ -45,6 +45,12 @@ class DatasetConfig(Strict):
     def _check_effects(self) -> Self:
         if self.render.effects is not None:
             refuse_long_exposure(self.render.effects, self.collection, "render.effects")
+            light = self.render.effects.light
+            if light and light.states and any(s.source == "mesh" for s in self.scenes.values()):
+                raise ValueError(
+                    "render.effects.light.states: nothing is known of the lamps of a mesh of your"
+                    " own; use ev, temperature_k and field_ev"
+                )
         return self
 
     @property

@@ -15,6 +15,9 @@ Stops = Annotated[float, Field(ge=-10, le=10)]
 class LightConfig(Strict):
     """The light of a path: drawn once for each, the same for all of its frames."""
 
+    states: tuple[Literal["all", "lamps", "daylight", "dusk", "night"], ...] = Field(
+        (), description="stand-ins: which of their lights are on, one of these drawn for each path"
+    )
     ev: tuple[Stops, Stops] = Field(
         (0.0, 0.0), description="brightness of all light: drawn between these, stops"
     )

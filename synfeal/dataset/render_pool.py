@@ -18,9 +18,8 @@ from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.progress import Progress, Stopwatch
 from synfeal.dataset.render_sequence import effects_of, write_sequence
+from synfeal.effects.relight import open_scene
 from synfeal.errors import InputError
-from synfeal.mesh.load import load_mesh
-from synfeal.render import open_renderer
 from synfeal.render.base import Renderer
 
 POLL_S = 0.2
@@ -45,7 +44,7 @@ class Studio:
 
     def open(self) -> Renderer:
         """A renderer."""
-        return open_renderer(load_mesh(self.mesh), self.camera, self.render)
+        return open_scene(self.mesh, self.camera, self.render)
 
     def carry_out(self, renderer: Renderer, task: Task, on_frame: Callable[[], object]) -> float:
         """Render a sequence; seconds it took."""

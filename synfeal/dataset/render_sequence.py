@@ -18,9 +18,8 @@ from synfeal.dataset.packed import View, fit_frame, new_packed
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.progress import Progress, Stopwatch
 from synfeal.effects.apply import Frame, varied_frames
+from synfeal.effects.relight import open_scene
 from synfeal.files import write_json
-from synfeal.mesh.load import load_mesh
-from synfeal.render import open_renderer
 from synfeal.render.base import Renderer
 from synfeal.render.choose import fastest_working
 
@@ -48,7 +47,7 @@ def render_sequence(
     watch = Stopwatch()
     with (
         writing_to(out, lambda: REMEDY),
-        open_renderer(load_mesh(mesh_path), camera, render) as renderer,
+        open_scene(mesh_path, camera, render) as renderer,
         Progress(len(poses), out.name) as progress,
     ):
         write_sequence(
@@ -145,7 +144,7 @@ def render_packed(
     chosen = resolved(render or RenderConfig())
     with (
         writing_to(out, lambda: REMEDY),
-        open_renderer(load_mesh(mesh_path), camera, chosen) as renderer,
+        open_scene(mesh_path, camera, chosen) as renderer,
         new_packed(out, len(poses), input_px) as packed,
         Progress(len(poses), out.stem) as progress,
     ):

@@ -18,6 +18,7 @@ from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig, EffectsConfig
 from synfeal.effects.camera import AutoExposure, channel_gains, compressed, with_noise
 from synfeal.effects.light import LightState, drawn_light
+from synfeal.effects.relight import LitRenderer
 from synfeal.effects.transfer import Light, light_of, rgb_of
 from synfeal.geometry.poses import interpolate
 from synfeal.render.base import Depth, Renderer, Rgb
@@ -142,6 +143,10 @@ class _Path:
             seen = self._blurred(world_from_cam, row, config)
         if light is not None:
             seen *= light.gains
+            if light.weights is not None:
+                if not isinstance(self.renderer, LitRenderer):
+                    raise TypeError("light.states: the renderer must come from open_scene")
+                seen *= self.renderer.left(pose, light.weights)
             if light.amplitude_ev and depth_m is not None:
                 seen *= light.field(self._points_m(pose, depth_m))[..., None]
         return seen, depth_m if with_depth else None

@@ -12,6 +12,15 @@ from synfeal.effects.camera import channel_gains
 from synfeal.effects.transfer import Light
 
 WAVES = 6
+GROUPS = ("ambient", "lamps", "daylight")
+# Weights of the groups; `lamps` and `daylight` add up to the scene's own light.
+STATES: dict[str, tuple[float, float, float]] = {
+    "all": (1.0, 1.0, 1.0),
+    "lamps": (0.5, 1.0, 0.0),
+    "daylight": (0.5, 0.0, 1.0),
+    "dusk": (0.25, 1.0, 0.15),
+    "night": (0.05, 0.1, 0.0),
+}
 
 
 @dataclass(frozen=True)
@@ -24,6 +33,7 @@ class LightState:
         wave_vectors: (K, 3) of the smooth change, radians per metre.
         phases: (K,) radians.
         amplitude_ev: of each of its waves, stops.
+        state: name in ``STATES``, where the scene's lights are switched.
     """
 
     ev: float
@@ -31,6 +41,12 @@ class LightState:
     wave_vectors: NDArray[np.float64]
     phases: NDArray[np.float64]
     amplitude_ev: float
+    state: str | None = None
+
+    @property
+    def weights(self) -> dict[str, float] | None:
+        """Of the groups of sources, where they are switched."""
+        return dict(zip(GROUPS, STATES[self.state], strict=True)) if self.state else None
 
     @property
     def gains(self) -> Light:
@@ -54,4 +70,6 @@ def drawn_light(config: LightConfig, rng: np.random.Generator) -> LightState:
     lengths_m = config.field_m * rng.uniform(1, 2, WAVES)
     amplitude = config.field_ev * np.sqrt(2 / WAVES)
     phases = rng.uniform(0, 2 * np.pi, WAVES)
-    return LightState(ev, 1e6 / mired, ways * (2 * np.pi / lengths_m[:, None]), phases, amplitude)
+    vectors = ways * (2 * np.pi / lengths_m[:, None])
+    state = config.states[int(rng.integers(len(config.states)))] if config.states else None
+    return LightState(ev, 1e6 / mired, vectors, phases, amplitude, state)

@@ -15,6 +15,8 @@ def effects_table(config: EffectsConfig, poses: Poses) -> pd.DataFrame:
         own = path_effects(config, poses, first)
         light = path_light(own, poses, first)
         acts = {name: int(getattr(own, name) is not None) for name in EFFECTS}
-        state = {"light_ev": light.ev, "light_k": light.temperature_k} if light else {}
+        state = {}
+        if light is not None:
+            state = {"lights": light.state, "ev": light.ev, "temperature_k": light.temperature_k}
         rows.append({"path": poses.path[first], "frames": last - first, **acts, **state})
     return pd.DataFrame(rows)

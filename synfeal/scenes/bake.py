@@ -8,10 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.effects.light import GROUPS
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.scenes.atlas import laid_out
 from synfeal.scenes.grids import Grid, Surface, albedo_of, jittered, surface_of
-from synfeal.scenes.lighting import Lighting, baked
+from synfeal.scenes.lighting import Lighting, baked, exposure_of, received
 from synfeal.scenes.patches import Item, Patch, Points, bilinear
 from synfeal.scenes.scan import Scanner, scanned, seen_faces
 
@@ -39,6 +40,46 @@ def scanned_mesh(
     return _textured(surface, points, shares, seen, pictures)
 
 
+def light_shares(
+    rng: np.random.Generator, item: Item, lighting: Lighting, scanner: Scanner
+) -> dict[str, TexturedMesh]:
+    """The same scan by groups of sources: vertices hold the share of their light, linear, 255 is 1.
+
+    What shines by itself belongs to the source that is nearest to it.
+    """
+    surface = surface_of(rng, item.patches, scanner.cell_m)
+    albedo, glow = _reflecting(surface, item.patches)
+    nearest = np.array([_nearest_group(patch, lighting) for patch in item.patches])
+    group_of = np.repeat(nearest, [grid.n_points for grid in surface.grids])
+    own_glow = {group: glow * (group_of == group) for group in GROUPS}
+    light = {
+        group: received(surface, albedo, own_glow[group], lighting.of_group(group))
+        for group in GROUPS
+    }
+    exposure = exposure_of(np.asarray(sum(light.values())))
+    shown = [
+        light[group] * (exposure * (1 - glow))[:, None] + own_glow[group][:, None]
+        for group in GROUPS
+    ]
+    *others, _ = np.round(255 * np.stack(shown) / np.maximum(sum(shown), 1e-9)).astype(np.uint8)
+    points, _ = _moved(rng, surface, scanned(rng, surface, scanner))
+    faces = surface.faces[seen_faces(points, surface.faces, scanner.stations_m)]
+    used, compact = np.unique(faces, return_inverse=True)
+    corners = points[used], compact.reshape(-1, 3)
+    # The last is what remains, so that all together are 1 whatever is rounded.
+    shares = [*others, np.clip(255 - np.sum(others, axis=0, dtype=int), 0, 255).astype(np.uint8)]
+    return {
+        group: TexturedMesh((MeshPart(group, *corners, vertex_rgb=share[used]),))
+        for group, share in zip(GROUPS, shares, strict=True)
+    }
+
+
+def _nearest_group(patch: Patch, lighting: Lighting) -> str:
+    middle = patch.points_m.reshape(-1, 3).mean(axis=0)
+    lamps = [(np.linalg.norm(middle - lamp.position_m), lamp.group) for lamp in lighting.lamps]
+    return min(lamps)[1] if lamps else GROUPS[0]
+
+
 def _moved(
     rng: np.random.Generator, surface: Surface, points_m: Points
 ) -> tuple[Points, list[NDArray[np.float64]]]:
@@ -52,13 +93,20 @@ def _tones(
     surface: Surface, patches: Sequence[Patch], lighting: Lighting
 ) -> list[NDArray[np.float32]]:
     """Light (R, C, 3) at the vertices of every patch."""
+    return surface.per_patch(baked(surface, *_reflecting(surface, patches), lighting))
+
+
+def _reflecting(
+    surface: Surface, patches: Sequence[Patch]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Linear albedo (V, 3) and glow (V,) at the vertices."""
     albedo = [
         albedo_of(patch, grid).reshape(-1, 3)
         for patch, grid in zip(patches, surface.grids, strict=True)
     ]
     sizes = [grid.n_points for grid in surface.grids]
     glow = np.repeat(np.array([patch.glow for patch in patches], np.float32), sizes)
-    return surface.per_patch(baked(surface, np.concatenate(albedo), glow, lighting))
+    return np.concatenate(albedo), glow
 
 
 def _lit(patch: Patch, grid: Grid, tone: NDArray[np.float32]) -> NDArray[np.uint8]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,11 +24,15 @@ GLOW = 1.2  # radiance of a surface that shines by itself
 
 @dataclass(frozen=True)
 class Lamp:
-    """A small source that shines around ``axis`` (unit) with a cosine, like a panel or a window."""
+    """A small source that shines around ``axis`` (unit) with a cosine, like a panel or a window.
+
+    ``group`` says what it is switched with.
+    """
 
     position_m: tuple[float, float, float]
     axis: tuple[float, float, float]
     colour: Colour
+    group: Literal["lamps", "daylight"] = "lamps"
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,15 @@ class Lighting:
             value = value[:, 0] * (1 - along) + value[:, 1] * along
         return np.asarray(value, np.float32)
 
+    def of_group(self, group: str) -> Lighting:
+        """One of :data:`synfeal.effects.light.GROUPS` alone: all of them add up to the whole."""
+        return replace(
+            self,
+            ambient=self.ambient if group == "ambient" else np.zeros_like(self.ambient),
+            lamps=[lamp for lamp in self.lamps if lamp.group == group],
+            sun=self.sun if group == "daylight" else None,
+        )
+
 
 def _single(values: ArrayLike) -> NDArray[np.float32]:
     return np.asarray(values, np.float32)
@@ -79,7 +93,21 @@ def _single(values: ArrayLike) -> NDArray[np.float32]:
 def baked(
     surface: Surface, albedo: Vectors, glow: NDArray[np.float32], lighting: Lighting
 ) -> Vectors:
-    """Factors (V, 3) on display-referred albedo, after exposure.
+    """Factors (V, 3) on display-referred albedo, after exposure; see :func:`received`."""
+    light = received(surface, albedo, glow, lighting)
+    exposed = light * exposure_of(light)
+    return np.asarray(exposed ** np.float32(1 / 2.2), np.float32)
+
+
+def exposure_of(light: Vectors) -> np.float32:
+    """The factor on light (V, 3) that a scene is shown with."""
+    return np.float32(MEDIAN_LIGHT / np.median(light))
+
+
+def received(
+    surface: Surface, albedo: Vectors, glow: NDArray[np.float32], lighting: Lighting
+) -> Vectors:
+    """Linear light (V, 3) that arrives; the sum of what every source alone gives.
 
     Args:
         surface: what receives, blocks and passes on the light.
@@ -100,8 +128,7 @@ def baked(
     for _ in range(N_BOUNCES):
         radiance = albedo * light + np.float32(GLOW) * glow[:, None] * albedo
         light = first + _gathered(radiance[surface.faces].mean(axis=1), hits)
-    exposed = light * np.float32(MEDIAN_LIGHT / np.median(light))
-    return np.asarray(exposed ** np.float32(1 / 2.2), np.float32)
+    return light
 
 
 def _gather_rays(

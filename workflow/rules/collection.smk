@@ -98,6 +98,7 @@ rule render:
     input:
         mesh=rules.scene.output.mesh,
         plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w).split}.csv",
+        light=lambda w: shares_for(w.scene, CONFIG.render.effects),
     output:
         frames=sequence_output(f"{ROOT}/datasets/{{scene}}/{{camera}}/{{sequence}}"),
     log:
@@ -173,6 +174,7 @@ rule render_packed:
     input:
         mesh=rules.scene.output.mesh,
         plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w, 'network').split}.csv",
+        light=lambda w: shares_for(w.scene, CONFIG.render.effects),
     output:
         frames=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.npy"),
         record=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.json"),

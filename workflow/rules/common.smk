@@ -31,6 +31,7 @@ from synfeal.config.models import MODELS
 from synfeal.dataset.archive import SUFFIX
 from synfeal.dataset.finish import origin_of
 from synfeal.dataset.sequences import sequences_of
+from synfeal.effects.light import GROUPS as LIGHT_GROUPS
 from synfeal.errors import InputError
 from synfeal.labels.errors import seed_names
 from synfeal.provenance import config_hash
@@ -330,6 +331,22 @@ def files_of_references():
         ),
         *reference_sets("metrics.json"),
     ]
+
+
+def shares_for(scene, effects):
+    """The shares of a scene's light, where effects switch its lamps."""
+    if not (effects and effects.light and effects.light.states):
+        return []
+    return [f"{ROOT}/scenes/{scene}/light_{group}.glb" for group in LIGHT_GROUPS]
+
+
+def has_path(scene):
+    return scene in CONFIG.scenes and CONFIG.scenes[scene].source == "mesh"
+
+
+def scene_seed(scene):
+    own = CONFIG.scenes[scene].seed
+    return CONFIG.seed if own is None else own
 
 
 def robustness_files(wildcards):

@@ -5,19 +5,54 @@ ROBUSTNESS = CONFIG.robustness
 ROBUST_SET = f"{ROBUSTNESS.scene}/{ROBUSTNESS.size}/synfeal"
 
 
+# Of a mesh of one's own nothing is known of its lamps.
+ROBUST_EFFECTS = [
+    name
+    for name, effects in ROBUSTNESS.effects.items()
+    if not (effects.light and effects.light.states and has_path(ROBUSTNESS.scene))
+]
+
+
 def robust_run(model):
     return Run(
         ROBUSTNESS.scene, ROBUSTNESS.size, "synfeal", "pretrained", model, repetition=0
     )
 
 
+def varied_effects(wildcards):
+    return {**ROBUSTNESS.effects, "mixed": ROBUSTNESS.mixed}[wildcards.effects]
+
+
 def varied_render(wildcards):
-    effects = {**ROBUSTNESS.effects, "mixed": ROBUSTNESS.mixed}[wildcards.effects]
+    effects = varied_effects(wildcards)
     return dump(CONFIG.render.model_copy(update={"effects": effects}))
+
+
+# How much of its light comes from where: for light states, of stand-ins alone.
+rule light_shares:
+    output:
+        shares=expand(
+            f"{ROOT}/scenes/{{{{scene}}}}/light_{{group}}.glb", group=LIGHT_GROUPS
+        ),
+    log:
+        f"{ROOT}/logs/light_shares/{{scene}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/light_shares/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(4000),
+    params:
+        builder=lambda w: CONFIG.scenes[w.scene].builder,
+        seed=lambda w: scene_seed(w.scene),
+    script:
+        "../scripts/light_shares.py"
 
 
 rule render_varied:
     input:
+        light=lambda w: shares_for(ROBUSTNESS.scene, varied_effects(w)),
         mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
         plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/{{split}}.csv",
     output:
@@ -111,9 +146,7 @@ rule robustness:
         train=f"{ROOT}/frames/{ROBUSTNESS.scene}/train.npy",
         mixed_train=f"{VARIED}/frames/mixed/train.npy",
         test=f"{ROOT}/frames/{ROBUSTNESS.scene}/test.npy",
-        varied=expand(
-            f"{VARIED}/frames/{{effects}}/test.npy", effects=ROBUSTNESS.effects
-        ),
+        varied=expand(f"{VARIED}/frames/{{effects}}/test.npy", effects=ROBUST_EFFECTS),
         labels=expand(f"{ROOT}/labels/{ROBUST_SET}/{{split}}.csv", split=SPLITS),
     output:
         csv=report(
@@ -132,7 +165,7 @@ rule robustness:
     resources:
         mem_mb=grown(2000),
     params:
-        effects=list(ROBUSTNESS.effects),
+        effects=ROBUST_EFFECTS,
         device=CONFIG.training.device,
     script:
         "../scripts/robustness.py"

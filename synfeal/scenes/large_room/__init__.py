@@ -6,6 +6,8 @@ boards, cabinets and light that differs from wall to wall make every pose decida
 
 from __future__ import annotations
 
+import numpy as np
+
 from synfeal.mesh.model import TexturedMesh
 from synfeal.scenes.ambient import ambient_corners
 from synfeal.scenes.bake import scanned_mesh
@@ -13,7 +15,7 @@ from synfeal.scenes.large_room.boards import SILL_M, WINDOW_M, WINDOWS_Y_M, boar
 from synfeal.scenes.large_room.contents import LAMP_STRENGTHS, LAMPS_M, contents
 from synfeal.scenes.large_room.shell import HEIGHT_M, LENGTH_M, WIDTH_M, shell
 from synfeal.scenes.lighting import Lamp, Lighting, Sun
-from synfeal.scenes.patches import joined
+from synfeal.scenes.patches import Item, joined
 from synfeal.scenes.scan import Scanner, stations
 from synfeal.seeds import generator_of
 
@@ -23,15 +25,20 @@ CELL_M = 0.0456  # gives the paper's number of faces
 
 def build(seed: int) -> TexturedMesh:
     """The laboratory; x 0 – 5 (windows at 0), y 0 – 6.6 (door at 0), z 0 – 2.71 m."""
+    return scanned_mesh(*ingredients(seed))
+
+
+def ingredients(seed: int) -> tuple[np.random.Generator, Item, Lighting, Scanner]:
+    """What it is scanned from."""
     rng = generator_of("scene", "large_room", seed)
     everything = joined([shell(rng), boards(rng), contents(rng)])
     scanner = Scanner(CELL_M, stations(LOWER_M, UPPER_M, (2, 3, 1)), LOWER_M, UPPER_M)
-    return scanned_mesh(rng, everything, _lighting(), scanner)
+    return rng, everything, _lighting(), scanner
 
 
 def _lighting() -> Lighting:
     daylight = [
-        Lamp((0.12, y + dy, z), (1, 0, 0), (0.5, 0.62, 0.78))
+        Lamp((0.12, y + dy, z), (1, 0, 0), (0.5, 0.62, 0.78), "daylight")
         for y in WINDOWS_Y_M
         for dy in (-0.45, 0.45)
         for z in (1.3, 1.9)
