@@ -9,6 +9,7 @@ from pathlib import Path
 from pydantic import Field
 
 from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig, Strict
+from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable, read_frames
 from synfeal.dataset.render_sequence import Effects, drawn
 from synfeal.mesh.load import load_mesh
@@ -44,9 +45,9 @@ def run(case: Case, seed: int) -> dict[str, float]:
 
 
 def _timed(renderer: Renderer, poses: PoseTable, effects: Effects | None) -> Iterator[float]:
-    """Seconds of the processor that each frame takes."""
+    """Seconds of the processor that each frame takes, drawn and compressed."""
     frames = drawn(renderer, poses, False, effects)
     for _ in range(len(poses)):
         began = time.process_time()
-        next(frames)
+        encode_png(next(frames)[0])
         yield time.process_time() - began

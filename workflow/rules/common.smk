@@ -61,6 +61,8 @@ RUNS = DESIGN.runs
 TABLE_NAMES = ["table1_meshes", *DESIGN.tables]
 RECONSTRUCTED = tuple(METHODS)
 EXTERNAL = CONFIG.references.external
+ROBUSTNESS = CONFIG.robustness
+ROBUST_SET = f"{ROBUSTNESS.scene}/{ROBUSTNESS.size}/synfeal"
 
 
 wildcard_constraints:
@@ -349,9 +351,32 @@ def scene_seed(scene):
     return CONFIG.seed if own is None else own
 
 
+# Of a mesh of one's own nothing is known of its lamps.
+ROBUST_EFFECTS = [
+    name
+    for name, effects in ROBUSTNESS.effects.items()
+    if not (effects.light and effects.light.states and has_path(ROBUSTNESS.scene))
+]
+
+
+def robust_run(model):
+    return Run(
+        ROBUSTNESS.scene, ROBUSTNESS.size, "synfeal", "pretrained", model, repetition=0
+    )
+
+
+def varied_effects(wildcards):
+    return {**ROBUSTNESS.effects, "mixed": ROBUSTNESS.mixed}[wildcards.effects]
+
+
+def varied_render(wildcards):
+    effects = varied_effects(wildcards)
+    return dump(CONFIG.render.model_copy(update={"effects": effects}))
+
+
 def robustness_files(wildcards):
     """The robustness table, where it has rows and its data set is trained on here."""
-    robust = CONFIG.robustness
+    robust = ROBUSTNESS
     wanted = (robust.scene, robust.size, "synfeal", "pretrained")
     made = any((r.scene, r.size, r.labels, r.init) == wanted for r in RUNS)
     if not (robust.effects and made) or RESTORED:

@@ -1,31 +1,6 @@
 # The same test paths in other light, through another camera (docs/variation.md): localizers trained
 # on ideal frames, and once more on frames with all effects mixed in.
 VARIED = f"{ROOT}/robustness"
-ROBUSTNESS = CONFIG.robustness
-ROBUST_SET = f"{ROBUSTNESS.scene}/{ROBUSTNESS.size}/synfeal"
-
-
-# Of a mesh of one's own nothing is known of its lamps.
-ROBUST_EFFECTS = [
-    name
-    for name, effects in ROBUSTNESS.effects.items()
-    if not (effects.light and effects.light.states and has_path(ROBUSTNESS.scene))
-]
-
-
-def robust_run(model):
-    return Run(
-        ROBUSTNESS.scene, ROBUSTNESS.size, "synfeal", "pretrained", model, repetition=0
-    )
-
-
-def varied_effects(wildcards):
-    return {**ROBUSTNESS.effects, "mixed": ROBUSTNESS.mixed}[wildcards.effects]
-
-
-def varied_render(wildcards):
-    effects = varied_effects(wildcards)
-    return dump(CONFIG.render.model_copy(update={"effects": effects}))
 
 
 # How much of its light comes from where: for light states, of stand-ins alone.
