@@ -31,6 +31,7 @@ KEYS: Mapping[str, str] = {
     "pitch": f"scenes.{SCENE}.angles.pitch_deg",
     "yaw": f"scenes.{SCENE}.angles.yaw_deg",
     "min_view_distance": f"scenes.{SCENE}.min_view_distance_m",
+    "clutter": f"scenes.{SCENE}.clutter",
     "frames": f"scenes.{SCENE}.sizes.{SIZE}.train",
     "test_frames": f"scenes.{SCENE}.sizes.{SIZE}.test",
     "mode": "collection.mode",
@@ -151,9 +152,9 @@ def _nested(options: Mapping[str, Any]) -> dict[str, Any]:
     if unknown:
         raise InputError(f"{unknown[0]}: no such option; there are {', '.join(KEYS)}")
     given = {KEYS[name]: value for name, value in options.items() if value is not None}
-    effects = given.get(KEYS["effects"])
-    if isinstance(effects, Path | str):
-        given[KEYS["effects"]] = read_yaml(Path(effects))
+    for key in (KEYS["effects"], KEYS["clutter"]):
+        if isinstance(given.get(key), Path | str):
+            given[key] = read_yaml(Path(given[key]))
     boxes = given.pop(KEYS["box"], None)
     if boxes is not None:
         first, *others = ({"x": b[0:2], "y": b[2:4], "z": b[4:6]} for b in boxes)

@@ -77,6 +77,7 @@ TABLE: dict[str, tuple[str, str, tuple[str, ...]]] = {
         (*PLACES[1:], ".", "empty", "notes.txt", "latin.txt", "room.glb"),
     ),
     "collect effects": (COLLECT, "--effects", (*PLACES, "empty", "notes.txt", "latin.txt")),
+    "collect clutter": (COLLECT, "--clutter", (*PLACES, "empty", "notes.txt", "latin.txt")),
     "collect background": (COLLECT, "--background", ("0 0 256", "-1 0 0")),
     "collect supersampling": (COLLECT, "--supersampling", ("0", "-1", "5", "9" * 400)),
     "collect workers": (COLLECT, "--workers", ("0", "-3")),

@@ -116,7 +116,9 @@ def test_all_five_localizers_are_needed(raw):
 
 def test_a_scene_may_be_called_like_a_key(raw):
     raw["scenes"]["angles"] = {**raw["scenes"]["sanctuary"], "colour": 1}
-    with pytest.raises(InputError, match="allowed here: angles, builder, further_boxes, min_view"):
+    with pytest.raises(
+        InputError, match="allowed here: angles, builder, clutter, further_boxes, min_view"
+    ):
         parse_config(raw, "my.yaml")
 
 

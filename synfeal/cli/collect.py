@@ -78,6 +78,14 @@ RENDER_OPTIONS: Options = (
             "help": "YAML: light, motion blur, exposure, noise and more (docs/variation.md)",
         },
     ),
+    (
+        "--clutter",
+        {
+            "type": Path,
+            "metavar": "FILE",
+            "help": "YAML: objects that stand about, your own or cartons (docs/variation.md)",
+        },
+    ),
     ("--workers", {"type": int, "default": 1, "help": "processes that render (1)"}),
     (
         "--sequence-frames",

@@ -6,7 +6,16 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationInfo,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from synfeal.camera.calibration_files import read_calibration
@@ -94,6 +103,24 @@ class SizeConfig(Strict):
     test: Annotated[int, Field(ge=0, le=MOST_FRAMES)] = Field(description="test frames at scale 1")
 
 
+class ClutterConfig(Strict):
+    """Objects that stand about, on the floor or on tables, wherever cameras can be above them."""
+
+    count: Annotated[int, Field(ge=1, le=1000)] = Field(10, description="how many")
+    files: tuple[Path, ...] = Field(
+        (), description="meshes to choose from in turn, metres; none: cartons"
+    )
+    size_m: tuple[Positive, Positive] = Field(
+        (0.12, 0.4), description="cartons: shortest and longest side, metres"
+    )
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = Field(0, description="of the layout")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _ordered("size_m", self.size_m)
+        return self
+
+
 class SceneConfig(Strict):
     """One scene: where its mesh comes from and where the camera may go."""
 
@@ -133,9 +160,16 @@ class SceneConfig(Strict):
         1.2,
         description="least free distance along the optical axis of a target pose (the paper's d)",
     )
+    clutter: ClutterConfig | None = Field(None, description="objects that stand about")
     sizes: dict[SizeName, SizeConfig] = Field(
         default_factory=dict, description="data set sizes by the paper's names, at scale 1"
     )
+
+    @model_serializer(mode="wrap")
+    def _without_absent(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without the key where nothing stands about: records of such scenes stay the same."""
+        values: dict[str, Any] = handler(self)
+        return {k: v for k, v in values.items() if k != "clutter" or v is not None}
 
     @model_validator(mode="after")
     def _check(self) -> Self:

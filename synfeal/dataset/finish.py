@@ -16,7 +16,10 @@ from synfeal.dataset.packed_record import file_sha256
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.dataset.sequences import Split, sequences_of
 from synfeal.dataset.sevenscenes import frame_paths, write_splits
+from synfeal.files import read_json
 from synfeal.frames import write_frame
+
+CLUTTER = "clutter.json"  # beside the mesh: which objects stand about in it, and where
 
 
 def finish(
@@ -54,6 +57,8 @@ def finish(
             pack_frames(chosen, packed_px, directory / f"{split}.npy")
     write_contact_sheet(frame_paths(list(paths.values()), "color.png"), directory / "preview.png")
     about = {"mesh_sha256": file_sha256(mesh), **origin, **_write_effects(directory, origin)}
+    if mesh.with_name(CLUTTER).is_file():
+        about["clutter"] = read_json(mesh.with_name(CLUTTER))
     write_manifest(directory, sequences, camera, about)
 
 

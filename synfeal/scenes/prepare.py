@@ -5,15 +5,19 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from synfeal.config.mesh_files import check_mesh_file
 from synfeal.config.models import SceneConfig
+from synfeal.dataset.finish import CLUTTER
 from synfeal.errors import InputError
 from synfeal.files import write_json
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.properties import mesh_properties
 from synfeal.mesh.save import save_glb
-from synfeal.mesh.triangles import merge_vertices, save_collision_mesh
+from synfeal.mesh.triangles import Triangles, merge_vertices, save_collision_mesh
 from synfeal.planning.plan import sampling_box_of
 from synfeal.scenes.collision import Rung, collision_mesh, write_curve
 from synfeal.seeds import generator_of
@@ -60,10 +64,35 @@ def prepare_mesh(
     else:
         rng = generator_of(seed, "collision", name)
         collision, curve = collision_mesh(mesh, scene, box, collision_agreement, rng)
+    if scene.clutter is not None:
+        mesh, collision = _with_clutter(name, scene, mesh, collision, box, out_dir)
     save_collision_mesh(out_dir / "collision.ply", collision)
     write_curve(out_dir / "collision_curve.csv", curve)
     save_glb(out_dir / "mesh.glb", mesh)
     return mesh, len(collision.faces)
+
+
+def _with_clutter(
+    name: str,
+    scene: SceneConfig,
+    mesh: TexturedMesh,
+    collision: Triangles,
+    box: NDArray[np.float64],
+    out_dir: Path,
+) -> tuple[TexturedMesh, Triangles]:
+    """Scene and collision mesh with objects, of which none is simplified: paths avoid them all."""
+    from synfeal.scenes.objects import cluttered  # paints, so takes time to load
+
+    assert scene.clutter is not None
+    rng = generator_of("clutter", scene.clutter.seed)
+    objects, places = cluttered(mesh, box, scene.clutter, rng, f"scenes.{name}.clutter")
+    write_json(out_dir / CLUTTER, places)
+    vertices, faces = objects.merged()
+    joined = Triangles(
+        np.concatenate([collision.vertices_m, vertices]),
+        np.concatenate([collision.faces, faces + len(collision.vertices_m)]),
+    )
+    return TexturedMesh((*mesh.parts, *objects.parts), mesh.findings), joined
 
 
 def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:
