@@ -1,48 +1,78 @@
-"""The contact sheets of variation.md: python docs/variation_sheets.py results/mini"""
+"""The contact sheets of variation.md: python docs/variation_sheets.py results/mini [NAME ...]"""
 
 import sys
+from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw
 
 from synfeal.config import load_config
+from synfeal.config.collection import ClutterConfig
 from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.dataset.render_sequence import drawn
+from synfeal.effects.relight import LitRenderer
 from synfeal.mesh.load import load_mesh
+from synfeal.mesh.model import TexturedMesh
 from synfeal.render import open_renderer
+from synfeal.scenes import large_room
+from synfeal.scenes.bake import light_shares
+from synfeal.scenes.objects import cluttered
 
-CAMERA = CameraConfig(width=320, height=240)
+CAMERA, RENDER = CameraConfig(width=320, height=240), RenderConfig(backend="opengl")
 SHOWN = (3, 10, 30, 47)  # paths of the test set, their second frame
 TITLE_PX = 14
 
 
-def main(root: Path) -> None:
+def main(root: Path, wanted: list[str]) -> None:
     """One row without and two with each effect of `robustness`, into docs/images."""
     settings = load_config(Path("config/config.yaml")).robustness.effects
     plan = read_pose_table(root / "plans/large_room/test.csv")
-    starts = [int(np.flatnonzero(plan.path == path)[1]) for path in SHOWN]
-    poses = [plan.between(row, row + 1) for row in starts]
+    poses = [plan.between(row, row + 1) for path in SHOWN for row in second_of(plan, path)]
     mesh = load_mesh(root / "scenes/large_room/mesh.glb")
-    with open_renderer(mesh, CAMERA, RenderConfig(backend="opengl")) as renderer:
-        ideal = row_of(renderer, poses, "ideal", None)
-        for name in dict.fromkeys(key.rpartition("_")[0] for key in settings):
-            varied = [f"{name}_{strength}" for strength in (1, 2)]
-            rows = [row_of(renderer, poses, key, settings[key]) for key in varied]
-            sheet = Image.fromarray(np.concatenate([ideal, *rows]))
-            sheet.save(Path(__file__).parent / f"images/variation_{name}.jpg", quality=85)
+    names = list(dict.fromkeys(key.rpartition("_")[0] for key in settings))
+    for name in [name for name in [*names, "clutter"] if not wanted or name in wanted]:
+        rows = [("ideal", None), *((key, settings.get(key)) for key in (f"{name}_1", f"{name}_2"))]
+        sheet = [row_of(mesh, poses, *row) for row in rows if row[1] or row[0] == "ideal"]
+        if name == "clutter":
+            bounds = np.array([[0.7, 0.7, 0.9], [4.3, 5.9, 2.1]])
+            rng = np.random.default_rng(0)
+            objects, _ = cluttered(mesh, bounds, ClutterConfig(count=14), rng, "clutter")
+            sheet.append(row_of(TexturedMesh((*mesh.parts, *objects.parts)), poses, name, None))
+        file = Path(__file__).parent / f"images/variation_{name}.jpg"
+        Image.fromarray(np.concatenate(sheet)).save(file, quality=85)
 
 
-def row_of(renderer, poses: list[PoseTable], title: str, effects: EffectsConfig | None):
+def second_of(plan: PoseTable, path: int) -> list[int]:
+    """The second row of a path, which has moved."""
+    return [int(np.flatnonzero(plan.path == path)[1])]
+
+
+def row_of(mesh: TexturedMesh, poses: list[PoseTable], title: str, effects: EffectsConfig | None):
     """The frames side by side under a title (H, W, 3)."""
     through = (CAMERA, effects) if effects else None
-    frames = [rgb for pose in poses for rgb, _ in drawn(renderer, pose, False, through)]
+    with ExitStack() as opened:
+        renderer = opened.enter_context(open_renderer(mesh, CAMERA, RENDER))
+        if effects and effects.light and effects.light.states:
+            shares = {
+                group: opened.enter_context(open_renderer(shared, CAMERA, RENDER))
+                for group, shared in shares_of_the_room().items()
+            }
+            renderer = LitRenderer(renderer, shares)
+        frames = [rgb for pose in poses for rgb, _ in drawn(renderer, pose, False, through)]
     row = Image.new("RGB", (CAMERA.width * len(frames), CAMERA.height + TITLE_PX))
     row.paste(Image.fromarray(np.hstack(frames)), (0, TITLE_PX))
     ImageDraw.Draw(row).text((4, 1), title, "white")
     return np.asarray(row)
 
 
+@cache
+def shares_of_the_room() -> dict[str, TexturedMesh]:
+    """How much of its light comes from where."""
+    return light_shares(*large_room.ingredients(0))
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), sys.argv[2:])

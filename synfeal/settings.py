@@ -120,7 +120,7 @@ def in_words_of_options(message: str) -> str:
     below = {**KEYS, "further box": FURTHER_BOXES}
     for option, own in sorted(below.items(), key=lambda item: -len(item[1])):
         if f"{key}.".startswith(f"{own}."):
-            inner = [name for name in key.removeprefix(own).split(".") if name.isalpha()]
+            inner = [name for name in key.removeprefix(own).split(".") if name.isidentifier()]
             message = ": ".join([_flag(option.removeprefix("further ")), *inner, rest])
             break
     for option, own in sorted(KEYS.items(), key=lambda item: -len(item[1])):

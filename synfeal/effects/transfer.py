@@ -24,10 +24,10 @@ _LEVEL: Rgb = np.round(255 * _encoded(np.arange(STEPS + 1) / STEPS)).astype(np.u
 
 def light_of(rgb: Rgb) -> Light:
     """Light (...), white is 1, of what files hold (...)."""
-    return np.take(_LIGHT, rgb)
+    return np.asarray(np.take(_LIGHT, rgb))
 
 
 def rgb_of(light: Light) -> Rgb:
     """What files hold (...) of light (...); what is beyond white is white."""
     step = np.clip(light * np.float32(STEPS) + np.float32(0.5), 0, STEPS).astype(np.uint16)
-    return np.take(_LEVEL, step)
+    return np.asarray(np.take(_LEVEL, step))

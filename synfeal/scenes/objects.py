@@ -125,7 +125,7 @@ def _place(
     caster = RayCaster(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
     base = np.array([(x, y, 0.0) for x in (-1, 0, 1) for y in (-1, 0, 1)]) * half_m
     for _ in range(TRIES):
-        start_m, yaw_rad = rng.uniform(*bounds_m), float(rng.uniform(0, 2 * np.pi))
+        start_m, yaw_rad = rng.uniform(bounds_m[0], bounds_m[1]), float(rng.uniform(0, 2 * np.pi))
         above = base @ _about_z(yaw_rad).T + start_m
         height_m = above[:, 2] - caster.first_hit_m(above, np.tile([0.0, 0.0, -1.0], (9, 1)))
         if not np.isfinite(height_m).all() or np.ptp(height_m) > FLAT_M:
