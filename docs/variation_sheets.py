@@ -36,7 +36,11 @@ def main(root: Path, wanted: list[str]) -> None:
     for name in [name for name in [*names, "clutter"] if not wanted or name in wanted]:
         rows = [("ideal", None), *((key, settings.get(key)) for key in (f"{name}_1", f"{name}_2"))]
         sheet = [row_of(mesh, poses, *row) for row in rows if row[1] or row[0] == "ideal"]
-        if name == "clutter":
+        if name == "clutter":  # on the floor and on tables
+            down = np.argsort(plan.world_from_cam[:, 2, 2])
+            rows = [down[plan.path[down] == path][0] for path in dict.fromkeys(plan.path[down])]
+            poses = [plan.between(int(row), int(row) + 1) for row in rows[: len(SHOWN)]]
+            sheet = [row_of(mesh, poses, "ideal", None)]
             bounds = np.array([[0.7, 0.7, 0.9], [4.3, 5.9, 2.1]])
             rng = np.random.default_rng(0)
             objects, _ = cluttered(mesh, bounds, ClutterConfig(count=14), rng, "clutter")
