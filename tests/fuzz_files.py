@@ -54,8 +54,8 @@ from synfeal.report.claims.model import Missing, published_claims
 from synfeal.report.claims.simulator import collection_rate
 from synfeal.report.claims.training import read_history
 from synfeal.report.compare.runs import read_run
-from synfeal.report.figures.cumulative_error import read_errors
-from synfeal.report.figures.sources import TEXTS, Results, number
+from synfeal.report.figures.cumulative_error import scene_errors
+from synfeal.report.figures.sources import Results
 from synfeal.report.html.claims import claims_table, read_claims
 from synfeal.report.html.labels import label_error_table
 from synfeal.report.html.origin import cost_sentence, origin_html, read_origin
@@ -529,8 +529,8 @@ _sizes = table_of(
 
 
 def _figure_table(path: Path) -> list[float]:
-    rows = Results(path.parents[1], design_of(())).table(path.stem)
-    return [number(row[column]) for row in rows for column in row if column not in TEXTS]
+    table = Results(path.parents[1], design_of(())).table(path.stem)
+    return table.select_dtypes("number").to_numpy().ravel().tolist()
 
 
 ROOM = ("sfm", "large_room", "6k")
@@ -582,7 +582,7 @@ KINDS: tuple[Kind, ...] = (
     Kind(
         "errors, figure",
         of_run("errors.csv"),
-        lambda p: read_errors(Results(p.parents[7], design_of((ROW,))), ROW),
+        lambda p: scene_errors(Results(p.parents[7], design_of((ROW,))), ROW),
         form=",",
     ),
     Kind("metrics", of_run("metrics.json"), lambda p: combine([read_metrics(p)]), form="json"),
