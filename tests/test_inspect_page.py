@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
@@ -15,11 +16,14 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 
+from synfeal.errors import InputError
 from synfeal.inspect.page import page_html
 from synfeal.inspect.surface import SurfacePoints
 from synfeal.inspect.text import Section
 from synfeal.inspect.viewer_mesh import ViewerMesh, split_longest_edges, viewer_mesh
+from synfeal.mesh.decimate import simplify
 from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.triangles import Triangles
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 FLAGS = (
@@ -134,6 +138,13 @@ def test_large_meshes_are_simplified_and_keep_their_shape() -> None:
     np.testing.assert_allclose(np.linalg.norm(points, axis=1), 2.0, atol=0.01)
     assert (copy.rgb[points[:, 2] > 0.2] == [255, 0, 0]).all()
     assert (copy.rgb[points[:, 2] < -0.2] == [0, 0, 255]).all()
+
+
+def test_a_large_mesh_without_open3d_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Open3D is an extra: who installs the simulator alone may lack it."""
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    with pytest.raises(InputError, match=r"pip install 'synfeal\[inspect\]'"):
+        simplify(Triangles(np.eye(3), np.array([[0, 1, 2]])), 1)
 
 
 def test_what_the_alpha_test_cuts_out_is_left_out() -> None:

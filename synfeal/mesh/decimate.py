@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from synfeal.errors import InputError
 from synfeal.mesh.triangles import Triangles
 
 
@@ -13,8 +14,16 @@ def simplify(mesh: Triangles, n_faces: int) -> Triangles:
     Open edges are given planes of their own (``boundary_weight``). Without them the rim of a flat
     sheet retracts within its plane at no cost: a column of four sheets without lids is the first
     thing to vanish, and cameras fly through it.
+
+    Raises:
+        InputError: Open3D is not installed.
     """
-    import open3d as o3d  # a second to load, and needed by the workflow alone
+    try:
+        import open3d as o3d  # a second to load, and needed by the workflow and by inspect alone
+    except ModuleNotFoundError:
+        raise InputError(
+            "simplifying a mesh needs Open3D, which is not there; pip install 'synfeal[inspect]'"
+        ) from None
 
     centre_m = mesh.vertices_m.mean(axis=0)  # far from the origin quadrics lose their digits
     full = o3d.geometry.TriangleMesh(
