@@ -605,7 +605,7 @@ KINDS: tuple[Kind, ...] = (
     Kind(
         "measured job",
         _benchmark,
-        lambda p: [vars(s) for s in read_stages(p.parents[2])],
+        lambda p: [vars(s) for s in read_stages([p], p.parents[2])],
         finite_numbers,
         "\t",
     ),

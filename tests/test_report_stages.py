@@ -20,15 +20,16 @@ def measure(path, seconds, peak_mb):
 
 @pytest.fixture
 def benchmarks(tmp_path):
-    measure(tmp_path / "train" / "room" / "a.tsv", 10, 300.5)
-    measure(tmp_path / "train" / "room" / "b.tsv", 4, 200)
-    measure(tmp_path / "train" / "c.tsv", 1, "NA")
-    measure(tmp_path / "summary.tsv", 0.5, "-")
-    return tmp_path
+    folder = tmp_path / "benchmarks"
+    measure(folder / "train" / "room" / "a.tsv", 10, 300.5)
+    measure(folder / "train" / "room" / "b.tsv", 4, 200)
+    measure(folder / "train" / "c.tsv", 1, "NA")
+    measure(folder / "summary.tsv", 0.5, "-")
+    return folder
 
 
 def test_jobs_are_summed_by_stage(benchmarks):
-    assert read_stages(benchmarks) == [
+    assert read_stages(benchmarks.rglob("*.tsv"), benchmarks) == [
         Stage("train", 3, 15.0, 4.0, 300.5),
         Stage("summary", 1, 0.5, 0.5, None),
     ]
@@ -37,16 +38,16 @@ def test_jobs_are_summed_by_stage(benchmarks):
 def test_a_broken_measurement_is_named(benchmarks):
     (benchmarks / "summary.tsv").write_text("s\tmax_rss\nfast\t1\n")
     with pytest.raises(InputError, match=r"summary\.tsv: row 2: s must be a number"):
-        read_stages(benchmarks)
+        read_stages([benchmarks / "summary.tsv"], benchmarks)
 
 
 def test_the_record_says_what_ran_where_and_for_how_long(benchmarks):
-    out = benchmarks / "provenance.json"
-    result, folder = benchmarks / "table.csv", benchmarks / "figures"
+    root = benchmarks.parent
+    out, result, folder = (root / name for name in ("provenance.json", "table.csv", "figures"))
     result.write_bytes(b"abc")
     folder.mkdir()
     (folder / "a.png").write_bytes(b"")
-    write_provenance(7, "feed", benchmarks, [result, folder], out)
+    write_provenance(7, "feed", list(benchmarks.rglob("*.tsv")), [result, folder], out)
     record = json.loads(out.read_text())
     assert (record["seed"], record["config_sha256"]) == (7, "feed")
     assert record["stages"][0]["seconds"] == 15.0

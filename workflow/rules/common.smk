@@ -45,7 +45,8 @@ try:
     CONFIG = parse_config(
         config, " + ".join(map(str, workflow.configfiles)) or "config"
     )
-    check_mesh_files(CONFIG.scenes)
+    if not workflow.storage_settings.default_storage_provider:
+        check_mesh_files(CONFIG.scenes)
     check_results(CONFIG.root)
     DESIGN = read_design(CONFIG)
     EXPERIMENTS = DESIGN.rows
@@ -259,10 +260,37 @@ def files_of_trainings(pattern):
     return [file for run, file in files.items() if run in made or file in RESTORED]
 
 
+def measurements(outputs):
+    """What the jobs that make ``outputs`` took, but for what was restored without it."""
+    stored = workflow.modifier.path_modifier.apply_default_storage
+    found = {}
+    for output in dict.fromkeys(outputs):
+        maker = next(rule for rule in workflow.rules if rule.is_producer(stored(output)))
+        benchmark = maker.expand_benchmark(maker.get_wildcards(stored(output)))
+        found[f"{ROOT}{benchmark.partition(ROOT)[2]}"] = output
+    return [f for f, made in found.items() if made not in RESTORED or f in RESTORED]
+
+
 def packed_frames(splits=SPLITS):
     """Frames as the localizers see them."""
     scenes = sorted({e.scene for e in EXPERIMENTS})
     return [f"{ROOT}/frames/{s}/{split}.npy" for s in scenes for split in splits]
+
+
+def passing_files():
+    """Outputs that go once they are used: parts of packed frames, features."""
+    rooms = CONFIG.rooms if backbones() else []
+    scenes = sorted({*(e.scene for e in EXPERIMENTS), *rooms})
+    sizes = sorted({(e.scene, e.size) for e in EXPERIMENTS})
+    return [
+        *(f for s in scenes for p in SPLITS for f in packed_shards(s, p, "npy")),
+        *(
+            f"{ROOT}/references/{s}/{z}/features-{split}.npz"
+            for s, z in sizes
+            for split in SPLITS
+            if has_structure(EXPERIMENTS, s, z)
+        ),
+    ]
 
 
 def manifests(camera):
@@ -481,4 +509,23 @@ def files_of_runs():
         *(f"{ROOT}/pretrained/{backbone}.pt" for backbone in sorted(backbones())),
         *(m.replace("metrics.json", "predictions.csv") for m in all_metrics()),
         *all_metrics(),
+    ]
+
+
+def files_of_evidence():
+    """An output of every job of a run but those that record and report the run."""
+    scenes = sorted({e.scene for e in EXPERIMENTS})
+    tables = ["assistance", "hard_cases", "label_error", "recall", "references"]
+    return [
+        *files_of_runs(),
+        *files_of_references(),
+        *coverages(),
+        *manifests("groundtruth"),
+        *(f"{ROOT}/scenes/{scene}/render_speed.csv" for scene in scenes),
+        *(f"{ROOT}/scenes/{scene}/collection_speed.json" for scene in scenes),
+        *(f"{ROOT}/tables/{t}.csv" for t in [*tables, "speed_vs_error", *TABLE_NAMES]),
+        f"{ROOT}/tables/all_tables.tex",
+        f"{ROOT}/figures",
+        f"{ROOT}/claims.csv",
+        f"{ROOT}/summary.md",
     ]

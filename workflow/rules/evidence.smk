@@ -299,18 +299,24 @@ rule claims:
         "../scripts/claims.py"
 
 
+RESULTS = [
+    *expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
+    rules.speed_vs_error.output.csv,
+    rules.hard_cases.output.csv,
+    rules.assistance.output.csv,
+    rules.label_error.output.csv,
+    rules.references_table.output.csv,
+    rules.recall.output.csv,
+    rules.figures.output.figures,
+    rules.summary.output.page,
+    rules.claims.output.csv,
+]
+
+
 rule provenance:
     input:
-        tables=expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
-        speed=rules.speed_vs_error.output.csv,
-        hard_cases=rules.hard_cases.output.csv,
-        assistance=rules.assistance.output.csv,
-        label_error=rules.label_error.output.csv,
-        references=rules.references_table.output.csv,
-        recall=rules.recall.output.csv,
-        figures=rules.figures.output.figures,
-        summary=rules.summary.output.page,
-        claims=rules.claims.output.csv,
+        results=RESULTS,
+        measured=lambda w: measurements([*files_of_evidence(), *passing_files()]),
     output:
         record=f"{ROOT}/provenance.json",
         jobs=f"{ROOT}/benchmarks.csv",
@@ -333,7 +339,7 @@ rule provenance:
 rule report:
     input:
         provenance=rules.provenance.output.record,
-        tables=rules.provenance.input,
+        results=RESULTS,
         metrics=all_metrics(),
         meshes=expand(
             f"{ROOT}/scenes/{{scene}}/mesh.glb",

@@ -6,11 +6,12 @@ from synfeal.report.html.provenance import write_provenance
 
 with job(snakemake.log[0]):
     out_json = Path(snakemake.output.record)
-    write_measured(out_json.parent)
+    measured = [Path(path) for path in snakemake.input.measured]
+    write_measured(measured, out_json.parent)
     write_provenance(
         snakemake.params.seed,
         snakemake.params.config_hash,
-        out_json.parent / "benchmarks",
-        [Path(path) for path in snakemake.input],
+        measured,
+        [Path(path) for path in snakemake.input.results],
         out_json,
     )

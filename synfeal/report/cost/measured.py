@@ -60,9 +60,10 @@ def read_jobs(paths: Iterable[Path], folder: Path) -> pd.DataFrame:
     return jobs.assign(cpu_s=jobs["wall_s"] * busy.fillna(usual))
 
 
-def write_measured(root: Path) -> None:
-    """Keep the measurements below ``<root>/benchmarks`` in one file, ``<root>/benchmarks.csv``."""
-    table = read_measured(root).round({"wall_s": 2, "cpu_s": 2, "peak_mb": 1})
+def write_measured(paths: Iterable[Path], root: Path) -> None:
+    """Keep files below ``<root>/benchmarks`` in one file, ``<root>/benchmarks.csv``."""
+    jobs = read_jobs(sorted(paths), root / "benchmarks")
+    table = jobs.round({"wall_s": 2, "cpu_s": 2, "peak_mb": 1})
     write_frame(root / "benchmarks.csv", table, float_format=None)
 
 

@@ -17,14 +17,18 @@ from synfeal.report.html.stages import read_stages
 
 
 def write_provenance(
-    seed: int, config_hash: str, benchmarks: Path, results: Iterable[Path], out_json: Path
+    seed: int,
+    config_hash: str,
+    measured: Iterable[Path],
+    results: Iterable[Path],
+    out_json: Path,
 ) -> None:
     """Write the record.
 
     Args:
         seed: root of all seeds.
         config_hash: :func:`synfeal.provenance.config_hash` of the configuration.
-        benchmarks: where the jobs were measured.
+        measured: what the jobs took, files below ``benchmarks`` beside the record.
         results: files, and directories of files, whose SHA-256 is recorded.
         out_json: ``synfeal.provenance.provenance``, ``machine``, ``stages`` and ``files``: hashes
             by path relative to the record.
@@ -32,7 +36,7 @@ def write_provenance(
     Raises:
         InputError: a measurement cannot be read.
     """
-    stages = [asdict(stage) for stage in read_stages(benchmarks)]
+    stages = [asdict(stage) for stage in read_stages(measured, out_json.parent / "benchmarks")]
     record = provenance(seed, config_hash)
     files = hashes(results, out_json.parent)
     write_json(out_json, record | {"machine": machine(), "stages": stages, "files": files})

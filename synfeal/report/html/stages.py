@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,13 +33,13 @@ class Stage:
     peak_mb: float | None
 
 
-def read_stages(benchmarks: Path) -> list[Stage]:
-    """Every stage measured below ``benchmarks``, the longest first.
+def read_stages(paths: Iterable[Path], benchmarks: Path) -> list[Stage]:
+    """Every stage measured, by files below ``benchmarks``, the longest first.
 
     Raises:
         InputError: a measurement cannot be read.
     """
-    jobs = [_read(path, benchmarks) for path in sorted(benchmarks.rglob("*.tsv"))]
+    jobs = [_read(path, benchmarks) for path in sorted(paths)]
     if not jobs:
         return []
     stages = (
