@@ -22,7 +22,6 @@ from synfeal.dataset.archive import (
     ArchivedFile,
     foreign_members,
     frame_file,
-    sequence_at,
     write_archive,
 )
 from synfeal.dataset.manifest import verify_manifest
@@ -30,7 +29,6 @@ from synfeal.dataset.packed import pack_frames, read_packed
 from synfeal.dataset.render_sequence import write_sequence
 from synfeal.dataset.sevenscenes import frame_paths, read_depth_m, read_pose, read_split
 from synfeal.errors import InputError
-from synfeal.planning.repeat import read_poses
 from tests.collected import save_room, tree_of
 from tests.damaged_sets import CAMERA, write_planar_set
 from tests.test_dataset import FakeRenderer, poses_of
@@ -115,13 +113,6 @@ def test_readers_see_the_same_frames(planar: Path, packed: Path, tmp_path: Path)
     for paths, name in zip(color, ("in", "out"), strict=True):
         link_images(paths, CAMERA, tmp_path / name)
     assert tree_of(tmp_path / "in") == tree_of(tmp_path / "out")
-
-
-def test_repeated_poses_may_be_archived(planar: Path, packed: Path, tmp_path: Path) -> None:
-    for source, name in ((planar, "plain"), (packed, "packed")):
-        shutil.copytree(source, tmp_path / name, ignore=shutil.ignore_patterns("*.csv"))
-    tables = [read_poses(tmp_path / name, "test") for name in ("plain", "packed")]
-    np.testing.assert_array_equal(tables[0].world_from_cam, tables[1].world_from_cam)
 
 
 def test_validate_passes_archives_as_directories(
@@ -212,13 +203,6 @@ def test_a_member_that_says_it_is_huge_is_not_read(
         ArchivedFile(packed / "seq-01.zip", "frame-000000.color.png").read_bytes()
     with pytest.raises(FileNotFoundError, match=r"seq-01\.zip/frame-000099\.color\.png"):
         ArchivedFile(packed / "seq-01.zip", "frame-000099.color.png").read_bytes()
-
-
-def test_a_directory_goes_before_an_archive_of_its_name(packed: Path, tmp_path: Path) -> None:
-    folder = Path(shutil.copytree(packed, tmp_path / "set"))
-    assert sequence_at(folder / "seq-01") == folder / "seq-01.zip"
-    (folder / "seq-01").mkdir()
-    assert sequence_at(folder / "seq-01") == folder / "seq-01"
 
 
 def test_a_sequence_is_rendered_into_an_archive_or_not_at_all(tmp_path: Path) -> None:

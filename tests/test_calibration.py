@@ -16,7 +16,6 @@ import yaml
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.calibration_files import read_calibration
 from synfeal.camera.rays import pixels_of_normalised
-from synfeal.cli import main
 from synfeal.config import load_config, parse_config, read_experiments
 from synfeal.config.load import merge, read_yaml
 from synfeal.config.models import CameraConfig
@@ -180,33 +179,6 @@ def test_a_file_that_cannot_be_used_is_refused_in_one_line(
         assert word in message
 
 
-@pytest.mark.parametrize("ending", ["yaml", "json", "txt", "bin", "xml"])
-@pytest.mark.parametrize(
-    "content", [b"", b"\xff\xfe\x00", bytes(range(256)), b"[" * 9999, b"5", b"- 1\n", b"&a [*a]"]
-)
-def test_bytes_that_are_no_calibration_end_in_one_line(
-    tmp_path: Path, ending: str, content: bytes
-) -> None:
-    path = tmp_path / f"camera.{ending}"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=r"camera\."):
-        read_calibration(path)
-
-
-@pytest.mark.parametrize(("name", "text"), FILES.items(), ids=FILES)
-def test_a_truncated_file_gives_the_camera_or_one_line(
-    tmp_path: Path, name: str, text: str
-) -> None:
-    whole = read_calibration(stored(tmp_path, name, text))
-    for end in range(0, len(text), 7):
-        path = stored(tmp_path, name, text[:end])
-        try:
-            found = read_calibration(path)
-        except InputError:
-            continue
-        assert (found.width, found.height, found.fx, found.fy) == (640, 480, whole.fx, whole.fy)
-
-
 def test_a_missing_or_binary_file_says_what_to_do(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"no\.yaml: cannot be read"):
         read_calibration(tmp_path / "no.yaml")
@@ -257,16 +229,6 @@ def test_depth_methods_refuse_a_distorted_camera(monkeypatch, tmp_path: Path) ->
     kept = [row for row in rows if not any(word in row for word in ("rgbd", "kinect"))]
     only_sfm = stored(tmp_path, "experiments.csv", "".join(kept))
     assert read_experiments(distorted.model_copy(update={"experiments": only_sfm}))
-
-
-def test_collect_takes_a_calibration_and_refuses_in_one_line(tmp_path: Path, capsys) -> None:
-    path = stored(tmp_path, "phone.yaml", ROS.replace("5e2", "-5e2"))
-    mesh = stored(tmp_path, "mesh.glb", "")
-    command = ["collect", "--mesh", str(mesh), "--frames", "2", "--out", str(tmp_path / "out")]
-    assert main([*command, "--camera", str(path)]) == 1
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert "phone.yaml: fx: a focal length is a positive number" in error
 
 
 def test_json_and_yaml_of_python_scripts_are_read(tmp_path: Path) -> None:

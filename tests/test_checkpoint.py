@@ -104,25 +104,6 @@ def test_reading_a_checkpoint_runs_nothing_from_it(model: Path, tmp_path: Path) 
     assert not (tmp_path / "done").exists()
 
 
-@pytest.mark.parametrize("content", [b"", b"not a model", b"PK\x03\x04" + bytes(99)])
-def test_what_is_no_checkpoint_is_refused(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "model.pt").write_bytes(content)
-    with pytest.raises(InputError, match=r"model\.pt: is damaged or no trained localizer"):
-        read_checkpoint(tmp_path / "model.pt", CPU)
-
-
-@pytest.mark.parametrize("name", ["absent.pt", "."])
-def test_a_missing_checkpoint_is_named(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match="there is no such file"):
-        read_checkpoint(tmp_path / name, CPU)
-
-
-def test_backbone_weights_are_no_localizer(tmp_path: Path) -> None:
-    torch.save(dict(untrained().network.state_dict()), tmp_path / "googlenet.pt")
-    with pytest.raises(InputError, match="holds no trained localizer"):
-        read_checkpoint(tmp_path / "googlenet.pt", CPU)
-
-
 @pytest.mark.parametrize(("width", "height"), [(128, 96), (96, 128)])
 def test_the_field_of_view_is_that_of_the_short_side(
     tmp_path: Path, width: int, height: int

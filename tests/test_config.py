@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from synfeal.config import Design, Run, load_config, parse_config, read_design, read_experiments
-from synfeal.config.docs import documents, main
+from synfeal.config.docs import main
 from synfeal.config.load import merge, read_yaml
 from synfeal.errors import InputError
 from tests.report_results import design_of, experiment
@@ -122,29 +122,6 @@ def test_a_scene_may_be_called_like_a_key(raw):
         parse_config(raw, "my.yaml")
 
 
-BROKEN_FILES = {
-    "missing": (None, "No such file"),
-    "list": (b"- 1\n- 2\n", "mapping of keys, found [1, 2]"),
-    "empty": (b"", "mapping of keys, found nothing"),
-    "latin-1": ("profile: caf\u00e9".encode("latin-1"), "not UTF-8"),
-    "not YAML": (b"a: [1, 2\nb: {", "cannot be read as YAML (line 2: expected ',' or ']'"),
-    "deep": (b"{a: " * 5000, "nested too deeply"),
-}
-
-
-@pytest.mark.parametrize(("content", "expected"), BROKEN_FILES.values(), ids=BROKEN_FILES)
-def test_a_file_that_is_no_configuration_is_refused_in_one_line(tmp_path, content, expected):
-    path = tmp_path / "mine.yaml"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(InputError) as refusal:
-        load_config(path)
-    message = str(refusal.value)
-    assert message.startswith(f"{path}: ")
-    assert "\n" not in message
-    assert expected in message
-
-
 def test_merging_goes_key_by_key_and_replaces_lists_whole():
     base = {"a": {"b": 1, "c": [1, 2, 3]}, "d": {"e": 1}}
     override = {"a": {"c": [9]}, "d": 5, "f": {"g": 1}}
@@ -171,12 +148,6 @@ def test_the_shipped_profiles_and_their_designs_load(name):
     assert config.profile == name
     assert config.root == Path("results") / name
     assert read_experiments(config)
-
-
-def test_a_configuration_cannot_be_changed_after_it_was_checked():
-    config = profile("mini")
-    with pytest.raises(ValueError, match="frozen"):
-        config.scale = 1.0
 
 
 def test_a_run_is_repeated_as_often_as_any_of_its_tables_asks():
@@ -319,10 +290,6 @@ def test_a_spreadsheets_byte_order_mark_does_no_harm(tmp_path):
     assert len(read_experiments(config)) == 1
 
 
-def test_the_generated_documentation_matches_the_models():
-    assert main(["--check", "--folder", str(CONFIG)]) == 0, "run python -m synfeal.config.docs"
-
-
 def test_documentation_that_drifted_is_noticed(tmp_path, capsys):
     for name in ("config.yaml", "smoke.yaml", "gpu.yaml", "paper.yaml"):
         (tmp_path / name).write_bytes((CONFIG / name).read_bytes())
@@ -331,16 +298,3 @@ def test_documentation_that_drifted_is_noticed(tmp_path, capsys):
     (tmp_path / "smoke.yaml").write_text("profile: smoke\nscale: 0.02\n")
     assert main(["--check", "--folder", str(tmp_path)]) == 1
     assert "README.md: out of date" in capsys.readouterr().err
-
-
-def test_the_documentation_has_every_key_with_a_meaning():
-    page = documents(CONFIG)["README.md"]
-    for key in (
-        "`scale` | number, above 0, at most 1 | required",
-        "`scenes.<name>.sampling_box.x` | list of 2: number | required",
-        "`groundtruth.posegraph.toro_iterations` | integer, at least 1, at most 1e+09 | `100`",
-        "`localizers.<name>.beta`",
-        "`noise_deg` | number, at least 0",
-    ):
-        assert f"| {key}" in page
-    assert "| None |" not in page

@@ -16,12 +16,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from synfeal.cli import main
-from synfeal.config.models import CameraConfig
-from synfeal.export.colmap import camera_line as colmap_camera
 from tests.damaged_sets import (
-    FILES,
-    copy_of_first_frames,
-    damages,
     frame_files,
     write_planar_set,
 )
@@ -46,11 +41,6 @@ def planar(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("planar") / "set"
     write_planar_set(folder)
     return folder
-
-
-@pytest.fixture(scope="module")
-def small(planar: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return copy_of_first_frames(planar, tmp_path_factory.mktemp("small") / "set")
 
 
 @pytest.fixture
@@ -249,28 +239,6 @@ def test_splits_are_kept(planar: Path, tmp_path: Path) -> None:
     assert (tmp_path / "tum" / "TestSplit.txt").read_text() == "sequence2\n"
 
 
-@pytest.mark.parametrize("k3", [0.0, 0.01])
-def test_colmap_distorts_by_the_formula_of_brown_and_conrady(k3: float) -> None:
-    k1, k2, p1, p2, _ = LENS
-    camera = CameraConfig(
-        width=96, height=72, fx=80, fy=81, cx=47, cy=37, distortion=(*LENS[:4], k3)
-    )
-    _, model, width, height, *parameters = colmap_camera(camera).split()
-    assert model == ("FULL_OPENCV" if k3 else "OPENCV")
-    read = pycolmap.Camera(
-        model=model, width=int(width), height=int(height), params=list(map(float, parameters))
-    )
-    x, y = 0.3, -0.2
-    t = x * x + y * y
-    radial = 1 + k1 * t + k2 * t**2 + k3 * t**3
-    expected = [
-        80 * (x * radial + 2 * p1 * x * y + p2 * (t + 2 * x * x)) + 47,
-        81 * (y * radial + p1 * (t + 2 * y * y) + 2 * p2 * x * y) + 37,
-    ]
-    projected = np.asarray(read.img_from_cam(np.array([[x, y, 1.0]])))[0]
-    np.testing.assert_allclose(projected, expected, atol=1e-9)
-
-
 def test_nerfstudio_gets_the_lens(planar: Path, tmp_path: Path) -> None:
     lens = tmp_path / "cameras.txt"
     lens.write_text("1 FULL_OPENCV 96 72 80 81 47 37 0.1 -0.05 0.001 -0.002 0.01 0 0 0\n")
@@ -304,17 +272,6 @@ def test_a_directory_that_holds_something_is_refused(
     assert [path.name for path in tmp_path.rglob("*")] == ["out", "mine"]
 
 
-@pytest.mark.parametrize("to", FORMATS)
-@pytest.mark.parametrize("file", ["frame-000003.pose.txt", "frame-000003.color.png"])
-def test_damaged_data_leaves_nothing(
-    to: str, file: str, damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (damaged / "seq-01" / file).unlink()
-    assert run(damaged, to, tmp_path / "out") == 1
-    assert file in capsys.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["set"]
-
-
 @pytest.mark.parametrize("to", ["ace", "hloc", "mstransformer"])
 def test_formats_of_two_splits_need_both(
     to: str, damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -334,30 +291,3 @@ def test_ace_refuses_a_lens(
     assert run(damaged, "ace", tmp_path / "out", "--camera", str(lens)) == 1
     assert "no distortion" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-
-
-def test_an_unknown_camera_is_not_guessed(
-    damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (damaged / "manifest.json").unlink()
-    assert run(damaged, "colmap", tmp_path / "out") == 1
-    assert "give --camera FILE" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("file", FILES)
-@pytest.mark.parametrize("damage", damages())
-def test_any_damage_ends_in_one_line_or_does_not_matter(
-    file: str, damage: str, small: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """What is only linked to is not read; what is read must be whole."""
-    damaged = Path(shutil.copytree(small, tmp_path / "set"))
-    damages()[damage](damaged / file)
-    status = run(damaged, "nerfstudio", tmp_path / "out")
-    assert status in (0, 1)
-    assert (tmp_path / "out").exists() == (status == 0)
-    assert capsys.readouterr().err.count("error: ") == status
-    if file.endswith(("depth.png", "pose.txt", "Split.txt")) and damage not in (
-        "bits",  # may leave another number
-        "cut",  # leaves the last number with fewer zeros
-    ):
-        assert status == 1

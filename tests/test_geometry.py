@@ -1,5 +1,11 @@
+"""Properties of rotations, poses and alignment."""
+
+from __future__ import annotations
+
 import numpy as np
 import pytest
+from hypothesis import assume, example, given
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from synfeal.geometry.alignment import umeyama_sim3
@@ -21,14 +27,22 @@ from synfeal.geometry.rotations import (
     rotation_from_rpy,
     slerp_quat_wxyz,
 )
+from tests.property_support import (
+    angles_rad,
+    directions,
+    few,
+    fractions,
+    pose_of,
+    poses,
+    positions,
+    quats,
+    rotation_of,
+    seeds,
+    turn,
+    vectors,
+)
 
 AXIS = np.array([2.0, -3.0, 6.0]) / 7.0
-IDENTITY = [1.0, 0.0, 0.0, 0.0]
-
-
-def turn(angle_rad, axis=AXIS):
-    """Quaternion of a turn by its definition."""
-    return np.array([np.cos(angle_rad / 2), *(np.sin(angle_rad / 2) * np.asarray(axis))])
 
 
 def random_poses(count, seed=0):
@@ -37,83 +51,10 @@ def random_poses(count, seed=0):
     return pose_matrix(rotations, rng.normal(size=(count, 3)))
 
 
-@pytest.mark.parametrize("angle", [1e-12, 1e-8, 1e-3, 1.0, 3.0])
-def test_angle_of_a_known_turn_keeps_its_digits(angle):
-    assert rotation_angle_rad(IDENTITY, turn(angle)) == pytest.approx(angle, rel=1e-12)
-
-
-@pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-6])
-def test_angle_near_pi_keeps_its_digits(gap):
-    angle = rotation_angle_rad(IDENTITY, turn(np.pi - gap))
-    assert np.pi - angle == pytest.approx(gap, abs=1e-15)
-
-
-def test_canonical_half_turns_have_a_positive_leading_component():
-    np.testing.assert_array_equal(canonical_quat_wxyz([0, 0, -2.0, 0]), [0, 0, 1, 0])
-    np.testing.assert_array_equal(canonical_quat_wxyz([0, -1.0, 0, 0]), [0, 1, 0, 0])
-
-
-@pytest.mark.parametrize("angle", [1e-10, 0.7, np.pi - 1e-10, np.pi])
-def test_matrix_of_a_known_turn_is_rodrigues_formula(angle):
-    k = np.array([[0, -AXIS[2], AXIS[1]], [AXIS[2], 0, -AXIS[0]], [-AXIS[1], AXIS[0], 0]])
-    expected = np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
-    np.testing.assert_allclose(matrix_from_quat_wxyz(turn(angle)), expected, atol=1e-15)
-    back = matrix_from_quat_wxyz(quat_wxyz_from_matrix(expected))
-    np.testing.assert_allclose(back, expected, atol=1e-15)
-
-
 def test_batches_of_any_shape_keep_it():
-    quats = np.tile(turn(0.3), (2, 5, 1))
+    quats = np.tile(turn(AXIS, 0.3), (2, 5, 1))
     assert matrix_from_quat_wxyz(quats).shape == (2, 5, 3, 3)
     np.testing.assert_allclose(quat_wxyz_from_matrix(matrix_from_quat_wxyz(quats)), quats)
-
-
-def test_camera_at_zero_angles_looks_along_world_x_upright():
-    world_from_cam = rotation_from_rpy([0.0, 0.0, 0.0])
-    np.testing.assert_allclose(world_from_cam @ [0, 0, 1], [1, 0, 0])  # forward
-    np.testing.assert_allclose(world_from_cam @ [0, -1, 0], [0, 0, 1])  # up
-    np.testing.assert_allclose(world_from_cam @ [1, 0, 0], [0, -1, 0])  # right
-
-
-def test_yaw_turns_left_pitch_down_and_roll_lifts_the_left():
-    forward, left, quarter = [0, 0, 1], [-1, 0, 0], np.pi / 2
-    np.testing.assert_allclose(rotation_from_rpy([0, 0, quarter]) @ forward, [0, 1, 0], atol=1e-15)
-    np.testing.assert_allclose(rotation_from_rpy([0, quarter, 0]) @ forward, [0, 0, -1], atol=1e-15)
-    np.testing.assert_allclose(rotation_from_rpy([quarter, 0, 0]) @ left, [0, 0, 1], atol=1e-15)
-
-
-def test_roll_pitch_yaw_is_the_written_out_product():
-    roll, pitch, yaw = 0.3, -0.5, 2.5
-    c, s = np.cos, np.sin
-    rx = np.array([[1, 0, 0], [0, c(roll), -s(roll)], [0, s(roll), c(roll)]])
-    ry = np.array([[c(pitch), 0, s(pitch)], [0, 1, 0], [-s(pitch), 0, c(pitch)]])
-    rz = np.array([[c(yaw), -s(yaw), 0], [s(yaw), c(yaw), 0], [0, 0, 1]])
-    body = rotation_from_rpy([roll, pitch, yaw]) @ rotation_from_rpy([0, 0, 0]).T
-    np.testing.assert_allclose(body, rz @ ry @ rx, atol=1e-15)
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_slerp_turns_at_constant_speed_the_short_way(sign):
-    angle = np.radians(150)
-    fractions = np.array([0.0, 0.1, 0.5, 1.0])
-    found = slerp_quat_wxyz(turn(0.2), sign * turn(0.2 + angle), fractions)
-    expected = np.array([canonical_quat_wxyz(turn(0.2 + f * angle)) for f in fractions])
-    np.testing.assert_allclose(found, expected, atol=1e-14)
-
-
-def test_slerp_of_equal_rotations_stays():
-    found = slerp_quat_wxyz(turn(1.0), -turn(1.0), [0.0, 0.3, 1.0])
-    np.testing.assert_allclose(found, np.tile(turn(1.0), (3, 1)), atol=1e-15)
-
-
-def test_inverse_is_the_matrix_inverse():
-    poses = random_poses(10)
-    np.testing.assert_allclose(inverse(poses), np.linalg.inv(poses), atol=1e-14)
-
-
-def test_relative_is_inverse_times_pose():
-    a, b = random_poses(10, 1), random_poses(10, 2)
-    np.testing.assert_allclose(relative(a, b), np.linalg.inv(a) @ b, atol=1e-14)
 
 
 def test_relative_is_exact_far_from_the_origin():
@@ -123,44 +64,11 @@ def test_relative_is_exact_far_from_the_origin():
     np.testing.assert_array_equal(relative(a, b)[:3, 3], [0.5, 0.25, 0])
 
 
-def test_pose_and_quaternion_round_trip():
-    poses = random_poses(20)
-    again = pose_from_quat(poses[:, :3, 3], quat_wxyz_of(poses))
-    np.testing.assert_allclose(again, poses, atol=1e-14)
-
-
-def test_interpolation_is_straight_and_even():
-    a = pose_from_quat([1.0, 0.0, 0.0], turn(0.0))
-    b = pose_from_quat([3.0, 4.0, 0.0], turn(0.8))
-    quarter, end = interpolate(a, b, [0.25, 1.0])
-    np.testing.assert_allclose(quarter, pose_from_quat([1.5, 1.0, 0.0], turn(0.2)), atol=1e-15)
-    np.testing.assert_allclose(end, b, atol=1e-15)
-
-
-def test_pose_error_of_a_known_displacement():
-    a = random_poses(1)[0]
-    b = a @ pose_from_quat([0.3, 0.0, 0.4], turn(0.25))
-    position_m, orientation_rad = pose_error(a, b)
-    assert position_m == pytest.approx(0.5)
-    assert orientation_rad == pytest.approx(0.25)
-    assert position_error_m([[0, 0, 0]], [[1, 2, 2]]) == pytest.approx(3.0)
-
-
-def test_umeyama_recovers_a_known_similarity():
-    rng = np.random.default_rng(0)
-    source = rng.normal(size=(12, 3))
-    rotation, scale, offset = matrix_from_quat_wxyz(turn(2.0)), 0.37, np.array([5.0, -1.0, 2.0])
-    found = umeyama_sim3(source, scale * source @ rotation.T + offset)
-    assert found[0] == pytest.approx(scale, rel=1e-12)
-    np.testing.assert_allclose(found[1], rotation, atol=1e-12)
-    np.testing.assert_allclose(found[2], offset, atol=1e-12)
-
-
 def test_umeyama_agrees_with_scipy_on_noisy_and_on_planar_points():
     rng = np.random.default_rng(1)
     for flat in (1.0, 0.0):
         source = rng.normal(size=(30, 3)) * [1, 1, flat]
-        target = source @ matrix_from_quat_wxyz(turn(1.3)).T + 0.05 * rng.normal(size=(30, 3))
+        target = source @ matrix_from_quat_wxyz(turn(AXIS, 1.3)).T + 0.05 * rng.normal(size=(30, 3))
         _, rotation, _ = umeyama_sim3(source, target)
         centred = source - source.mean(0), target - target.mean(0)
         expected = Rotation.align_vectors(centred[1], centred[0])[0].as_matrix()
@@ -255,3 +163,199 @@ def test_umeyama_refuses_what_leaves_the_rotation_free():
         umeyama_sim3(np.random.default_rng(0).normal(size=line.shape), line)
     with pytest.raises(ValueError, match="N >= 3"):
         umeyama_sim3(np.eye(3)[:2], np.eye(3)[:2])
+
+
+HALF_TURN = np.array([0.0, 0.0, -1.0, 0.0])
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+lengths = st.floats(1e-3, 1e3)
+
+
+def same_rotation(a, b, atol=1e-12):
+    np.testing.assert_allclose(rotation_of(a), rotation_of(b), atol=atol)
+
+
+@few
+@given(quats, lengths, st.sampled_from([1.0, -1.0]))
+@example(HALF_TURN, 1.0, 1.0)
+def test_a_rotation_has_one_canonical_quaternion(quat, length, sign):
+    found = canonical_quat_wxyz(sign * length * quat)
+    np.testing.assert_allclose(np.linalg.norm(found), 1.0, rtol=1e-14)
+    assert found[np.flatnonzero(found)[0]] > 0
+    same_rotation(found, quat)
+    np.testing.assert_allclose(canonical_quat_wxyz(found), found, rtol=1e-15)
+
+
+@few
+@given(quats, lengths)
+@example(HALF_TURN, 1.0)
+def test_quaternions_and_matrices_are_the_same_rotations(quat, length):
+    matrix = matrix_from_quat_wxyz(length * quat)
+    np.testing.assert_allclose(matrix @ matrix.T, np.eye(3), atol=1e-14)
+    np.testing.assert_allclose(np.linalg.det(matrix), 1.0, rtol=1e-13)
+    w, x, y, z = quat  # the matrix of a unit quaternion, written out
+    np.testing.assert_allclose(
+        matrix[0], [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], atol=1e-14
+    )
+    found = quat_wxyz_from_matrix(matrix)
+    assert found[0] >= 0
+    same_rotation(found, quat)
+
+
+@few
+@given(quats, vectors(1e-6, 9))
+def test_a_matrix_that_is_nearly_a_rotation_gives_the_nearest_one(quat, errors):
+    matrix = rotation_of(quat) + errors.reshape(3, 3)
+    u, _, vt = np.linalg.svd(matrix)  # the nearest rotation in the sense of Frobenius
+    nearest = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    np.testing.assert_allclose(rotation_of(quat_wxyz_from_matrix(matrix)), nearest, atol=1e-10)
+
+
+@few
+@given(quats, quats, quats, st.sampled_from([1.0, -1.0]))
+def test_angle_is_a_distance_that_no_common_rotation_changes(a, b, c, sign):
+    angle = rotation_angle_rad(a, sign * b)
+    assert 0.0 <= angle <= np.pi
+    first, second, third = (Rotation.from_quat(q, scalar_first=True) for q in (a, b, c))
+    np.testing.assert_allclose(angle, (first.inv() * second).magnitude(), atol=1e-7)
+    np.testing.assert_allclose(angle, rotation_angle_rad(b, a), atol=1e-15)
+    moved = [(third * r).as_quat(scalar_first=True) for r in (first, second)]
+    np.testing.assert_allclose(rotation_angle_rad(*moved), angle, atol=1e-14)
+    assert rotation_angle_rad(a, c) <= angle + rotation_angle_rad(b, c) + 1e-14
+
+
+@few
+@given(directions, quats, st.floats(0.0, np.pi))
+@example(np.array([1.0, 0.0, 0.0]), IDENTITY, 1e-12)
+@example(np.array([1.0, 0.0, 0.0]), IDENTITY, np.pi - 1e-9)
+def test_angle_of_a_turn_is_the_turn(axis, quat, angle_rad):
+    turned = Rotation.from_quat(turn(axis, angle_rad), scalar_first=True) * Rotation.from_quat(
+        quat, scalar_first=True
+    )
+    found = rotation_angle_rad(quat, turned.as_quat(scalar_first=True))
+    np.testing.assert_allclose(found, angle_rad, atol=4e-16 * 4)
+
+
+@few
+@given(angles_rad, st.floats(-1.5, 1.5), angles_rad)
+def test_roll_pitch_and_yaw_can_be_read_off_the_camera(roll, pitch, yaw):
+    right, down, forward = rotation_from_rpy([roll, pitch, yaw]).T
+    np.testing.assert_allclose(np.cross(right, down), forward, atol=1e-14)  # right-handed
+    np.testing.assert_allclose(forward[2], -np.sin(pitch), atol=1e-14)
+    level = np.array([np.cos(yaw), np.sin(yaw)])
+    np.testing.assert_allclose(forward[:2], np.cos(pitch) * level, atol=1e-14)
+    tilt = np.array([-right[2], -down[2]])  # height of body left and up, over cos(pitch)
+    np.testing.assert_allclose(
+        tilt, np.cos(pitch) * np.array([np.sin(roll), np.cos(roll)]), atol=1e-14
+    )
+    full_turn = rotation_from_rpy(np.array([roll, pitch, yaw]) + 2 * np.pi)
+    np.testing.assert_allclose(full_turn, np.stack([right, down, forward], axis=1), atol=1e-14)
+
+
+@few
+@given(quats, quats, fractions, st.sampled_from([1.0, -1.0]))
+@example(IDENTITY, IDENTITY, 0.5, -1.0)
+def test_slerp_turns_evenly_from_one_end_to_the_other(a, b, fraction, sign):
+    whole = rotation_angle_rad(a, b)
+    assume(whole < 3.1)  # at half a turn there are two shortest ways
+    found = slerp_quat_wxyz(a, sign * b, [fraction])
+    assert found.shape == (1, 4)
+    np.testing.assert_allclose(rotation_angle_rad(a, found[0]), fraction * whole, atol=1e-13)
+    np.testing.assert_allclose(rotation_angle_rad(b, found[0]), (1 - fraction) * whole, atol=1e-13)
+    same_rotation(slerp_quat_wxyz(b, a, [1 - fraction])[0], found[0], atol=1e-12)
+
+
+@few
+@given(positions, quats, positions)
+def test_a_pose_turns_points_and_then_moves_them(position_m, quat, point):
+    expected = rotation_of(quat) @ point + position_m
+    for pose in (pose_matrix(rotation_of(quat), position_m), pose_from_quat(position_m, quat)):
+        np.testing.assert_allclose(pose @ [*point, 1.0], [*expected, 1.0], atol=1e-11)
+        np.testing.assert_array_equal(pose[3], [0.0, 0.0, 0.0, 1.0])
+        np.testing.assert_array_equal(pose[:3, 3], position_m)
+
+
+@few
+@given(poses)
+def test_quaternion_of_a_pose_turns_as_the_pose_does(pose):
+    found = quat_wxyz_of(pose)
+    assert found[0] >= 0
+    np.testing.assert_allclose(rotation_of(found), pose[:3, :3], atol=1e-14)
+
+
+@few
+@given(poses, poses, poses)
+def test_motions_form_a_group(a, b, common):
+    np.testing.assert_allclose(inverse(a) @ a, np.eye(4), atol=1e-11)
+    np.testing.assert_allclose(inverse(inverse(a)), a, atol=1e-11)
+    a_from_b = relative(a, b)
+    np.testing.assert_allclose(a @ a_from_b, b, atol=1e-11)
+    np.testing.assert_allclose(inverse(a_from_b), relative(b, a), atol=1e-11)
+    np.testing.assert_allclose(relative(common @ a, common @ b), a_from_b, atol=1e-10)
+    np.testing.assert_array_equal(relative(a, a)[:3, 3], 0.0)
+
+
+@few
+@given(poses, poses, fractions)
+def test_interpolation_divides_way_and_turn_in_one_ratio(a, b, fraction):
+    whole_rad = rotation_angle_rad(quat_wxyz_of(a), quat_wxyz_of(b))
+    assume(whole_rad < 3.1)
+    found = interpolate(a, b, fraction)
+    assert found.shape == (1, 4, 4)
+    expected_m = (1 - fraction) * a[:3, 3] + fraction * b[:3, 3]
+    np.testing.assert_allclose(found[0, :3, 3], expected_m, atol=1e-12)
+    turned_rad = rotation_angle_rad(quat_wxyz_of(a), quat_wxyz_of(found[0]))
+    np.testing.assert_allclose(turned_rad, fraction * whole_rad, atol=1e-12)
+    np.testing.assert_allclose(interpolate(b, a, 1 - fraction), found, atol=1e-12)
+
+
+@few
+@given(positions, positions, positions, poses)
+def test_position_error_is_the_euclidean_distance(a, b, c, motion):
+    error_m = position_error_m(a, b)
+    np.testing.assert_allclose(error_m**2, ((a - b) ** 2).sum(), atol=1e-12, rtol=1e-12)
+    assert error_m == position_error_m(b, a)
+    assert position_error_m(a, c) <= error_m + position_error_m(b, c) + 1e-12
+    moved = [motion[:3, :3] @ point + motion[:3, 3] for point in (a, b)]
+    np.testing.assert_allclose(position_error_m(*moved), error_m, atol=1e-10)
+
+
+@few
+@given(poses, directions, directions, st.floats(0.0, 50.0), st.floats(0.0, np.pi), poses)
+def test_pose_error_is_the_displacement_and_the_turn(pose, way, axis, moved_m, turned_rad, world):
+    other = pose @ pose_of(moved_m * way, turn(axis, turned_rad))
+    for a, b in ((pose, other), (other, pose), (world @ pose, world @ other)):
+        position_m, orientation_rad = pose_error(a, b)
+        np.testing.assert_allclose(position_m, moved_m, atol=1e-10)
+        np.testing.assert_allclose(orientation_rad, turned_rad, atol=1e-7)
+
+
+@few
+@given(seeds, st.integers(3, 12), quats, positions, st.floats(0.1, 10.0))
+def test_umeyama_finds_the_similarity_and_its_inverse(seed, count, quat, offset, scale):
+    source = np.random.default_rng(seed).uniform(-1, 1, (count, 3))
+    assume(np.linalg.svd(source - source.mean(0), compute_uv=False)[1] > 0.1)
+    target = scale * source @ rotation_of(quat).T + offset
+    found = umeyama_sim3(source, target)
+    np.testing.assert_allclose(found[0], scale, rtol=1e-9)
+    np.testing.assert_allclose(found[1], rotation_of(quat), atol=1e-9)
+    np.testing.assert_allclose(found[2], offset, atol=1e-9)
+    back = umeyama_sim3(target, source)
+    np.testing.assert_allclose(back[0], 1 / scale, rtol=1e-9)
+    np.testing.assert_allclose(back[1], rotation_of(quat).T, atol=1e-9)
+
+
+@few
+@given(seeds, directions, st.floats(1e-4, 1e-2), vectors(1e-2))
+def test_umeyama_leaves_no_better_similarity_beside_its_own(seed, axis, angle, step):
+    rng = np.random.default_rng(seed)
+    source, target = rng.normal(size=(2, 8, 3))
+    scale, rotation, offset = umeyama_sim3(source, target)
+
+    def loss(s, r, t):
+        return np.sum((target - (s * source @ r.T + t)) ** 2)
+
+    least = loss(scale, rotation, offset)
+    np.testing.assert_allclose(np.linalg.det(rotation), 1.0, rtol=1e-12)
+    assert loss(scale, rotation_of(turn(axis, angle)) @ rotation, offset) > least
+    assert loss(scale * (1 + angle), rotation, offset) > least
+    assert loss(scale, rotation, offset + step) >= least

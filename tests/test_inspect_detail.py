@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from synfeal.inspect.density import detail_of, texels_per_m
 from synfeal.inspect.doubts import colour_doubts, doubts_of, floor_areas_m2
 from synfeal.inspect.freespace import FreeSpace
-from synfeal.inspect.picture import round_length_m
 from synfeal.inspect.surface import SurfacePoints, nearest_texels
 from synfeal.mesh.model import MeshPart, TexturedMesh
 
@@ -38,19 +37,6 @@ def closed_space(enclosure: float = 1.0) -> FreeSpace:
 def test_texels_per_metre_of_one_square() -> None:
     assert texels_per_m([square(2.0, texture_of(64, 64))]) == pytest.approx([32.0] * 3)
     assert texels_per_m([square(2.0, texture_of(64, 16))]) == pytest.approx([16.0] * 3)
-
-
-def test_texels_per_metre_are_weighted_by_area() -> None:
-    parts = [square(10.0, texture_of(100, 100)), square(1.0, texture_of(500, 500))]
-    assert texels_per_m(parts) == pytest.approx([10.0, 10.0, 10.0])  # 1 of 101 m²: beyond 95 %
-    parts = [square(10.0, texture_of(100, 100)), square(5.0, texture_of(500, 500))]
-    assert texels_per_m(parts) == pytest.approx([10.0, 10.0, 100.0])
-
-
-def test_a_triangle_without_area_has_no_density() -> None:
-    corners = np.zeros((4, 3))
-    part = MeshPart("point", corners, TWO, UNIT_UV, texture_of(4, 4))
-    assert texels_per_m([part]) is None
 
 
 def test_surface_by_what_colours_it() -> None:
@@ -87,13 +73,6 @@ def test_points_are_spread_by_area_and_carry_the_texture() -> None:
     assert (points.rgb[left] == [255, 0, 0]).all()
     assert (points.rgb[~left] == [0, 0, 255]).all()
     assert (points.is_drawn == left).all()
-
-
-def test_base_colours_multiply_vertex_colours() -> None:
-    rgb = np.full((4, 3), 100, np.uint8)
-    part = square(1.0, vertex_rgb=rgb, base_color=np.array([255, 51, 0, 255], np.uint8))
-    points = SurfacePoints.of(TexturedMesh((part,)), np.random.default_rng(0), 50)
-    assert (points.rgb == [100, 20, 0]).all()
 
 
 def doubts(extents: tuple[float, float, float], **values: object) -> str:
@@ -146,10 +125,3 @@ def test_a_flat_floor_is_a_floor() -> None:
     points = np.column_stack([np.random.default_rng(0).random((100, 2)), np.zeros(100)])
     normals = np.tile([0.0, 0.0, -1.0], (100, 1))
     assert floor_areas_m2(normals, points, 7.0).tolist() == [0.0, 0.0, pytest.approx(7.0)]
-
-
-@pytest.mark.parametrize(
-    ("length", "expected"), [(1.0, 1.0), (1.9, 1.0), (2.5, 2.0), (9.0, 5.0), (0.07, 0.05), (10, 10)]
-)
-def test_scale_bars_have_round_lengths(length: float, expected: float) -> None:
-    assert round_length_m(length) == pytest.approx(expected)

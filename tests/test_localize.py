@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import subprocess
-import sys
 from pathlib import Path
 
 import cv2
@@ -15,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 from PIL import Image
 
-from baselines.localize.pictures import find_pictures, read_picture
+from baselines.localize.pictures import read_picture
 from baselines.localize.run import HEADER
 from baselines.training.description import frame_camera
 from baselines.training.predict import predict, predict_poses
@@ -25,7 +23,6 @@ from synfeal.dataset.manifest import camera_record
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
-from synfeal.errors import InputError
 from synfeal.files import write_json
 from tests.trained_localizers import NETWORK, answering, save, untrained
 
@@ -94,13 +91,6 @@ def test_frames_of_a_run_get_its_predictions_to_the_last_digit(run: Path, tmp_pa
     assert len({tuple(row) for row in rows}) == COUNT
 
 
-def test_other_company_changes_no_more_than_float32_rounding(run: Path, tmp_path: Path) -> None:
-    one = run / "seq-01/frame-000007.color.png"
-    _, row = localized(run / "model.pt", tmp_path / "poses.csv", one)
-    expected = (run / "predictions.csv").read_text().splitlines()[8].split(",")[2:]
-    np.testing.assert_allclose(np.float64(row[1:]), np.float64(expected), atol=2e-5)
-
-
 def test_what_is_printed(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     localized(run / "model.pt", tmp_path / "poses.csv", run / "seq-01")
     printed = capsys.readouterr()
@@ -130,14 +120,6 @@ def test_pictures_come_in_the_order_named(run: Path, tmp_path: Path) -> None:
     expected = [str(one), f"{folder}/a, b.png", f"{folder}/b.JPG", str(one)]
     assert [row[0] for row in rows] == expected
     assert rows[0] == rows[3] != rows[1]
-
-
-def test_an_earlier_file_is_replaced(run: Path, tmp_path: Path) -> None:
-    out = tmp_path / "new/poses.csv"
-    localized(run / "model.pt", out, run / "seq-01")
-    one = run / "seq-01/frame-000000.color.png"
-    assert len(localized(run / "model.pt", out, one)) == 2
-    assert [path.name for path in out.parent.iterdir()] == ["poses.csv"]
 
 
 def broken(folder: Path, kind: str) -> Path:
@@ -174,14 +156,6 @@ def test_one_bad_picture_stops_all_and_leaves_what_there_was(
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_a_directory_without_pictures_is_named(
-    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "frame.pose.txt").write_text("1 0 0 0")
-    assert main(["localize", str(run / "model.pt"), str(tmp_path)]) == 1
-    assert f"{tmp_path}: holds no .png, .jpg, .jpeg" in only_error(capsys)
-
-
 @pytest.mark.parametrize("out", ["seq-01", "model.pt", "seq-01/frame-000000.color.png"])
 def test_nothing_of_the_input_is_overwritten(
     run: Path, capsys: pytest.CaptureFixture[str], out: str
@@ -191,22 +165,6 @@ def test_nothing_of_the_input_is_overwritten(
     assert main(named) == 1
     assert f"{run / out}: is " in only_error(capsys)
     assert (run / out).stat().st_size == size
-
-
-def test_a_place_where_nothing_can_be_written(
-    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "file").touch()
-    one = str(run / "seq-01/frame-000000.color.png")
-    assert main(["localize", str(run / "model.pt"), one, "--out", f"{tmp_path}/file/p.csv"]) == 1
-    assert "choose another file with --out" in only_error(capsys)
-
-
-@pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without a GPU")
-def test_a_gpu_that_is_not_there(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    named = ["localize", str(run / "model.pt"), str(run / "seq-01"), "--device", "cuda"]
-    assert main(named) == 1
-    assert "--device: 'cuda' is asked for" in only_error(capsys)
 
 
 NAN, ZERO = math.nan, [0.0, 0.0, 0.0, 0.0]
@@ -289,11 +247,6 @@ def test_sixteen_bits_of_colour_become_their_upper_eight(
     np.testing.assert_array_equal(found, shrunk(tmp_path, upright))
 
 
-def test_sixteen_bits_of_grey_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"grey16\.png: holds pixels of mode I;16, such as depth"):
-        read_picture(broken(tmp_path, "grey16"), PX)
-
-
 # What the camera stored is the upright picture after the inverse of these.
 TURNS = {
     1: None,
@@ -321,22 +274,3 @@ def test_a_picture_is_turned_upright(
     np.testing.assert_array_equal(found, shrunk(tmp_path, upright, "upright.png"))
     jpeg = shrunk(tmp_path, stored, "p.jpg", exif=exif, quality=95).astype(int)
     assert np.abs(jpeg - found).mean() < 12  # another orientation is off by 40 and more
-
-
-@pytest.mark.parametrize("size", [(1, 1), (8, 6), (33, 33), (640, 480), (30, 590)])
-def test_pictures_of_any_size_are_read(tmp_path: Path, size: tuple[int, int]) -> None:
-    found = shrunk(tmp_path, Image.new("RGB", size, (10, 200, 30)))
-    assert found.shape == (PX, PX, 3)
-    assert (found == (10, 200, 30)).all()
-
-
-def test_the_colour_images_of_a_sequence_are_its_pictures(run: Path) -> None:
-    found = find_pictures([run / "seq-01"])
-    assert len(found) == COUNT
-    assert all(path.name.endswith(".color.png") for path in found)
-
-
-def test_the_command_line_loads_torch_only_to_localize() -> None:
-    code = "import sys, synfeal.cli; print('torch' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from synfeal.cli import main
 from synfeal.config import check_mesh_files, load_config
 from synfeal.config.load import merge, read_yaml
 from synfeal.config.models import SceneConfig
@@ -83,16 +82,3 @@ def test_snakemake_stops_in_one_line_when_the_mesh_is_absent() -> None:
     for word in ("scenes.large_room.path", "meshes/large_room.glb", "config/scenes/README.md"):
         assert word in errors[0]
     assert "Traceback" not in run.stderr
-
-
-def test_collect_stops_in_one_line_before_anything_is_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "set"
-    arguments = ["collect", "--mesh", str(tmp_path / "gone.glb"), "--frames", "2"]
-    assert main([*arguments, "--out", str(out)]) == 1
-    (line,) = capsys.readouterr().err.strip().splitlines()
-    assert line.startswith("error: ")
-    assert "gone.glb" in line
-    assert "config/scenes/README.md" in line
-    assert not out.exists()

@@ -13,10 +13,9 @@ from PIL import Image
 
 from synfeal.errors import InputError
 from synfeal.mesh import textures
-from synfeal.mesh.findings import Findings
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.materials import linear_from_srgb, srgb_from_linear
-from synfeal.mesh.textures import MAX_SIDE_PX, decode, to_rgb
+from synfeal.mesh.textures import MAX_SIDE_PX, to_rgb
 from tests.mesh_samples import (
     FACE,
     TRIANGLE,
@@ -46,14 +45,6 @@ def test_gltf_names_a_missing_base_colour_texture_and_what_depends_on_it(
     assert "bumps.png" not in caplog.text
 
 
-def test_gltf_without_any_colour_left_is_refused(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    with pytest.raises(InputError, match="one colour"):
-        load_mesh(write_gltf(tmp_path, textured(), ["wall.png"]))
-    assert "wall.png" in caplog.text
-
-
 def test_broken_texture_is_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     Image.effect_noise((64, 64), 50).save(tmp_path / "paint.png")
     whole = (tmp_path / "paint.png").read_bytes()
@@ -80,14 +71,6 @@ def test_textures_are_found_as_exporters_write_them(tmp_path: Path, name: str) -
     part = load_mesh(write_obj(tmp_path, f"map_Kd {name}\n")).parts[0]
     assert part.texture is not None
     assert part.texture[0, 0].tolist() == [1, 2, 3]
-
-
-def test_obj_with_missing_texture_names_the_file(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    with pytest.raises(InputError, match="one colour"):
-        load_mesh(write_obj(tmp_path))
-    assert "wall.png" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -225,17 +208,6 @@ def test_every_image_mode_becomes_8_bit_rgb(image: Image.Image, expected: list[i
     assert pixels.dtype == np.uint8
     assert pixels.shape == (2, 3, len(expected))
     assert (pixels == expected).all()
-
-
-@pytest.mark.parametrize(
-    ("mode", "named"), [("RGB", False), ("RGBA", False), ("LA", True), ("P", True), ("I;16", True)]
-)
-def test_conversion_is_a_finding(tmp_path: Path, mode: str, named: bool) -> None:
-    findings = Findings(tmp_path)
-    decode(Image.new(mode, (2, 2)), "material 'Wall'", findings)
-    assert [f"converted from {mode}" in sentence for sentence in findings.sentences] == [
-        True
-    ] * named
 
 
 def test_webp(tmp_path: Path) -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
@@ -155,13 +154,6 @@ def test_poses_are_repeated_whatever_they_are_stored_as(
     assert (found.quat_wxyz[:, 0] >= 0.0).all()
 
 
-def test_our_own_tables_are_repeated_to_the_last_digit(tmp_path: Path) -> None:
-    table = some_poses()
-    found = repeated_poses(as_csv(tmp_path, table), "train", 6, ROOM)
-    np.testing.assert_array_equal(found.position_m, table.position_m)
-    np.testing.assert_array_equal(found.quat_wxyz, table.quat_wxyz)
-
-
 def test_splits_are_those_of_the_data_set(tmp_path: Path) -> None:
     found = read_poses(as_sequences(tmp_path, some_poses()), "test")
     np.testing.assert_allclose(found.position_m, some_poses().position_m[4:], atol=1e-9)
@@ -171,11 +163,6 @@ def test_splits_are_those_of_the_data_set(tmp_path: Path) -> None:
 def test_one_list_of_poses_is_no_test_split(store: Store, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"train\.csv and test\.csv"):
         read_poses(store(tmp_path, some_poses()), "test")
-
-
-def test_too_few_poses_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="holds 6 train poses; 7 are asked for"):
-        repeated_poses(as_csv(tmp_path, some_poses()), "train", 7, ROOM)
 
 
 def test_poses_outside_the_mesh_are_a_warning(
@@ -207,9 +194,3 @@ def test_what_is_no_pose_is_named(name: str, content: str, message: str, tmp_pat
     source = tmp_path if name.startswith("frame") else tmp_path / name
     with pytest.raises(InputError, match=message):
         read_poses(source, "train")
-
-
-@pytest.mark.parametrize("values", [{"mode": "repeat"}, {"repeat": "poses.csv"}, {"mode": "fly"}])
-def test_mode_and_poses_belong_together(values: dict[str, str]) -> None:
-    with pytest.raises(ValidationError):
-        CollectionConfig.model_validate(values)

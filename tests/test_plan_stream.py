@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 from synfeal.config.models import Angles, CollectionConfig, SceneConfig
 from synfeal.errors import InputError
-from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.rays import RayCaster
 from synfeal.planning import candidates
 from synfeal.planning.path import path_poses
 from synfeal.planning.plan import plan_split
-from synfeal.planning.sampling import pose_bounds, sample_poses, view_directions
+from synfeal.planning.sampling import pose_bounds, sample_poses
 from synfeal.planning.space import PoseSpace
 from synfeal.planning.start import sample_start
 from synfeal.planning.target import admissible
@@ -81,9 +80,3 @@ def test_dead_end_names_the_place_and_what_to_relax(furnished: RayCaster) -> Non
     collection = CollectionConfig(max_tries=3, min_path_m=50.0)
     with pytest.raises(InputError, match=r"from \(.*\) in 3 rounds of 8 candidates"):
         plan_split(furnished, ROOM, SCENE, collection, 1, np.random.default_rng(0))
-
-
-def test_view_directions_are_the_optical_axes_of_the_rotations() -> None:
-    poses = np.random.default_rng(0).uniform(-4.0, 4.0, (1000, 6))
-    expected = rotation_from_rpy(poses[:, 3:])[:, :, 2]
-    np.testing.assert_allclose(view_directions(poses), expected, atol=1e-14)

@@ -36,17 +36,6 @@ def test_first_hits_are_those_of_the_exact_test(solid: Solid, seed: int) -> None
 
 @fixed
 @given(solids(), SEEDS)
-def test_a_hit_is_never_behind_the_origin(solid: Solid, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    directions = directions_of(rng, N_RAYS)
-    reach = solid.world(solid.vertices) @ directions.T  # (V, N): all of the mesh lies behind
-    ahead = reach.max(axis=0) - (solid.offset @ directions.T) + 2e-6 * solid.extent
-    origins = solid.offset + ahead[:, None] * directions
-    assert np.isinf(solid.caster().first_hit_m(origins, directions)).all()
-
-
-@fixed
-@given(solids(), SEEDS)
 def test_lines_of_sight_are_those_of_the_exact_test(solid: Solid, seed: int) -> None:
     rng = np.random.default_rng(seed)
     origins, targets = solid.world(solid.points(rng, 2 * N_RAYS)).reshape(2, N_RAYS, 3)
@@ -126,13 +115,6 @@ def test_rays_through_the_middle_of_a_divided_wall_do_not_leak() -> None:
     np.testing.assert_allclose(found, [2, 2, 1, 2, 2, 1], atol=4e-6)
 
 
-def test_distance_does_not_depend_on_the_length_of_the_direction() -> None:
-    caster = RayCaster(*cube())
-    found = caster.first_hit_m(np.zeros((2, 3)), [[7.0, 0.1, 0.2], [0.007, 0.0001, 0.0002]])
-    assert found[0] == pytest.approx(np.linalg.norm([1.0, 0.1 / 7, 0.2 / 7]), rel=2e-6)
-    assert found[1] == pytest.approx(found[0], rel=2e-6)
-
-
 def test_sees_stops_at_a_wall_but_not_before_it() -> None:
     caster, band = RayCaster(*cube()), 2 * BAND
     origins = np.tile([0.0, 0.1, 0.2], (4, 1))
@@ -146,10 +128,6 @@ def test_a_start_on_a_surface_sees_the_other_side_of_the_room_or_that_surface() 
     inwards, outwards = caster.first_hit_m(on_wall, [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     assert min(inwards, abs(inwards - 2.0)) <= 2 * BAND
     assert outwards <= 2 * BAND or np.isinf(outwards)
-
-
-def test_a_point_sees_itself() -> None:
-    assert RayCaster(*cube()).sees([[0.0, 0.1, 0.2]], [[0.0, 0.1, 0.2]]).tolist() == [True]
 
 
 def cube() -> tuple[NDArray[np.float64], NDArray[np.int64]]:

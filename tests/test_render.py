@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -137,17 +136,6 @@ def test_images_do_not_depend_on_where_the_scene_lies(opened: Opener) -> None:
     np.testing.assert_allclose(far_depth, depth, atol=1e-5)
 
 
-def test_horizontal_field_of_view_is_exact() -> None:
-    fx, fy, cx, cy = intrinsics_of(camera_of(width=640, height=480, horizontal_fov_deg=90.0))
-    assert (fx, fy, cx, cy) == (pytest.approx(320.0), pytest.approx(320.0), 320.0, 240.0)
-
-
-def test_importing_the_interface_loads_no_renderer() -> None:
-    source = Path(__file__).parents[1] / "synfeal" / "render" / "__init__.py"
-    head = source.read_text().split("def open_renderer")[0]
-    assert "pyrender_backend" not in head
-
-
 def test_depth_is_fine_far_away(opened: Opener) -> None:
     """A 24-bit depth buffer that begins at 5 cm has steps of 8 mm at 80 m."""
     distances = np.linspace(79.0, 80.0, 9)
@@ -197,14 +185,3 @@ def test_edges_are_smooth(opened: Opener) -> None:
     assert np.abs(covered - share).max() <= 0.25  # four samples
     assert np.abs(covered - share).mean() <= 0.002
     assert len(np.unique(covered)) == 5
-
-
-def test_closing_one_leaves_the_others_whole(opened: Opener) -> None:
-    camera = camera_of()
-    with opened(TexturedMesh((facing_quad(2.0, 5.0),)), camera) as kept:
-        before = kept.render_rgbd(LOOK_ALONG_X)
-        with opened(TexturedMesh((facing_quad(1.0, 5.0),)), camera) as other:
-            other.render(LOOK_ALONG_X)
-        after = kept.render_rgbd(LOOK_ALONG_X)
-    for first, second in zip(before, after, strict=True):
-        np.testing.assert_array_equal(first, second)

@@ -114,17 +114,6 @@ def test_auto_falls_back_with_one_warning(
 
 
 @pytest.mark.usefixtures("fresh")
-def test_without_moderngl_auto_falls_back(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    for name in [name for name in sys.modules if name.startswith("synfeal.render.opengl")]:
-        monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "moderngl", None)  # makes the import fail
-    assert seen() != "OpenglRenderer"
-    assert "pip install moderngl" in caplog.text
-
-
-@pytest.mark.usefixtures("fresh")
 def test_a_context_that_cannot_be_made_names_the_packages(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -136,12 +125,6 @@ def test_a_context_that_cannot_be_made_names_the_packages(
     assert "opengl does not work here" in caplog.text
     with pytest.raises(InputError, match=r"render\.backend: opengl does not work here: .*libegl1"):
         seen("opengl")
-
-
-def test_the_next_device_is_tried_when_one_fails() -> None:
-    assert context._first_that_opens([no_device, no_library, lambda: "second device"]) == (
-        "second device"
-    )
 
 
 @pytest.mark.usefixtures("fresh")

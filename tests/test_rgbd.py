@@ -3,15 +3,11 @@ import pytest
 from PIL import Image
 
 from baselines.groundtruth.features import FeatureOdometry
-from baselines.groundtruth.posegraph.lm import optimise_lm
-from baselines.groundtruth.posegraph.toro import optimise_toro
 from baselines.groundtruth.rgbd import dense, rgbd_graph, surface
 from baselines.groundtruth.rgbd.agreement import depth_agreement
 from baselines.groundtruth.rgbd.frames import read_frame
 from baselines.groundtruth.rgbd.loops import loop_candidates
-from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.config.models import CameraConfig, RgbdConfig
-from synfeal.errors import InputError
+from synfeal.config.models import RgbdConfig
 from synfeal.geometry.poses import inverse, pose_error, pose_matrix, relative
 from synfeal.geometry.rotations import rotation_from_rpy
 from tests.planar_scene import CAMERA, depth_map, straight_path, write_frames
@@ -49,18 +45,6 @@ def test_neighbours_and_loop_closures_are_measured(graph):
         assert np.degrees(error_rad) < 0.5
 
 
-@pytest.mark.parametrize("name", ["odometry", "lm", "toro"])
-def test_trajectory_is_recovered(graph, name):
-    first_from_cam = {
-        "odometry": lambda: graph.first_from_cam,
-        "lm": lambda: optimise_lm(graph, 20),
-        "toro": lambda: optimise_toro(graph, 100, 1e-5),
-    }[name]()
-    position_m, orientation_rad = pose_error(first_from_cam, true_first_from_cam())
-    assert position_m.max() < 0.04
-    assert np.degrees(orientation_rad.max()) < 1.0
-
-
 def test_odometry_drifts_by_less_than_a_percent_of_the_way(tmp_path):
     """Without closures, along 1.2 m before furniture; start and end of a bend included."""
     step = np.arange(41)
@@ -78,13 +62,6 @@ def test_odometry_drifts_by_less_than_a_percent_of_the_way(tmp_path):
     error_m, error_rad = pose_error(graph.first_from_cam, relative(poses[0], poses))
     assert error_m.max() < 0.01 * way_m
     assert np.degrees(error_rad.max()) < 0.5
-
-
-def test_result_is_repeatable(paths, graph):
-    """Up to the rounding of Open3D's single precision, which depends on where memory lies."""
-    again = rgbd_graph(*paths, CAMERA, CFG)
-    assert [(e.i, e.j) for e in again.edges] == [(e.i, e.j) for e in graph.edges]
-    np.testing.assert_allclose(again.first_from_cam, graph.first_from_cam, atol=1e-3)
 
 
 def test_steps_of_one_scale_end_where_open3ds_own_loop_ends(tmp_path, monkeypatch):
@@ -163,16 +140,3 @@ def test_loop_candidates_are_keyframes_that_look_the_same_way():
     assert loop_candidates(poses, 2) == [(0, 2), (0, 6), (2, 6)]
     poses[6, :3, 3] = [5.0, 0, 0]
     assert loop_candidates(poses, 2) == [(0, 2)]
-
-
-def test_wrong_image_size_and_missing_image_are_named(paths):
-    with pytest.raises(InputError, match=r"is 160x120, the camera of the configuration 64x48"):
-        rgbd_graph(*paths, CameraConfig(width=64, height=48), CFG)
-    with pytest.raises(InputError, match=r"none\.png: cannot be read as an image"):
-        rgbd_graph([paths[0][0].with_name("none.png")], paths[1][:1], CAMERA, CFG)
-
-
-def test_intrinsics_of_a_right_angle():
-    camera = CameraConfig(width=200, height=100, horizontal_fov_deg=90.0)
-    expected = [[100, 0, 99.5], [0, 100, 49.5], [0, 0, 1]]
-    np.testing.assert_allclose(intrinsics_of(camera).matrix(-0.5), expected)

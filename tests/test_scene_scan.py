@@ -12,10 +12,10 @@ from synfeal.mesh.triangles import weld
 from synfeal.scenes.atlas import ATLAS_PX, GUTTER_PX, laid_out, pack
 from synfeal.scenes.bake import scanned_mesh
 from synfeal.scenes.grids import Surface, jittered, refined, surface_of
-from synfeal.scenes.lighting import MEDIAN_LIGHT, Lamp, Lighting, Sun, baked
-from synfeal.scenes.patches import Item, Patch, Points, bilinear
+from synfeal.scenes.lighting import Lamp, Lighting, Sun, baked
+from synfeal.scenes.patches import Item, Patch, Points
 from synfeal.scenes.primitives import box, level, tube, turned, upright
-from synfeal.scenes.scan import Scanner, displacement, rounded, seen_faces, stations
+from synfeal.scenes.scan import Scanner, rounded, seen_faces, stations
 
 GREY = np.full((8, 8, 3), 128, np.uint8)
 DARK = np.zeros((2, 2, 2, 3), np.float32)
@@ -47,25 +47,6 @@ def area_of(points: Points, faces: NDArray[np.int64]) -> float:
     corner = points[faces]
     sides = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     return float(np.linalg.norm(sides, axis=1).sum() / 2)
-
-
-def test_bilinear_is_exact_for_bilinear_functions() -> None:
-    rows, columns = np.mgrid[0:4, 0:5].astype(float)
-    grid = np.stack([rows, columns, rows * columns], axis=-1)
-    at_rows, at_columns = np.array([0.0, 1.25, 3.0]), np.array([0.5, 4.0])
-    value = bilinear(grid, at_rows, at_columns)
-    r, c = np.meshgrid(at_rows, at_columns, indexing="ij")
-    np.testing.assert_allclose(value, np.stack([r, c, r * c], axis=-1), atol=1e-12)
-
-
-def test_surfaces_face_where_they_say() -> None:
-    for points, normal in (
-        (upright((0, 0), (1, 0), 0, 1), (0, -1, 0)),
-        (level((0, 2), (0, 1), 0), (0, 0, 1)),
-        (level((0, 2), (0, 1), 0, face_down=True), (0, 0, -1)),
-    ):
-        normals = refined(Patch(points, GREY), 0.5).normals
-        np.testing.assert_allclose(normals, np.broadcast_to(normal, normals.shape), atol=1e-12)
 
 
 @pytest.mark.parametrize("shape", ["turned", "tube"])
@@ -125,22 +106,6 @@ def test_rounding_keeps_planes_and_takes_off_edges() -> None:
     assert np.abs(smooth - (0, 0, 0.5)).max() <= 0.5 + 1e-12
 
 
-def test_rounding_leaves_open_rims() -> None:
-    surface = surface_of(rng(), [Patch(level((0, 1), (0, 1), 0), GREY)], 0.1)
-    bent = surface.points_m + np.random.default_rng(1).normal(0, 0.01, surface.points_m.shape)
-    smooth = rounded(bent, surface.edges, surface.faces)
-    rim = (np.abs(surface.points_m[:, :2] - 0.5).max(axis=1)) > 0.5 - 1e-9
-    np.testing.assert_array_equal(smooth[rim], bent[rim])
-    assert np.abs(smooth[~rim, 2]).std() < np.abs(bent[~rim, 2]).std()
-
-
-def test_displacement_is_millimetres_and_smooth() -> None:
-    points = np.random.default_rng(2).uniform(0, 4, (4000, 3))
-    field = displacement(rng(), np.concatenate([points, points + np.array([0, 0, 0.01])]))
-    assert 0.002 < field.std() < 0.008
-    assert np.abs(field[:4000] - field[4000:]).max() < 0.001
-
-
 def test_a_box_in_a_room_hides_what_is_below_and_behind_it() -> None:
     wardrobe = grey_box((1.0, 0.5, 1.0)).placed(2.0, 3.75)
     surface = surface_of(rng(), [*room(), *wardrobe.patches], 0.1)
@@ -183,13 +148,6 @@ def test_lamp_light_falls_off_as_it_should() -> None:
     np.testing.assert_allclose(
         light[:, 0] / np.median(light), expected / np.median(expected), rtol=1e-4
     )
-
-
-def test_exposure_puts_the_median_where_it_belongs() -> None:
-    lamp = Lamp((2.0, 2.0, 2.9), (0, 0, -1), (3, 2, 1))
-    ambient = np.full_like(DARK, 0.3)
-    _, light = light_on(room(), Lighting(LOWER, UPPER, ambient, [lamp], None), 0.5)
-    assert np.median(light) == pytest.approx(MEDIAN_LIGHT, rel=1e-3)
 
 
 def test_table_shades_the_floor_from_a_lamp() -> None:
@@ -243,11 +201,6 @@ def test_packing_never_overlaps() -> None:
         used[atlas][row : row + high, column : column + wide] += 1
     assert max(grid.max() for grid in used) == 1
     assert sum(grid.sum() for grid in used) == sum(high * wide for high, wide in sizes)
-
-
-def test_packing_refuses_what_does_not_fit() -> None:
-    with pytest.raises(ValueError, match="atlas"):
-        pack([(ATLAS_PX + 1, 10)])
 
 
 def test_pictures_keep_a_rim_of_their_own_colour() -> None:

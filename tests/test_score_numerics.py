@@ -66,14 +66,6 @@ AXES = ((0.0, 0.0, 1.0), (2.0, -3.0, 6.0))
 
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("base", BASES)
-def test_the_reference_is_the_angle_turned_by(base: Sequence[float], axis: Sequence[float]) -> None:
-    for angle in ANGLES:
-        found = exact_angle(np.array(base), turned(base, axis, angle))
-        assert abs(found - angle) < 1e-15
-
-
-@pytest.mark.parametrize("axis", AXES)
-@pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_angles_from_0_to_180_degrees_keep_their_digits(
     base: Sequence[float], axis: Sequence[float], sign: float

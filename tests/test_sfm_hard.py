@@ -116,14 +116,6 @@ def test_three_frames_are_found(tmp_path):
     assert orientation_deg.max() < 0.5
 
 
-def test_two_frames_are_lost_because_points_must_be_seen_three_times(tmp_path):
-    assert not estimate(tmp_path, before_a_corner(2)).trajectory.registered.any()
-
-
-def test_one_frame_is_lost(tmp_path):
-    assert not estimate(tmp_path, sideways(1)).trajectory.registered.any()
-
-
 def test_a_turn_of_90_degrees_in_5_frames_loses_one_side_and_the_other_is_right(tmp_path):
     turn_deg = np.concatenate([np.zeros(3), np.linspace(0, 90, 6), np.full(3, 90.0)])
     poses = poses_at([1.2, 2.0, 1.5] + np.arange(12)[:, None] * [0.08, 0.05, 0.0], turn_deg)
@@ -160,26 +152,10 @@ def test_principal_point_off_the_centre_is_as_good_when_it_is_known(tmp_path):
     assert np.median(errors(result, poses)[0]) < 0.005
 
 
-def test_principal_point_wrong_by_20_px_is_not_noticed_but_bends_the_path(tmp_path):
-    poses = sideways(7, turn_deg=2.0)
-    result = estimate(tmp_path, poses, told=shifted(20))
-    position_m, _ = errors(result, poses)
-    assert result.trajectory.registered.any()
-    assert np.median(position_m) > 0.005
-
-
 def shifted(px):
     """The camera with its principal point moved to the right."""
     fx, fy, cx, cy = intrinsics_of(CAMERA)
     return CAMERA.model_copy(update={"fx": fx, "fy": fy, "cx": cx + px, "cy": cy})
-
-
-def test_damaged_image_is_named(tmp_path):
-    poses = sideways(3)
-    paths = write(tmp_path, poses)
-    paths[1].write_bytes(paths[1].read_bytes()[:500])
-    with pytest.raises(InputError, match=r"frame-000001\.color\.png: cannot be read as an image"):
-        sfm_batch(paths, CAMERA, poses, CFG, 0, tmp_path)
 
 
 def test_image_of_another_size_is_named(tmp_path):

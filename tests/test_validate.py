@@ -14,10 +14,7 @@ from PIL import Image
 from synfeal.cli import main
 from tests import damaged_sets
 from tests.damaged_sets import (
-    FILES,
     HIDDEN_ERRORS,
-    copy_of_first_frames,
-    damages,
     frame_files,
     without_manifest_hashes,
     write_planar_set,
@@ -203,22 +200,6 @@ def test_without_depth_frames_are_not_compared(
         path.unlink()
     assert main(["validate", str(damaged)]) == 0
     assert "no depth images" in capsys.readouterr().out
-
-
-@pytest.fixture(scope="module")
-def small(planar: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return copy_of_first_frames(planar, tmp_path_factory.mktemp("small") / "set")
-
-
-@pytest.mark.parametrize("file", FILES)
-@pytest.mark.parametrize("damage", damages())
-def test_any_damage_ends_in_error_lines(
-    file: str, damage: str, small: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = Path(shutil.copytree(small, tmp_path / "set"))
-    damages()[damage](folder / file)
-    assert main(["validate", str(folder)]) == 1
-    assert errors(capsys)
 
 
 @pytest.mark.parametrize("what", ["nothing", "a file", "an empty directory"])

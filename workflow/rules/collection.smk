@@ -3,7 +3,7 @@
 
 rule scene:
     input:
-        lambda w: CONFIG.scenes[w.scene].path or [],
+        mesh=lambda w: CONFIG.scenes[w.scene].path or [],
     output:
         mesh=f"{ROOT}/scenes/{{scene}}/mesh.glb",
         collision=f"{ROOT}/scenes/{{scene}}/collision.ply",

@@ -8,11 +8,11 @@ from synfeal.job import job
 from synfeal.planning.plan import plan_scene
 
 with job(snakemake.log[0]):
-    repeat = {"repeat": path for path in snakemake.input[1:]}  # where it lies here
+    repeat = snakemake.input.repeat or None  # where it lies here
     table = plan_scene(
         Path(snakemake.input.collision),
         SceneConfig(**snakemake.params.scene),
-        CollectionConfig(**{**snakemake.params.collection, **repeat}),
+        CollectionConfig(**snakemake.params.collection | {"repeat": repeat}),
         snakemake.params.n_frames,
         np.random.default_rng(snakemake.params.seed),
         snakemake.wildcards.split,

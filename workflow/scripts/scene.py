@@ -5,10 +5,9 @@ from synfeal.job import job
 from synfeal.scenes.prepare import prepare_scene
 
 with job(snakemake.log[0]):
-    mesh = {"path": path for path in snakemake.input}  # where it lies here
     prepare_scene(
         snakemake.wildcards.scene,
-        SceneConfig(**{**snakemake.params.scene, **mesh}),
+        SceneConfig(**snakemake.params.scene | {"path": snakemake.input.mesh or None}),
         snakemake.params.collision_agreement,
         snakemake.params.seed,
         Path(snakemake.output.mesh).parent,

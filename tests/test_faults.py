@@ -1,0 +1,267 @@
+"""A full disk at every kind of file the stages write: said so, nothing left, whole afterwards."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+from matplotlib.figure import Figure
+
+from baselines.groundtruth.posegraph.graph import PoseGraph, write_g2o
+from baselines.groundtruth.trajectory import failed_trajectory, read_trajectory, write_trajectory
+from baselines.training.checkpoint import save_atomically
+from baselines.training.device import memory_errors
+from baselines.training.progress import HistoryRow, write_history
+from baselines.training.resume import ResumeFile
+from synfeal.dataset.directories import atomic_directory
+from synfeal.dataset.packed import join_packed, new_packed, read_packed
+from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
+from synfeal.errors import InputError
+from synfeal.files import atomic_path, read_json, write_json
+from synfeal.mesh.load import load_mesh
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.save import save_glb
+from synfeal.mesh.triangles import Triangles, load_collision_mesh, save_collision_mesh
+from synfeal.report.figures.write import save
+from synfeal.report.latex import write_text
+from synfeal.run_lock import begin_run
+from tests.small_disk import mounted, remount
+
+N = 2000  # rows, vertices or values: more than the disk holds
+ROOM_FOR_NOTHING = "12k"
+
+
+def poses() -> PoseTable:
+    index = np.arange(N)
+    position_m = np.random.default_rng(0).normal(size=(N, 3))
+    return PoseTable(index, index, position_m, np.tile([1.0, 0, 0, 0], (N, 1)))
+
+
+def sphere() -> Triangles:
+    mesh = trimesh.creation.icosphere(4)
+    return Triangles(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+def write_mesh(path: Path) -> None:
+    vertices, faces = sphere()
+    colors = np.zeros((len(vertices), 3), np.uint8)
+    save_glb(path, TexturedMesh((MeshPart("sphere", vertices, faces, vertex_rgb=colors),)))
+
+
+def write_graph(path: Path) -> None:
+    write_g2o(path, PoseGraph(np.tile(np.eye(4), (N, 1, 1)), ()))
+
+
+def write_resume(path: Path) -> None:
+    ResumeFile(path, "this training").save_if_due({"weights": torch.nn.Linear(N, 4)}, now=True)
+
+
+def write_rows(path: Path) -> None:
+    write_history(path, [HistoryRow(step, 1 / 3, 1e-3) for step in range(N)])
+
+
+def write_parts(path: Path) -> None:
+    part = path.parents[1] / "part.npy"
+    with new_packed(part, N, 4) as packed:
+        packed[:] = 7
+    join_packed([part], path)
+
+
+def draw(path: Path) -> None:
+    figure = Figure()
+    figure.subplots().imshow(np.random.default_rng(0).random((N // 10, N // 10)))
+    save(figure, path)
+
+
+WRITERS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object]]] = {
+    "mesh.glb": (write_mesh, load_mesh),
+    "collision.ply": (lambda path: save_collision_mesh(path, sphere()), load_collision_mesh),
+    "properties.json": (lambda path: write_json(path, list(range(N))), read_json),
+    "train.csv": (lambda path: write_pose_table(path, poses()), read_pose_table),
+    "train.npy": (write_parts, read_packed),
+    "batch-000.csv": (lambda p: write_trajectory(p, failed_trajectory(N)), read_trajectory),
+    "batch-000.g2o": (write_graph, lambda path: path.read_text()),
+    "googlenet.pt": (lambda path: save_atomically(path, torch.zeros(N, 4)), torch.load),
+    "resume.pt": (write_resume, Path.read_bytes),
+    "history.csv": (write_rows, Path.read_text),
+    "table.tex": (lambda path: write_text(path, "cell & " * N), Path.read_text),
+    "figure.png": (draw, Path.read_bytes),
+    "figure.svg": (draw, Path.read_bytes),
+}
+
+
+@pytest.fixture(scope="module")
+def disk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    with mounted(tmp_path_factory.mktemp("faults") / "disk", ROOM_FOR_NOTHING) as place:
+        yield place
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_full_disk_is_named_and_nothing_is_left(name: str, disk: Path) -> None:
+    write, read = WRITERS[name]
+    with pytest.raises(OSError, match="No space left on device") as caught:
+        write(disk / name)
+    assert caught.value.errno == errno.ENOSPC
+    assert caught.value.filename == str(disk / name)
+    assert list(disk.iterdir()) == []
+    remount(disk, "size=50m")
+    write(disk / name)
+    read(disk / name)
+    assert [path.name for path in disk.iterdir()] == [name]
+    (disk / name).unlink()
+    remount(disk, f"size={ROOM_FOR_NOTHING}")
+
+
+def test_a_job_tells_of_a_full_disk_where_its_log_lies_too(disk: Path) -> None:
+    script = (
+        "from pathlib import Path\nfrom synfeal.files import write_json\n"
+        f"from synfeal.job import job\nwith job({str(disk / 'job.log')!r}):\n"
+        f"    write_json(Path({str(disk / 'facts.json')!r}), ['word'] * 9000)\n"
+    )
+    (disk / "other").write_bytes(bytes(8192))  # the log's first page is the last that is free
+    run = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 1
+    place = disk / "facts.json"
+    assert run.stderr == f"error: {place}: No space left on device; fix that and start again\n"
+    assert not place.exists()
+    for path in disk.iterdir():
+        path.unlink()
+
+
+ROOT = Path(__file__).parent.parent
+HOLD = "import sys, time; from pathlib import Path; from synfeal.run_lock import begin_run\n"
+HOLD += "begin_run(Path(sys.argv[1])); print('begun', flush=True); time.sleep(600)"
+
+# A job as a dry run lists it: rule, what it reads, what it writes.
+JOB = re.compile(
+    r"^(?:local)?rule (\w+):\n(?:    input: (.*)\n)?(?:    output: (.*)\n)?", re.MULTILINE
+)
+
+
+def other_run(root: Path) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", HOLD, str(root)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "begun\n"
+    return process
+
+
+def snakemake(results: Path, target: str, *more: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "snakemake", "--cores", "1", *more]
+    command += ["--configfile", "config/smoke.yaml", "--config", f"results={results}"]
+    command += ["--", target]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.slow
+def test_a_second_run_is_refused_until_the_first_is_dead(tmp_path: Path) -> None:
+    root = tmp_path / "results" / "smoke"
+    with other_run(root) as process:
+        with pytest.raises(InputError, match=rf"another run .* \(process {process.pid} on "):
+            begin_run(root)
+        second = snakemake(root.parent, f"{root}/tables/hard_cases.csv")
+        assert second.returncode == 1
+        errors = [line for line in second.stderr.splitlines() if line.startswith("error:")]
+        assert errors == [line for line in errors if "another run is at work there" in line] != []
+        assert "Traceback" not in second.stderr
+        assert [path.name for path in root.iterdir()] == [".lock"]
+        process.send_signal(signal.SIGKILL)
+    begin_run(root)  # nothing has to be unlocked
+
+
+KILLED = {"test.npy": atomic_path, "seq-01": atomic_directory}
+
+
+@pytest.mark.parametrize("name", KILLED)
+def test_what_killed_runs_left_half_written_is_removed_and_nothing_else(
+    name: str, tmp_path: Path
+) -> None:
+    """A job goes on after its run was killed, and the next run begins meanwhile."""
+    place = tmp_path / "frames" / "room"
+    finished = ["train.npy", "resume.pt", ".snakemake_timestamp", ".nfs0a1b2c3d", ".hidden-file"]
+    place.mkdir(parents=True)
+    for kept in finished:
+        (place / kept).write_text("whole")
+    half = KILLED[name](place / name)
+    path = half.__enter__()
+    (path / "frame.png" if path.is_dir() else path).write_bytes(b"half")
+    begin_run(tmp_path)
+    assert not path.exists()
+    with pytest.raises(FileNotFoundError):
+        half.__exit__(None, None, None)
+    assert sorted(path.name for path in place.iterdir()) == sorted(finished)
+
+
+def test_a_clock_that_jumped_back_leaves_no_date_in_the_future(tmp_path: Path) -> None:
+    jump_s = 3600
+    ages_s = {"plan.csv": 60, "mesh.glb": -jump_s, "frames.npy": -jump_s, "model.pt": -jump_s - 1}
+    now = time.time()
+    for name, age_s in ages_s.items():
+        (tmp_path / name).write_text(name)
+        os.utime(tmp_path / name, (now - age_s, now - age_s))
+    begin_run(tmp_path)
+    dates = {name: (tmp_path / name).stat().st_mtime for name in ages_s}
+    assert dates["plan.csv"] == pytest.approx(now - 60, abs=1e-3)
+    assert now <= dates["mesh.glb"] == dates["frames.npy"] < dates["model.pt"] <= time.time()
+
+
+def test_a_file_system_without_locks_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def no_locks(descriptor: int, operation: int) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr("synfeal.run_lock.fcntl.flock", no_locks)
+    begin_run(tmp_path)
+    message = f"{tmp_path}/.lock: No locks available; see yourself that no other run starts\n"
+    assert capsys.readouterr().err == message
+
+
+def test_torch_out_of_memory_is_a_memory_error() -> None:
+    with (
+        pytest.raises(MemoryError, match=r"can't allocate memory: you tried to allocate \d+ bytes"),
+        memory_errors(),
+    ):
+        torch.empty(2**56, dtype=torch.uint8)
+    with pytest.raises(RuntimeError, match="shape") as caught, memory_errors():
+        torch.zeros(3).reshape(2)
+    assert not isinstance(caught.value, MemoryError)
+
+
+def test_a_job_tells_of_too_little_memory_in_one_line(tmp_path: Path) -> None:
+    log = tmp_path / "job.log"
+    script = f"from synfeal.job import job\nwith job({str(log)!r}):\n    bytes(2**60)\n"
+    run = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 1
+    (line,) = run.stderr.splitlines()
+    assert line.startswith("error: out of memory (no more is to be had); ")
+    assert "--cores" in line
+    assert "MemoryError" in log.read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", ["all", "runs", "labels"])
+def test_every_job_has_an_output_that_the_target_asks_for(target: str, tmp_path: Path) -> None:
+    """Else Snakemake takes old results for those of a changed configuration after a failed job."""
+    plan = snakemake(tmp_path, target, "--dry-run", "--quiet", "host").stdout
+    jobs = JOB.findall(plan)
+    (asked,) = (set(inputs.split(", ")) for rule, inputs, _ in jobs if rule == target)
+    made = [(rule, set(outputs.split(", "))) for rule, _, outputs in jobs if outputs]
+    assert {"scene", "plan", "sfm", "rgbd", "posegraph", "chain"} <= {rule for rule, _ in made}
+    temporary = {"render_packed", "features"}  # what is made of their output is asked for
+    assert [rule for rule, outputs in made if rule not in temporary and not outputs & asked] == []
