@@ -13,7 +13,7 @@ RUN := $(BIN)/synfeal run --cores $(CORES)
 PYTEST := OMP_NUM_THREADS=1 $(BIN)/pytest --numprocesses $(CORES) --dist loadfile
 export PYTHONHASHSEED := 0
 
-.PHONY: help reproduce smoke start publish archive plan test test-all test-slurm coverage mutate check format lock clean
+.PHONY: help reproduce smoke start publish archive plan test test-all test-slurm test-isolated coverage mutate check format lock clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -57,6 +57,13 @@ test-slurm: $(SLURM_INSTALLED)  ## the smoke profile here and through a SLURM cl
 	setup/slurm_cluster.sh install
 	$(BIN)/python -m tests.slurm_run --work results/slurm_test $(if $(LOCAL),--local $(LOCAL))
 	$(BIN)/pytest tests/test_clusters.py tests/test_slurm_run.py
+
+test-isolated: $(SLURM_INSTALLED)  ## the smoke profile here, and with every job alone in an empty folder (docs/clusters.md)
+	command -v rsync || apt-get install --yes --no-install-recommends rsync
+	$(BIN)/snakemake --cores $(CORES) --configfile config/smoke.yaml -- all
+	PATH=$(abspath $(BIN)):$$PATH $(BIN)/snakemake --profile workflow/profiles/isolated \
+	  --default-storage-prefix $(abspath results/store) --configfile config/smoke.yaml -- all
+	$(BIN)/python -m tests.slurm_run.trees results/smoke results/store/results/smoke
 
 coverage: $(QUALITY)  ## which lines the test suite runs
 	$(BIN)/coverage erase

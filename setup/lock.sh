@@ -6,4 +6,4 @@ echo "# Exact versions of everything installed; written by 'make lock', read by 
 # torch's CUDA build and `make test-slurm` need stands in requirements-cuda.lock and -slurm.lock;
 # meshoptimizer, which has to be built, in setup/meshoptimizer.sh.
 "$1" -m pip freeze --exclude-editable --exclude synfeal | sed -E 's/\+[a-z0-9.]+$//' |
-    grep -Ev ' @ |^(nvidia|cuda)-|^triton=|^meshoptimizer=|^snakemake-executor-plugin-slurm'
+    grep -Ev ' @ |^(nvidia|cuda)-|^triton=|^meshoptimizer=|^snakemake-(executor|storage)-plugin|^(reretry|sysrsync|toml)='

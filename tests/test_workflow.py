@@ -1,5 +1,6 @@
 """The workflow as a user meets it: what a dry run plans, and how a wrong configuration ends."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -42,6 +43,17 @@ def test_default_profile_plans_the_papers_design(tmp_path: Path) -> None:
     assert jobs["descriptors"] == jobs["features"] == jobs["views"] == 2
     assert jobs["correspondences"] == jobs["tracks"] == jobs["references_table"] == 1
     assert jobs["table"] + jobs["table1_meshes"] == 6
+
+
+def test_the_record_of_a_run_reads_what_every_job_before_it_took(tmp_path: Path) -> None:
+    """Else the record depends on which jobs happen to have ended, and on a shared file system."""
+    out = tmp_path / "jobs.json"
+    command = ["synfeal.report.cost.dry_run", "config/smoke.yaml", str(tmp_path), str(out)]
+    subprocess.run([sys.executable, "-m", *command], cwd=ROOT, check=True, capture_output=True)
+    jobs = json.loads(out.read_text())
+    (read,) = (set(job["input"]) for job in jobs if job["rule"] == "provenance")
+    unread = {job["rule"] for job in jobs if job["benchmark"] and job["benchmark"] not in read}
+    assert unread == {"provenance", "report", "report_document"}
 
 
 def test_a_single_experiment_is_a_target(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fnmatch
 import hashlib
 import re
+import sys
 from pathlib import Path
 
 # Files of a results directory that say how long something took, or embed what does; by why.
@@ -89,3 +90,9 @@ def damaged(expected: dict[str, str], found: dict[str, str]) -> list[str]:
 def missing(expected: dict[str, str], found: dict[str, str]) -> list[str]:
     """Files of a complete tree that another one lacks."""
     return sorted(expected.keys() - found.keys())
+
+
+if __name__ == "__main__":  # EXPECTED FOUND: names what differs between two results directories
+    trees = [Hashes().tree(Path(root)) for root in sys.argv[1:3]]
+    differing = damaged(*trees) + missing(*trees)
+    sys.exit("\n".join(["these files differ or lack:", *differing]) if differing else 0)
