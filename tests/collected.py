@@ -6,6 +6,7 @@ import hashlib
 from pathlib import Path
 
 import numpy as np
+import pytest
 import trimesh
 
 from synfeal.cli import main
@@ -42,3 +43,11 @@ def tree_of(directory: Path) -> dict[str, str]:
         for path in sorted(directory.rglob("*"))
         if path.is_file()
     }
+
+
+def only_error(capfd: pytest.CaptureFixture[str]) -> str:
+    """The message; before it nothing but lines of progress, and no traceback of any process."""
+    *before, last = capfd.readouterr().err.strip().splitlines()
+    assert not [line for line in before if not line.startswith("seq-")], before
+    assert last.startswith("error: ")
+    return last

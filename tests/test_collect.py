@@ -3,12 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,16 +11,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.cli import main
-from synfeal.dataset import render_pool
 from synfeal.dataset.manifest import verify_manifest
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.sevenscenes import frame_paths, read_pose, read_split
 from synfeal.geometry.rotations import rotation_from_rpy
-from synfeal.render import open_renderer
-from synfeal.run_lock import only_command
-from tests.collected import collect, command, save_room, tree_of
-from tests.small_disk import mounted, remount
+from tests.collected import collect, only_error, save_room, tree_of
 from tests.test_workflow import snakemake
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
@@ -43,14 +33,6 @@ def calm(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("calm") / "set"
     assert collect(mesh, out, "--depth") == 0
     return out
-
-
-def only_error(capfd: pytest.CaptureFixture[str]) -> str:
-    """The message; before it nothing but lines of progress, and no traceback of any process."""
-    *before, last = capfd.readouterr().err.strip().splitlines()
-    assert not [line for line in before if not line.startswith("seq-")], before
-    assert last.startswith("error: ")
-    return last
 
 
 def test_collect_makes_a_complete_data_set(calm: Path) -> None:
@@ -144,174 +126,6 @@ def test_the_background_has_the_colour_asked_for(mesh: Path, tmp_path: Path, bac
         assert frame.getpixel((20, 16)) != (10, 200, 30)
 
 
-class Interrupting:
-    """A renderer that is interrupted after some frames, and counts those it rendered."""
-
-    def __init__(self, limit: int) -> None:
-        self.limit = limit
-        self.count = 0
-
-    def open(self, *arguments: object) -> Interrupting:
-        self.real = open_renderer(*arguments)  # type: ignore[arg-type]
-        return self
-
-    def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> object:
-        if self.count == self.limit:
-            raise KeyboardInterrupt
-        self.count += 1
-        return self.real.render_rgbd(world_from_cam)
-
-    def __enter__(self) -> Interrupting:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.real.close()
-
-
-def interrupted(mesh: Path, out: Path, limit: int = 13) -> Path:
-    """The unfinished directory of a collection that stopped after some frames."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(render_pool, "open_renderer", Interrupting(limit).open)
-        assert collect(mesh, out, "--depth") == 130
-    return out.with_name(f"{out.name}.part")
-
-
-def test_ctrl_c_keeps_whole_sequences_and_says_how_to_go_on(
-    mesh: Path, calm: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    part = interrupted(mesh, tmp_path / "set")
-    assert "kept in" in (message := only_error(capfd))
-    assert "same command again" in message
-    assert [path.name for path in part.glob("seq-*")] == ["seq-01"]
-    (part / ".seq-02-abcd1234").mkdir()  # of a command that was killed
-    (part / ".manifest-12345678.json").write_text("half a mani")
-    renderer = Interrupting(100)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(render_pool, "open_renderer", renderer.open)
-        assert collect(mesh, tmp_path / "set", "--depth") == 0
-    assert renderer.count == 32 - 10
-    assert tree_of(tmp_path / "set") == tree_of(calm)
-    assert [path.name for path in tmp_path.iterdir()] == ["set"]
-
-
-def test_a_collection_survives_being_killed(mesh: Path, calm: Path, tmp_path: Path) -> None:
-    out, part = tmp_path / "set", tmp_path / "set.part"
-    arguments = [sys.executable, "-m", "synfeal.cli", *command(mesh, out, "--depth")]
-    with subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
-        while run.poll() is None and not list(part.glob("*seq-*")):
-            time.sleep(0.005)
-        run.kill()
-    assert collect(mesh, out, "--depth") == 0 or run.returncode == 0
-    assert tree_of(out) == tree_of(calm)
-    assert [path.name for path in tmp_path.iterdir()] == ["set"]
-
-
-def test_killed_after_the_last_rename_there_is_only_a_directory_to_remove(
-    mesh: Path, calm: Path, tmp_path: Path
-) -> None:
-    assert collect(mesh, tmp_path / "set", "--depth") == 0
-    (tmp_path / "set" / ".work" / "scene").mkdir(parents=True)
-    assert collect(mesh, tmp_path / "set", "--depth") == 0
-    assert tree_of(tmp_path / "set") == tree_of(calm)
-
-
-def test_a_worker_that_is_killed_is_one_line(
-    mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(render_pool, "_start_worker", suicide)
-    assert collect(mesh, tmp_path / "set", "--workers", "2") == 1
-    assert "fewer --workers" in only_error(capfd)
-    assert (tmp_path / "set.part" / "train.csv").is_file()
-
-
-def suicide(*_: object) -> None:
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    with mounted(tmp_path / "disk", "240k") as disk:
-        yield disk
-
-
-@pytest.mark.parametrize("more", [(), ("--workers", "2")], ids=["alone", "processes"])
-def test_a_full_disk_is_one_line_and_the_collection_goes_on_when_there_is_room(
-    mesh: Path,
-    calm: Path,
-    small_disk: Path,
-    capfd: pytest.CaptureFixture[str],
-    more: tuple[str, ...],
-) -> None:
-    out = small_disk / "set"
-    assert collect(mesh, out, "--depth", *more) == 1
-    assert "No space left" in (message := only_error(capfd))
-    assert "same command again" in message
-    assert not out.exists()
-    remount(small_disk, "size=50m")
-    assert collect(mesh, out, "--depth") == 0
-    assert tree_of(out) == tree_of(calm)
-    remount(small_disk, "ro")
-    capfd.readouterr()
-    assert collect(mesh, small_disk / "other") == 1
-    assert "Read-only" in (message := only_error(capfd))
-    assert "nothing was kept" in message
-
-
-OTHERS = {
-    "seed": (["--seed", "1"], "--seed was 0, is 1"),
-    "width": (["--width", "48"], "--width was 40, is 48"),
-    "packed": (["--packed", "16"], "packed_px was None, is 16"),
-    "test frames": (["--test-frames", "9"], "--test-frames was 8, is 9"),
-    "spacing": (["--spacing", "0.3"], "--spacing was 0.2, is 0.3"),
-}
-
-
-def test_other_settings_and_commands_do_not_go_on_with_it(
-    mesh: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    part = interrupted(mesh, tmp_path / "set", 2)
-    before = sorted(part.rglob("*"))
-    other = save_room(tmp_path / "other.glb", seed=1)
-    refused = [(mesh, more, words) for more, words in OTHERS.values()]
-    for used, more, words in [*refused, (other, [], "sha256 was ")]:
-        capfd.readouterr()
-        assert collect(used, tmp_path / "set", "--depth", *more) == 1
-        assert words in (message := only_error(capfd))
-        assert f"delete {part}" in message
-    with only_command(part, part / ".work" / "lock"):
-        assert collect(mesh, tmp_path / "set", "--depth") == 1
-    assert "another run is at work there (process" in only_error(capfd)
-    assert sorted(part.rglob("*")) == before
-
-
-FOREIGN: dict[str, str | None] = {
-    "cut": '{"seed": 0',
-    "a list": "[]",
-    "of another version": '{"synfeal": "0.0"}',
-    "a directory": None,
-}
-
-
-@pytest.mark.parametrize("case", FOREIGN)
-def test_a_damaged_record_of_settings_is_named_and_nothing_is_touched(
-    case: str, mesh: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    part = tmp_path / "set.part"
-    record = part / ".work" / "settings.json"
-    (part / ".work" / "scene").mkdir(parents=True)  # prepared, and nothing planned yet
-    (part / ".work" / "lock").touch()
-    if (text := FOREIGN[case]) is None:
-        record.mkdir()
-    else:
-        record.write_text(text)
-    before = sorted(tmp_path.rglob("*"))
-    assert collect(mesh, tmp_path / "set") == 1
-    assert f"{record}: " in (message := only_error(capfd))
-    assert f"delete {part} to start anew" in message
-    assert sorted(tmp_path.rglob("*")) == before
-    assert text is None or record.read_text() == text
-
-
 def test_print_config_and_manifest_say_the_same(calm: Path) -> None:
     manifest = json.loads((calm / "manifest.json").read_text())
     assert manifest["frames"] == {"train": 24, "test": 8}
@@ -322,26 +136,13 @@ def test_print_config_and_manifest_say_the_same(calm: Path) -> None:
 
 # Options beside those of a small collection, and what the one line has to say.
 REFUSED = {
-    "no frames": (["--frames", "0"], "--frames: "),
-    "negative frames": (["--frames", "-3"], "--frames: "),
-    "endless frames": (["--frames", "99999999999"], "--frames: "),
-    "negative test frames": (["--test-frames", "-1"], "--test-frames: "),
-    "narrow": (["--width", "2"], "--width: "),
-    "no unit": (["--unit-m", "0"], "--unit-m: "),
-    "no spacing": (["--spacing", "nan"], "--spacing: "),
-    "endless spacing": (["--spacing", "1e-9"], "--spacing: "),
-    "flat lens": (["--fov", "180"], "--fov: "),
     "box": (["--box", "1", "0", "0", "1", "0", "1"], "--box: x: "),
     "second box": (["--box=0 1 0 1 0 1", "--box=0 1 2 1 0 1"], "--box: "),
     "far box": (["--box", "90", "91", "0", "1", "0", "1"], "--unit-m"),
     "small scene": (["--unit-m", "1e-5"], "--unit-m"),
-    "seed": (["--seed", "-1"], "--seed: "),
     "roll": (["--roll", "5", "-5"], "--roll: the first number must be below"),
     "pitch": (["--pitch", "-90", "0"], "--pitch: must lie within -90 and 90"),
     "colour": (["--background", "0", "256", "0"], "--background: "),
-    "samples": (["--supersampling", "9"], "--supersampling: "),
-    "workers": (["--workers", "0"], "--workers: "),
-    "packed": (["--packed", "33"], "--packed: "),
     "no poses": (["--mode", "repeat"], "--poses: "),
     "long paths": (["--min-path", "1e6"], "--min-path"),
     "the root": (["--out", "/"], "--out: / is a whole file system"),

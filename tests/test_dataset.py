@@ -15,16 +15,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from PIL import Image
 
-from synfeal.config.models import CameraConfig, RenderConfig, SceneConfig
+from synfeal.config.models import CameraConfig, SceneConfig
 from synfeal.dataset.contact_sheet import write_contact_sheet
 from synfeal.dataset.directories import atomic_directory
 from synfeal.dataset.frame_writer import MOST_WAITING
 from synfeal.dataset.manifest import verify_manifest, write_manifest
-from synfeal.dataset.packed import fit_frame, join_packed, pack_frames
-from synfeal.dataset.packed_record import write_packed_record
 from synfeal.dataset.png import encode_png
-from synfeal.dataset.pose_table import PoseTable, write_pose_table
-from synfeal.dataset.render_sequence import render_packed, render_sequence, write_sequence
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.render_sequence import render_sequence, write_sequence
 from synfeal.dataset.sequences import sequences_of
 from synfeal.dataset.sevenscenes import (
     depth_mm_of,
@@ -42,7 +40,6 @@ from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import load_collision_mesh
-from synfeal.render.choose import BACKENDS
 from synfeal.scenes.prepare import prepare_scene
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
@@ -201,65 +198,6 @@ def write_frames(directory: Path, values: list[int], size: tuple[int, int] = (40
     directory.mkdir()
     for index, value in enumerate(values):
         Image.new("RGB", size, (value, 0, 0)).save(directory / f"frame-{index:06d}.color.png")
-
-
-def test_packed_frames_keep_their_order(tmp_path: Path) -> None:
-    write_frames(tmp_path / "seq-01", [1, 2, 3])
-    write_frames(tmp_path / "seq-02", [4, 5])
-    pack_frames([tmp_path / "seq-01", tmp_path / "seq-02"], 16, tmp_path / "train.npy")
-    frames = np.load(tmp_path / "train.npy", mmap_mode="r")
-    assert (frames.shape, frames.dtype) == ((5, 16, 16, 3), np.uint8)
-    assert frames[:, 8, 8, 0].tolist() == [1, 2, 3, 4, 5]
-    assert not list(tmp_path.glob(".*"))
-
-
-@pytest.mark.parametrize("size", [(128, 96), (96, 128), (80, 60), (101, 77)])
-def test_frames_are_resized_and_cropped_about_the_centre(size: tuple[int, int]) -> None:
-    rows, columns = np.indices((size[1], size[0]))
-    ramp = np.stack([columns * 255 / size[0], rows * 255 / size[1], 0 * rows], axis=2)
-    fitted = fit_frame(Image.fromarray(ramp.astype(np.uint8)), 32).astype(float)
-    assert fitted.shape == (32, 32, 3)
-    np.testing.assert_allclose(fitted[15:17, 15:17, :2].mean(axis=(0, 1)), 127, atol=6)
-    visible = 32 / 33 * min(size) / size[0]  # share of the width left after the crop
-    assert np.ptp(fitted[..., 0]) == pytest.approx(255 * visible, rel=0.07)
-
-
-def test_frames_are_averaged_not_subsampled() -> None:
-    checker = np.repeat((np.indices((96, 128)).sum(axis=0) % 2 * 255)[..., None], 3, axis=2)
-    fitted = fit_frame(Image.fromarray(checker.astype(np.uint8)), 16)
-    np.testing.assert_allclose(fitted.astype(int), 127, atol=25)
-
-
-def test_a_broken_frame_is_named(tmp_path: Path) -> None:
-    write_frames(tmp_path / "seq-01", [1, 2])
-    (tmp_path / "seq-01" / "frame-000001.color.png").write_bytes(b"\x89PNG nonsense")
-    with pytest.raises(InputError, match=r"frame-000001\.color\.png"):
-        pack_frames([tmp_path / "seq-01"], 16, tmp_path / "train.npy")
-    assert not (tmp_path / "train.npy").exists()
-
-
-def test_frames_rendered_into_an_array_are_those_of_the_files(tmp_path: Path) -> None:
-    save_glb(tmp_path / "mesh.glb", room_mesh())
-    plan, bounds = poses_of(5), ((0, 3), (3, 5))
-    shards = [tmp_path / f"seq-{number:02d}.npy" for number in (1, 2)]
-    for (start, stop), shard in zip(bounds, shards, strict=True):
-        poses = plan.between(start, stop)
-        render_packed(tmp_path / "mesh.glb", CAMERA, poses, 24, shard)
-        render_sequence(tmp_path / "mesh.glb", CAMERA, poses, shard.with_suffix(""), False)
-    join_packed(shards, tmp_path / "train.npy")
-    pack_frames([shard.with_suffix("") for shard in shards], 24, tmp_path / "files.npy")
-    assert (tmp_path / "train.npy").read_bytes() == (tmp_path / "files.npy").read_bytes()
-    write_pose_table(tmp_path / "plan.csv", plan)
-    records = [shard.with_suffix(".json") for shard in shards]
-    write_packed_record(
-        tmp_path / "train.npy", records, tmp_path / "plan.csv", CAMERA, RenderConfig()
-    )
-    record = json.loads((tmp_path / "train.json").read_text())
-    assert (record["frames"], record["input_px"]) == (5, 24)
-    assert [(s["name"], s["frames"]) for s in record["shards"]] == [("seq-01", 3), ("seq-02", 2)]
-    assert {s["backend"] for s in record["shards"]} <= set(BACKENDS)
-    for name, file in (("sha256", "train.npy"), ("plan_sha256", "plan.csv")):
-        assert record[name] == hashlib.sha256((tmp_path / file).read_bytes()).hexdigest()
 
 
 @pytest.mark.parametrize("shape", [(1, 1, 3), (7, 5, 3), (30, 40, 3), (1, 1), (7, 5), (30, 40)])

@@ -1,0 +1,103 @@
+"""Similarity transforms between point sets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from synfeal.geometry.alignment import umeyama_sim3
+from synfeal.geometry.rotations import (
+    matrix_from_quat_wxyz,
+)
+from tests.property_support import (
+    directions,
+    few,
+    positions,
+    quats,
+    rotation_of,
+    seeds,
+    turn,
+    vectors,
+)
+
+AXIS = np.array([2.0, -3.0, 6.0]) / 7.0
+
+
+def test_umeyama_agrees_with_scipy_on_noisy_and_on_planar_points():
+    rng = np.random.default_rng(1)
+    for flat in (1.0, 0.0):
+        source = rng.normal(size=(30, 3)) * [1, 1, flat]
+        target = source @ matrix_from_quat_wxyz(turn(AXIS, 1.3)).T + 0.05 * rng.normal(size=(30, 3))
+        _, rotation, _ = umeyama_sim3(source, target)
+        centred = source - source.mean(0), target - target.mean(0)
+        expected = Rotation.align_vectors(centred[1], centred[0])[0].as_matrix()
+        np.testing.assert_allclose(rotation, expected, atol=1e-6)
+
+
+def test_umeyama_takes_points_that_are_barely_apart_and_far_away():
+    # 1 mm aside of a line of 1 m, 100 km from the origin: little, but far above rounding.
+    source = np.array([[1e5, 0, 0], [1e5 + 0.5, 1e-3, 0], [1e5 + 1.0, 0, 0]])
+    np.testing.assert_allclose(umeyama_sim3(source, source)[1], np.eye(3), atol=1e-4)
+    thin = np.array([[0.0, 0, 0], [0.5, 2e-9, 0], [1.0, 0, 0]])  # spread 2 : 1e9
+    np.testing.assert_allclose(umeyama_sim3(thin, thin)[1], np.eye(3), atol=1e-6)
+    for scale in (1e-3, 1.0, 1e3):  # what counts is the spread aside against that along
+        with pytest.raises(ValueError, match="collinear"):
+            umeyama_sim3(scale * thin * [1, 0.1, 1], thin)
+
+
+def test_umeyama_says_which_shapes_it_was_given():
+    with pytest.raises(ValueError, match=r"got \(4, 3\) and \(5, 3\)"):
+        umeyama_sim3(np.zeros((4, 3)), np.zeros((5, 3)))
+    with pytest.raises(ValueError, match=r"got \(9,\) and \(9,\)"):
+        umeyama_sim3(np.zeros(9), np.zeros(9))
+
+
+def test_umeyama_refuses_what_leaves_the_rotation_free():
+    line = np.outer(np.arange(5.0), [1, 2, 3])
+    whole = "^the points are collinear: the rotation about their line is undetermined$"
+    with pytest.raises(ValueError, match=whole):
+        umeyama_sim3(line, line)
+    with pytest.raises(ValueError, match="collinear"):  # all in one place
+        umeyama_sim3(np.zeros((4, 3)), np.zeros((4, 3)))
+    far_line = np.linspace(0, 0.1, 20)[:, None] * [0.3, -0.5, 0.81] + [1e6, -7e5, 3e5]
+    with pytest.raises(ValueError, match="collinear"):  # up to rounding
+        umeyama_sim3(far_line, far_line)
+    with pytest.raises(ValueError, match="collinear"):
+        umeyama_sim3(np.random.default_rng(0).normal(size=line.shape), line)
+    with pytest.raises(ValueError, match="N >= 3"):
+        umeyama_sim3(np.eye(3)[:2], np.eye(3)[:2])
+
+
+@few
+@given(seeds, st.integers(3, 12), quats, positions, st.floats(0.1, 10.0))
+def test_umeyama_finds_the_similarity_and_its_inverse(seed, count, quat, offset, scale):
+    source = np.random.default_rng(seed).uniform(-1, 1, (count, 3))
+    assume(np.linalg.svd(source - source.mean(0), compute_uv=False)[1] > 0.1)
+    target = scale * source @ rotation_of(quat).T + offset
+    found = umeyama_sim3(source, target)
+    np.testing.assert_allclose(found[0], scale, rtol=1e-9)
+    np.testing.assert_allclose(found[1], rotation_of(quat), atol=1e-9)
+    np.testing.assert_allclose(found[2], offset, atol=1e-9)
+    back = umeyama_sim3(target, source)
+    np.testing.assert_allclose(back[0], 1 / scale, rtol=1e-9)
+    np.testing.assert_allclose(back[1], rotation_of(quat).T, atol=1e-9)
+
+
+@few
+@given(seeds, directions, st.floats(1e-4, 1e-2), vectors(1e-2))
+def test_umeyama_leaves_no_better_similarity_beside_its_own(seed, axis, angle, step):
+    rng = np.random.default_rng(seed)
+    source, target = rng.normal(size=(2, 8, 3))
+    scale, rotation, offset = umeyama_sim3(source, target)
+
+    def loss(s, r, t):
+        return np.sum((target - (s * source @ r.T + t)) ** 2)
+
+    least = loss(scale, rotation, offset)
+    np.testing.assert_allclose(np.linalg.det(rotation), 1.0, rtol=1e-12)
+    assert loss(scale, rotation_of(turn(axis, angle)) @ rotation, offset) > least
+    assert loss(scale * (1 + angle), rotation, offset) > least
+    assert loss(scale, rotation, offset + step) >= least

@@ -1,0 +1,130 @@
+"""Data sets on disk: 7-Scenes files, packed frames, manifests, and what prepares a scene."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from baselines.training import data
+from baselines.training.data import image_statistics, read_images
+from synfeal.config.models import RenderConfig
+from synfeal.dataset.packed import fit_frame, join_packed, new_packed, pack_frames, read_packed
+from synfeal.dataset.packed_record import write_packed_record
+from synfeal.dataset.pose_table import write_pose_table
+from synfeal.dataset.render_sequence import render_packed, render_sequence
+from synfeal.errors import InputError
+from synfeal.mesh.save import save_glb
+from synfeal.render.choose import BACKENDS
+from tests.test_dataset import CAMERA, poses_of, room_mesh, write_frames
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
+
+
+def test_packed_frames_keep_their_order(tmp_path: Path) -> None:
+    write_frames(tmp_path / "seq-01", [1, 2, 3])
+    write_frames(tmp_path / "seq-02", [4, 5])
+    pack_frames([tmp_path / "seq-01", tmp_path / "seq-02"], 16, tmp_path / "train.npy")
+    frames = np.load(tmp_path / "train.npy", mmap_mode="r")
+    assert (frames.shape, frames.dtype) == ((5, 16, 16, 3), np.uint8)
+    assert frames[:, 8, 8, 0].tolist() == [1, 2, 3, 4, 5]
+    assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize("size", [(128, 96), (96, 128), (80, 60), (101, 77)])
+def test_frames_are_resized_and_cropped_about_the_centre(size: tuple[int, int]) -> None:
+    rows, columns = np.indices((size[1], size[0]))
+    ramp = np.stack([columns * 255 / size[0], rows * 255 / size[1], 0 * rows], axis=2)
+    fitted = fit_frame(Image.fromarray(ramp.astype(np.uint8)), 32).astype(float)
+    assert fitted.shape == (32, 32, 3)
+    np.testing.assert_allclose(fitted[15:17, 15:17, :2].mean(axis=(0, 1)), 127, atol=6)
+    visible = 32 / 33 * min(size) / size[0]  # share of the width left after the crop
+    assert np.ptp(fitted[..., 0]) == pytest.approx(255 * visible, rel=0.07)
+
+
+def test_frames_are_averaged_not_subsampled() -> None:
+    checker = np.repeat((np.indices((96, 128)).sum(axis=0) % 2 * 255)[..., None], 3, axis=2)
+    fitted = fit_frame(Image.fromarray(checker.astype(np.uint8)), 16)
+    np.testing.assert_allclose(fitted.astype(int), 127, atol=25)
+
+
+def test_a_broken_frame_is_named(tmp_path: Path) -> None:
+    write_frames(tmp_path / "seq-01", [1, 2])
+    (tmp_path / "seq-01" / "frame-000001.color.png").write_bytes(b"\x89PNG nonsense")
+    with pytest.raises(InputError, match=r"frame-000001\.color\.png"):
+        pack_frames([tmp_path / "seq-01"], 16, tmp_path / "train.npy")
+    assert not (tmp_path / "train.npy").exists()
+
+
+def test_frames_rendered_into_an_array_are_those_of_the_files(tmp_path: Path) -> None:
+    save_glb(tmp_path / "mesh.glb", room_mesh())
+    plan, bounds = poses_of(5), ((0, 3), (3, 5))
+    shards = [tmp_path / f"seq-{number:02d}.npy" for number in (1, 2)]
+    for (start, stop), shard in zip(bounds, shards, strict=True):
+        poses = plan.between(start, stop)
+        render_packed(tmp_path / "mesh.glb", CAMERA, poses, 24, shard)
+        render_sequence(tmp_path / "mesh.glb", CAMERA, poses, shard.with_suffix(""), False)
+    join_packed(shards, tmp_path / "train.npy")
+    pack_frames([shard.with_suffix("") for shard in shards], 24, tmp_path / "files.npy")
+    assert (tmp_path / "train.npy").read_bytes() == (tmp_path / "files.npy").read_bytes()
+    write_pose_table(tmp_path / "plan.csv", plan)
+    records = [shard.with_suffix(".json") for shard in shards]
+    write_packed_record(
+        tmp_path / "train.npy", records, tmp_path / "plan.csv", CAMERA, RenderConfig()
+    )
+    record = json.loads((tmp_path / "train.json").read_text())
+    assert (record["frames"], record["input_px"]) == (5, 24)
+    assert [(s["name"], s["frames"]) for s in record["shards"]] == [("seq-01", 3), ("seq-02", 2)]
+    assert {s["backend"] for s in record["shards"]} <= set(BACKENDS)
+    for name, file in (("sha256", "train.npy"), ("plan_sha256", "plan.csv")):
+        assert record[name] == hashlib.sha256((tmp_path / file).read_bytes()).hexdigest()
+
+
+N, PX = 30, 8
+CPU = torch.device("cpu")
+
+
+@pytest.fixture
+def frames(tmp_path: Path) -> Path:
+    path = tmp_path / "frames.npy"
+    with new_packed(path, N, PX) as packed:
+        packed[:] = np.random.default_rng(0).integers(0, 256, packed.shape)
+    return path
+
+
+def mapped(path: Path) -> bool:
+    """Whether this process has the file in its memory map."""
+    return str(path) in Path("/proc/self/maps").read_text(encoding="utf-8")
+
+
+def test_a_large_set_is_mapped_and_holds_the_same_images(
+    frames: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = read_images(frames, N - 3, PX, CPU)
+    assert not mapped(frames)
+    monkeypatch.setattr(data, "MOST_READ_BYTES", 100)
+    images = read_images(frames, N - 3, PX, CPU)
+    assert mapped(frames)
+    assert images.shape == (N - 3, 3, PX, PX)
+    assert images.stride() == read.stride()
+    assert torch.equal(images, read)
+    assert torch.equal(image_statistics(images).mean, image_statistics(read).mean)
+    before = frames.read_bytes()
+    images[5] = 0  # of this process alone
+    assert frames.read_bytes() == before
+    assert torch.equal(read_images(frames, N, PX, CPU)[:4], read[:4])
+
+
+def test_joined_frames_are_those_of_numpy_to_the_byte(frames: Path, tmp_path: Path) -> None:
+    content = read_packed(frames)
+    for name, part in (("a", content[:7]), ("b", content[7:])):
+        np.save(tmp_path / f"{name}.npy", part)
+    joined = tmp_path / "joined.npy"
+    join_packed([tmp_path / "a.npy", tmp_path / "b.npy"], joined)
+    assert joined.read_bytes() == frames.read_bytes()
+    np.testing.assert_array_equal(np.load(joined), content)
