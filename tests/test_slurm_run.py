@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.slurm_run.page import compare, job_records, page, plan_lines, recovery
-from tests.slurm_run.run import CLUSTER, Crash, DryRun
+from tests.slurm_run.page import compare, job_records, page
+from tests.slurm_run.run import CLUSTER, Crash
 
 JOBS = """\
 JobId=7 UserId=root(0) GroupId=root(0) Name=wrap JobState=NODE_FAIL Partition=gpu TimeLimit=5 \
@@ -34,10 +34,6 @@ def test_a_job_that_was_requeued_ends_twice() -> None:
         ("7", "COMPLETED"),
     ]
     assert records[0]["Tres"] == "cpu=1,mem=500M,node=1,billing=1"
-
-
-def test_the_log_of_a_lost_node_is_its_loss_and_its_return() -> None:
-    assert recovery(LOG) == LOG.splitlines()[1:]
 
 
 @pytest.fixture
@@ -87,15 +83,6 @@ def test_times_in_a_table_may_differ_and_errors_may_not(
         f"position_m,seconds_per_frame,peak_memory_mb\n{error_m},0.2,170\n"
     )
     assert len(compare(*trees).differing) == differing
-
-
-def test_the_dry_run_is_told_in_its_own_numbers() -> None:
-    rules = ("render_packed", "sfm", "rgbd", "estimate", "posegraph", "train", "total")
-    jobs = dict(zip(rules, (215, 34, 34, 34, 68, 125, 718), strict=True))
-    (line,) = filter(None, plan_lines(DryRun(jobs, 20.0, 8.0, 151.0, 4.0, 2)))
-    assert "plans 718 jobs, of them 215 `render_packed`, 34 `sfm`" in line
-    assert "in 20 s (8.0 s of a processor, 2 of which were shared by 4.0 processes)" in line
-    assert line.endswith("and 151 MB.")
 
 
 @pytest.mark.skipif(

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from synfeal.cli import main
 from tests import damaged_sets
@@ -162,12 +161,6 @@ def test_the_manifest_must_count_the_frames(
     check_fails(damaged, capsys, "manifest: ", "frames: train must be 24")
 
 
-def test_an_image_of_another_size(damaged: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = frame_files(damaged, "color.png")[0]
-    Image.new("RGB", (80, 60)).save(path)
-    check_fails(damaged, capsys, f"images: {path}: is 80 x 60, must be 96 x 72")
-
-
 def test_without_a_manifest_geometry_is_reported_and_not_judged(
     damaged: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -189,25 +182,3 @@ def test_a_calibration_file_stands_in_for_the_manifest(
         camera.write_text(f"1 PINHOLE 96 72 {focal} {focal} {48 + shift} {36 + shift}\n")
         assert main(["validate", str(damaged), "--camera", str(camera)]) == status
     assert any(line.startswith("camera: ") for line in errors(capsys))
-
-
-def test_without_depth_frames_are_not_compared(
-    damaged: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    without_manifest_hashes(damaged)
-    (damaged / "manifest.json").unlink()
-    for path in damaged.glob("seq-*/*.depth.png"):
-        path.unlink()
-    assert main(["validate", str(damaged)]) == 0
-    assert "no depth images" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("what", ["nothing", "a file", "an empty directory"])
-def test_no_data_set(what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "set"
-    if what == "a file":
-        path.write_text("")
-    elif what == "an empty directory":
-        path.mkdir()
-    assert main(["validate", str(path)]) == 1
-    assert len(errors(capsys)) == 1

@@ -16,8 +16,8 @@ from pathlib import Path
 
 from synfeal.errors import InputError, exit_status
 from synfeal.files import atomic_path
-from tests.slurm_run.page import compare, page, plan_lines
-from tests.slurm_run.run import cluster, dry_run, run_local, run_on_cluster
+from tests.slurm_run.page import compare, page
+from tests.slurm_run.run import cluster, run_local, run_on_cluster
 
 OUT = Path("results/benchmarks/slurm.md")
 
@@ -44,7 +44,6 @@ def _compare(work: Path, local: Path | None, out: Path) -> None:
         cluster("stop", work)
     files = compare(local or work / "local/smoke", work / "slurm/smoke")
     text = page((local_s, slurm_s), crash, work / "cluster", files)
-    text += "\n".join([*plan_lines(dry_run(work)), ""])
     with atomic_path(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     print(text)

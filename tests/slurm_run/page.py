@@ -7,7 +7,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.slurm_run.run import SLURM, Crash, DryRun
+from tests.slurm_run.run import Crash
 from tests.slurm_run.trees import Hashes, damaged, missing, reason_to_differ
 
 # What the controller writes about a node that is lost and found.
@@ -83,19 +83,6 @@ def page(
             "",
         ]
     )  # fmt: skip
-
-
-def plan_lines(plan: DryRun) -> list[str]:
-    """The dry run as sentences."""
-    rules = ("render_packed", "sfm", "rgbd", "estimate", "posegraph", "train")
-    counts = ", ".join(f"{plan.jobs[rule]} `{rule}`" for rule in rules)
-    return [
-        "",
-        f"`snakemake {' '.join(SLURM[:2])} --configfile config/paper.yaml -n all` plans"
-        f" {plan.jobs['total']} jobs, of them {counts}, in {plan.wall_s:.0f} s"
-        f" ({plan.cpu_s:.1f} s of a processor, {plan.processors} of which were shared by"
-        f" {plan.load:.1f} processes) and {plan.peak_mb:.0f} MB.",
-    ]
 
 
 def _crash_lines(crash: Crash, records: list[dict[str, str]]) -> list[str]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import re
 import subprocess
 import sys
 import time
@@ -45,45 +43,6 @@ class Crash:
     killed_s: float
     noticed_s: float
     back_s: float
-
-
-@dataclass(frozen=True)
-class DryRun:
-    """What planning the paper's design took.
-
-    Attributes:
-        jobs: how many by rule, and their ``total``.
-        wall_s: from start to end.
-        cpu_s: processor time.
-        peak_mb: largest resident memory.
-        load: processes that wanted a processor in the last minute, itself among them.
-        processors: of the machine.
-    """
-
-    jobs: dict[str, int]
-    wall_s: float
-    cpu_s: float
-    peak_mb: float
-    load: float
-    processors: int
-
-
-def dry_run(work: Path) -> DryRun:
-    """Plan the paper's design for the cluster, into an empty directory."""
-    command = (sys.executable, "-m", "snakemake", *SLURM[:2], "--configfile", "config/paper.yaml")
-    nothing = ("--config", f"results={work / 'planned'}", "--dry-run", "--", "all")
-    begin = time.monotonic()
-    process = subprocess.Popen((*command, *nothing), cwd=ROOT, stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    text = process.stdout.read()
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        raise InputError(f"the dry run of config/paper.yaml failed; start it alone: {command}")
-    jobs = {name: int(n) for name, n in re.findall(r"^(\w+) +(\d+)$", text, re.MULTILINE)}
-    cpu_s = usage.ru_utime + usage.ru_stime
-    wall_s, processors = time.monotonic() - begin, os.cpu_count() or 1
-    return DryRun(jobs, wall_s, cpu_s, usage.ru_maxrss / 1024, os.getloadavg()[0], processors)
 
 
 def snakemake(work: Path, name: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:

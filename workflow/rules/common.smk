@@ -265,10 +265,9 @@ def measurements(outputs):
     stored = workflow.modifier.path_modifier.apply_default_storage
     found = {}
     for output in dict.fromkeys(outputs):
-        maker = next(
-            rule for rule in workflow.rules if rule.is_producer(stored(output))
-        )
-        benchmark = maker.expand_benchmark(maker.get_wildcards(stored(output)))
+        path = stored(output)
+        maker = next(r for r in workflow.rules if r.is_producer(path))
+        benchmark = maker.expand_benchmark(maker.get_wildcards(path))
         found[f"{ROOT}{benchmark.partition(ROOT)[2]}"] = output
     return [f for f, made in found.items() if made not in RESTORED or f in RESTORED]
 
