@@ -279,15 +279,16 @@ def packed_frames(splits=SPLITS):
 
 
 def passing_files():
-    """Outputs that go once they are used: parts of packed frames, features."""
+    """Outputs that go once they are used: parts of packed frames, features, views."""
     rooms = CONFIG.rooms if backbones() else []
     scenes = sorted({*(e.scene for e in EXPERIMENTS), *rooms})
     sizes = sorted({(e.scene, e.size) for e in EXPERIMENTS})
     return [
         *(f for s in scenes for p in SPLITS for f in packed_shards(s, p, "npy")),
         *(
-            f"{ROOT}/references/{s}/{z}/features-{split}.npz"
+            f"{ROOT}/references/{s}/{z}/{kind}-{split}.npz"
             for s, z in sizes
+            for kind in ("features", "views")
             for split in SPLITS
             if has_structure(EXPERIMENTS, s, z)
         ),
