@@ -405,7 +405,8 @@ def varied_render(wildcards):
 
 
 def robustness_files(wildcards):
-    """The robustness table, where it has rows and its data set is trained on here."""
+    """An output of every job of the robustness table, where it has rows and its data set is trained
+    on here."""
     robust = ROBUSTNESS
     wanted = (robust.scene, robust.size, "synfeal", "pretrained")
     made = any((r.scene, r.size, r.labels, r.init) == wanted for r in RUNS)
@@ -416,7 +417,14 @@ def robustness_files(wildcards):
             refuse_long_exposure(effects, CONFIG.collection, f"robustness: {name}")
     except ValueError as error:
         sys.exit(f"error: {error}")
-    return [f"{ROOT}/tables/robustness.csv"]
+    varied = [robust.effects[name] for name in ROBUST_EFFECTS] + [robust.mixed]
+    return [
+        *(f for effects in varied for f in shares_for(robust.scene, effects)),
+        *(f"{ROOT}/robustness/frames/{e}/test.npy" for e in [*ROBUST_EFFECTS, "mixed"]),
+        f"{ROOT}/robustness/frames/mixed/train.npy",
+        *(f"{ROOT}/robustness/runs/{model}/model.pt" for model in MODELS),
+        f"{ROOT}/tables/robustness.csv",
+    ]
 
 
 def label_figures():
