@@ -120,6 +120,11 @@ def records_of(frame: pd.DataFrame) -> list[dict[str, Any]]:
     return [{str(name): value for name, value in row.items()} for row in frame.to_dict("records")]
 
 
+def rows_of(frame: pd.DataFrame) -> list[Any]:
+    """The rows of a frame as named tuples, ``Index`` first."""
+    return list(frame.itertuples())
+
+
 def write_frame(
     path: Path, frame: pd.DataFrame, float_format: str | None = "%.6g", na_rep: str = ""
 ) -> None:
@@ -153,4 +158,4 @@ def _value(cell: str, kind: Kind) -> object:
         return _BAD
     if kind.dtype == "float64":
         return number
-    return int(number) if number.is_integer() else _BAD
+    return int(number) if number.is_integer() and abs(number) < 2**53 else _BAD

@@ -42,12 +42,14 @@ from synfeal.dataset.sequences import Sequence
 from synfeal.dataset.sevenscenes import pose_text, read_depth_m, read_pose, read_split, write_splits
 from synfeal.dataset.unfinished import WORK, check_settings
 from synfeal.files import write_json
+from synfeal.frames import records_of
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import Triangles, load_collision_mesh, save_collision_mesh
 from synfeal.planning.repeat import read_poses
 from synfeal.report import assistance, label_error, meshes, speed_vs_error
 from synfeal.report.assistance import assistance_record
+from synfeal.report.cells import schema_of
 from synfeal.report.claims import table as claims
 from synfeal.report.claims.evidence import Cell, evidence_of
 from synfeal.report.claims.model import Missing, published_claims
@@ -57,16 +59,20 @@ from synfeal.report.compare.runs import read_run
 from synfeal.report.figures.cumulative_error import scene_errors
 from synfeal.report.figures.sources import Results
 from synfeal.report.html.claims import claims_table, read_claims
-from synfeal.report.html.labels import label_error_table
 from synfeal.report.html.origin import cost_sentence, origin_html, read_origin
-from synfeal.report.html.side_tables import assistance_table, meshes_table, speed_table
+from synfeal.report.html.side_tables import (
+    assistance_table,
+    label_error_table,
+    meshes_table,
+    speed_table,
+)
 from synfeal.report.html.stages import read_stages
 from synfeal.report.label_error import cost_record
 from synfeal.report.latex import HEADER, table_bodies, write_text
 from synfeal.report.meshes import write_meshes_table
 from synfeal.report.speed_vs_error import collision_rows, label_rows
 from synfeal.report.stats import combine, read_metrics
-from synfeal.report.tables import Value, columns_of, write_rows
+from synfeal.report.tables import Value, write_rows
 from synfeal.scenes.collision import CURVE_HEADER
 from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.images import read_color, read_depth_mm
@@ -453,7 +459,7 @@ def table_of(name: str, columns: Sequence_[str], **cells: Value) -> Callable[[Pa
 
 def _label_errors(folder: Path) -> Path:
     cells = {"scene": "large_room", "method": "sfm", "split": "total", "assistance": "after"}
-    return table_of("label_error", label_error.COLUMNS, **cells)(folder)
+    return table_of("label_error", [*label_error.SCHEMA], **cells)(folder)
 
 
 def _provenance(folder: Path) -> Path:
@@ -517,20 +523,18 @@ _claims = table_of(
     evidence="a;b",
 )
 _assistance_table = table_of(
-    "assistance", assistance.COLUMNS, scene="large_room", size="6k", method="sfm", split="total"
+    "assistance", [*assistance.SCHEMA], scene="large_room", size="6k", method="sfm", split="total"
 )
 _speeds = table_of(
-    "speed_vs_error", speed_vs_error.COLUMNS, scene="large_room", stage="collision", faces=9
+    "speed_vs_error", [*speed_vs_error.SCHEMA], scene="large_room", stage="collision", faces=9
 )
 
-_sizes = table_of(
-    "table4_size", columns_of("table4_size", 1), scene="a", size="6k", model="posenet"
-)
+_sizes = table_of("table4_size", [*schema_of("table4_size")], scene="a", size="6k", model="posenet")
 
 
 def _figure_table(path: Path) -> list[float]:
     table = Results(path.parents[1], design_of(())).table(path.stem)
-    return table.select_dtypes("number").to_numpy().ravel().tolist()
+    return table.select_dtypes("number").to_numpy(float).ravel().tolist()
 
 
 ROOM = ("sfm", "large_room", "6k")
@@ -612,7 +616,7 @@ KINDS: tuple[Kind, ...] = (
     Kind(
         "collision curve",
         _curve,
-        lambda p: collision_rows(p.parents[2], "large_room"),
+        lambda p: records_of(collision_rows(p.parents[2], "large_room")),
         finite_numbers,
         ",",
     ),
@@ -621,7 +625,10 @@ KINDS: tuple[Kind, ...] = (
     Kind("claims", _claims, lambda p: claims_table(read_claims(p)), form=","),
     Kind("provenance", _provenance, _origin, form="json"),
     Kind(
-        "table of meshes", table_of(meshes.NAME, meshes.COLUMNS, scene="a"), meshes_table, form=","
+        "table of meshes",
+        table_of(meshes.NAME, [*meshes.SCHEMA], scene="a"),
+        meshes_table,
+        form=",",
     ),
     Kind("table of assistance", _assistance_table, assistance_table, form=","),
     Kind("table of label errors", _label_errors, label_error_table, form=","),
@@ -629,7 +636,7 @@ KINDS: tuple[Kind, ...] = (
     Kind(
         "label errors",
         _label_errors,
-        lambda p: label_rows(p.parents[1], "large_room"),
+        lambda p: records_of(label_rows(p.parents[1], "large_room")),
         finite_numbers,
     ),
     Kind("size table", _sizes, _figure_table, form=","),

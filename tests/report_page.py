@@ -13,9 +13,9 @@ from synfeal.mesh.save import save_glb
 from synfeal.report import references
 from synfeal.report.assistance import LAST_POSE
 from synfeal.report.claims.table import COLUMNS
-from synfeal.report.label_error import COLUMNS as LABEL_ERROR_COLUMNS
+from synfeal.report.label_error import SCHEMA as LABEL_ERROR_SCHEMA
 from synfeal.report.recall import COLUMNS as RECALL_COLUMNS
-from synfeal.report.render_speed import COLUMNS as RENDER_COLUMNS
+from synfeal.report.speed_vs_error import SCHEMA as SPEEDS
 from synfeal.report.tables import write_rows
 from tests.report_results import METHODS_RUN, complete_results, shipped_design
 
@@ -34,11 +34,10 @@ CLAIM = {
 }
 UNTESTED = CLAIM | dict.fromkeys(("verdict_labels", "verdict_true"), "not testable here")
 UNTESTED |= {"id": "C15", "statement": "Another.", "reason": "no row 40k", "evidence": ""}
-SPEED = {
+SPEED = dict.fromkeys(SPEEDS, "") | {
     **{"stage": "collision", "scene": "large_room", "variant": "full", "faces": 4321},
     **{"seconds_per_item": 1e-6, "items_per_s": 1e6, "error": 0.125, "error_unit": "share"},
     "chosen": 1,
-    **dict.fromkeys(RENDER_COLUMNS, ""),
 }
 ASSISTED = {
     **{"scene": "large_room", "size": "6k", "method": "sfm", "split": "total", "batches": 17},
@@ -48,7 +47,7 @@ ASSISTED = {
     **{"published_assisted": 3, "published_batches": 34},
 }
 LABEL_ERROR = {
-    **dict.fromkeys(LABEL_ERROR_COLUMNS, 0.25),
+    **dict.fromkeys(LABEL_ERROR_SCHEMA, 0.25),
     **{"scene": "large_room", "size": "6k", "method": "sfm", "split": "total"},
     **{"assistance": "after", "frames": 425, "position_m_median": 0.0375},
     **{"relative_25_m_per_m": "", "relative_25_deg_per_m": ""},
@@ -61,7 +60,7 @@ HARD_CASE = {
 
 
 REFERENCE = {
-    **dict.fromkeys(references.COLUMNS, 0.0),
+    **dict.fromkeys(references.SCHEMA, 0.0),
     **{"scene": "large_room", "size": "6k", "labels": "sfm", "method": "nearest-vlad"},
     **{"title": "Nearest image, DenseVLAD", "kind": "reference", "position_m": 0.75},
 }
@@ -85,7 +84,7 @@ def page_results(root):
     write_rows(root / "tables" / "recall.csv", [*RECALL], [RECALL])
     write_rows(root / "tables" / "assistance.csv", [*ASSISTED], [ASSISTED])
     write_rows(root / "tables" / "label_error.csv", [*LABEL_ERROR], [LABEL_ERROR])
-    write_rows(root / "tables" / "references.csv", references.COLUMNS, [REFERENCE])
+    write_rows(root / "tables" / "references.csv", references.SCHEMA, [REFERENCE])
     write_rows(root / "tables" / "hard_cases.csv", [*HARD_CASE], [HARD_CASE])
     write_scene(root)
     write_figures(root / "figures")

@@ -1,10 +1,10 @@
 """A small results tree with known numbers, for the tests of the report."""
 
-import csv
 from pathlib import Path
 
 from synfeal.config import MODELS, Design, Experiment, load_config, read_experiments
 from synfeal.files import write_json
+from synfeal.frames import read_records
 from synfeal.report.meshes import write_meshes_table
 from synfeal.report.tables import write_table
 
@@ -158,8 +158,8 @@ def make(name, rows, root, repetitions=1):
 
 
 def read(path):
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
+    """Rows of a table as text, by column."""
+    return [row for _, row in read_records(path)]
 
 
 def cell(rows, **keys):

@@ -1,6 +1,5 @@
 """Claims on results where the truth is known: the paper's own numbers, and constructed ones."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ from scipy.stats import norm
 
 from synfeal.config import MODELS
 from synfeal.errors import InputError
+from synfeal.frames import read_records
 from synfeal.report.claims import labels as label_claims
 from synfeal.report.claims.evidence import Cell, evidence_of
 from synfeal.report.claims.model import (
@@ -402,8 +402,7 @@ def test_the_file_has_the_columns_and_comes_out_the_same_again(paper, tmp_path):
     for name in ("a.csv", "b.csv"):
         write_claims(design_of(paper.design), paper.root, tmp_path / name)
     assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
-    with (tmp_path / "a.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = [row for _, row in read_records(tmp_path / "a.csv")]
     assert tuple(rows[0]) == COLUMNS
     assert [row["id"] for row in rows] == IDS
 

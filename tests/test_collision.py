@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from synfeal.config.models import SceneConfig
 from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
+from synfeal.frames import write_frame
 from synfeal.mesh.decimate import simplify
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
@@ -26,8 +27,7 @@ from synfeal.mesh.triangles import (
 from synfeal.planning.questions import Questions, draw_questions
 from synfeal.planning.target import admissible, has_free_view
 from synfeal.report.figures import Results, write_figures
-from synfeal.report.speed_vs_error import COLUMNS, collision_rows, write_speed_vs_error
-from synfeal.report.tables import write_rows
+from synfeal.report.speed_vs_error import speeds_of, write_speed_vs_error
 from synfeal.scenes.collision import (
     CURVE_HEADER,
     Rung,
@@ -237,7 +237,7 @@ def test_the_table_rids_speeds_of_what_else_the_machine_did(tmp_path: Path) -> N
     curve = curve_of((4000, 1.0, 100, 100, 0), (800, 0.998, 75, 50, 1), (100, 0.9, 200, 100, 0))
     write_curve(tmp_path / "scenes" / "large_room" / "collision_curve.csv", curve)
     table = tmp_path / "tables" / "speed_vs_error.csv"
-    write_rows(table, COLUMNS, collision_rows(tmp_path, "large_room"))
+    write_frame(table, speeds_of("collision", ["large_room"], tmp_path))
     rows = read(table)
     assert [row["variant"] for row in rows] == ["full", "decimated", "decimated"]
     assert [float(row["items_per_s"]) for row in rows] == [100.0, 150.0, 200.0]

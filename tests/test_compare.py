@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from PIL import Image
 from synfeal.cli import main
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.files import write_json
+from synfeal.frames import read_records
 from synfeal.report.compare.run import OUTPUTS
 from synfeal.report.compare.summary import groups_of, remarks_of, summarise
 from synfeal.report.compare.trees import Comparison, compare_trees, one_yardstick
@@ -178,8 +178,7 @@ def test_files_agree_with_each_other_and_are_written_again_alike(
     assert main(["compare", *map(str, trees), "--out", str(out)]) == 0
     assert sorted(path.name for path in out.iterdir()) == sorted(OUTPUTS)
     first = {name: (out / name).read_bytes() for name in OUTPUTS}
-    with (out / "compare.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = [row for _, row in read_records(out / "compare.csv")]
     assert len(rows) == 6 * len(MEASURES)
     failed = next(r for r in rows if (r["model"], r["labels"]) == (FAILED, "sfm"))
     assert (failed["b"], failed["verdict"], failed["failed_b"]) == ("inf", "worse", str(N))

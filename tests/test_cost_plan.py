@@ -1,6 +1,5 @@
 """What a run costs: counts, laws with a closed form, scaling, and how bad input ends."""
 
-import csv
 import re
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import pytest
 
 from baselines.training.device import open_device
 from synfeal.cli import main
+from synfeal.frames import read_records
 from synfeal.report.cost import steps
 from synfeal.report.cost.estimate import (
     ALONE,
@@ -294,8 +294,7 @@ def test_tables_add_up_to_the_run():
 
 
 def read_rows(path):
-    with path.open() as file:
-        return list(csv.DictReader(file))
+    return [row for _, row in read_records(path)]
 
 
 def test_rates_of_steps_are_found(config, monkeypatch):

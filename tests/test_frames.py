@@ -53,6 +53,7 @@ def test_columns_are_found_by_name_and_extra_ones_may_be_missing(tmp_path):
         ("a,n,x\n\nb,1,2,3\n", "row 3: has 4 cells"),
         ('a,n,x\n"b,1,2\n', "cannot be read as CSV"),
         ("a,n,x\nb,1.5,2\n", "row 2: n must be a whole number, found '1.5'"),
+        ("a,n,x\nb,1e30,2\n", "row 2: n must be a whole number, found '1e30'"),
         ("a,n,x\nb,1,\n", "row 2: x must be a number, found ''"),
         ("a,n,x\nb,1,inf\n", "x must be a number, found 'inf'"),
         ("a,n,x\nb,1,2\nb,1,x\n", "row 3: x must be a number"),

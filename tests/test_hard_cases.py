@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from baselines.groundtruth.posegraph import lm
 from synfeal import bootstrap
+from synfeal.frames import read_records
 from synfeal.geometry import alignment, poses, rotations
 from synfeal.labels import noise
 from synfeal.mesh import rays
@@ -26,8 +27,7 @@ from synfeal.report.hard_cases import table as hard_table
 from synfeal.report.hard_cases.latex import hard_cases_latex
 from synfeal.report.hard_cases.table import CASES, COLUMNS, row_of, rows_of, write_hard_cases
 from synfeal.report.hard_cases.text import short
-from synfeal.report.html.hard_cases import hard_cases_table
-from synfeal.report.results import read_table
+from synfeal.report.html.side_tables import hard_cases_table
 from synfeal.report.tables import write_rows
 
 ALL = {(family.name, name): family for family in CASES for name in family.cases}
@@ -191,7 +191,7 @@ def test_pages_mark_what_exceeds_the_bound(tmp_path: Any, all_rows: list[dict[st
     for row, line in zip(all_rows, lines, strict=True):
         assert ("✗" in "".join(line[2].itertext())) == (row["naive_error"] > row["bound"])
         assert "✗" not in "".join(line[3].itertext())
-    text = hard_cases_latex(read_table(tmp_path / "table.csv"))
+    text = hard_cases_latex([row for _, row in read_records(tmp_path / "table.csv")])
     refused = r"\textcolor{red!85!black}{\textbf{answered}} & refused &"
     assert text.count(refused) == sum(row["quantity"] == cases.REFUSAL for row in all_rows)
     assert {c for c in text if ord(c) > 127} <= {"µ", "ö"}  # those LaTeX knows

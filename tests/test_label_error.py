@@ -14,10 +14,10 @@ from synfeal.config.models import GroundTruthConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.files import write_json
+from synfeal.frames import read_records
 from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
-from synfeal.report.label_error import COLUMNS, label_records, write_label_error_table
-from synfeal.report.results import read_table
-from synfeal.report.speed_vs_error import label_rows
+from synfeal.report.label_error import SCHEMA, label_records, write_label_error_table
+from synfeal.report.speed_vs_error import speeds_of
 from tests.report_results import experiment
 
 STEP_M, BATCH = 0.1, 10
@@ -173,7 +173,7 @@ def results(tmp_path):
 def test_the_table_holds_what_was_put_into_the_labels(results):
     root, rows = results
     write_label_error_table(rows, root, root / "tables/label_error.csv", root / "t.tex")
-    table = read_table(root / "tables/label_error.csv", COLUMNS)
+    table = [row for _, row in read_records(root / "tables/label_error.csv", SCHEMA)]
     keys = [(row["method"], row["split"], row["assistance"]) for row in table]
     states = [(s, a) for s in ("train", "test", "total") for a in ("before", "after")]
     assert keys == [(m, *state) for m in ("sfm", "rgbd-odometry") for state in states]
@@ -204,10 +204,10 @@ def test_a_frame_costs_what_its_stages_took_without_what_the_method_does_not_nee
 def test_speed_vs_error_has_a_row_per_method(results):
     root, rows = results
     write_label_error_table(rows, root, root / "tables/label_error.csv", root / "t.tex")
-    found = label_rows(root, "large_room")
-    assert [row["variant"] for row in found] == ["SfM", "RGB-D odometry alone"]
-    assert found[0]["items_per_s"] == pytest.approx(27 / 21, rel=1e-5)
-    assert label_rows(root, "sanctuary") == []
+    found = speeds_of("labels", ["large_room", "sanctuary"], root)
+    assert found.variant.tolist() == ["SfM", "RGB-D odometry alone"]
+    assert found.items_per_s[0] == pytest.approx(27 / 21, rel=1e-5)
+    assert set(found.scene) == {"large_room"}
 
 
 @pytest.mark.parametrize("content", [None, "{}", "[]", '{"peak_memory_mb": "much"}', "{"])

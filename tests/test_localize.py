@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
 
@@ -24,6 +23,7 @@ from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.files import write_json
+from synfeal.frames import read_records
 from tests.trained_localizers import NETWORK, answering, save, untrained
 
 COUNT = 120  # more than a batch
@@ -69,8 +69,8 @@ def localized(model: Path, out: Path, *images: Path) -> list[list[str]]:
     """Rows that the command wrote, the header first."""
     named = [str(path) for path in images]
     assert main(["localize", str(model), *named, "--out", str(out), "--device", "cpu"]) == 0
-    with out.open(encoding="utf-8", newline="") as file:
-        return list(csv.reader(file))
+    rows = [row for _, row in read_records(out)]
+    return [[*rows[0]], *([*row.values()] for row in rows)]
 
 
 def only_error(capsys: pytest.CaptureFixture[str]) -> str:

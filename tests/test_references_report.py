@@ -10,11 +10,11 @@ from synfeal.errors import InputError
 from synfeal.files import write_json
 from synfeal.report.crossing import crossing_finding
 from synfeal.report.figures.references_by_noise import figure_of
-from synfeal.report.html.references import references_table as html_table
+from synfeal.report.html.side_tables import references_table as html_table
 from synfeal.report.references import (
     label_title,
     read_references,
-    references_grid,
+    references_sheet,
     write_references_table,
 )
 from tests.report_results import experiment, metrics, write_run
@@ -91,13 +91,12 @@ def test_the_finding_counts_the_localizers_that_are_closer(table):
 
 
 def test_print_page_and_figure_show_every_method(root, table):
-    grid = references_grid(table)
+    sheet = references_sheet(table)
     titles = [reference.title for reference in REFERENCES.values()]
-    assert list(grid.columns[2:-1]) == ["Mean training pose", *titles, "Mine"]
-    (clean,) = [row for row in grid.groups[0].rows if row[0].label == "Synfeal"]
-    assert len(clean) == 1  # its labels are the truth
-    best = clean[0].entries[-1]
-    assert [value.text for value in best.values] == ["PoseNet", "0.2 m", "12°", "0 %"]
+    assert list(sheet.headings[2:-1]) == ["Mean training pose", *titles, "Mine"]
+    (clean,) = sheet.lines.index[sheet.lines.label == "Synfeal"]  # its labels are the truth
+    best = sheet.values[(sheet.values.line == clean) & (sheet.values["column"] == "Best localizer")]
+    assert best.text.tolist() == ["PoseNet, 0.2 m, 12°, 0 %"]
     page = html_table(root / "tables" / "references.csv")
     assert page.count("<tr") == 1 + len(table)
     rows = [row for row in design() if row.table == TABLE3]
@@ -115,5 +114,5 @@ def test_label_sets_are_called_by_their_noise():
 def test_a_table_without_a_column_is_refused(tmp_path):
     path = tmp_path / "references.csv"
     pd.DataFrame({"scene": ["a"]}).to_csv(path)
-    with pytest.raises(InputError, match=r"references.csv: cannot be read"):
+    with pytest.raises(InputError, match=r"references.csv: column .* missing"):
         read_references(path)

@@ -13,6 +13,7 @@ import pytest
 from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
+from synfeal.frames import write_frame
 from synfeal.geometry.rotations import quat_wxyz_from_matrix
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.save import save_glb
@@ -20,9 +21,7 @@ from synfeal.render import choose
 from synfeal.report.figures import render_speed
 from synfeal.report.figures.sources import Results
 from synfeal.report.figures.write import write_figures
-from synfeal.report.render_speed import render_rows
-from synfeal.report.speed_vs_error import COLUMNS as TABLE_COLUMNS
-from synfeal.report.tables import write_rows
+from synfeal.report.speed_vs_error import render_rows, speeds_of
 from synfeal.scenes import render_speed as speed
 from synfeal.scenes.render_speed_table import SCHEMA, Measured, read_speed, write_speed
 from tests.render_backends import BACKENDS, PYOPENGL_WARNS, camera_of
@@ -206,8 +205,8 @@ MADE_UP = [
 @pytest.fixture
 def made_up(tmp_path: Path) -> Path:
     write_speed(tmp_path / "scenes" / "large_room" / "render_speed.csv", MADE_UP)
-    rows = render_rows(tmp_path, "large_room")
-    write_rows(tmp_path / "tables" / "speed_vs_error.csv", TABLE_COLUMNS, rows)
+    speeds = speeds_of("render", ["large_room"], tmp_path)
+    write_frame(tmp_path / "tables" / "speed_vs_error.csv", speeds)
     return tmp_path
 
 

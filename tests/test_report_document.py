@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-import csv
 import shutil
 import subprocess
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from PIL import Image
 
 from synfeal.errors import InputError
+from synfeal.frames import TEXT, read_frame, write_frame
 from synfeal.report.document import CLAIM_COLUMNS, write_report_document
 from synfeal.report.figures import CAPTIONS
-from synfeal.report.grid import Entry, Grid, Group, Line, Value, with_bold
-from synfeal.report.latex import table_latex, write_latex
 from synfeal.report.published import FOLDER
+from synfeal.report.sheet import (
+    LINE,
+    PAPER,
+    VALUE,
+    Sheet,
+    sheet_latex,
+    sheet_markdown,
+    write_latex,
+)
 
 GOLDEN = r"""\begin{table*}[tp]
 \centering\footnotesize
@@ -38,45 +46,51 @@ Set & Error against & PoseNet & PoseNet2 \\
 """  # noqa: E501
 
 
-def small_grid() -> Grid:
-    def line(kind: str, label: str, against: str, *entries: Entry) -> Line:
-        return Line(kind, label, against, entries)  # type: ignore[arg-type]
-
-    def pair(metres: float, degrees: float) -> Entry:
-        return Entry((Value(f"{metres:.2f} m", metres), Value(f"{degrees:.2f}°", degrees)))
-
-    first = (
-        line("labels", "6k", "labels", pair(0.5, 9), pair(0.4, 8)),
-        line(
-            *("paper", "6k", "paper"),
-            *(Entry((Value("0.29 m", 0.29),)), Entry((Value("0.14 m", 0.14),), "Misprint.")),
-        ),
+def small_sheet() -> Sheet:
+    lines = pd.DataFrame(
+        [
+            ("", 0, "labels", "6k", "", "labels"),
+            ("", 0, PAPER, "6k", "", "paper"),
+            ("", 1, "labels", "20k", "", "labels"),
+        ],
+        columns=list(LINE),
     )
-    worse = Entry((Value("+2.0%", tone="worse"),))
-    second = (line("labels", "20k", "labels", pair(0.45, 7), worse),)
-    columns = ("Set", "Error against", "PoseNet", "PoseNet2")
-    rows = with_bold([first, second])
-    return Grid("small", "Errors of 2 & 3.", columns, (Group("", rows),), ("A remark.",))
+    values = [
+        *((0, "PoseNet", 0, "0.50 m"), (0, "PoseNet", 1, "9.00°"), (0, "PoseNet2", 0, "0.40 m")),
+        *((0, "PoseNet2", 1, "8.00°"), (1, "PoseNet", 0, "0.29 m")),
+        (1, "PoseNet2", 0, "0.14 m", False, "", "Misprint."),
+        *((2, "PoseNet", 0, "0.45 m", True), (2, "PoseNet", 1, "7.00°", True)),
+        (2, "PoseNet2", 0, "+2.0%", False, "worse"),
+    ]
+    whole = [(*value, *(False, "", "")[len(value) - 4 :]) for value in values]
+    headings = ("Set", "Error against", "PoseNet", "PoseNet2")
+    table = pd.DataFrame(whole, columns=list(VALUE))
+    return Sheet("small", "Errors of 2 & 3.", headings, lines, table, ("A remark.",))
 
 
 def test_latex_of_a_small_table_letter_by_letter() -> None:
-    # PoseNet2's second row has no number, so the first of its column wins against nothing.
-    assert table_latex(small_grid()) == GOLDEN
+    assert sheet_latex(small_sheet()) == GOLDEN
+
+
+def test_markdown_of_a_small_table_letter_by_letter() -> None:
+    assert sheet_markdown(small_sheet()) == (
+        "**Errors of 2 & 3.**\n\n"
+        "| Set | Error against | PoseNet | PoseNet2 |\n"
+        "|---|---|---|---|\n"
+        "| 6k | labels | 0.50 m, 9.00° | 0.40 m, 8.00° |\n"
+        "| *6k* | *paper* | *0.29 m* | *0.14 m* (a) |\n"
+        "| 20k | labels | **0.45 m**, **7.00°** | +2.0% |\n\n"
+        "(a) Misprint.  \n"
+    )
 
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
     """Results with one table, every published claim, and two figures."""
-    write_latex(tmp_path / "tables" / "small.tex", small_grid())
-    with (FOLDER / "claims.csv").open(encoding="utf-8", newline="") as file:
-        published = list(csv.DictReader(file))
-    columns = [*CLAIM_COLUMNS, "footnote"]
-    with (tmp_path / "claims.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(
-            file, columns, restval="p −55 % [−60, −50] & _τ_", extrasaction="ignore"
-        )
-        writer.writeheader()
-        writer.writerows(published)
+    write_latex(tmp_path / "tables" / "small.tex", small_sheet())
+    published = read_frame(FOLDER / "claims.csv", {"id": TEXT, "statement": TEXT, "footnote": TEXT})
+    filled = {name: "p −55 % [−60, −50] & _τ_" for name in CLAIM_COLUMNS if name not in published}
+    write_frame(tmp_path / "claims.csv", published.assign(**filled))
     (tmp_path / "figures").mkdir()
     for name in list(CAPTIONS)[:2]:
         Image.new("RGB", (60, 40), (200, 30, 30)).save(tmp_path / "figures" / f"{name}.png")

@@ -25,8 +25,8 @@ from synfeal.report.figures.label_sets import read_labelled_set
 from synfeal.report.figures.plan_view import floor_m, plan_of
 from synfeal.report.figures.style import METHOD_STYLES, RC
 from synfeal.report.layouts import SOURCES
-from synfeal.report.references import COLUMNS as REFERENCE_COLUMNS
-from synfeal.report.speed_vs_error import COLUMNS as SPEED_COLUMNS
+from synfeal.report.references import SCHEMA as REFERENCE
+from synfeal.report.speed_vs_error import SCHEMA as SPEED
 from synfeal.report.tables import write_rows
 from tests.figure_results import (
     LOOKS_ALONG_X,
@@ -51,7 +51,7 @@ SPEEDS = (
     ("training", "large_room", "PoseNet2", None, 400, 0.3, 0),
     ("render", "large_room", "64x48, opengl 2x2", 90, 100, 1.5, 1),
 )
-RENDERED = {"seconds_per_item": 0.01, "backend": "opengl", "supersampling": 2, "texture_scale": 1.0}
+RENDERED = {"backend": "opengl", "supersampling": 2, "texture_scale": 1.0}
 
 
 @pytest.fixture(scope="module")
@@ -59,12 +59,14 @@ def results(tmp_path_factory):
     root = fill_figures(tmp_path_factory.mktemp("results") / "toy")
     fill(root, design())
     make(TABLE4, design(), root)
-    speeds = [dict(zip(SPEED_KEYS, row, strict=True)) for row in SPEEDS]
+    seconds = {"seconds_per_item": 0.01}
+    speeds = [seconds | dict(zip(SPEED_KEYS, row, strict=True)) for row in SPEEDS]
     speeds[-1] |= RENDERED | {"width": 64, "height": 48}
-    write_rows(root / "tables" / "speed_vs_error.csv", SPEED_COLUMNS, speeds)
-    nearest = dict.fromkeys(REFERENCE_COLUMNS, 0.5) | {"scene": "large_room", "size": "6k"}
+    write_rows(root / "tables" / "speed_vs_error.csv", [*SPEED], speeds)
+    nearest = dict.fromkeys(REFERENCE, 0.5) | {"scene": "large_room", "size": "6k"}
+    nearest |= dict.fromkeys(("n_train", "n_test", "n_seeds", "failed"), 1)
     nearest |= {"labels": "synfeal", "method": "nearest-vlad", "title": "Nearest image"}
-    write_rows(root / "tables" / "references.csv", REFERENCE_COLUMNS, [nearest])
+    write_rows(root / "tables" / "references.csv", [*REFERENCE], [nearest])
     return Results(root, design_of(design()))
 
 

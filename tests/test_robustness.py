@@ -11,7 +11,7 @@ from baselines.references.robustness import NEAREST, SCHEMA, robustness_table
 from synfeal.dataset.packed import new_packed
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.frames import read_frame
-from synfeal.report.robustness import CLEAN, MIXED, robustness_grid, write_robustness
+from synfeal.report.robustness import CLEAN, MIXED, robustness_sheet, write_robustness
 from tests.trained_localizers import answering, save
 
 PX = 32
@@ -54,7 +54,7 @@ def test_errors_are_those_of_known_answers(tmp_path: Path) -> None:
     write_robustness(table, tmp_path / "r.csv", tmp_path / "r.tex")
     again = read_frame(tmp_path / "r.csv", SCHEMA)
     assert again.n_test.tolist() == [2] * 12
-    grid = robustness_grid(again)
-    assert [len(group.rows) for group in grid.groups] == [3, 3]
-    assert grid.groups[0].rows[1][0].label == "dark, strength 2"
+    sheet = robustness_sheet(again)
+    assert sheet.lines.groupby("block", sort=False).size().tolist() == [3, 3]
+    assert sheet.lines.label[1] == "dark, strength 2"
     assert "swapped, strength 1" in (tmp_path / "r.tex").read_text()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import subprocess
@@ -17,6 +16,7 @@ from synfeal.bootstrap import limits, medians
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import draws
+from synfeal.frames import read_records
 
 N = 40
 
@@ -50,8 +50,8 @@ def score(tmp_path):
         inputs = [tmp_path / f"{name}.csv" for name in tables]
         outputs = tmp_path / "errors.csv", tmp_path / "metrics.json"
         score_run(*inputs, *outputs, {"model": "posenet"})
-        with outputs[0].open(encoding="utf-8", newline="") as file:
-            return json.loads(outputs[1].read_text()), list(csv.DictReader(file))
+        rows = [row for _, row in read_records(outputs[0])]
+        return json.loads(outputs[1].read_text()), rows
 
     return run
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -18,10 +17,10 @@ from baselines.training.predict import predict_poses
 from baselines.training.score import score_run
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.evaluation.metrics import cumulative, pose_errors
+from synfeal.frames import read_records
 from synfeal.geometry.rotations import rotation_angle_rad
 from synfeal.report.cells import read_cells
 from synfeal.report.compare.runs import read_run
-from synfeal.report.tables import record_of
 from tests.report_results import design_of, experiment
 from tests.trained_localizers import NETWORK, answering, save
 
@@ -91,8 +90,7 @@ def score(tmp_path: Path) -> Scored:
         label_files = [out / "labels.csv"] * 3
         files = [out / "errors.csv", out / "metrics.json"]
         score_run(out / "predictions.csv", *label_files, *files, {})
-        with files[0].open(encoding="utf-8", newline="") as file:
-            return json.loads(files[1].read_text()), list(csv.DictReader(file))
+        return json.loads(files[1].read_text()), [row for _, row in read_records(files[0])]
 
     return run
 
@@ -196,13 +194,12 @@ def test_a_diverged_repetition_is_counted_and_averaged_into_nothing(
             other = out.parent.parent / model / out.name
             other.mkdir(parents=True)
             (other / "metrics.json").write_bytes((out / "metrics.json").read_bytes())
-    for cell in read_cells("table4_size", design_of([row], 3), tmp_path):
-        record = record_of("table4_size", cell)
-        assert (record["position_m"], record["position_m_sd"]) == (1.0, math.sqrt(0.5))
+    for cell in read_cells("table4_size", design_of([row], 3), tmp_path).itertuples():
+        assert (cell.position_m, cell.position_m_sd) == (1.0, math.sqrt(0.5))
         # All paths agree, so the limits are those of the two seeds: 1.96 * sqrt(0.5) / sqrt(2).
-        assert record["position_m_low"] == pytest.approx(0.02)
-        assert record["position_m_high"] == pytest.approx(1.98)
-        assert (record["failed"], record["n_seeds"], cell.own.n_finished) == (N, 3, 2)
+        assert cell.position_m_low == pytest.approx(0.02)
+        assert cell.position_m_high == pytest.approx(1.98)
+        assert (cell.failed, cell.n_seeds, cell.n_finished) == (N, 3, 2)
     errors = read_run(seeds)
     assert errors.failed == N
     error_m, percent = cumulative(errors.errors[:, 0].ravel())

@@ -21,37 +21,36 @@ def run_of(first):
 
 def test_a_cell_is_the_mean_of_its_runs_measure_by_measure():
     cell = combine([run_of(0), run_of(2), run_of(10)])  # offsets 0, 2, 10: mean 4, sd sqrt(28)
-    assert list(cell.scores) == list(MEASURES)
     for place, measure in enumerate(MEASURES):
-        score = cell.scores[measure]
         low = len(MEASURES) + 2 * place
-        assert score.value == place + 4
+        assert cell[measure] == place + 4
         # To the mean distance of the limits of the test paths comes the spread over seeds.
         of_seeds = 1.96 * math.sqrt(28 / 3)
-        assert score.high == pytest.approx(place + 4 + math.hypot(low + 1 - place, of_seeds))
-        assert score.low == max(place + 4 - math.hypot(low - place, of_seeds), 0)
-        assert score.sd == pytest.approx(math.sqrt(28))
-    assert (cell.position_rms_m, cell.references["floor_position_m"]) == (54, 60)
-    assert (cell.n_train, cell.n_test) == (300, 125)
-    assert (cell.n_seeds, cell.n_finished, cell.failed) == (3, 3, 0)
+        high = place + 4 + math.hypot(low + 1 - place, of_seeds)
+        assert cell[f"{measure}_high"] == pytest.approx(high)
+        assert cell[f"{measure}_low"] == max(place + 4 - math.hypot(low - place, of_seeds), 0)
+        assert cell[f"{measure}_sd"] == pytest.approx(math.sqrt(28))
+    assert (cell["position_rms_m"], cell["floor_position_m"]) == (54, 60)
+    assert (cell["n_train"], cell["n_test"]) == (300, 125)
+    assert (cell["n_seeds"], cell["n_finished"], cell["failed"]) == (3, 3, 0)
 
 
 def test_runs_without_a_score_count_as_runs_and_give_no_score():
     cell = combine([failed_metrics("6k"), run_of(3) | {"failed": 7}])
-    assert cell.scores["position_m"].value == 3
-    assert cell.scores["position_m"].sd is None
-    assert cell.references["baseline_position_m_true"] == 1  # guessing the mean needs no score
-    assert cell.position_rms_m == 53
-    assert (cell.n_seeds, cell.n_finished, cell.failed) == (2, 1, 125 + 7)
+    assert cell["position_m"] == 3
+    assert cell["position_m_sd"] is None
+    assert cell["baseline_position_m_true"] == 1  # guessing the mean needs no score
+    assert cell["position_rms_m"] == 53
+    assert (cell["n_seeds"], cell["n_finished"], cell["failed"]) == (2, 1, 125 + 7)
     nothing = combine([failed_metrics("6k")])
-    assert nothing.scores["orientation_deg"].value is None
-    assert (nothing.position_rms_m, nothing.n_finished, nothing.n_test) == (None, 0, 125)
+    assert nothing["orientation_deg"] is None
+    assert (nothing["position_rms_m"], nothing["n_finished"], nothing["n_test"]) == (None, 0, 125)
 
 
 def test_one_wide_limit_makes_the_mean_limit_unknown():
     score = score_of([run_of(0), run_of(2) | {"position_m_high": None}], "position_m")
-    assert (score.value, score.high) == (1, None)
-    assert score.sd == pytest.approx(math.sqrt(2))
+    assert (score["position_m"], score["position_m_high"]) == (1, None)
+    assert score["position_m_sd"] == pytest.approx(math.sqrt(2))
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-
 import numpy as np
 import pytest
 import torch
@@ -13,6 +11,7 @@ from baselines.training.device import autocast, precision_on
 from baselines.training.predict import predict_poses
 from synfeal.config.models import MODELS
 from synfeal.dataset.pose_table import read_pose_table
+from synfeal.frames import read_records
 from tests.coloured_frames import (
     CPU,
     HYPER,
@@ -39,8 +38,7 @@ def learned(request, split, tmp_path_factory):
     model, history = train(split, folder, samples=2400, training=training)
     test = write_split(folder, "test", 60, 1)
     predict_poses(model, *test, folder / "predictions.csv")
-    with history.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = [row for _, row in read_records(history)]
     return read_pose_table(test[1]), read_pose_table(folder / "predictions.csv"), rows
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 
 import numpy as np
@@ -21,6 +20,7 @@ from baselines.training.protocol import HALVE_EVERY, PROTOCOLS
 from baselines.training.selection import HeldOutErrors, Selection, held_out_errors
 from synfeal.config.models import MODELS, TrainingConfig
 from synfeal.errors import InputError
+from synfeal.frames import read_records
 from tests.coloured_frames import (
     HYPER,
     NETWORK,
@@ -221,8 +221,7 @@ def test_patience_ends_a_published_training_early(splits, tmp_path, monkeypatch)
     monkeypatch.setattr(selection, "held_out_errors", lambda *_: next(worse))
     training = PUBLISHED.model_copy(update={"patience": 3})
     _, history = train(splits[0], tmp_path, samples=640, training=training, test=splits[1])
-    with history.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = [row for _, row in read_records(history)]
     assert int(rows[-1]["samples_seen"]) == 640 // 20 * 4
 
 

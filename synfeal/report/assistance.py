@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from pathlib import Path
-from statistics import median
 from typing import Any
 
+import pandas as pd
 from pydantic import BaseModel, TypeAdapter
 
 from baselines.groundtruth.chain import BatchRecord
 from baselines.groundtruth.methods import METHODS
 from synfeal.config import Experiment
-from synfeal.report.grid import Entry, Grid, Group, Line
-from synfeal.report.grid import Value as Printed
-from synfeal.report.latex import write_latex
+from synfeal.frames import COUNT, MAYBE, MAYBE_COUNT, TEXT, frame_of, write_frame
 from synfeal.report.layouts import SOURCES, scene_title
 from synfeal.report.results import check_result, read_result
-from synfeal.report.tables import Value, write_rows
+from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
 
 NAME = "assistance"
 PUBLISHED_ASSISTED = {
@@ -36,10 +34,12 @@ LAST_POSE = tuple(
     for when in ("before", "after")
     for which in ("median", "max")
 )
-COLUMNS = (
-    *("scene", "size", "method", "split", *COUNTS, *LAST_POSE),
-    *("published_assisted", "published_batches"),
-)
+SCHEMA = {
+    **dict.fromkeys(("scene", "size", "method", "split"), TEXT),
+    **dict.fromkeys(COUNTS, COUNT),
+    **dict.fromkeys(LAST_POSE, MAYBE),
+    **dict.fromkeys(("published_assisted", "published_batches"), MAYBE_COUNT),
+}
 Records = list[dict[str, Any]]
 
 
@@ -74,8 +74,9 @@ def write_assistance_table(
         for names in estimated_sets(rows)
         for split in (*SPLITS, TOTAL)
     ]
-    write_rows(out_csv, COLUMNS, records)
-    write_latex(out_tex, assistance_grid([r for r in records if r["split"] == TOTAL]))
+    table = frame_of(records, SCHEMA)
+    write_frame(out_csv, table)
+    write_latex(out_tex, assistance_sheet(table[table.split == TOTAL]))
 
 
 def estimated_sets(rows: Iterable[Experiment]) -> list[tuple[str, str, str]]:
@@ -85,18 +86,22 @@ def estimated_sets(rows: Iterable[Experiment]) -> list[tuple[str, str, str]]:
 
 def assistance_record(
     root: Path, method: str, scene: str, size: str, split: str = TOTAL
-) -> dict[str, Value]:
+) -> dict[str, Any]:
     """One row of the table, by column; both splits together unless one is named."""
     splits = SPLITS if split == TOTAL else (split,)
-    batches = [batch for name in splits for batch in batch_records(root, method, scene, size, name)]
-    record: dict[str, Value] = {"method": method, "scene": scene, "size": size, "split": split}
-    record |= {"batches": len(batches)}
-    for count in ("assisted", "lost", "filled"):
-        record[count] = sum(int(batch[count]) for batch in batches)
+    found = [r for name in splits for r in batch_records(root, method, scene, size, name)]
+    batches = pd.DataFrame(found, columns=[*BatchRecord.__annotations__])
     # A batch shares its first frame with the one before; the first of a split shares none.
-    frames = sum(batch["stop"] - batch["start"] - (batch["start"] > 0) for batch in batches)
-    record |= {"frames": frames, "registered": frames - int(str(record["filled"]))}
-    record |= _last_pose(batches)
+    frames = int((batches.stop - batches.start - (batches.start > 0)).sum())
+    sums = {count: int(batches[count].sum()) for count in ("assisted", "lost", "filled")}
+    record: dict[str, Any] = {"method": method, "scene": scene, "size": size, "split": split}
+    record |= {"batches": len(batches), **sums, "frames": frames}
+    record |= {"registered": frames - sums["filled"]}
+    for unit in ("m", "deg"):
+        for when in ("before", "after"):
+            errors = batches[f"error_{when}_{unit}"].astype(float)
+            record[f"last_{unit}_{when}_median"] = errors.median()
+            record[f"last_{unit}_{when}_max"] = errors.max()
     if split == TOTAL and method in PUBLISHED_ASSISTED:
         record["published_assisted"] = PUBLISHED_ASSISTED[method]
         record["published_batches"] = PUBLISHED_BATCHES
@@ -117,39 +122,34 @@ def batch_records(root: Path, method: str, scene: str, size: str, split: str) ->
     return records
 
 
-def assistance_grid(records: Sequence[Mapping[str, Value]]) -> Grid:
+def assistance_sheet(table: pd.DataFrame) -> Sheet:
     """The rows of both splits together, as printed."""
-    headings = ("Batches", "Assisted", "Published", "Lost", "Frames", "Filled", "Last pose off by")
-    return Grid(
-        NAME,
-        "Assistance that the ground-truth methods needed.",
-        ("Labels from", "Data set", *headings),
-        (Group("", tuple((_line(record),) for record in records)),),
-        (
-            "Training and test batches together. Last pose off by: median over the batches before "
-            "assistance. Published: counts of section 4.1, of the batches its images make.",
-        ),
+    texts = pd.DataFrame(
+        {
+            "Labels from": table.method.map(SOURCES),
+            "Data set": table.scene.map(scene_title) + ", " + table["size"],
+            "Batches": table.batches.astype(str),
+            "Assisted": table.assisted.astype(str),
+            "Published": [
+                "–" if pd.isna(assisted) else f"{assisted} of {batches}"
+                for assisted, batches in table[["published_assisted", "published_batches"]].values
+            ],
+            "Lost": table.lost.astype(str),
+            "Frames": table.frames.astype(str),
+            "Filled": table.filled.astype(str),
+            "Last pose off by": last_pose(table, "before"),
+        }
+    )
+    remark = (
+        "Training and test batches together. Last pose off by: median over the batches before "
+        "assistance. Published: counts of section 4.1, of the batches its images make."
+    )
+    return sheet_of_texts(
+        NAME, "Assistance that the ground-truth methods needed.", texts, (remark,)
     )
 
 
-def _last_pose(batches: Records) -> dict[str, Value]:
-    """Errors of the last poses: median over the batches and maximum, before and after."""
-    found: dict[str, Value] = {}
-    for unit in ("m", "deg"):
-        for when in ("before", "after"):
-            errors = [float(batch[f"error_{when}_{unit}"]) for batch in batches]
-            found[f"last_{unit}_{when}_median"] = median(errors) if errors else None
-            found[f"last_{unit}_{when}_max"] = max(errors, default=None)
-    return found
-
-
-def _line(record: Mapping[str, Value]) -> Line:
-    published = "–"
-    if record.get("published_assisted") is not None:
-        published = f"{record['published_assisted']} of {record['published_batches']}"
-    metres, degrees = record["last_m_before_median"], record["last_deg_before_median"]
-    off = "–" if metres is None or degrees is None else f"{metres:.2f} m, {degrees:.2f}°"
-    cells = (record["batches"], record["assisted"], published, record["lost"], record["frames"])
-    entries = tuple(Entry((Printed(str(cell)),)) for cell in (*cells, record["filled"], off))
-    data_set = f"{scene_title(str(record['scene']))}, {record['size']}"
-    return Line("labels", SOURCES[str(record["method"])], data_set, entries)
+def last_pose(table: pd.DataFrame, when: str) -> list[str]:
+    """How far off last poses of batches were before or after assistance, in median."""
+    errors = table[[f"last_m_{when}_median", f"last_deg_{when}_median"]].to_numpy(float)
+    return ["–" if pd.isna(m) else f"{m:.2f} m, {deg:.2f}°" for m, deg in errors]

@@ -1,38 +1,52 @@
-"""The cells of tables 2 to 5: what each run scored, beside what the paper published."""
+"""The cells of tables 2 to 6: what each run scored, beside what the paper published."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from synfeal.config import MODELS, Design, Experiment, Run
+import pandas as pd
+
+from synfeal.config import MODELS, Design, Experiment
 from synfeal.config.experiments import FROM_SCRATCH
-from synfeal.report.published import PublishedCell, key_of, published_cells
-from synfeal.report.stats import MEASURES, CellScores, combine, percent_change, read_metrics
+from synfeal.config.tables import KEYS
+from synfeal.frames import COUNT, EXTRA, MAYBE, NUMBER, TEXT, Schema, frame_of
+from synfeal.report.published import KEY, SCHEMA, published_frame
+from synfeal.report.stats import (
+    BASELINES,
+    FLOORS,
+    MEASURES,
+    combine,
+    percent_change,
+    read_metrics,
+)
+
+LIMITS = tuple(f"{measure}_{end}" for measure in MEASURES for end in ("low", "high"))
+DEVIATIONS = tuple(f"{measure}_sd" for measure in MEASURES)
+# Of Table 5: by measure, the change against the run with transfer learning.
+CHANGES = {
+    "position_m": "position_change_percent",
+    "orientation_deg": "orientation_change_percent",
+    "position_m_true": "position_true_change_percent",
+    "orientation_deg_true": "orientation_true_change_percent",
+}
+COUNTS = ("n_train", "n_test", "n_seeds", "failed")
+SCORES = {
+    **dict.fromkeys((*MEASURES, "position_rms_m", *LIMITS, *DEVIATIONS), MAYBE),
+    **dict.fromkeys((*CHANGES.values(), *BASELINES, *FLOORS), MAYBE),
+    **dict.fromkeys(COUNTS, COUNT),
+}
+CELL = {
+    "row": COUNT,
+    **{key: SCHEMA[key] for key in KEY},
+    "label_id": TEXT,
+    **SCORES,
+    "n_finished": COUNT,
+}
+PUBLISHED = {name: f"published_{name}" for name in SCHEMA if name not in KEY}
 
 
-@dataclass(frozen=True)
-class Cell:
-    """One cell of tables 2 to 5.
-
-    Attributes:
-        row: the table row.
-        model: the localizer.
-        own: regenerated scores.
-        published: the paper's cell of the same design, if there is one.
-        change_percent: Table 5: by measure, the change against the run with transfer learning; None
-            where either run failed. Empty in the other tables.
-    """
-
-    row: Experiment
-    model: str
-    own: CellScores
-    published: PublishedCell | None
-    change_percent: dict[str, float | None]
-
-
-def read_cells(table: str, design: Design, root: Path) -> tuple[Cell, ...]:
+def read_cells(table: str, design: Design, root: Path) -> pd.DataFrame:
     """Read the cells of one table, row by row, five localizers each.
 
     Args:
@@ -40,24 +54,55 @@ def read_cells(table: str, design: Design, root: Path) -> tuple[Cell, ...]:
         design: of the profile; rows it leaves out are not in the table.
         root: results directory of the profile.
 
+    Returns:
+        Columns ``CELL`` (``row`` counts the rows of the table, ``n_finished`` the runs that have a
+        score, ``failed`` the predictions that were not finite) and ``PUBLISHED``, of which the text
+        is empty and the rest missing where the paper has no such cell.
+
     Raises:
         InputError: a run's scores are missing or unreadable.
     """
-    published = published_cells(table)
-    cells = []
-    for row in design.rows_of(table):
-        for model in MODELS:
-            own = _scores(design.runs_of(row, model), root)
-            change: dict[str, float | None] = {}
-            if table == FROM_SCRATCH:
-                change = _change(own, _scores(design.runs_of(row.pretrained, model), root))
-            cells.append(Cell(row, model, own, published.get(key_of(row, model)), change))
-    return tuple(cells)
+    records = [
+        {"row": place, "model": model, "label_id": row.label_id}
+        | row.model_dump()
+        | _scores(row, model, design, root)
+        for place, row in enumerate(design.rows_of(table))
+        for model in MODELS
+    ]
+    published = published_frame(table).rename(columns=PUBLISHED)
+    cells = frame_of(records, CELL).merge(published, how="left", on=list(KEY), validate="m:1")
+    texts = {name: "" for own, name in PUBLISHED.items() if SCHEMA[own] is TEXT}
+    return cells.fillna(texts)
 
 
-def _scores(runs: Sequence[Run], root: Path) -> CellScores:
-    return combine([read_metrics(root / "runs" / run.directory / "metrics.json") for run in runs])
+def schema_of(table: str, repeated: bool = False) -> Schema:
+    """The columns of a table's CSV, in order; ``*_sd`` where a cell has several seeds."""
+    left_out = {
+        *(() if repeated else DEVIATIONS),
+        *(() if table == FROM_SCRATCH else CHANGES.values()),
+    }
+    published = ["position_m", "orientation_deg"]
+    published += list(CHANGES.values())[:2] if table == FROM_SCRATCH else []
+    return {
+        **{key: NUMBER if key in ("noise_m", "noise_deg") else TEXT for key in KEYS[table]},
+        "model": TEXT,
+        **{name: kind for name, kind in SCORES.items() if name not in left_out},
+        **dict.fromkeys((PUBLISHED[name] for name in published), MAYBE),
+        "published_flag": TEXT,
+    } | (dict.fromkeys(DEVIATIONS, EXTRA) if repeated else {})
 
 
-def _change(new: CellScores, old: CellScores) -> dict[str, float | None]:
-    return {m: percent_change(new.scores[m].value, old.scores[m].value) for m in MEASURES}
+def _scores(row: Experiment, model: str, design: Design, root: Path) -> dict[str, Any]:
+    record = _combined(row, model, design, root)
+    if row.table != FROM_SCRATCH:
+        return record
+    pretrained = _combined(row.pretrained, model, design, root)
+    return record | {
+        change: percent_change(record[measure], pretrained[measure])
+        for measure, change in CHANGES.items()
+    }
+
+
+def _combined(row: Experiment, model: str, design: Design, root: Path) -> dict[str, Any]:
+    runs = [root / "runs" / run.directory / "metrics.json" for run in design.runs_of(row, model)]
+    return combine([read_metrics(path) for path in runs])

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from synfeal.frames import read_records
 from synfeal.report.figures import CAPTIONS
 from synfeal.report.hard_cases.latex import hard_cases_latex
 from synfeal.report.hard_cases.table import COLUMNS
 from synfeal.report.hard_cases.table import NAME as HARD_CASES
 from synfeal.report.latex import PACKAGES, document_latex, escape, table_bodies, write_text
-from synfeal.report.results import read_table
 
 CLAIM_PACKAGES = (*PACKAGES, "longtable", "array")
 WIDTHS_MM = (8, 42, 24, 30, 30, 20, 20)
@@ -35,16 +35,20 @@ def write_report_document(root: Path, tables: Sequence[Path], out_tex: Path) -> 
     Raises:
         InputError: ``claims.csv`` is missing, or it or ``hard_cases.csv`` is unreadable.
     """
-    claims = read_table(root / "claims.csv", [*CLAIM_COLUMNS, "footnote"])
+    claims = _rows(root / "claims.csv", [*CLAIM_COLUMNS, "footnote"])
     hard_cases = root / "tables" / f"{HARD_CASES}.csv"
     names = [name for name in CAPTIONS if (root / "figures" / f"{name}.png").is_file()]
     pages = [
         f"{title_latex(root.name)}\n{claims_latex(claims)}",
         *table_bodies(tables),
-        *([hard_cases_latex(read_table(hard_cases, COLUMNS))] if hard_cases.is_file() else []),
+        *([hard_cases_latex(_rows(hard_cases, COLUMNS))] if hard_cases.is_file() else []),
         *(figure_latex(name, CAPTIONS[name]) for name in names),
     ]
     write_text(out_tex, document_latex(pages, CLAIM_PACKAGES))
+
+
+def _rows(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
+    return [row for _, row in read_records(path, columns)]
 
 
 def title_latex(profile: str) -> str:

@@ -13,10 +13,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from synfeal.errors import InputError, why
+from synfeal.config.tables import KEYS
+from synfeal.frames import TEXT, read_frame
+from synfeal.report.cells import schema_of
 from synfeal.report.layouts import scene_title
 
 MEASURES = ("position_m", "orientation_deg")
+PUBLISHED = tuple(f"published_{measure}" for measure in MEASURES)
 HERE, PAPER = "here", "paper"
 COLUMNS = ("group", "change", "spoken", "model", "measure", "source", "factor")
 
@@ -133,19 +136,15 @@ def _factors(
 
 
 def _table(root: Path, name: str) -> pd.DataFrame:
+    schema = schema_of(name)
+    columns = [*KEYS[name], "model", *MEASURES, *(f"{m}_true" for m in MEASURES), *PUBLISHED]
     path = root / "tables" / f"{name}.csv"
-    try:
-        return pd.read_csv(path, dtype={"size": str, "labels": str, "model": str})
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read ({why(error)}); publish the run again") from None
+    return read_frame(path, {column: schema[column] for column in columns}, "publish again")
 
 
 def _claims_sentence(root: Path) -> str:
-    path = root / "claims.csv"
-    try:
-        verdicts = pd.read_csv(path).verdict_true.value_counts(sort=False)
-    except (OSError, ValueError, AttributeError) as error:
-        raise InputError(f"{path}: cannot be read ({why(error)}); publish the run again") from None
+    claims = read_frame(root / "claims.csv", {"verdict_true": TEXT}, "publish again")
+    verdicts = claims.verdict_true.value_counts(sort=False)
     parts = [f"{count} {verdict}" for verdict, count in verdicts.items()]
     return f"Verdicts on {verdicts.sum()} claims, by the true poses: {', '.join(parts)}."
 

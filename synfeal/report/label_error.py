@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from pydantic import FiniteFloat, TypeAdapter
 
 from baselines.groundtruth.label_error import (
@@ -22,12 +24,10 @@ from synfeal.config import Experiment
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.errors import InputError, why
 from synfeal.files import read_json
+from synfeal.frames import COUNT, MAYBE, NUMBER, TEXT, frame_of, write_frame
 from synfeal.report.assistance import SPLITS, TOTAL, batch_records, estimated_sets
-from synfeal.report.grid import Entry, Grid, Group, Line
-from synfeal.report.grid import Value as Printed
-from synfeal.report.latex import write_latex
 from synfeal.report.layouts import SOURCES, scene_title
-from synfeal.report.tables import Value, write_rows
+from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
 
 NAME = "label_error"
 _FACTS = TypeAdapter(dict[str, FiniteFloat])
@@ -45,10 +45,14 @@ RELATIVE = tuple(
     for n in RELATIVE_FRAMES
     for name in ("m_rmse", "deg_rmse", "m_per_m", "deg_per_m")
 )
-COLUMNS = (
-    *("scene", "size", "method", "split", "assistance", "frames", *ABSOLUTE, *RELATIVE),
-    *("share_within_5cm_5deg", "share_filled", "seconds_per_frame", "peak_memory_mb"),
-)
+SCHEMA = {
+    **dict.fromkeys(("scene", "size", "method", "split", "assistance"), TEXT),
+    "frames": COUNT,
+    **dict.fromkeys(ABSOLUTE, NUMBER),
+    **dict.fromkeys(RELATIVE, MAYBE),
+    **dict.fromkeys(("share_within_5cm_5deg", "share_filled"), NUMBER),
+    **dict.fromkeys(("seconds_per_frame", "peak_memory_mb"), NUMBER),
+}
 
 
 def write_label_error_table(
@@ -71,13 +75,14 @@ def write_label_error_table(
         for split in (*SPLITS, TOTAL)
         for record in label_records(root, *names, split)
     ]
-    write_rows(out_csv, COLUMNS, records)
-    write_latex(out_tex, label_error_grid([r for r in records if r["split"] == TOTAL]))
+    table = frame_of(records, SCHEMA)
+    write_frame(out_csv, table)
+    write_latex(out_tex, label_error_sheet(table[table.split == TOTAL]))
 
 
 def label_records(
     root: Path, method: str, scene: str, size: str, split: str
-) -> list[dict[str, Value]]:
+) -> list[dict[str, Any]]:
     """Both rows of a label set and a split, or of both splits together."""
     splits = SPLITS if split == TOTAL else (split,)
     filled = sum(
@@ -95,21 +100,21 @@ def label_records(
             for s in splits
         ]
         frames = sum(len(truth) for _, truth in pairs)
-        record: dict[str, Value] = {"scene": scene, "size": size, "method": method}
+        record: dict[str, Any] = {"scene": scene, "size": size, "method": method}
         record |= {"split": split, "assistance": state, "frames": frames}
         record |= error_record(pairs) | {"share_filled": filled / frames}
         records.append(record | cost_record(root, method, scene, size, splits, frames))
     return records
 
 
-def error_record(pairs: Sequence[Pair]) -> dict[str, Value]:
+def error_record(pairs: Sequence[Pair]) -> dict[str, Any]:
     """Errors of the labels of some splits against their true poses, by column."""
     every = [absolute_errors(*pair) for pair in pairs]
     errors: PoseErrors = (
         np.concatenate([position_m for position_m, _ in every]),
         np.concatenate([orientation_deg for _, orientation_deg in every]),
     )
-    record: dict[str, Value] = {}
+    record: dict[str, Any] = {}
     for measure, values in zip(("position_m", "orientation_deg"), errors, strict=True):
         found = spread(values)
         record[f"{measure}_median"] = found.median
@@ -122,7 +127,7 @@ def error_record(pairs: Sequence[Pair]) -> dict[str, Value]:
 
 def cost_record(
     root: Path, method: str, scene: str, size: str, splits: Sequence[str], frames: int
-) -> dict[str, Value]:
+) -> dict[str, Any]:
     """Processor seconds per frame and the largest memory, over all stages and batches."""
     seconds, peaks = 0.0, [0.0]
     for stage in stages_of(method):
@@ -136,25 +141,46 @@ def cost_record(
     return {"seconds_per_frame": seconds / frames, "peak_memory_mb": max(peaks)}
 
 
-def label_error_grid(records: Sequence[Mapping[str, Value]]) -> Grid:
+def label_error_sheet(table: pd.DataFrame) -> Sheet:
     """The rows of both splits together, as printed: a line before and a line after assistance."""
-    headings = ("Median", "RMSE", "Maximum", "Drift over 25 frames", "Within 5 cm, 5°", "Filled")
-    return Grid(
-        NAME,
-        "Errors of re-estimated labels against the true poses, before and after assistance.",
-        ("Labels from", "Assistance", *headings, "s per frame", "Memory"),
-        tuple(
-            Group(title, tuple(_lines([r for r in records if _data_set(r) == title])))
-            for title in dict.fromkeys(_data_set(record) for record in records)
-        ),
-        (
-            "Positions and orientations without alignment: the first pose is the true one. Drift: "
-            "errors of the motion over 25 frames, by the metre travelled.",
-        ),
+    data_set = table.scene.map(scene_title) + ", " + table["size"]
+    texts = pd.DataFrame(
+        {
+            "block": data_set,
+            "row": data_set + table.method,
+            "Labels from": table.method.map(SOURCES).where(table.assistance == "before", ""),
+            "Assistance": table.assistance,
+            **{
+                title: _pairs(table, f"position_m_{which}", f"orientation_deg_{which}")
+                for title, which in {"Median": "median", "RMSE": "rmse", "Maximum": "max"}.items()
+            },
+            "Drift over 25 frames": _pairs(
+                table, "relative_25_m_per_m", "relative_25_deg_per_m", (" m/m", "°/m")
+            ),
+            "Within 5 cm, 5°": [f"{100 * share:.0f} %" for share in table.share_within_5cm_5deg],
+            "Filled": [f"{100 * share:.1f} %" for share in table.share_filled],
+            "s per frame": [f"{seconds:.3g}" for seconds in table.seconds_per_frame],
+            "Memory": [f"{megabytes:.0f} MB" for megabytes in table.peak_memory_mb],
+        }
     )
+    caption = "Errors of re-estimated labels against the true poses, before and after assistance."
+    remark = (
+        "Positions and orientations without alignment: the first pose is the true one. Drift: "
+        "errors of the motion over 25 frames, by the metre travelled."
+    )
+    return sheet_of_texts(NAME, caption, texts, (remark,))
 
 
-def _relative_record(n: int, error: RelativeError | None) -> dict[str, Value]:
+def _pairs(
+    table: pd.DataFrame, first: str, second: str, units: tuple[str, str] = (" m", "°")
+) -> list[str]:
+    texts = [
+        f"{a:.3g}{units[0]}, {b:.3g}{units[1]}" for a, b in table[[first, second]].to_numpy(float)
+    ]
+    return [text.replace("nan", "–") for text in texts]
+
+
+def _relative_record(n: int, error: RelativeError | None) -> dict[str, Any]:
     if error is None:
         return {}
     values = (error.rmse_m, error.rmse_deg, error.per_metre_m, error.per_metre_deg)
@@ -175,37 +201,3 @@ def _read_facts(path: Path) -> dict[str, float]:
             f"{path}: cannot be read ({why(error)}); estimate that batch again"
         ) from None
     return facts
-
-
-def _data_set(record: Mapping[str, Value]) -> str:
-    return f"{scene_title(str(record['scene']))}, {record['size']}"
-
-
-def _lines(records: Sequence[Mapping[str, Value]]) -> list[tuple[Line, ...]]:
-    """The two lines of each method of a data set."""
-    methods = dict.fromkeys(record["method"] for record in records)
-    return [tuple(_line(r) for r in records if r["method"] == method) for method in methods]
-
-
-def _line(record: Mapping[str, Value]) -> Line:
-    def number(column: str) -> float:
-        value = record.get(column)
-        return float("nan") if value is None else float(value)
-
-    def pair(*columns: str, units: tuple[str, str] = (" m", "°")) -> str:
-        return ", ".join(
-            f"{number(c):.3g}{unit}" for c, unit in zip(columns, units, strict=True)
-        ).replace("nan", "–")
-
-    cells = (
-        *(pair(f"position_m_{w}", f"orientation_deg_{w}") for w in ("median", "rmse", "max")),
-        pair("relative_25_m_per_m", "relative_25_deg_per_m", units=(" m/m", "°/m")),
-        f"{100 * number('share_within_5cm_5deg'):.0f} %",
-        f"{100 * number('share_filled'):.1f} %",
-        f"{number('seconds_per_frame'):.3g}",
-        f"{number('peak_memory_mb'):.0f} MB",
-    )
-    title = SOURCES[str(record["method"])] if record["assistance"] == "before" else ""
-    return Line(
-        "labels", title, str(record["assistance"]), tuple(Entry((Printed(c),)) for c in cells)
-    )

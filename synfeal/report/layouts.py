@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import pandas as pd
 
 from baselines.groundtruth.methods import METHODS
-from synfeal.config import MODELS
 from synfeal.config.experiments import FROM_SCRATCH
-from synfeal.report.cells import Cell
-from synfeal.report.grid import Entry, Grid, Group, Kind, Line, Value, with_bold
-from synfeal.report.stats import Score
+from synfeal.frames import rows_of
+from synfeal.report.cells import CHANGES
+from synfeal.report.sheet import LINE, PAPER, VALUE, Sheet, with_bold
 
 TITLES = {
     "posenet": "PoseNet",
@@ -47,11 +48,11 @@ HEADINGS = {
     "table5_from_scratch": "(# train, # test)",
     "table6_label_errors": "Errors of the labels",
 }
-SCORES = (
+REMARK = (
     "Errors are against the labels the test set carries (the paper's protocol) and against the "
     "true poses of the simulator."
 )
-PAPER = (
+PUBLISHED = (
     "Lines marked paper: the values the paper printed, on its own meshes and at its own scale. Its "
     "position errors are root mean squares over the three axes; lines marked paper's unit are ours "
     "in that unit."
@@ -64,29 +65,20 @@ CHANGE = (
     "Red: worse than with transfer learning; green: not worse. Changes come from unrounded errors; "
     "some printed in the paper differ from what its rounded cells give."
 )
-ByModel = Sequence[Cell]
-
-
-def grid_of(name: str, cells: Sequence[Cell]) -> Grid:
-    """Lay out one of tables 2 to 5.
-
-    Args:
-        name: the table.
-        cells: its cells in order, the five localizers of a row side by side.
-    """
-    rows = [cells[i : i + len(MODELS)] for i in range(0, len(cells), len(MODELS))]
-    one_truth = all(cell.row.labels == "synfeal" for cell in cells)
-    groups = tuple(
-        Group(title, with_bold([lines_of(name, row, one_truth) for row in members]))
-        for title, members in _blocks(rows).items()
-    )
-    return Grid(
-        name,
-        f"{CAPTIONS[name]} {_where(name, rows)} Best scores in bold.",
-        (HEADINGS[name], "Error against", *TITLES.values(), *references_of(one_truth)),
-        groups,
-        (SCORES, UNTRAINED, PAPER, *([CHANGE] if name == FROM_SCRATCH else [])),
-    )
+# Kinds of lines in their order, and what their numbers are measured against; after those of a
+# score stands its change, in Table 5.
+AGAINST = {
+    "labels": "labels",
+    "labels change": "change",
+    "truth": "truth",
+    "truth change": "change",
+    "unit": "labels, paper's unit",
+    PAPER: "paper",
+    "paper change": "change, paper",
+}
+KIND_OF = {"labels": "", "truth": "_true"}
+FAILED = "failed"
+UNITS = {"position_m": " m", "orientation_deg": "°"}
 
 
 def scene_title(scene: str) -> str:
@@ -94,161 +86,175 @@ def scene_title(scene: str) -> str:
     return scene.replace("_", " ").title()
 
 
-def lines_of(name: str, row: ByModel, one_truth: bool) -> tuple[Line, ...]:
-    """The printed lines of one table row.
+def sheet_of(name: str, cells: pd.DataFrame) -> Sheet:
+    """Lay out one of tables 2 to 6.
 
     Args:
         name: the table.
-        row: its five cells.
-        one_truth: every label of the table is a true pose, so that both scores are one line.
+        cells: what :func:`synfeal.report.cells.read_cells` read for it.
     """
-    label = row_label(name, row[0])
-    if one_truth:
-        lines = _score_lines(row, "labels", label, "labels = truth")
-    else:
-        lines = _score_lines(row, "labels", label, "labels")
-        lines += _score_lines(row, "truth", "", "truth")
-    width = len(row) + len(references_of(one_truth))
-    lines += _paper_lines(name, row)
-    blank = Entry((Value(""),))
-    return tuple(
-        replace(line, entries=(*line.entries, *[blank] * (width - len(line.entries))))
-        for line in (_with_references(line, row[0], one_truth) for line in lines)
+    one_truth = bool((cells.labels == "synfeal").all())
+    values = printed_values(name, cells)
+    if one_truth:  # both scores are one line, and the true poses score zero
+        values = values[
+            ~values.kind.str.startswith("truth") & (values.column != REFERENCES["floor"])
+        ]
+    second = (values.text == FAILED) & (values.place == 1)
+    lines = _lines(name, cells, values, one_truth)
+    number = pd.Series(lines.index, pd.MultiIndex.from_frame(lines[["row", "kind"]]))
+    keys = pd.MultiIndex.from_frame(values[["row", "kind"]])
+    values = values.assign(line=number[keys].to_numpy())[~second]
+    references = [*REFERENCES.values()][: 1 if one_truth else 2]
+    return Sheet(
+        name,
+        f"{CAPTIONS[name]} {_where(cells)} Best scores in bold.",
+        (HEADINGS[name], "Error against", *TITLES.values(), *references),
+        lines.assign(kind=lines.kind.str.removesuffix(" change"))[list(LINE)],
+        values[list(VALUE)],
+        (REMARK, UNTRAINED, PUBLISHED, *([CHANGE] if name == FROM_SCRATCH else [])),
     )
 
 
-def references_of(one_truth: bool) -> tuple[str, ...]:
-    """Titles of the columns after the localizers; true labels have no floor but zero."""
-    return tuple(REFERENCES.values())[: 1 if one_truth else 2]
+def blocks_of(cells: pd.DataFrame) -> pd.Series:
+    """Titles of the block of each cell: noise of Table 3, and the scene where there are several."""
+    scenes = cells.scene.map(scene_title) if cells.scene.nunique() > 1 else ""
+    return (cells.block.map(BLOCKS) + " " + scenes).str.strip()
 
 
-def _with_references(line: Line, cell: Cell, one_truth: bool) -> Line:
-    """A line of scores with what the untrained score, the same for every localizer of the row."""
-    if line.kind not in ("labels", "truth") or line.against == "change":
-        return line
-    end = "_true" if line.kind == "truth" else ""
-    found = cell.own.references
-    entries = [
-        Entry((_plain(found[f"{name}_position_m{end}"], " m"), _plain(found[degrees], "°")))
-        for name in list(REFERENCES)[: len(references_of(one_truth))]
-        if (degrees := f"{name}_orientation_deg{end}") in found
+def printed_values(name: str, cells: pd.DataFrame) -> pd.DataFrame:
+    """Every number of a table as it is printed, in both scores.
+
+    Returns:
+        Columns ``row`` (as in the cells), ``kind`` (of ``AGAINST``), ``column`` (a heading),
+        ``place`` (0 position, 1 orientation), ``text``, ``tone``, ``note`` and ``bold``: whether it
+        is the lowest of its kind, column and block, as printed.
+    """
+    parts = []
+    for place, (measure, unit) in enumerate(UNITS.items()):
+        for kind, end in KIND_OF.items():
+            score = f"{measure}{end}"
+            parts.append(_scores(cells, kind, place, score, unit))
+            parts += _references(cells, kind, place, score, unit)
+            if name == FROM_SCRATCH:
+                parts.append(_changes(cells, f"{kind} change", place, CHANGES[score]))
+        parts.append(_published(cells, place, measure, unit))
+        if name == FROM_SCRATCH:
+            parts.append(_changes(cells, "paper change", place, f"published_{CHANGES[measure]}"))
+    in_print = cells[cells.published_position_m.notna()]
+    texts = [_plain(value, " m") for value in in_print.position_rms_m]
+    parts.append(_part(in_print, "unit", 0, texts))
+    values = pd.concat(parts, ignore_index=True)
+    blocks = values.row.map(blocks_of(cells).groupby(cells.row).first())
+    return with_bold(values, [blocks, values.kind, values["column"], values.place])
+
+
+def _part(
+    cells: pd.DataFrame, kind: str, place: int, texts: list[str], **more: Any
+) -> pd.DataFrame:
+    """Values of some cells; ``more``: columns of :func:`printed_values`, and ``number``."""
+    usual = {"column": cells.model.map(TITLES), "number": float("nan"), "tone": "", "note": ""}
+    found = pd.DataFrame({"row": cells.row, "kind": kind, "place": place, "text": texts})
+    return found.assign(**{**usual, **more})
+
+
+def _scores(cells: pd.DataFrame, kind: str, place: int, score: str, unit: str) -> pd.DataFrame:
+    texts = [
+        FAILED if pd.isna(value) else f"{value:.2f}{'' if pd.isna(sd) else f' ± {sd:.2f}'}{unit}"
+        for value, sd in zip(cells[score], cells[f"{score}_sd"], strict=True)
     ]
-    return replace(line, entries=(*line.entries, *entries))
+    notes = [
+        f"{cell.failed} of {cell.n_test * cell.n_seeds} predictions failed, {cell.n_finished} of"
+        f" {cell.n_seeds} runs have a score."
+        if cell.failed
+        else ""
+        for cell in rows_of(cells)
+    ]
+    return _part(
+        cells, kind, place, texts, number=cells[score].map(partial(round, ndigits=2)), note=notes
+    )
 
 
-def _plain(value: float | None, unit: str) -> Value:
-    """A number that does not compete for bold."""
-    return Value("–" if value is None else f"{value:.2f}{unit}")
+def _references(
+    cells: pd.DataFrame, kind: str, place: int, score: str, unit: str
+) -> list[pd.DataFrame]:
+    """What has not been trained, the same for every localizer of a row."""
+    first = cells.groupby("row", sort=False).head(1)
+    return [
+        _part(first, kind, place, [_plain(v, unit) for v in first[f"{name}_{score}"]], column=title)
+        for name, title in REFERENCES.items()
+        if f"{name}_{score}" in cells
+    ]
 
 
-def row_label(name: str, cell: Cell) -> str:
+def _published(cells: pd.DataFrame, place: int, measure: str, unit: str) -> pd.DataFrame:
+    found = cells[cells.published_position_m.notna()]
+    values = found[f"published_{measure}"]
+    # A misprinted orientation is shown, and never the best.
+    competes = (found.published_flag != "misprint") | (place == 0)
+    texts = [f"{value:.2f}{unit}" for value in values]
+    note = found.published_cell_note
+    return _part(found, PAPER, place, texts, number=values.where(competes), note=note)
+
+
+def _changes(cells: pd.DataFrame, kind: str, place: int, change: str) -> pd.DataFrame:
+    found = cells[cells.published_position_m.notna()] if kind == "paper change" else cells
+    values = found[change]
+    texts = ["no change known" if pd.isna(value) else f"{value:+.1f}%" for value in values]
+    tones = [
+        "" if pd.isna(value) else "worse" if round(value, 1) > 0 else "better" for value in values
+    ]
+    return _part(found, kind, place, texts, tone=tones)
+
+
+def _lines(name: str, cells: pd.DataFrame, values: pd.DataFrame, one_truth: bool) -> pd.DataFrame:
+    """The printed lines in order, blocks together; columns ``LINE``."""
+    rows = cells.assign(block=blocks_of(cells)).groupby("row", sort=False).first()
+    rows = rows.assign(group=rows.groupby("block", sort=False).ngroup())
+    kinds = values[["row", "kind"]].drop_duplicates()
+    lines = kinds.assign(order=kinds.kind.map(list(AGAINST).index), label="", label_note="")
+    lines = lines.join(rows[["group", "block", "published_row_note"]], on="row")
+    lines["against"] = lines.kind.map(AGAINST | ({"labels": "labels = truth"} if one_truth else {}))
+    own, paper = lines.kind == "labels", lines.kind == PAPER
+    labels = {row.Index: row_label(name, row) for row in rows_of(cells.set_index("row"))}
+    lines.loc[own, "label"] = lines.row.map(labels)
+    lines.loc[paper, "label"] = lines.row.map(published_labels(name, cells))
+    lines.loc[paper, "label_note"] = lines.published_row_note
+    return lines.sort_values(["group", "row", "order"]).reset_index(drop=True)
+
+
+def row_label(name: str, cell: Any) -> str:
     """First column of a row: label source, noise, or size with the frames actually used."""
-    row = cell.row
     if name == "table2_ground_truth":
-        return SOURCES.get(row.labels, row.label_id)
+        return SOURCES.get(cell.labels, str(cell.label_id))
     if name == "table3_inconsistencies":
-        return f"{_level(row.noise_m)} m, {row.noise_deg:g}°"
+        return f"{_level(cell.noise_m)} m, {cell.noise_deg:g}°"
     if name == "table6_label_errors":
-        size = f"{_level(row.noise_m)} m, {row.noise_deg:g}°"
-        return f"{ERRORS[row.labels]}, {size}" if row.labels in ERRORS else "none"
-    return f"{row.size}: ({cell.own.n_train}, {cell.own.n_test})"
+        size = f"{_level(cell.noise_m)} m, {cell.noise_deg:g}°"
+        return f"{ERRORS[cell.labels]}, {size}" if cell.labels in ERRORS else "none"
+    return f"{cell.size}: ({cell.n_train}, {cell.n_test})"
 
 
-def _blocks(rows: Sequence[ByModel]) -> dict[str, list[ByModel]]:
-    """Rows by the title of their block: noise of Table 3, and the scene where there are several."""
-    several = len({row[0].row.scene for row in rows}) > 1
-    blocks: dict[str, list[ByModel]] = {}
-    for row in rows:
-        scene = scene_title(row[0].row.scene) if several else ""
-        blocks.setdefault(f"{BLOCKS[row[0].row.block]} {scene}".strip(), []).append(row)
-    return blocks
+def published_labels(name: str, cells: pd.DataFrame) -> dict[Any, str]:
+    """By row, its label in print: frames, or another one than it is run under, or none."""
+    rows = cells[cells.published_position_m.notna()].groupby("row").first()
+    if name not in ("table4_size", FROM_SCRATCH):
+        return dict(rows.published_printed_row)
+    frames = zip(rows.index, rows.published_n_train, rows.published_n_test, strict=True)
+    return {row: f"({train / 1000:g}k, {test / 1000:g}k)" for row, train, test in frames}
 
 
-def _score_lines(row: ByModel, kind: Kind, label: str, against: str) -> list[Line]:
-    end = "_true" if kind == "truth" else ""
-    lines = [Line(kind, label, against, tuple(_entry(cell, end) for cell in row))]
-    if row[0].change_percent:
-        lines.append(Line(kind, "", "change", tuple(_change_entry(cell, end) for cell in row)))
-    return lines
+def _plain(value: float, unit: str) -> str:
+    """A number that does not compete for bold."""
+    return "–" if pd.isna(value) else f"{value:.2f}{unit}"
 
 
-def _entry(cell: Cell, end: str) -> Entry:
-    own = cell.own
-    note = ""
-    if own.failed:
-        note = f"{own.failed} of {own.n_test * own.n_seeds} predictions failed"
-        note += f", {own.n_finished} of {own.n_seeds} runs have a score."
-    if not own.n_finished:
-        return Entry((Value("failed"),), note)
-    position, orientation = own.scores[f"position_m{end}"], own.scores[f"orientation_deg{end}"]
-    return Entry((_value(position, " m"), _value(orientation, "°")), note)
-
-
-def _value(score: Score, unit: str) -> Value:
-    assert score.value is not None  # a cell with a run that finished has all its scores
-    spread = "" if score.sd is None else f" ± {score.sd:.2f}"
-    return Value(f"{score.value:.2f}{spread}{unit}", round(score.value, 2))
-
-
-def _change_entry(cell: Cell, end: str) -> Entry:
-    measures = (f"position_m{end}", f"orientation_deg{end}")
-    return Entry(tuple(_percent(cell.change_percent[measure]) for measure in measures))
-
-
-def _percent(value: float | None) -> Value:
-    if value is None:
-        return Value("no change known")
-    return Value(f"{value:+.1f}%", tone="worse" if round(value, 1) > 0 else "better")
-
-
-def _paper_lines(name: str, row: ByModel) -> list[Line]:
-    printed = next((cell.published for cell in row if cell.published), None)
-    if printed is None:
-        return []
-    label = printed.printed_row
-    if name in ("table4_size", FROM_SCRATCH):
-        label = f"({_thousands(printed.n_train)}, {_thousands(printed.n_test)})"
-    entries = tuple(_paper_entry(cell) for cell in row)
-    unit = Line("unit", "", "labels, paper's unit", tuple(_entry_in_print(cell) for cell in row))
-    lines = [unit, Line("paper", label, "paper", entries, printed.row_note)]
-    if name == FROM_SCRATCH:
-        lines.append(Line("paper", "", "change, paper", tuple(_paper_change(cell) for cell in row)))
-    return lines
-
-
-def _entry_in_print(cell: Cell) -> Entry:
-    return Entry((_plain(cell.own.position_rms_m, " m"),))
-
-
-def _paper_entry(cell: Cell) -> Entry:
-    printed = cell.published
-    if printed is None:
-        return Entry((Value("–"),))
-    degrees = None if printed.flag == "misprint" else printed.orientation_deg
-    values = (
-        Value(f"{printed.position_m:.2f} m", printed.position_m),
-        Value(f"{printed.orientation_deg:.2f}°", degrees),
-    )
-    return Entry(values, printed.cell_note)
-
-
-def _paper_change(cell: Cell) -> Entry:
-    printed = cell.published
-    if printed is None:
-        return Entry((Value("–"),))
-    return Entry(
-        (_percent(printed.position_change_percent), _percent(printed.orientation_change_percent))
-    )
-
-
-def _where(name: str, rows: Sequence[ByModel]) -> str:
+def _where(cells: pd.DataFrame) -> str:
     """Which scene, and how many frames where that is the same for the whole table."""
-    titles = list(dict.fromkeys(scene_title(row[0].row.scene) for row in rows))
+    titles = list(dict.fromkeys(map(scene_title, cells.scene)))
     where = f"Scene: {titles[0]}" if len(titles) == 1 else f"Scenes: {', '.join(titles)}"
-    counts = {(row[0].own.n_train, row[0].own.n_test) for row in rows}
+    counts = cells[["n_train", "n_test"]].drop_duplicates()
     if len(counts) == 1:
-        n_train, n_test = counts.pop()
-        where += f"; {n_train} training and {n_test} test frames"
+        where += "; {} training and {} test frames".format(*counts.iloc[0])
     return f"{where}."
 
 
@@ -257,7 +263,3 @@ def _level(noise_m: float) -> str:
     if noise_m == 0 or round(noise_m, 2) != noise_m:
         return f"{noise_m:g}"
     return f"{noise_m:.2f}"
-
-
-def _thousands(count: int) -> str:
-    return f"{count / 1000:g}k"

@@ -2,44 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
+import pandas as pd
 from pydantic import TypeAdapter
 
-from synfeal.report.grid import Entry, Grid, Group, Line, Value
-from synfeal.report.latex import write_latex
+from synfeal.frames import COUNT, MAYBE, MAYBE_COUNT, NUMBER, TEXT, frame_of, write_frame
 from synfeal.report.layouts import scene_title
 from synfeal.report.published import MeshFacts, published_meshes
 from synfeal.report.results import check_result, read_result
-from synfeal.report.tables import write_rows
+from synfeal.report.sheet import PAPER, Sheet, sheet_of_texts, write_latex
 
 NAME = "table1_meshes"
 _SHAPE = TypeAdapter(MeshFacts)
-FACTS = ("vertices", "faces", "volume_m3")
-COLUMNS = ("scene", *FACTS, *(f"published_{fact}" for fact in FACTS))
-LABELS = {"vertices": "# Vertices", "faces": "# Faces", "volume_m3": "Volume [m³]"}
+FACTS = {"vertices": "# Vertices", "faces": "# Faces", "volume_m3": "Volume [m³]"}
+SCHEMA = {
+    **{"scene": TEXT, "vertices": COUNT, "faces": COUNT, "volume_m3": NUMBER},
+    **{"published_vertices": MAYBE_COUNT, "published_faces": MAYBE_COUNT},
+    "published_volume_m3": MAYBE,
+}
 REMARK = (
     "Vertices at distinct positions, as a scan file counts them: copies along texture seams count"
     " once. Volume of the axis-aligned bounding box. Lines marked paper: the meshes of the paper."
 )
 
 
-def write_meshes_table(scenes: Sequence[str], root: Path, out_csv: Path, out_tex: Path) -> None:
+def write_meshes_table(scenes: Iterable[str], root: Path, out_csv: Path, out_tex: Path) -> None:
     """Write Table 1 from the properties of the scenes' meshes.
 
     Args:
         scenes: the scenes of the tables, in order.
         root: results directory of the profile, where ``scenes`` is.
-        out_csv: one row per scene.
+        out_csv: one row per scene, columns ``SCHEMA``.
         out_tex: a table environment.
 
     Raises:
         InputError: a scene's properties are missing or unreadable.
     """
-    meshes = {scene: read_mesh_facts(root, scene) for scene in scenes}
-    write_rows(out_csv, COLUMNS, [_record(scene, facts) for scene, facts in meshes.items()])
-    write_latex(out_tex, meshes_grid(meshes))
+    meshes = read_meshes(scenes, root)
+    write_frame(out_csv, meshes)
+    write_latex(out_tex, meshes_sheet(meshes))
+
+
+def read_meshes(scenes: Iterable[str], root: Path) -> pd.DataFrame:
+    """Columns ``SCHEMA`` of some scenes; what the paper has not is missing."""
+    printed = {
+        scene: {f"published_{fact}": value for fact, value in vars(facts).items()}
+        for scene, facts in published_meshes().items()
+    }
+    records = [
+        {"scene": scene} | vars(read_mesh_facts(root, scene)) | printed.get(scene, {})
+        for scene in scenes
+    ]
+    return frame_of(records, SCHEMA)
 
 
 def read_mesh_facts(root: Path, scene: str) -> MeshFacts:
@@ -52,34 +69,24 @@ def read_mesh_facts(root: Path, scene: str) -> MeshFacts:
     return MeshFacts(**facts)
 
 
-def meshes_grid(meshes: Mapping[str, MeshFacts]) -> Grid:
+def meshes_sheet(meshes: pd.DataFrame) -> Sheet:
     """Table 1 as printed: properties down, scenes across."""
-    titles = [scene_title(scene) for scene in meshes]
-    caption = "Properties of the 3D textured meshes used."
-    rows = tuple(_rows(meshes, fact) for fact in FACTS)
-    return Grid(NAME, caption, ("", "", *titles), (Group("", rows),), (REMARK,))
-
-
-def _record(scene: str, facts: MeshFacts) -> dict[str, str | int | float | None]:
-    published = published_meshes().get(scene)
-    record: dict[str, str | int | float | None] = {"scene": scene}
-    for fact in FACTS:
-        record[fact] = getattr(facts, fact)
-        record[f"published_{fact}"] = getattr(published, fact) if published else None
-    return record
-
-
-def _rows(meshes: Mapping[str, MeshFacts], fact: str) -> tuple[Line, ...]:
-    own = tuple(_entry(facts, fact) for facts in meshes.values())
-    printed = tuple(_entry(published_meshes().get(scene), fact) for scene in meshes)
-    return (
-        Line("labels", LABELS[fact], "regenerated", own),
-        Line("paper", "", "paper", printed),
+    scenes = meshes.set_index(meshes.scene.map(scene_title))
+    lines = [
+        {"row": fact, "kind": kind, " ": title, "  ": against}
+        | {scene: _printed(value, fact) for scene, value in scenes[f"{start}{fact}"].items()}
+        for fact, label in FACTS.items()
+        for start, kind, title, against in (
+            ("", "", label, "regenerated"),
+            ("published_", PAPER, "", "paper"),
+        )
+    ]
+    return sheet_of_texts(
+        NAME, "Properties of the 3D textured meshes used.", pd.DataFrame(lines), (REMARK,)
     )
 
 
-def _entry(facts: MeshFacts | None, fact: str) -> Entry:
-    if facts is None:
-        return Entry((Value("–"),))
-    number = getattr(facts, fact)
-    return Entry((Value(f"{number:.2f}" if fact == "volume_m3" else f"{number:,}"),))
+def _printed(value: Any, fact: str) -> str:
+    if pd.isna(value):
+        return "–"
+    return f"{value:,.2f}" if fact == "volume_m3" else f"{value:,.0f}"

@@ -12,26 +12,50 @@ import argparse
 import math
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from itertools import groupby
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
+
+import pandas as pd
 
 from synfeal.config import MODELS
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
+from synfeal.frames import (
+    COUNT,
+    MAYBE,
+    NUMBER,
+    TEXT,
+    Schema,
+    read_frame,
+    read_records,
+    records_of,
+    rows_of,
+)
+from synfeal.report.assistance import SCHEMA as ASSISTANCE
 from synfeal.report.assistance import TOTAL
 from synfeal.report.claims.table import claims_markdown
 from synfeal.report.findings import effects, sentences
 from synfeal.report.findings_figure import is_drawn_from, write_findings_figure
+from synfeal.report.label_error import SCHEMA as LABEL_ERROR
 from synfeal.report.layouts import SOURCES, TITLES, scene_title
 from synfeal.report.publish import PUBLISHED, RESULTS
-from synfeal.report.results import read_result, read_table
+from synfeal.report.results import read_result
+from synfeal.report.sheet import markdown_table
 
 PAGES = (Path("README.md"), Path("docs/results.md"), Path("docs/scenes.md"))
 FIGURE = Path("docs/images/findings.png")
 HEADLINES = ("night", "mini")
 PAPER_FRAMES = {"6k": 6000}
-Row = Mapping[str, str]
+CELL = {
+    "model": TEXT,
+    **dict.fromkeys(("n_train", "n_test"), COUNT),
+    **dict.fromkeys(("position_m_true", "orientation_deg_true"), MAYBE),
+    **dict.fromkeys(("published_position_m", "published_orientation_deg"), MAYBE),
+}
+SIFT = dict.fromkeys(
+    ("covered_share_mean", "covered_share_q10", "covered_share_q90", "keypoints_mean"), NUMBER
+)
 
 
 def headline() -> str:
@@ -47,74 +71,76 @@ def findings(root: Path) -> str:
 def origin(root: Path) -> str:
     """Which run the numbers are of."""
     record = read_result(root / "provenance.json", ("commit", "machine", "stages"), "publish again")
-    first = read_table(root / "tables" / "table4_size.csv")[0]
-    share = PAPER_FRAMES[first["size"]] / int(first["n_train"])
+    first = _table(root, "table4_size", {"size": TEXT, "n_train": COUNT, "n_seeds": COUNT}).iloc[0]
+    share = PAPER_FRAMES[first["size"]] / first.n_train
     frames = "the paper's frames" if share == 1 else f"1/{share:.3g} of the paper's frames"
     return (
-        f"Profile `{root.name}`: {frames}, {counted_seeds(first)}, at commit"
+        f"Profile `{root.name}`: {frames}, {counted_seeds(first.n_seeds)}, at commit"
         f" `{record['commit'][:9]}` on {record['machine']['usable_cores']} cores"
         f" ({record['machine']['processor']})."
     )
 
 
-def counted_seeds(row: Row) -> str:
+def counted_seeds(n_seeds: int) -> str:
     """As in ``3 training runs per cell``."""
-    return f"{row['n_seeds']} training run{'s' * (row['n_seeds'] != '1')} per cell"
+    return f"{n_seeds} training run{'' if n_seeds == 1 else 's'} per cell"
 
 
 def size_table(root: Path) -> str:
     """Table 4: errors against the true poses, published errors in brackets."""
-    return _localizer_table(
-        read_table(root / "tables" / "table4_size.csv"),
-        "scene, size (frames here)",
-        lambda row: (
-            f"{scene_title(row['scene'])} {row['size']} ({row['n_train']}, {row['n_test']})"
-        ),
-    )
+    cells = _table(root, "table4_size", {"scene": TEXT, "size": TEXT, **CELL})
+    frames = "(" + cells.n_train.astype(str) + ", " + cells.n_test.astype(str) + ")"
+    labels = cells.scene.map(scene_title) + " " + cells["size"] + " " + frames
+    return _localizer_table(cells, "scene, size (frames here)", labels)
 
 
 def labels_table(root: Path) -> str:
     """Table 2: errors against the true poses, published errors in brackets."""
-    return _localizer_table(
-        read_table(root / "tables" / "table2_ground_truth.csv"),
-        "labels from",
-        lambda row: SOURCES.get(row["labels"], row["labels"]),
-    )
+    cells = _table(root, "table2_ground_truth", {"labels": TEXT, **CELL})
+    labels = cells.labels.map(lambda name: SOURCES.get(name, name))
+    return _localizer_table(cells, "labels from", labels)
 
 
 def assistance(root: Path) -> str:
     """Batches that needed assistance, and how good the labels are."""
-    head = "| labels from | batches | assisted | median error, training | median error, test |"
-    errors = {
-        (row["method"], row["split"]): row
-        for row in read_table(root / "tables" / "label_error.csv")
-        if row["assistance"] == "after"
-    }
-    rows = [
-        f"| {SOURCES[row['method']]} | {row['batches']} | {row['assisted']}{_published(row)}"
-        f" | {_median(errors[row['method'], 'train'])} | {_median(errors[row['method'], 'test'])} |"
-        for row in read_table(root / "tables" / "assistance.csv")
-        if row["split"] == TOTAL
+    errors = _table(root, "label_error", LABEL_ERROR)
+    errors = errors[errors.assistance == "after"].set_index(["method", "split"])
+    median = errors.apply(
+        lambda e: f"{100 * e.position_m_median:.1f} cm, {e.orientation_deg_median:.2f}°", axis=1
+    )
+    counts = _table(root, "assistance", ASSISTANCE)
+    counts = counts[counts.split == TOTAL]
+    published = [
+        ""
+        if pd.isna(row.published_assisted)
+        else f" *({row.published_assisted} of {row.published_batches})*"
+        for row in rows_of(counts)
     ]
-    return "\n".join([head, "|---|---|---|---|---|", *rows])
-
-
-def _published(row: Row) -> str:
-    if not row["published_assisted"]:
-        return ""
-    return f" *({row['published_assisted']} of {row['published_batches']})*"
+    return markdown_table(
+        pd.DataFrame(
+            {
+                "labels from": counts.method.map(SOURCES),
+                "batches": counts.batches,
+                "assisted": counts.assisted.astype(str) + published,
+                **{
+                    f"median error, {title}": [median[method, split] for method in counts.method]
+                    for split, title in {"train": "training", "test": "test"}.items()
+                },
+            }
+        )
+    )
 
 
 def claims(root: Path) -> str:
     """Every claim with its verdict under both scores."""
-    return claims_markdown(read_table(root / "claims.csv", ["id"])).rstrip()
+    rows = read_records(root / "claims.csv", ["id"], "publish again")
+    return claims_markdown([row for _, row in rows]).rstrip()
 
 
 def difficulty(folder: Path = RESULTS / "benchmarks" / "scene_difficulty") -> str:
     """How hard the scenes are for localisation, one line per scene that was measured."""
-    head = "| scene | pixels near a keypoint | keypoints | best match far away | assisted batches |"
     names = sorted(path.name.removesuffix("-sift.csv") for path in folder.glob("*-sift.csv"))
-    return "\n".join([head, "|---|---|---|---|---|", *(_difficulty(folder, n) for n in names)])
+    return markdown_table(pd.DataFrame([_difficulty(folder, name) for name in names]))
 
 
 PARTS: dict[str, Callable[[Path], str]] = {
@@ -155,49 +181,45 @@ def part_of(name: str, profile: str) -> str:
     return PARTS[name](PUBLISHED / (headline() if profile == "headline" else profile))
 
 
-def _localizer_table(rows: Sequence[Row], heading: str, label: Callable[[Row], str]) -> str:
-    lines = [
-        f"| {heading} | {' | '.join(TITLES[model] for model in MODELS)} |",
-        f"|---|{'---|' * len(MODELS)}",
-    ]
-    for name, group in groupby(rows, key=label):
-        cells = {row["model"]: _cell(row) for row in group}
-        lines.append(f"| {name} | {' | '.join(cells[model] for model in MODELS)} |")
-    return "\n".join(lines)
+def _table(root: Path, name: str, schema: Schema) -> pd.DataFrame:
+    return read_frame(root / "tables" / f"{name}.csv", schema, "publish again")
 
 
-def _cell(row: Row) -> str:
+def _localizer_table(cells: pd.DataFrame, heading: str, labels: pd.Series) -> str:
+    """A row per label in their order, a column per localizer."""
+    texts = [_cell(cell) for cell in rows_of(cells)]
+    table = cells.assign(row=labels, text=texts).pivot(index="row", columns="model", values="text")
+    table = table.loc[labels.unique(), list(MODELS)].rename(columns=TITLES)
+    return markdown_table(table.rename_axis(index=heading).reset_index())
+
+
+def _cell(cell: Any) -> str:
     """Both errors in the paper's unit, positions as root mean squares over the axes."""
     own = "failed"
-    if row["position_m_true"]:
-        position_rms_m = float(row["position_m_true"]) / math.sqrt(3)
-        own = f"{position_rms_m:.2f} m, {float(row['orientation_deg_true']):.1f}°"
-    if not row["published_position_m"]:  # a row the paper has not
+    if not pd.isna(cell.position_m_true):
+        position_rms_m = cell.position_m_true / math.sqrt(3)
+        own = f"{position_rms_m:.2f} m, {cell.orientation_deg_true:.1f}°"
+    if pd.isna(cell.published_position_m):  # a row the paper has not
         return own
-    printed = float(row["published_position_m"]), float(row["published_orientation_deg"])
-    return f"{own} *({printed[0]:.2f} m, {printed[1]:.2f}°)*"
+    return f"{own} *({cell.published_position_m:.2f} m, {cell.published_orientation_deg:.2f}°)*"
 
 
-def _median(row: Row) -> str:
-    position_m, orientation_deg = row["position_m_median"], row["orientation_deg_median"]
-    return f"{100 * float(position_m):.1f} cm, {float(orientation_deg):.2f}°"
-
-
-def _difficulty(folder: Path, name: str) -> str:
-    (sift,) = read_table(folder / f"{name}-sift.csv")
-    (repetition,) = read_table(folder / f"{name}-repetition.csv")
-    share, low, high = (
-        f"{100 * float(sift[f'covered_share_{which}']):.0f} %" for which in ("mean", "q10", "q90")
-    )
+def _difficulty(folder: Path, name: str) -> dict[str, str]:
+    sift = read_frame(folder / f"{name}-sift.csv", SIFT).iloc[0]
+    far = read_frame(folder / f"{name}-repetition.csv", {"far_share": NUMBER}).far_share[0]
+    share, low, high = (f"{100 * sift[column]:.0f} %" for column in list(SIFT)[:3])
+    counts = {"method": TEXT, "assisted": COUNT, "batches": COUNT}
     methods = [
         f"{SOURCES[row['method']]} {row['assisted']} of {row['batches']}"
-        for row in read_table(folder / f"{name}-assistance.csv")
+        for row in records_of(read_frame(folder / f"{name}-assistance.csv", counts))
     ]
-    return (
-        f"| {scene_title(name)} | {share} (10 % of the frames below {low}, 10 % above {high})"
-        f" | {float(sift['keypoints_mean']):.0f}"
-        f" | {100 * float(repetition['far_share']):.1f} % of the frames | {', '.join(methods)} |"
-    )
+    return {
+        "scene": scene_title(name),
+        "pixels near a keypoint": f"{share} (10 % of the frames below {low}, 10 % above {high})",
+        "keypoints": f"{sift.keypoints_mean:.0f}",
+        "best match far away": f"{100 * far:.1f} % of the frames",
+        "assisted batches": ", ".join(methods),
+    }
 
 
 def stale(check: bool) -> list[Path]:

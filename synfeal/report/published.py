@@ -8,9 +8,10 @@ impossible and is left out of comparisons) and ``suspect`` (probably a copy of i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -20,6 +21,8 @@ from synfeal.frames import COUNT, EXTRA, NUMBER, TEXT, frame_of, read_frame, rec
 FOLDER = Path(__file__).parent / "published"
 Key = tuple[str, str, str, str, float, float, str, str]
 KEY = ("block", "scene", "size", "labels", "noise_m", "noise_deg", "init", "model")
+# Errors are medians (metres, degrees), changes against transfer learning; rows that are run under
+# another label than the printed one have both, and what is wrong in print has a note.
 SCHEMA = {
     **dict.fromkeys(KEY, TEXT) | dict.fromkeys(("noise_m", "noise_deg"), NUMBER),
     **dict.fromkeys(("n_train", "n_test"), COUNT),
@@ -28,35 +31,6 @@ SCHEMA = {
     **dict.fromkeys(("flag", "printed_row", "row_note", "cell_note"), TEXT),
 }
 MESHES = {"scene": TEXT, "vertices": COUNT, "faces": COUNT, "volume_m3": NUMBER}
-
-
-@dataclass(frozen=True)
-class PublishedCell:
-    """One cell of a table of the paper.
-
-    Attributes:
-        n_train: training frames.
-        n_test: test frames.
-        position_m: median position error, metres.
-        orientation_deg: median orientation error, degrees.
-        position_change_percent: Table 5: printed change against transfer learning.
-        orientation_change_percent: the same of the orientation error.
-        flag: ``none``, ``misprint`` (of the orientation) or ``suspect``.
-        printed_row: the row's label as printed where the row is run under another one, else empty.
-        row_note: footnote of the row, if any.
-        cell_note: footnote of the cell, if any.
-    """
-
-    n_train: int
-    n_test: int
-    position_m: float
-    orientation_deg: float
-    position_change_percent: float | None
-    orientation_change_percent: float | None
-    flag: str
-    printed_row: str
-    row_note: str
-    cell_note: str
 
 
 @dataclass(frozen=True)
@@ -75,13 +49,11 @@ def key_of(row: Experiment, model: str) -> Key:
 
 
 @cache
-def published_cells(table: str) -> dict[Key, PublishedCell]:
-    """All cells of one of the tables 2 to 5; none of one that the paper does not have."""
-    names = [field.name for field in fields(PublishedCell)]
-    return {
-        tuple(row[key] for key in KEY): PublishedCell(**{name: row[name] for name in names})
-        for row in records_of(published_frame(table))
-    }
+def published_cells(table: str) -> dict[Key, Any]:
+    """Cells of one of the tables 2 to 5 by what they are run with, attributes as in ``SCHEMA``."""
+    cells = published_frame(table)
+    keys = cells[list(KEY)].itertuples(index=False, name=None)
+    return dict(zip(keys, cells.itertuples(index=False), strict=True))
 
 
 @cache

@@ -7,10 +7,7 @@ Table 4, where labels are true poses and there is one number for each score.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from itertools import groupby
 from pathlib import Path
-from statistics import fmean
 
 import pandas as pd
 from pydantic import FiniteFloat, TypeAdapter
@@ -18,11 +15,10 @@ from pydantic import FiniteFloat, TypeAdapter
 from synfeal.config import MODELS, Design, Run
 from synfeal.evaluation.metrics import BOUNDS, MEANS, POSITION
 from synfeal.evaluation.reprojection import DCRE_BOUNDS
-from synfeal.files import atomic_path
-from synfeal.report.grid import Entry, Grid, Group, Line, Value
-from synfeal.report.latex import write_latex
+from synfeal.frames import COUNT, MAYBE, TEXT, frame_of, read_frame, write_frame
 from synfeal.report.layouts import TITLES, scene_title
-from synfeal.report.results import check_result, read_result, read_table
+from synfeal.report.results import check_result, read_result
+from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
 from synfeal.report.stats import REMEDY
 
 NAME, PRINTED = "recall", "table4_size"
@@ -35,6 +31,7 @@ COLUMNS = [
     for end in ("", "_true")
     for limit in ("", "_low", "_high")
 ]
+SCHEMA = {**dict.fromkeys(KEYS, TEXT), "n_seeds": COUNT, **dict.fromkeys(COLUMNS, MAYBE)}
 _SCORES = TypeAdapter(dict[str, FiniteFloat | None])
 CAPTION = (
     "Share of the test frames with both errors below a bound, and dense correspondence reprojection"
@@ -61,32 +58,25 @@ def write_recall_table(design: Design, root: Path, out_csv: Path, out_tex: Path)
         InputError: a run's scores are missing or unreadable.
     """
     table = recall_table(design, root)
-    with atomic_path(out_csv) as temporary:
-        table.to_csv(temporary, index=False, float_format="%.6g", lineterminator="\n")
-    write_latex(out_tex, recall_grid(design, table))
+    write_frame(out_csv, table)
+    write_latex(out_tex, recall_sheet(design, table))
 
 
 def recall_table(design: Design, root: Path) -> pd.DataFrame:
-    """Scores of every cell, columns ``KEYS``, ``n_seeds`` and ``COLUMNS``."""
+    """Scores of every cell, columns ``SCHEMA``; missing where a repetition has none."""
     runs = sorted(design.runs, key=lambda run: (*_key(run)[:-1], MODELS.index(run.model)))
-    cells = groupby(runs, _key)
-    rows = [dict(zip(KEYS, key, strict=True)) | _cell(list(same), root) for key, same in cells]
-    return pd.DataFrame(rows, columns=[*KEYS, "n_seeds", *COLUMNS])
+    records = [
+        dict(zip(KEYS, _key(run), strict=True))
+        | _read(root / "runs" / run.directory / "metrics.json")
+        for run in runs
+    ]
+    cells = frame_of(records, SCHEMA | {"n_seeds": MAYBE}).groupby(KEYS, sort=False)
+    means = cells[COLUMNS].mean(skipna=False)
+    return means.assign(n_seeds=cells.size()).reset_index()[list(SCHEMA)]
 
 
 def _key(run: Run) -> tuple[str, ...]:
     return tuple(getattr(run, key) for key in KEYS)
-
-
-def _cell(runs: Sequence[Run], root: Path) -> dict[str, float | None]:
-    """Mean of each score over the repetitions; None where one of them has none."""
-    every = [_read(root / "runs" / run.directory / "metrics.json") for run in runs]
-    found: dict[str, float | None] = {"n_seeds": len(runs)}
-    for column in COLUMNS:
-        values = [metrics.get(column) for metrics in every]
-        known = [value for value in values if value is not None]
-        found[column] = fmean(known) if len(known) == len(values) else None
-    return found
 
 
 def _read(path: Path) -> dict[str, float | None]:
@@ -104,32 +94,29 @@ def read_recall_table(path: Path) -> pd.DataFrame:
     Raises:
         InputError: it cannot be read, or is another table.
     """
-    rows = read_table(path, (*KEYS, "n_seeds", *COLUMNS), optional=COLUMNS)
-    table = pd.DataFrame(rows, columns=[*KEYS, "n_seeds", *COLUMNS])
-    return table.astype(dict.fromkeys(COLUMNS, float)) if len(rows) else table
+    return read_frame(path, SCHEMA)
 
 
-def recall_grid(design: Design, table: pd.DataFrame) -> Grid:
+def recall_sheet(design: Design, table: pd.DataFrame) -> Sheet:
     """The rows of Table 4 as printed, a block for each; those of all tables where it has none."""
-    headings = [
-        *("Localizer", "Mean error", *(bound.title for bound in BOUNDS)),
-        *("DCRE", f"DCRE < {DCRE_BOUNDS[-1]:.0%}"),
-    ]
-    groups = []
-    for row in design.rows_of(PRINTED) or design.rows:
-        keys = {"scene": row.scene, "size": row.size, "labels": row.label_id, "init": row.init}
-        chosen = table[(table[list(keys)] == pd.Series(keys)).all(axis=1)]
-        lines = [(_line(record),) for _, record in chosen.iterrows()]
-        groups.append(Group(f"{scene_title(row.scene)}, {row.size}", tuple(lines)))
-    return Grid(NAME, CAPTION, tuple(headings), tuple(groups), (REMARK,))
-
-
-def _line(record: pd.Series) -> Line:
-    """A localizer's scores against the true poses."""
-    mean = ", ".join(shown(record, score) for score in MEANS.values())
-    scores = (*(bound.name for bound in BOUNDS), DCRE[0], DCRE[-1])
-    entries = tuple(Entry((Value(shown(record, score)),)) for score in scores)
-    return Line("truth", TITLES[record["model"]], mean, entries)
+    rows = design.rows_of(PRINTED) or design.rows
+    keys = pd.DataFrame(
+        [(r.scene, r.size, r.label_id, r.init) for r in rows],
+        columns=["scene", "size", "labels", "init"],
+    )
+    chosen = keys.merge(table, how="left", on=list(keys))
+    records = [record for _, record in chosen.iterrows()]
+    scores = {bound.title: bound.name for bound in BOUNDS}
+    scores |= {"DCRE": DCRE[0], f"DCRE < {DCRE_BOUNDS[-1]:.0%}": DCRE[-1]}
+    texts = pd.DataFrame(
+        {
+            "block": chosen.scene.map(scene_title) + ", " + chosen["size"],
+            "Localizer": chosen.model.map(TITLES),
+            "Mean error": [", ".join(shown(r, score) for score in MEANS.values()) for r in records],
+            **{title: [shown(r, score) for r in records] for title, score in scores.items()},
+        }
+    )
+    return sheet_of_texts(NAME, CAPTION, texts, (REMARK,))
 
 
 def shown(record: pd.Series, score: str, end: str = "_true") -> str:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -21,26 +19,33 @@ from baselines.references.registry import (
     titles_of,
 )
 from synfeal.config import MODELS, Design
-from synfeal.errors import InputError, why
 from synfeal.evaluation.metrics import BOUNDS
-from synfeal.files import atomic_path
-from synfeal.report.grid import Entry, Grid, Group, Kind, Line
-from synfeal.report.grid import Value as Printed
-from synfeal.report.latex import write_latex
+from synfeal.frames import (
+    COUNT,
+    MAYBE,
+    MAYBE_COUNT,
+    NUMBER,
+    TEXT,
+    frame_of,
+    read_frame,
+    write_frame,
+)
+from synfeal.report.cells import LIMITS
 from synfeal.report.layouts import SOURCES, TITLES, scene_title
 from synfeal.report.results import read_result
-from synfeal.report.stats import MEASURES, REMEDY, CellScores, Metrics, combine, read_metrics
+from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
+from synfeal.report.stats import MEASURES, REMEDY, Metrics, combine, read_metrics
 
 NAME, LOCALIZER = "references", "localizer"
 CONSTANT = {"method": "constant", "title": "Mean training pose", "kind": "reference"}
 KEYS = ("scene", "size", "labels", "noise_m", "noise_deg", "method", "title", "kind")
-Record = Mapping[Hashable, Any]
-LIMITS = tuple(f"{measure}_{end}" for measure in MEASURES for end in ("low", "high"))
 WITHIN = ("within_5cm_5deg", "within_5cm_5deg_true")
-COLUMNS = (
-    *(*KEYS, *MEASURES, *LIMITS, *WITHIN),
-    *("n_train", "n_test", "n_seeds", "failed", "seconds_per_frame"),
-)
+SCHEMA = {
+    **dict.fromkeys(KEYS, TEXT) | dict.fromkeys(("noise_m", "noise_deg"), NUMBER),
+    **dict.fromkeys((*MEASURES, *LIMITS, *WITHIN), MAYBE),
+    **dict.fromkeys(("n_train", "n_test", "n_seeds"), COUNT),
+    **{"failed": MAYBE_COUNT, "seconds_per_frame": MAYBE},
+}
 
 
 def write_references_table(
@@ -59,13 +64,12 @@ def write_references_table(
         InputError: scores are missing or unreadable.
     """
     table = references_table(design, external, root)
-    with atomic_path(out_csv) as temporary:
-        table.to_csv(temporary, index=False, float_format="%.6g", lineterminator="\n")
-    write_latex(out_tex, references_grid(table))
+    write_frame(out_csv, table)
+    write_latex(out_tex, references_sheet(table))
 
 
 def references_table(design: Design, external: Externals, root: Path) -> pd.DataFrame:
-    """The table of :data:`COLUMNS`; where more than half of a method's answers failed, no score."""
+    """The table of :data:`SCHEMA`; where more than half of a method's answers failed, no score."""
     titles = {**titles_of(external), **TITLES}
     rows = {(row.scene, row.size, row.label_id): row for row in design.rows}
     trained = {key: row for key, row in rows.items() if design.runs_of(row.pretrained, MODELS[0])}
@@ -85,7 +89,7 @@ def references_table(design: Design, external: Externals, root: Path) -> pd.Data
             runs = [root / "runs" / r.directory for r in design.runs_of(row.pretrained, model)]
             names = {**keys, "method": model, "title": titles[model], "kind": LOCALIZER}
             records.append(names | _record(runs))
-    return pd.DataFrame.from_records(records, columns=list(COLUMNS))
+    return frame_of(records, SCHEMA)
 
 
 def read_references(path: Path) -> pd.DataFrame:
@@ -94,11 +98,7 @@ def read_references(path: Path) -> pd.DataFrame:
     Raises:
         InputError: it cannot be read or lacks a column.
     """
-    texts = dict.fromkeys(("scene", "size", "labels", "method", "title", "kind"), str)
-    try:
-        return pd.read_csv(path, usecols=list(COLUMNS), dtype=texts)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read ({why(error)}); make that table again") from None
+    return read_frame(path, SCHEMA)
 
 
 def _constant_record(metrics: Metrics) -> dict[str, Any]:
@@ -115,20 +115,7 @@ def _seconds(folder: Path) -> dict[str, float]:
 def _record(folders: Sequence[Path]) -> dict[str, Any]:
     """Scores of the repetitions of a method, by column."""
     scores = combine([read_metrics(folder / "metrics.json") for folder in folders])
-    record = {**_medians(scores), **dict(zip(WITHIN, _within(folders), strict=True))}
-    return (
-        record
-        | {name: getattr(scores, name) for name in ("n_train", "n_test", "n_seeds")}
-        | {"failed": scores.failed}
-    )
-
-
-def _medians(scores: CellScores) -> dict[str, float | None]:
-    record: dict[str, float | None] = {}
-    for measure, score in scores.scores.items():
-        record |= {measure: score.value}
-        record |= {f"{measure}_low": score.low, f"{measure}_high": score.high}
-    return record
+    return scores | dict(zip(WITHIN, _within(folders), strict=True))
 
 
 def _within(folders: Sequence[Path]) -> list[float]:
@@ -138,19 +125,34 @@ def _within(folders: Sequence[Path]) -> list[float]:
     return [fmean(metrics[name] for metrics in every) for name in names]
 
 
-def references_grid(table: pd.DataFrame) -> Grid:
-    """A block per scene and size, a row per label set, a column per method."""
+def references_sheet(table: pd.DataFrame) -> Sheet:
+    """A block per scene and size, a row per label set, a column per method.
+
+    Lines are against the labels and, where these are not the true poses, against those too.
+    """
     titles = titles_in(table[table.kind != LOCALIZER])
-    groups = []
-    for (scene, size), block in table.groupby(["scene", "size"], sort=False):
-        rows = [_row(part, list(titles)) for _, part in block.groupby("labels", sort=False)]
-        groups.append(Group(f"{scene_title(str(scene))}, {size}", tuple(rows)))
-    return Grid(
+    records = []
+    for (scene, size, labels), part in table.groupby(["scene", "size", "labels"], sort=False):
+        exact = labels == SIMULATOR
+        for against, end in {"labels": "", "true poses": "_true"}.items():
+            if exact and not end:
+                continue
+            shown = {str(row.method): _shown(row, end) for _, row in part.iterrows()}
+            records.append(
+                {
+                    "block": f"{scene_title(str(scene))}, {size}",
+                    "row": f"{scene} {size} {labels}",
+                    "Labels": label_title(str(labels)) if exact or not end else "",
+                    "Against": against,
+                    **{title: shown.get(name, "–") for name, title in titles.items()},
+                    "Best localizer": _best(part[part.kind == LOCALIZER], end),
+                }
+            )
+    return sheet_of_texts(
         NAME,
         "Reference methods beside the best of the localizers (by position): median errors, and the "
         "share of the test frames within 5 cm and 5 degrees.",
-        ("Labels", "Against", *titles.values(), "Best localizer"),
-        tuple(groups),
+        pd.DataFrame(records),
         (
             "Every method answers from the labels of the data set, as the localizers do; answers "
             "that failed count as infinite errors.",
@@ -163,47 +165,31 @@ def titles_in(table: pd.DataFrame) -> dict[str, str]:
     return dict(zip(table["method"], table["title"], strict=True))
 
 
-def _row(part: pd.DataFrame, methods: Sequence[str]) -> tuple[Line, ...]:
-    """The lines of a label set: against its labels and, where they differ, the true poses."""
-    records = {str(record["method"]): record for record in part.to_dict("records")}
-    labels = str(part.labels.iloc[0])
-    lines = [
-        _row_line("labels", label_title(labels), "labels", records, methods),
-        _row_line("truth", "", "true poses", records, methods),
-    ]
-    if labels == SIMULATOR:
-        return (replace(lines[1], label=label_title(labels)),)
-    return tuple(lines)
-
-
-def _row_line(
-    kind: Kind, label: str, against: str, records: Mapping[str, Record], methods: Sequence[str]
-) -> Line:
-    end = "_true" if kind == "truth" else ""
-    trained = [r for r in records.values() if r["kind"] == LOCALIZER]
-    scored = [r for r in trained if not math.isnan(r[f"position_m{end}"])]
-    best = min(scored, key=lambda r: float(r[f"position_m{end}"]), default=None)
-    entries = [*(_entry(records.get(name), end) for name in methods), _entry(best, end, named=True)]
-    return Line(kind, label, against, tuple(entries))
-
-
 def label_title(labels: str) -> str:
     """A label set as tables call it: ``noise-p0.1-r5`` is noise 0.1 m, 5°."""
     found = re.fullmatch(r"(\w+)-p([\d.]+)-r([\d.]+)", labels)
     return f"{found[1]} {found[2]} m, {found[3]}°" if found else SOURCES.get(labels, labels)
 
 
-def _entry(record: Record | None, end: str, named: bool = False) -> Entry:
-    """Errors and share of one method; ``named`` says whose they are."""
-    if record is None:
-        return Entry((Printed("–"),))
-    if math.isnan(record[f"position_m{end}"]):
-        return Entry((Printed("failed"),))
-    share = record[f"within_5cm_5deg{end}"]
-    values = (
-        *((Printed(record["title"]),) if named else ()),
-        Printed(f"{record[f'position_m{end}']:.2g} m"),
-        Printed(f"{record[f'orientation_deg{end}']:.2g}°"),
-        *(() if math.isnan(share) else (Printed(f"{100 * share:.0f} %"),)),
-    )
-    return Entry(values)
+def _best(trained: pd.DataFrame, end: str) -> str:
+    """Which localizer has the lowest position error, and its errors."""
+    scored = trained.dropna(subset=f"position_m{end}")
+    if scored.empty:
+        return "–"
+    best = scored.nsmallest(1, f"position_m{end}").iloc[0]
+    return f"{best.title}, {_shown(best, end)}"
+
+
+def _shown(row: pd.Series, end: str) -> str:
+    """Errors and share of a method."""
+    position_m, orientation_deg = row[f"position_m{end}"], row[f"orientation_deg{end}"]
+    if pd.isna(position_m):
+        return "failed"
+    share = row[f"within_5cm_5deg{end}"]
+    within = "" if pd.isna(share) else f", {100 * share:.0f} %"
+    return f"{position_m:.2g} m, {_degrees(orientation_deg)}°{within}"
+
+
+def _degrees(value: float) -> str:
+    """Two digits, and all before the point."""
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"

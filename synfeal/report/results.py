@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ from pydantic import TypeAdapter, ValidationError
 
 from synfeal.errors import InputError, why
 from synfeal.files import read_json
-from synfeal.frames import REMEDY, read_records
 
 
 def read_text(path: Path) -> str:
@@ -62,38 +60,3 @@ def check_result(path: Path, value: Any, shape: TypeAdapter[Any], remedy: str) -
         shape.validate_json(json.dumps(value), strict=True)
     except ValidationError as error:
         raise InputError(f"{path}: {why(error)}; {remedy}") from None
-
-
-def read_table(
-    path: Path,
-    needed: Iterable[str] = (),
-    numbers: Collection[str] = (),
-    optional: Collection[str] = (),
-) -> list[dict[str, str]]:
-    """Rows of a CSV file by column.
-
-    Args:
-        path: the file.
-        needed: columns it must have.
-        numbers: those of them whose cells hold finite numbers.
-        optional: columns whose cells, where the file has them, hold finite numbers or nothing.
-
-    Raises:
-        InputError: it cannot be read, lacks a column of ``needed``, has a row of another length, or
-            holds something else where a number belongs.
-    """
-    lines = read_records(path, needed)
-    for line, row in lines:
-        filled = [*numbers, *(column for column in optional if row.get(column))]
-        bad = [column for column in filled if not is_number(row[column])]
-        if bad:
-            raise InputError(f"{path}: row {line}: {bad[0]} must be a number; {REMEDY}")
-    return [row for _, row in lines]
-
-
-def is_number(text: str) -> bool:
-    """Whether a cell holds a finite number."""
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False

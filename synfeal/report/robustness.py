@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import pandas as pd
@@ -10,51 +9,63 @@ import pandas as pd
 from baselines.references.registry import REFERENCES
 from baselines.references.robustness import NEAREST
 from synfeal.frames import write_frame
-from synfeal.report.grid import Entry, Grid, Group, Line, Value, with_bold
-from synfeal.report.latex import write_latex
 from synfeal.report.layouts import TITLES
+from synfeal.report.sheet import LINE, VALUE, Sheet, with_bold, write_latex
 
 NAME = "robustness"
 CLEAN, MIXED = "clean", "mixed"
 BLOCKS = {CLEAN: "Trained on ideal frames", MIXED: "Trained on frames with effects mixed in"}
+FORMS = {"position_m": ("{:.2f} m", 2), "orientation_deg": ("{:.1f}°", 1)}
 
 
 def write_robustness(table: pd.DataFrame, out_csv: Path, out_tex: Path) -> None:
     """Write what :func:`baselines.references.robustness.robustness_table` found, and its LaTeX."""
     write_frame(out_csv, table)
-    write_latex(out_tex, robustness_grid(table))
+    write_latex(out_tex, robustness_sheet(table))
 
 
-def robustness_grid(table: pd.DataFrame) -> Grid:
-    """A row for each of the effects; the best method of each is not marked, the change is read."""
-    methods = list(dict.fromkeys(table.method))
-    groups = []
-    for trained_on, block in table.groupby("trained_on", sort=False):
-        cells = block.set_index(["effects", "method"])
-        lines = [
-            (_line(effects, [cells.loc[(effects, method)] for method in methods]),)
-            for effects in dict.fromkeys(block.effects)
-        ]
-        groups.append(Group(BLOCKS[str(trained_on)], with_bold(lines)))
+def robustness_sheet(table: pd.DataFrame) -> Sheet:
+    """A row for each of the effects; the lowest error of each method and block is bold."""
     titles = {**TITLES, NEAREST: REFERENCES[NEAREST].title}
-    return Grid(
+    rows = table[["trained_on", "effects"]].drop_duplicates()
+    blocks = rows.groupby("trained_on", sort=False).ngroup()
+    rows = rows.iloc[blocks.argsort(kind="stable")].reset_index(drop=True)
+    cells = table.merge(rows.rename_axis(index="line").reset_index())
+    failed = cells[list(FORMS)].isna().any(axis=1)
+    parts = [
+        pd.DataFrame(
+            {
+                "line": cells.line,
+                "column": cells.method.map(titles),
+                "place": place,
+                "text": cells[measure]
+                .map(form.format)
+                .where(~failed, "failed" if not place else ""),
+                "number": cells[measure].round(digits).where(~failed),
+                **{"tone": "", "note": "", "block": cells.trained_on},
+            }
+        )[~(failed & (place > 0))]
+        for place, (measure, (form, digits)) in enumerate(FORMS.items())
+    ]
+    values = pd.concat(parts, ignore_index=True)
+    lines = pd.DataFrame(
+        {
+            "block": rows.trained_on.map(BLOCKS),
+            "row": rows.index,
+            **{"kind": "truth", "label_note": "", "against": "true poses"},
+            "label": rows.effects.map(_label),
+        }
+    )
+    return Sheet(
         NAME,
         "The same test paths rendered with effects of a camera and of changing light (config, "
         "robustness): median errors against the true poses.",
-        ("Test frames", "Against", *(titles[method] for method in methods)),
-        tuple(groups),
+        ("Test frames", "Against", *(titles[method] for method in table.method.unique())),
+        lines[list(LINE)],
+        with_bold(values, [values[key] for key in ("block", "column", "place")])[list(VALUE)],
     )
 
 
-def _line(effects: str, cells: list[pd.Series]) -> Line:
+def _label(effects: str) -> str:
     name, _, strength = effects.rpartition("_")
-    label = f"{name.replace('_', ' ')}, strength {strength}" if strength.isdigit() else effects
-    return Line("truth", label, "true poses", tuple(_entry(cell) for cell in cells))
-
-
-def _entry(cell: pd.Series) -> Entry:
-    if math.isnan(cell.position_m) or math.isnan(cell.orientation_deg):
-        return Entry((Value("failed"),))
-    position, orientation = round(cell.position_m, 2), round(cell.orientation_deg, 1)
-    values = Value(f"{position:.2f} m", position), Value(f"{orientation:.1f}°", orientation)
-    return Entry(values)
+    return f"{name.replace('_', ' ')}, strength {strength}" if strength.isdigit() else effects

@@ -4,26 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from statistics import median
+
+import pandas as pd
 
 from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
+from synfeal.frames import (
+    COUNT,
+    MAYBE,
+    MAYBE_COUNT,
+    NUMBER,
+    TEXT,
+    frame_of,
+    read_frame,
+    records_of,
+    write_frame,
+)
 from synfeal.report.assistance import TOTAL
-from synfeal.report.label_error import COLUMNS as LABEL_COLUMNS
+from synfeal.report.label_error import SCHEMA as LABEL_ERROR
 from synfeal.report.layouts import SOURCES
-from synfeal.report.render_speed import COLUMNS as RENDER_COLUMNS
-from synfeal.report.render_speed import render_rows
-from synfeal.report.results import read_table
-from synfeal.report.tables import Value, write_rows
 from synfeal.report.training_speed import training_rows
-from synfeal.scenes.collision import CURVE_HEADER, Rung
+from synfeal.scenes.collision import CURVE_HEADER
+from synfeal.scenes.render_speed_table import SCHEMA as RENDERED
 
 NAME = "speed_vs_error"
-COLUMNS = (
-    *("stage", "scene", "variant", "faces", "seconds_per_item", "items_per_s"),
-    *("error", "error_unit", "chosen", *RENDER_COLUMNS),
-)
-Row = dict[str, Value]
+SCHEMA = {
+    **{"stage": TEXT, "scene": TEXT, "variant": TEXT, "faces": MAYBE_COUNT},
+    **dict.fromkeys(("seconds_per_item", "items_per_s", "error"), NUMBER),
+    **{"error_unit": TEXT, "chosen": COUNT},
+    **{"backend": TEXT, "width": MAYBE_COUNT, "height": MAYBE_COUNT},
+    **{"supersampling": MAYBE_COUNT, "texture_scale": MAYBE, "psnr_db": MAYBE},
+    **{"depth_error_mm": MAYBE, "depth_off_share": MAYBE},
+}
 
 
 def write_speed_vs_error(scenes: Sequence[str], root: Path, out_csv: Path) -> None:
@@ -39,11 +51,18 @@ def write_speed_vs_error(scenes: Sequence[str], root: Path, out_csv: Path) -> No
     Raises:
         InputError: a stage's measurements are missing or unreadable.
     """
-    rows = [row for reader in READERS for scene in scenes for row in reader(root, scene)]
-    write_rows(out_csv, COLUMNS, rows)
+    write_frame(out_csv, pd.concat([speeds_of(stage, scenes, root) for stage in READERS]))
 
 
-def collision_rows(root: Path, scene: str) -> list[Row]:
+def speeds_of(stage: str, scenes: Sequence[str], root: Path) -> pd.DataFrame:
+    """The rows of a stage, columns ``SCHEMA``; an item is what the stage makes one of."""
+    parts = [READERS[stage](root, scene).assign(scene=scene) for scene in scenes]
+    rows = [row for part in parts for row in records_of(part)]
+    speeds = [{"stage": stage, "items_per_s": 1.0 / row["seconds_per_item"]} for row in rows]
+    return frame_of([speed | row for speed, row in zip(speeds, rows, strict=True)], SCHEMA)
+
+
+def collision_rows(root: Path, scene: str) -> pd.DataFrame:
     """The face counts of the collision mesh, largest first; an item is a ray, an error a decision.
 
     The curve holds each mesh's speed beside the full mesh's at the same moment. Only their ratio
@@ -51,59 +70,72 @@ def collision_rows(root: Path, scene: str) -> list[Row]:
     """
     path = root / "scenes" / scene / "collision_curve.csv"
     values = read_numbers(path, CURVE_HEADER, "curve of the collision mesh")
-    curve = [Rung(*line) for line in values.tolist()]
-    if not curve or min(min(r.rays_per_s, r.full_rays_per_s) for r in curve) <= 0:
+    curve = pd.DataFrame(values, columns=CURVE_HEADER.split(","))
+    if not len(curve) or (curve[["rays_per_s", "full_rays_per_s"]] <= 0).to_numpy().any():
         raise InputError(f"{path}: needs rows, and speeds above 0; make the scene again")
-    full_rays_per_s = median(rung.full_rays_per_s for rung in curve)
-    variants = ["full"] + ["decimated"] * (len(curve) - 1)
-    return [
-        _row(scene, variant, rung, full_rays_per_s * rung.rays_per_s / rung.full_rays_per_s)
-        for variant, rung in zip(variants, curve, strict=True)
+    rays_per_s = curve.full_rays_per_s.median() * curve.rays_per_s / curve.full_rays_per_s
+    return pd.DataFrame(
+        {
+            "variant": ["full"] + ["decimated"] * (len(curve) - 1),
+            "faces": curve.faces.astype(int),
+            "seconds_per_item": 1.0 / rays_per_s,
+            "error": 1.0 - curve.agreement,
+            "error_unit": "share of decisions",
+            "chosen": curve.chosen.astype(int),
+        }
+    )
+
+
+def render_rows(root: Path, scene: str) -> pd.DataFrame:
+    """Ways to draw a frame, by camera; an item is a colour image, an error is in levels of 0-255.
+
+    Raises:
+        InputError: the measurements are missing or unreadable.
+    """
+    lines = read_frame(root / "scenes" / scene / "render_speed.csv", RENDERED, "measure again")
+    camera = lines.width.astype(str) + "x" + lines.height.astype(str) + ", "
+    return lines.assign(
+        variant=camera + _detail(lines),
+        seconds_per_item=lines.ms_per_frame / 1e3,
+        error=lines.mean_abs_error,
+        error_unit="grey levels",
+    )
+
+
+def _detail(lines: pd.DataFrame) -> pd.Series:
+    """Variants in words: backend, samples per pixel, and what detail of the mesh is left out."""
+    samples = lines.supersampling.astype(str)
+    textures = [
+        "" if scale == 1.0 else f", textures 1/{round(1.0 / scale)}"
+        for scale in lines.texture_scale
     ]
+    share = lines.faces / lines.faces.max()
+    faces = ["" if part == 1.0 else f", {part:.0%} of faces" for part in share]
+    return lines.backend + " " + samples + "x" + samples + textures + faces
 
 
-def _row(scene: str, variant: str, rung: Rung, rays_per_s: float) -> Row:
-    return {
-        "stage": "collision",
-        "scene": scene,
-        "variant": variant,
-        "faces": int(rung.faces),
-        "seconds_per_item": 1.0 / rays_per_s,
-        "items_per_s": rays_per_s,
-        "error": 1.0 - rung.agreement,
-        "error_unit": "share of decisions",
-        "chosen": int(rung.chosen),
-    }
-
-
-def label_rows(root: Path, scene: str) -> list[Row]:
+def label_rows(root: Path, scene: str) -> pd.DataFrame:
     """The methods that estimate labels; an item is a frame, an error that of its position.
 
     The error is the median over both splits after assistance; times are of the processor. Nothing
     is chosen: the paper compares the methods.
     """
-    numbers = ("seconds_per_frame", "position_m_median")
-    rows = read_table(root / "tables" / "label_error.csv", LABEL_COLUMNS, numbers)
-    shown = {"scene": scene, "split": TOTAL, "assistance": "after"}
-    return [
+    table = read_frame(root / "tables" / "label_error.csv", LABEL_ERROR)
+    chosen = (table.scene == scene) & (table.split == TOTAL) & (table.assistance == "after")
+    return pd.DataFrame(
         {
-            "stage": "labels",
-            "scene": scene,
-            "variant": SOURCES[row["method"]],
-            "seconds_per_item": float(row["seconds_per_frame"]),
-            "items_per_s": 1.0 / float(row["seconds_per_frame"]),
-            "error": float(row["position_m_median"]),
+            "variant": table.method.map(SOURCES),
+            "seconds_per_item": table.seconds_per_frame,
+            "error": table.position_m_median,
             "error_unit": "m",
             "chosen": 0,
         }
-        for row in rows
-        if shown.items() <= row.items()
-    ]
+    )[chosen]
 
 
-READERS: tuple[Callable[[Path, str], list[Row]], ...] = (
-    collision_rows,
-    render_rows,
-    label_rows,
-    training_rows,
-)
+READERS: dict[str, Callable[[Path, str], pd.DataFrame]] = {
+    "collision": collision_rows,
+    "render": render_rows,
+    "labels": label_rows,
+    "training": training_rows,
+}

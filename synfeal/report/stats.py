@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Annotated, Any
@@ -26,51 +25,6 @@ _COUNTS = TypeAdapter(dict[str, NonNegativeInt])
 _SCORES = TypeAdapter(dict[str, Annotated[FiniteFloat, Field(ge=0)] | None])
 
 
-@dataclass(frozen=True)
-class Score:
-    """One median error over the repetitions of a cell.
-
-    Attributes:
-        value: the run's median, or the mean of the medians of several runs; None when all failed.
-        low: lower 95 % limit: of one run from its test paths (bootstrap), of several the mean of
-            those, with the spread of the medians over the runs added in quadrature.
-        high: upper limit, likewise.
-        sd: standard deviation of the medians over the runs; None below two runs.
-    """
-
-    value: float | None
-    low: float | None = None
-    high: float | None = None
-    sd: float | None = None
-
-
-@dataclass(frozen=True)
-class CellScores:
-    """What the repetitions of one cell came to.
-
-    Attributes:
-        scores: by measure (:data:`MEASURES`).
-        position_rms_m: median position error as the published code computes it, metres.
-        references: median errors of what has not been trained: ``baseline_*`` of the mean training
-            pose, by measure, ``floor_*`` of the true poses against the labels.
-        n_train: training frames.
-        n_test: test frames.
-        n_seeds: repetitions, those without a score included.
-        n_finished: repetitions with a score.
-        failed: predictions that were not finite, over all repetitions; a run scores them as
-            infinite errors, so it has no score when more than half of them failed.
-    """
-
-    scores: dict[str, Score]
-    position_rms_m: float | None
-    references: dict[str, float]
-    n_train: int
-    n_test: int
-    n_seeds: int
-    n_finished: int
-    failed: int
-
-
 def read_metrics(path: Path) -> Metrics:
     """The scores of one run.
 
@@ -85,35 +39,46 @@ def read_metrics(path: Path) -> Metrics:
     return values
 
 
-def combine(runs: Sequence[Metrics]) -> CellScores:
-    """Combine the repetitions of one cell: scores of those that finished, counts of all."""
+def combine(runs: Sequence[Metrics]) -> dict[str, float | None]:
+    """Scores of the repetitions of one cell that finished, and counts of all, by column.
+
+    Returns:
+        Each of ``MEASURES`` with its limits and deviation (:func:`score_of`); ``position_rms_m``,
+        the median position error as the published code computes it; what has not been trained
+        (``BASELINES`` and ``FLOORS``), the same for all; training and test frames; ``n_seeds``,
+        ``n_finished`` (repetitions with a score) and ``failed``: predictions that were not finite.
+        A run scores those as infinite errors, so it has no score when more than half failed.
+    """
     finished = [run for run in runs if run["position_m"] is not None]
-    return CellScores(
-        scores={measure: score_of(finished, measure) for measure in MEASURES},
-        position_rms_m=_mean(finished, "position_rms_m"),
-        references={name: runs[0][name] for name in (*BASELINES, *FLOORS)},
-        n_train=runs[0]["n_train"],
-        n_test=runs[0]["n_test"],
-        n_seeds=len(runs),
-        n_finished=len(finished),
-        failed=sum(int(run["failed"]) for run in runs),
-    )
+    scores = [score_of(finished, measure) for measure in MEASURES]
+    return {
+        **{name: value for score in scores for name, value in score.items()},
+        "position_rms_m": _mean(finished, "position_rms_m"),
+        **{name: runs[0][name] for name in (*BASELINES, *FLOORS, "n_train", "n_test")},
+        "n_seeds": len(runs),
+        "n_finished": len(finished),
+        "failed": sum(int(run["failed"]) for run in runs),
+    }
 
 
-def score_of(finished: Sequence[Metrics], measure: str) -> Score:
-    """One measure over the runs that finished."""
+def score_of(finished: Sequence[Metrics], measure: str) -> dict[str, float | None]:
+    """One measure over the runs that finished.
+
+    Returns:
+        By column: the run's median, or the mean of the medians of several runs, missing when all
+        failed; ``_low`` and ``_high``, its 95 % limits: of one run from its test paths (bootstrap),
+        of several the mean of those, with the spread of the medians over the runs added in
+        quadrature; ``_sd``, the standard deviation of the medians, missing below two runs.
+    """
     values = [run[measure] for run in finished]
     mean, sd = _mean(finished, measure), stdev(values) if len(values) > 1 else None
     low, high = (_mean(finished, f"{measure}_{end}") for end in ("low", "high"))
-    if mean is None or sd is None:
-        return Score(mean, low, high, sd)
-    of_seeds = NORMAL_95 * sd / math.sqrt(len(values))
-    return Score(
-        mean,
-        None if low is None else max(mean - math.hypot(mean - low, of_seeds), 0.0),
-        None if high is None else mean + math.hypot(high - mean, of_seeds),
-        sd,
-    )
+    if mean is not None and sd is not None:
+        of_seeds = NORMAL_95 * sd / math.sqrt(len(values))
+        low = None if low is None else max(mean - math.hypot(mean - low, of_seeds), 0.0)
+        high = None if high is None else mean + math.hypot(high - mean, of_seeds)
+    parts = {"": mean, "_low": low, "_high": high, "_sd": sd}
+    return {f"{measure}{end}": value for end, value in parts.items()}
 
 
 def percent_change(new: float | None, old: float | None) -> float | None:

@@ -5,19 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import pandas as pd
+
 from synfeal.config import Design
 from synfeal.files import atomic_path
-from synfeal.report.alive import check_scenes, sentences
-from synfeal.report.cells import Cell, read_cells
+from synfeal.frames import rows_of
+from synfeal.report.alive import alive_sentences
+from synfeal.report.cells import read_cells
 from synfeal.report.crossing import crossing_findings
-from synfeal.report.layouts import grid_of
-from synfeal.report.markdown import markdown_of
-from synfeal.report.meshes import meshes_grid, read_mesh_facts
+from synfeal.report.layouts import sheet_of
+from synfeal.report.meshes import meshes_sheet, read_meshes
 from synfeal.report.recall import NAME as RECALL
-from synfeal.report.recall import read_recall_table, recall_grid
+from synfeal.report.recall import read_recall_table, recall_sheet
 from synfeal.report.references import NAME as REFERENCES
-from synfeal.report.references import read_references, references_grid
+from synfeal.report.references import read_references, references_sheet
+from synfeal.report.sheet import sheet_markdown
 
+ALIVE = "table4_size"
 INTRO = """\
 # Results of profile `{profile}`
 
@@ -43,47 +47,40 @@ def write_summary(design: Design, root: Path, out_md: Path) -> str:
         InputError: a result file is missing or unreadable.
     """
     cells = {name: read_cells(name, design, root) for name in design.tables}
-    findings = [runs_sentence(cells), *alive_sentences(cells)]
-    meshes = {
-        scene: read_mesh_facts(root, scene) for scene in dict.fromkeys(r.scene for r in design.rows)
-    }
+    findings = run_sentences(cells)
+    meshes = read_meshes(dict.fromkeys(row.scene for row in design.rows), root)
     references = root / "tables" / f"{REFERENCES}.csv"
-    grids = [meshes_grid(meshes), *(grid_of(name, found) for name, found in cells.items())]
+    sheets = [meshes_sheet(meshes), *(sheet_of(name, found) for name, found in cells.items())]
     if references.exists():
         table = read_references(references)
         findings += crossing_findings(table)
-        grids.append(references_grid(table))
+        sheets.append(references_sheet(table))
     recalls = root / "tables" / f"{RECALL}.csv"
     if recalls.exists():
-        grids.append(recall_grid(design, read_recall_table(recalls)))
+        sheets.append(recall_sheet(design, read_recall_table(recalls)))
     parts = [
         INTRO.format(profile=root.name),
         "## Do the localizers localize?\n",
         "".join(f"- {finding}\n" for finding in findings),
         "## Tables\n",
-        *map(markdown_of, grids),
+        *map(sheet_markdown, sheets),
     ]
     with atomic_path(out_md) as temporary:
         temporary.write_text("\n".join(parts), encoding="utf-8")
     return terminal_text(root, out_md, findings)
 
 
-def runs_sentence(cells: Mapping[str, Sequence[Cell]]) -> str:
-    """How many cells have a score, and which have none."""
-    every = [(name, cell) for name, found in cells.items() for cell in found]
+def run_sentences(cells: Mapping[str, pd.DataFrame]) -> list[str]:
+    """How many cells of the tables have a score, which have none, and what Table 4 says."""
     failed = [
-        f"{name} {cell.row.scene} {cell.row.size} {cell.row.label_id} {cell.model}"
-        for name, cell in every
-        if not cell.own.n_finished
+        f"{name} {cell.scene} {cell.size} {cell.label_id} {cell.model}"
+        for name, found in cells.items()
+        for cell in rows_of(found[found.n_finished == 0])
     ]
     which = f"; without one: {', '.join(failed)}" if failed else ""
-    return f"{len(every) - len(failed)} of {len(every)} table cells have a score{which}."
-
-
-def alive_sentences(cells: Mapping[str, Sequence[Cell]]) -> list[str]:
-    """The findings of Table 4, scene by scene; none when the profile has no such table."""
-    checks = check_scenes(cells.get("table4_size", ()))
-    return [sentence for check in checks for sentence in sentences(check)]
+    total = sum(map(len, cells.values()))
+    counted = f"{total - len(failed)} of {total} table cells have a score{which}."
+    return [counted, *(alive_sentences(cells[ALIVE]) if ALIVE in cells else [])]
 
 
 def terminal_text(root: Path, summary: Path, findings: Sequence[str]) -> str:

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
+
+import pandas as pd
 
 from synfeal.errors import InputError
+from synfeal.frames import COUNT, MAYBE, TEXT, frame_of, read_frame, rows_of
 from synfeal.report.cost.measured import read_jobs
 from synfeal.report.layouts import TITLES
-from synfeal.report.results import read_table
-from synfeal.report.tables import Value
 
 # The table whose training runs are shown, and the part of their names that all of them share.
 TABLE = "table4_size"
 KIND = "synfeal/pretrained"
+CELL = {
+    **{"scene": TEXT, "size": TEXT, "model": TEXT, "n_train": COUNT, "n_seeds": COUNT},
+    "position_m_true": MAYBE,
+}
 
 
-def training_rows(root: Path, scene: str) -> list[dict[str, Value]]:
+def training_rows(root: Path, scene: str) -> pd.DataFrame:
     """The localizers on the largest set of Table 4; an item is an image shown.
 
     The error is the median of positions against the true poses, in metres. The time is that of
@@ -25,45 +31,35 @@ def training_rows(root: Path, scene: str) -> list[dict[str, Value]]:
     design has no Table 4, and none for a localizer of which all seeds failed.
 
     Raises:
-        InputError: the table, the history of a training run or its measurement cannot be read.
+        InputError: the table, the history of a run or its measurement cannot be read.
     """
     path = root / "tables" / f"{TABLE}.csv"
-    if not path.exists():
-        return []
-    numbers = ("n_train", "n_seeds")
-    table = read_table(path, ("scene", "size", "model"), numbers, ("position_m_true",))
-    rows = [row for row in table if row["scene"] == scene]
-    largest = max((float(row["n_train"]) for row in rows), default=0.0)
-    shown = [row for row in rows if float(row["n_train"]) == largest and row["position_m_true"]]
-    if not shown:
-        return []
-    seconds = _processor_seconds(root, [name for row in shown for name in _runs(row)])
-    return [_row(row, _seconds_per_image(root, row, seconds)) for row in shown]
+    cells = read_frame(path, CELL) if path.exists() else frame_of((), CELL)
+    cells = cells[cells.scene == scene]
+    cells = cells[cells.n_train == cells.n_train.max()].dropna(subset="position_m_true")
+    runs = [_runs(cell) for cell in rows_of(cells)]
+    seconds = _processor_seconds(root, [name for names in runs for name in names])
+    return pd.DataFrame(
+        {
+            "variant": cells.model.map(TITLES),
+            "seconds_per_item": [_seconds_per_image(root, names, seconds) for names in runs],
+            "error": cells.position_m_true,
+            "error_unit": "m",
+            "chosen": 0,
+        }
+    )
 
 
-def _row(row: dict[str, str], seconds_per_image: float) -> dict[str, Value]:
-    return {
-        "stage": "training",
-        "scene": row["scene"],
-        "variant": TITLES[row["model"]],
-        "seconds_per_item": seconds_per_image,
-        "items_per_s": 1.0 / seconds_per_image,
-        "error": float(row["position_m_true"]),
-        "error_unit": "m",
-        "chosen": 0,
-    }
+def _seconds_per_image(root: Path, runs: Sequence[str], seconds: dict[str, float]) -> float:
+    """Processor seconds over images shown, of all repetitions of a cell."""
+    images = sum(_images_shown(root / "runs" / name / "history.csv") for name in runs)
+    return sum(seconds[name] for name in runs) / images
 
 
-def _seconds_per_image(root: Path, row: dict[str, str], seconds: dict[str, float]) -> float:
-    """Processor seconds over images shown, of all seeds."""
-    images = sum(_images_shown(root / "runs" / name / "history.csv") for name in _runs(row))
-    return sum(seconds[name] for name in _runs(row)) / images
-
-
-def _runs(row: dict[str, str]) -> list[str]:
+def _runs(cell: Any) -> list[str]:
     """Directories of a cell's training runs, below ``runs``."""
-    stem = f"{row['scene']}/{row['size']}/{KIND}/{row['model']}"
-    return [f"{stem}/seed{repetition}" for repetition in range(int(float(row["n_seeds"])))]
+    stem = f"{cell.scene}/{cell.size}/{KIND}/{cell.model}"
+    return [f"{stem}/seed{repetition}" for repetition in range(cell.n_seeds)]
 
 
 def _processor_seconds(root: Path, runs: Sequence[str]) -> dict[str, float]:
@@ -79,7 +75,7 @@ def _processor_seconds(root: Path, runs: Sequence[str]) -> dict[str, float]:
 
 
 def _images_shown(history: Path) -> float:
-    rows = read_table(history, ("samples_seen",), ("samples_seen",))
-    if not rows or float(rows[-1]["samples_seen"]) <= 0.0:
+    shown = read_frame(history, {"samples_seen": COUNT}, "train it again").samples_seen
+    if shown.empty or shown.iloc[-1] <= 0:
         raise InputError(f"{history}: shows no images; train it again")
-    return float(rows[-1]["samples_seen"])
+    return float(shown.iloc[-1])

@@ -11,19 +11,12 @@ from numpy.typing import NDArray
 
 from synfeal.config import Design, Experiment
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
-from synfeal.frames import COUNT, MAYBE, NUMBER, TEXT, read_frame
+from synfeal.frames import MAYBE, read_frame
 from synfeal.report import speed_vs_error
-from synfeal.report.tables import columns_of
+from synfeal.report.cells import schema_of
 
 Array = NDArray[np.float64]
 SPLITS = ("train", "test")
-# What the columns of tables hold where that is not a number or nothing.
-KINDS = {
-    **dict.fromkeys(("scene", "size", "labels", "block", "model", "published_flag"), TEXT),
-    **dict.fromkeys(("stage", "variant", "error_unit", "backend"), TEXT),
-    **dict.fromkeys(("items_per_s", "error"), NUMBER),
-    **dict.fromkeys(("n_train", "n_test"), COUNT),
-}
 
 
 @dataclass(frozen=True)
@@ -58,10 +51,10 @@ class Results:
         Raises:
             InputError: the table is missing or unreadable.
         """
-        speeds = name == speed_vs_error.NAME
-        columns = speed_vs_error.COLUMNS if speeds else columns_of(name)
-        schema = {column: KINDS.get(column, MAYBE) for column in columns}
-        return read_frame(self.root / "tables" / f"{name}.csv", schema)
+        schema = speed_vs_error.SCHEMA if name == speed_vs_error.NAME else schema_of(name)
+        # What is drawn is a number or a gap, a count too.
+        kinds = {column: MAYBE if kind.optional else kind for column, kind in schema.items()}
+        return read_frame(self.root / "tables" / f"{name}.csv", kinds)
 
     def speeds(self, stage: str) -> pd.DataFrame:
         """The rows of ``speed_vs_error.csv`` of one stage.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Mapping
-from html import escape
 from pathlib import Path
 
 from PIL import Image
@@ -24,16 +23,6 @@ def figure_files(folder: Path, captions: Mapping[str, str]) -> dict[str, Path]:
             found[path.stem] = path
     order = [*(name for name in captions if name in found), *sorted(found)]
     return {name: found[name] for name in dict.fromkeys(order)}
-
-
-def figure_html(name: str, path: Path, captions: Mapping[str, str]) -> str:
-    """A figure with its caption; without one, its name."""
-    caption = captions.get(name, name)
-    return (
-        f'<figure class="picture" id="figure-{escape(name)}"><div class="scroll" role="region"'
-        f' tabindex="0" aria-label="{escape(name)}"><img alt="{escape(caption)}"'
-        f' src="{data_address(path)}"></div><figcaption>{escape(caption)}</figcaption></figure>'
-    )
 
 
 def data_address(path: Path) -> str:

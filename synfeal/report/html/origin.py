@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from html import escape
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+from markupsafe import Markup
 from pydantic import BaseModel, TypeAdapter
 
-from synfeal.report.html.markup import Column, number_cell, plain_table, text_cell
+from synfeal.report.html.render import render
+from synfeal.report.html.sortable import Column, sortable
 from synfeal.report.html.stages import Stage
 from synfeal.report.results import check_result, read_result
 
@@ -44,7 +46,7 @@ def read_origin(path: Path) -> Record:
     return record
 
 
-def origin_html(record: Record) -> str:
+def origin_html(record: Record) -> Markup:
     """Facts, and the stages as a table."""
     machine = record["machine"]
     facts = {
@@ -59,8 +61,7 @@ def origin_html(record: Record) -> str:
         "Python": record["python"],
         "Packages": ", ".join(f"{name} {v}" for name, v in record["packages"].items()),
     }
-    lines = "".join(f"<dt>{name}</dt><dd>{escape(str(v))}</dd>" for name, v in facts.items())
-    return f'<dl class="facts">{lines}</dl>{_stages(record)}'
+    return render("origin.html", facts=facts, stages=_stages(record))
 
 
 def cost_sentence(record: Record) -> str:
@@ -83,19 +84,14 @@ def duration(seconds: float) -> str:
     return f"{seconds / 3600:.1f} h"
 
 
-def _stages(record: Record) -> str:
-    titles = ("Jobs", "All jobs", "Median job", "Peak memory (MB)")
-    columns = [Column("Stage"), *(Column(title, True) for title in titles)]
-    rows = []
-    for stage in record["stages"]:
-        peak = stage["peak_mb"]
-        cells = [
-            text_cell(stage["stage"]),
-            number_cell(stage["jobs"], str(stage["jobs"])),
-            number_cell(stage["seconds"], duration(stage["seconds"])),
-            number_cell(stage["median_seconds"], duration(stage["median_seconds"])),
-            number_cell(peak, "–" if peak is None else f"{peak:,.0f}"),
-        ]
-        rows.append(f"<tr>{''.join(cells)}</tr>")
+def _stages(record: Record) -> Markup:
+    columns = [
+        *(Column("Stage", "stage"), Column("Jobs", "jobs", "{:,}")),
+        Column("All jobs", "seconds", text="all"),
+        Column("Median job", "median_seconds", text="median"),
+        Column("Peak memory (MB)", "peak_mb", "{:,.0f}"),
+    ]
+    stages = pd.DataFrame(record["stages"])
+    texts = {"all": stages.seconds.map(duration), "median": stages.median_seconds.map(duration)}
     caption = "<b>Cost.</b> Time and largest resident memory of the jobs of each stage."
-    return plain_table("stages", caption, columns, rows)
+    return sortable("stages", caption, columns, stages.assign(**texts))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from baselines.groundtruth.methods import METHODS
@@ -17,6 +16,7 @@ from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.inspect.surface import SurfacePoints
 from synfeal.inspect.viewer_mesh import ViewerMesh, viewer_mesh
 from synfeal.mesh.load import load_mesh
+from synfeal.report.html.render import render
 from synfeal.report.layouts import SOURCES, scene_title
 from synfeal.seeds import generator_of
 
@@ -43,7 +43,7 @@ class Trajectory:
     is_shown: bool
 
 
-def room_html(scene: str, root: Path, rows: Sequence[Experiment]) -> str:
+def room_html(scene: str, root: Path, rows: Sequence[Experiment]) -> Markup:
     """The view of one scene, ready for ``report.js``.
 
     Args:
@@ -83,30 +83,12 @@ def paths_of(table: PoseTable) -> tuple[Array, ...]:
     return tuple(path for path in np.split(table.position_m, starts) if len(path) > 1)
 
 
-def _html(scene: str, mesh: ViewerMesh, drawn: Sequence[Trajectory]) -> str:
+def _html(scene: str, mesh: ViewerMesh, drawn: Sequence[Trajectory]) -> Markup:
     lines = [(path, trajectory.rgb) for trajectory in drawn for path in trajectory.paths_m]
     ends = np.cumsum([len(trajectory.paths_m) for trajectory in drawn]).tolist()
-    boxes = "".join(
-        _box(trajectory, start, end)
+    boxes = [
+        {**vars(trajectory), "start": start, "end": end}
         for trajectory, start, end in zip(drawn, [0, *ends], ends, strict=False)
-    )
-    title = escape(scene_title(scene))
-    data = json.dumps(mesh.scene(lines), allow_nan=False).replace("<", "\\u003c")
-    return (
-        f'<div class="room" id="room-{escape(scene)}"><h3>{title}</h3>'
-        f'<canvas tabindex="0" role="img" aria-label="{title}, to be turned by hand"></canvas>'
-        '<p class="fallback" hidden>This browser offers no WebGL 2.</p>'
-        f'<div class="controls">{boxes}<label>Cut above <input type="range" class="cut" min="0"'
-        ' max="1" step="0.005" value="1"> <output></output></label></div>'
-        f'<script type="application/json">{data}</script></div>'
-    )
-
-
-def _box(trajectory: Trajectory, start: int, end: int) -> str:
-    colour = "rgb({}, {}, {})".format(*trajectory.rgb)
-    checked = " checked" if trajectory.is_shown else ""
-    return (
-        f'<label><input type="checkbox" class="trajectory" data-start="{start}" data-end="{end}"'
-        f'{checked}> <span class="swatch" style="background: {colour}"></span>'
-        f"{escape(trajectory.title)}</label>"
-    )
+    ]
+    title = scene_title(scene)
+    return render("room.html", scene=scene, title=title, boxes=boxes, data=mesh.scene(lines))

@@ -1,108 +1,217 @@
-"""The tables that have one score only: meshes, assistance, and what speed costs."""
+"""The tables beside tables 2 to 6, as the page shows them: a column more is a line more."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Callable, Mapping
 from html import escape
 from pathlib import Path
 
-from synfeal.report import assistance, meshes, speed_vs_error
-from synfeal.report.html.markup import Column, number_cell, plain_table, text_cell
-from synfeal.report.layouts import SOURCES, scene_title
-from synfeal.report.results import read_table
+import pandas as pd
+from markupsafe import Markup
 
-Row = Mapping[str, str]
-USED = ' class="used"'
-WHEN = ("before", "after")
+from synfeal.evaluation.metrics import BOUNDS, MEANS, ORIENTATION, POSITION
+from synfeal.frames import read_frame, read_records
+from synfeal.report import assistance, label_error, meshes, recall, references, speed_vs_error
+from synfeal.report.hard_cases import table as hard_cases
+from synfeal.report.hard_cases.text import Row, error_text, judged, short
+from synfeal.report.html.sortable import Column, sortable
+from synfeal.report.layouts import SOURCES, TITLES, scene_title
+
+DATA_SET, LABELS = Column("Data set", "data_set"), Column("Labels", "labels")
 
 
-def meshes_table(path: Path) -> str:
+def meshes_table(path: Path) -> Markup:
     """Table 1: the meshes beside the paper's."""
-    printed = [f"published_{fact}" for fact in meshes.FACTS]
-    rows = read_table(path, meshes.COLUMNS, meshes.FACTS, printed)
-    columns = [Column("Scene"), *(Column(title, True) for title in meshes.LABELS.values())]
-    body = [
-        f"<tr>{text_cell(scene_title(row['scene']))}"
-        f"{''.join(_fact(row, fact) for fact in meshes.FACTS)}</tr>"
-        for row in rows
+    counts = {"vertices": "{:,.0f}", "faces": "{:,.0f}", "volume_m3": "{:,.2f}"}
+    columns = [
+        Column("Scene", "scene"),
+        *(
+            Column(meshes.FACTS[fact], fact, form, paper=f"published_{fact}")
+            for fact, form in counts.items()
+        ),
     ]
     caption = (
         "<b>Table 1.</b> Properties of the meshes: vertices at distinct positions, faces, volume of"
         " the axis-aligned bounding box. In grey: the meshes of the paper."
     )
-    return plain_table(meshes.NAME, caption, columns, body)
+    table = read_frame(path, meshes.SCHEMA)
+    return sortable(meshes.NAME, caption, columns, table.assign(scene=table.scene.map(scene_title)))
 
 
-def assistance_table(path: Path) -> str:
+def references_table(path: Path) -> Markup:
+    """A row per data set and method; localizers in grey."""
+    against = {"labels": "", "true poses": "_true"}
+    columns = [
+        *(DATA_SET, LABELS, Column("Method", "title")),
+        *(
+            Column(f"{unit}, {title}", f"{measure}{end}", "{:.3g}")
+            for title, end in against.items()
+            for measure, unit in {"position_m": "m", "orientation_deg": "°"}.items()
+        ),
+        *(
+            Column(f"Within, %, {title}", f"within_5cm_5deg{end}", "{:.0f}", 100)
+            for title, end in against.items()
+        ),
+        Column("Failed", "failed", "{:.0f}"),
+        Column("s per frame", "seconds_per_frame", "{:.2g}"),
+    ]
+    caption = (
+        "<b>References.</b> Image retrieval, the nearest training pose and structure-based poses"
+        " beside the localizers, all from the labels of the data set. Within: share of the test"
+        " frames within 5 cm and 5°. Seconds of one processor core, without what is done once for"
+        " all label sets."
+    )
+    table = _with_data_set(references.read_references(path))
+    table = table.assign(
+        labels=table.labels.map(references.label_title),
+        style=table.kind.where(table.kind == references.LOCALIZER, ""),
+    )
+    return sortable(references.NAME, caption, columns, table)
+
+
+def recall_table(path: Path) -> Markup:
+    """A row for every run of the design, its repetitions averaged."""
+    shares = {bound.name: bound.title for bound in BOUNDS} | {recall.DCRE[0]: "DCRE"}
+    shares |= {score: f"DCRE < {score.rsplit('_')[-1]}" for score in recall.DCRE[1:]}
+    columns = [
+        *(DATA_SET, LABELS, Column("Start", "init"), Column("Localizer", "model")),
+        Column("Mean, m", MEANS[POSITION], "{:.2f} m", scored=True),
+        Column("Mean, °", MEANS[ORIENTATION], "{:.1f}°", scored=True),
+        *(Column(title, name, "{:.1f} %", 100, scored=True) for name, title in shares.items()),
+    ]
+    caption = f"<b>Recall.</b> {escape(recall.CAPTION)} {escape(recall.REMARK)} Small: 95 % limits."
+    table = _with_data_set(recall.read_recall_table(path))
+    table = table.assign(
+        labels=table.labels.map(references.label_title), model=table.model.map(TITLES)
+    )
+    return sortable(recall.NAME, caption, columns, table)
+
+
+def assistance_table(path: Path) -> Markup:
     """How often the methods that re-estimate labels had to be helped, beside section 4.1."""
-    rows = read_table(path, assistance.COLUMNS, assistance.COUNTS, assistance.LAST_POSE)
-    titles = ("Batches", "Assisted", "Lost", "Frames", "Frames registered", "Frames filled")
-    columns = [Column("Method"), Column("Data set"), *(Column(title, True) for title in titles)]
-    columns += [Column(f"Last pose off by, {when} assistance", True) for when in WHEN]
+    columns = [
+        *(Column("Method", "title"), DATA_SET),
+        Column("Batches", "batches", "{:.0f}", paper="published_batches"),
+        Column("Assisted", "assisted", "{:.0f}", paper="published_assisted"),
+        Column("Lost", "lost", "{:.0f}"),
+        Column("Frames", "frames", "{:.0f}"),
+        Column("Frames registered", "registered", "{:.0f}"),
+        Column("Frames filled", "filled", "{:.0f}"),
+        *(
+            Column(f"Last pose, {when}", f"last_m_{when}_median", text=when)
+            for when in ("before", "after")
+        ),
+    ]
     caption = (
         "<b>Assistance.</b> Batches of both splits together. Assisted: the last pose was replaced"
-        " by the true one; lost: no motion was found. Last pose: median over the batches. In grey:"
-        " what section 4.1 of the paper counts."
+        " by the true one; lost: no motion was found. Last pose: its error before and after"
+        " assistance, median over the batches. In grey: what section 4.1 of the paper counts."
     )
-    total = [_assisted(row) for row in rows if row["split"] == assistance.TOTAL]
-    return plain_table("assistance", caption, columns, total)
+    table = _of_both_splits(read_frame(path, assistance.SCHEMA))
+    off = {when: assistance.last_pose(table, when) for when in ("before", "after")}
+    return sortable(assistance.NAME, caption, columns, table.assign(**off))
 
 
-def speed_table(path: Path) -> str:
+def label_error_table(path: Path) -> Markup:
+    """A row before and a row after assistance for every method and data set."""
+    spreads = {"median": "Median", "rmse": "RMSE", "max": "Max"}
+    columns = [
+        *(Column("Labels from", "title"), DATA_SET, Column("Assistance", "assistance")),
+        *(
+            Column(f"{title}, {unit}", f"{measure}_{which}", "{:.3g}")
+            for measure, unit in {"position_m": "m", "orientation_deg": "°"}.items()
+            for which, title in spreads.items()
+        ),
+        Column("Drift, %", "relative_25_m_per_m", "{:.2g}", 100),
+        Column("Drift, °/m", "relative_25_deg_per_m", "{:.2g}"),
+        Column("Within 5 cm, 5°, %", "share_within_5cm_5deg", "{:.0f}", 100),
+        Column("Filled, %", "share_filled", "{:.1f}", 100),
+        Column("s per frame", "seconds_per_frame", "{:.2g}"),
+        Column("Memory, MB", "peak_memory_mb", "{:,.0f}"),
+    ]
+    caption = (
+        "<b>Label errors.</b> Re-estimated labels of both splits against the true poses, without"
+        " alignment. Before assistance: what the labels were had no last pose been replaced. Drift:"
+        " errors of the motion over 25 frames, by the metre travelled; a replaced pose adds to it."
+        " Along the sequence: <a href='#figures'>the figures</a> of camera paths and label errors."
+    )
+    table = _of_both_splits(read_frame(path, label_error.SCHEMA))
+    return sortable(label_error.NAME, caption, columns, table)
+
+
+def speed_table(path: Path) -> Markup:
     """What each stage could choose among, how fast and how wrong each is."""
-    rows = read_table(path, speed_vs_error.COLUMNS, ("items_per_s", "error"), ("faces",))
-    columns = [Column(title) for title in ("Stage", "Scene", "Variant")]
-    columns += [Column(title, True) for title in ("Faces", "Items per second", "Error")]
+    columns = [
+        *(Column("Stage", "stage"), Column("Scene", "scene"), Column("Variant", "variant")),
+        Column("Faces", "faces", "{:,.0f}"),
+        Column("Items per second", "items_per_s", "{:,.0f}"),
+        Column("Error", "error", "{:.3g}"),
+        *(Column("Error unit", "error_unit"), Column("Used", "used")),
+    ]
     caption = (
         "<b>Speed against error.</b> What a stage could choose among; marked rows are what the run"
         " used. Speeds are measured and differ between runs."
     )
-    columns += [Column("Error unit"), Column("Used")]
-    return plain_table("speed_vs_error", caption, columns, _speeds(rows))
+    table = read_frame(path, speed_vs_error.SCHEMA)
+    used = table.chosen == 1
+    table = table.assign(scene=table.scene.map(scene_title))
+    table = table.assign(used=used.map({True: "✓", False: ""}))
+    table = table.assign(style=used.map({True: "used", False: ""}))
+    return sortable(speed_vs_error.NAME, caption, columns, table)
 
 
-def _fact(row: Row, fact: str) -> str:
-    printed = row[f"published_{fact}"]
-    beside = f'<div class="paper">{_count(printed)}</div>' if printed else ""
-    return number_cell(float(row[fact]), _count(row[fact]), beside)
-
-
-def _count(text: str) -> str:
-    return f"{int(text):,}" if text.isdigit() else f"{float(text):,.2f}"
-
-
-def _assisted(row: Row) -> str:
-    cells = [
-        text_cell(SOURCES.get(row["method"], row["method"])),
-        text_cell(f"{scene_title(row['scene'])}, {row['size']}"),
+def hard_cases_table(path: Path) -> Markup:
+    """Every case with both errors, over the formulas that made them, the bound and the times."""
+    columns = [
+        *(Column("What", "family"), Column("Case", "case", small="judged")),
+        *(
+            Column(title, which, text=f"{which}_text", small=f"{which}_formula", bad=f"{which}_bad")
+            for which, title in {"naive": "First thought", "our": "Ours"}.items()
+        ),
+        *(Column("Bound", "bound", text="bound_text"), Column("Truth", "reference")),
+        Column("First, µs", "naive_seconds", text="naive_time"),
+        Column("Ours, µs", "our_seconds", text="our_time"),
     ]
-    for count in assistance.COUNTS:
-        printed = row.get(f"published_{count}", "")
-        beside = f'<div class="paper">{escape(printed)}</div>' if printed else ""
-        cells.append(number_cell(float(row[count]), row[count], beside))
-    for when in WHEN:
-        metres, degrees = (row[f"last_{unit}_{when}_median"] for unit in ("m", "deg"))
-        text = f"{float(metres):.2f} m, {float(degrees):.2f}°" if metres and degrees else "–"
-        cells.append(number_cell(float(metres) if metres else None, text))
-    return f"<tr>{''.join(cells)}</tr>"
+    caption = (
+        "<b>Hard cases.</b> Errors against exact answers: of the formula somebody would write"
+        " first, and of the function this project uses. <b class='worse'>✗</b> marks errors above"
+        " the bound that ours promises; “none” is no answer or no number. Cases without one right"
+        " answer are to be refused. Times are those of one call, medians, and differ between runs."
+    )
+    frame = pd.DataFrame([_case(row) for _, row in read_records(path, hard_cases.COLUMNS)])
+    starts = frame.family != frame.family.shift()
+    frame = frame.assign(style=starts.map({True: "first", False: ""}))
+    return sortable(hard_cases.NAME, caption, columns, frame)
 
 
-def _speeds(rows: Sequence[Row]) -> list[str]:
-    lines = []
-    for row in rows:
-        used, items_per_s = row["chosen"] == "1", float(row["items_per_s"])
-        cells = [
-            *(text_cell(row["stage"]), text_cell(scene_title(row["scene"]))),
-            text_cell(row["variant"]),
-            _faces(row["faces"]),
-            number_cell(items_per_s, f"{items_per_s:,.0f}"),
-            number_cell(float(row["error"]), row["error"]),
-            text_cell(row["error_unit"]),
-            text_cell("✓" if used else ""),
-        ]
-        lines.append(f"<tr{USED if used else ''}>{''.join(cells)}</tr>")
-    return lines
+SIDE_TABLES: Mapping[str, tuple[str, Callable[[Path], Markup]]] = {
+    references.NAME: ("References", references_table),
+    recall.NAME: ("Recall", recall_table),
+    assistance.NAME: ("Assistance", assistance_table),
+    label_error.NAME: ("Label errors", label_error_table),
+    speed_vs_error.NAME: ("Speed against error", speed_table),
+    hard_cases.NAME: ("Hard cases", hard_cases_table),
+}
 
 
-def _faces(text: str) -> str:
-    return number_cell(float(text), f"{float(text):,.0f}") if text else text_cell("")
+def _with_data_set(table: pd.DataFrame) -> pd.DataFrame:
+    return table.assign(data_set=table.scene.map(scene_title) + ", " + table["size"])
+
+
+def _of_both_splits(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of both splits together, with the title of their method."""
+    table = _with_data_set(table[table.split == assistance.TOTAL])
+    return table.assign(title=table.method.map(lambda method: SOURCES.get(method, method)))
+
+
+def _case(row: Row) -> dict[str, object]:
+    bound = float(row["bound"])
+    cells: dict[str, object] = {"judged": judged(row), "bound_text": short(bound)}
+    for which, formula in {"naive": row["naive"], "our": row["ours"]}.items():
+        error, seconds = float(row[f"{which}_error"]), float(row[f"{which}_seconds"])
+        cells[which] = min(error, sys.float_info.max)
+        cells[f"{which}_text"] = error_text(row, f"{which}_error")
+        cells[f"{which}_formula"], cells[f"{which}_bad"] = formula, error > bound
+        cells[f"{which}_time"] = f"{1e6 * seconds:,.0f}" if seconds >= 1e-6 else "< 1"
+    return {**{k: v for k, v in row.items() if k not in cells}, **cells}
