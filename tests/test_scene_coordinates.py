@@ -120,6 +120,7 @@ def test_the_network_has_the_size_and_the_stride_of_its_source():
     network = CoordinateNetwork(torch.tensor([1.0, 2.0, 3.0]))
     size = sum(4 * p.numel() for p in network.parameters())
     assert 3.5e6 < size < 4.5e6  # DSAC* small: 4 MB
-    found = network(torch.zeros(2, 3, 66, 88))
+    found = network(torch.rand(2, 3, 66, 88))
     assert found.shape == (2, 3, 17, 22)
+    assert (found == network.mean_m).all()  # untrained: the mean
     assert cell_pixels(CAMERA, 88, 66).shape == (17, 22, 2)

@@ -55,6 +55,7 @@ class CoordinateNetwork(nn.Module):
 
     def __init__(self, mean_m: Tensor) -> None:
         super().__init__()
+        out = _Coordinates()
         self.layers = nn.Sequential(
             _Convolution(3, 32, 3),
             _Convolution(32, 64, 3, 2),
@@ -65,13 +66,14 @@ class CoordinateNetwork(nn.Module):
             _Residual(1, 1, 1),
             _Convolution(CHANNELS, CHANNELS, 1),
             _Convolution(CHANNELS, CHANNELS, 1),
-            _Coordinates(),
+            out,
         )
         self.register_buffer("mean_m", mean_m.view(1, 3, 1, 1))
         for module in self.modules():
             if isinstance(module, nn.Conv2d):
                 nn.init.kaiming_normal_(module.weight, nonlinearity="relu")
                 nn.init.zeros_(module.bias)  # type: ignore[arg-type]
+        nn.init.zeros_(out.linear.weight)  # the mean at first, not points outside the room
 
     def forward(self, images: Tensor) -> Tensor:
         """Of normalised images."""

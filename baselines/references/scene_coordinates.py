@@ -26,7 +26,7 @@ from baselines.training.optimizer import Schedule, optimisation_of
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 
-BATCH, LEARNING_RATE = 8, 2e-3
+BATCH, LEARNING_RATE = 8, 1e-3
 # Points are off by decimetres where features are off by a pixel: a twentieth of the image's width.
 MAX_ERROR_OF_WIDTH = 0.05
 LOGGED = 50  # steps
