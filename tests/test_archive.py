@@ -176,8 +176,8 @@ def test_archives_of_others_are_read(packed: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (lambda data: data[:-40], r"seq-01\.zip: cannot be read as a sequence \(.*damaged"),
-        (lambda data: b"", r"seq-01\.zip: cannot be read as a sequence \(.*damaged"),
+        (lambda data: data[:-40], r"seq-01\.zip: cannot be read as a sequence"),
+        (lambda data: b"", r"seq-01\.zip: cannot be read as a sequence"),
         (lambda data: data[:5000] + bytes(9) + data[5009:], r"Bad CRC-32|cannot be decoded"),
     ],
 )
