@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,9 @@ from PIL import Image
 from synfeal.cli import main
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
+from synfeal.validation.consistency import MEASURES, Pair, measure_check
+from synfeal.validation.listing import Frame
+from synfeal.validation.reprojection import Residual
 from tests.damaged_sets import (
     copy_of_first_frames,
     depth_in_centimetres,
@@ -183,3 +187,16 @@ def test_a_quaternion_of_the_other_sign_is_told(
     assert main(["validate", str(planar)]) == 1
     (line,) = [li for li in capsys.readouterr().err.splitlines() if li.startswith("error: ")]
     assert all(word in line for word in ["tables: ", "train.csv: row 2", "qw < 0", "qw >= 0"])
+
+
+@pytest.mark.parametrize(("wrong", "failed"), [({(3, 4)}, False), ({(2, 3), (3, 4)}, True)])
+def test_a_frame_is_wrong_where_it_disagrees_with_most_not_with_one(wrong, failed):
+    """Frame 3 has two neighbours; of right frames one can be hidden behind an edge."""
+    frames = [Frame(Path("seq-01"), number) for number in range(6)]
+    pairs = [
+        Pair(a, b, Residual(overlap=0.9, hidden=False, depth=82.0 if (i, i + 1) in wrong else 0.2))
+        for i, (a, b) in enumerate(pairwise(frames))
+    ]
+    check = measure_check(MEASURES[0], pairs)
+    assert bool(check.failures) == failed
+    assert not failed or "frame-000003.depth.png" in check.failures[0]
