@@ -66,7 +66,7 @@ def test_a_checkpoint_is_all_that_prediction_needs(
         ({"description": {"localizer": "posenet3"}}, "its description cannot be used .*localizer"),
         ({"images": None}, "holds no trained localizer"),
         ({"images": {"mean": 1.0, "deviation": 2.0}}, "not those of the posenet2"),
-        ({"localizer": {}}, "not those of the posenet2 it describes .*train it again"),
+        ({"localizer": {}}, "not those of the posenet2 it describes.*train it again"),
     ],
 )
 def test_a_damaged_checkpoint_is_one_line(model: Path, values: Any, message: str) -> None:

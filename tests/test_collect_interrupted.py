@@ -15,6 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from synfeal.dataset import render_pool
+from synfeal.effects import relight
 from synfeal.render import open_renderer
 from synfeal.run_lock import only_command
 from tests.collected import collect, command, only_error, save_room, tree_of
@@ -63,7 +64,7 @@ class Interrupting:
 def interrupted(mesh: Path, out: Path, limit: int = 13) -> Path:
     """The unfinished directory of a collection that stopped after some frames."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(render_pool, "open_renderer", Interrupting(limit).open)
+        patch.setattr(relight, "open_renderer", Interrupting(limit).open)
         assert collect(mesh, out, "--depth") == 130
     return out.with_name(f"{out.name}.part")
 
@@ -79,7 +80,7 @@ def test_ctrl_c_keeps_whole_sequences_and_says_how_to_go_on(
     (part / ".manifest-12345678.json").write_text("half a mani")
     renderer = Interrupting(100)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(render_pool, "open_renderer", renderer.open)
+        patch.setattr(relight, "open_renderer", renderer.open)
         assert collect(mesh, tmp_path / "set", "--depth") == 0
     assert renderer.count == 32 - 10
     assert tree_of(tmp_path / "set") == tree_of(calm)

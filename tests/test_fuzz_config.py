@@ -10,6 +10,7 @@ from pydantic import BaseModel
 
 from baselines.groundtruth.methods import check_sources
 from synfeal.config import Config, load_config, parse_config, read_experiments
+from synfeal.config.collection import ClutterConfig
 from tests.fuzzing import Damage, damages, problem_with, put, removed, replaced, text_damages
 from tests.report_results import design_of
 
@@ -34,7 +35,9 @@ def _in_the_repository(monkeypatch):
 def full(profile: tuple[str, ...]) -> dict[str, Any]:
     """Every key of a profile with its value, defaults included."""
     config = load_config(*(CONFIG / name for name in profile))
-    return config.model_dump(mode="json")
+    raw = config.model_dump(mode="json")
+    next(iter(raw["scenes"].values()))["clutter"] = ClutterConfig().model_dump(mode="json")
+    return raw
 
 
 def places(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:

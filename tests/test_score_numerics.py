@@ -201,7 +201,7 @@ def test_a_diverged_repetition_is_counted_and_averaged_into_nothing(
         assert cell.position_m_high == pytest.approx(1.98)
         assert (cell.failed, cell.n_seeds, cell.n_finished) == (N, 3, 2)
     errors = read_run(seeds)
-    assert errors.failed == N
+    assert errors.counts()["failed"] == N
     error_m, percent = cumulative(errors.errors[:, 0].ravel())
     assert np.isfinite(error_m).all()
     assert percent[-1] == pytest.approx(100 * 2 / 3)

@@ -208,6 +208,7 @@ def test_the_rate_is_halved_at_each_share():
 @pytest.mark.parametrize(("kind", "decays"), [("muon", False), ("adamw", False), ("halving", True)])
 def test_biases_decay_in_the_published_protocol_alone(kind, decays):
     layer = torch.nn.Linear(2, 2)
+    torch.nn.init.ones_(layer.weight)  # longer than a step
     torch.nn.init.ones_(layer.bias)
     optimisation = optimisation_of(kind, layer, Schedule(160, 16, 0.1, 0.5))
     before = layer.weight.detach().clone()

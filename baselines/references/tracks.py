@@ -109,6 +109,7 @@ def join_matches(features: Features, matches: Rows) -> Tracks:
     total = len(features.slope)
     graph = coo_matrix((np.ones(len(matches), bool), matches.T), shape=(total, total))
     _, component = connected_components(graph, directed=False)
+    component = component.astype(np.int64)  # times a number of frames it leaves 32 bits
     frame = features.frame
     size = np.bincount(component, minlength=1)
     seen = np.unique(component * len(features) + frame)  # (component, frame), each once

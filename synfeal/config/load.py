@@ -74,6 +74,8 @@ def describe(error: ValidationError, model: type[BaseModel] = Config) -> str:
     if first["type"] == "missing":
         return f"{key}: missing; it has no default"
     message = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "path_type":
+        message = "must be a path"
     if first["type"] == "model_type":
         message = "must hold a mapping of keys"
     if first["type"] == "value_error":

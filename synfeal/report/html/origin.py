@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -91,7 +92,7 @@ def _stages(record: Record) -> Markup:
         Column("Median job", "median_seconds", text="median"),
         Column("Peak memory (MB)", "peak_mb", "{:,.0f}"),
     ]
-    stages = pd.DataFrame(record["stages"])
+    stages = pd.DataFrame(record["stages"], columns=[field.name for field in fields(Stage)])
     texts = {"all": stages.seconds.map(duration), "median": stages.median_seconds.map(duration)}
     caption = "<b>Cost.</b> Time and largest resident memory of the jobs of each stage."
     return sortable("stages", caption, columns, stages.assign(**texts))
