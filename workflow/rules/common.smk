@@ -427,6 +427,12 @@ def robustness_files(wildcards):
     ]
 
 
+def robustness_tables(wildcards):
+    """The robustness table in both formats, where it is made."""
+    made = [f for f in robustness_files(wildcards) if f.endswith("/robustness.csv")]
+    return [f.removesuffix("csv") + ending for f in made for ending in ("csv", "tex")]
+
+
 def label_figures():
     """The figures of a design that draws nothing of training runs."""
     return [] if set(TABLE_NAMES) & set(DRAWN_TABLES) else [f"{ROOT}/figures"]

@@ -316,6 +316,7 @@ RESULTS = [
 rule provenance:
     input:
         results=RESULTS,
+        robustness=robustness_tables,
         measured=lambda w: measurements([*files_of_evidence(), *passing_files()]),
     output:
         record=f"{ROOT}/provenance.json",
