@@ -169,4 +169,5 @@ def _printed(found: pd.DataFrame, change: str, measure: str) -> str:
 
 def percent(factor: float) -> str:
     """A factor as a change in percent."""
-    return f"{100 * (factor - 1):+.0f} %".replace("-", "−")
+    change = round(100 * (factor - 1))  # an integer has no minus zero
+    return f"{change:+d} %".replace("-", "−") if change else "0 %"

@@ -429,7 +429,7 @@ def robustness_files(wildcards):
 
 def robustness_tables(wildcards):
     """The robustness table in both formats, where it is made."""
-    made = [f for f in robustness_files(wildcards) if f.endswith("/robustness.csv")]
+    made = [f for f in robustness_files(wildcards) if f.endswith("robustness.csv")]
     return [f.removesuffix("csv") + ending for f in made for ending in ("csv", "tex")]
 
 
