@@ -22,8 +22,6 @@ TIMED = {
     "tables/hard_cases.csv": "times of every case",
     "groundtruth/*.json": "what stages of a batch took",
     "figures/speed_vs_error*": "shows times",
-    "figures/training_speed.*": "shows times",
-    "figures/render_speed.*": "shows times",
 }
 # Parts of files that say so; what is compared is the rest.
 TIMED_PARTS = {
