@@ -34,7 +34,6 @@ rule all:
     default_target: True
     input:
         files_of_evidence(),
-        robustness_files,
         f"{ROOT}/provenance.json",
         f"{ROOT}/report.html",
         f"{ROOT}/report.tex",

@@ -88,7 +88,7 @@ TABLE: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "inspect unit": ("inspect room.glb", "--unit-m", NUMBERS),
     "inspect box": ("inspect room.glb", "--box", ("1 0 0 1 0 1", "50 51 0 1 0 1")),
     "preview": ("preview {} --out new.gif", "", DATA_SETS),
-    "preview out": ("preview set", "--out", ("notes.txt", "absent/x/y.mp4", "x" * 300)),
+    "preview out": ("preview set", "--out", ("notes.txt", "absent/x/y.avi", "x" * 300)),
     "preview frames": ("preview set --out new.gif", "--frames", ("0", "-1")),
     "preview rate": ("preview set --out new.gif", "--fps", NUMBERS),
     "validate": ("validate {}", "", DATA_SETS),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pandas as pd
 import pytest
@@ -269,6 +271,33 @@ def test_collected_with_effects_the_same_in_other_shards_and_workers(tmp_path: P
     assert main(["preview", str(one), str(other), "--frames", "9"]) == 0
     with Image.open(one / "preview.gif") as picture:
         assert (picture.n_frames, picture.width) == (9, 640)
+    films = [tmp_path / "film.mp4", tmp_path / "again.mp4"]
+    for film in films:
+        assert main(["preview", str(one), str(other), "--frames", "9", "--out", str(film)]) == 0
+    assert films[0].read_bytes() == films[1].read_bytes()
+    shown = np.stack(list(film_frames(films[0])))
+    with Image.open(colour_files(one, "train")[4]) as frame:
+        size = 320, round(320 * frame.height / frame.width)
+        ideal = np.asarray(frame.convert("RGB").resize(size, Image.Resampling.LANCZOS))
+    assert shown.shape == (9, 16 + size[1], 640, 3)
+    assert np.abs(shown[4, 16:, :320].astype(int) - ideal).mean() < 4  # grey levels, of coding
+
+
+def film_frames(path: Path) -> Iterator[np.ndarray]:
+    """Frames (H, W, 3) as another library decodes them."""
+    film = cv2.VideoCapture(str(path))
+    while (found := film.read())[0]:
+        yield found[1][..., ::-1]
+
+
+def test_a_film_without_an_encoder_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert main(["preview", str(tmp_path), "--out", str(tmp_path / "film.mp4")]) == 1
+    assert "apt-get install ffmpeg or pip install 'synfeal[video]'" in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())
 
 
 def colour_files(dataset: Path, split: str) -> list[Path]:

@@ -10,7 +10,7 @@ word (Arandjelović and Zisserman, CVPR 2013) and rotated to 256 dimensions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -25,7 +25,6 @@ from torch import Tensor
 
 from baselines.references.arrays import write_arrays
 from baselines.references.vectors import THUMBNAIL, VLAD, Vectors
-from synfeal.dataset.packed import read_packed
 
 Frames = NDArray[np.uint8]
 T = TypeVar("T", bound=np.generic)
@@ -148,25 +147,22 @@ def parts_of(values: NDArray[T]) -> Iterator[NDArray[T]]:
     return (values[start : start + CHUNK] for start in range(0, len(values), CHUNK))
 
 
-def write_descriptors(train: Path, test: Path, learned_from: int, seed: int, out: Path) -> None:
-    """Describe the packed frames of a scene as wholes.
+def write_descriptors(
+    frames: Mapping[str, Frames], learned_from: int, seed: int, out: Path
+) -> None:
+    """Describe packed frames as wholes.
 
     Args:
-        train: packed training frames of the largest size.
-        test: packed test frames, likewise.
-        learned_from: training frames that the vocabulary may be learned from: those of the
-            smallest size, so that no size sees frames that are not its own.
+        frames: by name; those of ``train`` are what the vocabulary and the axes come from.
+        learned_from: how many of them: those of the smallest size, so that no size sees frames
+            that are not its own.
         seed: of the samples and of k-means.
-        out: arrays to write, ``<descriptor>_<split>`` (N, D).
-
-    Raises:
-        InputError: frames cannot be read.
+        out: arrays to write, ``<descriptor>_<name>`` (N, D).
     """
     torch.set_num_threads(1)
-    frames = {"train": read_packed(train), "test": read_packed(test)}
     vlad = Vlad.learn(frames["train"][:learned_from], seed)
     methods = {THUMBNAIL: thumbnails, VLAD: vlad.describe}
     write_arrays(
         out,
-        {f"{name}_{s}": work(part) for name, work in methods.items() for s, part in frames.items()},
+        {f"{name}_{n}": work(part) for name, work in methods.items() for n, part in frames.items()},
     )

@@ -6,7 +6,7 @@ OpenCV's implementation takes half the time of COLMAP's for the same matches.
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig, ReferencesConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.sevenscenes import read_depth_m
+from synfeal.render.base import Depth
 
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
@@ -79,17 +80,29 @@ def find_features(
     Raises:
         InputError: an image cannot be read or is not of the camera's size.
     """
+    paths = tqdm(color_paths, "features", unit="frame", mininterval=5)
+    greys = (read_image(path, camera, "L") for path in paths)
+    return features_of(greys, map(read_depth_m, depth_paths) if depth_paths else None, camera, cfg)
+
+
+def features_of(
+    greys: Iterable[NDArray[np.uint8]],
+    depths_m: Iterator[Depth] | None,
+    camera: CameraConfig,
+    cfg: ReferencesConfig,
+) -> Features:
+    """Features of grey images (H, W), with their depth (H, W) where there is one."""
     cv2.setNumThreads(1)
     sift = cv2.SIFT.create(
         cfg.max_features, contrastThreshold=cfg.contrast, enable_precise_upscale=True
     )
     found = []
-    for index, color in enumerate(tqdm(color_paths, "features", unit="frame", mininterval=5)):
-        pixel, descriptor = _frame_features(sift, read_image(color, camera, "L"))
+    for grey in greys:
+        pixel, descriptor = _frame_features(sift, grey)
         depth_m = np.full(len(pixel), np.inf)
-        if depth_paths is not None:
+        if depths_m is not None:
             column, row = pixel.astype(int).T
-            depth_m = read_depth_m(depth_paths[index])[row, column].astype(np.float64)
+            depth_m = next(depths_m)[row, column].astype(np.float64)
         found.append((normalised_of_pixels(camera, pixel), depth_m, descriptor))
     slope, depth, descriptors = (np.concatenate(part) for part in zip(*found, strict=True))
     start = np.cumsum([0, *(len(part[1]) for part in found)])

@@ -1,4 +1,4 @@
-"""Localizers, and the nearest image, on test frames that are not like their training frames."""
+"""Localizers and reference methods on test frames that are not like their training frames."""
 
 from __future__ import annotations
 
@@ -6,21 +6,24 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from baselines.references.descriptors import thumbnails
-from baselines.references.vectors import most_alike
+import numpy as np
+
+from baselines.references.vectors import THUMBNAIL, VLAD, most_alike, read_described
 from baselines.training.checkpoint import read_checkpoint
 from baselines.training.data import read_images
 from baselines.training.device import memory_errors, open_device
 from baselines.training.predict import predict
-from synfeal.dataset.packed import read_packed
-from synfeal.dataset.pose_table import PoseTable, read_pose_table
+from synfeal.config.robustness import CLEAN
+from synfeal.dataset.number_table import read_numbers
+from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table
 from synfeal.evaluation.metrics import pose_errors, summary
 from synfeal.frames import COUNT, MAYBE, TEXT, frame_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-NEAREST = "nearest-thumbnail"
+NEAREST = {"nearest-thumbnail": THUMBNAIL, "nearest-vlad": VLAD}
+STRUCTURE = "structure-depth"
 MEASURES = ("position_m", "orientation_deg")
 SCHEMA = {
     **dict.fromkeys(("trained_on", "method", "effects"), TEXT),
@@ -33,7 +36,8 @@ Files = Mapping[str, Path]
 @memory_errors()
 def robustness_table(
     models: Mapping[str, Files],
-    train_frames: Files,
+    descriptors: Files,
+    structure: Files,
     test_frames: Files,
     labels: Path,
     device: Literal["auto", "cpu", "cuda"] = "auto",
@@ -42,7 +46,9 @@ def robustness_table(
 
     Args:
         models: checkpoints of localizers, by training set and name.
-        train_frames: packed training frames by training set; the nearest image is one of them.
+        descriptors: of the training frames and of all test frames, by training set.
+        structure: tables of what :func:`baselines.references.varied.answer_varied` finds on ideal
+            training frames, by effects; empty where there are none.
         test_frames: packed test frames by the name of their effects.
         labels: folder of the true poses, ``train.csv`` and ``test.csv``: the same for all.
         device: where to predict.
@@ -54,13 +60,16 @@ def robustness_table(
     truth, train = read_pose_table(labels / "test.csv"), read_pose_table(labels / "train.csv")
     records = []
     for trained_on, checkpoints in models.items():
-        known = thumbnails(read_packed(train_frames[trained_on])[: len(train)])
-        for effects, frames in test_frames.items():
-            alike = most_alike(known, thumbnails(read_packed(frames)[: len(truth)]), 1)[:, 0]
-            answers = PoseTable(
-                truth.frame, truth.path, train.position_m[alike], train.quat_wxyz[alike]
-            )
-            records.append(_record(trained_on, NEAREST, effects, answers, truth))
+        for method, descriptor in NEAREST.items():
+            for effects in test_frames:
+                known = read_described(descriptors[trained_on], len(train), len(truth), effects)
+                alike = most_alike(*known[descriptor], 1)[:, 0]
+                found = train.position_m[alike], train.quat_wxyz[alike]
+                answers = PoseTable(truth.frame, truth.path, *found)
+                records.append(_record(trained_on, method, effects, answers, truth))
+        for effects, file in structure.items() if trained_on == CLEAN else ():
+            answers = _read_answers(file)
+            records.append(_record(trained_on, STRUCTURE, effects, answers, truth))
         for name, checkpoint in checkpoints.items():
             trained = read_checkpoint(checkpoint, open_device(device))
             input_px = trained.description.network.input_px
@@ -74,6 +83,14 @@ def robustness_table(
 def _record(
     trained_on: str, method: str, effects: str, answers: PoseTable, truth: PoseTable
 ) -> dict[str, object]:
-    scores = summary(pose_errors(answers, truth), truth.path)
+    asked = truth.at(answers.frame)
+    scores = summary(pose_errors(answers, asked), asked.path)
     keys = {"trained_on": trained_on, "method": method, "effects": effects}
-    return {**scores, **keys, "n_test": len(truth)}
+    return {**scores, **keys, "n_test": len(asked)}
+
+
+def _read_answers(path: Path) -> PoseTable:
+    """Poses of some of the test frames, NaN where there is none."""
+    values = read_numbers(path, HEADER, "table of answers", finite=False)
+    frame, straight_path = values[:, :2].astype(np.int64).T
+    return PoseTable(frame, straight_path, values[:, 2:5], values[:, 5:9])

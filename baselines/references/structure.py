@@ -12,9 +12,11 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
+from baselines.references.correspondences import Correspondences
 from baselines.references.evidence import Evidence
 from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
+from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import inverse, pose_matrix
 
 Array = NDArray[np.float64]
@@ -28,28 +30,35 @@ MIN_INLIERS = 8
 
 def on_depth(evidence: Evidence) -> Array:
     """Poses (N, 4, 4) against features lifted by the training frames' depth; NaN where none."""
-    matches = evidence.correspondences
-    world_from_cam = evidence.train.world_from_cam[matches.train]
+    places = lifted(evidence.correspondences, evidence.train)
+    return localize(evidence.correspondences, places, evidence.camera, evidence.seed)
+
+
+def lifted(matches: Correspondences, train: PoseTable) -> Array:
+    """Where (C, 3) the depth of the training frames says matches lie in the world."""
+    world_from_cam = train.world_from_cam[matches.train]
     with np.errstate(invalid="ignore"):  # no depth
         turned = np.einsum("cij,cj->ci", world_from_cam[:, :3, :3], matches.point_m)
-    return localize(evidence, turned + world_from_cam[:, :3, 3])
+    return np.asarray(turned + world_from_cam[:, :3, 3])
 
 
-def localize(evidence: Evidence, point_m: Array) -> Array:
+def localize(matches: Correspondences, point_m: Array, seen_by: CameraConfig, seed: int) -> Array:
     """Poses (N, 4, 4) of the test frames, NaN where none is found.
 
     Args:
-        evidence: matches and camera.
+        matches: of the test frames with the training frames.
         point_m: (C, 3) where the training feature of each match lies in the world; not finite where
             that is not known.
+        seen_by: camera of the test frames.
+        seed: of RANSAC.
     """
-    matches, camera = evidence.correspondences, pinhole(evidence.camera)
+    camera = pinhole(seen_by)
     known = np.asarray(np.isfinite(point_m).all(axis=1))
     poses = np.full((len(matches), 4, 4), np.nan)
     for frame in range(len(matches)):
         usable = np.flatnonzero(known[matches.of(frame)]) + matches.start[frame]
         pixel = matches.slope[usable] * camera.params[:2]
-        pose = absolute_pose(pixel, point_m[usable], camera, evidence.seed)
+        pose = absolute_pose(pixel, point_m[usable], camera, seed)
         if pose is not None:
             poses[frame] = pose
     return poses

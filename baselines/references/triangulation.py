@@ -26,7 +26,7 @@ def on_points(evidence: Evidence, point_m: Array) -> Array:
     track = evidence.tracks.of_feature[evidence.correspondences.feature]
     places = np.full((len(track), 3), np.nan)
     places[track >= 0] = point_m[track[track >= 0]]
-    return localize(evidence, places)
+    return localize(evidence.correspondences, places, evidence.camera, evidence.seed)
 
 
 def triangulate(tracks: Tracks, world_from_cam: Array) -> Array:

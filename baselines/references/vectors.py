@@ -16,15 +16,17 @@ THUMBNAIL, VLAD = "thumbnail", "vlad"
 QUERIES = 500  # looked up at a time
 
 
-def read_described(path: Path, n_train: int, n_test: int) -> Described:
+def read_described(path: Path, n_train: int, n_test: int, test: str = "test") -> Described:
     """The first vectors of each split by descriptor: smaller data sets are prefixes of larger ones.
+
+    ``test`` names the test frames, where there are several of the same poses.
 
     Raises:
         InputError: the file cannot be read.
     """
     names = (THUMBNAIL, VLAD)
-    stored = read_arrays(path, [f"{name}_{split}" for name in names for split in ("train", "test")])
-    return {n: (stored[f"{n}_train"][:n_train], stored[f"{n}_test"][:n_test]) for n in names}
+    stored = read_arrays(path, [f"{name}_{split}" for name in names for split in ("train", test)])
+    return {n: (stored[f"{n}_train"][:n_train], stored[f"{n}_{test}"][:n_test]) for n in names}
 
 
 def most_alike(train: Vectors, test: Vectors, count: int) -> NDArray[np.int64]:

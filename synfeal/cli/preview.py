@@ -17,7 +17,7 @@ OPTIONS: Options = (
             "help": "data set of collect; several are shown side by side",
         },
     ),
-    ("--out", {"type": Path, "help": "GIF to write (preview.gif in the first data set)"}),
+    ("--out", {"type": Path, "help": "GIF or MP4 to write (preview.gif in the first data set)"}),
     ("--frames", {"type": int, "default": 120, "help": "frames to show, from the first (120)"}),
     ("--fps", {"type": float, "default": 12.0, "help": "frames a second, at most 50 (12)"}),
     ("--split", {"choices": ("train", "test"), "default": "train", "help": "(train)"}),
@@ -36,8 +36,8 @@ def run(arguments: argparse.Namespace) -> None:
 COMMAND = Command(
     "preview",
     "see the paths of a data set as a moving picture",
-    "Writes a GIF of the first frames of a data set; of several, with other effects on the same"
-    " paths for example, side by side under their names.",
+    "Writes a GIF or MP4 of the first frames of a data set; of several, with other effects on the"
+    " same paths for example, side by side under their names.",
     "synfeal preview clean blurred --out both.gif",
     OPTIONS,
     run,

@@ -64,7 +64,11 @@ class PoseTable:
         around = slice(edges[edges <= start].max(), edges[edges >= stop].min())
         return self._rows(slice(start, stop), None if self.whole else self._rows(around))
 
-    def _rows(self, part: slice, whole: PoseTable | None = None) -> PoseTable:
+    def at(self, rows: NDArray[np.int64]) -> PoseTable:
+        """Some of the frames, by row."""
+        return self._rows(rows)
+
+    def _rows(self, part: slice | NDArray[np.int64], whole: PoseTable | None = None) -> PoseTable:
         rows = (self.frame[part], self.path[part], self.position_m[part], self.quat_wxyz[part])
         return PoseTable(*rows, whole or self.whole)
 

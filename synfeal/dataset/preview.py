@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.util
+import shutil
+import subprocess
 from collections.abc import Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -22,34 +25,78 @@ TITLE_PX = 16
 def write_preview(
     datasets: Sequence[Path], out: Path, n_frames: int, fps: float, split: Split = "train"
 ) -> int:
-    """Write a GIF of the first frames of data sets, each under its name; how many it shows.
+    """Write a GIF or MP4 of the first frames of data sets, each under its name; how many it shows.
 
     Raises:
-        InputError: a data set has no such frames, or a number is out of its bounds.
+        InputError: a data set has no such frames, a number is out of its bounds, or there is no
+            encoder.
     """
     if n_frames < 1:
         raise InputError(f"--frames: {n_frames} frames are no picture; at least 1 is needed")
     if not 0 < fps <= 50:
         raise InputError(f"--fps: must be above 0 and at most 50, which a GIF can show, not {fps}")
-    if out.suffix.lower() != ".gif":
-        raise InputError(f"--out: {out}: a preview is a GIF; end its name in .gif")
+    write = WRITERS.get(out.suffix.lower())
+    if write is None:
+        raise InputError(f"--out: {out}: a preview is a GIF or MP4; end its name in .gif or .mp4")
+    if write is _write_mp4:
+        encoder()  # missing, it is to be missed before any frame is read
     columns = [frame_paths(read_split(dataset, split), "color.png") for dataset in datasets]
     names = [dataset.resolve().name for dataset in datasets]
     pictures = list(_rows([frames[:n_frames] for frames in columns], names))
     if not pictures:
         raise InputError(f"{datasets[0]}: has no {split} frames; choose the other --split")
     with atomic_path(out) as temporary:
-        pictures[0].save(
-            temporary, "GIF", save_all=True, append_images=pictures[1:], duration=1e3 / fps, loop=0
-        )
+        write(pictures, fps, temporary)
     return len(pictures)
 
 
-def _rows(columns: Sequence[Sequence[FrameFile]], names: Sequence[str]) -> Iterator[Image.Image]:
-    """The frames of all data sets at one moment, until the shortest ends; 256 colours of its own.
+def encoder() -> str:
+    """The program that encodes films: the system's, or that of the wheel ``imageio-ffmpeg``.
 
-    Dithering would flicker, and hide the noise that is to be seen.
+    It is run as a program of its own, so its licence (GPL, for x264) does not reach this one.
+
+    Raises:
+        InputError: there is none.
     """
+    found = shutil.which("ffmpeg")
+    if found is None and importlib.util.find_spec("imageio_ffmpeg") is not None:
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        found = get_ffmpeg_exe()
+    if found is None:
+        raise InputError(
+            "--out: MP4 needs ffmpeg, which is not there; apt-get install ffmpeg or pip install"
+            " 'synfeal[video]', or end the name in .gif"
+        )
+    return str(found)
+
+
+def _write_gif(pictures: Sequence[Image.Image], fps: float, out: Path) -> None:
+    """256 colours for each picture; dithering would flicker, and hide the noise that is shown."""
+    plain = [p.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE) for p in pictures]
+    plain[0].save(out, "GIF", save_all=True, append_images=plain[1:], duration=1e3 / fps, loop=0)
+
+
+def _write_mp4(pictures: Sequence[Image.Image], fps: float, out: Path) -> None:
+    """H.264 in the one pixel format that all browsers play, which has even sides."""
+    width, height = pictures[0].size
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}"]
+    even = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
+    coded = ["-c:v", "libx264", "-crf", "18", "-movflags", "+faststart", *BIT_EXACT]
+    command = [encoder(), "-v", "error", "-y", *raw, "-i", "-", *even, *coded, str(out)]
+    frames = b"".join(picture.tobytes() for picture in pictures)
+    done = subprocess.run(command, input=frames, capture_output=True, check=False)
+    if done.returncode:
+        said = done.stderr.decode(errors="replace").strip().splitlines() or ["it said nothing"]
+        raise InputError(f"--out: ffmpeg cannot write H.264 ({said[-1][:200]}); use .gif")
+
+
+BIT_EXACT = ("-threads", "1", "-fflags", "+bitexact", "-flags:v", "+bitexact")  # no versions in it
+WRITERS = {".gif": _write_gif, ".mp4": _write_mp4}
+
+
+def _rows(columns: Sequence[Sequence[FrameFile]], names: Sequence[str]) -> Iterator[Image.Image]:
+    """The frames of all data sets at one moment, until the shortest ends."""
     for moment in zip(*columns, strict=False):
         tiles = [_tile(file) for file in moment]
         height = max(tile.height for tile in tiles)
@@ -57,7 +104,7 @@ def _rows(columns: Sequence[Sequence[FrameFile]], names: Sequence[str]) -> Itera
         for index, (tile, name) in enumerate(zip(tiles, names, strict=True)):
             row.paste(tile, (index * TILE_WIDTH_PX, TITLE_PX))
             ImageDraw.Draw(row).text((index * TILE_WIDTH_PX + 4, 2), name, "white")
-        yield row.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        yield row
 
 
 def _tile(file: FrameFile) -> Image.Image:

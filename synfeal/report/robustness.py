@@ -7,15 +7,20 @@ from pathlib import Path
 import pandas as pd
 
 from baselines.references.registry import REFERENCES
-from baselines.references.robustness import NEAREST
-from synfeal.frames import write_frame
+from baselines.references.robustness import SCHEMA, STRUCTURE
+from synfeal.config.robustness import CLEAN, MIXED
+from synfeal.frames import read_frame, write_frame
 from synfeal.report.layouts import TITLES
 from synfeal.report.sheet import LINE, VALUE, Sheet, with_bold, write_latex
 
 NAME = "robustness"
-CLEAN, MIXED = "clean", "mixed"
 BLOCKS = {CLEAN: "Trained on ideal frames", MIXED: "Trained on frames with effects mixed in"}
+METHODS = {name: reference.title for name, reference in REFERENCES.items()} | TITLES
 FORMS = {"position_m": ("{:.2f} m", 2), "orientation_deg": ("{:.1f}°", 1)}
+CAPTION = (
+    "The same test paths rendered with effects of a camera and of changing light (config, "
+    "robustness): median errors against the true poses."
+)
 
 
 def write_robustness(table: pd.DataFrame, out_csv: Path, out_tex: Path) -> None:
@@ -24,9 +29,18 @@ def write_robustness(table: pd.DataFrame, out_csv: Path, out_tex: Path) -> None:
     write_latex(out_tex, robustness_sheet(table))
 
 
+def read_robustness(path: Path) -> pd.DataFrame:
+    """The table that :func:`write_robustness` wrote.
+
+    Raises:
+        InputError: it cannot be read or lacks a column.
+    """
+    return read_frame(path, SCHEMA)
+
+
 def robustness_sheet(table: pd.DataFrame) -> Sheet:
     """A row for each of the effects; the lowest error of each method and block is bold."""
-    titles = {**TITLES, NEAREST: REFERENCES[NEAREST].title}
+    titles = {name: METHODS[name] for name in table.method.unique()}
     rows = table[["trained_on", "effects"]].drop_duplicates()
     blocks = rows.groupby("trained_on", sort=False).ngroup()
     rows = rows.iloc[blocks.argsort(kind="stable")].reset_index(drop=True)
@@ -53,19 +67,33 @@ def robustness_sheet(table: pd.DataFrame) -> Sheet:
             "block": rows.trained_on.map(BLOCKS),
             "row": rows.index,
             **{"kind": "truth", "label_note": "", "against": "true poses"},
-            "label": rows.effects.map(_label),
+            "label": rows.effects.map(effects_title),
         }
     )
     return Sheet(
         NAME,
-        "The same test paths rendered with effects of a camera and of changing light (config, "
-        "robustness): median errors against the true poses.",
-        ("Test frames", "Against", *(titles[method] for method in table.method.unique())),
+        CAPTION,
+        ("Test frames", "Against", *titles.values()),
         lines[list(LINE)],
         with_bold(values, [values[key] for key in ("block", "column", "place")])[list(VALUE)],
+        remarks(table),
     )
 
 
-def _label(effects: str) -> str:
+def remarks(table: pd.DataFrame) -> tuple[str, ...]:
+    """How many of the test frames structure-based poses are tested on, and on which map."""
+    counts = table.groupby(table.method == STRUCTURE).n_test.max()
+    if True not in counts:
+        return ()
+    return (
+        f"{METHODS[STRUCTURE]}: {counts[True]:,} of the {counts[False]:,} test frames, spread "
+        "evenly and as large as its features need; its map is of ideal frames.",
+    )
+
+
+def effects_title(effects: str) -> str:
+    """As in ``motion blur, strength 2``; frames without effects are ideal."""
+    if effects == CLEAN:
+        return "ideal"
     name, _, strength = effects.rpartition("_")
     return f"{name.replace('_', ' ')}, strength {strength}" if strength.isdigit() else effects

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from synfeal.config.robustness import CLEAN
 from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
 from synfeal.frames import (
@@ -20,11 +21,13 @@ from synfeal.frames import (
     records_of,
     write_frame,
 )
+from synfeal.report import robustness
 from synfeal.report.assistance import TOTAL
 from synfeal.report.label_error import SCHEMA as LABEL_ERROR
-from synfeal.report.layouts import SOURCES
+from synfeal.report.layouts import SOURCES, TITLES
 from synfeal.report.training_speed import training_rows
 from synfeal.scenes.collision import CURVE_HEADER
+from synfeal.scenes.effects_speed import SCHEMA as EFFECTS_SPEED
 from synfeal.scenes.render_speed_table import SCHEMA as RENDERED
 
 NAME = "speed_vs_error"
@@ -133,9 +136,33 @@ def label_rows(root: Path, scene: str) -> pd.DataFrame:
     )[chosen]
 
 
+def effect_rows(root: Path, scene: str) -> pd.DataFrame:
+    """Effects of camera and light, where they are measured; an item is a frame for the network.
+
+    Seconds are of the processor; an error is the median position error of the localizers trained on
+    ideal frames, the mean over the five. The tables of the paper use ideal frames.
+    """
+    measured = root / "scenes" / scene / "effects_speed.csv"
+    tested = root / "tables" / f"{robustness.NAME}.csv"
+    if not (measured.exists() and tested.exists()):
+        return pd.DataFrame()
+    table = robustness.read_robustness(tested)
+    trained = table[(table.trained_on == CLEAN) & table.method.isin(TITLES)]
+    errors_m = trained.groupby("effects").position_m.mean()
+    speeds = read_frame(measured, EFFECTS_SPEED, "measure again")
+    return speeds.assign(
+        variant=speeds.effects.map(robustness.effects_title),
+        seconds_per_item=speeds.cpu_s_per_frame,
+        error=speeds.effects.map(errors_m),
+        error_unit="m",
+        chosen=speeds.effects.eq(CLEAN).astype(int),
+    )
+
+
 READERS: dict[str, Callable[[Path, str], pd.DataFrame]] = {
     "collision": collision_rows,
     "render": render_rows,
     "labels": label_rows,
     "training": training_rows,
+    "effects": effect_rows,
 }

@@ -19,6 +19,8 @@ from synfeal.report.recall import NAME as RECALL
 from synfeal.report.recall import read_recall_table, recall_sheet
 from synfeal.report.references import NAME as REFERENCES
 from synfeal.report.references import read_references, references_sheet
+from synfeal.report.robustness import NAME as ROBUSTNESS
+from synfeal.report.robustness import read_robustness, robustness_sheet
 from synfeal.report.sheet import sheet_markdown
 
 ALIVE = "table4_size"
@@ -58,6 +60,9 @@ def write_summary(design: Design, root: Path, out_md: Path) -> str:
     recalls = root / "tables" / f"{RECALL}.csv"
     if recalls.exists():
         sheets.append(recall_sheet(design, read_recall_table(recalls)))
+    robust = root / "tables" / f"{ROBUSTNESS}.csv"
+    if robust.exists():
+        sheets.append(robustness_sheet(read_robustness(robust)))
     parts = [
         INTRO.format(profile=root.name),
         "## Do the localizers localize?\n",

@@ -25,9 +25,9 @@ from baselines.training.record import training_parameters
 from synfeal.config import Run, check_mesh_files, parse_config, read_design
 from synfeal.config.load import read_yaml
 from synfeal.config.mesh_files import check_results
-from synfeal.config.dataset import refuse_long_exposure
 from synfeal.config.experiments import INJECTED
 from synfeal.config.models import MODELS
+from synfeal.config.robustness import CLEAN, MIXED
 from synfeal.dataset.archive import SUFFIX
 from synfeal.dataset.finish import origin_of
 from synfeal.dataset.sequences import sequences_of
@@ -60,6 +60,7 @@ ARCHIVE = SUFFIX if CONFIG.archive_sequences else ""
 SPLITS = ("train", "test")
 RUNS = DESIGN.runs
 TABLE_NAMES = ["table1_meshes", *DESIGN.tables]
+DRAWN_TABLES = ("table3_inconsistencies", "table4_size")
 RECONSTRUCTED = tuple(METHODS)
 EXTERNAL = CONFIG.references.external
 ROBUSTNESS = CONFIG.robustness
@@ -80,7 +81,7 @@ wildcard_constraints:
     error_kind="|".join(INJECTED),
     reconstructed="|".join(RECONSTRUCTED),
     external="|".join(EXTERNAL) or "none",
-    effects="|".join([*CONFIG.robustness.effects, "mixed"]),
+    effects="|".join([CLEAN, *CONFIG.robustness.effects, MIXED]),
     frame_method="|".join(frame_methods()),
     graph_method="|".join(graph_methods()),
 
@@ -292,6 +293,11 @@ def passing_files():
             for split in SPLITS
             if has_structure(EXPERIMENTS, s, z)
         ),
+        *(
+            f.replace("/frames/", "/shards/")
+            for f in robustness_files()
+            if "/robustness/frames/" in f
+        ),
     ]
 
 
@@ -381,12 +387,9 @@ def scene_seed(scene):
     return CONFIG.seed if own is None else own
 
 
-# Of a mesh of one's own nothing is known of its lamps.
-ROBUST_EFFECTS = [
-    name
-    for name, effects in ROBUSTNESS.effects.items()
-    if not (effects.light and effects.light.states and has_path(ROBUSTNESS.scene))
-]
+VARIATIONS = ROBUSTNESS.rendered(CONFIG.collection, has_path(ROBUSTNESS.scene))
+ROBUST_EFFECTS = [name for name in VARIATIONS if name != MIXED]
+ROBUST_STRUCTURE = has_structure(EXPERIMENTS, ROBUSTNESS.scene, ROBUSTNESS.size)
 
 
 def robust_run(model):
@@ -395,42 +398,76 @@ def robust_run(model):
     )
 
 
-def varied_effects(wildcards):
-    return {**ROBUSTNESS.effects, "mixed": ROBUSTNESS.mixed}[wildcards.effects]
+def robust_frames(split):
+    return CONFIG.n_frames(ROBUSTNESS.scene, ROBUSTNESS.size, split)
+
+
+def varied_training_frames(wildcards):
+    """What a training set of the robustness table looks like."""
+    if wildcards.trained_on == MIXED:
+        return f"{ROOT}/robustness/frames/{MIXED}/train.npy"
+    return f"{ROOT}/frames/{ROBUSTNESS.scene}/train.npy"
 
 
 def varied_render(wildcards):
-    effects = varied_effects(wildcards)
+    effects = VARIATIONS.get(wildcards.effects, CONFIG.render.effects)
     return dump(CONFIG.render.model_copy(update={"effects": effects}))
 
 
-def robustness_files(wildcards):
+def varied_shares(names):
+    """The shares of the scene's light, where one of these variations switches its lamps."""
+    usual = CONFIG.render.effects
+    files = [
+        shares_for(ROBUSTNESS.scene, VARIATIONS.get(name, usual)) for name in names
+    ]
+    return sorted({file for shares in files for file in shares})
+
+
+def varied_tests(clean, varied):
+    """Test frames by the name of their effects, as inputs of a rule."""
+    return {
+        CLEAN: clean,
+        **{name: varied.format(effects=name) for name in ROBUST_EFFECTS},
+    }
+
+
+def robustness_files():
     """An output of every job of the robustness table, where it has rows and its data set is trained
     on here."""
     robust = ROBUSTNESS
     wanted = (robust.scene, robust.size, "synfeal", "pretrained")
     made = any((r.scene, r.size, r.labels, r.init) == wanted for r in RUNS)
-    if not (robust.effects and made) or RESTORED:
+    if not (ROBUST_EFFECTS and made) or RESTORED:
         return []
-    try:
-        for name, effects in {**robust.effects, "mixed": robust.mixed}.items():
-            refuse_long_exposure(effects, CONFIG.collection, f"robustness: {name}")
-    except ValueError as error:
-        sys.exit(f"error: {error}")
-    varied = [robust.effects[name] for name in ROBUST_EFFECTS] + [robust.mixed]
+    frames = [(MIXED, "train"), *((name, "test") for name in VARIATIONS)]
     return [
-        *(f for effects in varied for f in shares_for(robust.scene, effects)),
-        *(f"{ROOT}/robustness/frames/{e}/test.npy" for e in [*ROBUST_EFFECTS, "mixed"]),
-        f"{ROOT}/robustness/frames/mixed/train.npy",
+        *varied_shares(VARIATIONS),
+        *(f"{ROOT}/robustness/frames/{name}/{split}.npy" for name, split in frames),
         *(f"{ROOT}/robustness/runs/{model}/model.pt" for model in MODELS),
+        *(f"{ROOT}/robustness/descriptors/{t}.npz" for t in (CLEAN, MIXED)),
+        *varied_structure(),
+        f"{ROOT}/scenes/{robust.scene}/effects_speed.csv",
         f"{ROOT}/tables/robustness.csv",
     ]
 
 
-def robustness_tables(wildcards):
-    """The robustness table in both formats, where it is made."""
-    made = [f for f in robustness_files(wildcards) if f.endswith("robustness.csv")]
-    return [f.removesuffix("csv") + ending for f in made for ending in ("csv", "tex")]
+def varied_structure():
+    """Structure-based poses of the varied test frames, where there are frames with depth."""
+    names = [CLEAN, *ROBUST_EFFECTS] if ROBUST_STRUCTURE else []
+    return [f"{ROOT}/robustness/structure/{name}.csv" for name in names]
+
+
+def robustness_tables(kind="csv"):
+    """The robustness table, where it is made."""
+    return [f"{ROOT}/tables/robustness.{kind}"] if robustness_files() else []
+
+
+def drawn_robustness():
+    """What figures and speeds read of it, where anything is drawn of training runs."""
+    if not (robustness_files() and set(TABLE_NAMES) & set(DRAWN_TABLES)):
+        return []
+    speed = f"{ROOT}/scenes/{ROBUSTNESS.scene}/effects_speed.csv"
+    return [speed, *robustness_tables()]
 
 
 def label_figures():
@@ -535,6 +572,7 @@ def files_of_evidence():
     return [
         *files_of_runs(),
         *files_of_references(),
+        *robustness_files(),
         *coverages(),
         *manifests("groundtruth"),
         *(f"{ROOT}/scenes/{scene}/render_speed.csv" for scene in scenes),

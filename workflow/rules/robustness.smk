@@ -27,7 +27,7 @@ rule light_shares:
 
 rule render_varied:
     input:
-        light=lambda w: shares_for(ROBUSTNESS.scene, varied_effects(w)),
+        light=lambda w: varied_shares([w.effects]),
         mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
         plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/{{split}}.csv",
     output:
@@ -45,7 +45,7 @@ rule render_varied:
     params:
         camera=dump(CONFIG.network_camera),
         start=0,
-        stop=lambda w: CONFIG.n_frames(ROBUSTNESS.scene, ROBUSTNESS.size, w.split),
+        stop=lambda w: robust_frames(w.split),
         input_px=CONFIG.network.input_px,
         view=CONFIG.network.view,
         render=varied_render,
@@ -101,10 +101,7 @@ rule train_varied:
     resources:
         mem_mb=lambda w, attempt: attempt
         * training_mb(
-            sum(
-                CONFIG.n_frames(ROBUSTNESS.scene, ROBUSTNESS.size, split)
-                for split in SPLITS
-            ),
+            sum(map(robust_frames, SPLITS)),
             CONFIG.network,
             CONFIG.training.batch_size,
         ),
@@ -114,12 +111,101 @@ rule train_varied:
         "../scripts/train.py"
 
 
+# Vectors of the ideal and of the varied frames: what the map of each training set is searched by.
+rule varied_descriptors:
+    input:
+        **varied_tests(
+            f"{ROOT}/frames/{ROBUSTNESS.scene}/test.npy",
+            f"{VARIED}/frames/{{effects}}/test.npy",
+        ),
+        train=varied_training_frames,
+    output:
+        descriptors=f"{VARIED}/descriptors/{{trained_on}}.npz",
+    log:
+        f"{ROOT}/logs/varied_descriptors/{{trained_on}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/varied_descriptors/{{trained_on}}.tsv"
+    wildcard_constraints:
+        trained_on=f"{CLEAN}|{MIXED}",
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(3000),
+    params:
+        frames={
+            **dict.fromkeys([CLEAN, *ROBUST_EFFECTS], robust_frames("test")),
+            "train": robust_frames("train"),
+        },
+        learned_from=smallest_train(ROBUSTNESS.scene),
+        seed=seed_of(CONFIG.seed, "descriptors", ROBUSTNESS.scene),
+    script:
+        "../scripts/descriptors.py"
+
+
+# A sample of the test frames, large enough for features, against the map of the ideal frames.
+rule varied_structure:
+    input:
+        light=lambda w: varied_shares([w.effects]),
+        mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
+        plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/test.csv",
+        descriptors=f"{VARIED}/descriptors/clean.npz",
+        features=f"{ROOT}/references/{ROBUSTNESS.scene}/{ROBUSTNESS.size}/features-train.npz",
+        labels=f"{ROOT}/labels/{ROBUST_SET}/train.csv",
+    output:
+        predictions=f"{VARIED}/structure/{{effects}}.csv",
+    log:
+        f"{ROOT}/logs/varied_structure/{{effects}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/varied_structure/{{effects}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(3000),
+    params:
+        n_test=robust_frames("test"),
+        sample=ROBUSTNESS.structure_frames,
+        camera=dump(CONFIG.groundtruth_camera),
+        render=varied_render,
+        references=dump(CONFIG.references, exclude={"coordinate_samples"}),
+        seed=seed_of(CONFIG.seed, "references", *ROBUST_SET.split("/")),
+    script:
+        "../scripts/varied_structure.py"
+
+
+rule effects_speed:
+    input:
+        light=varied_shares(VARIATIONS),
+        mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
+        plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/test.csv",
+    output:
+        speed=f"{ROOT}/scenes/{ROBUSTNESS.scene}/effects_speed.csv",
+    log:
+        f"{ROOT}/logs/effects_speed.log",
+    benchmark:
+        f"{ROOT}/benchmarks/effects_speed.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(3000),
+    params:
+        camera=dump(CONFIG.network_camera),
+        render=dump(CONFIG.render),
+        effects={name: dump(VARIATIONS[name]) for name in ROBUST_EFFECTS},
+    script:
+        "../scripts/effects_speed.py"
+
+
 rule robustness:
     input:
         clean=[f"{ROOT}/runs/{robust_run(m).directory}/model.pt" for m in MODELS],
         mixed=expand(f"{VARIED}/runs/{{model}}/model.pt", model=MODELS),
-        train=f"{ROOT}/frames/{ROBUSTNESS.scene}/train.npy",
-        mixed_train=f"{VARIED}/frames/mixed/train.npy",
+        descriptors=expand(
+            f"{VARIED}/descriptors/{{trained_on}}.npz", trained_on=[CLEAN, MIXED]
+        ),
+        structure=varied_structure(),
         test=f"{ROOT}/frames/{ROBUSTNESS.scene}/test.npy",
         varied=expand(f"{VARIED}/frames/{{effects}}/test.npy", effects=ROBUST_EFFECTS),
         labels=expand(f"{ROOT}/labels/{ROBUST_SET}/{{split}}.csv", split=SPLITS),

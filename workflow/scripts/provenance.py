@@ -12,6 +12,6 @@ with job(snakemake.log[0]):
         snakemake.params.seed,
         snakemake.params.config_hash,
         measured,
-        [Path(path) for path in (*snakemake.input.results, *snakemake.input.robustness)],
+        [Path(path) for path in snakemake.input.results],
         out_json,
     )

@@ -95,6 +95,9 @@ STAGES: dict[str, Stage] = {
     "render_varied": Stage("effects/split", "Msamples"),
     "pack_varied": Stage("effects/split", "MB"),
     "train_varied": Stage("model", "TFLOP"),
+    "varied_descriptors": Stage("trained_on", "frames", disk=DESCRIPTORS),
+    "varied_structure": Stage("effects", "frames", ("test",), disk=POSE),
+    "effects_speed": Stage(),
     "render_speed": Stage("scene", "image sizes"),
     **dict.fromkeys(("collection_speed", "tables"), Stage()),
     "claims": Stage("", "frames"),
@@ -242,6 +245,16 @@ def _varied(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
     return {**job, **{name: job[name] * drawn for name in ("size", "other") if name in job}}
 
 
+def _varied_tests(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
+    """All frames of a training set and of every test; of each test a sample."""
+    robust, config = profile.config.robustness, profile.config
+    train, test = (config.n_frames(robust.scene, robust.size, s) for s in ("train", "test"))
+    if "effects" in part:
+        return {"size": min(test, robust.structure_frames)}
+    frames = train + test * (1 + len(robust.effects))
+    return {"size": frames, "disk_bytes": kind.disk * frames}
+
+
 def _train_varied(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
     robust = profile.config.robustness
     return _train(profile, {**part, "scene": robust.scene, "size": robust.size}, kind)
@@ -265,6 +278,7 @@ OWN_SIZES: dict[str, Callable[[Profile, Part, Stage], dict[str, float]]] = {
     "coordinate_references": _coordinates,
     **dict.fromkeys(("render_varied", "pack_varied"), _varied),
     "train_varied": _train_varied,
+    **dict.fromkeys(("varied_descriptors", "varied_structure"), _varied_tests),
     "render_speed": _render_speed,
     "claims": _claims,
 }

@@ -16,6 +16,7 @@ from synfeal.report.figures import (
     poses,
     references_by_noise,
     render_speed,
+    robustness,
     speed_vs_error,
     trajectories,
 )
@@ -80,6 +81,12 @@ FIGURES: dict[str, Entry] = {
         "true poses, beside the published values in light grey, which come from the paper's own "
         "meshes and numbers of frames; dark grey lines are the mean training pose, the nearest "
         "training image and, where frames have depth, structure on depth.",
+    ),
+    "robustness": Entry(
+        robustness.draw,
+        "Median error on the same test paths rendered with effects of a camera and of changing "
+        "light, with 95 % limits, for methods that know ideal frames and for those that know "
+        "frames with effects mixed in; dotted lines are their errors on ideal frames.",
     ),
     "cumulative_error": Entry(
         cumulative_error.draw,

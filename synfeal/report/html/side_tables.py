@@ -12,7 +12,15 @@ from markupsafe import Markup
 
 from synfeal.evaluation.metrics import BOUNDS, MEANS, ORIENTATION, POSITION
 from synfeal.frames import read_frame, read_records
-from synfeal.report import assistance, label_error, meshes, recall, references, speed_vs_error
+from synfeal.report import (
+    assistance,
+    label_error,
+    meshes,
+    recall,
+    references,
+    robustness,
+    speed_vs_error,
+)
 from synfeal.report.hard_cases import table as hard_cases
 from synfeal.report.hard_cases.text import Row, error_text, judged, short
 from synfeal.report.html.sortable import Column, sortable
@@ -86,6 +94,26 @@ def recall_table(path: Path) -> Markup:
         labels=table.labels.map(references.label_title), model=table.model.map(TITLES)
     )
     return sortable(recall.NAME, caption, columns, table)
+
+
+def robustness_table(path: Path) -> Markup:
+    """A row for each training set and each of the effects; both errors in a cell."""
+    table = robustness.read_robustness(path)
+    texts = [table[measure].map(form.format) for measure, (form, _) in robustness.FORMS.items()]
+    text = texts[0].str.cat(texts[1], ", ").where(table.position_m.notna(), "failed")
+    rows = pd.MultiIndex.from_frame(table[["trained_on", "effects"]].drop_duplicates())
+    wide = table.assign(text=text).pivot(index=rows.names, columns="method").reindex(rows)
+    shown = wide["position_m"].join(wide["text"].fillna("–"), rsuffix="_text").reset_index()
+    shown = shown.assign(effects=shown.effects.map(robustness.effects_title))
+    columns = [
+        *(Column("Trained on", "trained_on"), Column("Test frames", "effects")),
+        *(
+            Column(robustness.METHODS[name], name, text=f"{name}_text")
+            for name in table.method.unique()
+        ),
+    ]
+    caption = escape(" ".join((robustness.CAPTION, *robustness.remarks(table))))
+    return sortable(robustness.NAME, f"<b>Robustness.</b> {caption}", columns, shown)
 
 
 def assistance_table(path: Path) -> Markup:
@@ -188,6 +216,7 @@ def hard_cases_table(path: Path) -> Markup:
 SIDE_TABLES: Mapping[str, tuple[str, Callable[[Path], Markup]]] = {
     references.NAME: ("References", references_table),
     recall.NAME: ("Recall", recall_table),
+    robustness.NAME: ("Robustness", robustness_table),
     assistance.NAME: ("Assistance", assistance_table),
     label_error.NAME: ("Label errors", label_error_table),
     speed_vs_error.NAME: ("Speed against error", speed_table),
