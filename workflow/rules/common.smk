@@ -293,11 +293,7 @@ def passing_files():
             for split in SPLITS
             if has_structure(EXPERIMENTS, s, z)
         ),
-        *(
-            f.replace("/frames/", "/shards/")
-            for f in robustness_files()
-            if "/robustness/frames/" in f
-        ),
+        *(f"{ROOT}/robustness/shards/{e}/{split}.npy" for e, split in varied_sets()),
     ]
 
 
@@ -431,22 +427,28 @@ def varied_tests(clean, varied):
     }
 
 
-def robustness_files():
-    """An output of every job of the robustness table, where it has rows and its data set is trained
-    on here."""
-    robust = ROBUSTNESS
-    wanted = (robust.scene, robust.size, "synfeal", "pretrained")
+def varied_sets():
+    """Effects and split of the frames of the robustness table, where it has rows and its data set
+    is trained on here."""
+    wanted = (ROBUSTNESS.scene, ROBUSTNESS.size, "synfeal", "pretrained")
     made = any((r.scene, r.size, r.labels, r.init) == wanted for r in RUNS)
     if not (ROBUST_EFFECTS and made) or RESTORED:
         return []
-    frames = [(MIXED, "train"), *((name, "test") for name in VARIATIONS)]
+    return [(MIXED, "train"), *((name, "test") for name in VARIATIONS)]
+
+
+def robustness_files():
+    """An output of every job of the robustness table."""
+    sets = varied_sets()
+    if not sets:
+        return []
     return [
         *varied_shares(VARIATIONS),
-        *(f"{ROOT}/robustness/frames/{name}/{split}.npy" for name, split in frames),
+        *(f"{ROOT}/robustness/frames/{name}/{split}.npy" for name, split in sets),
         *(f"{ROOT}/robustness/runs/{model}/model.pt" for model in MODELS),
         *(f"{ROOT}/robustness/descriptors/{t}.npz" for t in (CLEAN, MIXED)),
         *varied_structure(),
-        f"{ROOT}/scenes/{robust.scene}/effects_speed.csv",
+        f"{ROOT}/scenes/{ROBUSTNESS.scene}/effects_speed.csv",
         f"{ROOT}/tables/robustness.csv",
     ]
 
