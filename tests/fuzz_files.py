@@ -7,7 +7,6 @@ import math
 import shutil
 from collections.abc import Callable
 from collections.abc import Sequence as Sequence_
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,46 +39,19 @@ from synfeal.dataset.packed_record import write_packed_record
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.sequences import Sequence
 from synfeal.dataset.sevenscenes import pose_text, read_depth_m, read_pose, read_split, write_splits
-from synfeal.dataset.unfinished import WORK, check_settings
 from synfeal.files import write_json
-from synfeal.frames import records_of
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import Triangles, load_collision_mesh, save_collision_mesh
 from synfeal.planning.repeat import read_poses
-from synfeal.report import assistance, label_error, meshes, speed_vs_error
 from synfeal.report.assistance import assistance_record
-from synfeal.report.cells import schema_of
-from synfeal.report.claims import table as claims
-from synfeal.report.claims.evidence import Cell, evidence_of
-from synfeal.report.claims.model import Missing, published_claims
-from synfeal.report.claims.simulator import collection_rate
-from synfeal.report.claims.training import read_history
-from synfeal.report.compare.runs import read_run
-from synfeal.report.figures.cumulative_error import scene_errors
-from synfeal.report.figures.sources import Results
-from synfeal.report.html.claims import claims_table, read_claims
-from synfeal.report.html.origin import cost_sentence, origin_html, read_origin
-from synfeal.report.html.side_tables import (
-    assistance_table,
-    label_error_table,
-    meshes_table,
-    speed_table,
-)
-from synfeal.report.html.stages import read_stages
-from synfeal.report.label_error import cost_record
-from synfeal.report.latex import HEADER, table_bodies, write_text
-from synfeal.report.meshes import write_meshes_table
-from synfeal.report.speed_vs_error import collision_rows, label_rows
 from synfeal.report.stats import combine, read_metrics
 from synfeal.report.tables import Value, write_rows
-from synfeal.scenes.collision import CURVE_HEADER
 from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.images import read_color, read_depth_mm
 from synfeal.validation.run import validate
 from tests.mesh_samples import UV, box_mesh, store_gltf, textured, triangle_gltf, write_obj
 from tests.planar_scene import straight_path
-from tests.report_results import design_of, experiment
 
 CAMERA = CameraConfig(width=24, height=18)
 N = 6
@@ -348,41 +320,24 @@ def _weights(folder: Path) -> Path:
     return folder / "googlenet.pt"
 
 
-SEED_DIRECTORY = "runs/large_room/6k/synfeal/pretrained/posenet/seed0"
-ROW = experiment("table4_size")
-
-
-def _run(folder: Path) -> Path:
-    """Predictions, errors and metrics of every localizer of one row, and their labels."""
-    from synfeal.config import MODELS
-
-    for split in ("train", "test"):
-        _table(folder / "labels/large_room/6k/synfeal", f"{split}.csv")
-    for model in MODELS:
-        seed = folder / SEED_DIRECTORY.replace("posenet", model)
-        _table(seed, "predictions.csv")
-        labels = folder / "labels/large_room/6k/synfeal/test.csv"
-        outputs = seed / "errors.csv", seed / "metrics.json"
-        score_run(seed / "predictions.csv", labels, labels, labels, *outputs, {})
-    return folder / SEED_DIRECTORY
+def _predictions(folder: Path) -> Path:
+    return _table(folder, "predictions.csv")
 
 
 def _score(path: Path) -> object:
-    root = path.parents[7]
-    labels = root / "labels/large_room/6k/synfeal/test.csv"
+    outputs = path.with_name("e.csv"), path.with_name("m.json")
     try:
-        score_run(path, labels, labels, labels, root / "e.csv", root / "m.json", {})
-        return json.loads((root / "m.json").read_text())
+        score_run(path, *3 * [_table(path.parents[1] / "labels")], *outputs, {})
+        return json.loads(outputs[1].read_text())
     finally:
-        for name in ("e.csv", "m.json"):
-            (root / name).unlink(missing_ok=True)
+        for output in outputs:
+            output.unlink(missing_ok=True)
 
 
-def _evidence(path: Path) -> object:
-    evidence = evidence_of(design_of([ROW]), path.parents[7])
-    with suppress(Missing):  # which ends in a verdict
-        return evidence.errors(Cell("posenet"))
-    return None
+def _metrics(folder: Path) -> Path:
+    labels = _table(folder, "labels.csv")
+    score_run(labels, labels, labels, labels, folder / "errors.csv", folder / "metrics.json", {})
+    return folder / "metrics.json"
 
 
 def _labels_estimated(folder: Path) -> Path:
@@ -400,52 +355,6 @@ def _labels_estimated(folder: Path) -> Path:
     return path
 
 
-def _collected(folder: Path) -> Path:
-    for scene in ("large_room", "sanctuary"):
-        speed = {"width": 640, "height": 480, "frames_per_s": [5.0, 6.0]}
-        speed |= {"processor": "Abacus 9", "cores": 2}
-        write_json(folder / "scenes" / scene / "collection_speed.json", speed)
-    return folder / "scenes/large_room/collection_speed.json"
-
-
-def _rate(path: Path) -> object:
-    claim = next(claim for claim in published_claims() if claim.id == "C14")
-    both = [ROW, ROW.model_copy(update={"scene": "sanctuary"})]
-    return collection_rate(claim, evidence_of(design_of(both), path.parents[2]))
-
-
-def _curve(folder: Path) -> Path:
-    path = folder / "scenes/large_room/collision_curve.csv"
-    path.parent.mkdir(parents=True)
-    n = CURVE_HEADER.count(",") + 1
-    rows = [",".join(["1.0"] * (n - 1) + ["0"]) for _ in range(2)]
-    path.write_text("\n".join([CURVE_HEADER, *rows]) + "\n")
-    return path
-
-
-def _properties(folder: Path) -> Path:
-    path = folder / "scenes/large_room/properties.json"
-    write_json(path, {"vertices": 5000, "faces": 9000, "volume_m3": 88.25, "findings": []})
-    return path
-
-
-def _meshes_table(path: Path) -> None:
-    root = path.parents[2]
-    try:
-        write_meshes_table(["large_room"], root, root / "t.csv", root / "t.tex")
-    finally:
-        for name in ("t.csv", "t.tex"):
-            (root / name).unlink(missing_ok=True)
-
-
-SETTINGS = {"seed": 0, "scene": {"unit_m": 1.0}}
-
-
-def _job(folder: Path) -> Path:
-    write_json(folder / WORK / "settings.json", SETTINGS)
-    return folder / WORK / "settings.json"
-
-
 def table_of(name: str, columns: Sequence_[str], **cells: Value) -> Callable[[Path], Path]:
     """A table of two like rows: 1 but for ``cells``."""
 
@@ -457,84 +366,12 @@ def table_of(name: str, columns: Sequence_[str], **cells: Value) -> Callable[[Pa
     return make
 
 
-def _label_errors(folder: Path) -> Path:
-    cells = {"scene": "large_room", "method": "sfm", "split": "total", "assistance": "after"}
-    return table_of("label_error", [*label_error.SCHEMA], **cells)(folder)
-
-
-def _provenance(folder: Path) -> Path:
-    stage = {"stage": "plan", "jobs": 2, "seconds": 9.5, "median_seconds": 4.0, "peak_mb": None}
-    machine = {"processor": "P", "usable_cores": 2, "memory_gib": 8.0, "gpu": None}
-    record = dict.fromkeys(("commit", "config_sha256", "python", "platform", "time_utc"), "x")
-    record |= {"seed": 0, "packages": {"numpy": "2"}, "machine": machine, "stages": [stage]}
-    write_json(folder / "provenance.json", record)
-    return folder / "provenance.json"
-
-
-def _latex(folder: Path) -> Path:
-    write_text(folder / "t.tex", HEADER + "a table")
-    return folder / "t.tex"
-
-
-def _origin(path: Path) -> str:
-    record = read_origin(path)
-    return origin_html(record) + cost_sentence(record)
-
-
-def of_run(name: str) -> Callable[[Path], Path]:
-    return lambda folder: _run(folder) / name
-
-
-def _facts(folder: Path) -> Path:
-    _labels_estimated(folder)
-    return folder / "groundtruth/large_room/6k/sfm/train/batch-000.json"
-
-
-def _history(folder: Path) -> Path:
-    path = folder / "runs/large_room/6k/synfeal/scratch/posenet/seed0/history.csv"
-    path.parent.mkdir(parents=True)
-    header = "samples_seen,loss,learning_rate"
-    held_out = "held_out_loss,held_out_position_m,held_out_orientation_deg"
-    path.write_text(f"{header},{held_out}\n9,1.0,0.1,,,\n18,0.9,0.1,0.5,0.25,9.5\n")
-    return path
-
-
-def _benchmark(folder: Path) -> Path:
-    path = folder / "benchmarks/plan/large_room/train.tsv"
-    path.parent.mkdir(parents=True)
-    path.write_text("s\th:m:s\tmax_rss\n1.5\t0:00:01\t99.0\n2.5\t0:00:02\t-\n")
-    return path
-
-
 def _material(folder: Path) -> Path:
     return _obj(folder).with_suffix(".mtl")
 
 
 def _texture(folder: Path) -> Path:
     return _obj(folder).with_name("wall.png")
-
-
-_claims = table_of(
-    "claims",
-    claims.COLUMNS,
-    id="C1",
-    verdict_labels="holds",
-    verdict_true="opposite",
-    evidence="a;b",
-)
-_assistance_table = table_of(
-    "assistance", [*assistance.SCHEMA], scene="large_room", size="6k", method="sfm", split="total"
-)
-_speeds = table_of(
-    "speed_vs_error", [*speed_vs_error.SCHEMA], scene="large_room", stage="collision", faces=9
-)
-
-_sizes = table_of("table4_size", [*schema_of("table4_size")], scene="a", size="6k", model="posenet")
-
-
-def _figure_table(path: Path) -> list[float]:
-    table = Results(path.parents[1], design_of(())).table(path.stem)
-    return table.select_dtypes("number").to_numpy(float).ravel().tolist()
 
 
 ROOM = ("sfm", "large_room", "6k")
@@ -577,19 +414,8 @@ KINDS: tuple[Kind, ...] = (
     Kind("collision mesh", _collision, load_collision_mesh, is_triangles, n_flips=60),
     Kind("checkpoint", _checkpoint, _read_checkpoint, is_statistics, n_flips=40),
     Kind("backbone", _weights, lambda p: load_backbone_weights(_network(), p), n_flips=40),
-    Kind("predictions", of_run("predictions.csv"), _score, finite_numbers, ","),
-    Kind(
-        "predictions, compared", of_run("predictions.csv"), lambda p: read_run([p.parent]), form=","
-    ),
-    Kind("errors, compared", of_run("errors.csv"), lambda p: read_run([p.parent]), form=","),
-    Kind("errors, claims", of_run("errors.csv"), _evidence, form=","),
-    Kind(
-        "errors, figure",
-        of_run("errors.csv"),
-        lambda p: scene_errors(Results(p.parents[7], design_of((ROW,))), ROW),
-        form=",",
-    ),
-    Kind("metrics", of_run("metrics.json"), lambda p: combine([read_metrics(p)]), form="json"),
+    Kind("predictions", _predictions, _score, finite_numbers, ","),
+    Kind("metrics", _metrics, lambda p: combine([read_metrics(p)]), form="json"),
     Kind(
         "assistance",
         _labels_estimated,
@@ -597,49 +423,4 @@ KINDS: tuple[Kind, ...] = (
         finite_numbers,
         "json",
     ),
-    Kind(
-        "facts of a batch",
-        _facts,
-        lambda p: cost_record(p.parents[5], *ROOM, ("train", "test"), 9),
-        finite_numbers,
-        "json",
-    ),
-    Kind("speed of collecting", _collected, _rate, form="json"),
-    Kind("history of a claim", _history, read_history),
-    Kind(
-        "measured job",
-        _benchmark,
-        lambda p: [vars(s) for s in read_stages([p], p.parents[2])],
-        finite_numbers,
-        "\t",
-    ),
-    Kind(
-        "collision curve",
-        _curve,
-        lambda p: records_of(collision_rows(p.parents[2], "large_room")),
-        finite_numbers,
-        ",",
-    ),
-    Kind("properties", _properties, _meshes_table, form="json"),
-    Kind("unfinished job", _job, lambda p: check_settings(p.parents[1], SETTINGS), form="json"),
-    Kind("claims", _claims, lambda p: claims_table(read_claims(p)), form=","),
-    Kind("provenance", _provenance, _origin, form="json"),
-    Kind(
-        "table of meshes",
-        table_of(meshes.NAME, [*meshes.SCHEMA], scene="a"),
-        meshes_table,
-        form=",",
-    ),
-    Kind("table of assistance", _assistance_table, assistance_table, form=","),
-    Kind("table of label errors", _label_errors, label_error_table, form=","),
-    Kind("speeds", _speeds, speed_table, form=","),
-    Kind(
-        "label errors",
-        _label_errors,
-        lambda p: records_of(label_rows(p.parents[1], "large_room")),
-        finite_numbers,
-    ),
-    Kind("size table", _sizes, _figure_table, form=","),
-    Kind("speeds, figure", _speeds, _figure_table, form=","),
-    Kind("LaTeX table", _latex, lambda p: table_bodies([p])),
 )

@@ -1,7 +1,5 @@
 """Similarity transforms between point sets."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -9,9 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from synfeal.geometry.alignment import umeyama_sim3
-from synfeal.geometry.rotations import (
-    matrix_from_quat_wxyz,
-)
+from synfeal.geometry.rotations import matrix_from_quat_wxyz
 from tests.property_support import (
     directions,
     few,

@@ -1,7 +1,5 @@
 """Synfeal from Python: the quick start runs, files are the command's, nothing loads early."""
 
-from __future__ import annotations
-
 import copy
 import re
 import subprocess
@@ -21,14 +19,14 @@ pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 QUICKSTART = Path(__file__).parent.parent / "docs" / "quickstart.ipynb"
 
 
-def texts(notebook: nbformat.NotebookNode) -> list[str]:
+def texts(notebook):
     """What each cell of code says: printed, or its value."""
     cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
     said = [[o.get("text") or o.data.get("text/plain", "") for o in c.outputs] for c in cells]
     return ["".join(parts).split(" at 0x")[0] for parts in said]
 
 
-def test_the_quick_start_runs(tmp_path: Path) -> None:
+def test_the_quick_start_runs(tmp_path):
     shown = nbformat.read(QUICKSTART, as_version=4)
     ran = copy.deepcopy(shown)
     place = {"metadata": {"path": tmp_path}}
@@ -41,7 +39,7 @@ def test_the_quick_start_runs(tmp_path: Path) -> None:
     assert synfeal.open_dataset(tmp_path / "mydata").train.poses.position_m.shape == (40, 3)
 
 
-def test_the_functions_make_what_the_command_makes(tmp_path: Path) -> None:
+def test_the_functions_make_what_the_command_makes(tmp_path):
     mesh = save_room(tmp_path / "room.glb")
     assert collect(mesh, tmp_path / "typed") == 0
     options = {"width": 40, "height": 33, "spacing": 0.2, "sequence_frames": 10}
@@ -58,19 +56,19 @@ def test_the_functions_make_what_the_command_makes(tmp_path: Path) -> None:
         synfeal.plan(mesh, 10, colour="red")
 
 
-def test_validate_is_a_function_whatever_was_loaded_before() -> None:
+def test_validate_is_a_function_whatever_was_loaded_before():
     assert callable(report)
     assert callable(synfeal.validate)
 
 
-def loaded_by(code: str, among: set[str]) -> str:
+def loaded_by(code, among):
     """Which of some modules a fresh interpreter has loaded after some code."""
     code = f"{code}\nimport sys; print(*sorted({among!r} & set(sys.modules)))"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return run.stdout.strip()
 
 
-def test_nothing_is_loaded_early_and_collecting_needs_no_networks() -> None:
+def test_nothing_is_loaded_early_and_collecting_needs_no_networks():
     assert not loaded_by("import synfeal", {"numpy", "pydantic", "scipy", "torch", "trimesh"})
     names = ("api", "inspect.run", "validation.run", "export.run", "evaluation.run")
     code = "\n".join(f"import synfeal.{name}" for name in names)

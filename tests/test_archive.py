@@ -1,7 +1,5 @@
 """Archived sequences: unpacked by other programs they are the data set; readers need not unpack."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -18,12 +16,7 @@ from baselines.groundtruth.rgbd.sensor import frame_generator
 from baselines.groundtruth.sfm.images import link_images
 from synfeal.cli import main
 from synfeal.dataset import archive as archive_module
-from synfeal.dataset.archive import (
-    ArchivedFile,
-    foreign_members,
-    frame_file,
-    write_archive,
-)
+from synfeal.dataset.archive import ArchivedFile, foreign_members, frame_file, write_archive
 from synfeal.dataset.manifest import verify_manifest
 from synfeal.dataset.packed import pack_frames, read_packed
 from synfeal.dataset.render_sequence import write_sequence
@@ -37,13 +30,13 @@ pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 
 
 @pytest.fixture(scope="module")
-def planar(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def planar(tmp_path_factory):
     folder = tmp_path_factory.mktemp("planar") / "set"
     write_planar_set(folder)
     return folder
 
 
-def archived(folder: Path, out: Path) -> Path:
+def archived(folder, out):
     """A copy with every sequence as an archive."""
     shutil.copytree(folder, out)
     for directory in sorted(out.glob("seq-*")):
@@ -53,11 +46,11 @@ def archived(folder: Path, out: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def packed(planar: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def packed(planar, tmp_path_factory):
     return archived(planar, tmp_path_factory.mktemp("packed") / "set")
 
 
-def unpacked(folder: Path) -> Path:
+def unpacked(folder):
     """Unpack every archive where it lies, with another program than ours where there is one."""
     unzip = shutil.which("unzip")
     for path in sorted(folder.glob("seq-*.zip")):
@@ -67,15 +60,13 @@ def unpacked(folder: Path) -> Path:
     return folder
 
 
-def test_other_programs_unpack_the_data_set(planar: Path, packed: Path, tmp_path: Path) -> None:
+def test_other_programs_unpack_the_data_set(planar, packed, tmp_path):
     assert sorted(path.name for path in packed.glob("seq-*")) == ["seq-01.zip", "seq-02.zip"]
     copy = Path(shutil.copytree(packed, tmp_path / "set"))
     assert tree_of(unpacked(copy)) == tree_of(planar)
 
 
-def test_nothing_is_compressed_and_nothing_but_frames_decides_the_bytes(
-    planar: Path, packed: Path, tmp_path: Path
-) -> None:
+def test_nothing_is_compressed_and_nothing_but_frames_decides_the_bytes(planar, packed, tmp_path):
     directory = Path(shutil.copytree(planar / "seq-01", tmp_path / "seq-01"))
     for path in directory.iterdir():
         os.utime(path, (1e9, 1e9))
@@ -92,7 +83,7 @@ def test_nothing_is_compressed_and_nothing_but_frames_decides_the_bytes(
     assert data[30 + name_length :][:size] == first
 
 
-def test_readers_see_the_same_frames(planar: Path, packed: Path, tmp_path: Path) -> None:
+def test_readers_see_the_same_frames(planar, packed, tmp_path):
     assert read_split(packed, "test") == [packed / "seq-02.zip"]
     inside, outside = packed / "seq-01.zip", planar / "seq-01"
     for kind, read in (("pose.txt", read_pose), ("depth.png", read_depth_m)):
@@ -115,9 +106,7 @@ def test_readers_see_the_same_frames(planar: Path, packed: Path, tmp_path: Path)
     assert tree_of(tmp_path / "in") == tree_of(tmp_path / "out")
 
 
-def test_validate_passes_archives_as_directories(
-    planar: Path, packed: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_validate_passes_archives_as_directories(planar, packed, capsys):
     reports = []
     for folder in (planar, packed):
         assert main(["validate", str(folder)]) == 0
@@ -127,9 +116,7 @@ def test_validate_passes_archives_as_directories(
 
 
 @pytest.mark.parametrize("to", ["colmap", "nerfstudio", "tum"])
-def test_exports_are_those_of_the_directories(
-    planar: Path, packed: Path, tmp_path: Path, to: str
-) -> None:
+def test_exports_are_those_of_the_directories(planar, packed, tmp_path, to):
     for folder, more in ((planar, ["--copy"]), (packed, [])):
         out = tmp_path / folder.parent.name
         assert main(["export", str(folder), "--to", to, "--out", str(out), *more]) == 0
@@ -138,7 +125,7 @@ def test_exports_are_those_of_the_directories(
     assert not [path for path in second.rglob("*") if path.is_symlink()]
 
 
-def changed(packed: Path, tmp_path: Path, **members: bytes) -> Path:
+def changed(packed, tmp_path, **members):
     """A data set whose first archive has more members, which may replace others."""
     folder = Path(shutil.copytree(packed, tmp_path / "set"))
     with zipfile.ZipFile(folder / "seq-01.zip") as old:
@@ -153,15 +140,13 @@ def changed(packed: Path, tmp_path: Path, **members: bytes) -> Path:
     "name", ["../evil.txt", "/etc/evil", "seq-01/../../evil", "seq-02/frame-000000.color.png",
              "seq-01/sub/evil", "seq-01/..", "evil"]
 )  # fmt: skip
-def test_members_that_unpack_elsewhere_are_found(
-    packed: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_members_that_unpack_elsewhere_are_found(packed, tmp_path, name, capsys):
     folder = changed(packed, tmp_path, **{name: b"evil"})
     assert main(["validate", str(folder)]) == 1
     assert f"seq-01.zip: '{name}' does not unpack to one file in seq-01" in capsys.readouterr().err
 
 
-def test_archives_of_others_are_read(packed: Path, tmp_path: Path) -> None:
+def test_archives_of_others_are_read(packed, tmp_path):
     # 7-Scenes' own hold the directory and thumbnails too, and are compressed.
     folder = changed(packed, tmp_path, **{"seq-01/": b"", "seq-01/Thumbs.db": b"thumbs"})
     assert main(["validate", str(folder)]) == 0
@@ -181,12 +166,10 @@ def test_archives_of_others_are_read(packed: Path, tmp_path: Path) -> None:
         (lambda data: data[:5000] + bytes(9) + data[5009:], r"Bad CRC-32|cannot be decoded"),
     ],
 )
-def test_damage_ends_in_one_line(
-    packed: Path, tmp_path: Path, damage: object, message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_damage_ends_in_one_line(packed, tmp_path, damage, message, capsys):
     folder = Path(shutil.copytree(packed, tmp_path / "set"))
     path = folder / "seq-01.zip"
-    path.write_bytes(damage(path.read_bytes()))  # type: ignore[operator]
+    path.write_bytes(damage(path.read_bytes()))
     assert main(["validate", str(folder)]) == 1
     errors = capsys.readouterr().err.replace("\r", "\n").splitlines()
     assert any(line.startswith("error: ") and re.search(message, line) for line in errors)
@@ -195,9 +178,7 @@ def test_damage_ends_in_one_line(
         verify_manifest(folder)
 
 
-def test_a_member_that_says_it_is_huge_is_not_read(
-    packed: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_member_that_says_it_is_huge_is_not_read(packed, monkeypatch):
     monkeypatch.setattr(archive_module, "MOST_BYTES", 100)
     with pytest.raises(OSError, match="too many for a frame"):
         ArchivedFile(packed / "seq-01.zip", "frame-000000.color.png").read_bytes()
@@ -205,14 +186,14 @@ def test_a_member_that_says_it_is_huge_is_not_read(
         ArchivedFile(packed / "seq-01.zip", "frame-000099.color.png").read_bytes()
 
 
-def test_a_sequence_is_rendered_into_an_archive_or_not_at_all(tmp_path: Path) -> None:
+def test_a_sequence_is_rendered_into_an_archive_or_not_at_all(tmp_path):
     poses = poses_of(3)
     for out in (tmp_path / "plain" / "seq-01", tmp_path / "packed" / "seq-01.zip"):
-        write_sequence(FakeRenderer(), poses, out, True)  # type: ignore[arg-type]
+        write_sequence(FakeRenderer(), poses, out, True)
     assert [path.name for path in (tmp_path / "packed").iterdir()] == ["seq-01.zip"]
     assert tree_of(unpacked(tmp_path / "packed")) == tree_of(tmp_path / "plain")
     with pytest.raises(RuntimeError, match="on fire"):
-        write_sequence(FakeRenderer(2), poses, tmp_path / "none" / "seq-01.zip", True)  # type: ignore[arg-type]
+        write_sequence(FakeRenderer(2), poses, tmp_path / "none" / "seq-01.zip", True)
     assert list((tmp_path / "none").iterdir()) == []
 
 
@@ -220,19 +201,19 @@ FRAMES = ("--frames", "8", "--test-frames", "4", "--width", "40", "--height", "3
 
 
 @pytest.fixture(scope="module")
-def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def mesh(tmp_path_factory):
     path = tmp_path_factory.mktemp("mesh") / "room.glb"
     save_room(path)
     return path
 
 
-def collect(mesh: Path, out: Path, *more: str) -> dict[str, str]:
+def collect(mesh, out, *more):
     command = ["collect", "--mesh", str(mesh), "--out", str(out), *FRAMES, "--packed", "24", *more]
     assert main([*command, "--spacing", "0.2", "--sequence-frames", "4"]) == 0
     return tree_of(out)
 
 
-def test_collections_are_archived(mesh: Path, tmp_path: Path) -> None:
+def test_collections_are_archived(mesh, tmp_path):
     plain = collect(mesh, tmp_path / "plain")
     packed = collect(mesh, tmp_path / "packed", "--archive")
     assert len([name for name in packed if name.endswith(".zip")]) == 3

@@ -1,7 +1,5 @@
 """Backbones: the layout of the official ImageNet files, shapes, and loading of weights."""
 
-from __future__ import annotations
-
 import io
 import urllib.error
 
@@ -71,7 +69,7 @@ def test_a_file_that_is_no_weights_is_refused(tmp_path):
 
 @all_backbones
 def test_without_a_network_the_message_says_where_to_put_the_file(name, tmp_path, monkeypatch):
-    def refuse(url: str, timeout: float) -> None:
+    def refuse(url, timeout):
         raise urllib.error.URLError("no route to host")
 
     monkeypatch.setattr(weights.urllib.request, "urlopen", refuse)

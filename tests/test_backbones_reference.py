@@ -1,14 +1,10 @@
 """The backbones beside torchvision's: with the same weights, the same maps."""
 
-from __future__ import annotations
-
 import importlib.util
-from collections.abc import Iterator
-from types import ModuleType
 
 import pytest
 import torch
-from torch import Tensor, nn
+from torch import nn
 
 from baselines.localizers.backbones.weights import (
     CLASSIFIERS,
@@ -39,7 +35,7 @@ all_backbones = pytest.mark.parametrize("name", LAYERS)
 
 
 @pytest.fixture(scope="module")
-def models() -> Iterator[ModuleType]:
+def models():
     """``torchvision.models``.
 
     Wheels of torchvision are built for torch with CUDA. Beside torch without it their operators
@@ -65,7 +61,7 @@ def _one_thread_and_seed():
     torch.manual_seed(0)
 
 
-def reference(models: ModuleType, name: str) -> nn.Module:
+def reference(models, name):
     """torchvision's network; its batch normalisations do something."""
     network = getattr(models, name)(weights=None, **ARGUMENTS[name])
     for module in network.modules():
@@ -77,9 +73,9 @@ def reference(models: ModuleType, name: str) -> nn.Module:
     return network
 
 
-def outputs(network: nn.Module, layers: tuple[str, ...], images: Tensor) -> list[Tensor]:
+def outputs(network, layers, images):
     """What the layers put out."""
-    found: dict[str, Tensor] = {}
+    found = {}
     for layer in layers:
         hook = lambda _, __, out, layer=layer: found.update({layer: out.clone()})  # noqa: E731
         network.get_submodule(layer).register_forward_hook(hook)

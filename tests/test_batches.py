@@ -4,11 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.chain import chain_batches, chain_unassisted
-from baselines.groundtruth.trajectory import (
-    BatchTrajectory,
-    failed_trajectory,
-    read_trajectory,
-)
+from baselines.groundtruth.trajectory import BatchTrajectory, failed_trajectory, read_trajectory
 from synfeal.config.models import GroundTruthConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.errors import InputError
@@ -103,28 +99,6 @@ def test_failed_batch_is_assisted_counted_and_interpolated():
     turned = Rotation.from_quat(labels.quat_wxyz[:6], scalar_first=True).as_euler("ZYX")[:, 0]
     np.testing.assert_allclose(np.degrees(turned), 3.0 * np.arange(6), atol=1e-9)
     np.testing.assert_allclose(labels.position_m[5:], truth.position_m[5:], atol=1e-12)
-
-
-def test_a_lost_batch_that_stood_still_is_assisted_too():
-    truth = straight_truth(1)
-    truth = table_of(np.tile(truth.world_from_cam, (3, 1, 1)))
-    _, assistance = chain_batches(batches_of(3, 5), [failed_trajectory(3)], truth, CFG)
-    assert assistance.records[0].assisted
-    assert assistance.records[0].error_before_m == 0.0
-
-
-def test_filled_frames_are_counted():
-    truth = straight_truth(6)
-    poses = perfect(truth, batches_of(6, 5))[0].first_from_cam
-    registered = np.array([False, True, False, True, True, True])
-    labels, assistance = chain_batches(
-        batches_of(6, 5), [BatchTrajectory(poses, registered)], truth, CFG
-    )
-    record = assistance.records[0]
-    assert (record.registered, record.filled, record.lost) == (4, 1, False)
-    assert record.assisted  # its first registered frame was placed by the truth
-    assert record.error_before_m < 1e-12
-    np.testing.assert_allclose(labels.position_m, truth.position_m, atol=1e-12)
 
 
 def test_what_does_not_fit_together_is_refused():

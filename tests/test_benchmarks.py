@@ -44,7 +44,7 @@ SWEEP = {
 }
 
 
-def run(sweep: dict, folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
+def run(sweep, folder, *options):
     file = folder / "rates.yaml"
     file.write_text(yaml.safe_dump(sweep, sort_keys=False), encoding="utf-8")
     command = [sys.executable, "-m", "benchmarks", file, "--results", folder]

@@ -1,16 +1,11 @@
 """Nothing blank in silence: what would show nothing is refused or said before it is rendered."""
 
-from __future__ import annotations
-
 import json
 import logging
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from numpy.typing import NDArray
 
 from synfeal.cli import main
 from synfeal.config.models import CameraConfig, CollectionConfig, RenderConfig, SceneConfig
@@ -28,12 +23,12 @@ CAMERA = CameraConfig(width=64, height=48)
 SMALL = ("--frames", "30", "--spacing", "0.8", "--width", "64", "--height", "48")
 
 
-def box_room(scale: float = 1.0) -> trimesh.Trimesh:
+def box_room(scale=1.0):
     """A room of 6 x 5 x 3 units, times ``scale``."""
     return trimesh.creation.box((6.0, 5.0, 3.0)).subdivide().subdivide().apply_scale(scale)
 
 
-def save(path: Path, mesh: trimesh.Trimesh, rgb: NDArray[np.uint8] | None = None) -> Path:
+def save(path, mesh, rgb=None):
     if rgb is None:
         rgb = np.random.default_rng(0).integers(0, 256, (len(mesh.vertices), 3), np.uint8)
     part = MeshPart("room", np.asarray(mesh.vertices), np.asarray(mesh.faces), vertex_rgb=rgb)
@@ -41,21 +36,21 @@ def save(path: Path, mesh: trimesh.Trimesh, rgb: NDArray[np.uint8] | None = None
     return path
 
 
-def millimetres(folder: Path) -> Path:
+def millimetres(folder):
     return save(folder / "room.glb", box_room(1000.0))
 
 
-def kilometres(folder: Path) -> Path:
+def kilometres(folder):
     return save(folder / "room.glb", box_room(0.001))
 
 
-def one_grey(folder: Path) -> Path:
+def one_grey(folder):
     return save(
         folder / "room.glb", box_room(), np.full((len(box_room().vertices), 3), 99, np.uint8)
     )
 
 
-def obj_without_its_mtl(folder: Path) -> Path:
+def obj_without_its_mtl(folder):
     mesh = box_room()
     lines = ["mtllib room.mtl", *("v {} {} {}".format(*v) for v in mesh.vertices)]
     lines += ["vt {} {}".format(*v[:2]) for v in mesh.vertices]
@@ -75,13 +70,7 @@ def obj_without_its_mtl(folder: Path) -> Path:
         (obj_without_its_mtl, ["room.obj", "one colour", ".mtl"]),
     ],
 )
-def test_what_is_certainly_blank_is_refused_before_rendering(
-    make: Callable[[Path], Path],
-    words: list[str],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_what_is_certainly_blank_is_refused_before_rendering(make, words, tmp_path, capsys, caplog):
     mesh = make(tmp_path)
     before = sorted(tmp_path.iterdir())
     assert main(["collect", "--mesh", str(mesh), "--out", str(tmp_path / "set"), *SMALL]) == 1
@@ -90,7 +79,7 @@ def test_what_is_certainly_blank_is_refused_before_rendering(
     assert sorted(tmp_path.iterdir()) == before
 
 
-def open_room() -> trimesh.Trimesh:
+def open_room():
     """Neither ceiling nor one of the walls."""
     mesh = box_room()
     mesh.update_faces(mesh.face_normals[:, [0, 2]].max(axis=1) < 0.5)
@@ -98,13 +87,7 @@ def open_room() -> trimesh.Trimesh:
 
 
 @pytest.mark.parametrize(("mesh", "warns"), [(box_room(), False), (open_room(), True)])
-def test_collect_always_says_how_many_pixels_are_empty(
-    mesh: trimesh.Trimesh,
-    warns: bool,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_collect_always_says_how_many_pixels_are_empty(mesh, warns, tmp_path, capsys, caplog):
     path, out = save(tmp_path / "room.glb", mesh), tmp_path / "set"
     with caplog.at_level(logging.WARNING):
         assert main(["collect", "--mesh", str(path), "--out", str(out), *SMALL]) == 0
@@ -114,7 +97,7 @@ def test_collect_always_says_how_many_pixels_are_empty(
     assert any("will be empty" in line for line in caplog.messages) == warns
 
 
-def test_what_is_predicted_empty_is_what_is_rendered_empty(tmp_path: Path) -> None:
+def test_what_is_predicted_empty_is_what_is_rendered_empty(tmp_path):
     """Depth is infinite where nothing was hit: another code than the one that predicts."""
     mesh = load_mesh(save(tmp_path / "room.glb", open_room()))
     caster = RayCaster(*mesh.merged())

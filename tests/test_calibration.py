@@ -1,7 +1,5 @@
 """Calibration files as their tools write them, and as they should not be."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import re
@@ -66,14 +64,14 @@ COLMAP = """\
 FILES = {"ros.yaml": ROS, "old.yml": OLD_OPENCV, "cameras.txt": COLMAP}
 
 
-def stored(folder: Path, name: str, text: str) -> Path:
+def stored(folder, name, text):
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path
 
 
 @pytest.mark.parametrize("ending", ["yaml", "yml", "json"])
-def test_what_opencv_writes_is_read(tmp_path: Path, ending: str) -> None:
+def test_what_opencv_writes_is_read(tmp_path, ending):
     path = tmp_path / f"phone.{ending}"
     file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
     file.write("calibration_time", "Sat 21 Nov 2026 10:00:00")
@@ -89,7 +87,7 @@ def test_what_opencv_writes_is_read(tmp_path: Path, ending: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "text"), FILES.items(), ids=FILES)
-def test_one_camera_in_three_formats_is_one_camera(tmp_path: Path, name: str, text: str) -> None:
+def test_one_camera_in_three_formats_is_one_camera(tmp_path, name, text):
     found = read_calibration(stored(tmp_path, name, text))
     assert (found.width, found.height) == (640, 480)
     assert (found.fx, found.fy, found.cx, found.cy) == (500.0, 501.0, 320.0, 240.0)
@@ -99,7 +97,7 @@ def test_one_camera_in_three_formats_is_one_camera(tmp_path: Path, name: str, te
 @pytest.mark.parametrize(
     "model", ["SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV"]
 )
-def test_a_colmap_camera_projects_as_in_colmap(tmp_path: Path, model: str) -> None:
+def test_a_colmap_camera_projects_as_in_colmap(tmp_path, model):
     camera = pycolmap.Camera.create_from_model_name(1, model, 500.0, 640, 480)
     n_lens = len(camera.params) - {"S": 3, "R": 3}.get(model[0], 4)
     n_lens = 0 if model == "SIMPLE_PINHOLE" else n_lens
@@ -115,7 +113,7 @@ def test_a_colmap_camera_projects_as_in_colmap(tmp_path: Path, model: str) -> No
     np.testing.assert_allclose(pixels_of_normalised(found, normalised), expected, atol=1e-9)
 
 
-def test_scaling_keeps_every_ray() -> None:
+def test_scaling_keeps_every_ray():
     """A point in the middle of the image, or on its edge, stays there."""
     path_values = {"fx": 3100.0, "fy": 3000.0, "cx": 2000.0, "cy": 1500.0}
     full = Calibration(4032, 3024, **path_values, distortion=LENS)
@@ -144,12 +142,7 @@ def test_scaling_keeps_every_ray() -> None:
         ("ros.yaml", "[5e2, 0,", "[500,", ["camera_matrix", "9 numbers, found 8"]),
         ("ros.yaml", "[5e2, 0,", "[five, 0,", ["camera_matrix", "must hold numbers", "five"]),
         ("ros.yaml", "319.5", "959.5", ["cx", "960", "outside the image of 640x480"]),
-        (
-            "ros.yaml",
-            "[-0.2, 0.05, 1e-3",
-            "[1e-3",
-            ["distortion_coeff", "4 or 5", "found 3"],
-        ),
+        ("ros.yaml", "[-0.2, 0.05, 1e-3", "[1e-3", ["distortion_coeff", "4 or 5", "found 3"]),
         ("ros.yaml", "-2.0e-3, 0.0]", "-2.0e-3, 0.0, 0.1, 0, 0]", ["k1, k2, p1", "0.1"]),
         ("ros.yaml", "width: 640", "width: 640.5", ["image_width", "whole number", "640.5"]),
         ("ros.yaml", "width: 640", "width: -640", ["image_width", "whole number", "-640"]),
@@ -165,9 +158,7 @@ def test_scaling_keeps_every_ray() -> None:
         ("cameras.txt", "0 0 0\n", "0 0 0\n2 PINHOLE 9 9 5 5 5 5\n", ["2 cameras", "of its own"]),
     ],
 )
-def test_a_file_that_cannot_be_used_is_refused_in_one_line(
-    tmp_path: Path, name: str, old: str, new: str, words: list[str]
-) -> None:
+def test_a_file_that_cannot_be_used_is_refused_in_one_line(tmp_path, name, old, new, words):
     assert old in FILES[name]
     path = stored(tmp_path, name, FILES[name].replace(old, new))
     with pytest.raises(InputError) as refusal:
@@ -179,14 +170,14 @@ def test_a_file_that_cannot_be_used_is_refused_in_one_line(
         assert word in message
 
 
-def test_a_missing_or_binary_file_says_what_to_do(tmp_path: Path) -> None:
+def test_a_missing_or_binary_file_says_what_to_do(tmp_path):
     with pytest.raises(InputError, match=r"no\.yaml: cannot be read"):
         read_calibration(tmp_path / "no.yaml")
     with pytest.raises(InputError, match="colmap model_converter --input_path"):
         read_calibration(tmp_path / "cameras.bin")
 
 
-def test_a_profile_names_a_calibration_and_holds_its_numbers(tmp_path: Path, monkeypatch) -> None:
+def test_a_profile_names_a_calibration_and_holds_its_numbers(tmp_path, monkeypatch):
     monkeypatch.chdir(CONFIG.parent)
     path = stored(tmp_path, "phone.yaml", ROS)
     profile = stored(tmp_path, "my.yaml", f"network_camera: {{calibration: {path}, width: 320}}\n")
@@ -212,13 +203,13 @@ def test_a_profile_names_a_calibration_and_holds_its_numbers(tmp_path: Path, mon
         ({"calibration": 5}, "calibration: must be a path"),
     ],
 )
-def test_values_beside_a_calibration_must_agree(tmp_path: Path, values, words: str) -> None:
+def test_values_beside_a_calibration_must_agree(tmp_path, values, words):
     path = stored(tmp_path, "phone.yaml", ROS)
     with pytest.raises(ValueError, match=words):
         CameraConfig.model_validate({"calibration": path, **values})
 
 
-def test_depth_methods_refuse_a_distorted_camera(monkeypatch, tmp_path: Path) -> None:
+def test_depth_methods_refuse_a_distorted_camera(monkeypatch, tmp_path):
     monkeypatch.chdir(CONFIG.parent)
     config = load_config(CONFIG / "config.yaml")
     camera = config.groundtruth_camera.model_copy(update={"distortion": LENS})
@@ -231,7 +222,7 @@ def test_depth_methods_refuse_a_distorted_camera(monkeypatch, tmp_path: Path) ->
     assert read_experiments(distorted.model_copy(update={"experiments": only_sfm}))
 
 
-def test_json_and_yaml_of_python_scripts_are_read(tmp_path: Path) -> None:
+def test_json_and_yaml_of_python_scripts_are_read(tmp_path):
     values = {"image_size": [640, 480], "mtx": [[500, 0, 319.5], [0, 501, 239.5], [0, 0, 1]]}
     values["dist"] = [[-0.2, 0.05, 0.001, -0.002]]
     as_json = read_calibration(stored(tmp_path, "a.json", json.dumps(values)))
@@ -240,7 +231,7 @@ def test_json_and_yaml_of_python_scripts_are_read(tmp_path: Path) -> None:
     assert as_json == as_yaml == ros
 
 
-def test_the_documented_files_are_one_pinhole(tmp_path: Path) -> None:
+def test_the_documented_files_are_one_pinhole(tmp_path):
     page = (CONFIG.parent / "docs" / "cameras.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```(?:yaml)?\n(.*?)```", page, re.DOTALL)
     opencv = next(block for block in blocks if block.startswith("%YAML"))

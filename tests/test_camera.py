@@ -1,7 +1,5 @@
 """Lens distortion and pixels: against OpenCV, closed forms, and each other."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pycolmap
@@ -27,14 +25,14 @@ SMALL = st.floats(-0.2, 0.2)
 TINY = st.floats(-0.01, 0.01)
 
 
-def points_within(radius: float, count: int = 500) -> np.ndarray:
+def points_within(radius, count=500):
     rng = np.random.default_rng(0)
     angle, r = rng.uniform(0, 2 * np.pi, count), radius * np.sqrt(rng.random(count))
     return np.stack([r * np.cos(angle), r * np.sin(angle)], axis=-1)
 
 
 @pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
-def test_distortion_is_opencvs(lens: tuple[float, ...]) -> None:
+def test_distortion_is_opencvs(lens):
     normalised = points_within(min(1.2, fold_radius(lens)))
     rays = np.column_stack([normalised, np.ones(len(normalised))])
     expected, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), np.eye(3), np.array(lens))
@@ -42,7 +40,7 @@ def test_distortion_is_opencvs(lens: tuple[float, ...]) -> None:
 
 
 @pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
-def test_undistortion_is_opencvs(lens: tuple[float, ...]) -> None:
+def test_undistortion_is_opencvs(lens):
     seen = distort(points_within(min(0.7, 0.7 * fold_radius(lens))), lens)
     stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 500, 1e-14)
     expected = cv2.undistortPoints(seen[:, None], np.eye(3), np.array(lens), criteria=stop)
@@ -51,7 +49,7 @@ def test_undistortion_is_opencvs(lens: tuple[float, ...]) -> None:
 
 @given(SMALL, SMALL, TINY, TINY, SMALL)
 @settings(deadline=None, max_examples=100, derandomize=True)
-def test_pixels_return_within_1e_10(k1: float, k2: float, p1: float, p2: float, k3: float) -> None:
+def test_pixels_return_within_1e_10(k1, k2, p1, p2, k3):
     lens = (k1, k2, p1, p2, k3)
     normalised = points_within(min(1.5, 0.9 * fold_radius(lens)), 50)
     seen = distort(normalised, lens)
@@ -64,7 +62,7 @@ def test_pixels_return_within_1e_10(k1: float, k2: float, p1: float, p2: float, 
 
 
 @pytest.mark.parametrize("k1", [-0.3, -0.05])
-def test_the_fold_of_one_coefficient_in_closed_form(k1: float) -> None:
+def test_the_fold_of_one_coefficient_in_closed_form(k1):
     """r (1 + k1 r²) grows up to r² = -1 / (3 k1), where it is 2 r / 3."""
     lens = (k1, 0.0, 0.0, 0.0, 0.0)
     r = np.sqrt(-1 / (3 * k1))
@@ -75,7 +73,7 @@ def test_the_fold_of_one_coefficient_in_closed_form(k1: float) -> None:
     assert np.isnan(outside).all()
 
 
-def test_a_lens_without_fold_is_inverted_far_out() -> None:
+def test_a_lens_without_fold_is_inverted_far_out():
     """r + r³ = y in closed form, Cardano's."""
     y = np.array([0.0, 1e-9, 0.1, 10.0, 1000.0])
     root = np.sqrt(y**2 / 4 + 1 / 27)
@@ -84,7 +82,7 @@ def test_a_lens_without_fold_is_inverted_far_out() -> None:
     np.testing.assert_allclose(found[:, 1], expected, rtol=1e-9, atol=1e-13)
 
 
-def test_pixels_of_points_are_opencvs_but_for_half_a_pixel() -> None:
+def test_pixels_of_points_are_opencvs_but_for_half_a_pixel():
     camera = CameraConfig(
         width=640, height=480, fx=500, fy=510, cx=330, cy=235, distortion=LENSES["barrel"]
     )
@@ -99,7 +97,7 @@ def test_pixels_of_points_are_opencvs_but_for_half_a_pixel() -> None:
     np.testing.assert_allclose(normalised_of_pixels(camera, pixel), normalised, atol=1e-13)
 
 
-def test_a_lens_that_folds_inside_the_image_is_refused() -> None:
+def test_a_lens_that_folds_inside_the_image_is_refused():
     values = {"width": 400, "height": 300, "fx": 200, "fy": 200, "cx": 200, "cy": 150}
     lens = (-0.3, 0.0, 0.0, 0.0, 0.0)  # folds at 0.703 from the centre of the distorted image
     with pytest.raises(ValidationError, match=r"distortion: folds over inside the image at pixel"):
@@ -108,7 +106,7 @@ def test_a_lens_that_folds_inside_the_image_is_refused() -> None:
 
 
 @pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
-def test_structure_from_motion_is_told_the_same_camera(lens: tuple[float, ...]) -> None:
+def test_structure_from_motion_is_told_the_same_camera(lens):
     camera = CameraConfig(width=640, height=480, fx=900, fy=910, cx=330, cy=235, distortion=lens)
     told = pycolmap.Camera(
         model="FULL_OPENCV" if any(lens) else "PINHOLE",

@@ -1,9 +1,6 @@
 """Whatever is typed: no traceback, one line that says what is wrong, and nothing lost."""
 
-from __future__ import annotations
-
 import warnings
-from pathlib import Path
 
 import pytest
 
@@ -18,7 +15,7 @@ SECONDS = 20.0
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("made")
     mesh = save_room(made / "room.glb")
     assert collect(mesh, made / "set", "--depth") == 0
@@ -27,12 +24,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def tree(folder: Path) -> dict[str, tuple[int, int]]:
+def tree(folder):
     found = ((path, path.lstat()) for path in folder.rglob("*"))
     return {str(path): (at.st_size, at.st_mtime_ns) for path, at in found}
 
 
-def problem_with(arguments: list[str], capfd: pytest.CaptureFixture[str]) -> str | None:
+def problem_with(arguments, capfd):
     """What is wrong with how a command took its arguments; None if nothing is."""
     capfd.readouterr()
     try:
@@ -58,9 +55,7 @@ def problem_with(arguments: list[str], capfd: pytest.CaptureFixture[str]) -> str
 
 
 @pytest.mark.parametrize("name", TABLE)
-def test_a_careless_command_ends_in_one_line_and_nothing_is_lost(
-    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_careless_command_ends_in_one_line_and_nothing_is_lost(name, folder, monkeypatch, capfd):
     monkeypatch.chdir(folder)
     before, failures = tree(folder), []
     for value in TABLE[name][2]:
@@ -71,5 +66,5 @@ def test_a_careless_command_ends_in_one_line_and_nothing_is_lost(
     assert not failures, "\n".join(failures)
 
 
-def test_the_table_is_long() -> None:
+def test_the_table_is_long():
     assert sum(len(values) for _, _, values in TABLE.values()) >= 200

@@ -1,7 +1,5 @@
 """Whatever a configuration file holds: one line that names the file, the key, and what to do."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -23,7 +21,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
 )
 
 # What the file holds, and what the message has to say besides the file's name.
-TABLE: tuple[tuple[str, str], ...] = (
+TABLE = (
     # unknown keys, and keys at the wrong place
     ("profle: mine", "profle: unknown key; allowed here: archive_sequences, collection, dataset"),
     ("scale: 0.1\nframes: 300", "frames: unknown key"),
@@ -129,10 +127,7 @@ TABLE: tuple[tuple[str, str], ...] = (
     ("seed:\n\t1", "line 2: found character '\\t' that cannot start any token"),
     ("seed: !!python/object/apply:os.getcwd []", "could not determine a constructor for the tag"),
     ("seed: !mine 1", "could not determine a constructor for the tag"),
-    (
-        "profile: !!python/object/apply:os.mkdir [made]",
-        "could not determine a constructor",
-    ),
+    ("profile: !!python/object/apply:os.mkdir [made]", "could not determine a constructor"),
     ("profile: !!python/object:pathlib.Path {}", "could not determine a constructor"),
     ("profile: !!python/name:os.system", "could not determine a constructor"),
     ("seed: !!binary aGVsbG8=", "seed: Input should be a valid integer"),
@@ -152,7 +147,7 @@ TABLE: tuple[tuple[str, str], ...] = (
 )
 
 
-def read(path: Path) -> None:
+def read(path):
     """What the workflow asks of a profile before it plans a run."""
     config = read_profile(str(path)).config
     check_mesh_files(config.scenes)
@@ -160,19 +155,15 @@ def read(path: Path) -> None:
 
 
 @pytest.mark.parametrize(("text", "words"), TABLE, ids=[words[:40] for _, words in TABLE])
-def test_a_careless_configuration_ends_in_one_line(
-    text: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_careless_configuration_ends_in_one_line(text, words, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     path = tmp_path / "mine.yaml"
     path.write_text(f"{text}\n", encoding="utf-8")
     assert problem_with(lambda: read(path), lambda _: False, (words,), tmp_path) is None
 
 
-def test_run_hands_a_sound_profile_to_snakemake(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    started: list[tuple[list[str], str]] = []
+def test_run_hands_a_sound_profile_to_snakemake(tmp_path, monkeypatch):
+    started = []
     monkeypatch.setattr(
         os, "execve", lambda _, command, env: started.append((command, env["PYTHONPATH"]))
     )
@@ -190,7 +181,7 @@ def test_run_hands_a_sound_profile_to_snakemake(
 
 
 @pytest.mark.parametrize("name", ["absent.yaml", "deep.yaml", "latin.yaml", "profile.yaml"])
-def test_run_ends_in_one_line_where_snakemake_has_a_traceback(name: str, tmp_path: Path) -> None:
+def test_run_ends_in_one_line_where_snakemake_has_a_traceback(name, tmp_path):
     """The command as it is typed; the last file only Snakemake itself comes to."""
     path = tmp_path / name
     if name in FILES:
@@ -206,5 +197,5 @@ def test_run_ends_in_one_line_where_snakemake_has_a_traceback(name: str, tmp_pat
     assert not run.stdout
 
 
-def test_the_table_is_long() -> None:
+def test_the_table_is_long():
     assert len(TABLE) >= 110

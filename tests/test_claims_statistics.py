@@ -151,11 +151,10 @@ def test_what_cannot_be_known_widens_limits_at_both_ends():
 SHIFT = -20.0  # percent, the true change of the median
 
 
-def _covered(n_paths, n_frames, trials, seed, by_path=True):
+def _covered(n_paths, n_frames, trials, seed):
     """Share of trials whose limits hold the true change of two log-normal medians, paired."""
     rng = np.random.default_rng(seed)
     path = np.repeat(np.arange(n_paths), n_frames)
-    unit = path if by_path else np.arange(len(path))
     hits = 0
     for _ in range(trials):
         shared = rng.normal(0, 0.5, n_paths)
@@ -163,9 +162,9 @@ def _covered(n_paths, n_frames, trials, seed, by_path=True):
             (shared + rng.normal(0, 0.3, n_paths))[path] + rng.normal(0, 0.2, len(path))
             for _ in range(2)
         ]
-        counts = path_counts(unit[-1] + 1, rng, 400)
+        counts = path_counts(n_paths, rng, 400)
         new, old = np.exp(logs[0]) * (1 + SHIFT / 100), np.exp(logs[1])
-        low, high = limits(relative_change(medians(new, unit, counts), medians(old, unit, counts)))
+        low, high = limits(relative_change(medians(new, path, counts), medians(old, path, counts)))
         hits += low <= SHIFT <= high
     return hits / trials
 
@@ -173,14 +172,6 @@ def _covered(n_paths, n_frames, trials, seed, by_path=True):
 @pytest.mark.parametrize("n_paths", [17, 40])
 def test_limits_hold_the_truth_in_93_to_97_percent_of_1000_trials(n_paths):
     assert 0.93 <= _covered(n_paths, 6, 1000, seed=n_paths) <= 0.97
-
-
-def test_few_paths_give_limits_that_are_too_narrow_to_decide_on():
-    assert _covered(4, 6, 1000, seed=4) < 0.92
-
-
-def test_drawing_frames_instead_of_paths_would_be_too_sure():
-    assert _covered(20, 10, 300, seed=2, by_path=False) < 0.85
 
 
 def test_one_seed_fewer_is_drawn_than_there_are():
@@ -225,7 +216,3 @@ def _covered_over_seeds(n_seeds, run_sd, trials, seed):
 @pytest.mark.parametrize("run_sd", [0.0, 0.03, 0.08])
 def test_limits_over_three_seeds_hold_the_truth_in_at_least_94_percent(run_sd):
     assert _covered_over_seeds(3, run_sd, 200, seed=11) >= 0.94
-
-
-def test_limits_of_one_seed_do_not_know_how_seeds_differ():
-    assert _covered_over_seeds(1, 0.15, 200, seed=12) < 0.85

@@ -1,11 +1,8 @@
 """Cluster profiles: what they name is there, and the paper's design is planned through them."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -25,19 +22,18 @@ WORKFLOW = "".join(path.read_text() for path in sorted((ROOT / "workflow/rules")
 RULES = frozenset(re.findall(r"^rule (\w+):", WORKFLOW, re.MULTILINE))
 
 
-def profile(name: str) -> dict[str, Any]:
-    settings: dict[str, Any] = yaml.safe_load(PROFILES[name].read_text())
-    return settings
+def profile(name):
+    return yaml.safe_load(PROFILES[name].read_text())
 
 
 @pytest.mark.parametrize("name", PROFILES)
-def test_every_rule_a_profile_names_is_a_rule(name: str) -> None:
+def test_every_rule_a_profile_names_is_a_rule(name):
     settings = profile(name)
     assert RULES.issuperset({*settings["set-resources"], *settings["groups"]})
     assert settings["group-components"].keys() <= set(settings["groups"].values())
 
 
-def test_the_plugin_is_locked_within_its_range_and_beside_the_other_pins() -> None:
+def test_the_plugin_is_locked_within_its_range_and_beside_the_other_pins():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     (plugin,) = map(Requirement, project["optional-dependencies"]["slurm"])
     locked = pins("requirements-slurm.lock")
@@ -46,21 +42,21 @@ def test_the_plugin_is_locked_within_its_range_and_beside_the_other_pins() -> No
 
 
 @pytest.mark.parametrize("name", PROFILES)
-def test_no_setting_is_lost_to_the_default_profile(name: str) -> None:
+def test_no_setting_is_lost_to_the_default_profile(name):
     default = yaml.safe_load((ROOT / "profiles/default/profile.yaml").read_text())
     assert not default.keys() & profile(name).keys()
 
 
-def test_jobs_of_a_group_go_to_one_partition() -> None:
+def test_jobs_of_a_group_go_to_one_partition():
     settings = profile("slurm")
-    partitions: dict[str, set[str]] = {}
+    partitions = {}
     for rule, group in settings["groups"].items():
         chosen = {**settings["default-resources"], **settings["set-resources"].get(rule, {})}
         partitions.setdefault(group, set()).add(chosen["slurm_partition"])
     assert all(len(names) == 1 for names in partitions.values()), partitions
 
 
-def test_the_papers_design_is_planned_for_slurm(tmp_path: Path) -> None:
+def test_the_papers_design_is_planned_for_slurm(tmp_path):
     pytest.importorskip("snakemake_executor_plugin_slurm")
     arguments = ("--profile", "workflow/profiles/slurm", "--configfile", "config/paper.yaml")
     jobs = planned_jobs(tmp_path, *arguments, "--", "all")
@@ -72,9 +68,7 @@ def test_the_papers_design_is_planned_for_slurm(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "models"), [("mini", ["hourglass"]), ("paper", ["hourglass", "posenet", "poselstm"])]
 )
-def test_a_training_asks_for_what_the_largest_network_takes_and_not_for_twice_that(
-    name: str, models: list[str]
-) -> None:
+def test_a_training_asks_for_what_the_largest_network_takes_and_not_for_twice_that(name, models):
     config = read_profile(name).config
     batch = config.training.batch_size
     works = [training_work(m, config.network, config.localizers[m]) for m in models]
@@ -85,7 +79,7 @@ def test_a_training_asks_for_what_the_largest_network_takes_and_not_for_twice_th
     assert asked_mb - 1000 < 2 * (counted_mb + frames * frame_mb)
 
 
-def test_a_pretraining_fits_too() -> None:
+def test_a_pretraining_fits_too():
     config = read_profile("mini").config
     batch = config.pretraining.batch_size
     counted_mb = pretext_work("resnet34", config.network).held_bytes(batch) / 1e6

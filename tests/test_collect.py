@@ -1,13 +1,9 @@
 """``synfeal collect``: what is on disk afterwards, whatever happens on the way."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.cli import main
@@ -23,19 +19,19 @@ pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 
 
 @pytest.fixture(scope="module")
-def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def mesh(tmp_path_factory):
     return save_room(tmp_path_factory.mktemp("mesh") / "room.glb")
 
 
 @pytest.fixture(scope="module")
-def calm(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def calm(mesh, tmp_path_factory):
     """A data set nothing happened to."""
     out = tmp_path_factory.mktemp("calm") / "set"
     assert collect(mesh, out, "--depth") == 0
     return out
 
 
-def test_collect_makes_a_complete_data_set(calm: Path) -> None:
+def test_collect_makes_a_complete_data_set(calm):
     splits = ["TestSplit.txt", "TrainSplit.txt", "test.csv", "train.csv"]
     about = ["coverage.json", "manifest.json", "preview.png"]
     sequences = [f"seq-{number:02d}" for number in (1, 2, 3, 4)]
@@ -58,16 +54,14 @@ def test_collect_makes_a_complete_data_set(calm: Path) -> None:
 
 
 @pytest.mark.parametrize("more", [(), ("--workers", "2")], ids=["again", "processes"])
-def test_the_same_command_gives_the_same_bytes(
-    mesh: Path, calm: Path, tmp_path: Path, more: tuple[str, ...]
-) -> None:
+def test_the_same_command_gives_the_same_bytes(mesh, calm, tmp_path, more):
     assert collect(mesh, tmp_path / "set", "--depth", *more) == 0
     assert tree_of(tmp_path / "set") == tree_of(calm)
 
 
 def test_the_workflow_makes_the_same_bytes_from_the_printed_configuration(
-    mesh: Path, calm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    mesh, calm, tmp_path, capsys
+):
     assert collect(mesh, tmp_path / "set", "--depth", "--print-config") == 0
     profile = tmp_path / "mine.yaml"
     profile.write_text(capsys.readouterr().out)
@@ -80,9 +74,7 @@ def test_the_workflow_makes_the_same_bytes_from_the_printed_configuration(
     assert found == tree_of(calm)
 
 
-def test_packed_frames_are_those_of_the_files_and_another_seed_gives_others(
-    mesh: Path, calm: Path, tmp_path: Path
-) -> None:
+def test_packed_frames_are_those_of_the_files_and_another_seed_gives_others(mesh, calm, tmp_path):
     assert collect(mesh, tmp_path / "set", "--packed", "24", "--seed", "1") == 0
     pack_frames(read_split(tmp_path / "set", "train"), 24, tmp_path / "again.npy")
     assert (tmp_path / "set" / "train.npy").read_bytes() == (tmp_path / "again.npy").read_bytes()
@@ -90,7 +82,7 @@ def test_packed_frames_are_those_of_the_files_and_another_seed_gives_others(
     assert tree_of(tmp_path / "set")["train.csv"] != tree_of(calm)["train.csv"]
 
 
-def test_boxes_and_angles_confine_the_camera(mesh: Path, tmp_path: Path) -> None:
+def test_boxes_and_angles_confine_the_camera(mesh, tmp_path):
     boxes = ["--box", "-2.5", "-0.5", "-2", "0", "-0.5", "0.5", "--box=1 2 -1e0 1 -.5 5e-1"]
     angles = ["--roll", "-1", "1", "--pitch", "-5", "10", "--yaw", "170", "190"]
     more = ["--min-path", "0.3", "--min-view-distance", "0.5"]
@@ -110,13 +102,12 @@ def test_boxes_and_angles_confine_the_camera(mesh: Path, tmp_path: Path) -> None
     assert level[:, 2].tolist() == [1.0, 0.0, 0.0]  # the convention that yaw is measured in
 
 
-def within(points: NDArray[np.float64], low: list[float], high: list[float]) -> NDArray[np.bool_]:
-    inside: NDArray[np.bool_] = ((points >= low) & (points <= high)).all(axis=1)
-    return inside
+def within(points, low, high):
+    return ((points >= low) & (points <= high)).all(axis=1)
 
 
 @pytest.mark.parametrize("backend", ["opengl", "raycast"])
-def test_the_background_has_the_colour_asked_for(mesh: Path, tmp_path: Path, backend: str) -> None:
+def test_the_background_has_the_colour_asked_for(mesh, tmp_path, backend):
     (tmp_path / "away.txt").write_text("0 0 0 9 1 0 0 0\n" * 24)  # above the room, looking down
     repeat = ["--mode", "repeat", "--poses", str(tmp_path / "away.txt"), "--test-frames", "0"]
     look = ["--background", "10", "200", "30", "--supersampling", "1", "--backend", backend]
@@ -126,7 +117,7 @@ def test_the_background_has_the_colour_asked_for(mesh: Path, tmp_path: Path, bac
         assert frame.getpixel((20, 16)) != (10, 200, 30)
 
 
-def test_print_config_and_manifest_say_the_same(calm: Path) -> None:
+def test_print_config_and_manifest_say_the_same(calm):
     manifest = json.loads((calm / "manifest.json").read_text())
     assert manifest["frames"] == {"train": 24, "test": 8}
     assert manifest["scene"]["name"] == "scan"
@@ -157,12 +148,8 @@ REFUSED = {
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_a_person_can_mend_is_one_line_and_nothing_is_written(
-    case: str,
-    mesh: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+    case, mesh, tmp_path, monkeypatch, capfd
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / "loop").symlink_to("loop")
@@ -174,7 +161,7 @@ def test_what_a_person_can_mend_is_one_line_and_nothing_is_written(
 
 
 @pytest.mark.parametrize("options", [["collect"], ["collect", "--frames", "many"], ["paint"], []])
-def test_wrong_usage_exits_with_2(options: list[str]) -> None:
+def test_wrong_usage_exits_with_2(options):
     with pytest.raises(SystemExit) as caught:
         main(options)
     assert caught.value.code == 2

@@ -1,18 +1,12 @@
 """``synfeal collect`` that is stopped, killed, or runs out of disk, and goes on."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from pathlib import Path
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from synfeal.dataset import render_pool
 from synfeal.effects import relight
@@ -25,12 +19,12 @@ pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 
 
 @pytest.fixture(scope="module")
-def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def mesh(tmp_path_factory):
     return save_room(tmp_path_factory.mktemp("mesh") / "room.glb")
 
 
 @pytest.fixture(scope="module")
-def calm(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def calm(mesh, tmp_path_factory):
     """A data set nothing happened to."""
     out = tmp_path_factory.mktemp("calm") / "set"
     assert collect(mesh, out, "--depth") == 0
@@ -40,28 +34,28 @@ def calm(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 class Interrupting:
     """A renderer that is interrupted after some frames, and counts those it rendered."""
 
-    def __init__(self, limit: int) -> None:
+    def __init__(self, limit):
         self.limit = limit
         self.count = 0
 
-    def open(self, *arguments: object) -> Interrupting:
-        self.real = open_renderer(*arguments)  # type: ignore[arg-type]
+    def open(self, *arguments):
+        self.real = open_renderer(*arguments)
         return self
 
-    def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> object:
+    def render_rgbd(self, world_from_cam):
         if self.count == self.limit:
             raise KeyboardInterrupt
         self.count += 1
         return self.real.render_rgbd(world_from_cam)
 
-    def __enter__(self) -> Interrupting:
+    def __enter__(self):
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *_):
         self.real.close()
 
 
-def interrupted(mesh: Path, out: Path, limit: int = 13) -> Path:
+def interrupted(mesh, out, limit=13):
     """The unfinished directory of a collection that stopped after some frames."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(relight, "open_renderer", Interrupting(limit).open)
@@ -69,9 +63,7 @@ def interrupted(mesh: Path, out: Path, limit: int = 13) -> Path:
     return out.with_name(f"{out.name}.part")
 
 
-def test_ctrl_c_keeps_whole_sequences_and_says_how_to_go_on(
-    mesh: Path, calm: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_ctrl_c_keeps_whole_sequences_and_says_how_to_go_on(mesh, calm, tmp_path, capfd):
     part = interrupted(mesh, tmp_path / "set")
     assert "kept in" in (message := only_error(capfd))
     assert "same command again" in message
@@ -87,7 +79,7 @@ def test_ctrl_c_keeps_whole_sequences_and_says_how_to_go_on(
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
 
 
-def test_a_collection_survives_being_killed(mesh: Path, calm: Path, tmp_path: Path) -> None:
+def test_a_collection_survives_being_killed(mesh, calm, tmp_path):
     out, part = tmp_path / "set", tmp_path / "set.part"
     arguments = [sys.executable, "-m", "synfeal.cli", *command(mesh, out, "--depth")]
     with subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
@@ -99,42 +91,34 @@ def test_a_collection_survives_being_killed(mesh: Path, calm: Path, tmp_path: Pa
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
 
 
-def test_killed_after_the_last_rename_there_is_only_a_directory_to_remove(
-    mesh: Path, calm: Path, tmp_path: Path
-) -> None:
+def test_killed_after_the_last_rename_there_is_only_a_directory_to_remove(mesh, calm, tmp_path):
     assert collect(mesh, tmp_path / "set", "--depth") == 0
     (tmp_path / "set" / ".work" / "scene").mkdir(parents=True)
     assert collect(mesh, tmp_path / "set", "--depth") == 0
     assert tree_of(tmp_path / "set") == tree_of(calm)
 
 
-def test_a_worker_that_is_killed_is_one_line(
-    mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_worker_that_is_killed_is_one_line(mesh, tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(render_pool, "_start_worker", suicide)
     assert collect(mesh, tmp_path / "set", "--workers", "2") == 1
     assert "fewer --workers" in only_error(capfd)
     assert (tmp_path / "set.part" / "train.csv").is_file()
 
 
-def suicide(*_: object) -> None:
+def suicide(*_):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
 @pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
+def small_disk(tmp_path):
     with mounted(tmp_path / "disk", "240k") as disk:
         yield disk
 
 
 @pytest.mark.parametrize("more", [(), ("--workers", "2")], ids=["alone", "processes"])
 def test_a_full_disk_is_one_line_and_the_collection_goes_on_when_there_is_room(
-    mesh: Path,
-    calm: Path,
-    small_disk: Path,
-    capfd: pytest.CaptureFixture[str],
-    more: tuple[str, ...],
-) -> None:
+    mesh, calm, small_disk, capfd, more
+):
     out = small_disk / "set"
     assert collect(mesh, out, "--depth", *more) == 1
     assert "No space left" in (message := only_error(capfd))
@@ -159,9 +143,7 @@ OTHERS = {
 }
 
 
-def test_other_settings_and_commands_do_not_go_on_with_it(
-    mesh: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_other_settings_and_commands_do_not_go_on_with_it(mesh, tmp_path, capfd):
     part = interrupted(mesh, tmp_path / "set", 2)
     before = sorted(part.rglob("*"))
     other = save_room(tmp_path / "other.glb", seed=1)
@@ -177,7 +159,7 @@ def test_other_settings_and_commands_do_not_go_on_with_it(
     assert sorted(part.rglob("*")) == before
 
 
-FOREIGN: dict[str, str | None] = {
+FOREIGN = {
     "cut": '{"seed": 0',
     "a list": "[]",
     "of another version": '{"synfeal": "0.0"}',
@@ -186,9 +168,7 @@ FOREIGN: dict[str, str | None] = {
 
 
 @pytest.mark.parametrize("case", FOREIGN)
-def test_a_damaged_record_of_settings_is_named_and_nothing_is_touched(
-    case: str, mesh: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_damaged_record_of_settings_is_named_and_nothing_is_touched(case, mesh, tmp_path, capfd):
     part = tmp_path / "set.part"
     record = part / ".work" / "settings.json"
     (part / ".work" / "scene").mkdir(parents=True)  # prepared, and nothing planned yet

@@ -1,9 +1,6 @@
 """The collision mesh: what is kept, how it is chosen, and the curve that shows it."""
 
-from __future__ import annotations
-
 from dataclasses import astuple, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,14 +21,13 @@ from synfeal.mesh.triangles import (
     merge_vertices,
     save_collision_mesh,
 )
-from synfeal.planning.questions import Questions, draw_questions
+from synfeal.planning.questions import draw_questions
 from synfeal.planning.target import admissible, has_free_view
 from synfeal.report.figures import Results, write_figures
 from synfeal.report.speed_vs_error import speeds_of, write_speed_vs_error
 from synfeal.scenes.collision import (
     CURVE_HEADER,
     Rung,
-    Trial,
     collision_mesh,
     ladder,
     last_agreeing,
@@ -47,25 +43,25 @@ BOX = np.array([[-2.8, -1.8, 0.8], [2.8, 1.8, 1.8]])
 RUNG = Rung(100, 1.0, 0.99, 1.0, 0, 0, 1, 1, 0.0)
 
 
-def triangles_of(*meshes: trimesh.Trimesh) -> Triangles:
+def triangles_of(*meshes):
     joined = trimesh.util.concatenate(list(meshes))
     return merge_vertices(np.asarray(joined.vertices), np.asarray(joined.faces))
 
 
-def divided(mesh: trimesh.Trimesh, times: int) -> trimesh.Trimesh:
+def divided(mesh, times):
     for _ in range(times):
         mesh = mesh.subdivide()
     return mesh
 
 
-def open_column() -> trimesh.Trimesh:
+def open_column():
     """Four sheets from floor to ceiling, without lids: 8 triangles a quadric holds for flat."""
     box = trimesh.creation.box(bounds=[[-0.2, -0.2, 0.0], [0.2, 0.2, 2.5]])
     return trimesh.Trimesh(box.vertices, box.faces[np.abs(box.face_normals[:, 2]) < 0.5])
 
 
 @pytest.fixture(scope="module")
-def furnished() -> Triangles:
+def furnished():
     """A room with a column, a plate and a cupboard, finely divided: 4,040 triangles."""
     room = divided(trimesh.creation.box(bounds=ROOM), 4)
     plate = divided(trimesh.creation.box(bounds=[[1.0, -1.0, 1.0], [2.0, 1.0, 1.01]]), 2)
@@ -74,19 +70,17 @@ def furnished() -> Triangles:
 
 
 @pytest.fixture(scope="module")
-def questions(furnished: Triangles) -> Questions:
+def questions(furnished):
     rng = np.random.default_rng(1)
     return draw_questions(RayCaster(*furnished), SCENE, BOX, rng, N_QUESTIONS)
 
 
 @pytest.fixture(scope="module")
-def trials(furnished: Triangles, questions: Questions) -> list[Trial]:
+def trials(furnished, questions):
     return search(furnished, questions, 0.995)
 
 
-def test_a_divided_room_needs_few_of_its_triangles(
-    furnished: Triangles, trials: list[Trial]
-) -> None:
+def test_a_divided_room_needs_few_of_its_triangles(furnished, trials):
     (chosen,) = (trial for trial in trials if trial.rung.chosen)
     assert chosen.rung.faces == len(chosen.mesh.faces) < len(furnished.faces) / 8
     full, few = RayCaster(*furnished), RayCaster(*chosen.mesh)
@@ -95,9 +89,7 @@ def test_a_divided_room_needs_few_of_its_triangles(
     assert np.mean(fresh.answers(full) == fresh.answers(few)) >= 0.991
 
 
-def test_every_line_of_the_curve_can_be_counted_again(
-    furnished: Triangles, questions: Questions, trials: list[Trial]
-) -> None:
+def test_every_line_of_the_curve_can_be_counted_again(furnished, questions, trials):
     expected = questions.answers(RayCaster(*furnished))
     assert [trial.rung.faces for trial in trials] == sorted(
         (trial.rung.faces for trial in trials), reverse=True
@@ -114,7 +106,7 @@ def test_every_line_of_the_curve_can_be_counted_again(
     assert trials[0].rung.agreement_low == pytest.approx(low, abs=1e-6)
 
 
-def test_an_open_column_keeps_its_height() -> None:
+def test_an_open_column_keeps_its_height():
     column = triangles_of(divided(open_column(), 3))
     for n_faces in (256, 64, 16):
         caster = RayCaster(*simplify(column, n_faces))
@@ -122,7 +114,7 @@ def test_an_open_column_keeps_its_height() -> None:
         assert not caster.sees(starts, starts + np.array([2.0, 0.0, 0.0])).any()
 
 
-def test_simplification_is_the_same_at_map_coordinates(furnished: Triangles) -> None:
+def test_simplification_is_the_same_at_map_coordinates(furnished):
     offset = np.array([5e5, 4e6, 100.0])
     here = simplify(furnished, 1000)
     there = simplify(Triangles(furnished.vertices_m + offset, furnished.faces), 1000)
@@ -134,7 +126,7 @@ def test_simplification_is_the_same_at_map_coordinates(furnished: Triangles) -> 
     assert np.mean(same) > 0.995
 
 
-def test_starts_are_admissible_poses_of_the_room(furnished: Triangles) -> None:
+def test_starts_are_admissible_poses_of_the_room(furnished):
     caster = RayCaster(*furnished)
     questions = draw_questions(caster, SCENE, BOX, np.random.default_rng(3), 1000)
     assert has_free_view(caster, questions.starts, SCENE.min_view_distance_m).all()
@@ -145,9 +137,7 @@ def test_starts_are_admissible_poses_of_the_room(furnished: Triangles) -> None:
     assert not questions.answers(caster)[hidden].any()
 
 
-def test_starts_for_each_candidate_are_judged_one_by_one(
-    furnished: Triangles, questions: Questions
-) -> None:
+def test_starts_for_each_candidate_are_judged_one_by_one(furnished, questions):
     caster, some = RayCaster(*furnished), range(0, 200)
     one_by_one = [
         admissible(caster, questions.starts[i], questions.candidates[i : i + 1], 1.2)[0]
@@ -158,7 +148,7 @@ def test_starts_for_each_candidate_are_judged_one_by_one(
 
 @settings(derandomize=True, deadline=None)
 @given(st.lists(st.floats(0, 1), max_size=12), st.floats(0.5, 1))
-def test_the_choice_is_the_last_of_an_unbroken_run(rest: list[float], least: float) -> None:
+def test_the_choice_is_the_last_of_an_unbroken_run(rest, least):
     rungs = [replace(RUNG, agreement=value) for value in (1.0, *rest)]
     last = last_agreeing(rungs, least)
     assert all(rung.agreement >= least for rung in rungs[: last + 1])
@@ -166,14 +156,13 @@ def test_the_choice_is_the_last_of_an_unbroken_run(rest: list[float], least: flo
 
 
 @pytest.mark.parametrize(
-    ("n_faces", "expected"),
-    [(12, []), (100, []), (101, [100]), (1000, [800, 400, 200, 100])],
+    ("n_faces", "expected"), [(12, []), (100, []), (101, [100]), (1000, [800, 400, 200, 100])]
 )
-def test_ladder(n_faces: int, expected: list[int]) -> None:
+def test_ladder(n_faces, expected):
     assert ladder(n_faces) == expected
 
 
-def test_small_meshes_are_not_decimated() -> None:
+def test_small_meshes_are_not_decimated():
     box = trimesh.creation.box(bounds=ROOM)
     mesh = TexturedMesh((MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces)),))
     collision, curve = collision_mesh(mesh, SCENE, BOX, 0.995, np.random.default_rng(0))
@@ -181,23 +170,19 @@ def test_small_meshes_are_not_decimated() -> None:
     assert [(rung.faces, rung.chosen) for rung in curve] == [(12, 1)]
 
 
-def test_full_agreement_keeps_whatever_a_question_noticed(
-    furnished: Triangles, questions: Questions
-) -> None:
+def test_full_agreement_keeps_whatever_a_question_noticed(furnished, questions):
     (chosen,) = (trial.rung for trial in search(furnished, questions, 1.0) if trial.rung.chosen)
     assert chosen.agreement == 1.0
 
 
-def test_the_choice_does_not_depend_on_the_clock(
-    furnished: Triangles, questions: Questions, trials: list[Trial]
-) -> None:
+def test_the_choice_does_not_depend_on_the_clock(furnished, questions, trials):
     again = search(furnished, questions, 0.995)
     for a, b in zip(trials, again, strict=True):
         np.testing.assert_array_equal(a.mesh.vertices_m, b.mesh.vertices_m)
         assert a.rung.chosen == b.rung.chosen
 
 
-def test_a_scene_without_a_free_view_is_refused() -> None:
+def test_a_scene_without_a_free_view_is_refused():
     box = trimesh.creation.box(bounds=ROOM)
     mesh = TexturedMesh((MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces)),))
     scene = SCENE.model_copy(update={"min_view_distance_m": 20.0})
@@ -205,7 +190,7 @@ def test_a_scene_without_a_free_view_is_refused() -> None:
         collision_mesh(mesh, scene, BOX, 0.995, np.random.default_rng(0))
 
 
-def test_seam_copies_are_merged() -> None:
+def test_seam_copies_are_merged():
     box = trimesh.creation.box()
     soup, faces = box.vertices[box.faces].reshape(-1, 3), np.arange(36).reshape(-1, 3)
     vertices, merged = merge_vertices(soup, faces)
@@ -213,7 +198,7 @@ def test_seam_copies_are_merged() -> None:
     np.testing.assert_allclose(vertices[merged], soup[faces], atol=1e-5)
 
 
-def test_collision_mesh_file_keeps_map_coordinates(tmp_path: Path) -> None:
+def test_collision_mesh_file_keeps_map_coordinates(tmp_path):
     box = trimesh.creation.box()
     offset = np.array([5e5, 4e6, 100.123456789])
     mesh = Triangles(np.asarray(box.vertices) + offset, np.asarray(box.faces))
@@ -225,14 +210,14 @@ def test_collision_mesh_file_keeps_map_coordinates(tmp_path: Path) -> None:
         load_collision_mesh(tmp_path / "none.ply")
 
 
-def curve_of(*values: tuple[int, float, int, int, int]) -> list[Rung]:
+def curve_of(*values):
     return [
         replace(RUNG, faces=n, agreement=a, rays_per_s=r, full_rays_per_s=f, chosen=c)
         for n, a, r, f, c in values
     ]
 
 
-def test_the_table_rids_speeds_of_what_else_the_machine_did(tmp_path: Path) -> None:
+def test_the_table_rids_speeds_of_what_else_the_machine_did(tmp_path):
     # The second pair was measured while the machine did half its work elsewhere.
     curve = curve_of((4000, 1.0, 100, 100, 0), (800, 0.998, 75, 50, 1), (100, 0.9, 200, 100, 0))
     write_curve(tmp_path / "scenes" / "large_room" / "collision_curve.csv", curve)
@@ -254,7 +239,7 @@ def test_the_table_rids_speeds_of_what_else_the_machine_did(tmp_path: Path) -> N
     }
 
 
-def test_a_curve_reads_back_and_a_missing_one_is_named(tmp_path: Path) -> None:
+def test_a_curve_reads_back_and_a_missing_one_is_named(tmp_path):
     curve = curve_of((4000, 1.0, 100, 100, 0), (800, 1 / 3, 75, 50, 1))
     write_curve(tmp_path / "curve.csv", curve)
     values = read_numbers(tmp_path / "curve.csv", CURVE_HEADER, "curve")

@@ -1,12 +1,8 @@
 """``synfeal compare`` on small result trees whose errors are known."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from PIL import Image
 
@@ -16,7 +12,7 @@ from synfeal.files import write_json
 from synfeal.frames import read_records
 from synfeal.report.compare.run import OUTPUTS
 from synfeal.report.compare.summary import groups_of, remarks_of, summarise
-from synfeal.report.compare.trees import Comparison, compare_trees, one_yardstick
+from synfeal.report.compare.trees import compare_trees, one_yardstick
 from synfeal.report.stats import MEASURES
 from tests.compare_trees import (
     BETTER,
@@ -33,12 +29,12 @@ from tests.compare_trees import (
 
 
 @pytest.fixture(scope="module")
-def error_m() -> np.ndarray:
+def error_m():
     return np.random.default_rng(0).uniform(1, 2, N)
 
 
 @pytest.fixture
-def trees(tmp_path: Path, error_m: np.ndarray) -> tuple[Path, Path]:
+def trees(tmp_path, error_m):
     """B: PoseNet 0.5 m better, PoseLSTM as before, Hourglass without a finite prediction."""
     a = write_tree(tmp_path / "a", dict.fromkeys(MODELS, error_m))
     changed = {BETTER: error_m - 0.5, SAME: error_m, FAILED: np.full(N, np.nan)}
@@ -46,19 +42,19 @@ def trees(tmp_path: Path, error_m: np.ndarray) -> tuple[Path, Path]:
 
 
 @pytest.fixture
-def pair(tmp_path: Path, error_m: np.ndarray) -> tuple[Path, Path]:
+def pair(tmp_path, error_m):
     """The same tree twice."""
     return write_tree(tmp_path / "a", {BETTER: error_m}), write_tree(
         tmp_path / "b", {BETTER: error_m}
     )
 
 
-def by_run(comparison: Comparison) -> pd.DataFrame:
+def by_run(comparison):
     """Rows of the table by label source, model and measure."""
     return comparison.table.set_index(["labels", "model", "measure"])
 
 
-def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+def refusal(capsys, *arguments):
     """What the command says when it refuses, on one line and with status 1."""
     assert main(["compare", *map(str, arguments)]) == 1
     message = capsys.readouterr().err
@@ -67,9 +63,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
     return message
 
 
-def test_known_changes_are_found_against_both_yardsticks(
-    trees: tuple[Path, Path], error_m: np.ndarray
-) -> None:
+def test_known_changes_are_found_against_both_yardsticks(trees, error_m):
     comparison = compare_trees(*trees)
     assert (comparison.table[["test_frames", "test_labels"]] == "same").all(axis=None)
     runs = [run for _, run in comparison.table.groupby(["labels", "model"], sort=False)]
@@ -85,7 +79,7 @@ def test_known_changes_are_found_against_both_yardsticks(
         assert found.loc[labels, SAME, "position_m"].difference == 0
 
 
-def test_summary_counts_runs_and_signs(trees: tuple[Path, Path]) -> None:
+def test_summary_counts_runs_and_signs(trees):
     summary = summarise(compare_trees(*trees).table).set_index("measure")
     position, orientation = summary.loc["position_m"], summary.loc["orientation_deg"]
     assert (position.better, position.worse, position.unseen) == (2, 2, 2)
@@ -94,7 +88,7 @@ def test_summary_counts_runs_and_signs(trees: tuple[Path, Path]) -> None:
     assert orientation.p_sign == pytest.approx(0.5)  # two of two heads or two of two tails
 
 
-def test_group_means_are_of_relative_changes(trees: tuple[Path, Path], error_m: np.ndarray) -> None:
+def test_group_means_are_of_relative_changes(trees, error_m):
     groups = groups_of(compare_trees(*trees).table).set_index(["grouping", "name"])
     assert {g: n for g, n in groups.n_runs.items() if g[0] != "model"} == {
         ("scene", "room"): 6,
@@ -110,7 +104,7 @@ def test_group_means_are_of_relative_changes(trees: tuple[Path, Path], error_m: 
     assert (groups.loc["model", SAME][list(MEASURES)] == 0).all()
 
 
-def test_other_test_paths_are_not_paired(pair: tuple[Path, Path]) -> None:
+def test_other_test_paths_are_not_paired(pair):
     plan = pair[1] / "plans/room/test.csv"
     write_pose_table(plan, poses(0.5))
     comparison = compare_trees(*pair)
@@ -120,14 +114,14 @@ def test_other_test_paths_are_not_paired(pair: tuple[Path, Path]) -> None:
     assert "in 2 the test frames differ" in remarks_of(comparison)[1]
 
 
-def test_a_missing_plan_is_said_and_not_paired(pair: tuple[Path, Path]) -> None:
+def test_a_missing_plan_is_said_and_not_paired(pair):
     (pair[0] / "plans/room/test.csv").unlink()
     comparison = compare_trees(*pair)
     assert not (comparison.runs.test_frames == "same").any()
     assert "paired in 0 of 2 runs" in remarks_of(comparison)[1]
 
 
-def test_other_labels_are_said_and_frames_still_paired(pair: tuple[Path, Path]) -> None:
+def test_other_labels_are_said_and_frames_still_paired(pair):
     write_pose_table(pair[1] / "labels/room/6k/sfm/test.csv", poses(-3.0))
     comparison = compare_trees(*pair)
     assert comparison.runs.test_labels.tolist() == ["differ", "same"]
@@ -137,7 +131,7 @@ def test_other_labels_are_said_and_frames_still_paired(pair: tuple[Path, Path]) 
     )
 
 
-def test_several_seeds_are_averaged(tmp_path: Path, error_m: np.ndarray) -> None:
+def test_several_seeds_are_averaged(tmp_path, error_m):
     a = write_tree(tmp_path / "a", {BETTER: error_m}, seeds=3)
     b = write_tree(tmp_path / "b", {BETTER: error_m}, seeds=1)
     found = by_run(compare_trees(a, b)).loc["sfm", BETTER, "position_m_true"]
@@ -146,16 +140,14 @@ def test_several_seeds_are_averaged(tmp_path: Path, error_m: np.ndarray) -> None
     assert found.sd_a == pytest.approx(0.01)
 
 
-def test_runs_of_one_tree_only_are_counted(tmp_path: Path, error_m: np.ndarray) -> None:
+def test_runs_of_one_tree_only_are_counted(tmp_path, error_m):
     a = write_tree(tmp_path / "a", dict.fromkeys((BETTER, SAME), error_m))
     b = write_tree(tmp_path / "b", dict.fromkeys((BETTER, FAILED, "posenet2"), error_m))
     comparison = compare_trees(a, b)
     assert (len(comparison.runs), comparison.only) == (2, (2, 4))
 
 
-def test_provenance_that_differs_is_printed(
-    pair: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_provenance_that_differs_is_printed(pair, capsys):
     for root, rate in zip(pair, (0.1, 0.2), strict=True):
         value = {"config": {"training": {"rate": rate, "kept": 1}}, f"only_{root.name}": "x"}
         value["files"] = {"summary.md": root.name}  # an outcome, no cause
@@ -171,9 +163,7 @@ def test_provenance_that_differs_is_printed(
     assert "Keys of provenance.json that differ: 3." in printed
 
 
-def test_files_agree_with_each_other_and_are_written_again_alike(
-    trees: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_files_agree_with_each_other_and_are_written_again_alike(trees, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["compare", *map(str, trees), "--out", str(out)]) == 0
     assert sorted(path.name for path in out.iterdir()) == sorted(OUTPUTS)
@@ -191,9 +181,7 @@ def test_files_agree_with_each_other_and_are_written_again_alike(
     assert "failed" in capsys.readouterr().out
 
 
-def test_terminal_columns_are_aligned(
-    trees: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_terminal_columns_are_aligned(trees, capsys):
     assert main(["compare", *map(str, trees)]) == 0
     lines = capsys.readouterr().out.splitlines()
     start = next(i for i, line in enumerate(lines) if line.startswith("  model"))
@@ -203,9 +191,7 @@ def test_terminal_columns_are_aligned(
     assert all(line[ends - 1] != " " and line[ends] == " " for line in rows)
 
 
-def test_foreign_files_are_left_alone(
-    pair: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_foreign_files_are_left_alone(pair, tmp_path, capsys):
     out = tmp_path / "out"
     out.mkdir()
     (out / "notes.txt").write_text("mine")
@@ -214,9 +200,7 @@ def test_foreign_files_are_left_alone(
     assert "is a file" in refusal(capsys, *pair, "--out", out / "notes.txt")
 
 
-def test_what_is_no_results_tree_is_refused(
-    pair: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_no_results_tree_is_refused(pair, tmp_path, capsys):
     assert "not a results tree" in refusal(capsys, pair[0], tmp_path / "nowhere")
     assert "not a results tree" in refusal(capsys, pair[0] / "runs", pair[1])
     other = write_tree(tmp_path / "other", {SAME: np.ones(N)})
@@ -234,14 +218,7 @@ def test_what_is_no_results_tree_is_refused(
         ("metrics.json", "{}", "metrics.json: n_train"),
     ],
 )
-def test_broken_files_are_named(
-    pair: tuple[Path, Path],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    name: str,
-    content: str | None,
-    message: str,
-) -> None:
+def test_broken_files_are_named(pair, tmp_path, capsys, name, content, message):
     path = pair[1] / RUN / name
     path.unlink()
     if content is not None:
@@ -250,18 +227,14 @@ def test_broken_files_are_named(
     assert not (tmp_path / "out").exists()
 
 
-def test_scores_of_other_errors_are_refused(
-    pair: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_scores_of_other_errors_are_refused(pair, capsys):
     path = pair[1] / RUN / "metrics.json"
     metrics = json.loads(path.read_text())
     write_json(path, metrics | {"orientation_deg_true": 1.5})
     assert "orientation_deg_true is 1.5" in refusal(capsys, *pair)
 
 
-def test_seeds_of_one_run_must_share_their_frames(
-    tmp_path: Path, error_m: np.ndarray, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_seeds_of_one_run_must_share_their_frames(tmp_path, error_m, capsys):
     a = write_tree(tmp_path / "a", {BETTER: error_m}, seeds=2)
     path = a / RUN / "predictions.csv"
     write_pose_table(path, read_pose_table(path).first(N - 1))

@@ -1,7 +1,5 @@
 """Differences of medians: known shifts, scipy's bootstrap, and how often the limits hold."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -16,48 +14,36 @@ from synfeal.report.stats import MEASURES
 N = 120
 
 
-def run(*seeds: np.ndarray, path: np.ndarray | None = None) -> RunErrors:
+def run(*seeds, path=None):
     """A run with the same errors in every measure, one path per frame unless told."""
     frame = np.arange(seeds[0].shape[-1])
     errors = np.stack([np.broadcast_to(values, (4, len(frame))) for values in seeds])
     return RunErrors(frame, frame if path is None else path, errors)
 
 
-def difference(a: RunErrors, b: RunErrors, paired: bool = True) -> pd.Series:
+def difference(a, b, paired=True):
     found = compare_errors(a, b, paired)
     assert found.measure.tolist() == list(MEASURES)
     return found.iloc[0]
 
 
 @pytest.fixture
-def errors() -> np.ndarray:
+def errors():
     return np.random.default_rng(1).lognormal(size=N)
 
 
-def test_identical_runs_do_not_differ(errors: np.ndarray) -> None:
-    found = difference(run(errors), run(errors))
-    assert (found.difference, found.low, found.high, found.change_percent) == (0, 0, 0, 0)
-    assert found.verdict == "no difference seen"
-
-
-@pytest.mark.parametrize(("shift", "verdict"), [(0.25, "worse"), (-0.25, "better")])
-def test_paired_limits_of_a_constant_shift_are_the_shift(
-    errors: np.ndarray, shift: float, verdict: str
-) -> None:
+@pytest.mark.parametrize(
+    ("shift", "verdict"), [(0.25, "worse"), (-0.25, "better"), (0.0, "no difference seen")]
+)
+def test_paired_limits_of_a_constant_shift_are_the_shift(errors, shift, verdict):
     found = difference(run(errors + 1), run(errors + 1 + shift))
     assert [found.low, found.difference, found.high] == pytest.approx([shift] * 3, abs=1e-12)
     assert found.verdict == verdict
     assert found.change_percent == pytest.approx(100 * shift / (1 + np.median(errors)))
 
 
-def test_unpaired_limits_hold_the_shift_and_are_wider(errors: np.ndarray) -> None:
-    found = difference(run(errors), run(errors + 0.25), paired=False)
-    assert found.low < 0.25 < found.high
-    assert found.high - found.low > 0.2
-
-
 @pytest.mark.parametrize("paired", [True, False])
-def test_limits_are_those_of_scipy(paired: bool) -> None:
+def test_limits_are_those_of_scipy(paired):
     rng = np.random.default_rng(4)
     a = rng.lognormal(size=200)
     b = 1.1 * a * np.exp(0.3 * rng.normal(size=200))
@@ -74,33 +60,7 @@ def test_limits_are_those_of_scipy(paired: bool) -> None:
     assert [found.low, found.high] == pytest.approx(list(scipy_limits), abs=0.12 * width)
 
 
-def coverage(frames_are_independent: bool) -> float:
-    """How often the limits hold the true difference: 40 paths of 5 frames, hard ones for both."""
-    rng = np.random.default_rng(6)
-    path = np.repeat(np.arange(40), 5)
-    truth = math.exp(0.2) - 1
-    held = []
-    for _ in range(100):
-        shared = rng.normal(size=(4, 40))[:, path]
-        own = 0.5 * rng.normal(size=(2, 4, 40))[:, :, path]
-        noise = 0.3 * rng.normal(size=(2, 4, 200))
-        log_a, log_b = shared + own + noise
-        names = np.arange(200) if frames_are_independent else path
-        a, b = (RunErrors(np.arange(200), names, np.exp(v)[None]) for v in (log_a, log_b + 0.2))
-        found = compare_errors(a, b, paired=True)
-        held += found.low.le(truth).mul(found.high.ge(truth)).tolist()
-    return float(np.mean(held))
-
-
-def test_paired_limits_hold_the_truth_as_often_as_they_say() -> None:
-    assert 0.92 <= coverage(frames_are_independent=False) <= 0.98
-
-
-def test_frames_instead_of_paths_would_give_limits_that_are_too_narrow() -> None:
-    assert coverage(frames_are_independent=True) < 0.85
-
-
-def test_failures_make_a_run_worst(errors: np.ndarray) -> None:
+def test_failures_make_a_run_worst(errors):
     failed = np.full(N, np.inf)
     worse = difference(run(errors), run(failed))
     assert (worse.verdict, worse.difference, worse.change_percent) == ("worse", math.inf, math.inf)
@@ -110,20 +70,14 @@ def test_failures_make_a_run_worst(errors: np.ndarray) -> None:
     assert (both.verdict, both.difference, both.change_percent) == ("no difference seen", 0, 0)
 
 
-def test_few_failures_move_the_median_as_large_errors_would(errors: np.ndarray) -> None:
+def test_few_failures_move_the_median_as_large_errors_would(errors):
     some, large = errors.copy(), errors.copy()
     some[::3], large[::3] = np.inf, 1e9
     pd.testing.assert_series_equal(*(difference(run(errors), run(b)) for b in (some, large)))
     assert difference(run(errors), run(some)).difference > 0
 
 
-def test_one_failed_seed_is_not_dropped(errors: np.ndarray) -> None:
-    found = difference(run(errors, errors), run(errors, np.full(N, np.inf)))
-    assert (found.b, found.verdict) == (math.inf, "worse")
-    assert np.isnan([found.sd_b, found.se_seeds]).all()
-
-
-def test_seeds_give_means_and_the_standard_error_of_welch(errors: np.ndarray) -> None:
+def test_seeds_give_means_and_the_standard_error_of_welch(errors):
     a, b = [errors + s for s in (0.0, 0.3, 0.1)], [errors + s for s in (0.5, 0.9)]
     found = difference(run(*a), run(*b))
     medians = [[float(np.median(values)) for values in seeds] for seeds in (a, b)]
@@ -133,7 +87,7 @@ def test_seeds_give_means_and_the_standard_error_of_welch(errors: np.ndarray) ->
     assert found.difference / found.se_seeds == pytest.approx(welch.statistic)
 
 
-def test_each_measure_is_compared_with_itself(errors: np.ndarray) -> None:
+def test_each_measure_is_compared_with_itself(errors):
     frame = np.arange(N)
     a, b = (np.stack([(k + 1) * errors + shift * k for k in range(4)])[None] for shift in (0, 1))
     found = compare_errors(RunErrors(frame, frame, a), RunErrors(frame, frame, b), paired=True)
@@ -141,7 +95,7 @@ def test_each_measure_is_compared_with_itself(errors: np.ndarray) -> None:
     assert found.difference.tolist() == pytest.approx([0, 1, 2, 3])
 
 
-def test_draws_are_a_thousand_and_others_for_the_other_tree() -> None:
+def test_draws_are_a_thousand_and_others_for_the_other_tree():
     path = np.array([7, 7, 2, 9])
     (place, a), (_, again), (_, b) = (draws_of(path, tree) for tree in "aab")
     assert place.tolist() == [1, 1, 0, 2]
@@ -151,7 +105,7 @@ def test_draws_are_a_thousand_and_others_for_the_other_tree() -> None:
     assert not np.array_equal(a, b)
 
 
-def test_one_finite_seed_has_no_deviation(errors: np.ndarray) -> None:
+def test_one_finite_seed_has_no_deviation(errors):
     failed = np.full(N, np.inf)
     found = difference(run(errors, errors + 1, failed), run(errors, errors + 3))
     assert found.sd_a == pytest.approx(math.sqrt(0.5))  # of the two that are finite
@@ -164,7 +118,7 @@ def test_one_finite_seed_has_no_deviation(errors: np.ndarray) -> None:
     assert np.isnan(difference(run(errors, failed), run(errors, errors + 1)).sd_a)
 
 
-def test_limits_leave_out_two_and_a_half_percent_of_the_resamples_on_either_side() -> None:
+def test_limits_leave_out_two_and_a_half_percent_of_the_resamples_on_either_side():
     a, b = np.random.default_rng(8).lognormal(size=(2, 30))
     found = difference(run(a), run(b))
     _, counts = draws_of(np.arange(30), "a")
@@ -173,7 +127,7 @@ def test_limits_leave_out_two_and_a_half_percent_of_the_resamples_on_either_side
     assert (drawn > found.high).mean() <= 0.026 <= (drawn >= found.high).mean()
 
 
-def test_limits_are_differences_that_occur() -> None:
+def test_limits_are_differences_that_occur():
     whole = np.arange(N, dtype=float)  # medians of whole numbers, and so their differences
     found = difference(run(whole), run(whole[::-1] ** 2), paired=False)
     assert (2 * found.low) % 1 == 0

@@ -1,7 +1,5 @@
 """Images, conda and lock files agree with the project; that they work only building them tells."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import tomllib
@@ -17,11 +15,11 @@ ROOT = Path(__file__).parent.parent
 CPU, CUDA = "requirements.lock", "requirements-cuda.lock"
 
 
-def read(name: str) -> str:
+def read(name):
     return (ROOT / name).read_text(encoding="utf-8")
 
 
-def pins(name: str) -> dict[str, str]:
+def pins(name):
     """Versions by canonical name; a name twice is an error."""
     lines = [line for line in read(name).splitlines() if line and line[0] not in "#-"]
     pairs = [re.fullmatch(r"([\w.-]+)={2,3}([\w.]+)", line) for line in lines]
@@ -31,7 +29,7 @@ def pins(name: str) -> dict[str, str]:
     return found
 
 
-def test_every_dependency_is_locked_within_its_range() -> None:
+def test_every_dependency_is_locked_within_its_range():
     project = tomllib.loads(read("pyproject.toml"))["project"]
     locked = pins(CPU)
     for text in (*project["dependencies"], *project["optional-dependencies"]["dev"]):
@@ -40,7 +38,7 @@ def test_every_dependency_is_locked_within_its_range() -> None:
         assert requirement.specifier.contains(version, prereleases=True), requirement
 
 
-def test_the_locks_differ_in_what_cuda_needs() -> None:
+def test_the_locks_differ_in_what_cuda_needs():
     lines, cpu, cuda = read(CUDA).splitlines(), pins(CPU), pins(CUDA)
     assert f"--requirement {CPU}" in lines
     assert f"torch==={cpu['torch']}" in lines  # no local build: "==" would take "+cpu" too
@@ -50,7 +48,7 @@ def test_the_locks_differ_in_what_cuda_needs() -> None:
 
 
 @pytest.mark.parametrize("name", ["Dockerfile", "apptainer.def"])
-def test_images_are_built_by_the_makefile_and_the_one_list_of_packages(name: str) -> None:
+def test_images_are_built_by_the_makefile_and_the_one_list_of_packages(name):
     text = read(name)
     base = re.search(r"^(?:FROM|From:) (\S+)$", text, re.MULTILINE)
     assert base is not None
@@ -68,7 +66,7 @@ def test_images_are_built_by_the_makefile_and_the_one_list_of_packages(name: str
     assert not known & set(script.split())
 
 
-def test_one_python_everywhere() -> None:
+def test_one_python_everywhere():
     conda = yaml.safe_load(read("environment.yaml"))["dependencies"]
     inner = yaml.safe_load(read("workflow/envs/synfeal.yaml"))["dependencies"]
     [python] = [text for text in conda if str(text).startswith("python=")]
@@ -79,7 +77,7 @@ def test_one_python_everywhere() -> None:
     assert project["tool"]["mypy"]["python_version"] == version  # Debian bookworm's
 
 
-def test_what_make_needs_is_in_the_image() -> None:
+def test_what_make_needs_is_in_the_image():
     script = read("setup/container.sh").split()
     conda = yaml.safe_load(read("environment.yaml"))["dependencies"]
     for program in ("git", "make", "unzip"):
@@ -88,13 +86,13 @@ def test_what_make_needs_is_in_the_image() -> None:
 
 
 @pytest.mark.parametrize("name", ["container.sh", "system_packages.sh", "lock.sh", "lock_cuda.sh"])
-def test_scripts_are_programs_of_bash(name: str) -> None:
+def test_scripts_are_programs_of_bash(name):
     path = ROOT / "setup" / name
     assert path.stat().st_mode & 0o111
     subprocess.run(["bash", "-n", str(path)], check=True)
 
 
-def test_results_and_environments_stay_out_of_the_build() -> None:
+def test_results_and_environments_stay_out_of_the_build():
     ignored = read(".dockerignore").splitlines()
     assert {".venv", ".snakemake", "results/*", "!results/published"} <= set(ignored)
     assert ".git" not in ignored  # results say which commit made them

@@ -4,7 +4,6 @@ import io
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,14 +18,14 @@ from synfeal.seeds import generator_of, seed_of
 from tests.fuzzing import JARGON
 
 
-def random_table(n: int) -> PoseTable:
+def random_table(n):
     rng = np.random.default_rng(3)
     quat = rng.normal(size=(n, 4))
     quat /= np.linalg.norm(quat, axis=1, keepdims=True) * np.sign(quat[:, :1])
     return PoseTable(np.arange(n), np.arange(n) // 3, rng.normal(size=(n, 3)) * 1e3, quat)
 
 
-def test_pose_table_round_trip_is_exact(tmp_path: Path) -> None:
+def test_pose_table_round_trip_is_exact(tmp_path):
     table = random_table(10)
     write_pose_table(tmp_path / "poses.csv", table)
     read = read_pose_table(tmp_path / "poses.csv")
@@ -34,7 +33,7 @@ def test_pose_table_round_trip_is_exact(tmp_path: Path) -> None:
         np.testing.assert_array_equal(getattr(read, name), getattr(table, name))
 
 
-def test_first_frames_are_a_prefix_and_too_many_are_refused() -> None:
+def test_first_frames_are_a_prefix_and_too_many_are_refused():
     table = random_table(10)
     np.testing.assert_array_equal(table.first(4).position_m, table.position_m[:4])
     with pytest.raises(ValueError, match="11"):
@@ -51,7 +50,7 @@ def test_first_frames_are_a_prefix_and_too_many_are_refused() -> None:
         (f"{HEADER}\n0,0,1,2,nan,1,0,0,0\n", "row 2"),
     ],
 )
-def test_broken_pose_table_is_named_in_one_line(tmp_path: Path, text: str, words: str) -> None:
+def test_broken_pose_table_is_named_in_one_line(tmp_path, text, words):
     path = tmp_path / "poses.csv"
     path.write_text(text)
     with pytest.raises(InputError) as caught:
@@ -62,7 +61,7 @@ def test_broken_pose_table_is_named_in_one_line(tmp_path: Path, text: str, words
     assert "\n" not in message
 
 
-def raised(action: Callable[[], object]) -> Exception:
+def raised(action):
     try:
         action()
     except Exception as error:
@@ -89,19 +88,17 @@ def raised(action: Callable[[], object]) -> Exception:
         (lambda: yaml.safe_load("a: [1"), "line 1: expected ',' or ']', but got 'stream end'"),
     ],
 )
-def test_a_reason_is_in_words_and_not_in_those_of_python(
-    action: Callable[[], object], words: str
-) -> None:
+def test_a_reason_is_in_words_and_not_in_those_of_python(action, words):
     said = why(raised(action))
     assert said.startswith(words)
     assert not JARGON.search(said)
 
 
-def test_a_failed_write_leaves_the_old_file_and_no_other(tmp_path: Path) -> None:
+def test_a_failed_write_leaves_the_old_file_and_no_other(tmp_path):
     path = tmp_path / "result.txt"
     path.write_text("old")
 
-    def write_half() -> None:
+    def write_half():
         with atomic_path(path) as temporary:
             temporary.write_text("half of the n")
             raise RuntimeError
@@ -112,7 +109,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_other(tmp_path: Path) -> None
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_json_refuses_nan(tmp_path: Path) -> None:
+def test_json_refuses_nan(tmp_path):
     with pytest.raises(ValueError, match="JSON compliant"):
         write_json(tmp_path / "a.json", {"error_m": float("nan")})
     assert list(tmp_path.iterdir()) == []
@@ -120,7 +117,7 @@ def test_json_refuses_nan(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "a.json").read_text()) == {"a": None, "b": 1}
 
 
-def test_seeds_depend_on_every_component_and_on_nothing_else() -> None:
+def test_seeds_depend_on_every_component_and_on_nothing_else():
     assert seed_of(0, "train", "posenet") == seed_of(0, "train", "posenet")
     names = [(0, "a", "b"), (1, "a", "b"), (0, "ab"), (0, "a", "c"), (0, "b", "a")]
     assert len({seed_of(*name) for name in names}) == len(names)
@@ -128,7 +125,7 @@ def test_seeds_depend_on_every_component_and_on_nothing_else() -> None:
     assert generator_of("x").integers(2**40) == generator_of("x").integers(2**40)
 
 
-def run_job(tmp_path: Path, body: str) -> subprocess.CompletedProcess[str]:
+def run_job(tmp_path, body):
     log = tmp_path / "job.log"
     script = (
         "import os, sys\nfrom synfeal.errors import InputError\nfrom synfeal.job import job\n"
@@ -138,7 +135,7 @@ def run_job(tmp_path: Path, body: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def test_job_tells_a_person_one_line_and_logs_the_rest(tmp_path: Path) -> None:
+def test_job_tells_a_person_one_line_and_logs_the_rest(tmp_path):
     run = run_job(tmp_path, "raise InputError('mesh.glb: holds no faces;\\n export it again')")
     assert run.returncode == 1
     assert run.stderr == "error: mesh.glb: holds no faces; export it again\n"
@@ -148,7 +145,7 @@ def test_job_tells_a_person_one_line_and_logs_the_rest(tmp_path: Path) -> None:
     assert "native" in log
 
 
-def test_job_keeps_the_traceback_of_a_defect(tmp_path: Path) -> None:
+def test_job_keeps_the_traceback_of_a_defect(tmp_path):
     run = run_job(tmp_path, "1 / 0")
     assert run.returncode == 1
     assert "ZeroDivisionError" in (tmp_path / "job.log").read_text()

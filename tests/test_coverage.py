@@ -1,7 +1,5 @@
 """What a plan covers, against closed forms of boxes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh
@@ -56,16 +54,16 @@ SAMPLED = 4 * np.sqrt(0.25 / 20_000)  # four standard errors of a share of the p
 ALL_AROUND = [(0.0, yaw) for yaw in (0.0, 90.0, 180.0, 270.0)] + [(90.0, 0.0), (-90.0, 0.0)]
 
 
-def box(bounds: Array) -> trimesh.Trimesh:
+def box(bounds):
     return trimesh.creation.box(bounds=bounds).subdivide().subdivide()
 
 
-def joined(*meshes: trimesh.Trimesh) -> Triangles:
+def joined(*meshes):
     mesh = trimesh.util.concatenate(list(meshes))
     return Triangles(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
-def plan_of(position_m: tuple[float, ...], views: list[tuple[float, float]]) -> PoseTable:
+def plan_of(position_m, views):
     """Cameras at one place; ``views`` are pitch and yaw in degrees."""
     rpy = np.deg2rad([(0.0, *view) for view in views])
     poses = pose_matrix(rotation_from_rpy(rpy), np.tile(position_m, (len(views), 1)))
@@ -73,11 +71,11 @@ def plan_of(position_m: tuple[float, ...], views: list[tuple[float, float]]) -> 
     return PoseTable(index, index, poses[:, :3, 3], quat_wxyz_of(poses))
 
 
-def cover(mesh: Triangles, box_m: Array, plan: PoseTable, camera: CameraConfig = SQUARE) -> dict:  # type: ignore[type-arg]
+def cover(mesh, box_m, plan, camera=SQUARE):
     return plan_coverage(mesh, box_m, SCENE, plan, camera)
 
 
-def test_a_camera_turning_in_the_middle_of_a_room_sees_everything() -> None:
+def test_a_camera_turning_in_the_middle_of_a_room_sees_everything():
     found = cover(joined(box(CUBE)), CUBE, plan_of((0.1, 0.05, -0.1), ALL_AROUND))["surface"]
     assert found["visible_share"] == 1.0
     assert found["seen_share"] == 1.0
@@ -86,12 +84,12 @@ def test_a_camera_turning_in_the_middle_of_a_room_sees_everything() -> None:
 
 
 @pytest.mark.parametrize(("n", "share"), [(2, 0.0), (3, 1 / 6), (5, 1 / 6)])
-def test_often_is_three_frames(n: int, share: float) -> None:
+def test_often_is_three_frames(n, share):
     found = cover(joined(box(CUBE)), CUBE, plan_of((0.0, 0.0, 0.0), [(0, 0)] * n))["surface"]
     assert found["seen_often_share"] == pytest.approx(share, abs=SAMPLED)
 
 
-def test_of_a_divided_room_the_larger_part_is_the_scene() -> None:
+def test_of_a_divided_room_the_larger_part_is_the_scene():
     wall = box(np.array([[0.5, -2.0, -2.0], [0.6, 2.0, 2.0]]))
     found = cover(joined(box(CUBE), wall), CUBE, plan_of((-0.75, 0.0, 0.0), ALL_AROUND))
     # Seen: an end, four sides 2.5 m deep, the wall's near face. All: the cube, the wall's surface.
@@ -102,21 +100,7 @@ def test_of_a_divided_room_the_larger_part_is_the_scene() -> None:
     assert found["free_space"]["voxels"] == 10 * 16 * 16  # of 16 x 16 x 16
 
 
-def test_half_a_room_behind_a_screen_is_not_seen() -> None:
-    screen = box(np.array([[0.0, -1.9, -2.0], [0.05, 2.0, 2.0]]))  # a gap of 10 cm
-    found = cover(joined(box(CUBE), screen), CUBE, plan_of((-1.0, 1.0, 0.0), ALL_AROUND))
-    assert found["surface"]["seen_share"] == pytest.approx(0.5, abs=0.03)
-
-
-def test_what_is_too_far_is_not_seen() -> None:
-    hall = np.array([[0.0, -0.5, -0.5], [2 * FARTHEST_M, 0.5, 0.5]])
-    found = cover(joined(box(hall)), hall, plan_of((0.1, 0.0, 0.0), ALL_AROUND))["surface"]
-    near = 1 + 4 * 5.1  # the end wall and the sides as far as 5 m from the camera
-    whole = 2 + 4 * 10
-    assert found["seen_share"] == pytest.approx(near / whole, abs=SAMPLED + 0.03 * near / whole)
-
-
-def test_voxels_near_a_camera_are_counted() -> None:
+def test_voxels_near_a_camera_are_counted():
     corridor = np.array([[0.0, 0.0, 0.0], [5.0, 0.25, 0.25]])  # twenty voxels in a row
     shell = box(np.array([[-1.0, -1.0, -1.0], [6.0, 1.0, 1.0]]))
     camera = plan_of((1.125 + 0.1, 0.125, 0.125), [(0, 10), (0, 20), (0, 100)])
@@ -126,14 +110,14 @@ def test_voxels_near_a_camera_are_counted() -> None:
     assert found["headings_share"] == pytest.approx(4 * 2 / (20 * 8))  # 10 and 20 are one sector
 
 
-def test_poses_where_none_can_be_sampled_are_measured_too() -> None:
+def test_poses_where_none_can_be_sampled_are_measured_too():
     nowhere = np.array([[90.0, 90.0, 90.0], [91.0, 91.0, 91.0]])
     scene = SCENE.model_copy(update={"angles": Angles(yaw_deg=(0, 10))})
     found = plan_coverage(joined(box(CUBE)), nowhere, scene, plan_of((0, 0, 0), ALL_AROUND), SQUARE)
-    assert found["surface"]["seen_share"] == 1.0  # type: ignore[index]
+    assert found["surface"]["seen_share"] == 1.0
 
 
-def test_what_lies_beyond_the_fold_of_a_lens_is_not_in_the_image() -> None:
+def test_what_lies_beyond_the_fold_of_a_lens_is_not_in_the_image():
     camera = CameraConfig(horizontal_fov_deg=40.0, distortion=(-0.3, 0.0, 0.0, 0.0, 0.0))
     slope = np.array([[0.2, 0.0, 1.0], [1.7, 0.0, 1.0]])  # the second would land at 0.23
     assert in_image(camera, np.eye(4), slope).tolist() == [True, False]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import weakref
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -47,7 +46,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 CAMERA = CameraConfig.model_validate({"width": 40, "height": 30})
 
 
-def poses_of(count: int) -> PoseTable:
+def poses_of(count):
     rng = np.random.default_rng(0)
     poses = pose_matrix(
         rotation_from_rpy(rng.uniform(-0.5, 0.5, (count, 3))), rng.uniform(-0.5, 0.5, (count, 3))
@@ -56,7 +55,7 @@ def poses_of(count: int) -> PoseTable:
     return PoseTable(index, index, poses[:, :3, 3].copy(), quat_wxyz_of(poses))
 
 
-def room_mesh() -> TexturedMesh:
+def room_mesh():
     box = trimesh.creation.box((4.0, 4.0, 4.0))
     colors = np.random.default_rng(0).integers(0, 256, (8, 3), np.uint8)
     return TexturedMesh(
@@ -67,24 +66,22 @@ def room_mesh() -> TexturedMesh:
 class FakeRenderer:
     """Frames that say which pose they show; breaks after ``limit`` frames."""
 
-    def __init__(self, limit: int = 1000) -> None:
+    def __init__(self, limit=1000):
         self.limit = limit
 
-    def render_rgbd(
-        self, world_from_cam: NDArray[np.float64]
-    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    def render_rgbd(self, world_from_cam):
         self.limit -= 1
         if self.limit < 0:
             raise RuntimeError("the graphics card is on fire")
         x = world_from_cam[0, 3]
         return np.full((4, 6, 3), 100 + 100 * x, np.uint8), np.full((4, 6), 1 + x, np.float32)
 
-    def render(self, world_from_cam: NDArray[np.float64]) -> NDArray[np.uint8]:
+    def render(self, world_from_cam):
         return self.render_rgbd(world_from_cam)[0]
 
 
 @given(st.integers(0, 300), st.integers(0, 300), st.integers(1, 60))
-def test_sequences_cover_every_frame_once(n_train: int, n_test: int, shard: int) -> None:
+def test_sequences_cover_every_frame_once(n_train, n_test, shard):
     sequences = sequences_of(n_train, n_test, shard)
     for split, count in (("train", n_train), ("test", n_test)):
         frames = [i for s in sequences if s.split == split for i in range(s.start, s.stop)]
@@ -93,7 +90,7 @@ def test_sequences_cover_every_frame_once(n_train: int, n_test: int, shard: int)
     assert [s.number for s in sequences] == list(range(1, len(sequences) + 1))
 
 
-def test_sequence_names_count_train_first() -> None:
+def test_sequence_names_count_train_first():
     found = [(s.name, s.split, s.start, s.stop) for s in sequences_of(1200, 300, 1000)]
     assert found == [
         ("seq-01", "train", 0, 1000),
@@ -102,7 +99,7 @@ def test_sequence_names_count_train_first() -> None:
     ]
 
 
-def test_split_files_are_those_of_7_scenes(tmp_path: Path) -> None:
+def test_split_files_are_those_of_7_scenes(tmp_path):
     write_splits(tmp_path, sequences_of(5, 3, 3))
     assert (tmp_path / "TrainSplit.txt").read_text() == "sequence1\nsequence2\n"
     assert (tmp_path / "TestSplit.txt").read_text() == "sequence3\n"
@@ -112,7 +109,7 @@ def test_split_files_are_those_of_7_scenes(tmp_path: Path) -> None:
         read_split(tmp_path, "test")
 
 
-def test_depth_is_16_bit_millimetres(tmp_path: Path) -> None:
+def test_depth_is_16_bit_millimetres(tmp_path):
     depth = np.array([[0.5, 1.2344, np.inf], [65.534, 65.536, 100.0]], np.float32)
     (tmp_path / "depth.png").write_bytes(encode_png(depth_mm_of(depth)))
     stored = np.asarray(Image.open(tmp_path / "depth.png"))
@@ -122,7 +119,7 @@ def test_depth_is_16_bit_millimetres(tmp_path: Path) -> None:
     assert np.isinf(back[[0, 1, 1], [2, 1, 2]]).all()
 
 
-def test_pose_file_is_four_rows_and_exact(tmp_path: Path) -> None:
+def test_pose_file_is_four_rows_and_exact(tmp_path):
     pose = poses_of(1).world_from_cam[0]
     (tmp_path / "pose.txt").write_text(pose_text(pose))
     rows = (tmp_path / "pose.txt").read_text().splitlines()
@@ -130,7 +127,7 @@ def test_pose_file_is_four_rows_and_exact(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_pose(tmp_path / "pose.txt"), pose, atol=1e-10)
 
 
-def test_rendered_sequence_holds_what_the_poses_see(tmp_path: Path) -> None:
+def test_rendered_sequence_holds_what_the_poses_see(tmp_path):
     save_glb(tmp_path / "mesh.glb", room_mesh())
     poses = poses_of(3)
     render_sequence(tmp_path / "mesh.glb", CAMERA, poses, tmp_path / "out" / "seq-01", True)
@@ -154,33 +151,33 @@ def test_rendered_sequence_holds_what_the_poses_see(tmp_path: Path) -> None:
 class Remembering:
     """Counts frames that were handed over and not yet written, as ``write_sequence`` sees them."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.shown: list[weakref.ref[NDArray[np.uint8]]] = []
         self.most = 0
 
-    def render(self, world_from_cam: NDArray[np.float64]) -> NDArray[np.uint8]:
+    def render(self, world_from_cam):
         rgb = np.full((240, 320, 3), len(self.shown) % 256, np.uint8)
         self.shown.append(weakref.ref(rgb))
         self.most = max(self.most, sum(shown() is not None for shown in self.shown))
         return rgb
 
 
-def test_only_some_frames_wait_to_be_written(tmp_path: Path) -> None:
+def test_only_some_frames_wait_to_be_written(tmp_path):
     renderer = Remembering()
-    write_sequence(renderer, poses_of(300), tmp_path / "seq-01", False)  # type: ignore[arg-type]
+    write_sequence(renderer, poses_of(300), tmp_path / "seq-01", False)
     assert renderer.most <= MOST_WAITING + 2
     for index in (0, 100, 299):
         with Image.open(tmp_path / "seq-01" / f"frame-{index:06d}.color.png") as frame:
             assert frame.getpixel((160, 120)) == (index % 256,) * 3
 
 
-def test_an_interrupted_sequence_leaves_nothing(tmp_path: Path) -> None:
+def test_an_interrupted_sequence_leaves_nothing(tmp_path):
     with pytest.raises(RuntimeError, match="on fire"):
-        write_sequence(FakeRenderer(2), poses_of(5), tmp_path / "seq-01", True)  # type: ignore[arg-type]
+        write_sequence(FakeRenderer(2), poses_of(5), tmp_path / "seq-01", True)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_directories_that_hold_something_are_not_touched(tmp_path: Path) -> None:
+def test_directories_that_hold_something_are_not_touched(tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.txt").write_text("years of work")
     with pytest.raises(InputError, match="not empty"), atomic_directory(tmp_path / "mine"):
@@ -188,13 +185,13 @@ def test_directories_that_hold_something_are_not_touched(tmp_path: Path) -> None
     assert (tmp_path / "mine" / "thesis.txt").read_text() == "years of work"
 
 
-def test_empty_sequences_are_named(tmp_path: Path) -> None:
+def test_empty_sequences_are_named(tmp_path):
     (tmp_path / "seq-04").mkdir()
     with pytest.raises(InputError, match="seq-04"):
         frame_paths([tmp_path / "seq-04"], "color.png")
 
 
-def write_frames(directory: Path, values: list[int], size: tuple[int, int] = (40, 30)) -> None:
+def write_frames(directory, values, size=(40, 30)):
     directory.mkdir()
     for index, value in enumerate(values):
         Image.new("RGB", size, (value, 0, 0)).save(directory / f"frame-{index:06d}.color.png")
@@ -202,7 +199,7 @@ def write_frames(directory: Path, values: list[int], size: tuple[int, int] = (40
 
 @pytest.mark.parametrize("shape", [(1, 1, 3), (7, 5, 3), (30, 40, 3), (1, 1), (7, 5), (30, 40)])
 @pytest.mark.parametrize("kind", ["noise", "flat"])
-def test_png_files_hold_the_pixels(tmp_path: Path, shape: tuple[int, ...], kind: str) -> None:
+def test_png_files_hold_the_pixels(tmp_path, shape, kind):
     dtype = np.uint8 if len(shape) == 3 else np.uint16
     most = np.iinfo(dtype).max
     pixels = np.random.default_rng(0).integers(0, most + 1, shape).astype(dtype)
@@ -220,12 +217,12 @@ def test_png_files_hold_the_pixels(tmp_path: Path, shape: tuple[int, ...], kind:
 @pytest.mark.parametrize(
     "pixels", [np.zeros((4, 4), np.uint8), np.zeros((4, 4, 4), np.uint8), np.zeros((4, 4, 3))]
 )
-def test_other_pixels_are_no_frames(pixels: NDArray[np.uint8]) -> None:
+def test_other_pixels_are_no_frames(pixels):
     with pytest.raises(ValueError, match="cannot encode"):
         encode_png(pixels)
 
 
-def test_manifest_finds_a_changed_pixel(tmp_path: Path) -> None:
+def test_manifest_finds_a_changed_pixel(tmp_path):
     write_frames(tmp_path / "seq-01", [1, 2])
     write_frames(tmp_path / "seq-02", [3])
     write_manifest(tmp_path, sequences_of(2, 1, 2), CAMERA, {"scene": "room"})
@@ -240,7 +237,7 @@ def test_manifest_finds_a_changed_pixel(tmp_path: Path) -> None:
         verify_manifest(tmp_path)
 
 
-def test_contact_sheet_shows_frames_in_reading_order(tmp_path: Path) -> None:
+def test_contact_sheet_shows_frames_in_reading_order(tmp_path):
     write_frames(tmp_path / "seq-01", list(range(0, 240, 5)))  # 48 frames: every second is shown
     paths = frame_paths([tmp_path / "seq-01"], "color.png")
     write_contact_sheet(paths, tmp_path / "preview.png")
@@ -251,7 +248,7 @@ def test_contact_sheet_shows_frames_in_reading_order(tmp_path: Path) -> None:
         assert sheet.getpixel((100, 270)) == (60, 0, 0)
 
 
-def test_a_mesh_scene_is_prepared(tmp_path: Path) -> None:
+def test_a_mesh_scene_is_prepared(tmp_path):
     save_glb(tmp_path / "room.glb", room_mesh())
     sha256 = hashlib.sha256((tmp_path / "room.glb").read_bytes()).hexdigest()
     scene = SceneConfig.model_validate(
@@ -274,9 +271,7 @@ def test_a_mesh_scene_is_prepared(tmp_path: Path) -> None:
         ({"path": "nowhere.glb"}, "no such mesh file"),
     ],
 )
-def test_a_scene_that_contradicts_its_config_is_refused(
-    tmp_path: Path, values: dict[str, object], message: str
-) -> None:
+def test_a_scene_that_contradicts_its_config_is_refused(tmp_path, values, message):
     save_glb(tmp_path / "room.glb", room_mesh())
     scene = SceneConfig.model_validate({"source": "mesh", "path": tmp_path / "room.glb", **values})
     with pytest.raises(InputError, match=message):

@@ -1,7 +1,5 @@
 """Images through a lens: where points appear, how lines bend, exact depth, no border."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest
@@ -30,7 +28,7 @@ SLANT = np.array([0.3, -0.2, 1.0]) / 2.5  # the plane of points with SLANT @ poi
 each_lens = pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
 
 
-def camera_of(lens: tuple[float, ...], width: int = 160, height: int = 120) -> CameraConfig:
+def camera_of(lens, width=160, height=120):
     focal = 0.75 * width
     values = {"fx": focal, "fy": 0.99 * focal, "cx": 0.52 * width, "cy": 0.49 * height}
     return CameraConfig.model_validate(
@@ -38,14 +36,14 @@ def camera_of(lens: tuple[float, ...], width: int = 160, height: int = 120) -> C
     )
 
 
-def expected_pixels(points_cam: np.ndarray, camera: CameraConfig) -> np.ndarray:
+def expected_pixels(points_cam, camera):
     """OpenCV's, whose first pixel has its centre at (0, 0)."""
     matrix = intrinsics_of(camera).matrix(centre_shift_px=-0.5)
     lens = np.array(camera.distortion)
     return cv2.projectPoints(points_cam, np.zeros(3), np.zeros(3), matrix, lens)[0][:, 0] + 0.5
 
 
-def pixel_centres(camera: CameraConfig) -> np.ndarray:
+def pixel_centres(camera):
     row, column = np.mgrid[: camera.height, : camera.width] + 0.5
     return np.stack([column, row], axis=-1)
 
@@ -71,13 +69,13 @@ class Analytic:
         )
 
 
-def noise_colour(normalised: np.ndarray) -> np.ndarray:
+def noise_colour(normalised):
     return map_coordinates(
         NOISE, [normalised[..., 1] * 240, normalised[..., 0] * 240], order=1, mode="wrap"
     )
 
 
-def _noise() -> np.ndarray:
+def _noise():
     rng, image = np.random.default_rng(0), np.zeros((700, 700))
     for sigma, weight in ((1.5, 25), (4, 30), (12, 30)):
         octave = gaussian_filter(rng.standard_normal(image.shape), sigma, mode="wrap")
@@ -88,7 +86,7 @@ def _noise() -> np.ndarray:
 NOISE = _noise()
 
 
-def disc(centre_cam: np.ndarray, radius: float) -> MeshPart:
+def disc(centre_cam, radius):
     """A white disc that faces the camera; its round edge averages over where samples lie."""
     angle = np.linspace(0.0, 2 * np.pi, 61)[:-1]
     rim = centre_cam + radius * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
@@ -99,7 +97,7 @@ def disc(centre_cam: np.ndarray, radius: float) -> MeshPart:
 
 
 @each_lens
-def test_points_appear_where_opencv_projects_them(lens) -> None:
+def test_points_appear_where_opencv_projects_them(lens):
     camera = camera_of(lens, 320, 240)
     rng = np.random.default_rng(1)
     points = np.column_stack([rng.uniform([-0.5, -0.35], [0.5, 0.35], (6, 2)), np.ones(6)]) * 2.0
@@ -112,25 +110,7 @@ def test_points_appear_where_opencv_projects_them(lens) -> None:
 
 
 @each_lens
-def test_a_straight_line_bends_as_it_must(lens) -> None:
-    camera = camera_of(lens)
-
-    def line(normalised):
-        return 255.0 * (np.abs(normalised[..., 0] - 0.45) < 0.02)
-
-    grey = DistortedRenderer(lambda pinhole: Analytic(pinhole, line), camera).render(AHEAD)[..., 0]
-    y = np.linspace(-0.8, 0.8, 400)
-    curve = expected_pixels(np.column_stack([0 * y + 0.45, y, 0 * y + 1]), camera)
-    row = np.arange(5, 115)
-    columns = pixel_centres(camera)[row, :, 0]
-    seen = (columns * grey[row]).sum(axis=1) / grey[row].sum(axis=1, dtype=float)
-    expected = np.interp(row + 0.5, curve[:, 1], curve[:, 0])
-    np.testing.assert_allclose(seen, expected, atol=0.1)
-    assert np.ptp(expected) > 1.0
-
-
-@each_lens
-def test_colours_are_nearly_those_of_64_rays(lens) -> None:
+def test_colours_are_nearly_those_of_64_rays(lens):
     camera = camera_of(lens)
     expected = Analytic(camera, noise_colour, samples=8).render(AHEAD).astype(float)
     found = DistortedRenderer(lambda pinhole: Analytic(pinhole, noise_colour), camera).render(AHEAD)
@@ -140,7 +120,7 @@ def test_colours_are_nearly_those_of_64_rays(lens) -> None:
 
 
 @each_lens
-def test_depth_of_a_plane_is_exact(lens) -> None:
+def test_depth_of_a_plane_is_exact(lens):
     camera = camera_of(lens)
 
     def depth(normalised):
@@ -155,7 +135,7 @@ def test_depth_of_a_plane_is_exact(lens) -> None:
 
 
 @each_lens
-def test_depth_is_never_between_two_surfaces(lens) -> None:
+def test_depth_is_never_between_two_surfaces(lens):
     """A wall at 4 m before nothing, and before it a board at 2 m."""
     camera = camera_of(lens)
 
@@ -175,7 +155,7 @@ def test_depth_is_never_between_two_surfaces(lens) -> None:
 
 
 @each_lens
-def test_a_closed_room_fills_the_image(lens) -> None:
+def test_a_closed_room_fills_the_image(lens):
     box = trimesh.creation.box((4.0, 4.0, 4.0))
     rgb = np.full((8, 3), 200, np.uint8)
     room = MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces), vertex_rgb=rgb)
@@ -190,13 +170,7 @@ def test_a_closed_room_fills_the_image(lens) -> None:
     np.testing.assert_allclose(depth[ahead], 2.0, atol=1e-3)  # the wall that faces the camera
 
 
-def test_without_distortion_nothing_is_resampled() -> None:
-    mesh = TexturedMesh((MeshPart("t", np.eye(3), np.array([[0, 1, 2]])),))
-    with open_renderer(mesh, camera_of((0.0,) * 5)) as renderer:
-        assert not isinstance(renderer, DistortedRenderer)
-
-
-def test_the_pinhole_keeps_the_resolution_and_the_clip_planes() -> None:
+def test_the_pinhole_keeps_the_resolution_and_the_clip_planes():
     camera = camera_of(LENSES["barrel"]).model_copy(update={"near_m": 0.2, "far_m": 30.0})
     pinhole = covering_camera(camera)
     assert (pinhole.fx, pinhole.fy) == (2 * camera.fx, 2 * camera.fy)
@@ -204,6 +178,6 @@ def test_the_pinhole_keeps_the_resolution_and_the_clip_planes() -> None:
     assert not any(pinhole.distortion)
 
 
-def test_a_lens_too_wide_for_any_pinhole_image_is_refused() -> None:
+def test_a_lens_too_wide_for_any_pinhole_image_is_refused():
     with pytest.raises(InputError, match="give a smaller width"):
         covering_camera(camera_of((-0.2, 0.0, 0.0, 0.0, 0.0), 8192, 4096))

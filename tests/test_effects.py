@@ -1,8 +1,5 @@
 """Effects of camera and light against the physics they stand for."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -43,7 +40,7 @@ FOCAL = 60 / np.tan(np.radians(30))
 WALL_M, PERIOD_M, STEP_M = 2.0, 0.1, 0.03
 
 
-def along_x(count: int, per_path: int = 100) -> PoseTable:
+def along_x(count, per_path=100):
     """A camera that looks along world y at a wall and moves along x, upright."""
     index = np.arange(count)
     position = np.column_stack([STEP_M * index, 0 * index, 0 * index]).astype(float)
@@ -54,31 +51,31 @@ def along_x(count: int, per_path: int = 100) -> PoseTable:
 class Wall:
     """A wall at y = 2 m whose light is a sine along x; counts the frames it draws."""
 
-    def __init__(self, mean: float = 0.4, depth: float = 0.3, brighter_at: int = 10**9) -> None:
+    def __init__(self, mean=0.4, depth=0.3, brighter_at=10**9):
         self.mean, self.depth, self.brighter_at, self.drawn = mean, depth, brighter_at, 0
 
-    def light(self, x_m: np.ndarray | float) -> np.ndarray:
+    def light(self, x_m):
         column = np.arange(CAMERA.width) + 0.5 - CAMERA.width / 2
         at = np.asarray(x_m)[..., None] + WALL_M * column / FOCAL
         light = self.mean + self.depth * np.sin(2 * np.pi * at / PERIOD_M)
         return light * np.where(np.asarray(x_m)[..., None] >= self.brighter_at * STEP_M, 2.0, 1.0)
 
-    def render(self, world_from_cam: np.ndarray) -> np.ndarray:
+    def render(self, world_from_cam):
         self.drawn += 1
         row = rgb_of(self.light(world_from_cam[0, 3]).astype(np.float32))
         return np.broadcast_to(row[None, :, None], (CAMERA.height, CAMERA.width, 3)).copy()
 
-    def render_rgbd(self, world_from_cam: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def render_rgbd(self, world_from_cam):
         shape = CAMERA.height, CAMERA.width
         return self.render(world_from_cam), np.full(shape, WALL_M, np.float32)
 
 
-def frames(renderer: Wall, poses: PoseTable, **effects: object) -> list[np.ndarray]:
+def frames(renderer, poses, **effects):
     config = EffectsConfig.model_validate(effects)
     return [rgb for rgb, _ in drawn(renderer, poses, False, (CAMERA, config))]
 
 
-def test_every_level_survives_the_way_to_light_and_back() -> None:
+def test_every_level_survives_the_way_to_light_and_back():
     levels = np.arange(256, dtype=np.uint8)
     assert (rgb_of(light_of(levels)) == levels).all()
     # IEC 61966-2-1: mid grey reflects 18 % at level 118, and half the light is level 188.
@@ -86,7 +83,7 @@ def test_every_level_survives_the_way_to_light_and_back() -> None:
     assert rgb_of(np.float32(0.5)) == 188
 
 
-def test_blur_is_the_integral_of_the_light_over_the_exposure() -> None:
+def test_blur_is_the_integral_of_the_light_over_the_exposure():
     # 30 mm and 0.06 s between frames; 0.06 s of exposure is 30 mm of the wall's sine of 0.1 m.
     wall = Wall()
     blur = {"motion_blur": {"exposure_s": 0.06, "subframes": 16}, "speed_m_s": 0.5}
@@ -100,7 +97,7 @@ def test_blur_is_the_integral_of_the_light_over_the_exposure() -> None:
 
 
 @pytest.mark.parametrize("constant_s", [0.1, 1.0])
-def test_auto_exposure_lags_by_its_time_constant(constant_s: float) -> None:
+def test_auto_exposure_lags_by_its_time_constant(constant_s):
     config = EffectsConfig.model_validate({"exposure": {"time_constant_s": constant_s}}).exposure
     assert config is not None
     meter, frame_s = AutoExposure(config), 0.05
@@ -113,7 +110,7 @@ def test_auto_exposure_lags_by_its_time_constant(constant_s: float) -> None:
 
 
 @pytest.mark.parametrize("level", [0.05, 0.3, 0.7])
-def test_noise_has_the_mean_and_variance_of_the_photon_transfer_curve(level: float) -> None:
+def test_noise_has_the_mean_and_variance_of_the_photon_transfer_curve(level):
     config = EffectsConfig.model_validate({"noise": {"full_well_e": 2000, "read_e": 12}}).noise
     assert config is not None
     light = np.full((500, 500, 1), level, np.float32)
@@ -123,7 +120,7 @@ def test_noise_has_the_mean_and_variance_of_the_photon_transfer_curve(level: flo
     assert electrons.var() == pytest.approx(variance, rel=4 * np.sqrt(2 / 250_000))
 
 
-def test_white_balance_and_exposure_are_factors_on_light() -> None:
+def test_white_balance_and_exposure_are_factors_on_light():
     wall = Wall(0.2, 0.1)
     ideal = light_of(wall.render(along_x(1).world_from_cam[0]))
     (brighter,) = frames(wall, along_x(1), exposure={"ev": 1})
@@ -139,7 +136,7 @@ def test_white_balance_and_exposure_are_factors_on_light() -> None:
     assert blue[..., 2].mean() > blue[..., 0].mean() + 20
 
 
-def test_light_differs_from_path_to_path_and_stays_within_its_bounds() -> None:
+def test_light_differs_from_path_to_path_and_stays_within_its_bounds():
     config = EffectsConfig.model_validate(
         {"light": {"ev": [-2, 1], "temperature_k": [2700, 7500], "field_ev": 0.5}}
     ).light
@@ -153,7 +150,7 @@ def test_light_differs_from_path_to_path_and_stays_within_its_bounds() -> None:
     assert np.std(field) == pytest.approx(0.5, rel=0.12)
 
 
-def test_lights_add_up_in_linear_light(tmp_path: Path) -> None:
+def test_lights_add_up_in_linear_light(tmp_path):
     corners = ((4, 0), (0, 0), (0, 4), (4, 4), (4, 0))
     walls = [upright(a, b, 0, 3) for a, b in pairwise(corners)]
     grey = np.full((8, 8, 3), 230, np.uint8)
@@ -179,7 +176,7 @@ def test_lights_add_up_in_linear_light(tmp_path: Path) -> None:
     pose = pose_matrix(rotation_from_rpy([0, 0.3, 2.0]), [2.5, 1.5, 1.5])
     poses = PoseTable(np.array([0]), np.array([0]), pose[None, :3, 3], quat_wxyz_of(pose)[None])
 
-    def light(state: str) -> np.ndarray:
+    def light(state):
         settings = {"light": {"states": [state]}}
         render = RenderConfig.model_validate({"backend": "raycast", "effects": settings})
         with open_scene(tmp_path / "mesh.glb", CAMERA, render) as renderer:
@@ -207,7 +204,7 @@ ALL = {
 
 
 @pytest.mark.parametrize("cuts", [[0, 1, 2, 30], [0, 13, 17, 30], [0, 9, 10, 11, 12, 29, 30]])
-def test_shards_agree_to_the_byte(cuts: list[int]) -> None:
+def test_shards_agree_to_the_byte(cuts):
     poses = along_x(30, per_path=11)
     whole = frames(Wall(brighter_at=15), poses, **ALL)
     parts = [poses.between(a, b) for a, b in pairwise(cuts)]
@@ -216,7 +213,7 @@ def test_shards_agree_to_the_byte(cuts: list[int]) -> None:
     assert len({rgb.tobytes() for rgb in whole}) == 30
 
 
-def test_without_effects_nothing_is_recorded_or_drawn_anew() -> None:
+def test_without_effects_nothing_is_recorded_or_drawn_anew():
     assert set(RenderConfig().model_dump()) == {"backend", "supersampling", "background_rgb"}
     wall, poses = Wall(), along_x(4)
     ideal = [rgb for rgb, _ in drawn(wall, poses, False, None)]
@@ -239,7 +236,7 @@ def test_without_effects_nothing_is_recorded_or_drawn_anew() -> None:
         ({"vignette": 1}, "vignette: unknown key; allowed here: exposure"),
     ],
 )
-def test_bad_settings_are_one_line(changes: dict[str, object], message: str) -> None:
+def test_bad_settings_are_one_line(changes, message):
     raw = read_yaml(Path(__file__).parents[1] / "config" / "config.yaml")
     with pytest.raises(InputError, match=message) as refusal:
         parse_config({**raw, "render": {"effects": changes}})
@@ -247,7 +244,7 @@ def test_bad_settings_are_one_line(changes: dict[str, object], message: str) -> 
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-def test_collected_with_effects_the_same_in_other_shards_and_workers(tmp_path: Path) -> None:
+def test_collected_with_effects_the_same_in_other_shards_and_workers(tmp_path):
     mesh, settings = save_room(tmp_path / "room.glb"), tmp_path / "effects.yaml"
     settings.write_text(yaml.safe_dump({**ALL, "share": 1.0}))
     one, other = tmp_path / "one", tmp_path / "other"
@@ -283,16 +280,14 @@ def test_collected_with_effects_the_same_in_other_shards_and_workers(tmp_path: P
     assert np.abs(shown[4, 16:, :320].astype(int) - ideal).mean() < 4  # grey levels, of coding
 
 
-def film_frames(path: Path) -> Iterator[np.ndarray]:
+def film_frames(path):
     """Frames (H, W, 3) as another library decodes them."""
     film = cv2.VideoCapture(str(path))
     while (found := film.read())[0]:
         yield found[1][..., ::-1]
 
 
-def test_a_film_without_an_encoder_says_what_to_install(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_film_without_an_encoder_says_what_to_install(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("shutil.which", lambda name: None)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert main(["preview", str(tmp_path), "--out", str(tmp_path / "film.mp4")]) == 1
@@ -300,5 +295,5 @@ def test_a_film_without_an_encoder_says_what_to_install(
     assert not any(tmp_path.iterdir())
 
 
-def colour_files(dataset: Path, split: str) -> list[Path]:
+def colour_files(dataset, split):
     return [Path(str(path)) for path in frame_paths(read_split(dataset, split), "color.png")]

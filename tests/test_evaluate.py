@@ -1,10 +1,5 @@
 """``synfeal evaluate`` against evo's numbers, on files other programs wrote, and on bad ones."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -16,7 +11,6 @@ from synfeal.evaluation.run import Settings, evaluate
 from tests.foreign_poses import (
     PER_SEQUENCE,
     WRITERS,
-    Array,
     disturbed,
     frame_names,
     write_ace,
@@ -33,23 +27,23 @@ SIMILARITY = (1.7, np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
 
 
 @pytest.fixture(scope="module")
-def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def dataset(tmp_path_factory):
     folder = tmp_path_factory.mktemp("evaluate") / "set"
     write_dataset(folder)
     return folder
 
 
 @pytest.fixture(scope="module")
-def truth(tmp_path_factory: pytest.TempPathFactory) -> Array:
+def truth(tmp_path_factory):
     return write_dataset(tmp_path_factory.mktemp("truth"))
 
 
 @pytest.fixture(scope="module")
-def estimated(truth: Array) -> Array:
+def estimated(truth):
     return disturbed(truth, 0.1, 4.0)
 
 
-def evo_errors(truth: Array, poses: Array, align: str) -> dict[str, Array]:
+def evo_errors(truth, poses, align):
     """Errors of each frame by evo's own code."""
     reference, estimate = PosePath3D(poses_se3=list(truth)), PosePath3D(poses_se3=list(poses))
     if align != "none":
@@ -69,9 +63,7 @@ def evo_errors(truth: Array, poses: Array, align: str) -> dict[str, Array]:
 
 @pytest.mark.parametrize("align", ["none", "se3", "sim3"])
 @pytest.mark.parametrize("written_as", WRITERS)
-def test_errors_are_evos_whatever_the_file(
-    dataset: Path, truth: Array, estimated: Array, tmp_path: Path, written_as: str, align: str
-) -> None:
+def test_errors_are_evos_whatever_the_file(dataset, truth, estimated, tmp_path, written_as, align):
     poses = estimated.copy()
     if align != "none":  # the same trajectory in a world of another origin, heading and scale
         scale, rotation, translation = SIMILARITY
@@ -94,8 +86,8 @@ def test_errors_are_evos_whatever_the_file(
 
 
 def test_what_is_missing_or_no_rotation_counts_as_an_error_and_is_told(
-    dataset: Path, estimated: Array, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    dataset, estimated, tmp_path, capsys
+):
     lines = write_hloc(tmp_path / "poses.txt", estimated).read_text().splitlines()
     name, *numbers = lines[4].split()
     lines[4] = " ".join([name, "0.5 0 0 0", *numbers[4:]])  # half a quaternion
@@ -123,9 +115,7 @@ def test_what_is_missing_or_no_rotation_counts_as_an_error_and_is_told(
     assert (out / "errors.png").stat().st_size > 10_000
 
 
-def test_labels_are_a_second_yardstick(
-    dataset: Path, truth: Array, estimated: Array, tmp_path: Path
-) -> None:
+def test_labels_are_a_second_yardstick(dataset, truth, estimated, tmp_path):
     labels = disturbed(truth, 0.3, 20.0, seed=5)
     settings = Settings(labels=write_tree(tmp_path / "labels", labels))
     found = evaluate(dataset, write_ace(tmp_path / "ace.txt", estimated), settings)
@@ -136,9 +126,7 @@ def test_labels_are_a_second_yardstick(
         )
 
 
-def test_a_swapped_convention_is_noticed_and_can_be_given(
-    dataset: Path, estimated: Array, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_swapped_convention_is_noticed_and_can_be_given(dataset, estimated, tmp_path, capsys):
     swapped = write_ace(tmp_path / "ace.txt", np.linalg.inv(estimated))
     assert main(["evaluate", str(dataset), str(swapped)]) == 1
     error = capsys.readouterr().err
@@ -148,8 +136,8 @@ def test_a_swapped_convention_is_noticed_and_can_be_given(
     assert found.metrics["position_m"] < 0.5
 
 
-def lines_of(write: Callable[[Path, Array], Path]) -> Callable[[Path, Array], list[str]]:
-    def lines(folder: Path, poses: Array) -> list[str]:
+def lines_of(write):
+    def lines(folder, poses):
         return write(folder / "written", poses).read_text().splitlines()
 
     return lines
@@ -159,19 +147,19 @@ HLOC, ACE = lines_of(write_hloc), lines_of(write_ace)
 TABLE, LOCALIZED = lines_of(write_table), lines_of(write_localized)
 
 
-def tum(folder: Path, poses: Array) -> list[str]:
+def tum(folder, poses):
     return (write_tum(folder / "written", poses) / "seq-02.txt").read_text().splitlines()
 
 
-def with_line(at: int, line: str) -> Callable[[list[str]], list[str]]:
+def with_line(at, line):
     return lambda lines: [*lines[:at], line, *lines[at + 1 :]]
 
 
-def cut(at: int, columns: int) -> Callable[[list[str]], list[str]]:
+def cut(at, columns):
     return lambda lines: with_line(at, " ".join(lines[at].split()[:columns]))(lines)
 
 
-def each(change: Callable[[str], str]) -> Callable[[list[str]], list[str]]:
+def each(change):
     return lambda lines: [change(line) for line in lines]
 
 
@@ -208,20 +196,14 @@ BAD_LINES = {
 
 
 @pytest.mark.parametrize("case", BAD_LINES)
-def test_a_malformed_file_is_refused_in_one_line(
-    dataset: Path,
-    estimated: Array,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    case: str,
-) -> None:
+def test_a_malformed_file_is_refused_in_one_line(dataset, estimated, tmp_path, capsys, case):
     write, damage, words = BAD_LINES[case]
     bad = tmp_path / "poses"
     bad.write_text("".join(f"{line}\n" for line in damage(write(tmp_path, estimated))))
     refused(dataset, bad, words, capsys)
 
 
-def refused(dataset: Path, bad: Path, words: str, capsys: pytest.CaptureFixture[str], *more: str):
+def refused(dataset, bad, words, capsys, *more):
     assert main(["evaluate", str(dataset), str(bad), *more]) == 1
     captured = capsys.readouterr()
     assert captured.out == ""
@@ -230,26 +212,26 @@ def refused(dataset: Path, bad: Path, words: str, capsys: pytest.CaptureFixture[
     assert str(bad) in captured.err
 
 
-def binary_garbage(folder: Path, poses: Array) -> Path:
+def binary_garbage(folder, poses):
     (folder / "poses.txt").write_bytes(b"\xff\xfe\x00\x01" * 40)
     return folder / "poses.txt"
 
 
-def model_twice(folder: Path, poses: Array) -> Path:
+def model_twice(folder, poses):
     model = write_colmap(folder / "model", poses, binary=True)
     write_colmap(folder / "text", poses, binary=False)
     (folder / "text/images.txt").rename(model / "images.txt")
     return model
 
 
-def model_cut(folder: Path, poses: Array) -> Path:
+def model_cut(folder, poses):
     model = write_colmap(folder / "model", poses, binary=True)
     data = (model / "images.bin").read_bytes()
     (model / "images.bin").write_bytes(data[: len(data) // 2])
     return model
 
 
-def tree_of_three_rows(folder: Path, poses: Array) -> Path:
+def tree_of_three_rows(folder, poses):
     tree = write_tree(folder / "tree", poses)
     (tree / "seq-02/frame-000003.pose.txt").write_text("1 0 0 0\n0 1 0 0\n0 0 1 0\n")
     return tree
@@ -264,19 +246,11 @@ BAD_PATHS = {
 
 
 @pytest.mark.parametrize("make", BAD_PATHS, ids=lambda make: make.__name__)
-def test_a_malformed_place_is_refused_in_one_line(
-    dataset: Path,
-    estimated: Array,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    make: Callable[[Path, Array], Path],
-) -> None:
+def test_a_malformed_place_is_refused_in_one_line(dataset, estimated, tmp_path, capsys, make):
     refused(dataset, make(tmp_path, estimated), BAD_PATHS[make], capsys)
 
 
-def test_incomplete_labels_and_points_on_a_line_are_refused(
-    dataset: Path, truth: Array, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_incomplete_labels_and_points_on_a_line_are_refused(dataset, truth, tmp_path, capsys):
     labels = write_tree(tmp_path / "labels", truth)
     (labels / "seq-03/frame-000002.pose.txt").unlink()
     line = truth.copy()
@@ -287,9 +261,7 @@ def test_incomplete_labels_and_points_on_a_line_are_refused(
     refused(dataset, poses, "cannot be aligned", capsys, "--align", "se3")
 
 
-def test_frames_are_found_by_their_numbers_where_there_is_one_sequence(
-    dataset: Path, truth: Array, tmp_path: Path
-) -> None:
+def test_frames_are_found_by_their_numbers_where_there_is_one_sequence(dataset, truth, tmp_path):
     """Numbered time stamps, and names without a sequence, of a split with one sequence."""
     (dataset / "TrainSplit.txt").write_text("sequence1\nsequence2\n")
     (dataset / "TestSplit.txt").write_text("sequence3\n")

@@ -16,10 +16,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from synfeal.cli import main
-from tests.damaged_sets import (
-    frame_files,
-    write_planar_set,
-)
+from tests.damaged_sets import frame_files, write_planar_set
 
 FORMATS = ("ace", "colmap", "hloc", "mstransformer", "nerfstudio", "tum")
 WITH_CAMERA = tuple(name for name in FORMATS if name != "mstransformer")
@@ -37,22 +34,22 @@ class Exported:
 
 
 @pytest.fixture(scope="module")
-def planar(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def planar(tmp_path_factory):
     folder = tmp_path_factory.mktemp("planar") / "set"
     write_planar_set(folder)
     return folder
 
 
 @pytest.fixture
-def damaged(planar: Path, tmp_path: Path) -> Path:
+def damaged(planar, tmp_path):
     return Path(shutil.copytree(planar, tmp_path / "set"))
 
 
-def run(dataset: Path, to: str, out: Path, *more: str) -> int:
+def run(dataset, to, out, *more):
     return main(["export", str(dataset), "--to", to, "--out", str(out), *more])
 
 
-def read_colmap(out: Path) -> Exported:
+def read_colmap(out):
     model = pycolmap.Reconstruction(str(out / "sparse" / "0"))
     images = [model.images[key] for key in sorted(model.images)]
     camera = model.cameras[1]
@@ -65,11 +62,11 @@ def read_colmap(out: Path) -> Exported:
     )
 
 
-def read_nerfstudio(out: Path) -> Exported:
+def read_nerfstudio(out):
     """Cameras look along -z with y up; depth is scaled by 1e-3."""
     meta = json.loads((out / "transforms.json").read_text())
 
-    def project(points: np.ndarray) -> np.ndarray:
+    def project(points):
         x, y, z = (points * [1, -1, -1]).T  # to the axes of the format
         column = meta["fl_x"] * x / -z + meta["cx"]
         return np.stack([column, meta["cy"] - meta["fl_y"] * y / -z], axis=1)
@@ -84,10 +81,10 @@ def read_nerfstudio(out: Path) -> Exported:
     )
 
 
-def read_tum(out: Path) -> Exported:
+def read_tum(out):
     """As TUM's tools do: lists after three lines of comment, quaternions with w last."""
     poses, colors, depths = [], [], []
-    values: list[str] = []
+    values = []
     for name in ("seq-01", "seq-02"):
         lists = {
             kind: (out / name / f"{kind}.txt").read_text().splitlines()
@@ -116,7 +113,7 @@ def read_tum(out: Path) -> Exported:
     return Exported(lambda p: p[:, :2] / p[:, 2:] * scale + offset, poses, colors, depths)
 
 
-def read_ace(out: Path) -> Exported:
+def read_ace(out):
     """By the rules of ACE's loader: the files of sorted folders go together, by place."""
     poses, colors, depths = [], [], []
     matrix = np.eye(3)
@@ -132,7 +129,7 @@ def read_ace(out: Path) -> Exported:
     return Exported(lambda p: (p @ matrix.T)[:, :2] / p[:, 2:], poses, colors, depths)
 
 
-def read_hloc(out: Path) -> Exported:
+def read_hloc(out):
     """By the rules of hloc: binary models by name, the query list with its own camera."""
     model = pycolmap.Reconstruction(str(out / "model"))
     assert {path.suffix for path in (out / "model").iterdir()} == {".bin"}
@@ -157,7 +154,7 @@ def read_hloc(out: Path) -> Exported:
     )
 
 
-def read_mstransformer(out: Path) -> Exported:
+def read_mstransformer(out):
     """By the rules of its loader: columns by name, image paths below the directory."""
     poses, colors = [], []
     for split in ("train", "test"):
@@ -184,7 +181,7 @@ READERS = {
 
 
 @pytest.mark.parametrize("to", FORMATS)
-def test_poses_images_and_depth_come_back(to: str, planar: Path, tmp_path: Path) -> None:
+def test_poses_images_and_depth_come_back(to, planar, tmp_path):
     assert run(planar, to, tmp_path / "out") == 0
     exported = READERS[to](tmp_path / "out")
     names = [path for s in ("seq-01", "seq-02") for path in frame_files(planar, "pose.txt", s)]
@@ -201,9 +198,7 @@ def test_poses_images_and_depth_come_back(to: str, planar: Path, tmp_path: Path)
 
 
 @pytest.mark.parametrize("to", WITH_CAMERA)
-def test_a_point_lands_at_the_pixel_where_it_was_drawn(
-    to: str, planar: Path, tmp_path: Path
-) -> None:
+def test_a_point_lands_at_the_pixel_where_it_was_drawn(to, planar, tmp_path):
     """The wall of the scene is the plane x = 3: its corner pixels are known in the world."""
     assert run(planar, to, tmp_path / "out") == 0
     exported = READERS[to](tmp_path / "out")
@@ -218,14 +213,14 @@ def test_a_point_lands_at_the_pixel_where_it_was_drawn(
 
 
 @pytest.mark.parametrize("to", FORMATS)
-def test_images_are_links_or_copies(to: str, planar: Path, tmp_path: Path) -> None:
+def test_images_are_links_or_copies(to, planar, tmp_path):
     for options, linked in (((), True), (("--copy",), False)):
         out = tmp_path / f"out-{linked}"
         assert run(planar, to, out, *options) == 0
         assert {path.is_symlink() for path in READERS[to](out).colors} == {linked}
 
 
-def test_splits_are_kept(planar: Path, tmp_path: Path) -> None:
+def test_splits_are_kept(planar, tmp_path):
     for to in FORMATS:
         assert run(planar, to, tmp_path / to) == 0
     for split, count, sequence in (("train", 24, "seq-01"), ("test", 8, "seq-02")):
@@ -239,7 +234,7 @@ def test_splits_are_kept(planar: Path, tmp_path: Path) -> None:
     assert (tmp_path / "tum" / "TestSplit.txt").read_text() == "sequence2\n"
 
 
-def test_nerfstudio_gets_the_lens(planar: Path, tmp_path: Path) -> None:
+def test_nerfstudio_gets_the_lens(planar, tmp_path):
     lens = tmp_path / "cameras.txt"
     lens.write_text("1 FULL_OPENCV 96 72 80 81 47 37 0.1 -0.05 0.001 -0.002 0.01 0 0 0\n")
     assert run(planar, "nerfstudio", tmp_path / "out", "--camera", str(lens)) == 0
@@ -248,9 +243,7 @@ def test_nerfstudio_gets_the_lens(planar: Path, tmp_path: Path) -> None:
     assert tuple(meta[key] for key in ("fl_x", "fl_y", "cx", "cy")) == (80, 81, 47, 37)
 
 
-def test_tum_loses_what_is_beyond_its_range_and_says_so(
-    damaged: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_tum_loses_what_is_beyond_its_range_and_says_so(damaged, tmp_path, caplog):
     path = frame_files(damaged, "depth.png")[0]
     depth = np.asarray(Image.open(path)).copy()
     depth[0, :4] = 13107, 13108, 65535, 0
@@ -262,9 +255,7 @@ def test_tum_loses_what_is_beyond_its_range_and_says_so(
 
 
 @pytest.mark.parametrize("to", FORMATS)
-def test_a_directory_that_holds_something_is_refused(
-    to: str, planar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_directory_that_holds_something_is_refused(to, planar, tmp_path, capsys):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "mine").write_text("")
     assert run(planar, to, tmp_path / "out") == 1
@@ -273,9 +264,7 @@ def test_a_directory_that_holds_something_is_refused(
 
 
 @pytest.mark.parametrize("to", ["ace", "hloc", "mstransformer"])
-def test_formats_of_two_splits_need_both(
-    to: str, damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_formats_of_two_splits_need_both(to, damaged, tmp_path, capsys):
     for name in ("TrainSplit.txt", "TestSplit.txt"):
         (damaged / name).unlink()
     assert run(damaged, to, tmp_path / "out") == 1
@@ -283,9 +272,7 @@ def test_formats_of_two_splits_need_both(
     assert not (tmp_path / "out").exists()
 
 
-def test_ace_refuses_a_lens(
-    damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_ace_refuses_a_lens(damaged, tmp_path, capsys):
     lens = tmp_path / "cameras.txt"
     lens.write_text("1 OPENCV 96 72 80 80 47 37 0.1 -0.05 0.001 -0.002\n")
     assert run(damaged, "ace", tmp_path / "out", "--camera", str(lens)) == 1

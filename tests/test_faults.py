@@ -1,7 +1,5 @@
 """A full disk at every kind of file the stages write: said so, nothing left, whole afterwards."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re
@@ -9,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -42,49 +39,49 @@ N = 2000  # rows, vertices or values: more than the disk holds
 ROOM_FOR_NOTHING = "12k"
 
 
-def poses() -> PoseTable:
+def poses():
     index = np.arange(N)
     position_m = np.random.default_rng(0).normal(size=(N, 3))
     return PoseTable(index, index, position_m, np.tile([1.0, 0, 0, 0], (N, 1)))
 
 
-def sphere() -> Triangles:
+def sphere():
     mesh = trimesh.creation.icosphere(4)
     return Triangles(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
-def write_mesh(path: Path) -> None:
+def write_mesh(path):
     vertices, faces = sphere()
     colors = np.zeros((len(vertices), 3), np.uint8)
     save_glb(path, TexturedMesh((MeshPart("sphere", vertices, faces, vertex_rgb=colors),)))
 
 
-def write_graph(path: Path) -> None:
+def write_graph(path):
     write_g2o(path, PoseGraph(np.tile(np.eye(4), (N, 1, 1)), ()))
 
 
-def write_resume(path: Path) -> None:
+def write_resume(path):
     ResumeFile(path, "this training").save_if_due({"weights": torch.nn.Linear(N, 4)}, now=True)
 
 
-def write_rows(path: Path) -> None:
+def write_rows(path):
     write_history(path, [HistoryRow(step, 1 / 3, 1e-3) for step in range(N)])
 
 
-def write_parts(path: Path) -> None:
+def write_parts(path):
     part = path.parents[1] / "part.npy"
     with new_packed(part, N, 4) as packed:
         packed[:] = 7
     join_packed([part], path)
 
 
-def draw(path: Path) -> None:
+def draw(path):
     figure = Figure()
     figure.subplots().imshow(np.random.default_rng(0).random((N // 10, N // 10)))
     save(figure, path)
 
 
-WRITERS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object]]] = {
+WRITERS = {
     "mesh.glb": (write_mesh, load_mesh),
     "collision.ply": (lambda path: save_collision_mesh(path, sphere()), load_collision_mesh),
     "properties.json": (lambda path: write_json(path, list(range(N))), read_json),
@@ -102,13 +99,13 @@ WRITERS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object]]] = 
 
 
 @pytest.fixture(scope="module")
-def disk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def disk(tmp_path_factory):
     with mounted(tmp_path_factory.mktemp("faults") / "disk", ROOM_FOR_NOTHING) as place:
         yield place
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_a_full_disk_is_named_and_nothing_is_left(name: str, disk: Path) -> None:
+def test_a_full_disk_is_named_and_nothing_is_left(name, disk):
     write, read = WRITERS[name]
     with pytest.raises(OSError, match="No space left on device") as caught:
         write(disk / name)
@@ -123,7 +120,7 @@ def test_a_full_disk_is_named_and_nothing_is_left(name: str, disk: Path) -> None
     remount(disk, f"size={ROOM_FOR_NOTHING}")
 
 
-def test_a_job_tells_of_a_full_disk_where_its_log_lies_too(disk: Path) -> None:
+def test_a_job_tells_of_a_full_disk_where_its_log_lies_too(disk):
     script = (
         "from pathlib import Path\nfrom synfeal.files import write_json\n"
         f"from synfeal.job import job\nwith job({str(disk / 'job.log')!r}):\n"
@@ -151,7 +148,7 @@ JOB = re.compile(
 )
 
 
-def other_run(root: Path) -> subprocess.Popen[str]:
+def other_run(root):
     command = [sys.executable, "-c", HOLD, str(root)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -159,7 +156,7 @@ def other_run(root: Path) -> subprocess.Popen[str]:
     return process
 
 
-def snakemake(results: Path, target: str, *more: str) -> subprocess.CompletedProcess[str]:
+def snakemake(results, target, *more):
     command = [sys.executable, "-m", "snakemake", "--cores", "1", *more]
     command += ["--configfile", "config/smoke.yaml", "--config", f"results={results}"]
     command += ["--", target]
@@ -167,7 +164,7 @@ def snakemake(results: Path, target: str, *more: str) -> subprocess.CompletedPro
 
 
 @pytest.mark.slow
-def test_a_second_run_is_refused_until_the_first_is_dead(tmp_path: Path) -> None:
+def test_a_second_run_is_refused_until_the_first_is_dead(tmp_path):
     root = tmp_path / "results" / "smoke"
     with other_run(root) as process:
         with pytest.raises(InputError, match=rf"another run .* \(process {process.pid} on "):
@@ -186,9 +183,7 @@ KILLED = {"test.npy": atomic_path, "seq-01": atomic_directory}
 
 
 @pytest.mark.parametrize("name", KILLED)
-def test_what_killed_runs_left_half_written_is_removed_and_nothing_else(
-    name: str, tmp_path: Path
-) -> None:
+def test_what_killed_runs_left_half_written_is_removed_and_nothing_else(name, tmp_path):
     """A job goes on after its run was killed, and the next run begins meanwhile."""
     place = tmp_path / "frames" / "room"
     finished = ["train.npy", "resume.pt", ".snakemake_timestamp", ".nfs0a1b2c3d", ".hidden-file"]
@@ -205,7 +200,7 @@ def test_what_killed_runs_left_half_written_is_removed_and_nothing_else(
     assert sorted(path.name for path in place.iterdir()) == sorted(finished)
 
 
-def test_a_clock_that_jumped_back_leaves_no_date_in_the_future(tmp_path: Path) -> None:
+def test_a_clock_that_jumped_back_leaves_no_date_in_the_future(tmp_path):
     jump_s = 3600
     ages_s = {"plan.csv": 60, "mesh.glb": -jump_s, "frames.npy": -jump_s, "model.pt": -jump_s - 1}
     now = time.time()
@@ -218,10 +213,8 @@ def test_a_clock_that_jumped_back_leaves_no_date_in_the_future(tmp_path: Path) -
     assert now <= dates["mesh.glb"] == dates["frames.npy"] < dates["model.pt"] <= time.time()
 
 
-def test_a_file_system_without_locks_is_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def no_locks(descriptor: int, operation: int) -> None:
+def test_a_file_system_without_locks_is_said(tmp_path, monkeypatch, capsys):
+    def no_locks(descriptor, operation):
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
     monkeypatch.setattr("synfeal.run_lock.fcntl.flock", no_locks)
@@ -230,7 +223,7 @@ def test_a_file_system_without_locks_is_said(
     assert capsys.readouterr().err == message
 
 
-def test_torch_out_of_memory_is_a_memory_error() -> None:
+def test_torch_out_of_memory_is_a_memory_error():
     with (
         pytest.raises(MemoryError, match=r"can't allocate memory: you tried to allocate \d+ bytes"),
         memory_errors(),
@@ -241,7 +234,7 @@ def test_torch_out_of_memory_is_a_memory_error() -> None:
     assert not isinstance(caught.value, MemoryError)
 
 
-def test_a_job_tells_of_too_little_memory_in_one_line(tmp_path: Path) -> None:
+def test_a_job_tells_of_too_little_memory_in_one_line(tmp_path):
     log = tmp_path / "job.log"
     script = f"from synfeal.job import job\nwith job({str(log)!r}):\n    bytes(2**60)\n"
     run = subprocess.run(
@@ -256,7 +249,7 @@ def test_a_job_tells_of_too_little_memory_in_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("target", ["all", "runs", "labels"])
-def test_every_job_has_an_output_that_the_target_asks_for(target: str, tmp_path: Path) -> None:
+def test_every_job_has_an_output_that_the_target_asks_for(target, tmp_path):
     """Else Snakemake takes old results for those of a changed configuration after a failed job."""
     plan = snakemake(tmp_path, target, "--dry-run", "--quiet", "host").stdout
     jobs = JOB.findall(plan)

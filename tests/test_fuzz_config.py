@@ -1,9 +1,7 @@
 """No wrong configuration ends in a traceback, a hang or a silently different run."""
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from pydantic import BaseModel
@@ -20,7 +18,7 @@ CONFIG = REPOSITORY / "config"
 EXTERNAL = "../examples/external.yaml"  # no profile has a localizer of somebody else's
 PROFILES = (("config.yaml", EXTERNAL), ("config.yaml", "smoke.yaml"), ("config.yaml", "paper.yaml"))
 LEAST = 2500  # inputs of all kinds together
-VALUES: tuple[Any, ...] = (
+VALUES = (
     *(None, True, False, 0, -1, 0.5, 1e30, -1e30, 10**30, 10**400, 1e-320),
     *(float("nan"), float("inf"), float("-inf"), "", "x", "..", "../../x", "/", "a/b", "a\0b"),
     *("x" * 300, "x" * 100_000, "0x10", "1e400", [], [1], [[]], [None], {}, {"x": 1}, {1: 2}),
@@ -32,7 +30,7 @@ def _in_the_repository(monkeypatch):
     monkeypatch.chdir(REPOSITORY)
 
 
-def full(profile: tuple[str, ...]) -> dict[str, Any]:
+def full(profile):
     """Every key of a profile with its value, defaults included."""
     config = load_config(*(CONFIG / name for name in profile))
     raw = config.model_dump(mode="json")
@@ -40,7 +38,7 @@ def full(profile: tuple[str, ...]) -> dict[str, Any]:
     return raw
 
 
-def places(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+def places(value, place=()):
     entries = value.items() if isinstance(value, dict) else ()
     if isinstance(value, list):
         entries = enumerate(value)
@@ -49,13 +47,13 @@ def places(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]
         yield from places(inner, (*place, key))
 
 
-def at(value: Any, place: tuple[Any, ...]) -> Any:
+def at(value, place):
     for key in place:
         value = value[key]
     return value
 
 
-def wrong_values(profile: tuple[str, ...]) -> Iterator[tuple[str, tuple[Any, ...], Any, Any]]:
+def wrong_values(profile):
     """Label, changed key, what it was changed to, and the whole mapping."""
     raw = full(profile)
     for place in places(raw):
@@ -69,7 +67,7 @@ def wrong_values(profile: tuple[str, ...]) -> Iterator[tuple[str, tuple[Any, ...
                 yield f"{name} with {str(key)[:9]!r}", place, inner, replaced(raw, place, inner)
 
 
-def is_config(config: Config, place: tuple[Any, ...], value: Any) -> bool:
+def is_config(config, place, value):
     """Whether what was accepted is what was given, can be run, and stays in its directory."""
     dump = config.model_dump(mode="json")
     assert parse_config(dump) == config
@@ -107,7 +105,7 @@ def test_every_key_takes_a_right_value_or_none(profile):
     assert not failures, f"{len(failures)} of {profile}:\n" + "\n".join(failures)
 
 
-def models(model: type[BaseModel]) -> set[type[BaseModel]]:
+def models(model):
     """A model and all below it, by their annotations."""
     found, pending = {model}, [model]
     while pending:
@@ -131,7 +129,7 @@ def test_no_model_was_left_out():
         assert missing <= {"calibration"}, model
 
 
-def yaml_inputs() -> Iterator[Damage]:
+def yaml_inputs():
     data = (CONFIG / "config.yaml").read_bytes()
     others = {path.name: path.read_bytes() for path in CONFIG.iterdir() if path.is_file()}
     yield from damages(data, others, seed=5, n_flips=60)
@@ -149,7 +147,7 @@ def test_every_file_is_a_profile_or_is_refused(tmp_path):
     assert not failures, "\n".join(failures)
 
 
-def is_design(rows: Any) -> bool:
+def is_design(rows):
     """Whether every run and label set has a directory of its own below the results."""
     for run in design_of(rows).runs:
         assert all(part.strip(".") and "\0" not in part for part in Path(run.directory).parts)
@@ -160,14 +158,14 @@ def is_design(rows: Any) -> bool:
     return True
 
 
-def design_inputs() -> list[Damage]:
+def design_inputs():
     data = (CONFIG / "experiments-smoke.csv").read_bytes()
     others = {"profile": (CONFIG / "config.yaml").read_bytes(), "other": b"a,b\n1,2\n"}
     header, *rows = data.decode().splitlines()
     yield_rows = {
         "row twice": [*rows, rows[0]],
         "noise that prints alike": [
-            *(f"table3_inconsistencies,both,large_room,6k,noise,{m},0,pretrained" for m in NOISE),
+            *(f"table3_inconsistencies,both,large_room,6k,noise,{m},0,pretrained" for m in NOISE)
         ],
         "semicolons": [row.replace(",", ";") for row in rows],
         "spaces": [row.replace(",", ", ") for row in rows],
@@ -186,7 +184,7 @@ def test_every_table_of_experiments_is_a_design_or_is_refused(tmp_path):
     config = config.model_copy(update={"experiments": path})
     failures = []
 
-    def read() -> object:
+    def read():
         rows = read_experiments(config)
         check_sources(rows, path)
         return rows

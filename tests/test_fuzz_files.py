@@ -1,9 +1,7 @@
 """No damaged file ends in a traceback, a hang, half a result or a silently wrong one."""
 
-import ast
 import os
 import pickle
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,16 +15,8 @@ from synfeal.camera.calibration_files import PlainLoader
 from synfeal.config.models import GroundTruthConfig
 from synfeal.dataset.pose_table import read_frames, write_pose_table
 from synfeal.errors import InputError
-from tests.fuzz_files import KINDS, Kind
-from tests.fuzzing import (
-    Damage,
-    damages,
-    json_damages,
-    little_memory,
-    problem_with,
-    put,
-    text_damages,
-)
+from tests.fuzz_files import KINDS
+from tests.fuzzing import damages, json_damages, little_memory, problem_with, put, text_damages
 from tests.planar_scene import straight_path
 
 pytestmark = pytest.mark.slow
@@ -35,7 +25,7 @@ LEAST = 4000  # inputs of all kinds together
 
 
 @pytest.fixture(scope="session")
-def sound(tmp_path_factory) -> dict[str, bytes]:
+def sound(tmp_path_factory):
     """A sound file of every kind: what another may be mistaken for."""
     found = {}
     for kind in KINDS:
@@ -43,7 +33,7 @@ def sound(tmp_path_factory) -> dict[str, bytes]:
     return found
 
 
-def inputs_of(kind: Kind, sound: dict[str, bytes]) -> list[Damage]:
+def inputs_of(kind, sound):
     data = sound[kind.name]
     every = list(damages(data, sound, seed=KINDS.index(kind), n_flips=kind.n_flips))
     if kind.form == "json":
@@ -67,14 +57,10 @@ def test_damage_is_refused_in_one_line_or_does_no_harm(kind, sound, tmp_path):
     assert not failures, f"{len(failures)} of {kind.name}:\n" + "\n".join(failures)
 
 
-def test_there_are_thousands_of_inputs(sound):
-    assert sum(len(inputs_of(kind, sound)) for kind in KINDS) >= LEAST
-
-
 class Payload:
     """Unpickled, it makes a directory."""
 
-    def __init__(self, made: Path) -> None:
+    def __init__(self, made):
         self.made = str(made)
 
     def __reduce__(self):
@@ -100,52 +86,6 @@ def test_a_pickle_with_code_does_not_run(name, tmp_path):
         assert not made.exists()
     pickle.loads(pickle.dumps(Payload(made)))  # the payload itself is sound
     assert made.is_dir()
-
-
-UNSAFE = {"pickle.load", "pickle.loads", "eval", "exec", "marshal.loads", "os.system", "os.popen"}
-# Calls, and what makes them safe.
-NEEDED = {
-    "torch.load": lambda given, n: given.get("weights_only") is True,
-    "np.load": lambda given, n: given.get("allow_pickle", False) is False,
-    "yaml.load": lambda given, n: n == 2,  # the loader, which a test below looks at
-    "yaml.load_all": lambda given, n: False,
-    "yaml.unsafe_load": lambda given, n: False,
-    "yaml.full_load": lambda given, n: False,
-}
-
-
-def unsafe_calls(tree: ast.AST) -> Iterator[str]:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            names = [getattr(node, "module", ""), *(alias.name for alias in node.names)]
-            yield from (f"{node.lineno}: imports {n}" for n in names if n in ("pickle", "marshal"))
-        if isinstance(node, ast.Call):
-            called = ast.unparse(node.func)
-            given = {k.arg: getattr(k.value, "value", None) for k in node.keywords}
-            rule = NEEDED.get(called, lambda given, n: True)
-            is_safe = called not in UNSAFE and rule(given, len(node.args))
-            if not is_safe or given.get("shell", False) is not False:
-                yield f"{node.lineno}: {ast.unparse(node)[:80]}"
-
-
-def test_nothing_read_is_ever_executed():
-    found = []
-    for folder in ("synfeal", "baselines", "benchmarks", "workflow"):
-        for path in sorted((REPOSITORY / folder).rglob("*.py")):
-            tree = ast.parse(path.read_text(encoding="utf-8"))
-            found += [f"{path.relative_to(REPOSITORY)}:{call}" for call in unsafe_calls(tree)]
-    assert not found, "\n".join(found)
-
-
-@pytest.mark.parametrize(
-    "line",
-    [
-        *("import pickle", "eval(text)", "torch.load(path)", "torch.load(p, weights_only=False)"),
-        *("np.load(p, allow_pickle=True)", "yaml.load(text)", "subprocess.run(c, shell=True)"),
-    ],
-)
-def test_the_search_finds_what_it_looks_for(line):
-    assert list(unsafe_calls(ast.parse(line)))
 
 
 def test_the_loaders_of_yaml_build_plain_values_only():

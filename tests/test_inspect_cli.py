@@ -1,7 +1,5 @@
 """``synfeal inspect`` as a person uses it."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import io
@@ -29,7 +27,7 @@ OUTPUTS = ["inspect.html", "inspect.json", "inspect.png"]
 
 
 @pytest.fixture(scope="module")
-def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def mesh(tmp_path_factory):
     """A closed room of 6 x 5 x 3 m whose walls face inwards."""
     box = trimesh.creation.box((6.0, 5.0, 3.0)).subdivide().subdivide()
     colors = np.random.default_rng(0).integers(0, 256, (len(box.vertices), 3), np.uint8)
@@ -41,7 +39,7 @@ def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def inspected(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+def inspected(mesh, tmp_path_factory):
     """A directory the command was called in, with its default output, and what it printed."""
     folder = tmp_path_factory.mktemp("called")
     printed = io.StringIO()
@@ -50,7 +48,7 @@ def inspected(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
     return folder / "My Room-inspect", printed.getvalue()
 
 
-def test_it_writes_its_three_files(inspected: tuple[Path, str]) -> None:
+def test_it_writes_its_three_files(inspected):
     out, _ = inspected
     assert sorted(path.name for path in out.iterdir()) == OUTPUTS
     assert (out / "inspect.html").stat().st_size < 10e6
@@ -59,7 +57,7 @@ def test_it_writes_its_three_files(inspected: tuple[Path, str]) -> None:
         assert 800 <= picture.height <= 1000
 
 
-def test_its_numbers_are_those_of_the_room(inspected: tuple[Path, str], mesh: Path) -> None:
+def test_its_numbers_are_those_of_the_room(inspected, mesh):
     facts = json.loads((inspected[0] / "inspect.json").read_text())
     assert facts["properties"]["volume_m3"] == pytest.approx(90.0)
     assert facts["topology"]["watertight"] is True
@@ -71,7 +69,7 @@ def test_its_numbers_are_those_of_the_room(inspected: tuple[Path, str], mesh: Pa
     assert facts["doubts"] == []
 
 
-def test_what_it_prints_can_be_pasted(inspected: tuple[Path, str], mesh: Path) -> None:
+def test_what_it_prints_can_be_pasted(inspected, mesh):
     printed = inspected[1]
     assert printed.isascii()
     assert "90.00 m^3" in printed
@@ -84,9 +82,7 @@ def test_what_it_prints_can_be_pasted(inspected: tuple[Path, str], mesh: Path) -
     np.testing.assert_allclose(scene.sampling_box.z, [-0.7, 0.5], atol=0.2)
 
 
-def test_it_spares_files_of_others(
-    mesh: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_it_spares_files_of_others(mesh, tmp_path, capsys):
     (tmp_path / "notes.txt").write_text("mine")
     assert main(["inspect", str(mesh), "--out", str(tmp_path)]) == 1
     assert "notes.txt" in capsys.readouterr().err
@@ -101,13 +97,7 @@ def test_it_spares_files_of_others(
         (["--box", "90", "91", "0", "1", "0", "1"], ["outside", "--unit-m"]),
     ],
 )
-def test_what_a_person_can_mend_is_one_line(
-    mesh: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    options: list[str],
-    words: list[str],
-) -> None:
+def test_what_a_person_can_mend_is_one_line(mesh, tmp_path, capsys, options, words):
     assert main(["inspect", str(mesh), "--out", str(tmp_path / "out"), *options]) == 1
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1
@@ -115,11 +105,11 @@ def test_what_a_person_can_mend_is_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_top_view_shows_the_floor_in_its_place() -> None:
+def test_the_top_view_shows_the_floor_in_its_place():
     corners = np.array([[0.0, 0, 0], [4, 0, 0], [4, 2, 0], [0, 2, 0]])
     two = np.array([[0, 1, 2], [0, 2, 3]])
 
-    def plate(offset: list[float], side: float, rgb: tuple[int, int, int]) -> MeshPart:
+    def plate(offset, side, rgb):
         color = np.array([*rgb, 255], np.uint8)
         return MeshPart("plate", corners * side + offset, two, base_color=color)
 
@@ -129,9 +119,9 @@ def test_the_top_view_shows_the_floor_in_its_place() -> None:
     x0, x1, y0, y1 = view.extent_m
     height, width = view.rgb.shape[:2]
 
-    def seen(x: float, y: float) -> list[int]:
+    def seen(x, y):
         column, row = (x - x0) / (x1 - x0) * width, (y1 - y) / (y1 - y0) * height
-        return view.rgb[int(row), int(column)].tolist()  # type: ignore[no-any-return]
+        return view.rgb[int(row), int(column)].tolist()
 
     assert x0 < 0 < 4 < x1
     assert seen(1.0, 1.0) == [0, 0, 255]
@@ -141,7 +131,7 @@ def test_the_top_view_shows_the_floor_in_its_place() -> None:
 
 
 @pytest.mark.skipif("SYNFEAL_TEST_MESHES" not in os.environ, reason="no downloaded meshes")
-def test_a_downloaded_scene(tmp_path: Path) -> None:
+def test_a_downloaded_scene(tmp_path):
     path = Path(os.environ["SYNFEAL_TEST_MESHES"]) / "botanists-greenhouse" / "scene.gltf"
     assert main(["inspect", str(path), "--out", str(tmp_path / "out")]) == 0
     facts = json.loads((tmp_path / "out" / "inspect.json").read_text())

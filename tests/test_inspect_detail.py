@@ -1,11 +1,8 @@
 """Surface points, texel density and doubts, on surfaces small enough to work out by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh
-from numpy.typing import NDArray
 
 from synfeal.inspect.density import detail_of, texels_per_m
 from synfeal.inspect.doubts import colour_doubts, doubts_of, floor_areas_m2
@@ -17,29 +14,29 @@ UNIT_UV = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 TWO = np.array([[0, 1, 2], [0, 2, 3]])
 
 
-def square(side_m: float, texture: NDArray[np.uint8] | None = None, **values: object) -> MeshPart:
+def square(side_m, texture=None, **values):
     """A horizontal square with the whole texture on it."""
     corners = np.column_stack([UNIT_UV * side_m, np.zeros(4)])
     uv = None if texture is None else UNIT_UV
-    return MeshPart("square", corners, TWO, uv, texture, **values)  # type: ignore[arg-type]
+    return MeshPart("square", corners, TWO, uv, texture, **values)
 
 
-def texture_of(height: int, width: int, channels: int = 3) -> NDArray[np.uint8]:
+def texture_of(height, width, channels=3):
     return np.zeros((height, width, channels), np.uint8)
 
 
-def closed_space(enclosure: float = 1.0) -> FreeSpace:
+def closed_space(enclosure=1.0):
     mask = np.ones((2, 2, 2), np.bool_)
     axis = np.array([0.0, 1.0])
     return FreeSpace((axis, axis, axis), mask, mask, enclosure, 0.0)
 
 
-def test_texels_per_metre_of_one_square() -> None:
+def test_texels_per_metre_of_one_square():
     assert texels_per_m([square(2.0, texture_of(64, 64))]) == pytest.approx([32.0] * 3)
     assert texels_per_m([square(2.0, texture_of(64, 16))]) == pytest.approx([16.0] * 3)
 
 
-def test_surface_by_what_colours_it() -> None:
+def test_surface_by_what_colours_it():
     rgb = np.zeros((4, 3), np.uint8)
     detail = detail_of(
         TexturedMesh((square(1.0, texture_of(8, 8)), square(2.0, vertex_rgb=rgb), square(3.0)))
@@ -53,13 +50,13 @@ def test_surface_by_what_colours_it() -> None:
     assert bare["coloured_vertices_per_m"] is None
 
 
-def test_texels_are_looked_up_from_the_bottom_left_and_repeat() -> None:
+def test_texels_are_looked_up_from_the_bottom_left_and_repeat():
     texture = np.arange(4, dtype=np.uint8).reshape(2, 2, 1)  # 0 1 above 2 3
     uv = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [1.75, -0.25], [0.0, 0.0], [1.0, 1.0]])
     assert nearest_texels(texture, uv)[:, 0].tolist() == [2, 3, 0, 1, 2, 2]
 
 
-def test_points_are_spread_by_area_and_carry_the_texture() -> None:
+def test_points_are_spread_by_area_and_carry_the_texture():
     texture = texture_of(2, 2, 4)
     texture[:, 0] = [255, 0, 0, 255]
     texture[:, 1] = [0, 0, 255, 100]
@@ -75,10 +72,10 @@ def test_points_are_spread_by_area_and_carry_the_texture() -> None:
     assert (points.is_drawn == left).all()
 
 
-def doubts(extents: tuple[float, float, float], **values: object) -> str:
+def doubts(extents, **values):
     floors = np.array([1.0, 1.0, 10.0])
     given = {"floors_m2": floors, "space": closed_space(), **values}
-    return "\n".join(doubts_of(np.array(extents), **given))  # type: ignore[arg-type]
+    return "\n".join(doubts_of(np.array(extents), **given))
 
 
 @pytest.mark.parametrize(
@@ -89,15 +86,13 @@ def doubts(extents: tuple[float, float, float], **values: object) -> str:
         ((0.5, 0.4, 0.3), ["0.5 m", "more than 1"]),
     ],
 )
-def test_sizes_that_are_not_metres_are_doubted(
-    extents: tuple[float, float, float], words: list[str]
-) -> None:
+def test_sizes_that_are_not_metres_are_doubted(extents, words):
     found = doubts(extents)
     assert bool(found) == bool(words)
     assert all(word in found for word in words)
 
 
-def test_plain_and_open_meshes_are_doubted() -> None:
+def test_plain_and_open_meshes_are_doubted():
     plain = {"textured": 1.0, "coloured_by_vertex": 0.0, "plain": 3.0}
     two = (square(1.0, vertex_rgb=np.eye(4, 3, dtype=np.uint8) * 255), square(2.0))
     assert "75%" in colour_doubts(TexturedMesh(two), plain)[0]
@@ -109,7 +104,7 @@ def test_plain_and_open_meshes_are_doubted() -> None:
 @pytest.mark.parametrize(
     ("turn", "words"), [((0, 1, 2), ""), ((0, 2, 1), "--up-axis"), ((2, 1, 0), "turn the mesh")]
 )
-def test_the_largest_floor_tells_the_up_axis(turn: tuple[int, ...], words: str) -> None:
+def test_the_largest_floor_tells_the_up_axis(turn, words):
     room = trimesh.creation.box((8.0, 6.0, 3.0))  # its floor has 48 m², its walls 18 and 24
     points, faces = trimesh.sample.sample_surface(room, 20_000, seed=0)
     points, normals = np.asarray(points)[:, turn], np.asarray(room.face_normals)[faces][:, turn]
@@ -121,7 +116,7 @@ def test_the_largest_floor_tells_the_up_axis(turn: tuple[int, ...], words: str) 
     assert bool(found) == bool(words)
 
 
-def test_a_flat_floor_is_a_floor() -> None:
+def test_a_flat_floor_is_a_floor():
     points = np.column_stack([np.random.default_rng(0).random((100, 2)), np.zeros(100)])
     normals = np.tile([0.0, 0.0, -1.0], (100, 1))
     assert floor_areas_m2(normals, points, 7.0).tolist() == [0.0, 0.0, pytest.approx(7.0)]

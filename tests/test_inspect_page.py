@@ -9,18 +9,16 @@ import shutil
 import subprocess
 import sys
 from http.server import BaseHTTPRequestHandler, HTTPServer
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from numpy.typing import NDArray
 
 from synfeal.errors import InputError
 from synfeal.inspect.page import page_html
 from synfeal.inspect.surface import SurfacePoints
 from synfeal.inspect.text import Section
-from synfeal.inspect.viewer_mesh import ViewerMesh, split_longest_edges, viewer_mesh
+from synfeal.inspect.viewer_mesh import split_longest_edges, viewer_mesh
 from synfeal.mesh.decimate import simplify
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.triangles import Triangles
@@ -77,7 +75,7 @@ function drag(dy) {
 Shares = dict[str, float]
 
 
-def colored_box(rgb: tuple[int, int, int], *, inwards: bool) -> TexturedMesh:
+def colored_box(rgb, *, inwards):
     box = trimesh.creation.box((4.0, 3.0, 2.0))
     faces = np.asarray(box.faces)[:, ::-1] if inwards else np.asarray(box.faces)
     colours = np.tile(np.array(rgb, np.uint8), (8, 1))
@@ -86,20 +84,20 @@ def colored_box(rgb: tuple[int, int, int], *, inwards: bool) -> TexturedMesh:
     )
 
 
-def small_copy(mesh: TexturedMesh) -> ViewerMesh:
+def small_copy(mesh):
     return viewer_mesh(mesh, SurfacePoints.of(mesh, np.random.default_rng(0), 20_000))
 
 
-def corners_m(copy: ViewerMesh) -> NDArray[np.float64]:
+def corners_m(copy):
     return (copy.offset_m + copy.step_m * copy.positions)[copy.faces]
 
 
-def area_m2(corners: NDArray[np.float64]) -> float:
+def area_m2(corners):
     a, b, c = np.moveaxis(corners, 1, 0)
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2.0)
 
 
-def test_the_copy_lies_where_the_mesh_does() -> None:
+def test_the_copy_lies_where_the_mesh_does():
     mesh = colored_box((200, 10, 20), inwards=False)
     copy = small_copy(mesh)
     corners = corners_m(copy)
@@ -110,7 +108,7 @@ def test_the_copy_lies_where_the_mesh_does() -> None:
     assert (copy.rgb == [200, 10, 20]).all()
 
 
-def test_two_sides_of_a_thin_wall_keep_their_colours() -> None:
+def test_two_sides_of_a_thin_wall_keep_their_colours():
     front = trimesh.creation.box((4.0, 0.02, 3.0))
     side = np.asarray(front.face_normals)[:, 1]
     parts = [
@@ -128,7 +126,7 @@ def test_two_sides_of_a_thin_wall_keep_their_colours() -> None:
     assert (copy.rgb[y < 0] == [0, 0, 255]).all()
 
 
-def test_large_meshes_are_simplified_and_keep_their_shape() -> None:
+def test_large_meshes_are_simplified_and_keep_their_shape():
     sphere = trimesh.creation.icosphere(6, radius=2.0)  # 81,920 faces
     rgb = np.where(sphere.vertices[:, 2:] > 0, [255, 0, 0], [0, 0, 255]).astype(np.uint8)
     part = MeshPart("ball", np.asarray(sphere.vertices), np.asarray(sphere.faces), vertex_rgb=rgb)
@@ -140,14 +138,14 @@ def test_large_meshes_are_simplified_and_keep_their_shape() -> None:
     assert (copy.rgb[points[:, 2] < -0.2] == [0, 0, 255]).all()
 
 
-def test_a_large_mesh_without_open3d_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_large_mesh_without_open3d_is_one_line(monkeypatch):
     """Open3D is an extra: who installs the simulator alone may lack it."""
     monkeypatch.setitem(sys.modules, "open3d", None)
     with pytest.raises(InputError, match=r"pip install 'synfeal\[inspect\]'"):
         simplify(Triangles(np.eye(3), np.array([[0, 1, 2]])), 1)
 
 
-def test_what_the_alpha_test_cuts_out_is_left_out() -> None:
+def test_what_the_alpha_test_cuts_out_is_left_out():
     uv = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     texture = np.full((8, 8, 4), 255, np.uint8)
     texture[:, 4:, 3] = 0
@@ -158,7 +156,7 @@ def test_what_the_alpha_test_cuts_out_is_left_out() -> None:
     assert area_m2(corners_m(small_copy(TexturedMesh((part,))))) == pytest.approx(8.0, rel=0.02)
 
 
-def test_splitting_keeps_the_surface_and_the_limits() -> None:
+def test_splitting_keeps_the_surface_and_the_limits():
     corners = np.random.default_rng(0).normal(size=(7, 3, 3))
     split = split_longest_edges(corners, 500, 0.0)
     assert len(split) == 500
@@ -170,15 +168,13 @@ def test_splitting_keeps_the_surface_and_the_limits() -> None:
     np.testing.assert_allclose(*total, atol=1e-12)  # every triangle still faces the same way
 
 
-def page_of(
-    mesh: TexturedMesh, lines: list[tuple[NDArray[np.float64], tuple[int, int, int]]]
-) -> str:
+def page_of(mesh, lines):
     sections = [Section("<b>", (("a & b", "</script><script>alert(1)</script>"),))]
     scene = small_copy(mesh).scene(lines)
     return page_html("a <mesh>", ["look & see"], sections, "x: {y: [1, 2]}", b"png", scene)
 
 
-def test_the_page_needs_nothing_else_and_escapes_what_it_shows() -> None:
+def test_the_page_needs_nothing_else_and_escapes_what_it_shows():
     line = np.array([[99.0, 100, 100], [101, 100, 100]])
     page = page_of(colored_box((1, 2, 3), inwards=True), [(line, (0, 255, 0))])
     assert not re.findall(r"https?://|@import|url\(|<link|src=\"(?!data:)", page)
@@ -202,27 +198,27 @@ class Reply(HTTPServer):
     timeout = 40.0
 
     class RequestHandlerClass(BaseHTTPRequestHandler):
-        def do_POST(self) -> None:
+        def do_POST(self):
             length = int(self.headers["Content-Length"])
-            self.server.body = self.rfile.read(length)  # type: ignore[attr-defined]
+            self.server.body = self.rfile.read(length)
             self.send_response(204)
             self.end_headers()
 
-        def log_message(self, *_: object) -> None:
+        def log_message(self, *_):
             pass
 
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__(("127.0.0.1", 0), self.RequestHandlerClass)
 
 
-def browse(path: Path) -> subprocess.Popen[str]:
+def browse(path):
     assert CHROMIUM is not None
     profile = f"--user-data-dir={path.with_name('profile')}"
     command = [CHROMIUM, *FLAGS, profile, path.as_uri()]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
 
-def drawn(page: str, folder: Path, *actions: str) -> tuple[list[Shares], str]:
+def drawn(page, folder, *actions):
     """Shares of colours on the canvas after each action, and what the browser said."""
     head, _, tail = page.rpartition("</script>")
     path = folder / "page.html"
@@ -241,7 +237,7 @@ def drawn(page: str, folder: Path, *actions: str) -> tuple[list[Shares], str]:
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
-def test_a_room_is_looked_into_through_its_near_walls(tmp_path: Path) -> None:
+def test_a_room_is_looked_into_through_its_near_walls(tmp_path):
     line = np.array([[98.5, 98.8, 99.6], [101.5, 101.2, 99.6]])
     page = page_of(colored_box((255, 0, 0), inwards=True), [(line, (0, 255, 0))])
     (culled, whole), console = drawn(page, tmp_path, "", "set('backs', 'checked', true, 'change')")
@@ -253,7 +249,7 @@ def test_a_room_is_looked_into_through_its_near_walls(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
-def test_the_view_is_turned_zoomed_and_cut(tmp_path: Path) -> None:
+def test_the_view_is_turned_zoomed_and_cut(tmp_path):
     box = trimesh.creation.box((4.0, 4.0, 1.0))
     rgb = np.where(box.vertices[:, 2:] > 0, [0, 0, 255], [255, 0, 0]).astype(np.uint8)
     inwards = np.asarray(box.faces)[:, ::-1]
@@ -277,7 +273,7 @@ def test_the_view_is_turned_zoomed_and_cut(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
-def test_without_webgl_the_page_says_so(tmp_path: Path) -> None:
+def test_without_webgl_the_page_says_so(tmp_path):
     page = page_of(colored_box((255, 0, 0), inwards=True), [])
     page = page.replace('getContext("webgl2"', 'getContext("none"')
     check = "if (!{}('fallback').offsetHeight || {}('view').offsetHeight) throw new Error('hidden')"

@@ -1,34 +1,23 @@
 """Free space and the suggested box, in rooms whose free space is known."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
 import pytest
 import trimesh
-from numpy.typing import NDArray
 
-from synfeal.inspect.freespace import (
-    FreeSpace,
-    find_free_space,
-    suggest_box,
-    survey,
-    viewpoint,
-)
+from synfeal.inspect.freespace import find_free_space, suggest_box, survey, viewpoint
 from synfeal.inspect.largest_box import UNWANTED_WEIGHT, largest_box
 from synfeal.mesh.rays import RayCaster
 
 ROOM_M = (6.0, 4.0, 3.0)
 
 
-def box_at(
-    extents: tuple[float, float, float], centre: tuple[float, float, float]
-) -> trimesh.Trimesh:
+def box_at(extents, centre):
     return trimesh.creation.box(extents).apply_translation(centre)
 
 
-def space_of(meshes: list[trimesh.Trimesh], box_m: NDArray[np.float64] | None = None) -> FreeSpace:
+def space_of(meshes, box_m=None):
     mesh = trimesh.util.concatenate(meshes)
     surface, _ = trimesh.sample.sample_surface(mesh, 60_000, seed=0)
     bounds = np.asarray(mesh.bounds) if box_m is None else box_m
@@ -36,12 +25,12 @@ def space_of(meshes: list[trimesh.Trimesh], box_m: NDArray[np.float64] | None = 
     return find_free_space(caster, survey(caster, np.asarray(surface), bounds))
 
 
-def room() -> trimesh.Trimesh:
+def room():
     """6 x 4 x 3 m, floor at z = 0."""
     return box_at(ROOM_M, (0.0, 0.0, 1.5))
 
 
-def test_a_closed_room_is_free_and_its_box_keeps_off_the_walls() -> None:
+def test_a_closed_room_is_free_and_its_box_keeps_off_the_walls():
     space = space_of([room()])
     assert space.share > 0.97
     assert space.enclosure == 1.0
@@ -54,14 +43,14 @@ def test_a_closed_room_is_free_and_its_box_keeps_off_the_walls() -> None:
     np.testing.assert_allclose(box, [low, high], atol=0.2)
 
 
-def test_a_room_without_a_ceiling_is_a_room() -> None:
+def test_a_room_without_a_ceiling_is_a_room():
     mesh = room()
     mesh.update_faces(mesh.face_normals[:, 2] < 0.5)
     space = space_of([mesh], np.array([[-3.0, -2, 0], [3, 2, 2]]))
     assert space.share > 0.95
 
 
-def test_above_an_open_plain_nothing_is_free() -> None:
+def test_above_an_open_plain_nothing_is_free():
     plain = box_at((400.0, 400.0, 0.01), (0.0, 0.0, 0.0))
     space = space_of([plain], np.array([[-3.0, -3, 0.5], [3, 3, 2.5]]))
     assert space.share == 0.0
@@ -69,7 +58,7 @@ def test_above_an_open_plain_nothing_is_free() -> None:
     assert viewpoint(space, None) is None
 
 
-def test_the_inside_of_a_cupboard_is_not_where_cameras_go() -> None:
+def test_the_inside_of_a_cupboard_is_not_where_cameras_go():
     space = space_of([room(), box_at((1.5, 1.5, 2.9), (-2.0, 0.0, 1.45))])
     x, y, z = space.axes_m
     inside = np.ix_(np.abs(x + 2.0) < 0.7, np.abs(y) < 0.7, z < 2.8)
@@ -83,7 +72,7 @@ def test_the_inside_of_a_cupboard_is_not_where_cameras_go() -> None:
     assert ((position >= box[0]) & (position <= box[1])).all()
 
 
-def test_furniture_below_the_cameras_is_no_obstacle() -> None:
+def test_furniture_below_the_cameras_is_no_obstacle():
     space = space_of([room(), box_at((4.0, 1.0, 0.4), (0.0, 0.0, 0.2))])
     assert space.floor_m == pytest.approx(0.0, abs=1e-4)
     box = suggest_box(space)
@@ -93,11 +82,11 @@ def test_furniture_below_the_cameras_is_no_obstacle() -> None:
 
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("shape", [(5, 4, 3), (2, 9, 1), (1, 12, 1)])
-def test_largest_box_against_trying_them_all(shape: tuple[int, ...], seed: int) -> None:
+def test_largest_box_against_trying_them_all(shape, seed):
     wanted = np.random.default_rng(seed).random(shape) < 0.75
     worth = np.where(wanted, 1.0, -UNWANTED_WEIGHT)
 
-    def worth_of(lower: tuple[int, ...], upper: tuple[int, ...]) -> float:
+    def worth_of(lower, upper):
         slices = tuple(slice(a, b + 1) for a, b in zip(lower, upper, strict=True))
         return float(worth[slices].sum())
 

@@ -1,7 +1,5 @@
 """Finished runs in one file and back: nothing is lost, nothing trained again, nothing mistaken."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re
@@ -19,7 +17,7 @@ from baselines.references.registry import answered_by, data_sets
 from baselines.training.record import training_parameters, write_training_record
 from baselines.training.score import score_run
 from synfeal.cli import main
-from synfeal.config import Config, Run, load_config, read_design
+from synfeal.config import Run, load_config, read_design
 from synfeal.dataset.pose_table import COLUMNS, PoseTable, write_pose_table
 from synfeal.files import write_json
 from synfeal.report.predictions.package import POSES
@@ -32,14 +30,14 @@ table4_size,,large_room,20k,synfeal,0,0,pretrained
 """
 
 
-def smoke_config(folder: Path) -> Config:
+def smoke_config(folder):
     """The smoke profile with fifteen runs, in a folder."""
     (folder / "design.csv").write_text(DESIGN, encoding="utf-8")
     raw = load_config(REPO / "config/config.yaml", REPO / "config/smoke.yaml")
     return raw.model_copy(update={"results": folder, "experiments": folder / "design.csv"})
 
 
-def write_records(config: Config) -> None:
+def write_records(config):
     """What tables read of scenes, frames and reference methods."""
     root = config.root
     write_json(root / "frames/large_room/train.json", {})
@@ -57,7 +55,7 @@ def write_records(config: Config) -> None:
                 write_json(root.joinpath("references", *key, method, name), {})
 
 
-def table(count: int) -> PoseTable:
+def table(count):
     """The first poses of one plan, four frames to a path."""
     rng = np.random.default_rng(7)
     position_m, quat = rng.normal(size=(500, 3)), rng.normal(size=(500, 4))
@@ -66,7 +64,7 @@ def table(count: int) -> PoseTable:
     return PoseTable(frame, frame // 4, position_m[:count], quat[:count])
 
 
-def write_results(config: Config) -> None:
+def write_results(config):
     """What a finished run of the workflow leaves that is kept; and models, which are not."""
     root = config.root
     for size in ("6k", "20k"):
@@ -93,13 +91,11 @@ def write_results(config: Config) -> None:
         (folder / "history.csv").write_text("samples_seen\n320\n")
         (folder / "model.pt").write_bytes(b"large")
         write_training_record(
-            folder / "training.json",
-            training_parameters(config, run),
-            {"test_labels": test_labels},
+            folder / "training.json", training_parameters(config, run), {"test_labels": test_labels}
         )
 
 
-def contents(root: Path) -> dict[str, bytes]:
+def contents(root):
     return {
         path.relative_to(root).as_posix(): path.read_bytes()
         for path in root.rglob("*")
@@ -108,7 +104,7 @@ def contents(root: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Config:
+def made(tmp_path_factory):
     config = smoke_config(tmp_path_factory.mktemp("made"))
     write_results(config)
     write_records(config)
@@ -117,13 +113,11 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Config:
 
 
 @pytest.fixture(scope="module")
-def package(made: Config) -> Path:
+def package(made):
     return made.root / "predictions.zip"
 
 
-def test_everything_but_models_comes_back_byte_for_byte(
-    made: Config, package: Path, tmp_path: Path
-) -> None:
+def test_everything_but_models_comes_back_byte_for_byte(made, package, tmp_path):
     assert main(["restore", str(package), str(tmp_path / "new")]) == 0
     before = {k: v for k, v in contents(made.root).items() if not k.endswith("model.pt")}
     assert contents(tmp_path / "new") == before
@@ -131,9 +125,7 @@ def test_everything_but_models_comes_back_byte_for_byte(
     assert sorted(restored) == sorted(before)
 
 
-def test_the_file_is_a_data_package_that_holds_shared_poses_once(
-    made: Config, package: Path
-) -> None:
+def test_the_file_is_a_data_package_that_holds_shared_poses_once(made, package):
     """Checked by the standard's words alone: hashes, sizes, schema; no code of ours reads it."""
     with zipfile.ZipFile(package) as opened:
         descriptor = json.loads(opened.read("datapackage.json"))
@@ -149,9 +141,7 @@ def test_the_file_is_a_data_package_that_holds_shared_poses_once(
     assert "labels/large_room/6k/synfeal/train.csv" not in names  # the 20k set begins with it
 
 
-def test_a_longer_run_gives_the_same_bytes_for_what_was_there(
-    made: Config, package: Path, tmp_path: Path
-) -> None:
+def test_a_longer_run_gives_the_same_bytes_for_what_was_there(made, package, tmp_path):
     root = Path(shutil.copytree(made.root, tmp_path / "smoke"))
     main(["keep", str(root), "--out", str(tmp_path / "same.zip")])
     assert (tmp_path / "same.zip").read_bytes() == package.read_bytes()
@@ -166,7 +156,7 @@ def test_a_longer_run_gives_the_same_bytes_for_what_was_there(
     assert (tmp_path / "more.zip").read_bytes().startswith(at)
 
 
-def rewritten(package: Path, out: Path, changes: dict[str, bytes | None]) -> Path:
+def rewritten(package, out, changes):
     with zipfile.ZipFile(package) as old, zipfile.ZipFile(out, "w") as new:
         for name in old.namelist():
             data = changes.get(name, old.read(name))
@@ -192,12 +182,8 @@ OUTSIDE = b'{"resources": [{"path": "../x", "hash": "sha256:0", "bytes": 1}]}'
     ],
 )
 def test_a_damaged_package_is_refused_in_one_line_and_writes_nothing(
-    package: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    changes: dict[str, bytes | None] | None,
-    words: str,
-) -> None:
+    package, tmp_path, capsys, changes, words
+):
     bad = tmp_path / "bad.zip"
     if changes is None:
         bad.write_bytes(package.read_bytes()[:-30])
@@ -211,9 +197,7 @@ def test_a_damaged_package_is_refused_in_one_line_and_writes_nothing(
     assert not (tmp_path / "out").exists()
 
 
-def test_results_that_differ_are_not_overwritten(
-    made: Config, package: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_results_that_differ_are_not_overwritten(made, package, tmp_path, capsys):
     other = tmp_path / "out" / PREDICTED
     other.parent.mkdir(parents=True)
     other.write_text("mine\n")
@@ -222,7 +206,7 @@ def test_results_that_differ_are_not_overwritten(
     assert [p for p in (tmp_path / "out").rglob("*") if p.is_file()] == [other]
 
 
-def test_predictions_are_not_scored_by_other_labels(made: Config, tmp_path: Path) -> None:
+def test_predictions_are_not_scored_by_other_labels(made, tmp_path):
     run = Run("large_room", "6k", "synfeal", "pretrained", "posenet", 0)
     folder = Path(shutil.copytree(made.root / "runs" / run.directory, tmp_path / "run"))
     labels = made.root / "labels/large_room/6k/synfeal"
@@ -241,19 +225,19 @@ def test_predictions_are_not_scored_by_other_labels(made: Config, tmp_path: Path
         score_run(given[0], tmp_path / "other.csv", given[2], labels / "train.csv", *outputs, {})
 
 
-def planned(config: Config, target: str, *changes: str) -> subprocess.CompletedProcess[str]:
+def planned(config, target, *changes):
     given = [f"results={config.results}", f"experiments={config.experiments}", *changes]
     command = [sys.executable, "-m", "snakemake", "--cores", "1", "--dry-run", "--configfile"]
     command += ["config/smoke.yaml", "--config", *given, "--", target]
     return subprocess.run(command, cwd=REPO, capture_output=True, text=True, check=False)
 
 
-def jobs_of(run: subprocess.CompletedProcess[str]) -> set[str]:
+def jobs_of(run):
     assert run.returncode == 0, run.stdout + run.stderr
     return {name for name, _ in re.findall(r"^(\w+) +(\d+)$", run.stdout, re.MULTILINE)}
 
 
-def test_the_workflow_goes_on_from_restored_runs(package: Path, tmp_path: Path) -> None:
+def test_the_workflow_goes_on_from_restored_runs(package, tmp_path):
     config = smoke_config(tmp_path)
     assert main(["restore", str(package), str(config.root)]) == 0
     tables = jobs_of(planned(config, "rescored"))

@@ -17,7 +17,6 @@ from baselines.groundtruth.rgbd import rgbd_graph
 from baselines.groundtruth.sfm import sfm_batch
 from baselines.groundtruth.trajectory import read_trajectory, write_trajectory
 from synfeal.config.models import GroundTruthConfig
-from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.labels.noise import add_noise
 from tests.planar_scene import CAMERA, straight_path, write_frames
 
@@ -86,11 +85,3 @@ def test_labels_are_near_the_truth(labels):
     position_m, orientation_deg = absolute_errors(labels, TRUTH)
     assert position_m.max() < 0.11
     assert orientation_deg.max() < 5.1
-
-
-def test_labels_survive_their_file_bit_for_bit(labels, tmp_path):
-    path = tmp_path / "train.csv"
-    write_pose_table(path, labels)
-    again = read_pose_table(path)
-    for name in ("frame", "path", "position_m", "quat_wxyz"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(labels, name))

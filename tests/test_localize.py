@@ -1,7 +1,5 @@
 """``synfeal localize``: pictures in, poses out, as a person uses it."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -9,7 +7,6 @@ import cv2
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 from PIL import Image
 
 from baselines.localize.pictures import read_picture
@@ -31,7 +28,7 @@ WIDTH, HEIGHT = 52, 39
 PX = NETWORK.input_px
 
 
-def picture(rng: np.random.Generator, width: int = WIDTH, height: int = HEIGHT) -> NDArray:
+def picture(rng, width=WIDTH, height=HEIGHT):
     """A smooth picture (height, width, 3) with some noise."""
     coarse = rng.integers(0, 256, (4, 5, 3), np.uint8)
     smooth = np.asarray(Image.fromarray(coarse).resize((width, height), Image.Resampling.BICUBIC))
@@ -40,7 +37,7 @@ def picture(rng: np.random.Generator, width: int = WIDTH, height: int = HEIGHT) 
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run(tmp_path_factory):
     """A directory with a sequence of frames, a localizer and what it predicts for them."""
     folder = tmp_path_factory.mktemp("run")
     sequence = folder / "seq-01"
@@ -65,7 +62,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def localized(model: Path, out: Path, *images: Path) -> list[list[str]]:
+def localized(model, out, *images):
     """Rows that the command wrote, the header first."""
     named = [str(path) for path in images]
     assert main(["localize", str(model), *named, "--out", str(out), "--device", "cpu"]) == 0
@@ -73,14 +70,14 @@ def localized(model: Path, out: Path, *images: Path) -> list[list[str]]:
     return [[*rows[0]], *([*row.values()] for row in rows)]
 
 
-def only_error(capsys: pytest.CaptureFixture[str]) -> str:
+def only_error(capsys):
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1, lines
     assert lines[0].startswith("error: ")
     return lines[0]
 
 
-def test_frames_of_a_run_get_its_predictions_to_the_last_digit(run: Path, tmp_path: Path) -> None:
+def test_frames_of_a_run_get_its_predictions_to_the_last_digit(run, tmp_path):
     header, *rows = localized(run / "model.pt", tmp_path / "poses.csv", run / "seq-01")
     assert header == ["image", "tx", "ty", "tz", "qw", "qx", "qy", "qz"]
     assert [Path(row[0]).name for row in rows] == [
@@ -91,7 +88,7 @@ def test_frames_of_a_run_get_its_predictions_to_the_last_digit(run: Path, tmp_pa
     assert len({tuple(row) for row in rows}) == COUNT
 
 
-def test_what_is_printed(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_printed(run, tmp_path, capsys):
     localized(run / "model.pt", tmp_path / "poses.csv", run / "seq-01")
     printed = capsys.readouterr()
     model, poses = printed.out.splitlines()
@@ -109,7 +106,7 @@ def test_what_is_printed(run: Path, tmp_path: Path, capsys: pytest.CaptureFixtur
     ]
 
 
-def test_pictures_come_in_the_order_named(run: Path, tmp_path: Path) -> None:
+def test_pictures_come_in_the_order_named(run, tmp_path):
     folder = tmp_path / "more"
     folder.mkdir()
     rng = np.random.default_rng(1)
@@ -122,7 +119,7 @@ def test_pictures_come_in_the_order_named(run: Path, tmp_path: Path) -> None:
     assert rows[0] == rows[3] != rows[1]
 
 
-def broken(folder: Path, kind: str) -> Path:
+def broken(folder, kind):
     """A picture that cannot be used."""
     path = folder / f"{kind}.png"
     good = encode_png(picture(np.random.default_rng(2)))
@@ -142,9 +139,7 @@ def broken(folder: Path, kind: str) -> Path:
 
 
 @pytest.mark.parametrize("kind", ["absent", "text", "empty", "cut", "gif", "grey16", "long"])
-def test_one_bad_picture_stops_all_and_leaves_what_there_was(
-    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
-) -> None:
+def test_one_bad_picture_stops_all_and_leaves_what_there_was(run, tmp_path, capsys, kind):
     out = tmp_path / "poses.csv"
     earlier = ",".join(HEADER) + "\n"
     out.write_text(earlier)
@@ -157,9 +152,7 @@ def test_one_bad_picture_stops_all_and_leaves_what_there_was(
 
 
 @pytest.mark.parametrize("out", ["seq-01", "model.pt", "seq-01/frame-000000.color.png"])
-def test_nothing_of_the_input_is_overwritten(
-    run: Path, capsys: pytest.CaptureFixture[str], out: str
-) -> None:
+def test_nothing_of_the_input_is_overwritten(run, capsys, out):
     named = ["localize", str(run / "model.pt"), str(run / "seq-01"), "--out", str(run / out)]
     size = (run / out).stat().st_size
     assert main(named) == 1
@@ -179,13 +172,7 @@ NAN, ZERO = math.nan, [0.0, 0.0, 0.0, 0.0]
         ([NAN, 2.0, 3.0], [1.0, 0.0, 0.0, 0.0]),
     ],
 )
-def test_a_pose_that_is_none_is_nan_and_counted(
-    run: Path,
-    tmp_path: Path,
-    caplog: pytest.LogCaptureFixture,
-    position_m: list[float],
-    quat_wxyz: list[float],
-) -> None:
+def test_a_pose_that_is_none_is_nan_and_counted(run, tmp_path, caplog, position_m, quat_wxyz):
     model = save(tmp_path / "model.pt", answering(position_m, quat_wxyz))
     _, *rows = localized(model, tmp_path / "poses.csv", run / "seq-01/frame-000000.color.png")
     pose = np.float64(rows[0][1:])
@@ -195,7 +182,7 @@ def test_a_pose_that_is_none_is_nan_and_counted(
 
 
 @pytest.mark.parametrize("length", [1e-30, 1e-3, 1.0, 1e30])
-def test_a_quaternion_of_any_length_but_0_is_a_rotation(length: float) -> None:
+def test_a_quaternion_of_any_length_but_0_is_a_rotation(length):
     trained = answering([0.0, 0.0, 0.0], [-0.6 * length, 0.0, 0.8 * length, 0.0])
     images = torch.zeros((2, 3, PX, PX), dtype=torch.uint8)
     _, quat_wxyz = predict(trained, images)
@@ -203,17 +190,17 @@ def test_a_quaternion_of_any_length_but_0_is_a_rotation(length: float) -> None:
     np.testing.assert_allclose(np.linalg.norm(quat_wxyz, axis=1), 1.0, atol=1e-15)
 
 
-def shrunk(tmp_path: Path, image: Image.Image, name: str = "p.png", **options: object) -> NDArray:
-    image.save(tmp_path / name, **options)  # type: ignore[arg-type]
+def shrunk(tmp_path, image, name="p.png", **options):
+    image.save(tmp_path / name, **options)
     return read_picture(tmp_path / name, PX)
 
 
 @pytest.fixture
-def upright() -> Image.Image:
+def upright():
     return Image.fromarray(picture(np.random.default_rng(3)))
 
 
-def test_a_grey_picture_has_three_equal_channels(tmp_path: Path, upright: Image.Image) -> None:
+def test_a_grey_picture_has_three_equal_channels(tmp_path, upright):
     grey = shrunk(tmp_path, upright.convert("L"))
     assert (grey == grey[:, :, :1]).all()
     coloured = Image.merge("RGB", [upright.convert("L")] * 3)
@@ -221,25 +208,21 @@ def test_a_grey_picture_has_three_equal_channels(tmp_path: Path, upright: Image.
 
 
 @pytest.mark.parametrize("alpha", [0, 128, 255])
-def test_an_alpha_channel_changes_nothing(tmp_path: Path, upright: Image.Image, alpha: int) -> None:
+def test_an_alpha_channel_changes_nothing(tmp_path, upright, alpha):
     expected = shrunk(tmp_path, upright)
     upright.putalpha(alpha)
     np.testing.assert_array_equal(shrunk(tmp_path, upright), expected)
 
 
 @pytest.mark.parametrize("transparency", [None, 0, b"\x00\x80\xff"])
-def test_a_palette_means_its_colours(
-    tmp_path: Path, upright: Image.Image, transparency: object
-) -> None:
+def test_a_palette_means_its_colours(tmp_path, upright, transparency):
     indexed = upright.quantize(64)
     options = {} if transparency is None else {"transparency": transparency}
     expected = shrunk(tmp_path, indexed.convert("RGB"))
     np.testing.assert_array_equal(shrunk(tmp_path, indexed, **options), expected)
 
 
-def test_sixteen_bits_of_colour_become_their_upper_eight(
-    tmp_path: Path, upright: Image.Image
-) -> None:
+def test_sixteen_bits_of_colour_become_their_upper_eight(tmp_path, upright):
     pixels = np.asarray(upright)
     deep = pixels[:, :, ::-1].astype(np.uint16) * 256 + 77
     assert cv2.imwrite(str(tmp_path / "deep.png"), deep)
@@ -261,12 +244,7 @@ TURNS = {
 
 
 @pytest.mark.parametrize(("orientation", "stored_by"), TURNS.items())
-def test_a_picture_is_turned_upright(
-    tmp_path: Path,
-    upright: Image.Image,
-    orientation: int,
-    stored_by: Image.Transpose | None,
-) -> None:
+def test_a_picture_is_turned_upright(tmp_path, upright, orientation, stored_by):
     exif = Image.Exif()
     exif[0x0112] = orientation
     stored = upright if stored_by is None else upright.transpose(stored_by)

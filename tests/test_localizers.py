@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 import torch
-from torch import Tensor
 
 from baselines.localizers.backbones.weights import build_backbone
-from baselines.localizers.base import Localizer
 from baselines.localizers.heads import PoseRegressor
 from baselines.localizers.hourglass import UpBlock
-from baselines.localizers.losses import (
-    PosePrediction,
-)
+from baselines.localizers.losses import PosePrediction
 from baselines.localizers.names import RESNET_LOCALIZERS, backbone_of
 from baselines.localizers.poselstm import FourDirectionLstm
 from baselines.localizers.registry import LOCALIZERS, build_localizer
@@ -40,13 +35,13 @@ class Case(NamedTuple):
     network: NetworkConfig = NETWORK
     hyper: LocalizerConfig = HYPER
 
-    def build(self) -> Localizer:
+    def build(self):
         return build_localizer(*self)
 
-    def batch(self, count: int = 6) -> tuple[Tensor, Tensor, Tensor]:
+    def batch(self, count=6):
         return batch(count, self.network.input_px)
 
-    def resized(self, input_px: int, width: float = 0.125) -> Case:
+    def resized(self, input_px, width=0.125):
         update = {"input_px": input_px, "width": width}
         return self._replace(network=self.network.model_copy(update=update))
 
@@ -62,7 +57,7 @@ CASES = {
 }
 
 
-def over(names: Iterable[str]) -> pytest.MarkDecorator:
+def over(names):
     return pytest.mark.parametrize("case", [CASES[n] for n in names], ids=list(names))
 
 
@@ -77,7 +72,7 @@ def _one_thread_and_seed():
     torch.manual_seed(0)
 
 
-def batch(count: int = 6, px: int = 32) -> tuple[Tensor, Tensor, Tensor]:
+def batch(count=6, px=32):
     """Noise images, positions and unit quaternions."""
     quat = torch.nn.functional.normalize(torch.randn(count, 4), dim=1)
     return torch.randn(count, 3, px, px), torch.randn(count, 3), quat

@@ -1,7 +1,5 @@
 """Checks before hours are spent: the sampling box, the merged mesh, and the files asked for."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +21,7 @@ CONFIG = Path(__file__).parents[1] / "config"
     ("scale", "shift", "message"),
     [(1.0, 0.0, None), (1000.0, 0.0, "1000 times"), (1.0, 50.0, "outside"), (0.001, 2, "outside")],
 )
-def test_sampling_box_must_fit_the_mesh(scale: float, shift: float, message: str | None) -> None:
+def test_sampling_box_must_fit_the_mesh(scale, shift, message):
     bounds = np.array([[-1.0, -1, -1], [1, 1, 1]]) * scale + shift
     box = np.array([[-1.0, -1, -1], [1, 1, 1]])
     if message is None:
@@ -34,13 +32,13 @@ def test_sampling_box_must_fit_the_mesh(scale: float, shift: float, message: str
     assert "unit_m" in str(caught.value)
 
 
-def test_merged_parts_keep_their_triangles() -> None:
+def test_merged_parts_keep_their_triangles():
     mesh = TexturedMesh((MeshPart("a", TRIANGLE, FACE), MeshPart("b", TRIANGLE + 5, FACE)))
     vertices, faces = mesh.merged()
     np.testing.assert_array_equal(vertices[faces[1]], TRIANGLE + 5)
 
 
-def test_the_first_missing_mesh_is_named(tmp_path: Path) -> None:
+def test_the_first_missing_mesh_is_named(tmp_path):
     (tmp_path / "here.glb").write_bytes(b"anything")
     scenes = {
         "stand_in": SceneConfig(source="procedural", builder="sanctuary"),
@@ -55,7 +53,7 @@ def test_the_first_missing_mesh_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("scene", ["large_room", "sanctuary"])
-def test_scene_fragments_are_complete_configurations(scene: str) -> None:
+def test_scene_fragments_are_complete_configurations(scene):
     config = load_config(CONFIG / "config.yaml", CONFIG / "scenes" / f"{scene}.yaml")
     assert config.scenes[scene].source == "mesh"
     assert config.scenes[scene].min_view_distance_m == 1.2
@@ -66,7 +64,7 @@ def test_scene_fragments_are_complete_configurations(scene: str) -> None:
     assert (CONFIG / "scenes" / "README.md").is_file()
 
 
-def test_both_fragments_work_together() -> None:
+def test_both_fragments_work_together():
     merged = merge(
         *(read_yaml(CONFIG / "scenes" / f"{s}.yaml") for s in ("large_room", "sanctuary"))
     )
@@ -74,7 +72,7 @@ def test_both_fragments_work_together() -> None:
 
 
 @pytest.mark.skipif((CONFIG.parent / "meshes/large_room.glb").exists(), reason="mesh is here")
-def test_snakemake_stops_in_one_line_when_the_mesh_is_absent() -> None:
+def test_snakemake_stops_in_one_line_when_the_mesh_is_absent():
     run = snakemake("--dry-run", "--configfile", "config/scenes/large_room.yaml", "--", "all")
     assert run.returncode == 1
     errors = [line for line in run.stderr.splitlines() if line.startswith("error:")]

@@ -5,8 +5,6 @@ from __future__ import annotations
 import base64
 import sys
 import zlib
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,7 +39,7 @@ RGB = np.asarray(255 * np.abs(VERTICES) / 2.0, np.uint8)
 class Maker:
     """A glTF put together view by view."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.binary = b""
         self.header: Json = {
             "asset": {"version": "2.0"},
@@ -55,30 +53,29 @@ class Maker:
         }
 
     @property
-    def primitive(self) -> Json:
-        primitive: Json = self.header["meshes"][0]["primitives"][0]
-        return primitive
+    def primitive(self):
+        return self.header["meshes"][0]["primitives"][0]
 
-    def view(self, content: bytes, **more: object) -> int:
+    def view(self, content, **more):
         place = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(content)}
         self.header["bufferViews"].append({**place, **more})
         self.binary += content + b"\0" * (-len(content) % 4)
         self.header["buffers"][0]["byteLength"] = len(self.binary)
         return len(self.header["bufferViews"]) - 1
 
-    def accessor(self, kind: int, count: int, shape: str, **more: object) -> int:
+    def accessor(self, kind, count, shape, **more):
         entry = {"componentType": kind, "count": count, "type": shape, **more}
         self.header["accessors"].append(entry)
         return len(self.header["accessors"]) - 1
 
-    def needs(self, *names: str) -> None:
+    def needs(self, *names):
         self.header["extensionsRequired"] = self.header["extensionsUsed"] = [*names]
 
-    def save(self, folder: Path) -> Path:
+    def save(self, folder):
         return store_glb(folder, self.header, self.binary)
 
 
-def quantised(maker: Maker) -> None:
+def quantised(maker):
     """Positions as normalised 16-bit integers in a node that scales, colours as bytes."""
     position = np.round(VERTICES / 2.0 * 32767).astype("<i2")
     padded = np.pad(position, ((0, 0), (0, 1)))
@@ -95,7 +92,7 @@ def quantised(maker: Maker) -> None:
     maker.needs("KHR_mesh_quantization")
 
 
-def meshopt(maker: Maker) -> None:
+def meshopt(maker):
     """As gltfpack writes: compressed views that stand for those of a buffer that is not there."""
     from meshoptimizer import encode_index_buffer, encode_vertex_buffer
 
@@ -122,7 +119,7 @@ def meshopt(maker: Maker) -> None:
     maker.needs("KHR_mesh_quantization", name)
 
 
-def draco(maker: Maker) -> None:
+def draco(maker):
     import DracoPy
 
     data = DracoPy.encode(VERTICES, FACES, quantization_bits=20, colors=RGB, preserve_order=True)
@@ -145,9 +142,7 @@ def draco(maker: Maker) -> None:
 @pytest.mark.parametrize(
     ("make", "library"), [(quantised, None), (meshopt, "meshoptimizer"), (draco, "DracoPy")]
 )
-def test_a_compressed_file_is_read_as_the_plain_one(
-    make: Callable[[Maker], None], library: str | None, tmp_path: Path
-) -> None:
+def test_a_compressed_file_is_read_as_the_plain_one(make, library, tmp_path):
     if library is not None:
         pytest.importorskip(library)
     maker = Maker()
@@ -164,9 +159,7 @@ def test_a_compressed_file_is_read_as_the_plain_one(
 
 
 @pytest.mark.parametrize(("make", "library"), [(meshopt, "meshoptimizer"), (draco, "DracoPy")])
-def test_without_its_library_a_file_is_refused_with_advice(
-    make: Callable[[Maker], None], library: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_its_library_a_file_is_refused_with_advice(make, library, tmp_path, monkeypatch):
     pytest.importorskip(library)
     maker = Maker()
     make(maker)
@@ -177,7 +170,7 @@ def test_without_its_library_a_file_is_refused_with_advice(
     assert "\n" not in str(caught.value)
 
 
-def test_what_is_damaged_is_named(tmp_path: Path) -> None:
+def test_what_is_damaged_is_named(tmp_path):
     pytest.importorskip("meshoptimizer")
     maker = Maker()
     meshopt(maker)
@@ -188,7 +181,7 @@ def test_what_is_damaged_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("codec", "levels"), [("UASTC", 1), ("ETC1S", 8)])
-def test_ktx2_textures_are_read(codec: str, levels: int, tmp_path: Path) -> None:
+def test_ktx2_textures_are_read(codec, levels, tmp_path):
     pytest.importorskip("opengl_basisu")
     content = zlib.decompress(base64.b64decode(KTX2[codec]))
     (tmp_path / "paint.ktx2").write_bytes(content)

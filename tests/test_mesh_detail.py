@@ -1,10 +1,7 @@
 """Less detail of a textured mesh: what is seen of flat surfaces stays, and seams stay seams."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from synfeal.mesh.detail import with_fewer_faces, with_smaller_textures
 from synfeal.mesh.model import MeshPart, TexturedMesh
@@ -15,9 +12,7 @@ N = 24  # cells along each side of a grid
 RED, GREEN, BLUE = (220, 30, 30), (30, 220, 30), (30, 30, 220)
 
 
-def sheet(
-    y: tuple[float, float], u: tuple[float, float], depth: object = None, half: float = 2.0
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+def sheet(y, u, depth=None, half=2.0):
     """Vertices, faces and texture coordinates of a grid at x = 3 m that faces the camera.
 
     Args:
@@ -35,7 +30,7 @@ def sheet(
     return np.stack([xs, ys, zs], axis=1), faces, np.stack([u[0] + (u[1] - u[0]) * right, up], 1)
 
 
-def joined(*sheets: tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]) -> MeshPart:
+def joined(*sheets):
     """Sheets as one part; where they meet there are two copies of each vertex. No texture yet."""
     vertices, faces, uv = zip(*sheets, strict=True)
     first = np.cumsum([0, *map(len, vertices)])
@@ -43,28 +38,28 @@ def joined(*sheets: tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.flo
     return MeshPart("part", np.concatenate(vertices), np.concatenate(shifted), np.concatenate(uv))
 
 
-def textured(part: MeshPart, texture: NDArray[np.uint8]) -> MeshPart:
+def textured(part, texture):
     return MeshPart(part.name, part.vertices_m, part.faces, part.uv, texture)
 
 
-def bands() -> NDArray[np.uint8]:
+def bands():
     """Red to 0.4 of the width, blue from 0.6 on, and between them a green that nothing shows."""
     image = np.empty((16, 160, 3), np.uint8)
     image[:, :72], image[:, 72:88], image[:, 88:] = RED, GREEN, BLUE
     return image
 
 
-def waves(y: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
+def waves(y, z):
     return 0.1 * np.sin(4.0 * z) + 0.08 * np.sin(5.0 * y + z)
 
 
-def seen(mesh: TexturedMesh, backend: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+def seen(mesh, backend):
     with opener_of(backend)(mesh, camera_of()) as renderer:
         return renderer.render_rgbd(LOOK_ALONG_X)
 
 
 @pytest.mark.parametrize("factor", [2, 4])
-def test_a_smaller_texture_holds_the_means_of_boxes(factor: int) -> None:
+def test_a_smaller_texture_holds_the_means_of_boxes(factor):
     rng = np.random.default_rng(0)
     texture = rng.integers(0, 256, (8, 16, 3)).astype(np.uint8)
     part = textured(joined(sheet((2, -2), (0, 1))), texture)
@@ -74,7 +69,7 @@ def test_a_smaller_texture_holds_the_means_of_boxes(factor: int) -> None:
     np.testing.assert_allclose(smaller, boxes, atol=0.5001)
 
 
-def test_what_is_cut_out_does_not_shine_through_a_smaller_texture() -> None:
+def test_what_is_cut_out_does_not_shine_through_a_smaller_texture():
     texture = np.zeros((2, 2, 4), np.uint8)
     texture[:, 0] = (200, 100, 50, 255)
     part = textured(joined(sheet((2, -2), (0, 1))), texture)
@@ -83,7 +78,7 @@ def test_what_is_cut_out_does_not_shine_through_a_smaller_texture() -> None:
     np.testing.assert_allclose(smaller, [[[200, 100, 50, 128]]], atol=1)
 
 
-def test_parts_without_a_texture_and_of_one_texel_stay() -> None:
+def test_parts_without_a_texture_and_of_one_texel_stay():
     bare = joined(sheet((2, -2), (0, 1)))
     dot = textured(bare, np.full((1, 1, 3), 7, np.uint8))
     out = with_smaller_textures(TexturedMesh((bare, dot)), 4).parts
@@ -95,11 +90,11 @@ class TestFewerFaces:
     """Needs the simplifier, which a machine without a compiler may lack."""
 
     @pytest.fixture(autouse=True)
-    def _simplifier(self) -> None:
+    def _simplifier(self):
         pytest.importorskip("meshoptimizer")
 
     @pytest.mark.parametrize("backend", BACKENDS)
-    def test_a_flat_wall_looks_the_same(self, backend: str) -> None:
+    def test_a_flat_wall_looks_the_same(self, backend):
         texture = np.random.default_rng(1).integers(0, 256, (64, 64, 3)).astype(np.uint8)
         full = TexturedMesh((textured(joined(sheet((2, -2), (0, 1))), texture),))
         reduced = with_fewer_faces(full, 60)
@@ -109,7 +104,7 @@ class TestFewerFaces:
         np.testing.assert_allclose(after[1], before[1], atol=1e-5)
 
     @pytest.mark.parametrize("parts", [1, 2])
-    def test_a_seam_neither_smears_nor_opens(self, parts: int) -> None:
+    def test_a_seam_neither_smears_nor_opens(self, parts):
         left = sheet((2.5, 0.2), (0.0, 0.4), waves)
         right = sheet((0.2, -2.5), (0.6, 1.0), waves)
         sheets = [joined(left, right)] if parts == 1 else [joined(left), joined(right)]
@@ -122,7 +117,7 @@ class TestFewerFaces:
         assert (np.abs(rgb.astype(int) - before) > 2).mean() < 0.02  # along the seam at most
         np.testing.assert_allclose(depth_m, 3.0, atol=0.25)
 
-    def test_what_remains_is_a_subset_with_its_own_coordinates(self) -> None:
+    def test_what_remains_is_a_subset_with_its_own_coordinates(self):
         part = textured(joined(sheet((2, -2), (0, 1), waves)), bands())
         offset = np.array([5e5, 4e6, 100.123456789])  # a scan in map coordinates
         part = MeshPart(part.name, part.vertices_m + offset, part.faces, part.uv, part.texture)
@@ -140,7 +135,7 @@ class TestFewerFaces:
             else:
                 np.testing.assert_array_equal(out.vertex_rgb, rgb[index])
 
-    def test_a_part_of_which_nothing_is_left_is_left_out(self) -> None:
+    def test_a_part_of_which_nothing_is_left_is_left_out(self):
         wall = joined(sheet((2, -2), (0, 1)))
         speck = TexturedMesh((wall, MeshPart("speck", 1e-7 * wall.vertices_m, wall.faces)))
         reduced = with_fewer_faces(speck, 20)

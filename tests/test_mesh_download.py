@@ -1,19 +1,15 @@
 """A scene as its author published it: what is found in it, and the same scene in other formats."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from synfeal.config.models import CameraConfig
 from synfeal.geometry.poses import pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.load import load_mesh
-from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.render import open_renderer
 from tests.mesh_conversions import without_alpha, write_coloured_ply, write_obj_scene
@@ -30,12 +26,12 @@ LIMIT = 2.5
 
 
 @pytest.fixture(scope="module")
-def greenhouse() -> TexturedMesh:
+def greenhouse():
     folder = Path(os.environ["SYNFEAL_TEST_MESHES"]) / "botanists-greenhouse"
     return load_mesh(folder / "scene.gltf")
 
 
-def views(mesh: TexturedMesh) -> list[NDArray[np.float64]]:
+def views(mesh):
     with open_renderer(mesh, CameraConfig(width=320, height=240)) as renderer:
         poses = [
             pose_matrix(rotation_from_rpy([0.0, 0.1, yaw]), [x, y, 1.5]) for yaw, x, y in VIEWS
@@ -43,13 +39,13 @@ def views(mesh: TexturedMesh) -> list[NDArray[np.float64]]:
         return [renderer.render(pose).astype(np.float64) for pose in poses]
 
 
-def assert_looks_like(mesh: TexturedMesh, reference: TexturedMesh) -> None:
+def assert_looks_like(mesh, reference):
     for image, expected in zip(views(mesh), views(reference), strict=True):
         assert expected.std() > 10.0  # something is to be seen
         assert np.abs(image - expected).mean() < LIMIT
 
 
-def test_it_stands_upright(greenhouse: TexturedMesh) -> None:
+def test_it_stands_upright(greenhouse):
     assert greenhouse.n_faces > 7000
     room = next(part for part in greenhouse.parts if "Room" in part.name)
     leaves = next(part for part in greenhouse.parts if "Plants" in part.name)
@@ -57,7 +53,7 @@ def test_it_stands_upright(greenhouse: TexturedMesh) -> None:
     assert room.vertices_m[:, 2].max() == greenhouse.bounds_m[1, 2]  # the roof is on top
 
 
-def test_every_problem_is_named(greenhouse: TexturedMesh) -> None:
+def test_every_problem_is_named(greenhouse):
     findings = "\n".join(greenhouse.findings)
     for words in (
         "'textures/M_Glass_01_baseColor.png' of material 'M_Glass_01' is missing",
@@ -73,20 +69,18 @@ def test_every_problem_is_named(greenhouse: TexturedMesh) -> None:
     assert len(greenhouse.findings) == 8
 
 
-def test_saved_and_read_again_it_looks_the_same(greenhouse: TexturedMesh, tmp_path: Path) -> None:
+def test_saved_and_read_again_it_looks_the_same(greenhouse, tmp_path):
     save_glb(tmp_path / "mesh.glb", greenhouse)
     assert_looks_like(load_mesh(tmp_path / "mesh.glb"), greenhouse)
 
 
-def test_converted_to_obj_it_looks_the_same(greenhouse: TexturedMesh, tmp_path: Path) -> None:
+def test_converted_to_obj_it_looks_the_same(greenhouse, tmp_path):
     converted = load_mesh(write_obj_scene(tmp_path, greenhouse))
     assert converted.n_faces == greenhouse.n_faces
     assert_looks_like(converted, greenhouse)
 
 
-def test_converted_to_vertex_colours_it_looks_the_same(
-    greenhouse: TexturedMesh, tmp_path: Path
-) -> None:
+def test_converted_to_vertex_colours_it_looks_the_same(greenhouse, tmp_path):
     opaque = without_alpha(greenhouse)
     converted = load_mesh(write_coloured_ply(tmp_path / "scene.ply", opaque, spacing_m=0.04))
     assert all(part.texture is None for part in converted.parts)

@@ -18,7 +18,6 @@ from tests.mesh_samples import (
     FACE,
     TRIANGLE,
     UV,
-    Json,
     add_attribute,
     store_glb,
     store_gltf,
@@ -30,24 +29,24 @@ from tests.mesh_samples import (
 
 
 @pytest.fixture
-def paint(tmp_path: Path) -> list[str]:
+def paint(tmp_path):
     Image.new("RGB", (2, 2), (1, 2, 3)).save(tmp_path / "paint.png")
     return ["paint.png"]
 
 
-def z_up(points: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+def z_up(points):
     """Coordinates of a y-up file in the world."""
     return np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1)
 
 
-def test_gltf_node_transform_axes_and_units(tmp_path: Path, paint: list[str]) -> None:
+def test_gltf_node_transform_axes_and_units(tmp_path, paint):
     path = write_gltf(tmp_path, textured(), paint)
     in_file = 2.0 * TRIANGLE + [10.0, 20.0, 30.0]  # scale, then translation
     np.testing.assert_allclose(load_mesh(path).parts[0].vertices_m, z_up(in_file))
     np.testing.assert_allclose(load_mesh(path, "z", 0.01).parts[0].vertices_m, 0.01 * in_file)
 
 
-def test_gltf_and_glb_of_one_scene_are_the_same(tmp_path: Path, paint: list[str]) -> None:
+def test_gltf_and_glb_of_one_scene_are_the_same(tmp_path, paint):
     header, binary = triangle_gltf(textured(), paint)
     plain = load_mesh(store_gltf(tmp_path, header, binary)).parts[0]
     packed = load_mesh(store_glb(tmp_path, header, binary)).parts[0]
@@ -56,7 +55,7 @@ def test_gltf_and_glb_of_one_scene_are_the_same(tmp_path: Path, paint: list[str]
     np.testing.assert_array_equal(packed.texture, plain.texture)
 
 
-def test_nested_nodes_and_instances(tmp_path: Path, paint: list[str]) -> None:
+def test_nested_nodes_and_instances(tmp_path, paint):
     header, binary = triangle_gltf(textured(), paint)
     quarter_turn = [0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)]  # about y: x becomes -z
     header["nodes"] = [
@@ -71,7 +70,7 @@ def test_nested_nodes_and_instances(tmp_path: Path, paint: list[str]) -> None:
     assert parts[0].texture is parts[1].texture  # decoded once
 
 
-def test_without_a_scene_all_nodes_are_meant(tmp_path: Path, paint: list[str]) -> None:
+def test_without_a_scene_all_nodes_are_meant(tmp_path, paint):
     header, binary = triangle_gltf(textured(), paint)
     expected = load_mesh(store_gltf(tmp_path, header, binary)).parts[0].vertices_m
     header["nodes"].append({"children": [0]})
@@ -80,7 +79,7 @@ def test_without_a_scene_all_nodes_are_meant(tmp_path: Path, paint: list[str]) -
     np.testing.assert_array_equal(part.vertices_m, expected)
 
 
-def test_parts_keep_the_order_of_the_file(tmp_path: Path, paint: list[str]) -> None:
+def test_parts_keep_the_order_of_the_file(tmp_path, paint):
     header, binary = triangle_gltf(textured(), paint)
     primitive = header["meshes"][0]["primitives"][0]
     header["meshes"] = [
@@ -94,7 +93,7 @@ def test_parts_keep_the_order_of_the_file(tmp_path: Path, paint: list[str]) -> N
 
 
 @pytest.mark.parametrize("scale", [[-1.0, 1.0, 1.0], [1.0, 1.0, 1.0], [-2.0, -1.0, -3.0]])
-def test_mirrored_nodes_keep_the_outside_outside(tmp_path: Path, scale: list[float]) -> None:
+def test_mirrored_nodes_keep_the_outside_outside(tmp_path, scale):
     box = trimesh.creation.box((1.0, 2.0, 3.0))
     box.visual.vertex_colors = np.arange(32).reshape(8, 4).astype(np.uint8)
     scene = trimesh.Scene()
@@ -117,10 +116,7 @@ def test_mirrored_nodes_keep_the_outside_outside(tmp_path: Path, scale: list[flo
 )
 @pytest.mark.parametrize("has_material", [True, False])
 def test_gltf_vertex_colours_are_linear(
-    tmp_path: Path,
-    values: np.ndarray,  # type: ignore[type-arg]
-    expected: list[int],
-    has_material: bool,
+    tmp_path: Path, values: np.ndarray, expected: list[int], has_material: bool
 ) -> None:
     # IEC 61966-2-1: linear 0.214 is display 0.5.
     header, binary = triangle_gltf({}, [])
@@ -132,7 +128,7 @@ def test_gltf_vertex_colours_are_linear(
     np.testing.assert_allclose(part.vertex_rgb, [expected] * 3, atol=1)
 
 
-def test_obj_with_material_and_texture(tmp_path: Path) -> None:
+def test_obj_with_material_and_texture(tmp_path):
     pixels = np.arange(2 * 2 * 3, dtype=np.uint8).reshape(2, 2, 3)
     Image.fromarray(pixels).save(tmp_path / "wall.png")
     part = load_mesh(write_obj(tmp_path)).parts[0]
@@ -142,7 +138,7 @@ def test_obj_with_material_and_texture(tmp_path: Path) -> None:
     np.testing.assert_array_equal(part.texture, pixels)
 
 
-def test_obj_with_several_materials(tmp_path: Path) -> None:
+def test_obj_with_several_materials(tmp_path):
     (tmp_path / "two.mtl").write_text("newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n")
     (tmp_path / "two.obj").write_text(
         "mtllib two.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n"
@@ -154,7 +150,7 @@ def test_obj_with_several_materials(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "binary"])
-def test_ply_with_vertex_colours(tmp_path: Path, encoding: str) -> None:
+def test_ply_with_vertex_colours(tmp_path, encoding):
     colors = np.array([[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255]], np.uint8)
     mesh = trimesh.Trimesh(TRIANGLE, FACE, vertex_colors=colors)
     (tmp_path / "scan.ply").write_bytes(mesh.export(file_type="ply", encoding=encoding))
@@ -182,7 +178,7 @@ end_header
 """
 
 
-def test_ply_with_texture(tmp_path: Path, paint: list[str]) -> None:
+def test_ply_with_texture(tmp_path, paint):
     (tmp_path / "scan.ply").write_text(PLY_WITH_TEXTURE)
     mesh = load_mesh(tmp_path / "scan.ply")
     part = mesh.parts[0]
@@ -193,7 +189,7 @@ def test_ply_with_texture(tmp_path: Path, paint: list[str]) -> None:
     assert part.texture[0, 0].tolist() == [1, 2, 3]
 
 
-def test_ply_with_face_colours(tmp_path: Path) -> None:
+def test_ply_with_face_colours(tmp_path):
     box = trimesh.creation.box()
     box.visual.face_colors = np.arange(48).reshape(12, 4).astype(np.uint8)
     box.export(tmp_path / "box.ply")
@@ -203,7 +199,7 @@ def test_ply_with_face_colours(tmp_path: Path) -> None:
         assert (part.vertex_rgb[face] == colour[:3]).all()
 
 
-def test_material_from_another_writer(tmp_path: Path) -> None:
+def test_material_from_another_writer(tmp_path):
     material = PBRMaterial(baseColorTexture=Image.new("P", (4, 4), 3), name="palette")
     visual = TextureVisuals(uv=UV, material=material)
     trimesh.Trimesh(TRIANGLE, FACE, visual=visual, process=False).export(tmp_path / "mesh.glb")
@@ -236,9 +232,7 @@ HEADER_ONLY = b'{"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"attri
         ("plain.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "neither a texture nor"),
     ],
 )
-def test_unusable_files_are_one_line(
-    tmp_path: Path, name: str, content: bytes | None, message: str
-) -> None:
+def test_unusable_files_are_one_line(tmp_path, name, content, message):
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)
@@ -248,27 +242,27 @@ def test_unusable_files_are_one_line(
     assert "\n" not in str(caught.value)
 
 
-def short_buffer(header: Json) -> None:
+def short_buffer(header):
     header["bufferViews"][0]["byteLength"] = 360
     header["accessors"][0]["count"] = 30
 
 
-def absent_buffer(header: Json) -> None:
+def absent_buffer(header):
     header["buffers"][0]["uri"] = "nowhere.bin"
 
 
-def wild_index(header: Json) -> None:
+def wild_index(header):
     header["accessors"][1] = {**header["accessors"][0], "componentType": 5125, "type": "SCALAR"}
     header["meshes"][0]["primitives"][0]["indices"] = 1
 
 
-def endless_scene(header: Json) -> None:
+def endless_scene(header):
     header["scenes"][0]["nodes"] = [7]
 
 
 @pytest.mark.parametrize("damage", [short_buffer, absent_buffer, wild_index, endless_scene])
-def test_contradictory_gltf_is_one_line(tmp_path: Path, damage: object) -> None:
+def test_contradictory_gltf_is_one_line(tmp_path, damage):
     header, binary = triangle_gltf({}, [])
-    damage(header)  # type: ignore[operator]
+    damage(header)
     with pytest.raises(InputError, match=r"scene\.gltf"):
         load_mesh(store_gltf(tmp_path, header, binary))

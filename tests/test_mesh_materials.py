@@ -1,11 +1,7 @@
 """Materials and textures: every kind of image, alpha, and what is named when colour is lost."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,9 +25,7 @@ from tests.mesh_samples import (
 )
 
 
-def test_gltf_names_a_missing_base_colour_texture_and_what_depends_on_it(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_gltf_names_a_missing_base_colour_texture_and_what_depends_on_it(tmp_path, caplog):
     material = textured({"normalTexture": {"index": 1}, "alphaMode": "BLEND"})
     header, binary = triangle_gltf(material, ["wall.png", "bumps.png"])
     binary = add_attribute(header, binary, "COLOR_0", np.array([[1, 2, 3, 4]] * 3, np.uint8))
@@ -45,7 +39,7 @@ def test_gltf_names_a_missing_base_colour_texture_and_what_depends_on_it(
     assert "bumps.png" not in caplog.text
 
 
-def test_broken_texture_is_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_broken_texture_is_a_warning(tmp_path, caplog):
     Image.effect_noise((64, 64), 50).save(tmp_path / "paint.png")
     whole = (tmp_path / "paint.png").read_bytes()
     (tmp_path / "paint.png").write_bytes(whole[: len(whole) // 2])
@@ -63,7 +57,7 @@ def test_broken_texture_is_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFi
         "C:\\art\\textures\\wall 1.png",
     ],
 )
-def test_textures_are_found_as_exporters_write_them(tmp_path: Path, name: str) -> None:
+def test_textures_are_found_as_exporters_write_them(tmp_path, name):
     (tmp_path / "textures").mkdir()
     Image.new("RGB", (2, 2), (1, 2, 3)).save(tmp_path / "textures/wall 1.png")
     Image.new("RGB", (2, 2), (1, 2, 3)).save(tmp_path / "wall 1.png")
@@ -83,9 +77,7 @@ def test_textures_are_found_as_exporters_write_them(tmp_path: Path, name: str) -
         ({}, None, None),
     ],
 )
-def test_alpha_mode_becomes_a_cutoff(
-    tmp_path: Path, mode: dict[str, object], cutoff: float | None, finding: str | None
-) -> None:
+def test_alpha_mode_becomes_a_cutoff(tmp_path, mode, cutoff, finding):
     Image.new("RGBA", (2, 2), (1, 2, 3, 200)).save(tmp_path / "paint.png")
     mesh = load_mesh(write_gltf(tmp_path, textured(mode), ["paint.png"]))
     assert mesh.parts[0].alpha_cutoff == cutoff
@@ -95,14 +87,14 @@ def test_alpha_mode_becomes_a_cutoff(
     assert finding is None or finding in mesh.findings[0]
 
 
-def test_a_blended_texture_without_holes_is_opaque(tmp_path: Path) -> None:
+def test_a_blended_texture_without_holes_is_opaque(tmp_path):
     Image.new("RGBA", (2, 2), (1, 2, 3, 255)).save(tmp_path / "paint.png")
     mesh = load_mesh(write_gltf(tmp_path, textured({"alphaMode": "BLEND"}), ["paint.png"]))
     assert mesh.parts[0].alpha_cutoff is None
     assert mesh.findings == ()
 
 
-def test_what_is_never_visible_is_dropped(tmp_path: Path) -> None:
+def test_what_is_never_visible_is_dropped(tmp_path):
     Image.new("LA", (2, 2), (255, 255)).save(tmp_path / "paint.png")
     material = textured({"alphaMode": "BLEND"})
     material["pbrMetallicRoughness"]["baseColorFactor"] = [1, 1, 1, 0.03]
@@ -114,9 +106,7 @@ def test_what_is_never_visible_is_dropped(tmp_path: Path) -> None:
     ("mtl", "channels", "cutoff"),
     [("map_Kd wall.png\nmap_d wall.png\n", 4, 0.5), ("map_Kd wall.png\n", 3, None)],
 )
-def test_obj_alpha_counts_where_the_mtl_says_so(
-    tmp_path: Path, mtl: str, channels: int, cutoff: float | None
-) -> None:
+def test_obj_alpha_counts_where_the_mtl_says_so(tmp_path, mtl, channels, cutoff):
     Image.new("RGBA", (2, 2), (1, 2, 3, 200)).save(tmp_path / "wall.png")
     part = load_mesh(write_obj(tmp_path, mtl)).parts[0]
     assert part.texture is not None
@@ -125,13 +115,13 @@ def test_obj_alpha_counts_where_the_mtl_says_so(
 
 
 @pytest.mark.parametrize("opacity", ["d 0.03", "Tr 0.97"])
-def test_obj_glass_is_not_drawn(tmp_path: Path, opacity: str) -> None:
+def test_obj_glass_is_not_drawn(tmp_path, opacity):
     Image.new("RGB", (2, 2)).save(tmp_path / "wall.png")
     with pytest.raises(InputError, match="no faces"):
         load_mesh(write_obj(tmp_path, f"map_Kd wall.png\n{opacity}\n"))
 
 
-def test_specular_glossiness_shows_its_diffuse_colour(tmp_path: Path) -> None:
+def test_specular_glossiness_shows_its_diffuse_colour(tmp_path):
     Image.new("RGB", (2, 2), (9, 8, 7)).save(tmp_path / "paint.png")
     Image.new("RGB", (2, 2), (1, 1, 1)).save(tmp_path / "fallback.png")
     material = textured()
@@ -144,7 +134,7 @@ def test_specular_glossiness_shows_its_diffuse_colour(tmp_path: Path) -> None:
     assert part.base_color.tolist() == [255, 127, 255, 255]
 
 
-def test_texture_transform_scales_turns_and_moves(tmp_path: Path) -> None:
+def test_texture_transform_scales_turns_and_moves(tmp_path):
     Image.new("RGB", (2, 2)).save(tmp_path / "paint.png")
     transform = {"offset": [0.5, 0.25], "scale": [2.0, 1.0], "rotation": np.pi / 2}
     material = textured(extensions={"KHR_texture_transform": transform})
@@ -155,7 +145,7 @@ def test_texture_transform_scales_turns_and_moves(tmp_path: Path) -> None:
     np.testing.assert_allclose(part.uv, np.stack([v + 0.5, 1.0 - (-u + 0.25)], axis=1), atol=1e-12)
 
 
-def test_the_second_set_of_texture_coordinates_is_used_where_asked_for(tmp_path: Path) -> None:
+def test_the_second_set_of_texture_coordinates_is_used_where_asked_for(tmp_path):
     Image.new("RGB", (2, 2)).save(tmp_path / "paint.png")
     header, binary = triangle_gltf(textured(texCoord=1), ["paint.png"])
     second = np.array([[0.5, 0.5], [0.25, 0.5], [1.0, 0.0]], "<f4")
@@ -164,7 +154,7 @@ def test_the_second_set_of_texture_coordinates_is_used_where_asked_for(tmp_path:
     np.testing.assert_allclose(part.uv, second * [1, -1] + [0, 1])
 
 
-def test_a_texture_without_coordinates_is_named(tmp_path: Path) -> None:
+def test_a_texture_without_coordinates_is_named(tmp_path):
     Image.new("RGB", (2, 2)).save(tmp_path / "paint.png")
     material = textured()
     header, binary = triangle_gltf(material, ["paint.png"])
@@ -176,7 +166,7 @@ def test_a_texture_without_coordinates_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_texture_coordinates_that_are_no_numbers_become_0(tmp_path: Path, bad: float) -> None:
+def test_texture_coordinates_that_are_no_numbers_become_0(tmp_path, bad):
     Image.new("RGB", (2, 2)).save(tmp_path / "paint.png")
     header, binary = triangle_gltf(textured(), ["paint.png"])
     uv = UV.astype("<f4")
@@ -203,14 +193,14 @@ def test_texture_coordinates_that_are_no_numbers_become_0(tmp_path: Path, bad: f
     ],
     ids=lambda value: getattr(value, "mode", ""),
 )
-def test_every_image_mode_becomes_8_bit_rgb(image: Image.Image, expected: list[int]) -> None:
+def test_every_image_mode_becomes_8_bit_rgb(image, expected):
     pixels = to_rgb(image)
     assert pixels.dtype == np.uint8
     assert pixels.shape == (2, 3, len(expected))
     assert (pixels == expected).all()
 
 
-def test_webp(tmp_path: Path) -> None:
+def test_webp(tmp_path):
     Image.new("RGB", (2, 2), (10, 200, 30)).save(tmp_path / "paint.webp", lossless=True)
     header, binary = triangle_gltf(textured(), ["paint.webp"])
     header["textures"] = [{"extensions": {"EXT_texture_webp": {"source": 0}}}]
@@ -220,9 +210,7 @@ def test_webp(tmp_path: Path) -> None:
     assert part.texture[0, 0].tolist() == [10, 200, 30]
 
 
-def test_a_texture_wider_than_renderers_take_is_made_smaller(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_texture_wider_than_renderers_take_is_made_smaller(tmp_path, caplog):
     halves = np.zeros((4, 2 * MAX_SIDE_PX, 3), np.uint8)
     halves[:, MAX_SIDE_PX:] = 200
     Image.fromarray(halves).save(tmp_path / "paint.png")
@@ -235,9 +223,7 @@ def test_a_texture_wider_than_renderers_take_is_made_smaller(
     assert mesh.findings[0] in caplog.text
 
 
-def test_a_large_texture_is_no_decompression_bomb(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_large_texture_is_no_decompression_bomb(tmp_path, monkeypatch):
     Image.new("RGB", (64, 64)).save(tmp_path / "paint.png")
     path = write_gltf(tmp_path, textured(), ["paint.png"])
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)  # Pillow refuses twice as many
@@ -248,7 +234,7 @@ def test_a_large_texture_is_no_decompression_bomb(
         load_mesh(path)
 
 
-def test_srgb_curve_at_published_points() -> None:
+def test_srgb_curve_at_published_points():
     # IEC 61966-2-1: linear 0.214 is display 0.5; alpha has no curve.
     assert srgb_from_linear([0, 0.2140, 1, 0.5]).tolist() == [0, 127, 255, 128]
     np.testing.assert_allclose(linear_from_srgb([0, 128, 255, 51]), [0, 0.2159, 1, 0.2], atol=1e-4)
@@ -256,7 +242,7 @@ def test_srgb_curve_at_published_points() -> None:
     np.testing.assert_array_equal(srgb_from_linear(linear_from_srgb(every)), every)
 
 
-def test_parts_of_plain_colours_are_a_scene(tmp_path: Path) -> None:
+def test_parts_of_plain_colours_are_a_scene(tmp_path):
     header, binary = triangle_gltf({}, [])
     header["materials"] = [
         {"pbrMetallicRoughness": {"baseColorFactor": [0.008, 0.0, 0.0, 1.0]}},
@@ -273,13 +259,7 @@ def test_parts_of_plain_colours_are_a_scene(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("content", [b"no image at all", b"\x89PNG\r\n\x1a\n" + bytes(30)])
 @pytest.mark.parametrize(("write", "name"), [(write_gltf, "paint.png"), (write_obj, "wall.png")])
-def test_a_texture_that_is_no_image_is_named(
-    write: Callable[..., Path],
-    name: str,
-    content: bytes,
-    tmp_path: Path,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_a_texture_that_is_no_image_is_named(write, name, content, tmp_path, caplog):
     (tmp_path / name).write_bytes(content)
     path = write(tmp_path, textured(), [name]) if write is write_gltf else write(tmp_path)
     with contextlib.suppress(InputError):  # of a file whose only colour this was

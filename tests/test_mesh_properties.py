@@ -1,7 +1,5 @@
 """The numbers of Table 1."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh
@@ -10,12 +8,12 @@ from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.properties import mesh_properties
 
 
-def box_part(offset_m: float = 0.0) -> MeshPart:
+def box_part(offset_m=0.0):
     box = trimesh.creation.box((2.0, 3.0, 4.0))
     return MeshPart("box", np.asarray(box.vertices) + offset_m, np.asarray(box.faces))
 
 
-def test_a_box_in_closed_form() -> None:
+def test_a_box_in_closed_form():
     properties = mesh_properties(TexturedMesh((box_part(),)))
     assert (properties["vertices"], properties["faces"], properties["parts"]) == (8, 12, 1)
     assert properties["volume_m3"] == pytest.approx(24.0)
@@ -24,12 +22,12 @@ def test_a_box_in_closed_form() -> None:
     assert properties["texture_pixels"] == 0
 
 
-def test_volume_is_that_of_the_bounding_box() -> None:
+def test_volume_is_that_of_the_bounding_box():
     two = TexturedMesh((box_part(), box_part(10.0)))
     assert mesh_properties(two)["volume_m3"] == pytest.approx(12.0 * 13.0 * 14.0)
 
 
-def test_seam_copies_count_once_as_in_the_file_of_a_scan() -> None:
+def test_seam_copies_count_once_as_in_the_file_of_a_scan():
     part = box_part()
     rng = np.random.default_rng(0)
     corners = part.vertices_m[part.faces.ravel()] + rng.uniform(-1e-7, 1e-7, (36, 3))

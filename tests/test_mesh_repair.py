@@ -1,7 +1,5 @@
 """What is removed from a mesh, what is kept, and that both are said."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +15,12 @@ from synfeal.mesh.repair import repaired
 from tests.mesh_samples import FACE, TRIANGLE, UV
 
 
-def repair(part: MeshPart) -> tuple[MeshPart, tuple[str, ...]]:
+def repair(part):
     findings = Findings(Path("mesh.glb"))
     return repaired(part, findings), findings.sentences
 
 
-def test_a_sound_part_is_left_alone() -> None:
+def test_a_sound_part_is_left_alone():
     part = MeshPart("wall", TRIANGLE, FACE, UV, np.zeros((2, 2, 3), np.uint8))
     same, findings = repair(part)
     np.testing.assert_array_equal(same.vertices_m, part.vertices_m)
@@ -32,7 +30,7 @@ def test_a_sound_part_is_left_alone() -> None:
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("offset", [0.0, 1e6])
-def test_points_and_lines_are_removed_but_slivers_stay(scale: float, offset: float) -> None:
+def test_points_and_lines_are_removed_but_slivers_stay(scale, offset):
     sliver = 1e-8 if offset == 0.0 else 1e-5
     vertices = np.array(
         [
@@ -52,7 +50,7 @@ def test_points_and_lines_are_removed_but_slivers_stay(scale: float, offset: flo
     np.testing.assert_array_equal(part.faces, [[0, 1, 2], [0, 1, 3]])
 
 
-def test_duplicates_are_removed_and_faces_with_another_texture_kept() -> None:
+def test_duplicates_are_removed_and_faces_with_another_texture_kept():
     vertices = np.vstack([TRIANGLE, TRIANGLE, TRIANGLE + 9])
     faces = np.array([[0, 1, 2], [1, 2, 0], [2, 1, 0], [3, 4, 5], [6, 7, 8]])
     part, findings = repair(MeshPart("wall", vertices, faces))
@@ -63,7 +61,7 @@ def test_duplicates_are_removed_and_faces_with_another_texture_kept() -> None:
     )
 
 
-def test_unused_vertices_take_their_colours_and_coordinates_along() -> None:
+def test_unused_vertices_take_their_colours_and_coordinates_along():
     vertices = np.vstack([[[99.0, 99, 99]], TRIANGLE, [[np.nan] * 3]])
     rgb = np.arange(15, dtype=np.uint8).reshape(5, 3)
     uv = np.arange(10.0).reshape(5, 2)
@@ -75,7 +73,7 @@ def test_unused_vertices_take_their_colours_and_coordinates_along() -> None:
     assert findings == ("part 'wall': 2 unused vertices removed",)
 
 
-def test_what_is_removed_was_never_hit() -> None:
+def test_what_is_removed_was_never_hit():
     rng = np.random.default_rng(0)
     sphere = trimesh.creation.icosphere(subdivisions=2)
     lines = np.stack([sphere.faces[:, 0], sphere.faces[:, 1], sphere.faces[:, 1]], axis=1)
@@ -88,7 +86,7 @@ def test_what_is_removed_was_never_hit() -> None:
     np.testing.assert_allclose(after, before, rtol=1e-6)
 
 
-def test_open_and_non_manifold_surfaces_are_kept(tmp_path: Path) -> None:
+def test_open_and_non_manifold_surfaces_are_kept(tmp_path):
     # Three walls that meet in one edge: non-manifold there, open everywhere else.
     colours = np.array([[255, 0, 0, 255]] * 4 + [[0, 255, 0, 255]], np.uint8)
     vertices = np.array([[0.0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, -1, 0]])
@@ -101,7 +99,7 @@ def test_open_and_non_manifold_surfaces_are_kept(tmp_path: Path) -> None:
     assert mesh.findings == ()
 
 
-def test_a_file_without_any_area_has_no_faces(tmp_path: Path) -> None:
+def test_a_file_without_any_area_has_no_faces(tmp_path):
     colours = np.array([[255, 0, 0, 255]] * 3, np.uint8)
     line = np.array([[0.0, 0, 0], [1, 1, 1], [2, 2, 2]])
     trimesh.Trimesh(line, FACE, vertex_colors=colours, process=False).export(tmp_path / "l.ply")

@@ -1,7 +1,5 @@
 """Saving: what is stored is what is read back, wherever and however large the mesh is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,14 +14,14 @@ from synfeal.mesh.save import save_glb
 from tests.mesh_samples import FACE, TRIANGLE, UV, box_mesh
 
 
-def there_and_back(mesh: TexturedMesh) -> TexturedMesh:
+def there_and_back(mesh):
     with TemporaryDirectory() as folder:
         path = Path(folder) / "mesh.glb"
         save_glb(path, mesh)
         return load_mesh(path)
 
 
-def test_round_trip_keeps_geometry_texture_and_order() -> None:
+def test_round_trip_keeps_geometry_texture_and_order():
     rng = np.random.default_rng(1)
     texture = rng.integers(0, 256, (5, 7, 3), np.uint8)
     parts = (
@@ -53,7 +51,7 @@ def test_round_trip_keeps_geometry_texture_and_order() -> None:
     assert loaded.parts[0].texture is loaded.parts[4].texture  # one image, decoded once
 
 
-def test_every_colour_survives() -> None:
+def test_every_colour_survives():
     grey = np.repeat(np.arange(256, dtype=np.uint8)[:, None], 3, axis=1)
     vertices = np.random.default_rng(0).normal(size=(256, 3))
     faces = np.arange(255).reshape(-1, 3)
@@ -69,7 +67,7 @@ def test_every_colour_survives() -> None:
     assert [part.base_color[1] for part in back] == list(range(256))
 
 
-def test_other_programs_read_linear_colours(tmp_path: Path) -> None:
+def test_other_programs_read_linear_colours(tmp_path):
     save_glb(tmp_path / "mesh.glb", box_mesh())  # display colour 99
     raw = trimesh.load_scene(tmp_path / "mesh.glb", process=False)
     (geometry,) = raw.geometry.values()
@@ -78,7 +76,7 @@ def test_other_programs_read_linear_colours(tmp_path: Path) -> None:
     assert stored[0].tolist() == [32, 32, 32, 255]
 
 
-def test_glb_is_stored_y_up_as_the_format_demands(tmp_path: Path) -> None:
+def test_glb_is_stored_y_up_as_the_format_demands(tmp_path):
     save_glb(tmp_path / "mesh.glb", box_mesh((1.0, 2.0, 9.0)))
     raw = trimesh.load_scene(tmp_path / "mesh.glb")
     np.testing.assert_allclose(raw.extents, [1.0, 9.0, 2.0])
@@ -92,9 +90,7 @@ SIDES = st.tuples(*[st.floats(0.1, 8.0)] * 3)
 
 @settings(max_examples=40, deadline=None, derandomize=True, database=None)
 @given(SIDES, OFFSETS, SCALES)
-def test_coordinates_are_exact_to_the_size_of_the_mesh(
-    sides: tuple[float, ...], offset: tuple[float, ...], scale: float
-) -> None:
+def test_coordinates_are_exact_to_the_size_of_the_mesh(sides, offset, scale):
     box = trimesh.creation.box(sides)
     rgb = np.arange(24, dtype=np.uint8).reshape(8, 3)
     vertices = np.asarray(box.vertices) * scale + np.array(offset)
@@ -105,14 +101,14 @@ def test_coordinates_are_exact_to_the_size_of_the_mesh(
     np.testing.assert_allclose(back.vertices_m, vertices, rtol=0, atol=limit)
 
 
-def test_parts_that_touch_still_touch_far_from_the_origin() -> None:
+def test_parts_that_touch_still_touch_far_from_the_origin():
     left = MeshPart("l", TRIANGLE / 3 + 1e6, FACE, vertex_rgb=np.eye(3, dtype=np.uint8))
     right = MeshPart("r", -TRIANGLE / 7 + 1e6, FACE, vertex_rgb=np.eye(3, dtype=np.uint8))
     first, second = there_and_back(TexturedMesh((left, right))).parts
     np.testing.assert_array_equal(first.vertices_m[0], second.vertices_m[0])
 
 
-def test_another_centre_after_a_repair_changes_no_coordinate() -> None:
+def test_another_centre_after_a_repair_changes_no_coordinate():
     # float32 makes a line of the sliver; without it the mesh has another centre, from which what
     # lay at the old one is stored less finely.
     sliver = [[0.0, 0.3, 0.0], [50.0, 0.3, 0.0], [50.0, 0.3 + 1e-9, 0.0]]

@@ -1,7 +1,5 @@
 """Muon against torch's own, against singular values, and kernel against matrix."""
 
-from __future__ import annotations
-
 import pytest
 import torch
 

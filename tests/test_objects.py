@@ -1,9 +1,5 @@
 """Objects that stand about: whether they touch anything, by linear programming and by points."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 import yaml
@@ -15,12 +11,12 @@ from synfeal.scenes.objects import meets_box
 from tests.collected import collect, save_room
 
 
-def turn(yaw_rad: float) -> np.ndarray:
+def turn(yaw_rad):
     cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
     return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
 
 
-def test_a_triangle_meets_a_box_where_a_point_is_in_both() -> None:
+def test_a_triangle_meets_a_box_where_a_point_is_in_both():
     rng = np.random.default_rng(0)
     centre, half, yaw = np.array([0.3, -0.2, 1.0]), np.array([0.5, 0.2, 0.4]), 0.7
     corners = centre + rng.normal(0, 0.9, (250, 3, 3))
@@ -39,7 +35,7 @@ def test_a_triangle_meets_a_box_where_a_point_is_in_both() -> None:
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-def test_objects_touch_neither_each_other_nor_the_room_nor_a_path(tmp_path: Path) -> None:
+def test_objects_touch_neither_each_other_nor_the_room_nor_a_path(tmp_path):
     mesh, layout = save_room(tmp_path / "room.glb"), tmp_path / "clutter.yaml"
     layout.write_text(yaml.safe_dump({"count": 12, "size_m": [0.3, 0.9]}))
     assert collect(mesh, tmp_path / "set", "--clutter", str(layout)) == 0
@@ -64,9 +60,7 @@ def test_objects_touch_neither_each_other_nor_the_room_nor_a_path(tmp_path: Path
     assert not any(within(along, *box).any() for box in boxes)
 
 
-def within(
-    points: np.ndarray, centre: np.ndarray, half: np.ndarray, rotation: np.ndarray
-) -> np.ndarray:
+def within(points, centre, half, rotation):
     return (np.abs((points - centre) @ rotation) < half - 1e-3).all(axis=1)
 
 
@@ -79,9 +73,7 @@ def within(
         ({"size_m": [2, 1]}, "--clutter: size_m"),
     ],
 )
-def test_a_layout_that_cannot_be_is_one_line(
-    layout: dict[str, object], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_layout_that_cannot_be_is_one_line(layout, message, tmp_path, capsys):
     mesh, file = save_room(tmp_path / "room.glb"), tmp_path / "clutter.yaml"
     file.write_text(yaml.safe_dump(layout))
     assert collect(mesh, tmp_path / "set", "--clutter", str(file)) == 1

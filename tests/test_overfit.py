@@ -1,30 +1,24 @@
 """Every localizer can learn a batch by heart, as it is used: in evaluation mode."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
 import torch
 from PIL import Image
 from scipy.spatial.transform import Rotation
-from torch import Tensor
 
-from baselines.localizers.base import Localizer
 from baselines.localizers.registry import build_localizer
 from baselines.training.checkpoint import TrainedLocalizer
 from baselines.training.data import image_statistics
 from baselines.training.description import ModelDescription
 from baselines.training.predict import predict
-from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig
+from synfeal.config.models import LocalizerConfig, NetworkConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.evaluation.metrics import pose_errors
 
 BATCH, PX = 8, 32
 STEPS, FROZEN_STEPS = 60, 120
 LEARNING_RATE = 3e-3
-VARIANTS: list[tuple[ModelName, dict[str, Any], dict[str, Any]]] = [
+VARIANTS = [
     ("posenet", {}, {}),
     ("poselstm", {}, {}),
     ("hourglass", {}, {"skip": "sum"}),
@@ -35,7 +29,7 @@ VARIANTS: list[tuple[ModelName, dict[str, Any], dict[str, Any]]] = [
 ]
 
 
-def views(px: int) -> Tensor:
+def views(px):
     """Pictures (BATCH, 3, px, px) uint8 of soft patches with fine detail, unlike one another."""
     rng = np.random.default_rng(0)
     patches = rng.integers(0, 256, (BATCH, 6, 6, 3), np.uint8)
@@ -45,7 +39,7 @@ def views(px: int) -> Tensor:
     return torch.from_numpy(pixels.astype(np.uint8)).permute(0, 3, 1, 2)
 
 
-def poses() -> PoseTable:
+def poses():
     """Anywhere in a room of 4 x 4 x 4 m, turned in any way."""
     rng = np.random.default_rng(1)
     quat = Rotation.random(BATCH, rng=rng).as_quat(canonical=True, scalar_first=True)
@@ -53,7 +47,7 @@ def poses() -> PoseTable:
     return PoseTable(frame, frame, rng.uniform(-2.0, 2.0, (BATCH, 3)), quat)
 
 
-def learn(localizer: Localizer, images: Tensor, table: PoseTable) -> None:
+def learn(localizer, images, table):
     """Descend to the poses, the second half with the batch normalisation as prediction uses it.
 
     A running variance is that of a sample, n / (n - 1) times what the training step divides by.
@@ -77,9 +71,7 @@ def learn(localizer: Localizer, images: Tensor, table: PoseTable) -> None:
 
 
 @pytest.mark.parametrize(("name", "shape", "changes"), VARIANTS)
-def test_a_batch_is_learned_by_heart(
-    name: ModelName, shape: dict[str, Any], changes: dict[str, Any]
-) -> None:
+def test_a_batch_is_learned_by_heart(name, shape, changes):
     torch.set_num_threads(1)
     torch.manual_seed(0)
     network = NetworkConfig.model_validate({"input_px": PX, "width": 0.125} | shape)

@@ -25,7 +25,7 @@ def test_the_seed_of_a_run_leaves_out_its_labels():
 class Recorder(Jitter):
     """Remembers what was shown, image by image."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__()
         self.shown: list[torch.Tensor] = []
 

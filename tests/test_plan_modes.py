@@ -1,10 +1,6 @@
 """Modes of collection: independent poses, and the poses of an earlier data set."""
 
-from __future__ import annotations
-
 import logging
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,18 +26,18 @@ SCENE = SceneConfig.model_validate(
 
 
 @pytest.fixture(scope="module")
-def flat() -> RayCaster:
+def flat():
     meshes = [trimesh.creation.box(bounds=bounds) for bounds in (ROOM, WALL, CUPBOARD)]
     joined = trimesh.util.concatenate(meshes)
     return RayCaster(joined.vertices, joined.faces)
 
 
-def random_plan(caster: RayCaster, n_frames: int, seed: int = 0, **values: object) -> PoseTable:
+def random_plan(caster, n_frames, seed=0, **values):
     collection = CollectionConfig.model_validate({"mode": "random", **values})
     return plan_split(caster, ROOM, SCENE, collection, n_frames, np.random.default_rng(seed))
 
 
-def test_random_poses_have_a_free_view_in_the_connected_space(flat: RayCaster) -> None:
+def test_random_poses_have_a_free_view_in_the_connected_space(flat):
     plan = random_plan(flat, 3000)
     np.testing.assert_array_equal(plan.frame, np.arange(3000))
     np.testing.assert_array_equal(plan.path, np.arange(3000))  # no two are of one path
@@ -52,7 +48,7 @@ def test_random_poses_have_a_free_view_in_the_connected_space(flat: RayCaster) -
     assert np.mean(at[:, 0] > 1.1) > 0.1  # beyond the door too: one space, not one convex part
 
 
-def test_random_poses_are_uniform_where_all_views_are_free() -> None:
+def test_random_poses_are_uniform_where_all_views_are_free():
     room = trimesh.creation.box(bounds=ROOM)
     box = np.array([[-1.0, -0.5, 1.0], [1.0, 0.5, 1.5]])  # at least 1 m from every wall
     scene = SCENE.model_copy(update={"min_view_distance_m": 0.5})
@@ -70,44 +66,44 @@ def test_random_poses_are_uniform_where_all_views_are_free() -> None:
     assert np.median(step) > 0.5  # neighbours in the list are no neighbours in space
 
 
-def test_random_plans_are_prefixes_and_repeatable_whatever_the_round(flat: RayCaster) -> None:
+def test_random_plans_are_prefixes_and_repeatable_whatever_the_round(flat):
     longer = random_plan(flat, 500).position_m
     np.testing.assert_array_equal(random_plan(flat, 100).position_m, longer[:100])
     np.testing.assert_array_equal(random_plan(flat, 500, candidates=1).position_m, longer)
     assert not np.array_equal(random_plan(flat, 100, seed=1).position_m, longer[:100])
 
 
-def test_nothing_admissible_ends_in_one_line(flat: RayCaster) -> None:
+def test_nothing_admissible_ends_in_one_line(flat):
     scene = SCENE.model_copy(update={"min_view_distance_m": 50.0})
     collection = CollectionConfig(mode="random", max_tries=50)
     with pytest.raises(InputError, match="min_view_distance_m"):
         plan_split(flat, ROOM, scene, collection, 10, np.random.default_rng(0))
 
 
-def some_poses(count: int = 6) -> PoseTable:
+def some_poses(count=6):
     rng = np.random.default_rng(4)
     quat = Rotation.random(count, random_state=rng).as_quat(canonical=True, scalar_first=True)
     position = rng.uniform(ROOM[0], ROOM[1], (count, 3))
     return PoseTable(np.arange(count), np.arange(count) // 2, position, quat)
 
 
-def as_csv(folder: Path, table: PoseTable) -> Path:
+def as_csv(folder, table):
     write_pose_table(folder / "poses.csv", table)
     return folder / "poses.csv"
 
 
-def as_collected(folder: Path, table: PoseTable) -> Path:
+def as_collected(folder, table):
     write_pose_table(folder / "train.csv", table)
     return folder
 
 
-def as_frames(folder: Path, table: PoseTable) -> Path:
+def as_frames(folder, table):
     for index, pose in enumerate(table.world_from_cam):
         np.savetxt(folder / f"frame-{index:06d}.pose.txt", pose)
     return folder
 
 
-def as_sequences(folder: Path, table: PoseTable) -> Path:
+def as_sequences(folder, table):
     for number, half in enumerate((slice(0, 4), slice(4, 6)), 1):
         (folder / f"seq-{number:02d}").mkdir()
         for index, pose in enumerate(table.world_from_cam[half]):
@@ -117,16 +113,13 @@ def as_sequences(folder: Path, table: PoseTable) -> Path:
     return folder
 
 
-def as_tum(folder: Path, table: PoseTable) -> Path:
+def as_tum(folder, table):
     lines = ["# timestamp tx ty tz qx qy qz qw"]
     for time, (at, (w, *xyz)) in enumerate(zip(table.position_m, table.quat_wxyz, strict=True)):
         numbers = [time / 30, *at, *(-np.array(xyz)), -w]  # the same rotation
         lines += [" ".join(map(repr, map(float, numbers))), ""]
     (folder / "trajectory.txt").write_text("\n".join(lines))
     return folder / "trajectory.txt"
-
-
-Store = Callable[[Path, PoseTable], Path]
 
 
 @pytest.mark.parametrize(
@@ -139,9 +132,7 @@ Store = Callable[[Path, PoseTable], Path]
         (as_tum, [0] * 5),
     ],
 )
-def test_poses_are_repeated_whatever_they_are_stored_as(
-    store: Store, paths: list[int], tmp_path: Path, flat: RayCaster
-) -> None:
+def test_poses_are_repeated_whatever_they_are_stored_as(store, paths, tmp_path, flat):
     table = some_poses()
     collection = CollectionConfig(mode="repeat", repeat=store(tmp_path, table))
     narrow = np.array([[0.0, 0.0, 0.0], [0.1, 0.1, 0.1]])  # sampling plays no part
@@ -154,20 +145,18 @@ def test_poses_are_repeated_whatever_they_are_stored_as(
     assert (found.quat_wxyz[:, 0] >= 0.0).all()
 
 
-def test_splits_are_those_of_the_data_set(tmp_path: Path) -> None:
+def test_splits_are_those_of_the_data_set(tmp_path):
     found = read_poses(as_sequences(tmp_path, some_poses()), "test")
     np.testing.assert_allclose(found.position_m, some_poses().position_m[4:], atol=1e-9)
 
 
 @pytest.mark.parametrize("store", [as_csv, as_frames, as_tum])
-def test_one_list_of_poses_is_no_test_split(store: Store, tmp_path: Path) -> None:
+def test_one_list_of_poses_is_no_test_split(store, tmp_path):
     with pytest.raises(InputError, match=r"train\.csv and test\.csv"):
         read_poses(store(tmp_path, some_poses()), "test")
 
 
-def test_poses_outside_the_mesh_are_a_warning(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_poses_outside_the_mesh_are_a_warning(tmp_path, caplog):
     source = as_csv(tmp_path, some_poses())
     with caplog.at_level(logging.WARNING, "synfeal"):
         repeated_poses(source, "train", 6, ROOM)
@@ -189,7 +178,7 @@ def test_poses_outside_the_mesh_are_a_warning(
         ("frame-000000.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n1 0 0 1\n", "not a rigid pose"),
     ],
 )
-def test_what_is_no_pose_is_named(name: str, content: str, message: str, tmp_path: Path) -> None:
+def test_what_is_no_pose_is_named(name, content, message, tmp_path):
     (tmp_path / name).write_text(content)
     source = tmp_path if name.startswith("frame") else tmp_path / name
     with pytest.raises(InputError, match=message):

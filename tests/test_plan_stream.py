@@ -1,7 +1,5 @@
 """The stream of candidates against a planner that draws and tests one round at a time."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh
@@ -26,18 +24,18 @@ SCENE = SceneConfig.model_validate({"source": "mesh", "path": "scene.glb"})
 
 
 @pytest.fixture(scope="module")
-def furnished() -> RayCaster:
+def furnished():
     boxes = ([[-0.5, -0.5, 0.0], [0.5, 0.5, 1.8]], [[1.0, -2.0, 0.0], [1.2, 1.0, 2.5]])
     meshes = [trimesh.creation.box(bounds=bounds) for bounds in (ROOM, *boxes)]
     joined = trimesh.util.concatenate(meshes)
     return RayCaster(joined.vertices, joined.faces)
 
 
-def round_by_round(caster: RayCaster, k: int, n_frames: int, rng: np.random.Generator) -> Array:
+def round_by_round(caster, k, n_frames, rng):
     """Positions (n_frames, 3) planned as the paper describes it, without any look-ahead."""
     bounds = pose_bounds(ROOM, Angles())
     start = sample_start(PoseSpace(caster, bounds, VIEW_M, rng), 100)
-    found: list[Array] = []
+    found = []
     while len(found) < n_frames:
         poses = sample_poses(bounds, k, rng)
         fit = [bool(admissible(caster, start, pose[None], VIEW_M)[0]) for pose in poses]
@@ -52,9 +50,7 @@ def round_by_round(caster: RayCaster, k: int, n_frames: int, rng: np.random.Gene
 
 @pytest.mark.parametrize("block", [7, 64, 4096])
 @pytest.mark.parametrize("k", [1, 3, 8])
-def test_plan_is_that_of_one_round_at_a_time(
-    furnished: RayCaster, k: int, block: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_plan_is_that_of_one_round_at_a_time(furnished, k, block, monkeypatch):
     monkeypatch.setattr(candidates, "BLOCK", block)
     collection = CollectionConfig(candidates=k, frame_spacing_m=SPACING_M, min_path_m=MIN_PATH_M)
     for seed in range(3):
@@ -64,7 +60,7 @@ def test_plan_is_that_of_one_round_at_a_time(
 
 
 @pytest.mark.parametrize("tries", [1, 5, 1000])
-def test_no_more_rounds_are_tried_than_allowed(tries: int) -> None:
+def test_no_more_rounds_are_tried_than_allowed(tries):
     room = trimesh.creation.box(bounds=ROOM)
     bounds = pose_bounds(ROOM, Angles())
     caster, rng = RayCaster(room.vertices, room.faces), np.random.default_rng(0)
@@ -76,7 +72,7 @@ def test_no_more_rounds_are_tried_than_allowed(tries: int) -> None:
     assert found is None or (drawn[-2:] == found).all(axis=1).any()
 
 
-def test_dead_end_names_the_place_and_what_to_relax(furnished: RayCaster) -> None:
+def test_dead_end_names_the_place_and_what_to_relax(furnished):
     collection = CollectionConfig(max_tries=3, min_path_m=50.0)
     with pytest.raises(InputError, match=r"from \(.*\) in 3 rounds of 8 candidates"):
         plan_split(furnished, ROOM, SCENE, collection, 1, np.random.default_rng(0))

@@ -1,9 +1,5 @@
 """Graphs in the style of the public ones, and graphs that are hard: all optimisers alike."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -17,21 +13,20 @@ from synfeal.geometry.poses import pose_error, pose_matrix, relative
 from tests.large_graphs import manhattan, measured, sphere
 
 Array = NDArray[np.float64]
-Optimise = Callable[[PoseGraph], Array]
-LEAST_SQUARES: dict[str, Optimise] = {
+LEAST_SQUARES = {
     "lm": lambda graph: optimise_lm(graph, 100),
     "open3d": lambda graph: optimise_open3d(graph, 100),
 }
-ALL: dict[str, Optimise] = LEAST_SQUARES | {"toro": lambda graph: optimise_toro(graph, 600, 1e-12)}
+ALL = LEAST_SQUARES | {"toro": lambda graph: optimise_toro(graph, 600, 1e-12)}
 
 
-def small_sphere(sigma_m: float, sigma_rad: float, seed: int = 0) -> tuple[Array, PoseGraph]:
+def small_sphere(sigma_m, sigma_rad, seed=0):
     truth, pairs = sphere(6, 12, 5.0)
     rng = np.random.default_rng(seed)
     return relative(truth[0], truth), measured(rng, truth, pairs, sigma_m, sigma_rad)
 
 
-def small_manhattan(sigma_m: float, sigma_rad: float, seed: int = 0) -> tuple[Array, PoseGraph]:
+def small_manhattan(sigma_m, sigma_rad, seed=0):
     rng = np.random.default_rng(seed)
     truth, pairs = manhattan(rng, 120, 4)
     return relative(truth[0], truth), measured(rng, truth, pairs, sigma_m, sigma_rad)
@@ -39,9 +34,7 @@ def small_manhattan(sigma_m: float, sigma_rad: float, seed: int = 0) -> tuple[Ar
 
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("make", [small_sphere, small_manhattan])
-def test_noise_free_graphs_are_recovered_from_a_bad_start(
-    name: str, make: Callable[[float, float], tuple[Array, PoseGraph]]
-) -> None:
+def test_noise_free_graphs_are_recovered_from_a_bad_start(name, make):
     truth, graph = make(0.0, 0.0)
     rng = np.random.default_rng(1)
     turn = Rotation.from_rotvec(0.05 * rng.normal(size=(len(truth), 3))).as_matrix()
@@ -53,9 +46,7 @@ def test_noise_free_graphs_are_recovered_from_a_bad_start(
 
 
 @pytest.mark.parametrize(("make", "factor"), [(small_sphere, 1.3), (small_manhattan, 1.3)])
-def test_toro_comes_near_least_squares(
-    make: Callable[[float, float], tuple[Array, PoseGraph]], factor: float
-) -> None:
+def test_toro_comes_near_least_squares(make, factor):
     _, graph = make(0.02, 0.005)
     best = chi2(graph, optimise_lm(graph, 100))
     assert 0.999 * best <= chi2(graph, optimise_toro(graph, 100, 1e-5)) <= factor * best
@@ -63,7 +54,7 @@ def test_toro_comes_near_least_squares(
 
 # Open3D's steps are too long for this: it stays 7 m away.
 @pytest.mark.parametrize("name", [name for name in ALL if name != "open3d"])
-def test_nodes_that_are_upside_down_find_their_way(name: str) -> None:
+def test_nodes_that_are_upside_down_find_their_way(name):
     """A loop whose last third starts turned by 170 degrees about its own axis."""
     truth, graph = small_manhattan(0.0, 0.0)
     start = truth.copy()
@@ -75,7 +66,7 @@ def test_nodes_that_are_upside_down_find_their_way(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_information_over_twelve_orders_of_magnitude_stays_finite(name: str) -> None:
+def test_information_over_twelve_orders_of_magnitude_stays_finite(name):
     truth, graph = small_manhattan(0.0, 0.0)
     rng = np.random.default_rng(2)
     scale = 10.0 ** rng.uniform(-6, 6, len(graph.edges))

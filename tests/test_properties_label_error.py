@@ -13,7 +13,6 @@ from synfeal.labels.noise import add_noise
 from tests.property_support import (
     directions,
     few,
-    fractions,
     pose_of,
     poses,
     poses_near,
@@ -35,14 +34,6 @@ def test_labels_off_by_a_known_motion_have_that_error(listed, axis, off_m, off_d
     assert share_within(errors, off_m + 1e-6, off_deg + 1e-4) == 1.0
     assert share_within(errors, off_m - 1e-6, off_deg + 1e-4) == 0.0
     assert share_within(errors, off_m + 1e-6, off_deg - 1e-4) == 0.0
-
-
-@few
-@given(seeds, st.integers(1, 30), fractions, fractions)
-def test_share_within_is_counted(seed, count, limit_m, limit_deg):
-    errors = np.random.default_rng(seed).random((2, count))
-    within = sum(m <= limit_m and deg <= limit_deg for m, deg in errors.T)
-    assert share_within(tuple(errors), limit_m, limit_deg) == pytest.approx(within / count)
 
 
 @few

@@ -72,12 +72,6 @@ def test_no_candidate_behind_a_wall_is_admissible(seed, wall):
 
 
 @few
-@given(st.integers(0, 20))
-def test_every_question_costs_two_rays(count):
-    assert Questions(np.zeros((count, 6)), np.zeros((count, 6)), 0.0).n_rays == 2 * count
-
-
-@few
 @given(seeds, st.integers(1, 4), st.integers(1, 5), st.floats(0.0, 7.0), walls)
 def test_target_is_what_trying_one_after_the_other_finds(seed, n_rounds, k, min_path_m, wall):
     rounds = inside_poses(seed, n_rounds * k).reshape(n_rounds, k, 6)
@@ -114,7 +108,7 @@ def test_targets_of_the_stream_are_far_enough_and_have_a_view(seed, k, view_m, m
 def test_of_a_divided_room_the_larger_part_is_the_space(seed, wall, view_m):
     caster = divided(wall)
 
-    def sampled() -> PoseSpace:
+    def sampled():
         return PoseSpace(caster, BOUNDS, view_m, np.random.default_rng(seed))
 
     group = largest_group(sampled(), 100, 200)

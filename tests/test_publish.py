@@ -1,7 +1,5 @@
 """Publishing a run, and what is published: small, whole, and of one run."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import subprocess
@@ -18,7 +16,7 @@ LIMIT_MB, PACKAGE_LIMIT_MB = 4.0, 50.0
 
 
 @pytest.fixture
-def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def root(tmp_path, monkeypatch):
     """A finished run in ``results/mini``, and pages that show one of its two figures."""
     monkeypatch.chdir(tmp_path)
     run = tmp_path / "results/mini"
@@ -49,11 +47,11 @@ def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return run
 
 
-def files_below(folder: Path) -> set[str]:
+def files_below(folder):
     return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
 
 
-def test_predictions_are_published_as_one_file(root: Path) -> None:
+def test_predictions_are_published_as_one_file(root):
     run = root / "runs/large_room/6k/synfeal/scratch/posenet/seed0/predictions.csv"
     labels = root / "labels/large_room/6k/synfeal/test.csv"
     for path in (run, labels):
@@ -64,7 +62,7 @@ def test_predictions_are_published_as_one_file(root: Path) -> None:
         assert run.relative_to(root).as_posix() in package.namelist()
 
 
-def test_a_run_is_published_without_what_no_page_shows(root: Path) -> None:
+def test_a_run_is_published_without_what_no_page_shows(root):
     target = root.parent / "published/mini"
     (target / "tables").mkdir(parents=True)
     (target / "tables/of_an_older_design.csv").write_text("old")
@@ -74,7 +72,7 @@ def test_a_run_is_published_without_what_no_page_shows(root: Path) -> None:
     assert all((target / name).read_bytes() == (root / name).read_bytes() for name in tables)
 
 
-def test_a_run_of_labels_alone_has_tables_and_figures(root: Path) -> None:
+def test_a_run_of_labels_alone_has_tables_and_figures(root):
     for name in FINISHED:
         (root / name).unlink()
     assert main([]) == 0
@@ -89,9 +87,7 @@ def test_a_run_of_labels_alone_has_tables_and_figures(root: Path) -> None:
         ("tables/table1_meshes.csv", "another run's", "is not the file of .*provenance.json"),
     ],
 )
-def test_what_does_not_belong_together_is_not_published(
-    root: Path, name: str, text: str | None, said: str
-) -> None:
+def test_what_does_not_belong_together_is_not_published(root, name, text, said):
     if text is None:
         (root / name).unlink()
     else:
@@ -104,12 +100,12 @@ def test_what_does_not_belong_together_is_not_published(
     assert files_below(target) == {"kept.txt"}
 
 
-def test_without_a_run_the_command_says_so(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_run_the_command_says_so(root, capsys):
     assert main(["--profile", "night"]) == 1
     assert "results/night/tables: holds no tables" in capsys.readouterr().err
 
 
-def test_tracked_results_are_small_and_of_their_provenance() -> None:
+def test_tracked_results_are_small_and_of_their_provenance():
     listed = subprocess.run(
         ["git", "ls-files", "-z", "results"], cwd=REPOSITORY, capture_output=True, check=True
     )
@@ -121,7 +117,7 @@ def test_tracked_results_are_small_and_of_their_provenance() -> None:
 
 
 @pytest.mark.parametrize("profile", ["mini", "night"])
-def test_published_results_are_those_of_a_recorded_run(profile: str) -> None:
+def test_published_results_are_those_of_a_recorded_run(profile):
     root = REPOSITORY / "results/published" / profile
     if profile != "mini" and not root.exists():
         pytest.skip("not published")

@@ -4,17 +4,14 @@ The band is 1e-6 of the mesh's extent: the caster's answer must be that of the m
 moved by no more than that, which along a ray that meets a surface at an angle is band / cosine.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from synfeal.mesh.rays import RayCaster
-from tests.ray_truth import BAND, Solid, box, crossings, directions_of, l_shape, solids
+from tests.ray_truth import BAND, box, crossings, directions_of, l_shape, solids
 
 N_RAYS = 40
 N_AIMED = 100_000
@@ -24,7 +21,7 @@ fixed = settings(derandomize=True, deadline=None, max_examples=150)
 
 @fixed
 @given(solids(), SEEDS)
-def test_first_hits_are_those_of_the_exact_test(solid: Solid, seed: int) -> None:
+def test_first_hits_are_those_of_the_exact_test(solid, seed):
     rng = np.random.default_rng(seed)
     origins, directions = solid.world(solid.points(rng, N_RAYS)), directions_of(rng, N_RAYS)
     found = solid.caster().first_hit_m(origins, directions)
@@ -36,7 +33,7 @@ def test_first_hits_are_those_of_the_exact_test(solid: Solid, seed: int) -> None
 
 @fixed
 @given(solids(), SEEDS)
-def test_lines_of_sight_are_those_of_the_exact_test(solid: Solid, seed: int) -> None:
+def test_lines_of_sight_are_those_of_the_exact_test(solid, seed):
     rng = np.random.default_rng(seed)
     origins, targets = solid.world(solid.points(rng, 2 * N_RAYS)).reshape(2, N_RAYS, 3)
     length = np.linalg.norm(targets - origins, axis=1)
@@ -49,7 +46,7 @@ def test_lines_of_sight_are_those_of_the_exact_test(solid: Solid, seed: int) -> 
 
 @fixed
 @given(solids(watertight=True), SEEDS)
-def test_an_odd_number_of_crossings_is_inside(solid: Solid, seed: int) -> None:
+def test_an_odd_number_of_crossings_is_inside(solid, seed):
     rng = np.random.default_rng(seed)
     points, directions = solid.points(rng, N_RAYS), directions_of(rng, N_RAYS)
     origins, step = solid.world(points), 20 * BAND * solid.extent
@@ -63,9 +60,7 @@ def test_an_odd_number_of_crossings_is_inside(solid: Solid, seed: int) -> None:
     np.testing.assert_array_equal(count % 2 == 1, solid.contains(points[clear]))
 
 
-def count_hits(
-    caster: RayCaster, origins: NDArray[np.float64], directions: NDArray[np.float64], step: float
-) -> NDArray[np.int64]:
+def count_hits(caster, origins, directions, step):
     """Surfaces (N,) along rays, each ray cast on from ``step`` behind its last hit."""
     count, at = np.zeros(len(origins), np.int64), origins.copy()
     for _ in range(20):
@@ -87,7 +82,7 @@ WATERTIGHT = {
 @pytest.mark.parametrize("offset", [0.0, 1e6])
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 100.0])
 @pytest.mark.parametrize("name", WATERTIGHT)
-def test_no_ray_leaks_through_an_edge_or_a_vertex(name: str, scale: float, offset: float) -> None:
+def test_no_ray_leaks_through_an_edge_or_a_vertex(name, scale, offset):
     mesh, rng = WATERTIGHT[name], np.random.default_rng(5)
     assert mesh.is_watertight
     vertices = np.asarray(mesh.vertices) * scale + offset
@@ -108,28 +103,13 @@ def test_no_ray_leaks_through_an_edge_or_a_vertex(name: str, scale: float, offse
     assert int(np.sum(caster.sees(origins, beyond))) == 0
 
 
-def test_rays_through_the_middle_of_a_divided_wall_do_not_leak() -> None:
-    room = trimesh.creation.box((4.0, 4.0, 2.0)).subdivide().subdivide()
-    axes = np.vstack([np.eye(3), -np.eye(3)])
-    found = RayCaster(room.vertices, room.faces).first_hit_m(np.zeros((6, 3)), axes)
-    np.testing.assert_allclose(found, [2, 2, 1, 2, 2, 1], atol=4e-6)
-
-
-def test_sees_stops_at_a_wall_but_not_before_it() -> None:
+def test_sees_stops_at_a_wall_but_not_before_it():
     caster, band = RayCaster(*cube()), 2 * BAND
     origins = np.tile([0.0, 0.1, 0.2], (4, 1))
     targets = [[x, 0.1, 0.2] for x in (0.99, 1 - 2 * band, 1 + 2 * band, 1.01)]
     assert caster.sees(origins, targets).tolist() == [True, True, False, False]
 
 
-def test_a_start_on_a_surface_sees_the_other_side_of_the_room_or_that_surface() -> None:
-    caster = RayCaster(*cube())
-    on_wall = np.tile([1.0, 0.3, 0.2], (2, 1))
-    inwards, outwards = caster.first_hit_m(on_wall, [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    assert min(inwards, abs(inwards - 2.0)) <= 2 * BAND
-    assert outwards <= 2 * BAND or np.isinf(outwards)
-
-
-def cube() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def cube():
     mesh = trimesh.creation.box((2.0, 2.0, 2.0))
     return np.asarray(mesh.vertices), np.asarray(mesh.faces)

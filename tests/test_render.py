@@ -1,7 +1,5 @@
 """Rendering: projection, depth and orientation against closed forms, for every backend."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +14,6 @@ from tests.render_backends import (
     LOOK_ALONG_X,
     PYOPENGL_WARNS,
     TWO,
-    Opener,
     camera_of,
     colored,
     facing_quad,
@@ -27,11 +24,11 @@ pytestmark = pytest.mark.filterwarnings(PYOPENGL_WARNS)
 
 
 @pytest.fixture(params=BACKENDS)
-def opened(request: pytest.FixtureRequest) -> Opener:
+def opened(request):
     return opener_of(request.param)
 
 
-def test_depth_of_a_frontal_plane_is_its_distance_everywhere(opened: Opener) -> None:
+def test_depth_of_a_frontal_plane_is_its_distance_everywhere(opened):
     mesh = TexturedMesh((facing_quad(3.0, 10.0, base_color=colored((255, 0, 0))),))
     with opened(mesh, camera_of()) as renderer:
         rgb, depth = renderer.render_rgbd(LOOK_ALONG_X)
@@ -41,7 +38,7 @@ def test_depth_of_a_frontal_plane_is_its_distance_everywhere(opened: Opener) -> 
     assert (rgb == [255, 0, 0]).all()
 
 
-def test_depth_of_a_slanted_floor_in_closed_form(opened: Opener) -> None:
+def test_depth_of_a_slanted_floor_in_closed_form(opened):
     height, pitch = 1.5, 0.6
     floor = np.array([[-99.0, -99, 0], [99, -99, 0], [99, 99, 0], [-99, 99, 0]])
     mesh = TexturedMesh((MeshPart("floor", floor, TWO, base_color=colored((9, 9, 9))),))
@@ -55,7 +52,7 @@ def test_depth_of_a_slanted_floor_in_closed_form(opened: Opener) -> None:
     np.testing.assert_allclose(depth, np.repeat(expected[:, None], 64, axis=1), rtol=1e-5)
 
 
-def test_where_nothing_is_depth_is_infinite(opened: Opener) -> None:
+def test_where_nothing_is_depth_is_infinite(opened):
     mesh = TexturedMesh((facing_quad(2.0, 0.2, base_color=colored((255, 255, 255))),))
     with opened(mesh, camera_of()) as renderer:
         rgb, depth = renderer.render_rgbd(LOOK_ALONG_X)
@@ -65,7 +62,7 @@ def test_where_nothing_is_depth_is_infinite(opened: Opener) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_point_is_seen_at_the_pixel_it_projects_to(opened: Opener, seed: int) -> None:
+def test_a_point_is_seen_at_the_pixel_it_projects_to(opened, seed):
     rng = np.random.default_rng(seed)
     camera = camera_of(width=161, height=119, fx=110.0, fy=125.0, cx=70.0, cy=66.0)
     pose = pose_matrix(rotation_from_rpy(rng.uniform(-0.5, 0.5, 3)), rng.uniform(-1, 1, 3))
@@ -84,7 +81,7 @@ def test_a_point_is_seen_at_the_pixel_it_projects_to(opened: Opener, seed: int) 
     np.testing.assert_allclose(seen, [fx * x / z + cx, fy * y / z + cy], atol=0.03)
 
 
-def test_up_in_the_world_is_up_in_the_image(opened: Opener) -> None:
+def test_up_in_the_world_is_up_in_the_image(opened):
     above, below = facing_quad(2.0, 0.3), facing_quad(2.0, 0.3)
     parts = tuple(
         MeshPart(
@@ -99,20 +96,17 @@ def test_up_in_the_world_is_up_in_the_image(opened: Opener) -> None:
     assert rgb[24:, :, 2].max() == 255
 
 
-def test_surfaces_show_from_behind(opened: Opener) -> None:
+def test_surfaces_show_from_behind(opened):
     mesh = TexturedMesh((facing_quad(1.0, 5.0, base_color=colored((0, 255, 0))),))
     behind = pose_matrix(rotation_from_rpy([0.0, 0.0, np.pi]), [2.0, 0.0, 0.0])
     with opened(mesh, camera_of()) as renderer:
         assert (renderer.render(behind) == [0, 255, 0]).all()
 
 
-def test_several_cameras_and_meshes_share_a_process(opened: Opener) -> None:
+def test_several_cameras_and_meshes_share_a_process(opened):
     red = TexturedMesh((facing_quad(1.0, 5.0, np.full((4, 4, 3), (255, 0, 0), np.uint8)),))
     blue = TexturedMesh((facing_quad(1.0, 5.0, np.full((4, 4, 3), (0, 0, 255), np.uint8)),))
-    with (
-        opened(red, camera_of()) as first,
-        opened(blue, camera_of(width=100, height=30)) as second,
-    ):
+    with opened(red, camera_of()) as first, opened(blue, camera_of(width=100, height=30)) as second:
         for _ in range(2):  # in turns
             assert (first.render(LOOK_ALONG_X) == [255, 0, 0]).all()
             assert second.render(LOOK_ALONG_X).shape == (30, 100, 3)
@@ -120,7 +114,7 @@ def test_several_cameras_and_meshes_share_a_process(opened: Opener) -> None:
         assert (third.render(LOOK_ALONG_X) == [0, 0, 255]).all()
 
 
-def test_images_do_not_depend_on_where_the_scene_lies(opened: Opener) -> None:
+def test_images_do_not_depend_on_where_the_scene_lies(opened):
     """In map coordinates, single precision alone would move everything by centimetres."""
     texture = np.random.default_rng(0).integers(0, 256, (64, 64, 3), np.uint8)
     quad = facing_quad(3.0, 1.0, texture)
@@ -136,7 +130,7 @@ def test_images_do_not_depend_on_where_the_scene_lies(opened: Opener) -> None:
     np.testing.assert_allclose(far_depth, depth, atol=1e-5)
 
 
-def test_depth_is_fine_far_away(opened: Opener) -> None:
+def test_depth_is_fine_far_away(opened):
     """A 24-bit depth buffer that begins at 5 cm has steps of 8 mm at 80 m."""
     distances = np.linspace(79.0, 80.0, 9)
     camera = camera_of(width=16, height=16)
@@ -147,7 +141,7 @@ def test_depth_is_fine_far_away(opened: Opener) -> None:
         np.testing.assert_allclose(depth, distance, atol=2e-4)
 
 
-def test_what_is_nearer_than_near_or_farther_than_far_is_not_drawn(opened: Opener) -> None:
+def test_what_is_nearer_than_near_or_farther_than_far_is_not_drawn(opened):
     camera = camera_of(near_m=1.0, far_m=5.0)
     quads = {
         x: facing_quad(x, 3.0 * x, base_color=colored((0, 0, int(x * 20)))) for x in (0.9, 1.1)
@@ -164,13 +158,13 @@ def test_what_is_nearer_than_near_or_farther_than_far_is_not_drawn(opened: Opene
         np.testing.assert_allclose(depth, distance if is_drawn else np.inf, atol=1e-4)
 
 
-def test_near_and_far_are_measured_along_the_optical_axis(opened: Opener) -> None:
+def test_near_and_far_are_measured_along_the_optical_axis(opened):
     camera = camera_of(far_m=2.01, horizontal_fov_deg=120.0)  # corner rays are 4.6 m long
     with opened(TexturedMesh((facing_quad(2.0, 9.0),)), camera) as renderer:
         assert np.isfinite(renderer.render_rgbd(LOOK_ALONG_X)[1]).all()
 
 
-def test_edges_are_smooth(opened: Opener) -> None:
+def test_edges_are_smooth(opened):
     """A half-plane whose edge is slanted: each pixel is as bright as it is covered."""
     edge = np.array([[2.0, 0.0, 9.0], [2.0, -9.0, 9.0], [2.0, -9.0, -9.0], [2.0, 1.0, -9.0]])
     camera = camera_of(width=101, height=101, horizontal_fov_deg=60.0)

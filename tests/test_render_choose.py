@@ -1,14 +1,9 @@
 """Which backend draws: failures are injected, and one process really cannot load EGL."""
 
-from __future__ import annotations
-
 import logging
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +29,7 @@ GREEN = TexturedMesh((facing_quad(2.0, 9.0, base_color=colored((0, 255, 0))),))
 
 
 @pytest.fixture(autouse=True)
-def forget() -> Iterator[None]:
+def forget():
     """What worked is remembered for the process; not from one test to the next."""
     yield
     choose.why_not.cache_clear()
@@ -42,24 +37,24 @@ def forget() -> Iterator[None]:
 
 
 @pytest.fixture
-def fresh(forget: None) -> None:
+def fresh(forget):
     choose.why_not.cache_clear()
     choose.fastest_working.cache_clear()
 
 
-def seen(backend: str = "auto") -> Any:
-    with open_renderer(GREEN, camera_of(), RenderConfig(backend=backend)) as renderer:  # type: ignore[arg-type]
+def seen(backend="auto"):
+    with open_renderer(GREEN, camera_of(), RenderConfig(backend=backend)) as renderer:
         assert (renderer.render(LOOK_ALONG_X) == [0, 255, 0]).all()
         return type(renderer).__name__
 
 
 @pytest.mark.parametrize("name", BACKENDS)
-def test_a_backend_may_be_named(name: str) -> None:
+def test_a_backend_may_be_named(name):
     assert seen(name).lower() == f"{name}renderer"
 
 
 @pytest.mark.usefixtures("fresh")
-def test_auto_takes_the_first_and_says_so_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_auto_takes_the_first_and_says_so_once(caplog):
     caplog.set_level(logging.INFO, "synfeal")
     assert seen().lower() == f"{BACKENDS[0]}renderer"
     seen()
@@ -70,23 +65,23 @@ def test_auto_takes_the_first_and_says_so_once(caplog: pytest.LogCaptureFixture)
         assert len(caplog.records) == 1
 
 
-def no_library(*_: object, **__: object) -> Any:
+def no_library(*_, **__):
     raise ImportError("libEGL.so.1 not loaded")
 
 
-def no_device(*_: object, **__: object) -> Any:
+def no_device(*_, **__):
     raise RuntimeError("requested device index 0,\nbut found 0 devices")
 
 
-def black(*_: object, **__: object) -> Any:
+def black(*_, **__):
     class Black:
-        def render_rgbd(self, _: object) -> Any:
+        def render_rgbd(self, _):
             return np.zeros((16, 16, 3), np.uint8), np.ones((16, 16), np.float32)
 
-        def __enter__(self) -> Any:
+        def __enter__(self):
             return self
 
-        def __exit__(self, *_: object) -> None: ...
+        def __exit__(self, *_): ...
 
     return Black()
 
@@ -100,9 +95,7 @@ def black(*_: object, **__: object) -> Any:
         (black, "it draws a red square wrongly"),
     ],
 )
-def test_auto_falls_back_with_one_warning(
-    broken: Any, said: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_auto_falls_back_with_one_warning(broken, said, monkeypatch, caplog):
     monkeypatch.setitem(choose.BACKENDS, "opengl", broken)
     assert seen() != "OpenglRenderer"
     seen()
@@ -114,9 +107,7 @@ def test_auto_falls_back_with_one_warning(
 
 
 @pytest.mark.usefixtures("fresh")
-def test_a_context_that_cannot_be_made_names_the_packages(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_context_that_cannot_be_made_names_the_packages(monkeypatch, caplog):
     monkeypatch.setattr(context, "_attempts", lambda: [no_device, no_library])
     with pytest.raises(InputError, match=r"found 0 devices.*libegl1 libgl1 libgl1-mesa-dri"):
         context.shared_context.__wrapped__()
@@ -128,7 +119,7 @@ def test_a_context_that_cannot_be_made_names_the_packages(
 
 
 @pytest.mark.usefixtures("fresh")
-def test_when_nothing_works_all_of_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_when_nothing_works_all_of_it_is_named(monkeypatch):
     for name in choose.BACKENDS:
         monkeypatch.setitem(choose.BACKENDS, name, no_device)
     with pytest.raises(InputError) as raised:
@@ -151,7 +142,7 @@ for name in ("opengl", "pyrender"):
 
 
 @pytest.mark.parametrize("lacking", ["library", "driver"])
-def test_a_process_without_egl_still_draws(lacking: str, tmp_path: Path) -> None:
+def test_a_process_without_egl_still_draws(lacking, tmp_path):
     """Once libEGL cannot be loaded, once it finds no driver."""
     (tmp_path / "libEGL.so.1").write_bytes(b"no library")
     places = {

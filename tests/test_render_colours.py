@@ -1,7 +1,5 @@
 """Rendering: textures, colours and alpha, for every backend."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +10,6 @@ from tests.render_backends import (
     BACKENDS,
     LOOK_ALONG_X,
     PYOPENGL_WARNS,
-    Opener,
     camera_of,
     colored,
     facing_quad,
@@ -23,11 +20,11 @@ pytestmark = pytest.mark.filterwarnings(PYOPENGL_WARNS)
 
 
 @pytest.fixture(params=BACKENDS)
-def opened(request: pytest.FixtureRequest) -> Opener:
+def opened(request):
     return opener_of(request.param)
 
 
-def test_texture_is_upright_and_not_mirrored(opened: Opener) -> None:
+def test_texture_is_upright_and_not_mirrored(opened):
     quarters = np.zeros((64, 64, 3), np.uint8)  # an image: first row on top
     quarters[:32, :32], quarters[:32, 32:] = (255, 0, 0), (0, 255, 0)
     quarters[32:, :32], quarters[32:, 32:] = (0, 0, 255), (255, 255, 0)
@@ -40,7 +37,7 @@ def test_texture_is_upright_and_not_mirrored(opened: Opener) -> None:
     assert rgb[-5, -5].tolist() == [255, 255, 0]
 
 
-def test_vertex_colours_are_interpolated(opened: Opener) -> None:
+def test_vertex_colours_are_interpolated(opened):
     colors = np.array([[0, 0, 0], [200, 0, 0], [200, 0, 0], [0, 0, 0]], np.uint8)
     mesh = TexturedMesh((facing_quad(1.0, 1.0, vertex_rgb=colors),))
     with opened(mesh, camera_of(horizontal_fov_deg=90.0)) as renderer:
@@ -49,7 +46,7 @@ def test_vertex_colours_are_interpolated(opened: Opener) -> None:
     np.testing.assert_allclose(row[2:-2], expected[2:-2], atol=2.0)
 
 
-def test_alpha_below_the_cutoff_lets_the_wall_behind_through(opened: Opener) -> None:
+def test_alpha_below_the_cutoff_lets_the_wall_behind_through(opened):
     leaf = np.full((32, 32, 4), (0, 255, 0, 255), np.uint8)
     leaf[:, 16:] = (255, 255, 255, 150)  # right half: alpha 0.59
     back = facing_quad(2.0, 9.0, base_color=colored((255, 0, 0)))
@@ -62,7 +59,7 @@ def test_alpha_below_the_cutoff_lets_the_wall_behind_through(opened: Opener) -> 
         assert depth[24, 56] == pytest.approx(distance, abs=1e-3)
 
 
-def test_hidden_colour_of_cut_out_texels_does_not_bleed(opened: Opener) -> None:
+def test_hidden_colour_of_cut_out_texels_does_not_bleed(opened):
     rng = np.random.default_rng(0)
     leaf = np.full((256, 256, 4), (0, 200, 0, 255), np.uint8)
     leaf[rng.random((256, 256)) < 0.5] = (255, 0, 255, 0)  # magenta that must never show
@@ -73,7 +70,7 @@ def test_hidden_colour_of_cut_out_texels_does_not_bleed(opened: Opener) -> None:
     assert rgb[..., 0].max() <= 2
 
 
-def test_fine_texture_is_averaged_not_aliased(opened: Opener) -> None:
+def test_fine_texture_is_averaged_not_aliased(opened):
     checker = np.indices((512, 512)).sum(axis=0) % 2 * 255
     texture = np.repeat(checker[..., None], 3, axis=2).astype(np.uint8)
     mesh = TexturedMesh((facing_quad(3.0, 3.0, texture),))
@@ -82,7 +79,7 @@ def test_fine_texture_is_averaged_not_aliased(opened: Opener) -> None:
     np.testing.assert_allclose(rgb.astype(int), 127, atol=3)
 
 
-def test_odd_sizes_are_not_sheared(opened: Opener) -> None:
+def test_odd_sizes_are_not_sheared(opened):
     texture = np.zeros((9, 7, 3), np.uint8)
     texture[:, 3] = 255  # a vertical line
     mesh = TexturedMesh((facing_quad(1.0, 1.0, texture),))
@@ -91,7 +88,7 @@ def test_odd_sizes_are_not_sheared(opened: Opener) -> None:
     assert np.ptp(columns) <= 1
 
 
-def test_alpha_of_the_base_colour_counts(opened: Opener) -> None:
+def test_alpha_of_the_base_colour_counts(opened):
     leaf = np.full((8, 8, 4), (0, 255, 0, 255), np.uint8)
     faint = np.array([255, 255, 255, 100], np.uint8)  # 0.39
     back = facing_quad(2.0, 9.0, base_color=colored((255, 0, 0)))
@@ -100,7 +97,7 @@ def test_alpha_of_the_base_colour_counts(opened: Opener) -> None:
         assert (renderer.render(LOOK_ALONG_X) == [255, 0, 0]).all()
 
 
-def test_rays_pass_through_many_layers(opened: Opener) -> None:
+def test_rays_pass_through_many_layers(opened):
     """Twenty sheets with a hole in the middle, a wall behind them."""
     sheet = np.full((4, 4, 4), (0, 0, 255, 255), np.uint8)
     sheet[1:3, 1:3, 3] = 0
@@ -114,7 +111,7 @@ def test_rays_pass_through_many_layers(opened: Opener) -> None:
     assert depth[2, 32] == pytest.approx(1.0, abs=1e-5)
 
 
-def test_depth_of_a_cut_out_ends_where_half_of_it_is_left(opened: Opener) -> None:
+def test_depth_of_a_cut_out_ends_where_half_of_it_is_left(opened):
     """Alpha falls from 1 to 0 between the middles of texels 15 and 16: half is where they meet."""
     leaf = np.full((32, 32, 4), (0, 255, 0, 255), np.uint8)
     leaf[:, 16:, 3] = 0
@@ -126,22 +123,22 @@ def test_depth_of_a_cut_out_ends_where_half_of_it_is_left(opened: Opener) -> Non
     assert np.isinf(depth[:, 321:629]).all()
 
 
-def test_base_colour_multiplies_texture_and_vertex_colours(opened: Opener) -> None:
+def test_base_colour_multiplies_texture_and_vertex_colours(opened):
     factor = np.array([128, 255, 51, 255], np.uint8)
     grey = np.full((4, 4, 3), 200, np.uint8)
     expected = np.array([200 * 128 / 255, 200, 200 * 51 / 255])
     for values in ({"texture": grey}, {"vertex_rgb": grey[0]}):
-        quad = facing_quad(1.0, 3.0, base_color=factor, **values)  # type: ignore[arg-type]
+        quad = facing_quad(1.0, 3.0, base_color=factor, **values)
         with opened(TexturedMesh((quad,)), camera_of()) as renderer:
             rgb = renderer.render(LOOK_ALONG_X)
         assert np.abs(rgb - expected).max() <= 1.0
 
 
-def test_textures_repeat(opened: Opener) -> None:
+def test_textures_repeat(opened):
     texture = np.zeros((2, 2, 3), np.uint8)
     texture[:, 1] = 255
     quad = facing_quad(1.0, 1.0, texture)
-    twice = replace(quad, uv=quad.uv * 4.0 - 1.0)  # type: ignore[operator]
+    twice = replace(quad, uv=quad.uv * 4.0 - 1.0)
     camera = camera_of(width=64, height=64, horizontal_fov_deg=90.0)
     with opened(TexturedMesh((twice,)), camera) as renderer:
         row = renderer.render(LOOK_ALONG_X)[32, :, 0].astype(float)
@@ -150,7 +147,7 @@ def test_textures_repeat(opened: Opener) -> None:
     np.testing.assert_allclose(row[20:28], 255.0 * (np.arange(8) + 0.5) / 8.0, atol=2.0)
 
 
-def test_parts_that_never_show_are_left_out(opened: Opener) -> None:
+def test_parts_that_never_show_are_left_out(opened):
     shaft = facing_quad(1.0, 3.0, alpha_cutoff=0.5, base_color=np.array([9, 9, 9, 20], np.uint8))
     back = facing_quad(2.0, 9.0, base_color=colored((255, 0, 0)))
     with opened(TexturedMesh((shaft, back)), camera_of()) as renderer:

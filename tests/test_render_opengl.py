@@ -1,18 +1,13 @@
 """The OpenGL backend: culling, sampling and company in one process never change a pixel."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import TexturedMesh
 from synfeal.render.opengl import backend as opengl
@@ -21,17 +16,15 @@ from synfeal.render.opengl.backend import OpenglRenderer, clip_from_cam
 from synfeal.render.opengl.chunks import FACES_PER_CHUNK, chunks_of, visible_runs
 from synfeal.render.opengl.context import shared_context
 from tests.render_backends import (
-    BACKENDS,
     LOOK_ALONG_X,
     PYOPENGL_WARNS,
     camera_of,
     facing_quad,
-    opener_of,
 )
 from tests.triangle_soup import CAMERA, digest, poses, soup
 
 
-def has_context() -> bool:
+def has_context():
     """Whether this machine has OpenGL at all; asked without drawing, or defects would skip."""
     try:
         shared_context()
@@ -46,7 +39,7 @@ pytestmark = [
 ]
 
 
-def test_chunks_hold_every_triangle_once_with_its_corners_in_order() -> None:
+def test_chunks_hold_every_triangle_once_with_its_corners_in_order():
     part = soup(3000).parts[1]
     chunks = chunks_of(part.vertices_m, part.faces)
     found = chunks.vertices[chunks.faces]
@@ -58,7 +51,7 @@ def test_chunks_hold_every_triangle_once_with_its_corners_in_order() -> None:
         assert (inside <= chunks.upper_m[index]).all()
 
 
-def test_every_triangle_with_a_corner_in_view_is_in_a_visible_run() -> None:
+def test_every_triangle_with_a_corner_in_view_is_in_a_visible_run():
     part = soup(20_000).parts[0]
     chunks = chunks_of(part.vertices_m, part.faces)
     n_drawn = 0
@@ -76,19 +69,19 @@ def test_every_triangle_with_a_corner_in_view_is_in_a_visible_run() -> None:
     assert n_drawn < 0.75 * 20 * len(part.faces)  # or nothing is culled
 
 
-def test_culling_changes_no_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_culling_changes_no_pixel(monkeypatch):
     mesh, views = soup(6000), poses(8)
     with OpenglRenderer(mesh, CAMERA) as renderer:
         culled = digest(renderer, views)
 
-        def all_of(chunks: Any, clip_from_mesh: Any) -> list[tuple[int, int]]:
+        def all_of(chunks, clip_from_mesh):
             return [(0, 3 * len(chunks.faces))]
 
         monkeypatch.setattr(opengl_part, "visible_runs", all_of)
         assert digest(renderer, views) == culled
 
 
-def test_images_do_not_depend_on_what_was_drawn_before() -> None:
+def test_images_do_not_depend_on_what_was_drawn_before():
     mesh, views = soup(3000), poses(6)
     with OpenglRenderer(mesh, CAMERA) as renderer:
         forth = digest(renderer, views)
@@ -115,7 +108,7 @@ assert len(open3d.geometry.TriangleMesh.create_box().triangles) == 12
 
 
 @pytest.mark.parametrize(("code", "threads"), [(OPEN3D + DRAW, "1"), (DRAW + OPEN3D + DRAW, "3")])
-def test_images_are_the_same_in_another_process(code: str, threads: str) -> None:
+def test_images_are_the_same_in_another_process(code, threads):
     """With other numbers of threads, and Open3D imported before or after."""
     with OpenglRenderer(soup(3000), CAMERA) as renderer:
         here = digest(renderer, poses(6))
@@ -129,24 +122,8 @@ def test_images_are_the_same_in_another_process(code: str, threads: str) -> None
     assert {tuple(line.split()) for line in there.stdout.splitlines()} == {tuple(here)}
 
 
-@pytest.mark.skipif("pyrender" not in BACKENDS, reason="pyrender does not work here")
-def test_pyrender_and_opengl_live_side_by_side() -> None:
-    mesh, views = soup(500), poses(3)
-    with OpenglRenderer(mesh, CAMERA) as ours:
-        alone = digest(ours, views)
-        with opener_of("pyrender")(mesh, CAMERA) as theirs:
-            first = [theirs.render(view).tobytes() for view in views]
-            for view, image, known in zip(views, first, alone, strict=True):
-                assert digest(ours, [view]) == [known]
-                assert theirs.render(view).tobytes() == image
-            with OpenglRenderer(mesh, CAMERA) as late:
-                assert digest(late, views) == alone
-            assert [theirs.render(view).tobytes() for view in views] == first
-        assert digest(ours, views) == alone
-
-
-def test_colours_alone_draw_no_depth(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: object) -> None:
+def test_colours_alone_draw_no_depth(monkeypatch):
+    def fail(*_):
         raise AssertionError("depth was drawn")
 
     monkeypatch.setattr(opengl_part.DevicePart, "draw_depth", fail)
@@ -156,7 +133,7 @@ def test_colours_alone_draw_no_depth(monkeypatch: pytest.MonkeyPatch) -> None:
             renderer.render_rgbd(LOOK_ALONG_X)
 
 
-def hit_depth_m(mesh: TexturedMesh, camera: CameraConfig) -> NDArray[np.float64]:
+def hit_depth_m(mesh, camera):
     """Depth (H, W) of the nearest of few triangles through each pixel's centre, in closed form.
 
     The camera stands at the origin and looks along world x.
@@ -178,7 +155,7 @@ def hit_depth_m(mesh: TexturedMesh, camera: CameraConfig) -> NDArray[np.float64]
     return depth
 
 
-def test_depth_is_that_of_the_nearest_triangle_at_the_pixels_centre() -> None:
+def test_depth_is_that_of_the_nearest_triangle_at_the_pixels_centre():
     mesh = soup(2000)
     with OpenglRenderer(mesh, CAMERA) as renderer:
         depth = renderer.render_rgbd(LOOK_ALONG_X)[1]
@@ -189,7 +166,7 @@ def test_depth_is_that_of_the_nearest_triangle_at_the_pixels_centre() -> None:
 
 
 @pytest.mark.parametrize("distance", [0.7, 0.75, 0.8, 0.95, 1.1, 1.4, 2.0])
-def test_fine_checkerboards_are_grey_at_every_distance(distance: float) -> None:
+def test_fine_checkerboards_are_grey_at_every_distance(distance):
     """From four texels a pixel on, two a sample, there is nothing to resolve."""
     checker = np.indices((1024, 1024)).sum(axis=0) % 2 * 255
     image = np.repeat(checker[..., None], 3, axis=2).astype(np.uint8)
@@ -199,9 +176,7 @@ def test_fine_checkerboards_are_grey_at_every_distance(distance: float) -> None:
     np.testing.assert_allclose(rgb.astype(int), 127, atol=4)
 
 
-def test_textures_larger_than_the_device_takes_are_reduced(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_textures_larger_than_the_device_takes_are_reduced(monkeypatch):
     image = np.zeros((300, 100, 3), np.uint8)
     image[:150] = 200
     with OpenglRenderer(TexturedMesh((facing_quad(2.0, 0.9, image),)), CAMERA) as renderer:
@@ -214,19 +189,19 @@ def test_textures_larger_than_the_device_takes_are_reduced(
     assert np.abs(reduced - full).mean() < 2.0
 
 
-def test_images_beyond_the_devices_limit_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_images_beyond_the_devices_limit_are_refused(monkeypatch):
     monkeypatch.setitem(shared_context().info, "GL_MAX_TEXTURE_SIZE", 128)
     with pytest.raises(InputError, match=r"camera: 64x48 pixels at 3 .* lower render\.supersamp"):
         OpenglRenderer(soup(10), camera_of(), supersampling=3)
 
 
-def test_closing_frees_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_closing_frees_the_device(monkeypatch):
     """Every object the renderer asked the context for is released by its end."""
     context = shared_context()
-    made: list[Any] = []
+    made = []
 
     class Recorder:
-        def __getattr__(self, name: str) -> Any:
+        def __getattr__(self, name):
             value = getattr(context, name)
             if name in ("buffer", "texture", "program", "vertex_array", "renderbuffer") or (
                 "framebuffer" in name or name == "depth_renderbuffer"
@@ -234,10 +209,10 @@ def test_closing_frees_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
                 return lambda *args, **kwargs: made.append(value(*args, **kwargs)) or made[-1]
             return value
 
-        def __enter__(self) -> Any:
+        def __enter__(self):
             return context.__enter__()
 
-        def __exit__(self, *error: Any) -> Any:
+        def __exit__(self, *error):
             return context.__exit__(*error)
 
     monkeypatch.setattr(opengl, "shared_context", Recorder)

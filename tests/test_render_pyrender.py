@@ -1,7 +1,5 @@
 """What only the pyrender backend has."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,8 @@ from synfeal.render import pyrender_backend
 from synfeal.render.pieces import pieces
 
 
-def test_without_egl_the_packages_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail() -> None:
+def test_without_egl_the_packages_are_named(monkeypatch):
+    def fail():
         raise ImportError("libEGL.so.1: cannot open shared object file")
 
     monkeypatch.setattr(pyrender_backend, "_pyrender", fail)
@@ -20,7 +18,7 @@ def test_without_egl_the_packages_are_named(monkeypatch: pytest.MonkeyPatch) -> 
         pyrender_backend._context.__wrapped__()
 
 
-def test_parts_with_too_many_vertices_are_drawn_in_pieces() -> None:
+def test_parts_with_too_many_vertices_are_drawn_in_pieces():
     rng = np.random.default_rng(0)
     vertices = rng.normal(size=(300, 3))
     faces = rng.integers(0, 300, (500, 3))

@@ -1,16 +1,12 @@
 """What rendering costs and is worth: errors in closed form, which variants, files, rows, figure."""
 
-from __future__ import annotations
-
 import importlib.util
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.config.models import RenderConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.frames import write_frame
@@ -34,17 +30,17 @@ SIMPLIFIES = importlib.util.find_spec("meshoptimizer") is not None
 LINE = Measured("opengl", 128, 96, 2, 1.0, 1000, 8.0, 2.0, 35.0, 0.0, 0.0, 1)
 
 
-def room() -> TexturedMesh:
+def room():
     """Six painted walls, and a ball that has nearly all of the triangles."""
     parts = furnished_room((2.0, 8.0)).parts
     return TexturedMesh((*parts[:6], *(part for part in parts if part.name == "ball")))
 
 
-def sizes(cameras: Sequence[CameraConfig]) -> list[tuple[int, int]]:
+def sizes(cameras):
     return [(camera.width, camera.height) for camera in cameras]
 
 
-def test_the_profiles_sizes_and_the_papers_are_measured_smallest_first_and_once() -> None:
+def test_the_profiles_sizes_and_the_papers_are_measured_smallest_first_and_once():
     small, paper = camera_of(width=128, height=96), camera_of(width=640, height=480, far_m=9.0)
     assert sizes(speed.measured_cameras(small, LARGE, 3)) == [(80, 60), (128, 96), (640, 480)]
     assert sizes(speed.measured_cameras(small, LARGE, 1)) == [(80, 60)]
@@ -53,7 +49,7 @@ def test_the_profiles_sizes_and_the_papers_are_measured_smallest_first_and_once(
     assert sizes(speed.measured_cameras(small, wide, 3)) == [(128, 96), (640, 480)]
 
 
-def test_colour_errors_in_closed_form() -> None:
+def test_colour_errors_in_closed_form():
     expected = np.full((2, 4, 4, 3), 100.0, np.float32)
     rgb = np.full(expected.shape, 100, np.uint8)
     rgb[0, :2], rgb[1, :2] = 104, 96  # half the pixels are 4 levels off
@@ -62,7 +58,7 @@ def test_colour_errors_in_closed_form() -> None:
     assert found["psnr_db"] == pytest.approx(20 * np.log10(255) - 10 * np.log10(8.0), abs=1e-3)
 
 
-def test_depth_errors_look_where_both_hit() -> None:
+def test_depth_errors_look_where_both_hit():
     expected = np.array([[1.0, 1.0, 1.0, 1.0, np.inf, 2.0]], np.float32)
     depth = np.array([[1.001, 0.998, 1.003, 1.05, 1.0, np.inf]], np.float32)
     found = speed.depth_errors(depth, expected)
@@ -71,12 +67,12 @@ def test_depth_errors_look_where_both_hit() -> None:
 
 
 @pytest.fixture(scope="module")
-def lines() -> list[Measured]:
+def lines():
     render = RenderConfig.model_validate({"backend": BACKENDS[0], "supersampling": 2})
     return speed.measure_speed(room(), [SMALL, LARGE], room_poses(3, seed=1), render)
 
 
-def drawn_by(lines: list[Measured], camera: CameraConfig, name: str) -> list[Measured]:
+def drawn_by(lines, camera, name):
     """The full mesh through one camera by one backend, by number of samples."""
     full = max(line.faces for line in lines)
     found = [
@@ -88,7 +84,7 @@ def drawn_by(lines: list[Measured], camera: CameraConfig, name: str) -> list[Mea
     return sorted(found, key=lambda line: line.supersampling)
 
 
-def test_every_working_backend_is_measured_and_one_variant_is_chosen(lines: list[Measured]) -> None:
+def test_every_working_backend_is_measured_and_one_variant_is_chosen(lines):
     for camera in (SMALL, LARGE):
         (used,) = (row for row in lines if row.chosen and row.width == camera.width)
         assert (used.backend, used.supersampling, used.texture_scale) == (BACKENDS[0], 2, 1.0)
@@ -98,7 +94,7 @@ def test_every_working_backend_is_measured_and_one_variant_is_chosen(lines: list
             assert counts == ([] if slow and camera is LARGE else list(speed.SUPERSAMPLING[name]))
 
 
-def test_more_samples_are_closer_and_backends_agree(lines: list[Measured]) -> None:
+def test_more_samples_are_closer_and_backends_agree(lines):
     for name in BACKENDS:
         found = drawn_by(lines, SMALL, name)
         errors = [line.mean_abs_error for line in found]
@@ -111,7 +107,7 @@ def test_more_samples_are_closer_and_backends_agree(lines: list[Measured]) -> No
     assert all(line.ms_per_frame > 0 for line in lines)
 
 
-def test_less_detail_is_further_off(lines: list[Measured]) -> None:
+def test_less_detail_is_further_off(lines):
     for camera in (SMALL, LARGE):
         used, *others = [line for line in lines if line.width == camera.width]
         textures = [line for line in others if line.texture_scale < 1.0]
@@ -125,9 +121,7 @@ def test_less_detail_is_further_off(lines: list[Measured]) -> None:
             assert line.faces == pytest.approx(share * used.faces, rel=0.1)
 
 
-def test_without_the_simplifier_the_rest_is_measured_and_it_says_so(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_without_the_simplifier_the_rest_is_measured_and_it_says_so(monkeypatch, caplog):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     mesh = room()
     found = speed.less_detailed(speed.Variant(mesh, RenderConfig()))
@@ -135,26 +129,26 @@ def test_without_the_simplifier_the_rest_is_measured_and_it_says_so(
     assert "pip install meshoptimizer" in caplog.text
 
 
-def test_speeds_are_told_in_turns_with_the_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_speeds_are_told_in_turns_with_the_chosen(monkeypatch):
     """A machine that grows slower while it measures changes no ratio."""
 
     class Drawing:
-        def __init__(self, cost: float) -> None:
+        def __init__(self, cost):
             self.cost = cost
 
-        def render(self, _: object) -> None:
+        def render(self, _):
             nonlocal now, load
             load *= 1.0001
             now += self.cost * load
 
     now, load = 0.0, 1.0
     monkeypatch.setattr(speed.time, "perf_counter", lambda: now)
-    seconds = speed.seconds_of([Drawing(1.0), Drawing(3.0)], np.zeros((5, 4, 4)))  # type: ignore[list-item]
+    seconds = speed.seconds_of([Drawing(1.0), Drawing(3.0)], np.zeros((5, 4, 4)))
     assert seconds.shape == (5 * speed.ROUNDS, 2)
     np.testing.assert_allclose(seconds[:, 1] / seconds[:, 0], 3.0, rtol=1e-3)
 
 
-def test_a_scene_is_measured_from_its_files(tmp_path: Path) -> None:
+def test_a_scene_is_measured_from_its_files(tmp_path):
     save_glb(tmp_path / "mesh.glb", room())
     poses = room_poses(4, seed=2)
     index = np.arange(len(poses))
@@ -180,9 +174,7 @@ def test_a_scene_is_measured_from_its_files(tmp_path: Path) -> None:
         ",".join(SCHEMA) + "\nopengl,128\n",
     ],
 )
-def test_a_file_that_is_no_measurement_is_named_in_one_line(
-    tmp_path: Path, text: str | None
-) -> None:
+def test_a_file_that_is_no_measurement_is_named_in_one_line(tmp_path, text):
     path = tmp_path / "scenes" / "large_room" / "render_speed.csv"
     if text is not None:
         path.parent.mkdir(parents=True)
@@ -203,14 +195,14 @@ MADE_UP = [
 
 
 @pytest.fixture
-def made_up(tmp_path: Path) -> Path:
+def made_up(tmp_path):
     write_speed(tmp_path / "scenes" / "large_room" / "render_speed.csv", MADE_UP)
     speeds = speeds_of("render", ["large_room"], tmp_path)
     write_frame(tmp_path / "tables" / "speed_vs_error.csv", speeds)
     return tmp_path
 
 
-def test_rows_say_what_each_variant_is(made_up: Path) -> None:
+def test_rows_say_what_each_variant_is(made_up):
     rows = read(made_up / "tables" / "speed_vs_error.csv")
     assert [row["variant"] for row in rows] == [
         "128x96, opengl 2x2",
@@ -228,7 +220,7 @@ def test_rows_say_what_each_variant_is(made_up: Path) -> None:
     assert [row["chosen"] for row in rows] == ["1", "0", "0", "0", "0", "1"]
 
 
-def test_the_figure_has_a_panel_per_size_with_the_choice_ringed(made_up: Path) -> None:
+def test_the_figure_has_a_panel_per_size_with_the_choice_ringed(made_up):
     figure = render_speed.draw(Results(made_up, design_of(())))
     assert figure is not None
     small, large = figure.axes
@@ -245,7 +237,7 @@ def test_the_figure_has_a_panel_per_size_with_the_choice_ringed(made_up: Path) -
     assert {text.get_text() for text in small.texts} == {"1/4", "25%"}
 
 
-def test_the_figure_is_written_under_its_name(made_up: Path) -> None:
+def test_the_figure_is_written_under_its_name(made_up):
     write_figures(Results(made_up, design_of(())), made_up / "figures")
     assert {path.name for path in (made_up / "figures").iterdir()} == {
         "speed_vs_error_render.png",

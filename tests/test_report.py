@@ -1,20 +1,16 @@
 """Tables from results: known scores in, exact cells out."""
 
 import math
-from collections import Counter
 
 import pytest
 
 from synfeal.config import MODELS
-from synfeal.errors import InputError
-from synfeal.report.stats import percent_change
 from tests.report_results import (
     ROWS,
     SIZES,
     TABLE4,
     cell,
     complete_results,
-    design_of,
     experiment,
     failed_metrics,
     fill,
@@ -120,12 +116,6 @@ def test_table_5_gives_the_change_against_the_same_run_with_transfer_learning(re
     assert r"\textcolor{green!45!black}{$+$0.0\%}" in tex  # the paper: 0.0 % is green
 
 
-def test_table_5_asks_for_the_runs_it_compares_with(design):
-    runs = design_of(design, 2).table_runs("table5_from_scratch")
-    assert Counter(run.init for run in runs) == {"scratch": 40, "pretrained": 40}
-    assert len(design_of(design).table_runs(TABLE4)) == 40
-
-
 def test_a_level_the_paper_does_not_have_has_no_published_value(tmp_path):
     noise = {"labels": "noise", "noise_m": 0.05, "noise_deg": 0}
     row = experiment("table3_inconsistencies", block="position", **noise)
@@ -202,33 +192,3 @@ def test_repetitions_are_averaged_with_their_spread_and_failures_stay_visible(tm
     assert (part["n_seeds"], part["failed"]) == ("3", "125")
     assert r"0.30 $\pm$ 0.10 m, 10.00 $\pm$ 0.00$^\circ$" in tex
     assert "125 of 375 predictions failed, 2 of 3 runs have a score." in tex
-
-
-def test_percent_change():
-    assert percent_change(0.42, 0.28) == pytest.approx(50)
-    assert percent_change(0.14, 0.28) == pytest.approx(-50)
-    assert percent_change(None, 1.0) is None
-    assert percent_change(1.0, None) is None
-    assert percent_change(1.0, 0.0) is None
-
-
-@pytest.mark.parametrize(
-    ("content", "expected"),
-    [
-        (None, "No such file"),
-        ("{", "cannot be read as JSON"),
-        ("[]", "mapping"),
-        ('{"position_m": 1}', "orientation_deg, .* missing"),
-    ],
-)
-def test_unusable_scores_are_one_line_that_names_the_file(tmp_path, content, expected):
-    row = experiment(TABLE4)
-    fill(tmp_path, [row])
-    path = tmp_path / "runs/large_room/6k/synfeal/pretrained/posenet/seed0/metrics.json"
-    path.unlink()
-    if content is not None:
-        path.write_text(content)
-    with pytest.raises(InputError, match=expected) as refusal:
-        make(TABLE4, [row], tmp_path)
-    assert str(path) in str(refusal.value)
-    assert "\n" not in str(refusal.value)

@@ -1,10 +1,7 @@
 """report.tex: everything in one document, which compiles; LaTeX of a table, letter by letter."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
-from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -15,15 +12,7 @@ from synfeal.frames import TEXT, read_frame, write_frame
 from synfeal.report.document import CLAIM_COLUMNS, write_report_document
 from synfeal.report.figures import CAPTIONS
 from synfeal.report.published import FOLDER
-from synfeal.report.sheet import (
-    LINE,
-    PAPER,
-    VALUE,
-    Sheet,
-    sheet_latex,
-    sheet_markdown,
-    write_latex,
-)
+from synfeal.report.sheet import LINE, PAPER, VALUE, Sheet, sheet_latex, sheet_markdown, write_latex
 
 GOLDEN = r"""\begin{table*}[tp]
 \centering\footnotesize
@@ -46,7 +35,7 @@ Set & Error against & PoseNet & PoseNet2 \\
 """  # noqa: E501
 
 
-def small_sheet() -> Sheet:
+def small_sheet():
     lines = pd.DataFrame(
         [
             ("", 0, "labels", "6k", "", "labels"),
@@ -68,11 +57,11 @@ def small_sheet() -> Sheet:
     return Sheet("small", "Errors of 2 & 3.", headings, lines, table, ("A remark.",))
 
 
-def test_latex_of_a_small_table_letter_by_letter() -> None:
+def test_latex_of_a_small_table_letter_by_letter():
     assert sheet_latex(small_sheet()) == GOLDEN
 
 
-def test_markdown_of_a_small_table_letter_by_letter() -> None:
+def test_markdown_of_a_small_table_letter_by_letter():
     assert sheet_markdown(small_sheet()) == (
         "**Errors of 2 & 3.**\n\n"
         "| Set | Error against | PoseNet | PoseNet2 |\n"
@@ -85,7 +74,7 @@ def test_markdown_of_a_small_table_letter_by_letter() -> None:
 
 
 @pytest.fixture
-def root(tmp_path: Path) -> Path:
+def root(tmp_path):
     """Results with one table, every published claim, and two figures."""
     write_latex(tmp_path / "tables" / "small.tex", small_sheet())
     published = read_frame(FOLDER / "claims.csv", {"id": TEXT, "statement": TEXT, "footnote": TEXT})
@@ -97,7 +86,7 @@ def root(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_document_holds_claims_tables_and_the_figures_there_are(root: Path) -> None:
+def test_document_holds_claims_tables_and_the_figures_there_are(root):
     write_report_document(root, [root / "tables" / "small.tex"], root / "report.tex")
     text = (root / "report.tex").read_text(encoding="utf-8")
     assert all(f"\nC{number} & " in text for number in range(1, 17))
@@ -106,14 +95,14 @@ def test_document_holds_claims_tables_and_the_figures_there_are(root: Path) -> N
     assert "55 \\%" in text
 
 
-def test_missing_claims_are_an_input_error(root: Path) -> None:
+def test_missing_claims_are_an_input_error(root):
     (root / "claims.csv").unlink()
     with pytest.raises(InputError, match=r"claims\.csv"):
         write_report_document(root, [], root / "report.tex")
 
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
-def test_document_compiles(root: Path) -> None:
+def test_document_compiles(root):
     write_report_document(root, [root / "tables" / "small.tex"], root / "report.tex")
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "report.tex"]
     for _ in range(2):

@@ -99,12 +99,7 @@ def test_label_error_marks_borders_and_assisted_batches(results):
         for box in [bar.get_paths()[0].get_extents()]
     ]
     colours = [METHOD_STYLES[method]["color"].lower() for method in METHODS]
-    assert bars == [
-        (0, 4, "#ffffff"),
-        (4, 8, colours[0]),
-        (0, 4, "#ffffff"),
-        (4, 8, colours[1]),
-    ]
+    assert bars == [(0, 4, "#ffffff"), (4, 8, colours[0]), (0, 4, "#ffffff"), (4, 8, colours[1])]
 
 
 def test_trajectories_draw_both_paths_and_ring_what_was_assisted(results):

@@ -150,13 +150,6 @@ def test_nothing_is_requested_and_nothing_sticks_out(page, tmp_path):
     assert images == [True, True]
 
 
-def test_without_webgl_the_page_says_so(page, tmp_path):
-    without = tmp_path / "without.html"
-    without.write_text(page.read_text().replace('getContext("webgl2"', 'getContext("none"'))
-    probe = "return [...document.querySelector('.room').children].map((p) => p.offsetHeight > 0)"
-    assert asked(without, tmp_path, probe) == [True, False, True, False, False]
-
-
 def test_paths_are_cut_where_their_number_changes():
     table = straight([[0.0, 0, 0], [1, 0, 0], [5, 5, 5], [2, 0, 0], [3, 0, 0], [4, 0, 0]])
     table.path[:] = [0, 0, 1, 2, 2, 2]

@@ -62,14 +62,14 @@ class Residual(NamedTuple):
     shared: float
 
 
-def lifted(pixel: Floats, depth_m: Floats, pose: Floats, intrinsics: Intrinsics) -> Floats:
+def lifted(pixel, depth_m, pose, intrinsics):
     """World points (N, 3) at depths (N,) behind places (N, 2) in the image."""
     fx, fy, cx, cy = intrinsics
     ray = np.column_stack([(pixel[:, 0] - cx) / fx, (pixel[:, 1] - cy) / fy, np.ones(len(pixel))])
     return (ray * depth_m[:, None]) @ pose[:3, :3].T + pose[:3, 3]
 
 
-def projected(point: Floats, pose: Floats, intrinsics: Intrinsics) -> tuple[Floats, Floats]:
+def projected(point, pose, intrinsics):
     """Places (N, 2) in the image and depths (N,) of world points (N, 3)."""
     cam_from_world = inverse(pose)
     in_cam = point @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
@@ -80,7 +80,7 @@ def projected(point: Floats, pose: Floats, intrinsics: Intrinsics) -> tuple[Floa
     return np.column_stack(place), z
 
 
-def flat(depth_m: Floats) -> Floats:
+def flat(depth_m):
     """1 where the surface is a plane: there, and only there, 1 / z is linear in the image."""
     inverse_depth = 1.0 / depth_m
     bend = np.zeros_like(depth_m)
@@ -91,13 +91,13 @@ def flat(depth_m: Floats) -> Floats:
     return (bend < 1e-4).astype(np.float64)
 
 
-def at(image: Floats, pixel: Floats, order: int = 1) -> Floats:
+def at(image, pixel, order=1):
     """An image at places (N, 2); the centre of the first pixel is (0.5, 0.5)."""
     coordinates = (pixel - 0.5).T[::-1]
     return np.asarray(map_coordinates(image, coordinates, order=order, mode="nearest"))
 
 
-def residual(first: Frame, second: Frame, intrinsics: Intrinsics) -> Residual:
+def residual(first, second, intrinsics):
     """How far what the first frame sees is from what the second sees at the same place."""
     height, width = first.depth_m.shape
     row, column = np.indices((height, width))
@@ -122,7 +122,7 @@ def residual(first: Frame, second: Frame, intrinsics: Intrinsics) -> Residual:
     )
 
 
-def shift(image: Floats, place: Floats, expected: Floats) -> float:
+def shift(image, place, expected):
     """By how much places must move for the image to have the values expected there."""
     gradient = np.column_stack([at(g, place) for g in np.gradient(image)[::-1]])
     off = expected - at(image, place, order=3)
@@ -130,7 +130,7 @@ def shift(image: Floats, place: Floats, expected: Floats) -> float:
     return float(np.linalg.norm(np.linalg.lstsq(gradient[usual], off[usual], rcond=None)[0]))
 
 
-def frames_of(name: str) -> list[Frame]:
+def frames_of(name):
     with opener_of(name)(furnished_room(SMOOTH_TEXELS), CAMERA) as renderer:
         images = [renderer.render_rgbd(pose) for pose in POSES]
     return [
@@ -140,11 +140,11 @@ def frames_of(name: str) -> list[Frame]:
 
 
 @pytest.fixture(scope="module", params=BACKENDS)
-def frames(request: pytest.FixtureRequest) -> list[Frame]:
+def frames(request):
     return frames_of(request.param)
 
 
-def worst(frames: list[Frame], intrinsics: Intrinsics) -> Residual:
+def worst(frames, intrinsics):
     """The worst of each figure over all pairs of frames."""
     found = [residual(frames[i], frames[j], intrinsics) for i, j in PAIRS]
     return Residual(
@@ -155,7 +155,7 @@ def worst(frames: list[Frame], intrinsics: Intrinsics) -> Residual:
     )
 
 
-def test_reprojection_closes(frames: list[Frame]) -> None:
+def test_reprojection_closes(frames):
     found = worst(frames, intrinsics_of(CAMERA))
     assert found.shared > 0.9  # of the points that both have in view
     assert found.px <= 0.001
@@ -164,22 +164,9 @@ def test_reprojection_closes(frames: list[Frame]) -> None:
 
 
 @pytest.mark.parametrize("shift_px", [(0.5, 0.0), (0.0, -0.5), (0.5, 0.5)])
-def test_half_a_pixel_would_be_noticed(frames: list[Frame], shift_px: tuple[float, float]) -> None:
+def test_half_a_pixel_would_be_noticed(frames, shift_px):
     fx, fy, cx, cy = intrinsics_of(CAMERA)
     found = worst(frames, Intrinsics(fx, fy, cx + shift_px[0], cy + shift_px[1]))
     assert found.shift_px > 0.4
     assert found.px > 0.02
     assert found.m > 1e-3
-
-
-@pytest.mark.parametrize("axes", [(-1, 1, 1), (1, -1, 1), (-1, -1, 1), (1, -1, -1)])
-def test_a_flipped_axis_would_be_noticed(frames: list[Frame], axes: tuple[int, int, int]) -> None:
-    flip = np.diag([*axes, 1.0])
-    wrong = [frame._replace(world_from_cam=frame.world_from_cam @ flip) for frame in frames]
-    found = worst(wrong, intrinsics_of(CAMERA))
-    assert found.shared < 0.5
-
-
-def test_swapped_focal_lengths_would_be_noticed(frames: list[Frame]) -> None:
-    fx, fy, cx, cy = intrinsics_of(CAMERA)
-    assert worst(frames, Intrinsics(fy, fx, cx, cy)).shift_px > 0.4

@@ -1,9 +1,5 @@
 """The robustness table, of answers that are known."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -19,13 +15,13 @@ from tests.trained_localizers import answering, save
 PX = 32
 
 
-def packed(path: Path, frames: np.ndarray) -> Path:
+def packed(path, frames):
     with new_packed(path, len(frames), PX) as array:
         array[:] = frames
     return path
 
 
-def test_errors_are_those_of_known_answers(tmp_path: Path) -> None:
+def test_errors_are_those_of_known_answers(tmp_path):
     frames = np.random.default_rng(0).integers(0, 256, (4, PX, PX, 3), np.uint8)
     index, upright = np.arange(4), np.tile([1.0, 0.0, 0.0, 0.0], (4, 1))
     train = PoseTable(index, index, np.column_stack([index, 0 * index, 0 * index]) * 1.0, upright)

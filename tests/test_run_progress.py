@@ -1,7 +1,5 @@
 """What a person sees of a run: the time left, the first scores, and what went wrong."""
 
-from __future__ import annotations
-
 import heapq
 import io
 import os
@@ -26,7 +24,7 @@ REPOSITORY = Path(__file__).parent.parent
 
 
 @pytest.mark.parametrize("factor", [1 / 3, 1.0, 4.0])
-def test_the_time_left_finds_the_speed_of_the_machine(factor: float) -> None:
+def test_the_time_left_finds_the_speed_of_the_machine(factor):
     """A list schedule of known jobs, whose training runs are slower than the rest by a half more.
 
     From a third of the way on, what is said to be left is within 20 % of what is left, or within
@@ -40,9 +38,9 @@ def test_the_time_left_finds_the_speed_of_the_machine(factor: float) -> None:
         for job, seconds in expected.items()
     }
     left, now_s = TimeLeft(expected, 2), 0.0
-    running: list[tuple[float, str]] = []
+    running = []
     waiting = [str(job) for job in rng.permutation(list(expected))]
-    said: list[tuple[float, float]] = []
+    said = []
     while waiting or running:
         while waiting and len(running) < 2:
             job = waiting.pop()
@@ -58,7 +56,7 @@ def test_the_time_left_finds_the_speed_of_the_machine(factor: float) -> None:
             assert seconds == pytest.approx(now_s - at_s, rel=0.2, abs=0.02 * now_s)
 
 
-def test_every_job_of_a_profile_has_an_expected_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_job_of_a_profile_has_an_expected_time(monkeypatch):
     monkeypatch.chdir(REPOSITORY)
     config = load_config(REPOSITORY / "config/config.yaml", REPOSITORY / "config/smoke.yaml")
     experiments = read_experiments(config)
@@ -69,24 +67,24 @@ def test_every_job_of_a_profile_has_an_expected_time(monkeypatch: pytest.MonkeyP
     assert plan.expected_s["train/large_room/6k/synfeal/pretrained/posenet/seed0"] > 2
 
 
-def test_a_job_is_named_as_its_measurement() -> None:
+def test_a_job_is_named_as_its_measurement():
     assert job_name("results/mini/benchmarks/render/room/seq-01.tsv") == "render/room/seq-01"
 
 
 @pytest.fixture
-def runs(tmp_path: Path) -> tuple[Run, ...]:
+def runs(tmp_path):
     """Two repetitions of every localizer on one data set, one of one on another."""
     both = [Run("room", "6k", "sfm", "scratch", model, seed) for model in MODELS for seed in (0, 1)]
     return (*both, Run("room", "6k", "synfeal", "pretrained", "posenet", 0))
 
 
-def write_scores(root: Path, run: Run, scores: dict[str, object]) -> Path:
+def write_scores(root, run, scores):
     path = root / "runs" / run.directory / "metrics.json"
     write_json(path, scores)
     return path
 
 
-def test_the_table_fills_as_scores_come(tmp_path: Path, runs: tuple[Run, ...]) -> None:
+def test_the_table_fills_as_scores_come(tmp_path, runs):
     scores = FirstScores(tmp_path, runs)
     row = ("room", "6k", "sfm", "scratch")
     for run in runs:
@@ -106,9 +104,7 @@ def test_the_table_fills_as_scores_come(tmp_path: Path, runs: tuple[Run, ...]) -
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_the_view_keeps_rows_and_one_line(
-    terminal: bool, tmp_path: Path, runs: tuple[Run, ...]
-) -> None:
+def test_the_view_keeps_rows_and_one_line(terminal, tmp_path, runs):
     text, now_s = io.StringIO(), [0.0]
     console = Console(file=text, force_terminal=terminal, width=100, height=12)
     view = RunView(console, lambda: now_s[0])
@@ -152,7 +148,7 @@ onstart:
 """
 
 
-def test_snakemake_shows_a_run_by_the_plugin(tmp_path: Path) -> None:
+def test_snakemake_shows_a_run_by_the_plugin(tmp_path):
     (tmp_path / "Snakefile").write_text(SNAKEFILE)
     command = [sys.executable, "-m", "snakemake", "--logger", "synfeal", "--cores", "1"]
     path = os.pathsep.join(map(str, (REPOSITORY, REPOSITORY / "workflow/plugins")))

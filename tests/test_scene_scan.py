@@ -1,19 +1,16 @@
 """How procedural scenes become scans: grids, light, rounding, warping, holes, textures."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from synfeal.mesh.triangles import weld
 from synfeal.scenes.atlas import ATLAS_PX, GUTTER_PX, laid_out, pack
 from synfeal.scenes.bake import scanned_mesh
-from synfeal.scenes.grids import Surface, jittered, refined, surface_of
+from synfeal.scenes.grids import jittered, refined, surface_of
 from synfeal.scenes.lighting import Lamp, Lighting, Sun, baked
-from synfeal.scenes.patches import Item, Patch, Points
+from synfeal.scenes.patches import Item, Patch
 from synfeal.scenes.primitives import box, level, tube, turned, upright
 from synfeal.scenes.scan import Scanner, rounded, seen_faces, stations
 
@@ -22,15 +19,15 @@ DARK = np.zeros((2, 2, 2, 3), np.float32)
 LOWER, UPPER = (0.0, 0.0, 0.0), (4.0, 4.0, 3.0)
 
 
-def rng() -> np.random.Generator:
+def rng():
     return np.random.default_rng(0)
 
 
-def grey_box(size_m: tuple[float, float, float]) -> Item:
+def grey_box(size_m):
     return box(rng(), size_m, lambda c: c.plain((0.5, 0.5, 0.5)), 20)
 
 
-def room() -> list[Patch]:
+def room():
     """A closed room of 4 × 4 × 3 m seen from inside."""
     corners = ((4, 0), (0, 0), (0, 4), (4, 4), (4, 0))
     walls = [upright(a, b, 0, 3) for a, b in pairwise(corners)]
@@ -38,19 +35,19 @@ def room() -> list[Patch]:
     return [Patch(points, GREY) for points in (*walls, *ends)]
 
 
-def welded_box(size_m: tuple[float, float, float], cell_m: float) -> tuple[Points, Surface]:
+def welded_box(size_m, cell_m):
     surface = surface_of(rng(), grey_box(size_m).patches, cell_m)
     return weld(surface.points_m)[0], surface
 
 
-def area_of(points: Points, faces: NDArray[np.int64]) -> float:
+def area_of(points, faces):
     corner = points[faces]
     sides = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     return float(np.linalg.norm(sides, axis=1).sum() / 2)
 
 
 @pytest.mark.parametrize("shape", ["turned", "tube"])
-def test_round_things_face_outwards(shape: str) -> None:
+def test_round_things_face_outwards(shape):
     if shape == "turned":
         profile = [(0.5, 1.0), (0.5, 0.0)]
         (patch,) = turned(rng(), profile, lambda c: c.plain((1, 0, 0)), 50, 64).patches
@@ -63,7 +60,7 @@ def test_round_things_face_outwards(shape: str) -> None:
     assert max(patch.picture.shape) / min(patch.picture.shape[:2]) == pytest.approx(np.pi, rel=0.02)
 
 
-def test_grid_has_the_area_of_its_patch_and_faces_its_front() -> None:
+def test_grid_has_the_area_of_its_patch_and_faces_its_front():
     surface = surface_of(rng(), room(), 0.13)
     assert area_of(surface.points_m, surface.faces) == pytest.approx(2 * 16 + 4 * 12)
     corner = surface.points_m[surface.faces]
@@ -72,7 +69,7 @@ def test_grid_has_the_area_of_its_patch_and_faces_its_front() -> None:
     assert (np.sum(normals * towards_middle, axis=1) > 0).all()
 
 
-def test_neighbouring_patches_divide_their_common_rim_alike() -> None:
+def test_neighbouring_patches_divide_their_common_rim_alike():
     points, surface = welded_box((0.62, 0.4, 1.1), 0.047)
     faces = weld(surface.points_m)[1][surface.faces]
     sides = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
@@ -81,7 +78,7 @@ def test_neighbouring_patches_divide_their_common_rim_alike() -> None:
     assert len(points) - len(count) + len(faces) == 2  # Euler
 
 
-def test_jitter_leaves_rims_and_pictures_in_place() -> None:
+def test_jitter_leaves_rims_and_pictures_in_place():
     points = level((0, 3), (0, 2), 1)
     grid = refined(Patch(points, GREY), 0.1)
     moved, shares = jittered(rng(), grid, grid.points_m)
@@ -94,7 +91,7 @@ def test_jitter_leaves_rims_and_pictures_in_place() -> None:
         np.testing.assert_array_equal(change[edge], 0)
 
 
-def test_rounding_keeps_planes_and_takes_off_edges() -> None:
+def test_rounding_keeps_planes_and_takes_off_edges():
     points, surface = welded_box((1.0, 1.0, 1.0), 0.1)
     index = weld(surface.points_m)[1]
     smooth = rounded(points, index[surface.edges], index[surface.faces])
@@ -106,7 +103,7 @@ def test_rounding_keeps_planes_and_takes_off_edges() -> None:
     assert np.abs(smooth - (0, 0, 0.5)).max() <= 0.5 + 1e-12
 
 
-def test_a_box_in_a_room_hides_what_is_below_and_behind_it() -> None:
+def test_a_box_in_a_room_hides_what_is_below_and_behind_it():
     wardrobe = grey_box((1.0, 0.5, 1.0)).placed(2.0, 3.75)
     surface = surface_of(rng(), [*room(), *wardrobe.patches], 0.1)
     seen = seen_faces(surface.points_m, surface.faces, np.array([[2.0, 1.0, 1.5]]))
@@ -120,7 +117,7 @@ def test_a_box_in_a_room_hides_what_is_below_and_behind_it() -> None:
     assert seen[front].all()
 
 
-def test_stations_lie_evenly_within_the_room() -> None:
+def test_stations_lie_evenly_within_the_room():
     places = stations(LOWER, UPPER, (2, 4, 1))
     assert places.shape == (8, 3)
     np.testing.assert_allclose(np.unique(places[:, 0]), [1, 3])
@@ -128,9 +125,7 @@ def test_stations_lie_evenly_within_the_room() -> None:
     np.testing.assert_allclose(places[:, 2], 1.5)
 
 
-def light_on(
-    patches: list[Patch], lighting: Lighting, albedo: float = 0.0
-) -> tuple[Surface, NDArray[np.float64]]:
+def light_on(patches, lighting, albedo=0.0):
     """Linear light (V, 3) on a surface, up to the exposure."""
     surface = surface_of(rng(), patches, 0.1)
     count = len(surface.points_m)
@@ -139,7 +134,7 @@ def light_on(
     return surface, factor.astype(np.float64) ** 2.2
 
 
-def test_lamp_light_falls_off_as_it_should() -> None:
+def test_lamp_light_falls_off_as_it_should():
     lamp = Lamp((0.0, 0.0, 2.0), (0, 0, -1), (1, 1, 1))
     floor = [Patch(level((-2, 2), (-2, 2), 0), GREY)]
     surface, light = light_on(floor, Lighting((-2, -2, 0), (2, 2, 3), DARK, [lamp], None))
@@ -150,7 +145,7 @@ def test_lamp_light_falls_off_as_it_should() -> None:
     )
 
 
-def test_table_shades_the_floor_from_a_lamp() -> None:
+def test_table_shades_the_floor_from_a_lamp():
     lamp = Lamp((2.0, 2.0, 2.8), (0, 0, -1), (1, 1, 1))
     top = grey_box((1.0, 1.0, 0.05)).placed(2.0, 2.0, 1.4)
     surface, light = light_on([*room(), *top.patches], Lighting(LOWER, UPPER, DARK, [lamp], None))
@@ -161,7 +156,7 @@ def test_table_shades_the_floor_from_a_lamp() -> None:
     assert (light[on_floor & (off > 1.15) & (off < 1.9)] > 0).all()
 
 
-def test_sun_falls_through_its_opening_only() -> None:
+def test_sun_falls_through_its_opening_only():
     opening = (((0.0, 1.0, 1.0), (0.0, 2.0, 2.0)),)
     sun = Sun((1.0, 0.0, -1.0), (1, 1, 1), opening)
     ambient = np.full_like(DARK, 1e-3)
@@ -175,7 +170,7 @@ def test_sun_falls_through_its_opening_only() -> None:
     assert not bright[outside].any()
 
 
-def test_a_red_wall_tints_its_neighbours() -> None:
+def test_a_red_wall_tints_its_neighbours():
     patches = room()
     surface = surface_of(rng(), patches, 0.2)
     albedo = np.full((len(surface.points_m), 3), 0.5, np.float32)
@@ -190,7 +185,7 @@ def test_a_red_wall_tints_its_neighbours() -> None:
     assert redness[floor & near & ~red].mean() > redness[floor & far].mean() + 0.03 > 1.03
 
 
-def test_packing_never_overlaps() -> None:
+def test_packing_never_overlaps():
     sizes = [(int(h), int(w)) for h, w in rng().integers(5, 900, (150, 2))]
     places, atlases = pack(sizes)
     assert len(atlases) > 1
@@ -203,7 +198,7 @@ def test_packing_never_overlaps() -> None:
     assert sum(grid.sum() for grid in used) == sum(high * wide for high, wide in sizes)
 
 
-def test_pictures_keep_a_rim_of_their_own_colour() -> None:
+def test_pictures_keep_a_rim_of_their_own_colour():
     pictures = [np.full((20, 30, 3), value, np.uint8) for value in (10, 200)]
     places, (texture,) = laid_out(pictures)
     for (_, row, column), picture in zip(places, pictures, strict=True):
@@ -213,7 +208,7 @@ def test_pictures_keep_a_rim_of_their_own_colour() -> None:
         assert (around == picture[0, 0, 0]).all()
 
 
-def test_scan_shows_every_picture_where_it_belongs() -> None:
+def test_scan_shows_every_picture_where_it_belongs():
     """A ramp painted on the floor is found again through the texture coordinates."""
     ramp = np.repeat(np.linspace(0, 255, 400)[None, :, None], 300, axis=0).repeat(3, axis=2)
     floor = Patch(level((0, 4), (0, 4), 0), ramp.astype(np.uint8), glow=1.0)

@@ -1,7 +1,5 @@
 """Procedural scenes: volumes of the paper, valid textured meshes, same bytes, room for a camera."""
 
-from __future__ import annotations
-
 import hashlib
 from functools import cache
 
@@ -9,7 +7,6 @@ import numpy as np
 import pytest
 
 from synfeal.errors import InputError
-from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import weld
 from synfeal.scenes import BUILDERS, build_scene
@@ -27,16 +24,16 @@ every_scene = pytest.mark.parametrize("name", sorted(BUILDERS))
 
 
 @cache
-def scene(name: str) -> TexturedMesh:
+def scene(name):
     return build_scene(name, 0)
 
 
 @cache
-def caster(name: str) -> RayCaster:
+def caster(name):
     return RayCaster(*scene(name).merged())
 
 
-def digest(mesh: TexturedMesh) -> str:
+def digest(mesh):
     value = hashlib.sha256()
     for part in mesh.parts:
         for array in (part.vertices_m, part.faces, part.uv, part.texture):
@@ -45,7 +42,7 @@ def digest(mesh: TexturedMesh) -> str:
     return value.hexdigest()
 
 
-def views(name: str, n: int) -> tuple[np.ndarray, np.ndarray]:
+def views(name, n):
     """Origins in the sampling box and directions over the whole sphere, (n, 3) each."""
     rng = np.random.default_rng(5)
     lower, upper = np.array(BOXES_M[name]).T
@@ -55,25 +52,25 @@ def views(name: str, n: int) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def test_unknown_builder_is_an_input_error() -> None:
+def test_unknown_builder_is_an_input_error():
     with pytest.raises(InputError, match="large_room"):
         build_scene("cathedral", 0)
 
 
 @pytest.mark.parametrize("name", sorted(VOLUMES_M3))
-def test_volume_is_the_papers(name: str) -> None:
+def test_volume_is_the_papers(name):
     volume = float(np.prod(np.diff(scene(name).bounds_m, axis=0)))
     assert volume == pytest.approx(VOLUMES_M3[name], rel=0.01)
 
 
-def test_same_seed_same_bytes_and_another_seed_another_scene() -> None:
+def test_same_seed_same_bytes_and_another_seed_another_scene():
     again = build_scene("random_room", 0)
     assert digest(again) == digest(scene("random_room"))
     assert digest(build_scene("random_room", 1)) != digest(again)
 
 
 @every_scene
-def test_mesh_is_sound(name: str) -> None:
+def test_mesh_is_sound(name):
     mesh = scene(name)
     assert len(mesh.parts) <= 8
     for part in mesh.parts:
@@ -90,14 +87,14 @@ def test_mesh_is_sound(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(COUNTS))
-def test_vertices_and_faces_are_the_papers(name: str) -> None:
+def test_vertices_and_faces_are_the_papers(name):
     vertices, faces = COUNTS[name]
     assert len(weld(scene(name).merged()[0])[0]) == pytest.approx(vertices, rel=0.1)
     assert scene(name).n_faces == pytest.approx(faces, rel=0.1)
 
 
 @pytest.mark.parametrize("name", sorted(COUNTS))
-def test_textures_are_fine_enough_for_half_a_metre_and_not_flat(name: str) -> None:
+def test_textures_are_fine_enough_for_half_a_metre_and_not_flat(name):
     densities, areas = [], []
     for part in scene(name).parts:
         assert part.texture is not None
@@ -117,14 +114,14 @@ def test_textures_are_fine_enough_for_half_a_metre_and_not_flat(name: str) -> No
     assert median > 250  # a pixel at 640 px and 0.5 m covers 0.9 mm
 
 
-def triangle_areas(corners: np.ndarray) -> np.ndarray:
+def triangle_areas(corners):
     """Areas (F,) of triangles (F, 3, 3)."""
     sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return np.linalg.norm(sides, axis=1) / 2
 
 
 @every_scene
-def test_room_has_only_few_holes_around_the_cameras(name: str) -> None:
+def test_room_has_only_few_holes_around_the_cameras(name):
     origins, directions = views(name, 20_000)
     distance = caster(name).first_hit_m(origins, directions)
     closed = name == "random_room"  # too coarse for a scanner to miss a cell of it
@@ -132,7 +129,7 @@ def test_room_has_only_few_holes_around_the_cameras(name: str) -> None:
 
 
 @every_scene
-def test_centre_of_the_sampling_box_is_free(name: str) -> None:
+def test_centre_of_the_sampling_box_is_free(name):
     centre = np.mean(BOXES_M[name], axis=1)
     directions = np.concatenate([np.eye(3), -np.eye(3)])
     distance = caster(name).first_hit_m(np.tile(centre, (6, 1)), directions)
@@ -145,7 +142,7 @@ def test_centre_of_the_sampling_box_is_free(name: str) -> None:
 
 
 @every_scene
-def test_most_straight_paths_are_free(name: str) -> None:
+def test_most_straight_paths_are_free(name):
     starts, _ = views(name, 2000)
     ends = starts[::-1]
     length = np.linalg.norm(ends - starts, axis=1)
@@ -154,7 +151,7 @@ def test_most_straight_paths_are_free(name: str) -> None:
 
 
 @every_scene
-def test_walls_differ_in_brightness_or_hue(name: str) -> None:
+def test_walls_differ_in_brightness_or_hue(name):
     """Even averaged over half a metre, the first part of a scene has very different places."""
     texture = scene(name).parts[0].texture
     assert texture is not None
@@ -163,7 +160,7 @@ def test_walls_differ_in_brightness_or_hue(name: str) -> None:
     assert means.std(axis=0).max() > 12
 
 
-def test_noise_has_zero_mean_unit_deviation_and_the_canvas_size() -> None:
+def test_noise_has_zero_mean_unit_deviation_and_the_canvas_size():
     canvas = Canvas(np.random.default_rng(0), 300, 400, 100)
     noise = canvas.noise(0.1, 4)
     assert noise.shape == (300, 400)

@@ -1,12 +1,7 @@
 """Scores keep their digits from the predictions to the table, and what is no pose has none."""
 
-from __future__ import annotations
-
 import json
 import math
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any
 
 import mpmath
 import numpy as np
@@ -16,7 +11,7 @@ from numpy.typing import NDArray
 from baselines.training.predict import predict_poses
 from baselines.training.score import score_run
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
-from synfeal.evaluation.metrics import cumulative, pose_errors
+from synfeal.evaluation.metrics import cumulative
 from synfeal.frames import read_records
 from synfeal.geometry.rotations import rotation_angle_rad
 from synfeal.report.cells import read_cells
@@ -32,7 +27,7 @@ ANGLES = [*GAPS, 1.0, *(MP.pi - MP.mpf(gap) for gap in GAPS)]
 Array = NDArray[np.float64]
 
 
-def turned(base: Sequence[float], axis: Sequence[float], angle: Any) -> Array:
+def turned(base, axis, angle):
     """The unit quaternion ``base`` followed by a turn, rounded to doubles at the end."""
     half = MP.mpf(angle) / 2
     length = MP.sqrt(sum(MP.mpf(v) ** 2 for v in axis))
@@ -47,7 +42,7 @@ def turned(base: Sequence[float], axis: Sequence[float], angle: Any) -> Array:
     return np.array([float(value) for value in product])
 
 
-def exact_angle(a: Array, b: Array) -> Any:
+def exact_angle(a, b):
     """The angle between two quaternions of doubles, by Kahan's formula for angles of vectors."""
     p, q = ([MP.mpf(float(v)) for v in quat] for quat in (a, b))
     if sum(x * y for x, y in zip(p, q, strict=True)) < 0:
@@ -66,9 +61,7 @@ AXES = ((0.0, 0.0, 1.0), (2.0, -3.0, 6.0))
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_angles_from_0_to_180_degrees_keep_their_digits(
-    base: Sequence[float], axis: Sequence[float], sign: float
-) -> None:
+def test_angles_from_0_to_180_degrees_keep_their_digits(base, axis, sign):
     quats = np.array([sign * turned(base, axis, angle) for angle in ANGLES])
     found = rotation_angle_rad(np.tile(base, (len(quats), 1)), quats)
     for angle, quat, truth in zip(found, quats, ANGLES, strict=True):
@@ -76,14 +69,11 @@ def test_angles_from_0_to_180_degrees_keep_their_digits(
         assert abs(MP.mpf(float(angle)) - truth) < 1e-15
 
 
-Scored = Callable[..., tuple[dict[str, Any], list[dict[str, str]]]]
-
-
 @pytest.fixture
-def score(tmp_path: Path) -> Scored:
+def score(tmp_path):
     """Score predictions against labels that are also the truth; metrics and rows of errors."""
 
-    def run(predicted: PoseTable | Path, labels: PoseTable, out: Path = tmp_path) -> Any:
+    def run(predicted, labels, out=tmp_path):
         write_pose_table(out / "labels.csv", labels)
         if isinstance(predicted, PoseTable):
             write_pose_table(out / "predictions.csv", predicted)
@@ -95,7 +85,7 @@ def score(tmp_path: Path) -> Scored:
     return run
 
 
-def table(quat_wxyz: Array, position_m: Array | None = None) -> PoseTable:
+def table(quat_wxyz, position_m=None):
     frame = np.arange(len(quat_wxyz))
     if position_m is None:
         position_m = np.zeros((len(frame), 3))
@@ -103,9 +93,7 @@ def table(quat_wxyz: Array, position_m: Array | None = None) -> PoseTable:
 
 
 @pytest.mark.parametrize("base", BASES)
-def test_the_errors_written_are_exact_to_a_billionth_of_a_radian(
-    score: Scored, base: Sequence[float]
-) -> None:
+def test_the_errors_written_are_exact_to_a_billionth_of_a_radian(score, base):
     """The whole path: numbers to text, text to numbers, angles, degrees, text."""
     quats = np.array([turned(base, AXES[1], angle) for angle in ANGLES])
     offset_m = np.outer(0.1 * np.arange(len(quats)), [3.0, 0.0, 4.0])
@@ -115,13 +103,6 @@ def test_the_errors_written_are_exact_to_a_billionth_of_a_radian(
         assert abs(found_rad - angle) < 2e-15
         assert MP.mpf(row["orientation_deg"]) == MP.mpf(row["orientation_deg_true"])
         assert float(row["position_m"]) == pytest.approx(0.5 * index, rel=1e-15, abs=0)
-
-
-def test_medians_in_the_json_are_those_of_the_table(score: Scored) -> None:
-    quats = np.array([turned(BASES[1], AXES[1], angle) for angle in ANGLES])
-    metrics, rows = score(table(quats), table(np.tile(BASES[1], (len(quats), 1))))
-    for name in ("position_m", "orientation_deg", "orientation_deg_true"):
-        assert metrics[name] == np.median([float(row[name]) for row in rows])
 
 
 NO_POSE = {
@@ -138,8 +119,8 @@ NO_POSE = {
 
 
 @pytest.mark.parametrize("kind", NO_POSE)
-@pytest.mark.parametrize("lost", [1, N])
-def test_what_is_no_pose_has_failed(score: Scored, kind: str, lost: int) -> None:
+@pytest.mark.parametrize("lost", [1, N // 2, N])
+def test_what_is_no_pose_has_failed(score, kind, lost):
     truth = table(np.tile([1.0, 0.0, 0.0, 0.0], (N, 1)))
     position, quat = truth.position_m.copy(), truth.quat_wxyz.copy()
     position[:lost], quat[:lost] = NO_POSE[kind]
@@ -147,26 +128,12 @@ def test_what_is_no_pose_has_failed(score: Scored, kind: str, lost: int) -> None
     assert metrics["failed"] == lost
     for name in ("position_m", "orientation_deg", "position_m_true", "orientation_deg_true"):
         assert [float(row[name]) for row in rows] == [math.inf] * lost + [0.0] * (N - lost)
-        assert metrics[name] == (None if lost == N else 0.0)
-
-
-def test_half_of_the_predictions_lost_leave_no_median(score: Scored) -> None:
-    """Even half: the median of an even number is the mean of the middle two."""
-    truth = table(np.tile([1.0, 0.0, 0.0, 0.0], (N, 1)))
-    quat = truth.quat_wxyz.copy()
-    quat[: N // 2] = math.nan
-    metrics, _ = score(table(quat), truth)
-    assert (metrics["failed"], metrics["position_m"], metrics["orientation_deg"]) == (
-        N // 2,
-        None,
-        None,
-    )
+        # Even of half: the median of an even number is the mean of the middle two.
+        assert metrics[name] == (None if lost >= N // 2 else 0.0)
 
 
 @pytest.mark.parametrize("quat_wxyz", [[0.0] * 4, [math.nan] * 4, [math.inf, 0.0, 0.0, 0.0]])
-def test_a_network_without_an_answer_is_scored_as_failed(
-    score: Scored, tmp_path: Path, quat_wxyz: list[float]
-) -> None:
+def test_a_network_without_an_answer_is_scored_as_failed(score, tmp_path, quat_wxyz):
     """From the network's output to the score, through the files between them."""
     model = save(tmp_path / "model.pt", answering([1.0, 2.0, 3.0], quat_wxyz))
     np.save(tmp_path / "frames.npy", np.zeros((N, NETWORK.input_px, NETWORK.input_px, 3), np.uint8))
@@ -178,9 +145,7 @@ def test_a_network_without_an_answer_is_scored_as_failed(
     assert (metrics["failed"], metrics["position_m"], metrics["orientation_deg"]) == (N, None, None)
 
 
-def test_a_diverged_repetition_is_counted_and_averaged_into_nothing(
-    score: Scored, tmp_path: Path
-) -> None:
+def test_a_diverged_repetition_is_counted_and_averaged_into_nothing(score, tmp_path):
     """Three seeds of one cell, the second lost: the mean is that of the other two."""
     row = experiment("table4_size")
     truth = table(np.tile([1.0, 0.0, 0.0, 0.0], (N, 1)))
@@ -205,11 +170,3 @@ def test_a_diverged_repetition_is_counted_and_averaged_into_nothing(
     error_m, percent = cumulative(errors.errors[:, 0].ravel())
     assert np.isfinite(error_m).all()
     assert percent[-1] == pytest.approx(100 * 2 / 3)
-
-
-def test_errors_of_no_poses_raise_no_warning() -> None:
-    """Warnings are errors here: nothing is divided by zero and nothing overflows."""
-    position, quat = (np.array(values) for values in zip(*NO_POSE.values(), strict=True))
-    errors = pose_errors(table(quat, position), table(np.tile(BASES[0], (len(quat), 1))))
-    assert np.isinf(errors["position_m"]).all()
-    assert np.isinf(errors["orientation_deg"]).all()

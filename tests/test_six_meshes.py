@@ -1,12 +1,8 @@
 """Meshes of different origin: inspect, the command it prints, validate; nobody helps."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import shlex
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +15,7 @@ from synfeal.mesh.rays import RayCaster
 from synfeal.planning.empty_pixels import empty_shares
 from synfeal.planning.path import poses_of
 from synfeal.planning.sampling import pose_bounds, sample_poses
-from tests.varied_meshes import MESHES, Varied
+from tests.varied_meshes import MESHES
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 
@@ -27,12 +23,12 @@ pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 SMALLER = ["--frames", "40", "--spacing", "0.25", "--width", "96", "--height", "72"]
 
 
-def explained_by_holes(mesh: Varied, n_paths: int) -> float:
+def explained_by_holes(mesh, n_paths):
     """Share of empty pixels of cameras anywhere in the room that look anywhere.
 
     With three standard errors of a set of that many paths, the frames of each being alike.
     """
-    loaded = load_mesh(mesh.path, mesh.up_axis, mesh.unit_m)  # type: ignore[arg-type]
+    loaded = load_mesh(mesh.path, mesh.up_axis, mesh.unit_m)
     bounds = pose_bounds(mesh.inside_m, Angles())
     poses = poses_of(sample_poses(bounds, 1000, np.random.default_rng(0)))
     shares = empty_shares(RayCaster(*loaded.merged()), poses, CameraConfig())
@@ -40,9 +36,7 @@ def explained_by_holes(mesh: Varied, n_paths: int) -> float:
 
 
 @pytest.mark.parametrize("make", MESHES.values(), ids=MESHES)
-def test_from_a_mesh_to_a_data_set_without_help(
-    make: Callable[[Path], Varied], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_from_a_mesh_to_a_data_set_without_help(make, tmp_path, capsys):
     mesh = make(tmp_path)
     with contextlib.chdir(tmp_path):
         assert main(["inspect", mesh.path.name]) == 0

@@ -1,7 +1,5 @@
 """The evidence of a run through SLURM, from what SLURM 22.05 writes; a cluster, where installed."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path
@@ -27,7 +25,7 @@ LOG = """\
 CRASH = Crash(3, ("7 group_fits_train_score",), 60.0, 100.0, 110.0)
 
 
-def test_a_job_that_was_requeued_ends_twice() -> None:
+def test_a_job_that_was_requeued_ends_twice():
     records = job_records(JOBS)
     assert [(r["JobId"], r["JobState"]) for r in records] == [
         ("7", "NODE_FAIL"),
@@ -37,7 +35,7 @@ def test_a_job_that_was_requeued_ends_twice() -> None:
 
 
 @pytest.fixture
-def trees(tmp_path: Path) -> tuple[Path, Path]:
+def trees(tmp_path):
     for tree in ("local", "slurm"):
         (tmp_path / tree / "tables").mkdir(parents=True)
         (tmp_path / tree / "tables/table4_size.csv").write_text("scene\n")
@@ -47,7 +45,7 @@ def trees(tmp_path: Path) -> tuple[Path, Path]:
     return tmp_path / "local", tmp_path / "slurm"
 
 
-def test_equal_tables_are_called_equal(tmp_path: Path, trees: tuple[Path, Path]) -> None:
+def test_equal_tables_are_called_equal(tmp_path, trees):
     text = page((100.0, 200.0), CRASH, tmp_path, compare(*trees))
     assert "Files that differ or lack: none." in text
     assert "| of these, tables | 1 | 1 equal |" in text
@@ -58,9 +56,7 @@ def test_equal_tables_are_called_equal(tmp_path: Path, trees: tuple[Path, Path])
 
 
 @pytest.mark.parametrize("change", ["other", "gone"])
-def test_a_table_that_differs_or_lacks_is_named(
-    tmp_path: Path, trees: tuple[Path, Path], change: str
-) -> None:
+def test_a_table_that_differs_or_lacks_is_named(tmp_path, trees, change):
     table = trees[1] / "tables/table4_size.csv"
     if change == "gone":
         table.unlink()
@@ -74,9 +70,7 @@ def test_a_table_that_differs_or_lacks_is_named(
 
 
 @pytest.mark.parametrize(("error_m", "differing"), [("0.02", 0), ("0.03", 1)])
-def test_times_in_a_table_may_differ_and_errors_may_not(
-    trees: tuple[Path, Path], error_m: str, differing: int
-) -> None:
+def test_times_in_a_table_may_differ_and_errors_may_not(trees, error_m, differing):
     name = "tables/label_error.csv"
     (trees[0] / name).write_text("position_m,seconds_per_frame,peak_memory_mb\n0.02,0.1,160\n")
     (trees[1] / name).write_text(
@@ -91,8 +85,8 @@ def test_times_in_a_table_may_differ_and_errors_may_not(
     or Path("/etc/slurm/slurm.conf").exists(),
     reason="needs SLURM installed, and no cluster on this machine",
 )
-def test_a_cluster_of_one_node_runs_a_job_and_leaves_nothing(tmp_path: Path) -> None:
-    def cluster(action: str) -> None:
+def test_a_cluster_of_one_node_runs_a_job_and_leaves_nothing(tmp_path):
+    def cluster(action):
         subprocess.run((CLUSTER, action, tmp_path), check=True, timeout=100)
 
     cluster("start")

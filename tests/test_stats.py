@@ -2,7 +2,7 @@
 
 import json
 import math
-from itertools import count
+from itertools import count, product
 
 import pytest
 
@@ -76,32 +76,23 @@ def test_metrics_are_read_back_as_they_are(tmp_path):
     assert read_metrics(path) == values
 
 
-@pytest.mark.parametrize("key", [*KEYS, "position_rms_m", "baseline_orientation_deg"])
-@pytest.mark.parametrize("value", [-1.0, "one", [1.0]])
-def test_a_score_that_is_no_error_is_refused_by_name(tmp_path, key, value):
+GONE = object()
+
+
+@pytest.mark.parametrize(
+    ("keys", "values"),
+    [
+        ([*KEYS, "position_rms_m", "baseline_orientation_deg"], [-1.0, "one", [1.0]]),
+        (["n_train", "n_test", "failed"], [-1, 0.5, None]),
+        ([*KEYS, "position_rms_m", "n_train", "failed"], [GONE]),
+    ],
+    ids=["no error", "no count", "missing"],
+)
+def test_a_score_that_is_none_is_refused_by_name(tmp_path, keys, values):
     path = tmp_path / "metrics.json"
-    path.write_text(json.dumps(run_of(0) | {key: value}))
-    with pytest.raises(InputError, match=f"{key}.*score that run again") as refusal:
-        read_metrics(path)
-    assert str(refusal.value).startswith(str(path))
-
-
-@pytest.mark.parametrize("key", ["n_train", "n_test", "failed"])
-@pytest.mark.parametrize("value", [-1, 0.5, None])
-def test_a_count_that_is_none_is_refused_by_name(tmp_path, key, value):
-    path = tmp_path / "metrics.json"
-    path.write_text(json.dumps(run_of(0) | {key: value}))
-    with pytest.raises(InputError, match=f"{key}.*score that run again") as refusal:
-        read_metrics(path)
-    assert str(refusal.value).startswith(str(path))
-
-
-@pytest.mark.parametrize("key", [*KEYS, "position_rms_m", "n_train", "failed"])
-def test_a_missing_score_is_named(tmp_path, key):
-    path = tmp_path / "metrics.json"
-    values = run_of(0)
-    del values[key]
-    path.write_text(json.dumps(values))
-    with pytest.raises(InputError, match=f"{key} .*score that run again") as refusal:
-        read_metrics(path)
-    assert str(refusal.value).startswith(str(path))
+    for key, value in product(keys, values):
+        changed = {k: v for k, v in (run_of(0) | {key: value}).items() if v is not GONE}
+        path.write_text(json.dumps(changed))
+        with pytest.raises(InputError, match=f"{key}.*score that run again") as refusal:
+            read_metrics(path)
+        assert str(refusal.value).startswith(str(path))

@@ -1,7 +1,5 @@
 """Topology of meshes whose pieces, holes and volume are known."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np
@@ -12,11 +10,11 @@ from synfeal.mesh.topology import mesh_topology
 from synfeal.mesh.triangles import merge_vertices
 
 
-def arrays(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
+def arrays(mesh):
     return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
 
 
-def test_a_closed_box_encloses_its_volume_with_a_sign() -> None:
+def test_a_closed_box_encloses_its_volume_with_a_sign():
     vertices, faces = arrays(trimesh.creation.box((2.0, 3.0, 4.0)))
     outward = mesh_topology(vertices + 1e3, faces)
     assert (outward.components, outward.boundary_edges, outward.non_manifold_edges) == (1, 0, 0)
@@ -26,7 +24,7 @@ def test_a_closed_box_encloses_its_volume_with_a_sign() -> None:
     assert mesh_topology(vertices, faces[:, ::-1]).enclosed_volume_m3 == pytest.approx(-24.0)
 
 
-def test_one_face_turned_over_leaves_no_inside() -> None:
+def test_one_face_turned_over_leaves_no_inside():
     vertices, faces = arrays(trimesh.creation.box())
     faces[3] = faces[3, ::-1]
     topology = mesh_topology(vertices, faces)
@@ -34,7 +32,7 @@ def test_one_face_turned_over_leaves_no_inside() -> None:
     assert topology.enclosed_volume_m3 is None
 
 
-def test_holes_are_measured_along_their_rims() -> None:
+def test_holes_are_measured_along_their_rims():
     box = trimesh.creation.box((2.0, 3.0, 4.0))
     vertices, faces = arrays(box)
     normals = np.asarray(box.face_normals)
@@ -46,7 +44,7 @@ def test_holes_are_measured_along_their_rims() -> None:
     assert not cut.watertight
 
 
-def test_three_faces_at_one_edge_are_not_a_surface() -> None:
+def test_three_faces_at_one_edge_are_not_a_surface():
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]])
     topology = mesh_topology(vertices, np.array([[0, 1, 2], [0, 1, 3], [1, 0, 4]]))
     assert topology.non_manifold_edges == 1
@@ -54,14 +52,14 @@ def test_three_faces_at_one_edge_are_not_a_surface() -> None:
     assert topology.enclosed_volume_m3 is None
 
 
-def test_seams_count_as_holes_until_their_copies_are_merged() -> None:
+def test_seams_count_as_holes_until_their_copies_are_merged():
     box = trimesh.creation.box()
     soup, faces = np.asarray(box.vertices)[box.faces].reshape(-1, 3), np.arange(36).reshape(-1, 3)
     assert mesh_topology(soup, faces).components == 12
     assert mesh_topology(*merge_vertices(soup, faces)).enclosed_volume_m3 == pytest.approx(1.0)
 
 
-def test_random_holes_against_counting_one_by_one() -> None:
+def test_random_holes_against_counting_one_by_one():
     rng = np.random.default_rng(5)
     pieces = [trimesh.creation.icosphere(2).apply_translation([4.0 * i, 0, 0]) for i in range(3)]
     vertices, faces = arrays(trimesh.util.concatenate(pieces))

@@ -1,7 +1,5 @@
 """Training, prediction and pretraining on data whose poses can be read off the images."""
 
-from __future__ import annotations
-
 import json
 import math
 

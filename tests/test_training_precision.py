@@ -1,7 +1,5 @@
 """What training runs learn, in either precision."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import torch

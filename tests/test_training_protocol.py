@@ -1,13 +1,10 @@
 """The parts of the two protocols: order, held-out paths, selection, distances, schedules."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 import torch
-from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from baselines.localizers.losses import PosePrediction
@@ -18,7 +15,7 @@ from baselines.training.optimizer import Schedule, optimisation_of
 from baselines.training.order import BatchOrder, held_out_paths
 from baselines.training.protocol import HALVE_EVERY, PROTOCOLS
 from baselines.training.selection import HeldOutErrors, Selection, held_out_errors
-from synfeal.config.models import MODELS, TrainingConfig
+from synfeal.config.models import MODELS
 from synfeal.errors import InputError
 from synfeal.frames import read_records
 from tests.coloured_frames import (
@@ -224,9 +221,3 @@ def test_patience_ends_a_published_training_early(splits, tmp_path, monkeypatch)
     _, history = train(splits[0], tmp_path, samples=640, training=training, test=splits[1])
     rows = [row for _, row in read_records(history)]
     assert int(rows[-1]["samples_seen"]) == 640 // 20 * 4
-
-
-def test_patience_is_refused_where_the_rate_falls_over_the_whole_run():
-    with pytest.raises(ValidationError, match=r"patience: must be left out with `protocol: corr"):
-        TrainingConfig(samples_seen={}, patience=3)
-    assert TrainingConfig(samples_seen={}, patience=3, protocol="published").patience == 3

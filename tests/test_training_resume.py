@@ -1,7 +1,5 @@
 """A training run that is stopped, in whatever way, and started again ends as an undisturbed one."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -114,7 +112,7 @@ def test_a_killed_process_ends_the_same(splits, undisturbed, tmp_path):
     assert rest.calls == STEPS - (KILLED_AT - 1)
 
 
-def changed(content: bytes) -> bytes:
+def changed(content):
     middle = len(content) // 2
     return content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
 

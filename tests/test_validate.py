@@ -1,10 +1,7 @@
 """``synfeal validate`` passes a data set in closed form and finds every error put into it."""
 
-from __future__ import annotations
-
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +9,7 @@ import pytest
 
 from synfeal.cli import main
 from tests import damaged_sets
-from tests.damaged_sets import (
-    HIDDEN_ERRORS,
-    frame_files,
-    without_manifest_hashes,
-    write_planar_set,
-)
+from tests.damaged_sets import HIDDEN_ERRORS, frame_files, without_manifest_hashes, write_planar_set
 
 # What each error must be found by; other checks may fail too.
 FOUND_BY = {
@@ -35,32 +27,32 @@ FOUND_BY = {
 
 
 @pytest.fixture(scope="module")
-def planar(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def planar(tmp_path_factory):
     folder = tmp_path_factory.mktemp("planar") / "set"
     write_planar_set(folder)
     return folder
 
 
 @pytest.fixture
-def damaged(planar: Path, tmp_path: Path) -> Path:
+def damaged(planar, tmp_path):
     return Path(shutil.copytree(planar, tmp_path / "set"))
 
 
-def errors(capsys: pytest.CaptureFixture[str]) -> list[str]:
+def errors(capsys):
     """The ``error:`` lines; nothing else may be on stderr but progress bars."""
     text = capsys.readouterr().err
     assert "Traceback" not in text
     return [line[7:] for line in text.replace("\r", "\n").splitlines() if line[:7] == "error: "]
 
 
-def check_fails(folder: Path, capsys: pytest.CaptureFixture[str], *words: str) -> None:
+def check_fails(folder, capsys, *words):
     """Exit status 1 and an error line with all of the words."""
     assert main(["validate", str(folder)]) == 1
     lines = errors(capsys)
     assert any(all(word in line for word in words) for line in lines), lines
 
 
-def test_a_sound_data_set_passes(planar: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_sound_data_set_passes(planar, capsys):
     assert main(["validate", str(planar)]) == 0
     captured = capsys.readouterr()
     verdicts = [line.split()[1] for line in captured.out.splitlines()[1:]]
@@ -69,9 +61,7 @@ def test_a_sound_data_set_passes(planar: Path, capsys: pytest.CaptureFixture[str
 
 
 @pytest.mark.parametrize("error", HIDDEN_ERRORS, ids=lambda error: str(error.__name__))
-def test_geometry_alone_finds(
-    error: Callable[[Path], None], damaged: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_geometry_alone_finds(error, damaged, capsys):
     without_manifest_hashes(damaged)
     error(damaged)
     check_fails(damaged, capsys, f"{FOUND_BY[error.__name__]}: ")
@@ -80,9 +70,7 @@ def test_geometry_alone_finds(
 @pytest.mark.parametrize(
     "error", [damaged_sets.swapped_colours, damaged_sets.pose_of_the_neighbour]
 )
-def test_one_wrong_frame_is_named(
-    error: Callable[[Path], None], damaged: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_one_wrong_frame_is_named(error, damaged, capsys):
     without_manifest_hashes(damaged)
     error(damaged)
     assert main(["validate", str(damaged)]) == 1
@@ -90,9 +78,7 @@ def test_one_wrong_frame_is_named(
     assert "frame-000012" in named[0] or "frame-000013" in named[0]
 
 
-def test_the_manifest_and_the_tables_find_a_changed_pose(
-    damaged: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_manifest_and_the_tables_find_a_changed_pose(damaged, capsys):
     damaged_sets.pose_of_the_neighbour(damaged)
     assert main(["validate", str(damaged)]) == 1
     found = {line.split(": ")[0]: line for line in errors(capsys)}
@@ -100,36 +86,32 @@ def test_the_manifest_and_the_tables_find_a_changed_pose(
     assert "seq-01/frame-000012.pose.txt: differs from train.csv" in found["tables"]
 
 
-def write_rows(path: Path, change: Callable[[np.ndarray], None]) -> None:
+def write_rows(path, change):
     pose = np.loadtxt(path)
     change(pose)
     np.savetxt(path, pose, fmt="%.10e")
 
 
-def mirror(pose: np.ndarray) -> None:
+def mirror(pose):
     pose[:3, 0] *= -1
 
 
-def stretch(pose: np.ndarray) -> None:
+def stretch(pose):
     pose[:3, :3] *= 1 + 1e-5
 
 
-def slant(pose: np.ndarray) -> None:
+def slant(pose):
     pose[3, 0] = 0.1
 
 
 @pytest.mark.parametrize("change", [mirror, stretch, slant])
-def test_poses_that_are_not_rigid(
-    change: Callable[[np.ndarray], None], damaged: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_poses_that_are_not_rigid(change, damaged, capsys):
     path = frame_files(damaged, "pose.txt")[5]
     write_rows(path, change)
     check_fails(damaged, capsys, f"poses: {path}: no rigid pose")
 
 
-def test_a_test_frame_from_the_training_set(
-    damaged: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_test_frame_from_the_training_set(damaged, capsys):
     copied = frame_files(damaged, "pose.txt", "seq-02")[3]
     shutil.copy(frame_files(damaged, "pose.txt")[7], copied)
     check_fails(damaged, capsys, f"overlap: {copied}", "frame-000007")
@@ -144,16 +126,12 @@ def test_a_test_frame_from_the_training_set(
         ("one\n", ("'one' names no sequence",)),
     ],
 )
-def test_splits(
-    text: str, words: tuple[str, ...], damaged: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_splits(text, words, damaged, capsys):
     (damaged / "TrainSplit.txt").write_text(text)
     check_fails(damaged, capsys, "splits: ", *words)
 
 
-def test_the_manifest_must_count_the_frames(
-    damaged: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_manifest_must_count_the_frames(damaged, capsys):
     path = damaged / "manifest.json"
     manifest = json.loads(path.read_text())
     manifest["frames"]["train"] = 23
@@ -161,9 +139,7 @@ def test_the_manifest_must_count_the_frames(
     check_fails(damaged, capsys, "manifest: ", "frames: train must be 24")
 
 
-def test_without_a_manifest_geometry_is_reported_and_not_judged(
-    damaged: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_a_manifest_geometry_is_reported_and_not_judged(damaged, capsys):
     (damaged / "manifest.json").unlink()
     assert main(["validate", str(damaged)]) == 0
     lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()[1:]}
@@ -172,9 +148,7 @@ def test_without_a_manifest_geometry_is_reported_and_not_judged(
     assert "ok" in lines["images"]
 
 
-def test_a_calibration_file_stands_in_for_the_manifest(
-    damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_calibration_file_stands_in_for_the_manifest(damaged, tmp_path, capsys):
     (damaged / "manifest.json").unlink()
     focal = 48 / np.tan(np.radians(30))
     for shift, status in ((0.0, 0), (0.5, 1)):

@@ -1,9 +1,6 @@
 """``synfeal validate`` is right on right sets, however they were collected, and on blank ones."""
 
-from __future__ import annotations
-
 import shutil
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
@@ -36,7 +33,7 @@ BOX_M = np.array([0.4, 4.6, 0.4, 3.6, 0.8, 2.0])
 FAR_M = np.array([432_100.0, -87_654.0, 321.0])  # as map coordinates
 
 
-def moved(mesh: TexturedMesh, offset_m: np.ndarray) -> TexturedMesh:
+def moved(mesh, offset_m):
     parts = [
         MeshPart(
             *(part.name, part.vertices_m + offset_m, part.faces, part.uv, part.texture),
@@ -47,7 +44,7 @@ def moved(mesh: TexturedMesh, offset_m: np.ndarray) -> TexturedMesh:
     return TexturedMesh(tuple(parts))
 
 
-def verdicts(folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
+def verdicts(folder, capsys):
     """Names of the checks and the lines of the report; exit status is that of the verdicts."""
     capsys.readouterr()
     status = main(["validate", str(folder)])
@@ -66,12 +63,7 @@ def verdicts(folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, str]
     ],
     ids=["random", "1 m apart", "wide", "far from the origin"],
 )
-def test_a_faultless_set_passes(
-    options: list[str],
-    offset_m: np.ndarray,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_faultless_set_passes(options, offset_m, tmp_path, capsys):
     save_glb(tmp_path / "room.glb", moved(furnished_room(PAINT_TEXELS), offset_m))
     box = [f"{value:.2f}" for value in BOX_M + np.repeat(offset_m, 2)]
     out = tmp_path / "set"
@@ -86,7 +78,7 @@ def test_a_faultless_set_passes(
 
 
 @pytest.fixture(scope="module")
-def small_random(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def small_random(tmp_path_factory):
     """Independent poses, 64 x 48: few pairs of frames see the same, and few pixels of it."""
     folder = tmp_path_factory.mktemp("random")
     save_glb(folder / "room.glb", furnished_room(PAINT_TEXELS))
@@ -109,12 +101,8 @@ def small_random(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ],
 )
 def test_independent_poses_are_told_right_from_wrong_in_small_images(
-    change: Callable[[Path], object] | None,
-    failing: set[str],
-    small_random: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    change, failing, small_random, tmp_path, capsys
+):
     copied = Path(shutil.copytree(small_random, tmp_path / "set"))
     if change is not None:
         change(copied)
@@ -124,24 +112,24 @@ def test_independent_poses_are_told_right_from_wrong_in_small_images(
 
 
 @pytest.fixture
-def planar(tmp_path: Path) -> Path:
+def planar(tmp_path):
     write_planar_set(tmp_path / "whole")
     copied = copy_of_first_frames(tmp_path / "whole", tmp_path / "set", (24, 8))
     shutil.rmtree(tmp_path / "whole")
     return copied
 
 
-def black(folder: Path, count: int) -> None:
+def black(folder, count):
     for path in frame_files(folder, "color.png")[:count]:
         Image.new("RGB", (96, 72)).save(path)
 
 
-def grey(folder: Path, count: int) -> None:
+def grey(folder, count):
     for path in frame_files(folder, "color.png")[:count]:
         Image.new("RGB", (96, 72), (102, 102, 102)).save(path)
 
 
-def two_thirds_without_depth(folder: Path, count: int) -> None:
+def two_thirds_without_depth(folder, count):
     for path in frame_files(folder, "depth.png")[:count]:
         depth = np.asarray(Image.open(path)).copy()
         depth[: 2 * len(depth) // 3] = 65535
@@ -158,13 +146,7 @@ def two_thirds_without_depth(folder: Path, count: int) -> None:
         (two_thirds_without_depth, 8, []),
     ],
 )
-def test_blank_frames_are_found_where_they_are_many(
-    change: Callable[[Path, int], None],
-    count: int,
-    words: list[str],
-    planar: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_blank_frames_are_found_where_they_are_many(change, count, words, planar, capsys):
     without_manifest_hashes(planar)
     change(planar, count)
     assert main(["validate", str(planar)]) in (0, 1)
@@ -176,9 +158,7 @@ def test_blank_frames_are_found_where_they_are_many(
     assert all(word in errors[0] for word in words)
 
 
-def test_a_quaternion_of_the_other_sign_is_told(
-    planar: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_quaternion_of_the_other_sign_is_told(planar, capsys):
     path = planar / "train.csv"
     header, first, *rows = path.read_text().splitlines()
     cells = first.split(",")

@@ -14,19 +14,19 @@ from baselines.groundtruth.methods import METHODS
 ROOT = Path(__file__).parent.parent
 
 
-def snakemake(*arguments: str) -> subprocess.CompletedProcess[str]:
+def snakemake(*arguments):
     command = [sys.executable, "-m", "snakemake", "--cores", "2", *arguments]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
-def planned_jobs(results: Path, *arguments: str) -> dict[str, int]:
+def planned_jobs(results, *arguments):
     """Jobs by rule that a dry run into an empty results directory plans."""
     run = snakemake("--dry-run", "--config", f"results={results}", *arguments)
     assert run.returncode == 0, run.stdout + run.stderr
     return {name: int(n) for name, n in re.findall(r"^(\w+) +(\d+)$", run.stdout, re.MULTILINE)}
 
 
-def test_default_profile_plans_the_papers_design(tmp_path: Path) -> None:
+def test_default_profile_plans_the_papers_design(tmp_path):
     jobs = planned_jobs(tmp_path)
     assert jobs["train"] == jobs["score"] == 155  # 31 distinct data set x initialisation, 5 models
     assert jobs["scene"] == 2
@@ -45,7 +45,7 @@ def test_default_profile_plans_the_papers_design(tmp_path: Path) -> None:
     assert jobs["table"] + jobs["table1_meshes"] == 6
 
 
-def test_the_record_of_a_run_reads_what_every_job_before_it_took(tmp_path: Path) -> None:
+def test_the_record_of_a_run_reads_what_every_job_before_it_took(tmp_path):
     """Else the record depends on which jobs happen to have ended, and on a shared file system."""
     out = tmp_path / "jobs.json"
     command = ["synfeal.report.cost.dry_run", "config/smoke.yaml", str(tmp_path), str(out)]
@@ -56,7 +56,7 @@ def test_the_record_of_a_run_reads_what_every_job_before_it_took(tmp_path: Path)
     assert unread == {"provenance", "report", "report_document"}  # made beside the record
 
 
-def test_a_single_experiment_is_a_target(tmp_path: Path) -> None:
+def test_a_single_experiment_is_a_target(tmp_path):
     target = f"{tmp_path}/mini/runs/large_room/6k/synfeal/scratch/posenet2/seed0/metrics.json"
     jobs = planned_jobs(tmp_path, "--", target)
     assert jobs["train"] == 1
@@ -67,7 +67,7 @@ def test_a_single_experiment_is_a_target(tmp_path: Path) -> None:
     assert "render" not in jobs
 
 
-def test_the_stretch_profile_labels_with_every_method_and_trains_nothing(tmp_path: Path) -> None:
+def test_the_stretch_profile_labels_with_every_method_and_trains_nothing(tmp_path):
     jobs = planned_jobs(tmp_path, "--configfile", "config/stretch.yaml", "--", "labels")
     assert not {"train", "score", "pretrain", "table"} & set(jobs)
     assert jobs["sfm"] == jobs["rgbd"] == jobs["estimate"] == 4 + 1  # 1,000 and 250 frames
@@ -77,14 +77,14 @@ def test_the_stretch_profile_labels_with_every_method_and_trains_nothing(tmp_pat
     assert jobs["figures"] == 1
 
 
-def test_labels_of_the_papers_profile_come_from_34_batches_and_no_training(tmp_path: Path) -> None:
+def test_labels_of_the_papers_profile_come_from_34_batches_and_no_training(tmp_path):
     jobs = planned_jobs(tmp_path, "--configfile", "config/paper.yaml", "--", "labels")
     assert jobs["sfm"] == jobs["rgbd"] == 24 + 10  # 6,000 and 2,500 frames in batches of 250
     assert jobs["posegraph"] == 2 * 34
     assert not {"train", "score", "pretrain", "figures"} & set(jobs)
 
 
-def test_changing_one_noise_level_adds_only_that_rows_jobs(tmp_path: Path) -> None:
+def test_changing_one_noise_level_adds_only_that_rows_jobs(tmp_path):
     changed = tmp_path / "experiments.csv"
     shutil.copy(ROOT / "config/experiments.csv", changed)
     text = changed.read_text()
@@ -97,7 +97,7 @@ def test_changing_one_noise_level_adds_only_that_rows_jobs(tmp_path: Path) -> No
     assert all("noise-p0-r25" in path for path in after - before)
 
 
-def planned_runs(results: Path, *config: str) -> set[str]:
+def planned_runs(results, *config):
     run = snakemake("--dry-run", "--config", f"results={results}", *config, "--", "runs")
     assert run.returncode == 0, run.stdout + run.stderr
     listing = snakemake("--summary", "--config", f"results={results}", *config, "--", "runs")
@@ -114,9 +114,7 @@ def planned_runs(results: Path, *config: str) -> set[str]:
         ("experiments={wrong_labels}", ["labels 'orb'", "rgbd-toro"]),
     ],
 )
-def test_wrong_configuration_ends_in_one_line(
-    tmp_path: Path, override: str, words: list[str]
-) -> None:
+def test_wrong_configuration_ends_in_one_line(tmp_path, override, words):
     design = (ROOT / "config/experiments.csv").read_text().replace(",sfm,", ",orb,")
     (tmp_path / "design.csv").write_text(design)
     override = override.format(wrong_labels=tmp_path / "design.csv")

@@ -118,7 +118,7 @@ def _unknown(path: Path) -> str:
 def _from_yaml(text: str) -> Calibration:
     if text.startswith("%YAML:"):  # OpenCV's header, which YAML has no name for
         text = text.partition("\n")[2]
-    return _from_mapping(yaml.load(text, _Loader))
+    return _from_mapping(yaml.load(text, _Loader))  # noqa: S506 (a SafeLoader)
 
 
 def _from_json(text: str) -> Calibration:

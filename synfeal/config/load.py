@@ -42,7 +42,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
         InputError: the file is missing, is not UTF-8, is not YAML, or is no mapping.
     """
     try:
-        value = yaml.load(path.read_text(encoding="utf-8"), PlainLoader)
+        value = yaml.load(path.read_text(encoding="utf-8"), PlainLoader)  # noqa: S506 (a SafeLoader)
     except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise InputError(f"{path}: cannot be read as YAML ({why(error)})") from None
     if not isinstance(value, dict):
