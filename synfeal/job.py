@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import inspect
 import logging
 import os
 import sys
 import traceback
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
+from pathlib import Path, PurePath
+from pkgutil import resolve_name
+from typing import Any
+
+from pydantic import validate_call
 
 from synfeal.errors import InputError
 
@@ -37,6 +42,25 @@ def job(log: str | Path) -> Iterator[None]:
         sys.exit(1)
     finally:
         os.close(real_stderr)
+
+
+def call(snakemake: Any) -> None:
+    """Call the function that a rule names, ``params.function``, with what it is asked for by name.
+
+    An argument is the rule's parameter, wildcard or input of that name, ``out_<name>`` its output
+    ``<name>``, and ``root`` the results directory where this job has it, which with a storage
+    plugin is a copy. Texts become paths, numbers and models as annotated.
+    """
+    function = resolve_name(snakemake.params.function)
+    given = {**dict(snakemake.wildcards.items()), **dict(snakemake.input.items())}
+    given |= dict(snakemake.params.items())
+    given |= {f"out_{name}": path for name, path in snakemake.output.items()}
+    asked = inspect.signature(function).parameters
+    if "root" in asked:
+        root = PurePath(snakemake.config["results"], snakemake.config["profile"]).as_posix()
+        output = str(snakemake.output[0])
+        given["root"] = output[: output.rindex(root) + len(root)]
+    validate_call(function)(**{name: given[name] for name in asked})
 
 
 def refuse_restored(inputs: Collection[object], output: str | Path) -> None:

@@ -23,7 +23,7 @@ from synfeal.mesh.triangles import (
 )
 from synfeal.planning.questions import draw_questions
 from synfeal.planning.target import admissible, has_free_view
-from synfeal.report.figures import Results, write_figures
+from synfeal.report.figures import write_figures
 from synfeal.report.speed_vs_error import speeds_of, write_speed_vs_error
 from synfeal.scenes.collision import (
     CURVE_HEADER,
@@ -232,7 +232,7 @@ def test_the_table_rids_speeds_of_what_else_the_machine_did(tmp_path):
     assert [float(row["error"]) for row in rows] == pytest.approx([0.0, 0.002, 0.1])
     assert [row["chosen"] for row in rows] == ["0", "1", "0"]
     assert {(row["stage"], row["scene"]) for row in rows} == {("collision", "large_room")}
-    write_figures(Results(tmp_path, design_of(())), tmp_path / "figures")
+    write_figures(design_of(()), tmp_path, tmp_path / "figures")
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {
         "speed_vs_error_collision.png",
         "speed_vs_error_collision.svg",

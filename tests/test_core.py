@@ -5,15 +5,18 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
 from PIL import Image
+from snakemake.iocontainers import Namedlist
 
 from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table, write_pose_table
 from synfeal.errors import InputError, why
 from synfeal.files import atomic_path, write_json
+from synfeal.job import call
 from synfeal.seeds import generator_of, seed_of
 from tests.fuzzing import JARGON
 
@@ -143,6 +146,35 @@ def test_job_tells_a_person_one_line_and_logs_the_rest(tmp_path):
     log = (tmp_path / "job.log").read_text()
     assert "spoken" in log
     assert "native" in log
+
+
+def test_a_rule_calls_its_function_with_its_files_by_name(tmp_path):
+    table, document = tmp_path / "table.tex", tmp_path / "tables/all.tex"
+    table.write_text("% one table")
+    document.parent.mkdir()
+    job = SimpleNamespace(
+        wildcards=Namedlist(fromdict={"scene": "large_room"}),
+        input=Namedlist(fromdict={"tables": [str(table)]}),
+        params=Namedlist(fromdict={"function": "synfeal.report.latex:write_document"}),
+        output=Namedlist(fromdict={"tex": str(document)}),
+    )
+    call(job)
+    assert "% one table" in document.read_text()
+
+
+def test_a_called_function_gets_the_results_directory_of_its_job(tmp_path):
+    """With a storage plugin the configured path is the end of a longer one."""
+    root = tmp_path / "results/smoke/stored/results/smoke"
+    function = "synfeal.report.meshes:write_meshes_table"
+    job = SimpleNamespace(
+        config={"results": "results/", "profile": "smoke"},
+        wildcards=Namedlist(),
+        input=Namedlist(),
+        params=Namedlist(fromdict={"function": function, "scenes": ["hall"]}),
+        output=Namedlist(fromdict={end: f"{root}/tables/a.{end}" for end in ("csv", "tex")}),
+    )
+    with pytest.raises(InputError, match=f"^{root}/scenes/hall/properties.json: "):
+        call(job)
 
 
 def test_job_keeps_the_traceback_of_a_defect(tmp_path):

@@ -238,7 +238,7 @@ def test_the_figure_has_a_panel_per_size_with_the_choice_ringed(made_up):
 
 
 def test_the_figure_is_written_under_its_name(made_up):
-    write_figures(Results(made_up, design_of(())), made_up / "figures")
+    write_figures(design_of(()), made_up, made_up / "figures")
     assert {path.name for path in (made_up / "figures").iterdir()} == {
         "speed_vs_error_render.png",
         "speed_vs_error_render.svg",

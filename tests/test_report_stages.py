@@ -6,11 +6,11 @@ import pytest
 
 from synfeal.errors import InputError
 from synfeal.provenance import processor_name
+from synfeal.report.cost.measured import read_jobs
 from synfeal.report.html.origin import cost_sentence, duration, origin_html
-from synfeal.report.html.provenance import write_provenance
-from synfeal.report.html.stages import Stage, read_stages
+from synfeal.report.html.provenance import stages_of, write_provenance
 
-HEADER = "s\th:m:s\tmax_rss\tmax_vms\n"
+HEADER = "s\th:m:s\tmax_rss\tcpu_time\n"
 
 
 def measure(path, seconds, peak_mb):
@@ -29,16 +29,15 @@ def benchmarks(tmp_path):
 
 
 def test_jobs_are_summed_by_stage(benchmarks):
-    assert read_stages(benchmarks.rglob("*.tsv"), benchmarks) == [
-        Stage("train", 3, 15.0, 4.0, 300.5),
-        Stage("summary", 1, 0.5, 0.5, None),
-    ]
+    train, summary = stages_of(read_jobs(benchmarks.rglob("*.tsv"), benchmarks))
+    assert [*train.values()] == ["train", 3, 15.0, 4.0, 300.5]
+    assert [*summary.values()] == ["summary", 1, 0.5, 0.5, None]
 
 
 def test_a_broken_measurement_is_named(benchmarks):
-    (benchmarks / "summary.tsv").write_text("s\tmax_rss\nfast\t1\n")
+    (benchmarks / "summary.tsv").write_text("s\tmax_rss\tcpu_time\nfast\t1\t1\n")
     with pytest.raises(InputError, match=r"summary\.tsv: row 2: s must be a number"):
-        read_stages([benchmarks / "summary.tsv"], benchmarks)
+        read_jobs([benchmarks / "summary.tsv"], benchmarks)
 
 
 def test_the_record_says_what_ran_where_and_for_how_long(benchmarks):

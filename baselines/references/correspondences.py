@@ -80,7 +80,9 @@ def mutual_matches(
     return rows, nearest[rows]
 
 
-def write_matches(descriptors: Path, train: Path, test: Path, retrieved: int, out: Path) -> None:
+def write_matches(
+    descriptors: Path, train: Path, test: Path, retrieved: int, out_matches: Path
+) -> None:
     """Match each test frame with the training frames that look most alike, and write the matches.
 
     Raises:
@@ -90,7 +92,7 @@ def write_matches(descriptors: Path, train: Path, test: Path, retrieved: int, ou
     described = read_described(descriptors, len(of_train), len(of_test))
     rows = most_alike(*described[VLAD], retrieved)
     found = match_test_frames(of_train, of_test, rows)
-    write_arrays(out, {name: getattr(found, name) for name in ARRAYS})
+    write_arrays(out_matches, {name: getattr(found, name) for name in ARRAYS})
 
 
 def read_correspondences(path: Path) -> Correspondences:

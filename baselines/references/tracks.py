@@ -49,7 +49,7 @@ class Tracks:
         return int(self.track.max(initial=-1)) + 1
 
 
-def write_tracks(descriptors: Path, train: Path, out: Path) -> None:
+def write_tracks(descriptors: Path, train: Path, out_tracks: Path) -> None:
     """Match training frames with each other, and write the tracks.
 
     Raises:
@@ -59,7 +59,7 @@ def write_tracks(descriptors: Path, train: Path, out: Path) -> None:
     vectors, _ = read_described(descriptors, len(features), 0)[VLAD]
     alike = most_alike(vectors, vectors, ALIKE + 1)
     tracks = find_tracks(features, frame_pairs(alike))
-    write_arrays(out, {name: getattr(tracks, name) for name in ARRAYS})
+    write_arrays(out_tracks, {name: getattr(tracks, name) for name in ARRAYS})
 
 
 def read_tracks(path: Path) -> Tracks:

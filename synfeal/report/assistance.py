@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +56,7 @@ _SHAPE = TypeAdapter(_Splits)
 
 
 def write_assistance_table(
-    rows: Iterable[Experiment], root: Path, out_csv: Path, out_tex: Path
+    rows: Sequence[Experiment], root: Path, out_csv: Path, out_tex: Path
 ) -> None:
     """Write one row per re-estimated label set and split, and one of both splits together.
 
@@ -79,7 +79,7 @@ def write_assistance_table(
     write_latex(out_tex, assistance_sheet(table[table.split == TOTAL]))
 
 
-def estimated_sets(rows: Iterable[Experiment]) -> list[tuple[str, str, str]]:
+def estimated_sets(rows: Sequence[Experiment]) -> list[tuple[str, str, str]]:
     """Method, scene and size of every label set of a design that a method re-estimated."""
     return list(dict.fromkeys((r.labels, r.scene, r.size) for r in rows if r.labels in METHODS))
 

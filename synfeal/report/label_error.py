@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +56,7 @@ SCHEMA = {
 
 
 def write_label_error_table(
-    rows: Iterable[Experiment], root: Path, out_csv: Path, out_tex: Path
+    rows: Sequence[Experiment], root: Path, out_csv: Path, out_tex: Path
 ) -> None:
     """Write two rows, before and after assistance, per re-estimated label set and split.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ REMARK = (
 )
 
 
-def write_meshes_table(scenes: Iterable[str], root: Path, out_csv: Path, out_tex: Path) -> None:
+def write_meshes_table(scenes: Sequence[str], root: Path, out_csv: Path, out_tex: Path) -> None:
     """Write Table 1 from the properties of the scenes' meshes.
 
     Args:
@@ -46,7 +46,7 @@ def write_meshes_table(scenes: Iterable[str], root: Path, out_csv: Path, out_tex
     write_latex(out_tex, meshes_sheet(meshes))
 
 
-def read_meshes(scenes: Iterable[str], root: Path) -> pd.DataFrame:
+def read_meshes(scenes: Sequence[str], root: Path) -> pd.DataFrame:
     """Columns ``SCHEMA`` of some scenes; what the paper has not is missing."""
     printed = {
         scene: {f"published_{fact}": value for fact, value in vars(facts).items()}

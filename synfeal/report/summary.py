@@ -8,11 +8,11 @@ from pathlib import Path
 import pandas as pd
 
 from synfeal.config import Design
-from synfeal.files import atomic_path
 from synfeal.frames import rows_of
 from synfeal.report.alive import alive_sentences
 from synfeal.report.cells import read_cells
 from synfeal.report.crossing import crossing_findings
+from synfeal.report.latex import write_text
 from synfeal.report.layouts import sheet_of
 from synfeal.report.meshes import meshes_sheet, read_meshes
 from synfeal.report.recall import NAME as RECALL
@@ -34,23 +34,21 @@ frame counts are in `tables/*.csv`, and as LaTeX in `tables/*.tex`.
 """
 
 
-def write_summary(design: Design, root: Path, out_md: Path) -> str:
+def write_summary(design: Design, root: Path, out_md: Path, out_txt: Path) -> None:
     """Write the summary of a profile's results.
 
     Args:
         design: of the profile.
         root: results directory of the profile.
         out_md: the page: checks, then every table beside the paper's.
-
-    Returns:
-        A short text for the terminal at the end of a run.
+        out_txt: what a person sees when the run ends.
 
     Raises:
         InputError: a result file is missing or unreadable.
     """
     cells = {name: read_cells(name, design, root) for name in design.tables}
     findings = run_sentences(cells)
-    meshes = read_meshes(dict.fromkeys(row.scene for row in design.rows), root)
+    meshes = read_meshes([*dict.fromkeys(row.scene for row in design.rows)], root)
     references = root / "tables" / f"{REFERENCES}.csv"
     sheets = [meshes_sheet(meshes), *(sheet_of(name, found) for name, found in cells.items())]
     if references.exists():
@@ -70,9 +68,8 @@ def write_summary(design: Design, root: Path, out_md: Path) -> str:
         "## Tables\n",
         *map(sheet_markdown, sheets),
     ]
-    with atomic_path(out_md) as temporary:
-        temporary.write_text("\n".join(parts), encoding="utf-8")
-    return terminal_text(root, out_md, findings)
+    write_text(out_md, "\n".join(parts))
+    write_text(out_txt, terminal_text(root, out_md, findings))
 
 
 def run_sentences(cells: Mapping[str, pd.DataFrame]) -> list[str]:

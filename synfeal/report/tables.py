@@ -17,7 +17,7 @@ Value = str | int | float | None
 
 
 def write_table(
-    name: str,
+    table: str,
     design: Design,
     root: Path,
     out_csv: Path,
@@ -26,7 +26,7 @@ def write_table(
     """Write one of tables 2 to 6 from the scores of its runs.
 
     Args:
-        name: the table, e.g. ``table4_size``.
+        table: e.g. ``table4_size``.
         design: of the profile, the rows of this table among others.
         root: results directory of the profile, where ``runs`` is.
         out_csv: one row per cell.
@@ -35,9 +35,9 @@ def write_table(
     Raises:
         InputError: a run's scores are missing or unreadable.
     """
-    cells = read_cells(name, design, root)
-    write_frame(out_csv, cells[[*schema_of(name, repeated=bool((cells.n_seeds > 1).any()))]])
-    write_latex(out_tex, sheet_of(name, cells))
+    cells = read_cells(table, design, root)
+    write_frame(out_csv, cells[[*schema_of(table, repeated=bool((cells.n_seeds > 1).any()))]])
+    write_latex(out_tex, sheet_of(table, cells))
 
 
 def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Mapping[str, Value]]) -> None:

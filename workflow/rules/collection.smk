@@ -1,6 +1,19 @@
 # Mesh in, data sets with exact poses out (section 3 of the paper).
 
 
+# A job that calls one function, `params.function`, with the rule's files, parameters and wildcards
+# (synfeal.job.call); rules that add nothing else are `use rule call as ... with`.
+rule call:
+    log:
+        f"{ROOT}/logs/call.log",
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
+    script:
+        "../scripts/call.py"
+
+
 rule scene:
     input:
         mesh=lambda w: CONFIG.scenes[w.scene].path or [],
@@ -15,7 +28,6 @@ rule scene:
         f"{ROOT}/benchmarks/scene/{{scene}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(4000),
     params:
@@ -38,7 +50,6 @@ rule plan:
         f"{ROOT}/benchmarks/plan/{{scene}}/{{split}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(2000),
     params:
@@ -62,7 +73,6 @@ rule coverage:
         f"{ROOT}/benchmarks/coverage/{{scene}}/{{split}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(1000),
     params:
@@ -85,7 +95,6 @@ rule cell_depth:
         f"{ROOT}/benchmarks/cell_depth/{{scene}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(1000),
     params:
@@ -107,7 +116,6 @@ rule render:
         f"{ROOT}/benchmarks/render/{{scene}}/{{camera}}/{{sequence}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
     params:
@@ -132,7 +140,6 @@ rule render_speed:
         f"{ROOT}/benchmarks/render_speed/{{scene}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
     params:
@@ -157,7 +164,6 @@ rule collection_speed:
         f"{ROOT}/benchmarks/collection_speed/{{scene}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
     params:
@@ -184,7 +190,6 @@ rule render_packed:
         f"{ROOT}/benchmarks/render_packed/{{scene}}/{{sequence}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
     params:
@@ -212,7 +217,6 @@ rule pack:
         f"{ROOT}/benchmarks/pack/{{scene}}/{{split}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(2000),
     params:
@@ -239,7 +243,6 @@ rule dataset:
         f"{ROOT}/benchmarks/dataset/{{scene}}/{{camera}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(1000),
     params:
@@ -262,7 +265,6 @@ rule true_labels:
         f"{ROOT}/benchmarks/labels/{{scene}}/{{size}}/synfeal/{{split}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(1000),
     params:

@@ -58,6 +58,8 @@ except InputError as error:
 ROOT = CONFIG.root.as_posix()
 ARCHIVE = SUFFIX if CONFIG.archive_sequences else ""
 SPLITS = ("train", "test")
+SCENES = sorted({e.scene for e in EXPERIMENTS})
+SIZES = sorted({(e.scene, e.size) for e in EXPERIMENTS})
 RUNS = DESIGN.runs
 TABLE_NAMES = ["table1_meshes", *DESIGN.tables]
 DRAWN_TABLES = ("table3_inconsistencies", "table4_size")
@@ -213,21 +215,22 @@ def predictions_there(wildcards):
     return paths
 
 
-def all_labels():
-    sets = sorted({(e.scene, e.size, e.label_id) for e in EXPERIMENTS})
+def label_files(sets, end=""):
+    """Both splits of label sets, by scene, size and name."""
     return [
-        f"{ROOT}/labels/{s}/{z}/{l}/{split}.csv" for s, z, l in sets for split in SPLITS
+        f"{ROOT}/labels/{s}/{z}/{l}/{split}{end}.csv"
+        for s, z, l in sorted(sets)
+        for split in SPLITS
     ]
+
+
+def all_labels():
+    return label_files({(e.scene, e.size, e.label_id) for e in EXPERIMENTS})
 
 
 def true_labels():
     """The true poses of every data set."""
-    sets = sorted({(e.scene, e.size) for e in EXPERIMENTS})
-    return [
-        f"{ROOT}/labels/{s}/{z}/synfeal/{split}.csv"
-        for s, z in sets
-        for split in SPLITS
-    ]
+    return label_files((s, z, "synfeal") for s, z in SIZES)
 
 
 def histories():
@@ -238,15 +241,7 @@ def histories():
 
 def pose_labels():
     """The true poses of every data set, and those that ground-truth methods estimated."""
-    sets = {(e.scene, e.size, "synfeal") for e in EXPERIMENTS}
-    sets |= {
-        (e.scene, e.size, e.labels) for e in EXPERIMENTS if e.labels in RECONSTRUCTED
-    }
-    return [
-        f"{ROOT}/labels/{s}/{z}/{l}/{split}.csv"
-        for s, z, l in sorted(sets)
-        for split in SPLITS
-    ]
+    return label_files({(s, z, "synfeal") for s, z in SIZES} | {*estimated_sets()})
 
 
 def errors_of(runs):
@@ -275,20 +270,17 @@ def measurements(outputs):
 
 def packed_frames(splits=SPLITS):
     """Frames as the localizers see them."""
-    scenes = sorted({e.scene for e in EXPERIMENTS})
-    return [f"{ROOT}/frames/{s}/{split}.npy" for s in scenes for split in splits]
+    return [f"{ROOT}/frames/{s}/{split}.npy" for s in SCENES for split in splits]
 
 
 def passing_files():
     """Outputs that go once they are used: parts of packed frames, features, views."""
-    rooms = CONFIG.rooms if backbones() else []
-    scenes = sorted({*(e.scene for e in EXPERIMENTS), *rooms})
-    sizes = sorted({(e.scene, e.size) for e in EXPERIMENTS})
+    scenes = sorted({*SCENES, *(CONFIG.rooms if backbones() else ())})
     return [
         *(f for s in scenes for p in SPLITS for f in packed_shards(s, p, "npy")),
         *(
             f"{ROOT}/references/{s}/{z}/{kind}-{split}.npz"
-            for s, z in sizes
+            for s, z in SIZES
             for kind in ("features", "views")
             for split in SPLITS
             if has_structure(EXPERIMENTS, s, z)
@@ -353,13 +345,11 @@ def reference_sets(file):
 
 def files_of_references():
     """An output of every job that reference methods are answered by."""
-    scenes = sorted({e.scene for e in EXPERIMENTS})
-    sizes = sorted({(e.scene, e.size) for e in EXPERIMENTS})
     return [
-        *(f"{ROOT}/references/{scene}/descriptors.npz" for scene in scenes),
+        *(f"{ROOT}/references/{scene}/descriptors.npz" for scene in SCENES),
         *(
             f"{ROOT}/references/{s}/{z}/{file}.npz"
-            for s, z in sizes
+            for s, z in SIZES
             for file in ("correspondences", "tracks")
             if has_structure(EXPERIMENTS, s, z)
         ),
@@ -479,8 +469,7 @@ def label_figures():
 
 def coverages():
     """How much of its scene every plan covers: kept on record, read by people alone."""
-    scenes = sorted({e.scene for e in EXPERIMENTS})
-    return [f"{ROOT}/plans/{s}/{p}.coverage.json" for s in scenes for p in SPLITS]
+    return [f"{ROOT}/plans/{s}/{p}.coverage.json" for s in SCENES for p in SPLITS]
 
 
 def assistance_files():
@@ -490,11 +479,7 @@ def assistance_files():
 
 
 def unassisted_labels():
-    return [
-        f"{ROOT}/labels/{s}/{z}/{l}/{split}-unassisted.csv"
-        for s, z, l in estimated_sets()
-        for split in SPLITS
-    ]
+    return label_files(estimated_sets(), "-unassisted")
 
 
 def batch_facts():
@@ -536,11 +521,10 @@ def backbones():
 
 def files_of_labels():
     """An output of every job that labels are made by."""
-    scenes = sorted({e.scene for e in EXPERIMENTS})
     return [
-        *(f"{ROOT}/scenes/{scene}/properties.json" for scene in scenes),
-        *(f"{ROOT}/plans/{scene}/{split}.csv" for scene in scenes for split in SPLITS),
-        *(d for scene in scenes for d in sequence_dirs(scene, "groundtruth")),
+        *(f"{ROOT}/scenes/{scene}/properties.json" for scene in SCENES),
+        *(f"{ROOT}/plans/{scene}/{split}.csv" for scene in SCENES for split in SPLITS),
+        *(d for scene in SCENES for d in sequence_dirs(scene, "groundtruth")),
         *pose_labels(),
         *all_labels(),
         *batch_facts(),
@@ -557,10 +541,7 @@ def files_of_runs():
         *(f"{ROOT}/plans/{scene}/train.csv" for scene in rooms),
         *(f"{ROOT}/frames/{scene}/train.npy" for scene in rooms),
         *packed_frames(),
-        *(
-            f"{ROOT}/scenes/{scene}/test_depth.npy"
-            for scene in sorted({e.scene for e in EXPERIMENTS})
-        ),
+        *(f"{ROOT}/scenes/{scene}/test_depth.npy" for scene in SCENES),
         *(f"{ROOT}/pretrained/{backbone}.pt" for backbone in sorted(backbones())),
         *(m.replace("metrics.json", "predictions.csv") for m in all_metrics()),
         *all_metrics(),
@@ -569,7 +550,6 @@ def files_of_runs():
 
 def files_of_evidence():
     """An output of every job of a run but those that record and report the run."""
-    scenes = sorted({e.scene for e in EXPERIMENTS})
     tables = ["assistance", "hard_cases", "label_error", "recall", "references"]
     return [
         *files_of_runs(),
@@ -577,8 +557,8 @@ def files_of_evidence():
         *robustness_files(),
         *coverages(),
         *manifests("groundtruth"),
-        *(f"{ROOT}/scenes/{scene}/render_speed.csv" for scene in scenes),
-        *(f"{ROOT}/scenes/{scene}/collection_speed.json" for scene in scenes),
+        *(f"{ROOT}/scenes/{scene}/render_speed.csv" for scene in SCENES),
+        *(f"{ROOT}/scenes/{scene}/collection_speed.json" for scene in SCENES),
         *(f"{ROOT}/tables/{t}.csv" for t in [*tables, "speed_vs_error", *TABLE_NAMES]),
         f"{ROOT}/tables/all_tables.tex",
         f"{ROOT}/figures",

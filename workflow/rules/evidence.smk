@@ -1,12 +1,9 @@
 # Tables, figures and the summary: they read result files and compute nothing upstream.
 
 
-rule table1_meshes:
+use rule call as table1_meshes with:
     input:
-        properties=expand(
-            f"{ROOT}/scenes/{{scene}}/properties.json",
-            scene=sorted({e.scene for e in EXPERIMENTS}),
-        ),
+        properties=expand(f"{ROOT}/scenes/{{scene}}/properties.json", scene=SCENES),
     output:
         csv=report(
             f"{ROOT}/tables/table1_meshes.csv",
@@ -18,18 +15,12 @@ rule table1_meshes:
         f"{ROOT}/logs/tables/table1_meshes.log",
     benchmark:
         f"{ROOT}/benchmarks/tables/table1_meshes.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
     params:
-        scenes=sorted({e.scene for e in EXPERIMENTS}),
-    script:
-        "../scripts/table1_meshes.py"
+        function="synfeal.report.meshes:write_meshes_table",
+        scenes=SCENES,
 
 
-rule table:
+use rule call as table with:
     input:
         metrics=lambda w: metrics_of(DESIGN.table_runs(w.table)),
     output:
@@ -45,18 +36,12 @@ rule table:
         f"{ROOT}/benchmarks/tables/{{table}}.tsv"
     wildcard_constraints:
         table="table[2-9]_[a-z_]+",
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="synfeal.report.tables:write_table",
         design=dump(DESIGN),
-    script:
-        "../scripts/table.py"
 
 
-rule recall:
+use rule call as recall with:
     input:
         metrics=all_metrics(),
     output:
@@ -70,18 +55,12 @@ rule recall:
         f"{ROOT}/logs/tables/recall.log",
     benchmark:
         f"{ROOT}/benchmarks/tables/recall.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="synfeal.report.recall:write_recall_table",
         design=dump(DESIGN),
-    script:
-        "../scripts/recall.py"
 
 
-rule assistance:
+use rule call as assistance with:
     input:
         records=assistance_files(),
     output:
@@ -91,18 +70,12 @@ rule assistance:
         f"{ROOT}/logs/tables/assistance.log",
     benchmark:
         f"{ROOT}/benchmarks/tables/assistance.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="synfeal.report.assistance:write_assistance_table",
         rows=[dump(e) for e in EXPERIMENTS if e.labels in RECONSTRUCTED],
-    script:
-        "../scripts/assistance.py"
 
 
-rule label_error:
+use rule call as label_error with:
     input:
         labels=pose_labels(),
         unassisted=unassisted_labels(),
@@ -115,27 +88,15 @@ rule label_error:
         f"{ROOT}/logs/tables/label_error.log",
     benchmark:
         f"{ROOT}/benchmarks/tables/label_error.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="synfeal.report.label_error:write_label_error_table",
         rows=[dump(e) for e in EXPERIMENTS if e.labels in RECONSTRUCTED],
-    script:
-        "../scripts/label_error.py"
 
 
-rule speed_vs_error:
+use rule call as speed_vs_error with:
     input:
-        curves=expand(
-            f"{ROOT}/scenes/{{scene}}/collision_curve.csv",
-            scene=sorted({e.scene for e in EXPERIMENTS}),
-        ),
-        rendering=expand(
-            f"{ROOT}/scenes/{{scene}}/render_speed.csv",
-            scene=sorted({e.scene for e in EXPERIMENTS}),
-        ),
+        curves=expand(f"{ROOT}/scenes/{{scene}}/collision_curve.csv", scene=SCENES),
+        rendering=expand(f"{ROOT}/scenes/{{scene}}/render_speed.csv", scene=SCENES),
         labels=rules.label_error.output.csv,
         trainings=expand(
             f"{ROOT}/tables/{{table}}.csv",
@@ -150,36 +111,27 @@ rule speed_vs_error:
         f"{ROOT}/logs/tables/speed_vs_error.log",
     benchmark:
         f"{ROOT}/benchmarks/tables/speed_vs_error.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
     params:
-        scenes=sorted({e.scene for e in EXPERIMENTS}),
-    script:
-        "../scripts/speed_vs_error.py"
+        function="synfeal.report.speed_vs_error:write_speed_vs_error",
+        scenes=SCENES,
 
 
-rule hard_cases:
+use rule call as hard_cases with:
     output:
         csv=f"{ROOT}/tables/hard_cases.csv",
     log:
         f"{ROOT}/logs/tables/hard_cases.log",
     benchmark:
         f"{ROOT}/benchmarks/tables/hard_cases.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(2000),
-    script:
-        "../scripts/hard_cases.py"
+    params:
+        function="synfeal.report.hard_cases.table:write_hard_cases",
 
 
-rule document:
+use rule call as document with:
     input:
-        tex=[
+        tables=[
             *expand(
                 f"{ROOT}/tables/{{table}}.tex",
                 table=[*TABLE_NAMES, "references", "recall"],
@@ -192,16 +144,11 @@ rule document:
         f"{ROOT}/logs/tables/document.log",
     benchmark:
         f"{ROOT}/benchmarks/tables/document.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
-    script:
-        "../scripts/document.py"
+    params:
+        function="synfeal.report.latex:write_document",
 
 
-rule figures:
+use rule call as figures with:
     input:
         tables=expand(
             f"{ROOT}/tables/{{table}}.csv",
@@ -217,13 +164,10 @@ rule figures:
         labels=pose_labels(),
         assistance=assistance_files(),
         errors=errors_of(DESIGN.table_runs("table4_size")),
-        collision=expand(
-            f"{ROOT}/scenes/{{scene}}/collision.ply",
-            scene=sorted({e.scene for e in EXPERIMENTS}),
-        ),
+        collision=expand(f"{ROOT}/scenes/{{scene}}/collision.ply", scene=SCENES),
         frames=packed_frames(["test"]),
     output:
-        figures=report(
+        dir=report(
             directory(f"{ROOT}/figures"),
             patterns=["{figure}.png"],
             caption="../report/figure.rst",
@@ -234,18 +178,14 @@ rule figures:
         f"{ROOT}/logs/figures.log",
     benchmark:
         f"{ROOT}/benchmarks/figures.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(2000),
     params:
+        function="synfeal.report.figures.write:write_figures",
         design=dump(DESIGN),
-    script:
-        "../scripts/figures.py"
 
 
-rule summary:
+use rule call as summary with:
     input:
         metrics=all_metrics(),
         references=rules.references_table.output.csv,
@@ -253,34 +193,25 @@ rule summary:
         robustness=robustness_tables(),
         properties=rules.table1_meshes.input.properties,
     output:
-        page=f"{ROOT}/summary.md",
-        text=f"{ROOT}/summary.txt",
+        md=f"{ROOT}/summary.md",
+        txt=f"{ROOT}/summary.txt",
     log:
         f"{ROOT}/logs/summary.log",
     benchmark:
         f"{ROOT}/benchmarks/summary.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="synfeal.report.summary:write_summary",
         design=dump(DESIGN),
-    script:
-        "../scripts/summary.py"
 
 
-rule claims:
+use rule call as claims with:
     input:
         errors=errors_of(RUNS),
         histories=histories(),
         labels=true_labels(),
         assistance=assistance_files(),
         properties=rules.table1_meshes.input.properties,
-        speed=expand(
-            f"{ROOT}/scenes/{{scene}}/collection_speed.json",
-            scene=sorted({e.scene for e in EXPERIMENTS}),
-        ),
+        speed=expand(f"{ROOT}/scenes/{{scene}}/collection_speed.json", scene=SCENES),
     output:
         csv=report(
             f"{ROOT}/claims.csv",
@@ -291,15 +222,9 @@ rule claims:
         f"{ROOT}/logs/claims.log",
     benchmark:
         f"{ROOT}/benchmarks/claims.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="synfeal.report.claims.table:write_claims",
         design=dump(DESIGN),
-    script:
-        "../scripts/claims.py"
 
 
 RESULTS = [
@@ -311,83 +236,65 @@ RESULTS = [
     rules.references_table.output.csv,
     rules.recall.output.csv,
     *robustness_tables(),
-    rules.figures.output.figures,
-    rules.summary.output.page,
+    rules.figures.output.dir,
+    rules.summary.output.md,
     rules.claims.output.csv,
 ]
 
 
-rule provenance:
+use rule call as provenance with:
     input:
         results=RESULTS,
         measured=lambda w: measurements([*files_of_evidence(), *passing_files()]),
     output:
-        record=f"{ROOT}/provenance.json",
-        jobs=f"{ROOT}/benchmarks.csv",
+        json=f"{ROOT}/provenance.json",
+        csv=f"{ROOT}/benchmarks.csv",
     log:
         f"{ROOT}/logs/provenance.log",
     benchmark:
         f"{ROOT}/benchmarks/provenance.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="synfeal.report.html.provenance:write_provenance",
         seed=CONFIG.seed,
         config_hash=config_hash(CONFIG),
-    script:
-        "../scripts/provenance.py"
 
 
-rule report:
+use rule call as report with:
     input:
-        provenance=rules.provenance.output.record,
+        provenance=rules.provenance.output.json,
         results=RESULTS,
         metrics=all_metrics(),
-        meshes=expand(
-            f"{ROOT}/scenes/{{scene}}/mesh.glb",
-            scene=sorted({e.scene for e in EXPERIMENTS}),
-        ),
+        meshes=expand(f"{ROOT}/scenes/{{scene}}/mesh.glb", scene=SCENES),
         plans=expand(
             f"{ROOT}/plans/{{scene}}/{{split}}.csv",
-            scene=sorted({e.scene for e in EXPERIMENTS}),
+            scene=SCENES,
             split=SPLITS,
         ),
         labels=pose_labels(),
     output:
-        page=f"{ROOT}/report.html",
+        html=f"{ROOT}/report.html",
     log:
         f"{ROOT}/logs/report.log",
     benchmark:
         f"{ROOT}/benchmarks/report.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(4000),
     params:
+        function="synfeal.report.html.page:write_report",
         design=dump(DESIGN),
-    script:
-        "../scripts/report.py"
 
 
-rule report_document:
+use rule call as report_document with:
     input:
-        tex=rules.document.input.tex,
+        tables=rules.document.input.tables,
         hard_cases=rules.hard_cases.output.csv,
         claims=rules.claims.output.csv,
-        figures=rules.figures.output.figures,
+        figures=rules.figures.output.dir,
     output:
         tex=f"{ROOT}/report.tex",
     log:
         f"{ROOT}/logs/report_document.log",
     benchmark:
         f"{ROOT}/benchmarks/report_document.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
-    script:
-        "../scripts/report_document.py"
+    params:
+        function="synfeal.report.document:write_report_document",

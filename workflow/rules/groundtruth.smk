@@ -15,7 +15,6 @@ rule erroneous_labels:
         f"{ROOT}/benchmarks/labels/{{scene}}/{{size}}/{{error_kind}}-p{{noise_m}}-r{{noise_deg}}/{{split}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(1000),
     params:
@@ -45,7 +44,6 @@ rule sfm:
         f"{ROOT}/benchmarks/sfm/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(4000),
     params:
@@ -73,7 +71,6 @@ rule rgbd:
         f"{ROOT}/benchmarks/rgbd/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(4000),
     params:
@@ -101,7 +98,6 @@ rule estimate:
         f"{ROOT}/benchmarks/{{frame_method}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(4000),
     params:
@@ -131,7 +127,6 @@ rule posegraph:
         f"{ROOT}/benchmarks/{{graph_method}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(2000),
     params:
@@ -163,7 +158,6 @@ rule chain:
         f"{ROOT}/benchmarks/chain/{{scene}}/{{size}}/{{reconstructed}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(1000),
     params:

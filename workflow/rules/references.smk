@@ -16,7 +16,6 @@ rule descriptors:
         f"{ROOT}/benchmarks/descriptors/{{scene}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
     params:
@@ -42,7 +41,6 @@ rule features:
         f"{ROOT}/benchmarks/features/{{scene}}/{{size}}/{{split}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
     params:
@@ -53,7 +51,7 @@ rule features:
         "../scripts/features.py"
 
 
-rule correspondences:
+use rule call as correspondences with:
     input:
         descriptors=rules.descriptors.output.descriptors,
         train=f"{ROOT}/references/{{scene}}/{{size}}/features-train.npz",
@@ -64,18 +62,14 @@ rule correspondences:
         f"{ROOT}/logs/correspondences/{{scene}}/{{size}}.log",
     benchmark:
         f"{ROOT}/benchmarks/correspondences/{{scene}}/{{size}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
     params:
+        function="baselines.references.correspondences:write_matches",
         retrieved=CONFIG.references.retrieved,
-    script:
-        "../scripts/correspondences.py"
 
 
-rule tracks:
+use rule call as tracks with:
     input:
         descriptors=rules.descriptors.output.descriptors,
         train=f"{ROOT}/references/{{scene}}/{{size}}/features-train.npz",
@@ -85,13 +79,10 @@ rule tracks:
         f"{ROOT}/logs/tracks/{{scene}}/{{size}}.log",
     benchmark:
         f"{ROOT}/benchmarks/tracks/{{scene}}/{{size}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
-    script:
-        "../scripts/tracks.py"
+    params:
+        function="baselines.references.tracks:write_tracks",
 
 
 rule image_references:
@@ -109,7 +100,6 @@ rule image_references:
         f"{ROOT}/benchmarks/image_references/{REFERENCE_LOG}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(2000),
     params:
@@ -136,7 +126,6 @@ rule structure_references:
         f"{ROOT}/benchmarks/structure_references/{REFERENCE_LOG}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
     params:
@@ -172,7 +161,6 @@ rule views:
         f"{ROOT}/benchmarks/views/{{scene}}/{{size}}/{{split}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(2000),
     params:
@@ -199,7 +187,6 @@ rule coordinate_references:
         f"{ROOT}/benchmarks/coordinate_references/{REFERENCE_LOG}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
     params:
@@ -229,7 +216,6 @@ rule external_reference:
         f"{ROOT}/benchmarks/external_reference/{REFERENCE_LOG}/{{external}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(4000),
     params:
@@ -239,7 +225,7 @@ rule external_reference:
         "../scripts/external_reference.py"
 
 
-rule references_table:
+use rule call as references_table with:
     input:
         metrics=reference_sets("metrics.json"),
         facts=reference_sets("facts.json"),
@@ -255,13 +241,7 @@ rule references_table:
         f"{ROOT}/logs/tables/references.log",
     benchmark:
         f"{ROOT}/benchmarks/tables/references.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="synfeal.report.references:write_references_table",
         design=dump(DESIGN),
         external={name: dump(method) for name, method in EXTERNAL.items()},
-    script:
-        "../scripts/references_table.py"

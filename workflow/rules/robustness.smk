@@ -15,7 +15,6 @@ rule light_shares:
         f"{ROOT}/benchmarks/light_shares/{{scene}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(4000),
     params:
@@ -39,7 +38,6 @@ rule render_varied:
         f"{ROOT}/benchmarks/render_varied/{{effects}}/{{split}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
     params:
@@ -67,7 +65,6 @@ rule pack_varied:
         f"{ROOT}/benchmarks/pack_varied/{{effects}}/{{split}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(2000),
     params:
@@ -97,7 +94,6 @@ rule train_varied:
         f"{ROOT}/benchmarks/train_varied/{{model}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=lambda w, attempt: attempt
         * training_mb(
@@ -129,7 +125,6 @@ rule varied_descriptors:
         trained_on=f"{CLEAN}|{MIXED}",
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
     params:
@@ -160,7 +155,6 @@ rule varied_structure:
         f"{ROOT}/benchmarks/varied_structure/{{effects}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
     params:
@@ -187,7 +181,6 @@ rule effects_speed:
         f"{ROOT}/benchmarks/effects_speed.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(3000),
     params:
@@ -222,7 +215,6 @@ rule robustness:
         f"{ROOT}/benchmarks/tables/robustness.tsv"
     conda:
         "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(2000),
     params:

@@ -60,9 +60,8 @@ def read_jobs(paths: Iterable[Path], folder: Path) -> pd.DataFrame:
     return jobs.assign(cpu_s=jobs["wall_s"] * busy.fillna(usual))
 
 
-def write_measured(paths: Iterable[Path], root: Path) -> None:
-    """Keep files below ``<root>/benchmarks`` in one file, ``<root>/benchmarks.csv``."""
-    jobs = read_jobs(sorted(paths), root / "benchmarks")
+def write_measured(jobs: pd.DataFrame, root: Path) -> None:
+    """Keep the jobs of :func:`read_jobs` in one file, ``<root>/benchmarks.csv``."""
     table = jobs.round({"wall_s": 2, "cpu_s": 2, "peak_mb": 1})
     write_frame(root / "benchmarks.csv", table, float_format=None)
 

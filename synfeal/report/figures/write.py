@@ -7,6 +7,7 @@ from pathlib import Path
 import matplotlib
 from matplotlib.figure import Figure
 
+from synfeal.config import Design
 from synfeal.files import atomic_path
 from synfeal.report.figures.registry import FIGURES
 from synfeal.report.figures.sources import Results
@@ -16,7 +17,7 @@ DPI = 150
 METADATA: dict[str, dict[str, str | None]] = {".png": {"Software": None}, ".svg": {"Date": None}}
 
 
-def write_figures(results: Results, out_dir: Path) -> list[str]:
+def write_figures(design: Design, root: Path, out_dir: Path) -> list[str]:
     """Write every figure of the registry whose inputs the design makes, as SVG and PNG.
 
     Equal results give equal files.
@@ -27,7 +28,7 @@ def write_figures(results: Results, out_dir: Path) -> list[str]:
     Raises:
         InputError: a result file that the design makes is missing or unreadable.
     """
-    written = []
+    results, written = Results(root, design), []
     for name, entry in FIGURES.items():
         with matplotlib.rc_context(rc=RC):
             figure = entry.draw(results)

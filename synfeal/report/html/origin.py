@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,6 @@ from pydantic import BaseModel, TypeAdapter
 
 from synfeal.report.html.render import render
 from synfeal.report.html.sortable import Column, sortable
-from synfeal.report.html.stages import Stage
 from synfeal.report.results import check_result, read_result
 
 NEEDED = ("commit", "config_sha256", "seed", "python", "packages", "platform", "time_utc")
@@ -27,9 +25,17 @@ class _Machine(BaseModel):
     gpu: str | None
 
 
+class _Stage(BaseModel):
+    stage: str
+    jobs: int
+    seconds: float
+    median_seconds: float
+    peak_mb: float | None
+
+
 class _Origin(BaseModel):
     machine: _Machine
-    stages: list[Stage]
+    stages: list[_Stage]
     packages: dict[str, str]
 
 
@@ -92,7 +98,7 @@ def _stages(record: Record) -> Markup:
         Column("Median job", "median_seconds", text="median"),
         Column("Peak memory (MB)", "peak_mb", "{:,.0f}"),
     ]
-    stages = pd.DataFrame(record["stages"], columns=[field.name for field in fields(Stage)])
+    stages = pd.DataFrame(record["stages"], columns=list(_Stage.model_fields))
     texts = {"all": stages.seconds.map(duration), "median": stages.median_seconds.map(duration)}
     caption = "<b>Cost.</b> Time and largest resident memory of the jobs of each stage."
     return sortable("stages", caption, columns, stages.assign(**texts))
