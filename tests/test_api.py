@@ -12,7 +12,6 @@ from nbclient import NotebookClient
 
 import synfeal
 from synfeal.errors import InputError
-from synfeal.validation.run import report
 from tests.collected import collect, save_room
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
@@ -54,11 +53,6 @@ def test_the_functions_make_what_the_command_makes(tmp_path):
         synfeal.plan(mesh, 10, spacing=-1)
     with pytest.raises(InputError, match=r"^colour: no such option"):
         synfeal.plan(mesh, 10, colour="red")
-
-
-def test_validate_is_a_function_whatever_was_loaded_before():
-    assert callable(report)
-    assert callable(synfeal.validate)
 
 
 def loaded_by(code, among):

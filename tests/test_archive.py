@@ -22,18 +22,11 @@ from synfeal.dataset.packed import pack_frames, read_packed
 from synfeal.dataset.render_sequence import write_sequence
 from synfeal.dataset.sevenscenes import frame_paths, read_depth_m, read_pose, read_split
 from synfeal.errors import InputError
-from tests.collected import save_room, tree_of
-from tests.damaged_sets import CAMERA, write_planar_set
+from tests.collected import tree_of
+from tests.damaged_sets import CAMERA
 from tests.test_dataset import FakeRenderer, poses_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-
-
-@pytest.fixture(scope="module")
-def planar(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("planar") / "set"
-    write_planar_set(folder)
-    return folder
 
 
 def archived(folder, out):
@@ -198,13 +191,6 @@ def test_a_sequence_is_rendered_into_an_archive_or_not_at_all(tmp_path):
 
 
 FRAMES = ("--frames", "8", "--test-frames", "4", "--width", "40", "--height", "32")
-
-
-@pytest.fixture(scope="module")
-def mesh(tmp_path_factory):
-    path = tmp_path_factory.mktemp("mesh") / "room.glb"
-    save_room(path)
-    return path
 
 
 def collect(mesh, out, *more):

@@ -12,23 +12,10 @@ from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.sevenscenes import frame_paths, read_pose, read_split
 from synfeal.geometry.rotations import rotation_from_rpy
-from tests.collected import collect, only_error, save_room, tree_of
+from tests.collected import collect, only_error, tree_of
 from tests.test_workflow import snakemake
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-
-
-@pytest.fixture(scope="module")
-def mesh(tmp_path_factory):
-    return save_room(tmp_path_factory.mktemp("mesh") / "room.glb")
-
-
-@pytest.fixture(scope="module")
-def calm(mesh, tmp_path_factory):
-    """A data set nothing happened to."""
-    out = tmp_path_factory.mktemp("calm") / "set"
-    assert collect(mesh, out, "--depth") == 0
-    return out
 
 
 def test_collect_makes_a_complete_data_set(calm):

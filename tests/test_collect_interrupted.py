@@ -18,19 +18,6 @@ from tests.small_disk import mounted, remount
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 
 
-@pytest.fixture(scope="module")
-def mesh(tmp_path_factory):
-    return save_room(tmp_path_factory.mktemp("mesh") / "room.glb")
-
-
-@pytest.fixture(scope="module")
-def calm(mesh, tmp_path_factory):
-    """A data set nothing happened to."""
-    out = tmp_path_factory.mktemp("calm") / "set"
-    assert collect(mesh, out, "--depth") == 0
-    return out
-
-
 class Interrupting:
     """A renderer that is interrupted after some frames, and counts those it rendered."""
 

@@ -36,66 +36,6 @@ def profile(name):
     return load_config(*(CONFIG / file for file in PROFILES[name]))
 
 
-def with_value(raw, dotted, value):
-    changed = copy.deepcopy(raw)
-    inner = changed
-    *parents, last = dotted.split("/")
-    for key in parents:
-        inner = inner[key]
-    inner[last] = value
-    return changed
-
-
-REFUSED = [
-    # key to set, value, what the message has to say
-    ("sacle", 1, ["sacle: unknown key", "scale"]),
-    ("scenes/sanctuary/colour", 1, ["scenes.sanctuary.colour: unknown key", "sampling_box"]),
-    ("scenes/sanctuary/sampling_box/w", [0, 1], ["sampling_box.w: unknown key", "x, y, z"]),
-    ("scenes/sanctuary/sizes/6k/tset", 1, ["sizes.6k.tset: unknown key", "test, train"]),
-    ("groundtruth/sfm/featuers", 9, ["groundtruth.sfm.featuers: unknown key", "max_features"]),
-    ("localizers/posenet/lr", 1e-3, ["localizers.posenet.lr: unknown key", "learning_rate"]),
-    ("localizers/vit", {}, ["localizers.vit", "'poselstm'", "'posenet2'"]),
-    ("scale", "much", ["scale", "valid number", "'much'"]),
-    ("scale", 1.5, ["scale", "less than or equal to 1", "1.5"]),
-    ("scale", float("nan"), ["scale", "nan"]),
-    ("seed", -1, ["seed", "greater than or equal to 0", "-1"]),
-    ("profile", "My Profile", ["profile", "pattern"]),
-    ("scenes", None, ["scenes", "dictionary"]),
-    ("scenes/sanctuary/sampling_box/x", [1, float("inf")], ["sampling_box.x.1", "finite"]),
-    ("scenes/sanctuary/sampling_box/x", [1, 2, 3], ["sampling_box.x", "2 items"]),
-    ("scenes/sanctuary/sizes/6k/train", 0, ["sizes.6k.train", "greater than or equal to 1"]),
-    ("training/samples_seen/6k", 1.5, ["training.samples_seen.6k", "valid integer"]),
-    ("collection/interpolation", "lerp", ["collection.interpolation", "'rpy' or 'slerp'"]),
-    ("localizers/posenet/dropout", 1.0, ["localizers.posenet.dropout", "less than 1"]),
-    ("localizers/posenet2", {"s_position": float("nan")}, ["s_position", "finite"]),
-    # more than one key has to agree
-    ("scenes/sanctuary/sampling_box/x", [3, 1], ["scenes.sanctuary.sampling_box.x", "below"]),
-    ("scenes/sanctuary/angles", {"pitch_deg": [-90, 90]}, ["angles.pitch_deg", "within -90"]),
-    ("scenes/sanctuary/builder", None, ["scenes.sanctuary.builder", "large_room, sanctuary"]),
-    ("scenes/sanctuary/source", "mesh", ["scenes.sanctuary.path", "mesh file"]),
-    ("network_camera/near_m", 200, ["network_camera.near_m", "below far_m"]),
-    ("network/input_px", 96, ["network_camera", "at least 96 pixels", "network.input_px 96"]),
-    ("network/backbone", "inception_v3", ["network.input_px", "at least 75", "found 64"]),
-    ("pretraining/source", "rooms", ["pretraining.source", "builder: random_room"]),
-    ("network/width", 0.5, ["network.width", "must be 0.25", "shipped"]),
-    ("pretraining/source", "imagenet", ["network.width", "must be 1"]),
-]
-
-
-@pytest.mark.parametrize(("key", "value", "expected"), REFUSED)
-def test_a_wrong_value_is_refused_in_one_line_that_names_file_key_and_what_is_allowed(
-    raw, key, value, expected
-):
-    with pytest.raises(InputError) as refusal:
-        parse_config(with_value(raw, key, value), "my.yaml")
-    message = str(refusal.value)
-    assert message.startswith("my.yaml: ")
-    assert "\n" not in message
-    assert len(message) < 400
-    for part in expected:
-        assert part in message
-
-
 @pytest.mark.parametrize("key", ["scale", "training", "scenes/sanctuary/source"])
 def test_a_missing_key_is_named_without_printing_the_whole_file(raw, key):
     *parents, last = key.split("/")

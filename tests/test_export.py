@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from synfeal.cli import main
-from tests.damaged_sets import frame_files, write_planar_set
+from tests.damaged_sets import frame_files
 
 FORMATS = ("ace", "colmap", "hloc", "mstransformer", "nerfstudio", "tum")
 WITH_CAMERA = tuple(name for name in FORMATS if name != "mstransformer")
@@ -31,18 +30,6 @@ class Exported:
     cam_from_world: list[np.ndarray]
     colors: list[Path]
     depth_m: list[np.ndarray] | None
-
-
-@pytest.fixture(scope="module")
-def planar(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("planar") / "set"
-    write_planar_set(folder)
-    return folder
-
-
-@pytest.fixture
-def damaged(planar, tmp_path):
-    return Path(shutil.copytree(planar, tmp_path / "set"))
 
 
 def run(dataset, to, out, *more):

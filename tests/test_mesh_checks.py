@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from synfeal.config import check_mesh_files, load_config
-from synfeal.config.load import merge, read_yaml
+from synfeal.config.load import read_yaml
 from synfeal.config.models import SceneConfig
 from synfeal.errors import InputError
 from synfeal.mesh.checks import check_sampling_box
-from synfeal.mesh.model import MeshPart, TexturedMesh
-from tests.mesh_samples import FACE, TRIANGLE
 from tests.test_workflow import snakemake
 
 CONFIG = Path(__file__).parents[1] / "config"
@@ -30,12 +28,6 @@ def test_sampling_box_must_fit_the_mesh(scale, shift, message):
     with pytest.raises(InputError, match=message) as caught:
         check_sampling_box(box, bounds, "scenes.room")
     assert "unit_m" in str(caught.value)
-
-
-def test_merged_parts_keep_their_triangles():
-    mesh = TexturedMesh((MeshPart("a", TRIANGLE, FACE), MeshPart("b", TRIANGLE + 5, FACE)))
-    vertices, faces = mesh.merged()
-    np.testing.assert_array_equal(vertices[faces[1]], TRIANGLE + 5)
 
 
 def test_the_first_missing_mesh_is_named(tmp_path):
@@ -62,13 +54,6 @@ def test_scene_fragments_are_complete_configurations(scene):
     # Results of another mesh must not end up among those of the stand-ins.
     assert config.profile != read_yaml(CONFIG / "config.yaml")["profile"]
     assert (CONFIG / "scenes" / "README.md").is_file()
-
-
-def test_both_fragments_work_together():
-    merged = merge(
-        *(read_yaml(CONFIG / "scenes" / f"{s}.yaml") for s in ("large_room", "sanctuary"))
-    )
-    assert {scene["source"] for scene in merged["scenes"].values()} == {"mesh"}
 
 
 @pytest.mark.skipif((CONFIG.parent / "meshes/large_room.glb").exists(), reason="mesh is here")

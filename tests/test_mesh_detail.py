@@ -78,14 +78,6 @@ def test_what_is_cut_out_does_not_shine_through_a_smaller_texture():
     np.testing.assert_allclose(smaller, [[[200, 100, 50, 128]]], atol=1)
 
 
-def test_parts_without_a_texture_and_of_one_texel_stay():
-    bare = joined(sheet((2, -2), (0, 1)))
-    dot = textured(bare, np.full((1, 1, 3), 7, np.uint8))
-    out = with_smaller_textures(TexturedMesh((bare, dot)), 4).parts
-    assert out[0] is bare
-    np.testing.assert_array_equal(out[1].texture, dot.texture)
-
-
 class TestFewerFaces:
     """Needs the simplifier, which a machine without a compiler may lack."""
 

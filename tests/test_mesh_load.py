@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
-from trimesh.visual import TextureVisuals
-from trimesh.visual.material import PBRMaterial
 
 from synfeal.errors import InputError
 from synfeal.mesh.load import load_mesh
@@ -197,15 +195,6 @@ def test_ply_with_face_colours(tmp_path):
     assert part.vertex_rgb is not None
     for face, colour in zip(part.faces, box.visual.face_colors, strict=True):
         assert (part.vertex_rgb[face] == colour[:3]).all()
-
-
-def test_material_from_another_writer(tmp_path):
-    material = PBRMaterial(baseColorTexture=Image.new("P", (4, 4), 3), name="palette")
-    visual = TextureVisuals(uv=UV, material=material)
-    trimesh.Trimesh(TRIANGLE, FACE, visual=visual, process=False).export(tmp_path / "mesh.glb")
-    part = load_mesh(tmp_path / "mesh.glb").parts[0]
-    assert part.texture is not None
-    assert part.texture.shape[2] in (3, 4)
 
 
 HEADER_ONLY = b'{"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"attributes": {}}]}]}'

@@ -6,26 +6,16 @@ import numpy as np
 import pytest
 import trimesh
 
-from synfeal.errors import InputError
 from synfeal.mesh.findings import Findings
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart
-from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.repair import repaired
-from tests.mesh_samples import FACE, TRIANGLE, UV
+from tests.mesh_samples import FACE, TRIANGLE
 
 
 def repair(part):
     findings = Findings(Path("mesh.glb"))
     return repaired(part, findings), findings.sentences
-
-
-def test_a_sound_part_is_left_alone():
-    part = MeshPart("wall", TRIANGLE, FACE, UV, np.zeros((2, 2, 3), np.uint8))
-    same, findings = repair(part)
-    np.testing.assert_array_equal(same.vertices_m, part.vertices_m)
-    np.testing.assert_array_equal(same.faces, part.faces)
-    assert findings == ()
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
@@ -73,19 +63,6 @@ def test_unused_vertices_take_their_colours_and_coordinates_along():
     assert findings == ("part 'wall': 2 unused vertices removed",)
 
 
-def test_what_is_removed_was_never_hit():
-    rng = np.random.default_rng(0)
-    sphere = trimesh.creation.icosphere(subdivisions=2)
-    lines = np.stack([sphere.faces[:, 0], sphere.faces[:, 1], sphere.faces[:, 1]], axis=1)
-    faces = np.concatenate([sphere.faces, lines, np.roll(sphere.faces, 1, axis=1)])
-    part, _ = repair(MeshPart("ball", np.asarray(sphere.vertices), faces))
-    assert len(part.faces) == len(sphere.faces)
-    origins, directions = rng.normal(size=(500, 3)) * 2.0, rng.normal(size=(500, 3))
-    before = RayCaster(sphere.vertices, faces).first_hit_m(origins, directions)
-    after = RayCaster(part.vertices_m, part.faces).first_hit_m(origins, directions)
-    np.testing.assert_allclose(after, before, rtol=1e-6)
-
-
 def test_open_and_non_manifold_surfaces_are_kept(tmp_path):
     # Three walls that meet in one edge: non-manifold there, open everywhere else.
     colours = np.array([[255, 0, 0, 255]] * 4 + [[0, 255, 0, 255]], np.uint8)
@@ -97,11 +74,3 @@ def test_open_and_non_manifold_surfaces_are_kept(tmp_path):
     mesh = load_mesh(tmp_path / "walls.ply")
     np.testing.assert_array_equal(mesh.parts[0].faces, faces)
     assert mesh.findings == ()
-
-
-def test_a_file_without_any_area_has_no_faces(tmp_path):
-    colours = np.array([[255, 0, 0, 255]] * 3, np.uint8)
-    line = np.array([[0.0, 0, 0], [1, 1, 1], [2, 2, 2]])
-    trimesh.Trimesh(line, FACE, vertex_colors=colours, process=False).export(tmp_path / "l.ply")
-    with pytest.raises(InputError, match="no faces"):
-        load_mesh(tmp_path / "l.ply")

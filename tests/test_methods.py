@@ -13,7 +13,6 @@ from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.chain import chain_batches
 from baselines.groundtruth.methods import METHODS, Method, estimate_batch, solve_graph
 from baselines.groundtruth.posegraph.graph import Edge, PoseGraph
-from baselines.groundtruth.posegraph.optimise import OPTIMISERS
 from synfeal.config.models import CameraConfig, GroundTruthConfig, PoseGraphConfig
 from synfeal.geometry.poses import pose_matrix
 from synfeal.report.figures.style import METHOD_STYLES
@@ -66,13 +65,6 @@ def test_every_method_has_a_title_a_style_and_someone_who_runs_it():
     assert own_rules == {"sfm"}
     rules = (PAGE.parent.parent / "workflow/rules/groundtruth.smk").read_text()
     assert all(f"rule {name}:" in rules for name in own_rules)
-
-
-def test_every_optimiser_is_a_method():
-    assert {METHODS[name].optimiser for name in methods.graph_methods()} == {
-        *OPTIMISERS,
-        methods.ODOMETRY,
-    }
 
 
 def test_odometry_alone_keeps_the_chain_that_an_optimiser_moves():

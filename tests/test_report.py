@@ -10,7 +10,6 @@ from tests.report_results import (
     SIZES,
     TABLE4,
     cell,
-    complete_results,
     experiment,
     failed_metrics,
     fill,
@@ -18,19 +17,8 @@ from tests.report_results import (
     make,
     metrics,
     read,
-    shipped_design,
     write_run,
 )
-
-
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    return complete_results(tmp_path_factory.mktemp("results") / "mini")
-
-
-@pytest.fixture(scope="module")
-def design():
-    return shipped_design()
 
 
 @pytest.mark.parametrize(("table", "count"), [("table1_meshes", 2), *ROWS.items()])

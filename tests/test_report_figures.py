@@ -15,15 +15,14 @@ from synfeal.report.figures.pareto import pareto_front
 from synfeal.report.figures.reference_lines import SHOWN
 from synfeal.report.figures.style import METHOD_STYLES, MODEL_STYLES, PUBLISHED, SPLIT_STYLES
 from synfeal.report.layouts import TITLES
-from tests.report_results import ROWS, complete_results, design_of
+from tests.report_results import ROWS, design_of
 
 MODEL_OF = {title: model for model, title in TITLES.items()}
 
 
 @pytest.fixture(scope="module")
-def tables(tmp_path_factory):
-    root = complete_results(tmp_path_factory.mktemp("results") / "mini")
-    return {name: Results(root, design_of(())).table(name) for name in ROWS}
+def tables(results):
+    return {name: Results(results, design_of(())).table(name) for name in ROWS}
 
 
 def drawn(axes):

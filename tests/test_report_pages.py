@@ -14,7 +14,6 @@ from synfeal.report.summary import write_summary
 from tests.report_results import (
     ROWS,
     TABLE4,
-    complete_results,
     design_of,
     experiment,
     failed_metrics,
@@ -24,16 +23,6 @@ from tests.report_results import (
     shipped_design,
     write_run,
 )
-
-
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    return complete_results(tmp_path_factory.mktemp("results") / "mini")
-
-
-@pytest.fixture(scope="module")
-def design():
-    return shipped_design()
 
 
 def test_the_papers_lines_are_bold_where_the_paper_has_them_bold(results):
@@ -84,9 +73,9 @@ def test_the_document_with_all_tables_compiles(results, tmp_path):
     assert "(6 pages" in done.stdout
 
 
-def test_the_summary_shows_every_table_and_what_was_measured(results, design):
+def test_the_summary_shows_every_table_and_what_was_measured(results):
     out = results / "summary.md"
-    write_summary(design_of(design), results, out, out.with_suffix(".txt"))
+    write_summary(design_of(shipped_design()), results, out, out.with_suffix(".txt"))
     page, text = out.read_text(), out.with_suffix(".txt").read_text()
     assert page.count("| PoseNet2ResNet |") == 5
     assert "190 of 190 table cells have a score." in text
@@ -118,8 +107,8 @@ def test_the_checks_presume_no_outcome(tmp_path):
     assert second.endswith("the orientation error for 4 of 5 (not Hourglass).")
 
 
-def test_assistance_counts_each_split_and_both_beside_the_papers_counts(results, design, tmp_path):
-    write_assistance_table(design, results, tmp_path / "a.csv", tmp_path / "a.tex")
+def test_assistance_counts_each_split_and_both_beside_the_papers_counts(results, tmp_path):
+    write_assistance_table(shipped_design(), results, tmp_path / "a.csv", tmp_path / "a.tex")
     rows = read(tmp_path / "a.csv")
     assert [(r["method"], r["split"]) for r in rows[:3]] == [
         ("sfm", "train"),

@@ -7,7 +7,7 @@ import pytest
 from synfeal.errors import InputError
 from synfeal.provenance import processor_name
 from synfeal.report.cost.measured import read_jobs
-from synfeal.report.html.origin import cost_sentence, duration, origin_html
+from synfeal.report.html.origin import cost_sentence, origin_html
 from synfeal.report.html.provenance import stages_of, write_provenance
 
 HEADER = "s\th:m:s\tmax_rss\tcpu_time\n"
@@ -65,9 +65,3 @@ def test_the_processor_is_the_kernels_word_for_it(tmp_path):
     path.write_text("processor : 0\nmodel name\t: Abacus 9 @ 1 GHz\nmodel name\t: other\n")
     assert processor_name(path) == "Abacus 9 @ 1 GHz"
     assert processor_name(tmp_path / "none")
-
-
-def test_durations_are_read_by_people():
-    assert [duration(s) for s in (0.25, 89.0, 90.0, 5399.0, 7200.0)] == [
-        *("0.2 s", "89.0 s", "1.5 min", "90.0 min", "2.0 h")
-    ]

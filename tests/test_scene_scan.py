@@ -117,14 +117,6 @@ def test_a_box_in_a_room_hides_what_is_below_and_behind_it():
     assert seen[front].all()
 
 
-def test_stations_lie_evenly_within_the_room():
-    places = stations(LOWER, UPPER, (2, 4, 1))
-    assert places.shape == (8, 3)
-    np.testing.assert_allclose(np.unique(places[:, 0]), [1, 3])
-    np.testing.assert_allclose(np.unique(places[:, 1]), [0.5, 1.5, 2.5, 3.5])
-    np.testing.assert_allclose(places[:, 2], 1.5)
-
-
 def light_on(patches, lighting, albedo=0.0):
     """Linear light (V, 3) on a surface, up to the exposure."""
     surface = surface_of(rng(), patches, 0.1)

@@ -96,11 +96,6 @@ def test_no_motion_has_no_scale_and_is_lost(tmp_path):
     assert not estimate(tmp_path, poses).trajectory.registered.any()
 
 
-def test_pure_rotation_has_no_scale_and_is_lost(tmp_path):
-    poses = poses_at(np.tile([2.2, 3.0, 1.5], (4, 1)), 4.0 * np.arange(4))
-    assert not estimate(tmp_path, poses).trajectory.registered.any()
-
-
 def before_a_corner(n_frames):
     """Poses that look into a corner of the room and move across."""
     step = 0.25 * np.arange(n_frames)[:, None]
@@ -144,12 +139,6 @@ def test_a_pattern_that_repeats_within_a_view_misleads_and_the_mapper_starts_aga
     assert np.isfinite(result.trajectory.first_from_cam).all()
     assert result.facts.explained < CFG.min_explained
     assert result.facts.starts == 4
-
-
-def test_principal_point_off_the_centre_is_as_good_when_it_is_known(tmp_path):
-    poses = sideways(7, turn_deg=2.0)
-    result = estimate(tmp_path, poses, camera=shifted(20))
-    assert np.median(errors(result, poses)[0]) < 0.005
 
 
 def shifted(px):

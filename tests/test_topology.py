@@ -7,7 +7,6 @@ import pytest
 import trimesh
 
 from synfeal.mesh.topology import mesh_topology
-from synfeal.mesh.triangles import merge_vertices
 
 
 def arrays(mesh):
@@ -50,13 +49,6 @@ def test_three_faces_at_one_edge_are_not_a_surface():
     assert topology.non_manifold_edges == 1
     assert topology.boundary_edges == 6
     assert topology.enclosed_volume_m3 is None
-
-
-def test_seams_count_as_holes_until_their_copies_are_merged():
-    box = trimesh.creation.box()
-    soup, faces = np.asarray(box.vertices)[box.faces].reshape(-1, 3), np.arange(36).reshape(-1, 3)
-    assert mesh_topology(soup, faces).components == 12
-    assert mesh_topology(*merge_vertices(soup, faces)).enclosed_volume_m3 == pytest.approx(1.0)
 
 
 def test_random_holes_against_counting_one_by_one():

@@ -62,10 +62,6 @@ def test_a_design_without_table_4_has_no_rows(tmp_path):
     assert training_rows(tmp_path, "large_room").empty
 
 
-def test_a_scene_that_is_not_in_the_table_has_no_rows(root):
-    assert training_rows(root, "random_room").empty
-
-
 def test_a_training_that_was_not_measured_is_named(root):
     with pytest.raises(InputError, match=r"sanctuary/95k/.*/posenet/seed0\.tsv: missing"):
         training_rows(root, "sanctuary")
