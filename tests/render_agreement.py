@@ -8,13 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import CameraConfig, RenderConfig, SceneConfig
-from synfeal.geometry.poses import pose_matrix
-from synfeal.geometry.rotations import rotation_from_rpy
+from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.mesh.model import TexturedMesh
-from synfeal.mesh.rays import RayCaster
-from synfeal.planning.plan import sampling_box_of
-from synfeal.planning.sampling import pose_bounds, sample_poses, view_directions
 from synfeal.render.base import Depth, Rgb
 from synfeal.render.choose import BACKENDS
 
@@ -91,16 +86,3 @@ def render_all(
         renderer.close()
     stacked = {name: [np.stack(kind) for kind in zip(*images[name], strict=True)] for name in names}
     return {name: Frames(*kinds) for name, kinds in stacked.items()}
-
-
-def free_poses(
-    mesh: TexturedMesh, scene: SceneConfig, name: str, count: int, seed: int
-) -> NDArray[np.float64]:
-    """Poses (N, 4, 4) that see nothing closer than the scene's least view distance."""
-    box_m = sampling_box_of(scene, mesh.bounds_m, name)
-    vectors = sample_poses(
-        pose_bounds(box_m, scene.angles), 50 * count, np.random.default_rng(seed)
-    )
-    view_m = RayCaster(*mesh.merged()).first_hit_m(vectors[:, :3], view_directions(vectors))
-    free = vectors[(view_m > scene.min_view_distance_m) & np.isfinite(view_m)][:count]
-    return np.stack([pose_matrix(rotation_from_rpy(v[3:]), v[:3]) for v in free])

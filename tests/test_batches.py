@@ -6,16 +6,11 @@ from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.chain import chain_batches, chain_unassisted
 from baselines.groundtruth.trajectory import BatchTrajectory, failed_trajectory, read_trajectory
 from synfeal.config.models import GroundTruthConfig
-from synfeal.dataset.pose_table import PoseTable
 from synfeal.errors import InputError
-from synfeal.geometry.poses import pose_matrix, quat_wxyz_of, relative
+from synfeal.geometry.poses import pose_matrix, relative
+from tests.property_support import table_of
 
 CFG = GroundTruthConfig(batch_frames=5)
-
-
-def table_of(world_from_cam):
-    index = np.arange(len(world_from_cam))
-    return PoseTable(index, index // 3, world_from_cam[:, :3, 3], quat_wxyz_of(world_from_cam))
 
 
 def straight_truth(count):

@@ -13,24 +13,21 @@ from synfeal.frames import read_records
 from synfeal.report.cost import steps
 from synfeal.report.cost.estimate import (
     ALONE,
-    CPU,
-    GPU,
     OWN,
     Machine,
     compare_cost,
     job_costs,
-    stage_costs,
     summed,
     table_costs,
-    wall_seconds,
 )
-from synfeal.report.cost.jobs import COLUMNS, job_of
-from synfeal.report.cost.laws import LAW, fit_laws, fit_seconds, matched, seconds_of
+from synfeal.report.cost.jobs import job_of
+from synfeal.report.cost.laws import fit_laws, matched, seconds_of
 from synfeal.report.cost.measured import last_look_s, read_measured, write_measured
 from synfeal.report.cost.networks import training_work
 from synfeal.report.cost.plan import compare_runs
 from synfeal.report.cost.profiles import read_run
 from tests.planned_runs import ROOT, planned, run_jobs
+from tests.test_cost_laws import a_law
 
 HEADER = "s\tmax_rss\tcpu_time\n"
 # What the made-up run takes: seconds to start, and per unit of each law.
@@ -46,19 +43,6 @@ def _at_the_root(monkeypatch):
 @pytest.fixture(scope="module")
 def config():
     return planned("smoke")[0].config
-
-
-def a_law(name, **values):
-    """One law, as :func:`fit_laws` gives it."""
-    law = {"fixed_s": 0.0, "rate_other": 0.0, "rate": 0.0, "low": 1.0, "high": 1.0, **values}
-    return pd.DataFrame(law, index=[name], columns=list(LAW), dtype=float)
-
-
-def alike(count, stage, law, **values):
-    """Jobs that differ in their names alone."""
-    job = {"stage": stage, "law": law, "unit": "", "disk_bytes": 0.0, "held_bytes": 0.0, **values}
-    jobs = pd.DataFrame([{"job": str(i), **job} for i in range(count)], columns=list(COLUMNS))
-    return jobs.astype({"other": float, "size": float})
 
 
 def write_job(benchmarks, job, seconds):
@@ -131,23 +115,6 @@ def test_a_rule_that_nobody_told_the_planner_of_is_counted_as_jobs_that_are_all_
     assert "size" not in job_of(planned("smoke")[0], "weather", "today")
 
 
-def test_multiply_adds_are_the_published_ones():
-    config = planned("paper")[0].config
-    work = {m: training_work(m, config.network, h) for m, h in config.localizers.items()}
-    # He et al. (CVPR 2016, table 1): ResNet-34 takes 3.6e9, its 1000-way classifier included.
-    # Szegedy et al. (CVPR 2015, table 1): GoogLeNet takes 1.5e9 with its printed rounding.
-    assert work["posenet2resnet"].flop / 2 == pytest.approx(3.6e9, rel=0.05)
-    assert work["posenet2"].flop / 2 == pytest.approx(1.5e9, rel=0.07)
-    # The weights of ResNet-34 without its classifier are 21.28 million (torchvision).
-    assert work["posenet2resnet"].parameter_bytes >= 4 * 21.28e6
-
-
-def test_looks_follow_snakemakes_schedule():
-    assert [last_look_s(s) for s in (0.4, 0.6, 14.9, 15.2, 44.9, 45.1, 100)] == [
-        *(0, 0.5, 14.5, 15, 15, 45, 75)
-    ]
-
-
 def test_processor_time_is_completed(tmp_path):
     root = tmp_path / "smoke"
     write = {"a": (40, 7.5), "b": (4.4, 2.0), "c": (0.4, 0.0)}
@@ -170,106 +137,11 @@ def test_one_file_keeps_the_measurements(made_up_run, tmp_path):
     assert after.cpu_s.tolist() == pytest.approx(before.cpu_s.tolist(), abs=0.006)
 
 
-def test_a_law_is_found_and_outliers_are_not_followed():
-    rng = np.random.default_rng(0)
-    sizes = rng.uniform(1, 10, (40, 2))
-    seconds = 2 + sizes @ [0.5, 3]
-    assert fit_seconds(sizes, seconds, 0.3) == (
-        pytest.approx(2, rel=1e-3),
-        pytest.approx((0.5, 3), rel=1e-3),
-    )
-    seconds[:3] *= 4
-    fixed_s, rates = fit_seconds(sizes, seconds, 0.3)
-    assert fixed_s + np.dot(rates, (5, 5)) == pytest.approx(19.5, rel=0.05)
-
-
-def test_jobs_of_one_size_tell_only_the_rate():
-    sizes, seconds = np.full((10, 1), 4.0), np.full(10, 9.0)
-    assert fit_seconds(sizes, seconds, 1.0) == (1.0, (2.0,))
-    assert fit_seconds(np.empty((3, 0)), np.array([1.0, 2.0, 6.0]), 1.0) == (3.0, ())
-
-
-def test_chance_is_no_rate():
-    # Short jobs that take 1 s whatever their size, off by up to 30 %: a thousand times the size
-    # must not become a thousand times the time, whichever job happened to be slow.
-    rng = np.random.default_rng(0)
-    sizes = np.array([25, 60, 25, 60, 50, 200, 25, 60], dtype=float)[:, None]
-    for _ in range(20):
-        fixed_s, rates = fit_seconds(sizes, rng.uniform(0.9, 1.3, 8), 0.9)
-        assert fixed_s >= 0.85
-        assert fixed_s + rates[0] * 2000 < 12
-
-
-def test_no_part_is_negative():
-    sizes = np.linspace(1, 10, 20)[:, None]
-    fixed_s, rates = fit_seconds(sizes, 5 * sizes[:, 0] ** 1.5, 0.1)
-    assert fixed_s >= 0
-    assert rates[0] > 0
-
-
 def test_the_made_up_runs_costs_are_predicted(made_up_run):
     rows = compare_runs([made_up_run], made_up_run)[str(made_up_run), str(made_up_run)]
     factors = dict(zip(rows.stage, rows.factor, strict=True))
     assert factors.keys() >= {"train", "render_packed", "sfm", "total"}
     assert list(factors.values()) == pytest.approx([1.0] * len(factors), abs=0.05)
-
-
-def test_rendering_scales_with_samples():
-    law = a_law(
-        "rendering",
-        fixed_s=5.0,
-        rate_other=0.01,
-        rate=0.1,
-        low=0.5,
-        high=2.0,
-        largest=100,
-        base_mb=700,
-    )
-    sizes = {"other": 1000.0, "size": 1228.8, "held_bytes": 5e6}
-    machine = Machine(cores=2, gpus=0, gpu_tflops=1.0)
-    [stage] = stage_costs(
-        job_costs(alike(3, "render_packed", "rendering", **sizes), law, machine), machine
-    )
-    seconds = 5 + 10 + 122.88
-    assert [stage[c] for c in CPU] == pytest.approx([1.5 * seconds, 3 * seconds, 6 * seconds])
-    assert stage["wall_mid"] == pytest.approx(2 * seconds)  # three equal jobs on two cores
-    assert stage["wall_high"] == pytest.approx(4 * seconds)
-    assert stage["beyond"] == pytest.approx(12.288)
-    assert stage["peak_mb"] == pytest.approx(705)
-
-
-def test_training_on_a_gpu_takes_the_assumed_throughput():
-    law = a_law("training", fixed_s=3.0, rate_other=1e-4, rate=8.0, low=0.9, high=1.1)
-    jobs = alike(4, "train", "training", other=1e5, size=7200.0)
-    machine = Machine(8, 2, 10.0)
-    [on_gpu] = stage_costs(job_costs(jobs, law, machine), machine)
-    # 4 x 7200 TFLOP at 20, 10 and 5 TFLOP/s; a core drives each, and starts it.
-    assert [on_gpu[c] for c in GPU] == pytest.approx([1440, 2880, 5760])
-    assert on_gpu["cpu_mid"] == pytest.approx(2880 + 4 * 3)
-    assert on_gpu["wall_mid"] == pytest.approx(2 * (720 + 3))
-    # Starting ten million layers, at 0.1 ms each, takes longer than the arithmetic.
-    cost = job_costs(alike(1, "train", "training", other=1e7, size=7200.0), law, machine)
-    assert cost.gpu_mid.tolist() == pytest.approx([1000])
-    on_cores = Machine(4, 0, 10.0)
-    [on_cpu] = stage_costs(job_costs(jobs, law, on_cores), on_cores)
-    assert on_cpu["gpu_mid"] == 0
-    assert on_cpu["cpu_mid"] == pytest.approx(4 * (3 + 10 + 57_600))
-
-
-def test_unmeasured_stages_are_said_to_be():
-    machine, laws = Machine(1, 0, 1.0), a_law("other", fixed_s=1.0)
-    costs = job_costs(alike(1, "sfm", "sfm", size=1.0, disk_bytes=10.0), laws, machine)
-    [stage] = stage_costs(costs, machine)
-    assert stage["measured"] == "no"
-    assert np.isnan(stage["cpu_mid"])
-    whole = summed(costs, machine)
-    assert (whole["cpu_mid"], whole["wall_mid"], whole["disk_bytes"]) == (0, 0, 10)
-
-
-def test_longest_jobs_start_first():
-    assert wall_seconds([1, 1, 1, 3], 2) == 3
-    assert wall_seconds([2, 2, 2], 2) == 4
-    assert wall_seconds([5, 1], 8) == 5
 
 
 def test_tables_add_up_to_the_run():
@@ -326,13 +198,6 @@ def test_steps_that_are_timed_tell_what_a_small_run_does_not():
         total = compare_cost(fit_laws(matched(jobs, run), rates), mini).iloc[-1]
         assert total.stage == "total"
         assert 1 / 1.5 < total.factor < 1.5
-
-
-def test_timed_steps_of_a_gpu_replace_the_assumption():
-    law = a_law("training", fixed_s=3.0, rate_other=1e-4, rate=8.0)
-    machine = Machine(8, 2, 10.0, gpu_rates=(1e-5, 0.05))
-    cost = job_costs(alike(1, "train", "training", other=1e6, size=7200.0), law, machine)
-    assert cost.gpu_mid.tolist() == pytest.approx([1e6 * 1e-5 + 7200 * 0.05])
 
 
 def test_the_command_prints_and_writes_the_plan(made_up_run, tmp_path, capsys):

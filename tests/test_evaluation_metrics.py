@@ -11,7 +11,7 @@ from baselines.training.score import score_run
 from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config import Design, Experiment
 from synfeal.config.models import CameraConfig
-from synfeal.dataset.pose_table import PoseTable, write_pose_table
+from synfeal.dataset.pose_table import write_pose_table
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import BOUNDS, Bound, joint_error, pose_errors, summary, within
 from synfeal.evaluation.reprojection import (
@@ -25,6 +25,7 @@ from synfeal.evaluation.reprojection import (
 )
 from synfeal.mesh.rays import RayCaster
 from synfeal.report.recall import COLUMNS, read_recall_table, recall_table, write_recall_table
+from tests.property_support import table_of
 
 CAMERA = CameraConfig(width=128, height=96, horizontal_fov_deg=60.0)
 LENS = CAMERA.model_copy(update={"distortion": (0.1, -0.05, 0.001, -0.002, 0.01)})
@@ -72,12 +73,6 @@ def test_limits_of_a_recall_are_those_of_a_share_when_paths_are_frames():
     assert found["recall_5cm_5deg_high"] == pytest.approx(0.3 + half, abs=0.01)
     lumped = summary(errors, np.arange(400) // 20)  # twenty paths of like frames say less
     assert lumped["recall_5cm_5deg_low"] < 0.3 - 2 * half
-
-
-def table_of(poses):
-    quat = Rotation.from_matrix(poses[:, :3, :3]).as_quat(canonical=True, scalar_first=True)
-    frame = np.arange(len(poses))
-    return PoseTable(frame, frame // 4, poses[:, :3, 3], quat)
 
 
 def random_poses(count, spread_m, angle_deg, seed):

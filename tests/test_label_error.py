@@ -11,22 +11,18 @@ from baselines.groundtruth.label_set import chain_split, write_assistance
 from baselines.groundtruth.methods import METHODS, check_sources, stages_of
 from baselines.groundtruth.trajectory import BatchTrajectory, failed_trajectory, write_trajectory
 from synfeal.config.models import GroundTruthConfig
-from synfeal.dataset.pose_table import PoseTable, write_pose_table
+from synfeal.dataset.pose_table import write_pose_table
 from synfeal.errors import InputError
 from synfeal.files import write_json
 from synfeal.frames import read_records
-from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
+from synfeal.geometry.poses import pose_matrix
 from synfeal.report.label_error import SCHEMA, label_records, write_label_error_table
 from synfeal.report.speed_vs_error import speeds_of
+from tests.property_support import table_of
 from tests.report_results import experiment
 
 STEP_M, BATCH = 0.1, 10
 CFG = GroundTruthConfig(batch_frames=BATCH)
-
-
-def table_of(poses):
-    index = np.arange(len(poses))
-    return PoseTable(index, index, poses[:, :3, 3], quat_wxyz_of(poses))
 
 
 def straight(n_frames, step_m=STEP_M, turn_deg=0.0):

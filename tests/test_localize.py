@@ -230,24 +230,10 @@ def test_sixteen_bits_of_colour_become_their_upper_eight(tmp_path, upright):
     np.testing.assert_array_equal(found, shrunk(tmp_path, upright))
 
 
-# What the camera stored is the upright picture after the inverse of these.
-TURNS = {
-    1: None,
-    2: Image.Transpose.FLIP_LEFT_RIGHT,
-    3: Image.Transpose.ROTATE_180,
-    4: Image.Transpose.FLIP_TOP_BOTTOM,
-    5: Image.Transpose.TRANSPOSE,
-    6: Image.Transpose.ROTATE_90,
-    7: Image.Transpose.TRANSVERSE,
-    8: Image.Transpose.ROTATE_270,
-}
-
-
-@pytest.mark.parametrize(("orientation", "stored_by"), TURNS.items())
-def test_a_picture_is_turned_upright(tmp_path, upright, orientation, stored_by):
+def test_a_picture_is_turned_upright(tmp_path, upright):
     exif = Image.Exif()
-    exif[0x0112] = orientation
-    stored = upright if stored_by is None else upright.transpose(stored_by)
+    exif[0x0112] = 6  # what the camera stored is to be turned to the right
+    stored = upright.transpose(Image.Transpose.ROTATE_90)
     found = shrunk(tmp_path, stored, exif=exif)
     np.testing.assert_array_equal(found, shrunk(tmp_path, upright, "upright.png"))
     jpeg = shrunk(tmp_path, stored, "p.jpg", exif=exif, quality=95).astype(int)

@@ -13,8 +13,9 @@ from baselines.references.triangulation import triangulate, triangulated
 from synfeal.geometry.alignment import umeyama_sim3
 from synfeal.geometry.poses import pose_error, pose_matrix
 from synfeal.labels.noise import add_noise
+from tests.property_support import table_of
 from tests.room_scene import CAMERA, pose_at
-from tests.test_references import BESIDE, seen, table_of
+from tests.test_references import BESIDE, seen
 
 POSES = np.stack(BESIDE)
 TEST = np.stack([pose_at([0.1, -0.4, 1.2], 4.0), pose_at([0.2, 0.3, 1.4], -3.0), POSES[0]])

@@ -12,8 +12,8 @@ from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
+from tests.property_support import table_of
 from tests.room_scene import CAMERA, FURNISHED, cast, colour_of, pose_at, write_room
-from tests.test_references import table_of
 
 WALL_M = 3.0  # x of the wall
 SMALL = CameraConfig(width=32, height=24, horizontal_fov_deg=60.0)
