@@ -79,8 +79,12 @@ class LabelledFrames:
         )
 
 
-def read_images(path: Path, count: int, input_px: int, device: torch.device) -> Tensor:
+def read_images(
+    path: Path, count: int, input_px: int, device: torch.device, every: int = 1
+) -> Tensor:
     """The first ``count`` frames of a packed file as (count, 3, px, px) uint8, channels last.
+
+    With ``every`` above 1 the first of each so many frames, ``count`` of them.
 
     Beside the result no more than ``CHUNK`` frames are in memory, on whatever device it is. On a
     processor a result of over 2 GiB is a map of the file, which must not be changed meanwhile.
@@ -94,16 +98,17 @@ def read_images(path: Path, count: int, input_px: int, device: torch.device) -> 
             f"{path}: holds {frames.dtype} {frames.shape}, expected uint8 (N, {input_px}, "
             f"{input_px}, 3) for this network.input_px; pack the frames again"
         )
-    if len(frames) < count:
-        raise InputError(f"{path}: holds {len(frames)} frames, but {count} are labelled")
+    thinned = frames[::every]
+    if len(thinned) < count:
+        raise InputError(f"{path}: holds {len(thinned)} frames, but {count} are labelled")
     n_bytes = count * input_px**2 * 3
-    if device.type == "cpu" and n_bytes > MOST_READ_BYTES:
+    if device.type == "cpu" and n_bytes > MOST_READ_BYTES and every == 1:
         content = torch.from_file(str(path), size=frames.offset + n_bytes, dtype=torch.uint8)
         return content[frames.offset :].view(count, input_px, input_px, 3).permute(0, 3, 1, 2)
     images = torch.empty((count, *frames.shape[1:]), dtype=torch.uint8, device=device)
     for start in range(0, count, CHUNK):
         chunk = images[start : start + CHUNK]
-        chunk.copy_(torch.from_numpy(np.array(frames[start : start + len(chunk)])))
+        chunk.copy_(torch.from_numpy(np.array(thinned[start : start + len(chunk)])))
     return images.permute(0, 3, 1, 2)
 
 

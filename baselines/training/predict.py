@@ -28,6 +28,7 @@ def predict_poses(
     labels_like: Path,
     out: Path,
     device: Literal["auto", "cpu", "cuda"] = "auto",
+    every: int = 1,
 ) -> None:
     """Write predictions as a pose table with unit quaternions, w >= 0.
 
@@ -37,6 +38,7 @@ def predict_poses(
         labels_like: a pose table that says which frames there are; its poses are not used.
         out: pose table to write; a value the network gives no finite number for is ``nan``.
         device: where to predict.
+        every: predict the first of each so many frames.
 
     Raises:
         InputError: one of the files cannot be used.
@@ -44,10 +46,10 @@ def predict_poses(
     """
     trained = read_checkpoint(model, open_device(device))
     table = read_pose_table(labels_like)
+    table = table.at(np.arange(0, len(table), every))
     input_px = trained.description.network.input_px
-    images = read_images(frames, len(table), input_px, trained.device)
-    position_m, quat_wxyz = predict(trained, images)
-    write_pose_table(out, PoseTable(table.frame, table.path, position_m, quat_wxyz))
+    images = read_images(frames, len(table), input_px, trained.device, every)
+    write_pose_table(out, PoseTable(table.frame, table.path, *predict(trained, images)))
 
 
 @torch.inference_mode()

@@ -92,6 +92,25 @@ def score_run(
     write_json(out_metrics, metrics)
 
 
+def score_common(predictions: Path, truth: Path, out: Path) -> None:
+    """Write the errors on the common test set, against the true poses.
+
+    Args:
+        predictions: pose table of some frames of that set; may hold ``nan``.
+        truth: the true poses of the scene's largest test set.
+        out: CSV to write, columns ``frame``, ``position_m`` and ``orientation_deg``.
+
+    Raises:
+        InputError: a file cannot be read, or the truth lacks frames of the predictions.
+    """
+    predicted, whole = _read_predictions(predictions), read_pose_table(truth)
+    poses = whole.at(np.flatnonzero(np.isin(whole.frame, predicted.frame)))
+    if not np.array_equal(poses.frame, predicted.frame):
+        raise InputError(f"{predictions}: has frames that {truth} does not have; predict again")
+    table = pd.DataFrame({"frame": predicted.frame, **pose_errors(predicted, poses)})
+    write_frame(out, table, float_format=None, na_rep="nan")
+
+
 def _both_scores(poses: PoseTable, labels: PoseTable, truth: PoseTable) -> dict[str, Array]:
     """Errors (N,) against the labels, and under names that end in ``_true`` against the truth."""
     true = {f"{name}_true": e for name, e in pose_errors(poses, truth).items()}

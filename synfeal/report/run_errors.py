@@ -1,7 +1,8 @@
-"""The errors of one run over its test frames: ``errors.csv`` of a training run."""
+"""The errors of one training run over test frames: ``errors.csv`` and ``common_errors.csv``."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -10,13 +11,14 @@ from synfeal.dataset.number_table import read_numbers
 from synfeal.report.stats import MEASURES
 
 COLUMNS = ("frame", *MEASURES)
+COMMON_COLUMNS = COLUMNS[:3]
 
 
-def read_errors(path: Path) -> pd.DataFrame:
-    """A row per test frame, columns :data:`COLUMNS`; not finite where a prediction failed.
+def read_errors(path: Path, columns: Sequence[str] = COLUMNS) -> pd.DataFrame:
+    """A row per test frame; not finite where a prediction failed.
 
     Raises:
         InputError: it is missing, or holds anything but these columns of numbers.
     """
-    values = read_numbers(path, ",".join(COLUMNS), "table of errors", finite=False)
-    return pd.DataFrame(values, columns=list(COLUMNS))
+    values = read_numbers(path, ",".join(columns), "table of errors", finite=False)
+    return pd.DataFrame(values, columns=list(columns))

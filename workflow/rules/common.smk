@@ -244,8 +244,8 @@ def pose_labels():
     return label_files({(s, z, "synfeal") for s, z in SIZES} | {*estimated_sets()})
 
 
-def errors_of(runs):
-    return [f"{ROOT}/runs/{run.directory}/errors.csv" for run in runs]
+def errors_of(runs, file="errors.csv"):
+    return [f"{ROOT}/runs/{run.directory}/{file}" for run in runs]
 
 
 def files_of_trainings(pattern):
@@ -308,6 +308,17 @@ def estimated_sets():
     """Scene, size and method of every label set that is re-estimated, each once."""
     sets = {(e.scene, e.size, e.labels) for e in EXPERIMENTS}
     return sorted(s for s in sets if s[2] in RECONSTRUCTED)
+
+
+def common_test_set(scene):
+    """What localizers of all sizes are tested on, beside their own test sets: the true poses of the
+    largest, and of how many of its frames one is taken, so that there are as many as in the smallest.
+    """
+    sizes = {e.size for e in EXPERIMENTS if e.scene == scene}
+    counts = {CONFIG.n_frames(scene, size, "test"): size for size in sizes}
+    largest, smallest = max(counts), min(counts)
+    poses = f"{ROOT}/labels/{scene}/{counts[largest]}/synfeal/test.csv"
+    return poses, largest // smallest
 
 
 def smallest_train(scene):

@@ -207,6 +207,7 @@ use rule call as summary with:
 use rule call as claims with:
     input:
         errors=errors_of(RUNS),
+        common_errors=errors_of(RUNS, "common_errors.csv"),
         histories=histories(),
         labels=true_labels(),
         assistance=assistance_files(),

@@ -51,6 +51,9 @@ rule train:
             f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
         ),
         weights=unless_restored(f"{RUN}/predictions.csv", backbone_weights),
+        common=unless_restored(
+            f"{RUN}/predictions.csv", lambda w: common_test_set(w.scene)[0]
+        ),
         # The camera of packed frames, and their hash, are in the records beside them.
         records=unless_restored(
             f"{RUN}/predictions.csv",
@@ -61,6 +64,7 @@ rule train:
         history=f"{RUN}/history.csv",
         record=f"{RUN}/training.json",
         predictions=f"{RUN}/predictions.csv",
+        common=f"{RUN}/common_predictions.csv",
     log:
         f"{ROOT}/logs/train/{RUN_LOG}.log",
     benchmark:
@@ -72,6 +76,7 @@ rule train:
         mem_mb=train_mem_mb,
     params:
         run=lambda w: training_parameters(CONFIG, Run(**w)),
+        every=lambda w: common_test_set(w.scene)[1],
     script:
         "../scripts/train.py"
 
@@ -85,8 +90,11 @@ rule score:
         truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
         train_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
         depth=f"{ROOT}/scenes/{{scene}}/test_depth.npy",
+        common=f"{RUN}/common_predictions.csv",
+        common_truth=lambda w: common_test_set(w.scene)[0],
     output:
         errors=f"{RUN}/errors.csv",
+        common=f"{RUN}/common_errors.csv",
         metrics=f"{RUN}/metrics.json",
     log:
         f"{ROOT}/logs/score/{RUN_LOG}.log",

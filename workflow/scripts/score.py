@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from baselines.training.score import score_run
+from baselines.training.score import score_common, score_run
 from synfeal.config.models import CameraConfig
 from synfeal.job import job
 
@@ -14,4 +14,9 @@ with job(snakemake.log[0]):
         Path(snakemake.output.metrics),
         dict(snakemake.wildcards),
         (Path(snakemake.input.depth), CameraConfig(**snakemake.params.camera)),
+    )
+    score_common(
+        Path(snakemake.input.common),
+        Path(snakemake.input.common_truth),
+        Path(snakemake.output.common),
     )

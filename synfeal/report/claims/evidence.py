@@ -1,5 +1,10 @@
 """What a run left behind, as the tests of the claims need it: a median error per cell, resampled.
 
+Errors are read on one of two test sets. A cell's *own* is what the tables show, labelled by the
+cell's method. The *common* one of a scene has frames from all paths of its largest test set, the
+same for every cell, and true poses: many more paths than small sizes have, and sizes compared on
+the same frames.
+
 Only what the profile's design makes is read, so that files of an earlier design in the same place
 decide nothing. What the design does not make ends in :class:`Missing`; a file that it makes and
 that is not there, or cannot be read, ends in an ``InputError``, as everywhere.
@@ -30,7 +35,7 @@ from synfeal.evaluation.metrics import pose_errors
 from synfeal.labels.constant import constant_pose
 from synfeal.report.claims.model import Missing
 from synfeal.report.layouts import TITLES
-from synfeal.report.run_errors import read_errors
+from synfeal.report.run_errors import COLUMNS, COMMON_COLUMNS, read_errors
 from synfeal.report.stats import MEASURES
 from synfeal.seeds import generator_of
 
@@ -38,6 +43,7 @@ from synfeal.seeds import generator_of
 LEARNT = 0.75
 # Errors of a cell are two samples (2, 1 + RESAMPLES) of medians: metres and degrees.
 QUANTITIES = ("position", "orientation")
+OWN_ERRORS, COMMON_ERRORS = "errors.csv", "common_errors.csv"
 
 
 class Cell(NamedTuple):
@@ -67,6 +73,7 @@ class Evidence:
         root: results directory of the profile.
         runs: by cell of the profile, its runs.
         end: ``""`` for errors against the labels, ``"_true"`` against the true poses.
+        common: whether errors are those on the common test set; they are against the true poses.
         used: files read so far, relative to ``root``.
         test_paths: by test set, how many paths it has.
     """
@@ -74,14 +81,15 @@ class Evidence:
     root: Path
     runs: Mapping[Cell, Sequence[Run]]
     end: str = ""
+    common: bool = False
     used: dict[str, None] = field(default_factory=dict)
-    test_paths: dict[tuple[str, str], int] = field(default_factory=dict)
+    test_paths: dict[tuple[str, str, bool], int] = field(default_factory=dict)
     _errors: dict[tuple[Cell, str], Array] = field(default_factory=dict)
-    _tests: dict[tuple[str, str], TestSet] = field(default_factory=dict)
+    _tests: dict[tuple[str, str, bool], TestSet] = field(default_factory=dict)
 
-    def under(self, end: str) -> Evidence:
-        """The same results under a score, with nothing read yet."""
-        return replace(self, end=end, used={}, test_paths={})
+    def under(self, end: str, common: bool = False) -> Evidence:
+        """The same results under a score and on a test set, with nothing read yet."""
+        return replace(self, end=end, common=common, used={}, test_paths={})
 
     def file(self, relative: str) -> Path:
         """A result file that the design makes, noted as used.
@@ -129,25 +137,39 @@ class Evidence:
     def _errors_of(self, cell: Cell) -> Array:
         runs = self.runs_of(cell)
         test = self.test_set(cell.scene, cell.size)
-        files = [self.file(f"runs/{run.directory}/errors.csv") for run in runs]
-        if (cell, self.end) not in self._errors:
+        name = COMMON_ERRORS if self.common else OWN_ERRORS
+        files = [self.file(f"runs/{run.directory}/{name}") for run in runs]
+        key = cell, COMMON_ERRORS if self.common else self.end
+        if key not in self._errors:
             draw = generator_of("claims", "seeds", cell._replace(labels=""), len(runs))
             weights = seed_weights(len(runs), draw)
-            columns = [f"{measure}{self.end}" for measure in MEASURES[:2]]
-            seeds = [_medians(file, columns, test) for file in files]
+            seeds = [self._medians(file, test) for file in files]
             samples = [over_seeds(of_seeds, weights) for of_seeds in zip(*seeds, strict=True)]
-            self._errors[cell, self.end] = np.array(samples)
-        return self._errors[cell, self.end]
+            self._errors[key] = np.array(samples)
+        return self._errors[key]
+
+    def _medians(self, path: Path, test: TestSet) -> list[Array]:
+        """Samples of both medians of one run's errors on the frames of a test set."""
+        end = "" if self.common else self.end
+        table = read_errors(path, COMMON_COLUMNS if self.common else COLUMNS)
+        if not np.array_equal(table["frame"], test.poses.frame):
+            raise InputError(
+                f"{path}: its frames are not those of the test set; score that run again"
+            )
+        errors = [table[f"{measure}{end}"].to_numpy() for measure in MEASURES[:2]]
+        return [medians(values, test.path, test.counts) for values in errors]
 
     def test_set(self, scene: str, size: str) -> TestSet:
         """A test set, and the errors on it of always answering the mean true training pose."""
-        folder = f"labels/{scene}/{size}/synfeal"
-        train, path = self.file(f"{folder}/train.csv"), self.file(f"{folder}/test.csv")
-        key = scene, size
+        train = self.file(f"labels/{scene}/{size}/synfeal/train.csv")
+        sizes = {cell.size for cell in self.runs if cell.scene == scene} if self.common else {size}
+        paths = [self.file(f"labels/{scene}/{one}/synfeal/test.csv") for one in sorted(sizes)]
+        key = scene, size, self.common
         if key not in self._tests:
-            poses = read_pose_table(path)
-            paths, place = np.unique(poses.path, return_inverse=True)
-            counts = path_counts(len(paths), generator_of("claims", *key))
+            poses = _thinned([read_pose_table(path) for path in paths])
+            straight, place = np.unique(poses.path, return_inverse=True)
+            draw = ("common", scene) if self.common else (scene, size)
+            counts = path_counts(len(straight), generator_of("claims", *draw))
             errors = pose_errors(constant_pose(read_pose_table(train), poses), poses)
             constant = np.array([medians(errors[m], place, counts) for m in MEASURES[:2]])
             self._tests[key] = TestSet(poses, place, counts, constant)
@@ -193,9 +215,7 @@ def _name(cell: Cell) -> str:
     return f"{cell.scene} {cell.size} {cell.labels} {cell.init}"
 
 
-def _medians(path: Path, columns: Sequence[str], test: TestSet) -> list[Array]:
-    """Samples of the median of some columns of one run's errors on the frames of a test set."""
-    table = read_errors(path)
-    if not np.array_equal(table["frame"], test.poses.frame):
-        raise InputError(f"{path}: its frames are not those of the test set; score that run again")
-    return [medians(table[column].to_numpy(), test.path, test.counts) for column in columns]
+def _thinned(tables: Sequence[PoseTable]) -> PoseTable:
+    """Frames of the longest table, as many as the shortest has (``common_test_set``)."""
+    shortest, longest = min(tables, key=len), max(tables, key=len)
+    return longest.at(np.arange(0, len(longest), len(longest) // len(shortest)))

@@ -8,13 +8,13 @@ from pathlib import Path
 from synfeal.config import Design
 from synfeal.report.claims.evidence import Evidence, evidence_of
 from synfeal.report.claims.model import NOT_LEARNT, NOT_TESTABLE, Claim, published_claims
-from synfeal.report.claims.registry import judge
+from synfeal.report.claims.registry import judge, views
 from synfeal.report.tables import write_rows
 
 COLUMNS = (
     *("id", "section", "statement", "published", "measured_labels", "measured_true"),
     *("interval_labels", "interval_true", "test", "verdict_labels", "verdict_true"),
-    *("reason", "footnote", "evidence"),
+    *("test_paths_labels", "test_paths_true", "reason", "footnote", "evidence"),
 )
 HEADINGS = (
     *("", "Claim", "Published", "Against the labels (the paper's protocol)", "Verdict"),
@@ -51,15 +51,16 @@ def claims_markdown(rows: Sequence[Row]) -> str:
 
 
 def _row(claim: Claim, evidence: Evidence) -> dict[str, str]:
-    views = {"labels": evidence.under(""), "true": evidence.under("_true")}
-    outcomes = {score: judge(claim, view) for score, view in views.items()}
+    by_score = views(claim, evidence)
+    outcomes = {score: judge(claim, view) for score, view in by_score.items()}
     row = {name: getattr(claim, name) for name in COLUMNS if hasattr(claim, name)}
     for score, outcome in outcomes.items():
         row[f"measured_{score}"] = outcome.measured
         row[f"interval_{score}"] = outcome.interval
         row[f"verdict_{score}"] = outcome.verdict
+        row[f"test_paths_{score}"] = str(min(by_score[score].test_paths.values(), default=""))
     row["reason"] = _joined({score: outcome.reason for score, outcome in outcomes.items()})
-    row["evidence"] = ";".join(dict.fromkeys(f for view in views.values() for f in view.used))
+    row["evidence"] = ";".join(dict.fromkeys(f for view in by_score.values() for f in view.used))
     return row
 
 

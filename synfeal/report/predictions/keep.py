@@ -14,7 +14,7 @@ from synfeal.errors import InputError
 from synfeal.report.predictions.package import write_package
 
 PACKAGE, PREDICTIONS = "predictions.zip", "predictions.csv"
-OF_RUN = (PREDICTIONS, "history.csv", "training.json")
+OF_RUN = (PREDICTIONS, "common_predictions.csv", "history.csv", "training.json")
 OF_SCENE = (
     *("properties.json", "collision_curve.csv", "render_speed.csv", "collection_speed.json"),
     "test_depth.npy",
