@@ -13,7 +13,7 @@ from synfeal.geometry.rotations import canonical_quat_wxyz
 from synfeal.report.claims.evidence import evidence_of
 from synfeal.report.claims.table import claim_rows
 from synfeal.report.published import key_of, published_cells
-from synfeal.report.run_errors import COLUMNS
+from synfeal.report.run_errors import COLUMNS, COMMON_COLUMNS
 from tests.report_results import design_of, fill_assistance, shipped_design
 
 N_PATHS, FRAMES_OF_PATH = 12, 3
@@ -44,8 +44,11 @@ class Results:
         ]
         columns = [self.table.frame[:, None], both[0], both[-1]]
         name = f"{row.scene}/{row.size}/{row.label_id}/{row.init}/{model}/seed{repetition}"
-        rows = np.concatenate(columns, axis=1).tolist()
-        write_numbers(self.root / "runs" / name / "errors.csv", ",".join(COLUMNS), rows)
+        rows = np.concatenate(columns, axis=1)
+        folder = self.root / "runs" / name
+        write_numbers(folder / "errors.csv", ",".join(COLUMNS), rows.tolist())
+        common = rows[:, [0, 3, 4]].tolist()  # all sizes have the same test frames here
+        write_numbers(folder / "common_errors.csv", ",".join(COMMON_COLUMNS), common)
 
     def rows(self):
         """``claims.csv`` by claim."""

@@ -8,6 +8,7 @@ import pytest
 from scipy.stats import norm
 
 from synfeal.config import MODELS
+from synfeal.dataset.pose_table import write_pose_table
 from synfeal.errors import InputError
 from synfeal.frames import read_records
 from synfeal.report.claims import labels as label_claims
@@ -121,7 +122,9 @@ def test_evidence_names_files_that_exist_and_are_all_of_the_test(paper, paper_ro
     for row in paper_rows.values():
         files = row["evidence"].split(";") if row["evidence"] else []
         assert all((paper.root / file).is_file() for file in files)
-    assert len(paper_rows["C1"]["evidence"].split(";")) == 22  # 20 cells and their true labels
+    assert (
+        len(paper_rows["C1"]["evidence"].split(";")) == 45
+    )  # 20 cells on two test sets, with their true labels
     assert len(paper_rows["C12"]["evidence"].split(";")) == 48  # 40 cells, 4 data sets
     assert paper_rows["C15"]["evidence"].split(";") == [
         "labels/large_room/6k/kinect-fusion/assistance.json",
@@ -345,6 +348,31 @@ def test_an_unreadable_result_is_one_line_that_names_the_file(results, content, 
     with pytest.raises(InputError, match=expected) as refusal:
         results.rows()
     assert str(path) in str(refusal.value)
+
+
+def test_a_claim_is_judged_on_the_common_test_set_unless_it_is_about_labels(tmp_path):
+    """Six long paths at 6k, the first of the eighteen at 80k; errors tell which were read."""
+    results = papers_results(tmp_path, n_paths=18)
+    small = results.table.first(18)
+    for row in rows_where(results, size="6k"):
+        write_pose_table(tmp_path / f"labels/{row.scene}/6k/synfeal/test.csv", small)
+        for errors in tmp_path.glob(
+            f"runs/{row.scene}/6k/{row.label_id}/{row.init}/*/*/errors.csv"
+        ):
+            lines = errors.read_text().splitlines(keepends=True)
+            errors.write_text("".join(lines[: 1 + len(small)]))
+        for errors in tmp_path.glob(f"runs/{row.scene}/*/*/*/*/*/common_errors.csv"):
+            lines = errors.read_text().splitlines(keepends=True)
+            if len(lines) > 1 + len(small):
+                errors.write_text("".join([lines[0], *lines[1::3]]))
+    rows = results.rows()
+    expected = dict.fromkeys(("C7", "C8", "C9", "C10", "C11", "C12"), ("18", "18"))
+    expected |= dict.fromkeys(("C1", "C2", "C3", "C5", "C6"), ("6", "18"))
+    found = {i: (rows[i]["test_paths_labels"], rows[i]["test_paths_true"]) for i in expected}
+    assert found == expected
+    assert rows["C2"]["verdict_labels"] == UNDECIDED  # six paths decide nothing
+    assert rows["C2"]["verdict_true"] == rows["C7"]["verdict_labels"] == HOLDS
+    assert "posenet2/seed0/common_errors.csv" in rows["C7"]["evidence"]
 
 
 def test_repetitions_are_averaged(results):

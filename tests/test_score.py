@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from baselines.training.score import score_run
+from baselines.training.score import score_common, score_run
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.frames import read_records
@@ -64,6 +64,22 @@ def test_known_motions_give_known_errors_against_labels_and_truth(score):
     assert metrics["orientation_deg_true"] == pytest.approx(25.0)
     assert all(float(row["orientation_deg"]) == pytest.approx(25.0) for row in errors)
     assert [int(row["frame"]) for row in errors] == list(range(N))
+
+
+def test_on_the_common_test_set_each_frame_is_compared_with_its_own_true_pose(tmp_path):
+    truth = poses(np.random.default_rng(1))
+    part = moved(truth, np.array([3.0, 0.0, 4.0]), math.radians(25)).at(np.arange(0, N, 8))
+    files = [tmp_path / name for name in ("predictions.csv", "truth.csv", "errors.csv")]
+    write_pose_table(files[0], part)
+    write_pose_table(files[1], truth)
+    score_common(*files)
+    rows = [row for _, row in read_records(files[2])]
+    assert [int(row["frame"]) for row in rows] == [0, 8, 16, 24, 32]
+    assert [float(row["position_m"]) for row in rows] == pytest.approx([5.0] * 5)
+    assert [float(row["orientation_deg"]) for row in rows] == pytest.approx([25.0] * 5)
+    write_pose_table(files[1], truth.first(30))
+    with pytest.raises(InputError, match=r"predictions\.csv: has frames that"):
+        score_common(*files)
 
 
 def test_the_baseline_predicts_the_mean_training_position(score):

@@ -13,7 +13,7 @@ from baselines.training.predict import predict_poses
 from baselines.training.pretrain import pretrain_backbone
 from baselines.training.score import score_run
 from synfeal.config.models import PretrainingConfig
-from synfeal.dataset.pose_table import write_pose_table
+from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.errors import InputError
 from synfeal.frames import read_records
 from tests.coloured_frames import (
@@ -104,6 +104,19 @@ def test_a_diverged_training_stops_and_has_failed(split, tmp_path):
     found = json.loads(metrics.read_text())
     assert found["failed"] == found["n_test"] == 120
     assert found["position_m"] is None
+
+
+def test_every_seventh_frame_is_predicted_as_it_is_among_all(split, tmp_path):
+    model, _ = train(split, tmp_path, samples=640)
+    tables = []
+    for every in (1, 7):
+        predict_poses(model, *split, tmp_path / "out.csv", "cpu", every)
+        tables.append(read_pose_table(tmp_path / "out.csv"))
+    whole, part = tables
+    np.testing.assert_array_equal(part.frame, whole.frame[::7])
+    np.testing.assert_allclose(part.position_m, whole.position_m[::7], atol=1e-4)
+    np.testing.assert_allclose(part.quat_wxyz, whole.quat_wxyz[::7], atol=1e-4)
+    assert np.ptp(part.position_m, axis=0).max() > 1e-3
 
 
 def test_normalised_images_have_zero_mean_and_unit_deviation(split):
