@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from synfeal.config import MODELS
+from synfeal.config.experiments import SHARES
 from synfeal.dataset.number_table import write_numbers
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.files import write_json
@@ -67,16 +68,23 @@ def far_apart(n_paths, metres, degrees):
     return PoseTable(np.arange(len(path)), path, position_m, quat)
 
 
-def write_history(root, run, errors, samples=100):
-    """A history whose held-out errors (m and deg alike) are looked at every ``samples`` images."""
-    lines = [
-        "samples_seen,loss,learning_rate,held_out_loss,held_out_position_m,held_out_orientation_deg"
-    ]
-    lines += [f"{samples * (k + 1)},1.0,0.1,1.0,{e},{e}" for k, e in enumerate(errors)]
-    lines.insert(2, f"{samples + 1},1.0,0.1,,,")  # a row that was logged without a look
-    path = root / "runs" / run.directory / "history.csv"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("\n".join(lines) + "\n")
+def write_part(results, row, model):
+    """Errors of a run that is shown a part of the images, as many times as large as these are few;
+    those of one that is shown all are the paper's."""
+    start, _, part = row.init.partition("-")
+    table = "table4_size" if start == "pretrained" else "table5_from_scratch"
+    cell = published_cells(table)[key_of(row.model_copy(update={"init": start}), model)]
+    errors = np.array([AXES * cell.position_m, cell.orientation_deg]) / SHARES[part]
+    results.write(row, model, errors)
+
+
+def write_lengths(results, ratio, exponent=0.8):
+    """Errors that fall as a power of the images shown, from scratch ``ratio`` times as many."""
+    for row in rows_where(results, table="table7_images_shown"):
+        start, _, part = row.init.partition("-")
+        images = SHARES[part] / (ratio if start == "scratch" else 1.0)
+        for model in MODELS:
+            results.write(row, model, np.array([0.2, 10.0]) * images**-exponent)
 
 
 def papers_results(root, **changes):
@@ -85,6 +93,9 @@ def papers_results(root, **changes):
     for row in results.design:
         for model in MODELS:
             cell = published_cells(row.table).get(key_of(row, model))
+            if row.table == "table7_images_shown":
+                write_part(results, row, model)
+                continue
             if row.table == "table6_label_errors" and row.labels in ("synfeal", "noise"):
                 continue  # the runs of other tables
             if cell is None:  # KinectFusion, say: the paper has no such row
@@ -96,10 +107,6 @@ def papers_results(root, **changes):
     assisted = {"sfm": 3, "rgbd-toro": 6, "rgbd-g2o": 4, "kinect-fusion": 34}
     fill_assistance(root, assisted, batches=(34, 0))
     write_scenes(root)
-    for run in design_of(results.design).table_runs("table5_from_scratch"):
-        # From scratch the lowest error comes with the eighth look, else that low with the fifth.
-        start = 1.0 if run.init == "scratch" else 0.7
-        write_history(root, run, [start - 0.1 * k for k in range(8)])
     return results
 
 

@@ -17,6 +17,7 @@ ROWS = {
     "table4_size": 40,
     "table5_from_scratch": 20,
     "table6_label_errors": 45,
+    "table7_images_shown": 30,
 }
 
 MEASURES = ("position_m", "orientation_deg", "position_m_true", "orientation_deg_true")
@@ -82,7 +83,7 @@ def write_run(root, row, model, values, repetition=0):
 def fill(root, rows, repetitions=1):
     """Scores for every run of some rows: the later the model, the lower; scratch twice as high."""
     for row in rows:
-        for init, factor in (("pretrained", 1), ("scratch", 2)):
+        for init, factor in {row.init: 1, "pretrained": 1, "scratch": 2}.items():
             same = row.model_copy(update={"init": init})
             share = 1.0 if row.labels == "synfeal" else 0.5
             base = factor * (1 + 3 * row.noise_m) * 300 / FRAMES[row.size][0] ** 0.5 / 17.320508

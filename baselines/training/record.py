@@ -30,11 +30,11 @@ def training_parameters(config: Config, run: Run) -> dict[str, Any]:
         "localizer": config.localizers[cast(ModelName, run.model)].model_dump(mode="json"),
         "network": config.network.model_dump(mode="json"),
         "training": hyper,
-        "samples_seen": config.training.samples_seen[run.size],
+        "samples_seen": round(run.share * config.training.samples_seen[run.size]),
         "camera": config.network_camera.model_dump(mode="json"),
         "seed": run.seed(config.seed),
     }
-    if run.init == "pretrained":
+    if run.start == "pretrained":
         parameters["pretraining"] = config.pretraining.model_dump(mode="json")
     return parameters
 

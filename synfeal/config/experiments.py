@@ -15,7 +15,17 @@ from synfeal.errors import InputError
 from synfeal.frames import read_records
 from synfeal.seeds import seed_of
 
-Init = Literal["pretrained", "scratch"]
+Start = Literal["pretrained", "scratch"]
+Init = Literal[
+    "pretrained",
+    "pretrained-half",
+    "pretrained-quarter",
+    "scratch",
+    "scratch-half",
+    "scratch-quarter",
+]
+# Share of `training.samples_seen` that a run is shown, by how its `init` ends.
+SHARES = {"": 1.0, "half": 0.5, "quarter": 0.25}
 # Errors that are put into true poses, of a size that noise_m and noise_deg name: one by frame,
 # one by path, a bend of space, another scale (`synfeal/labels/errors.py`).
 INJECTED = ("noise", "offset", "bend", "scale")
@@ -26,7 +36,7 @@ COLUMNS = ("table", "block", "scene", "size", "labels", "noise_m", "noise_deg", 
 class Experiment(Strict):
     """One table row: five cells, one per localizer."""
 
-    table: TableName = Field(description="the table the row belongs to; table 6 is our own")
+    table: TableName = Field(description="the table the row belongs to; tables 6 and 7 are our own")
     block: Literal["", "orientation", "position", "both"] = Field(
         description="rows of table 3: its block; empty in the other tables"
     )
@@ -40,7 +50,10 @@ class Experiment(Strict):
     )
     noise_m: NonNegative = Field(description="median position error put into labels, metres")
     noise_deg: NonNegative = Field(description="the same of orientation, degrees; 0 with `scale`")
-    init: Init = Field(description="weights a training run starts from: `pretrained` or `scratch`")
+    init: Init = Field(
+        description="weights a training run starts from: `pretrained` or `scratch`; ending in "
+        "`-half` or `-quarter` where it is shown that share of `training.samples_seen`"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Experiment:
@@ -83,13 +96,23 @@ class Run:
     model: str
     repetition: int
 
+    @property
+    def start(self) -> Start:
+        """Where its weights come from."""
+        return "scratch" if self.init.startswith("scratch") else "pretrained"
+
+    @property
+    def share(self) -> float:
+        """Share of the images of its size that it is shown."""
+        return SHARES[self.init.partition("-")[2]]
+
     def seed(self, profile_seed: int) -> int:
-        """Seed of what the run draws, its labels left out.
+        """Seed of what the run draws, its labels and how many images it is shown left out.
 
         So runs that differ in their labels alone have the same initial weights, held-out paths,
         order and rotations: a comparison of labels is paired.
         """
-        names = (self.scene, self.size, self.init, self.model, self.repetition)
+        names = (self.scene, self.size, self.start, self.model, self.repetition)
         return seed_of(profile_seed, "train", *names)
 
     @property

@@ -13,6 +13,7 @@ TableName = Literal[
     "table4_size",
     "table5_from_scratch",
     "table6_label_errors",
+    "table7_images_shown",
 ]
 # A table shows each combination of these columns once.
 KEYS: Mapping[str, tuple[str, ...]] = {
@@ -21,6 +22,7 @@ KEYS: Mapping[str, tuple[str, ...]] = {
     "table4_size": ("scene", "size"),
     "table5_from_scratch": ("scene", "size"),
     "table6_label_errors": ("labels", "noise_m", "noise_deg"),
+    "table7_images_shown": ("scene", "size", "init"),
 }
 assert set(KEYS) == set(get_args(TableName))
 

@@ -1,4 +1,4 @@
-"""The cells of tables 2 to 6: what each run scored, beside what the paper published."""
+"""The cells of tables 2 to 7: what each run scored, beside what the paper published."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def read_cells(table: str, design: Design, root: Path) -> pd.DataFrame:
     """Read the cells of one table, row by row, five localizers each.
 
     Args:
-        table: one of tables 2 to 6.
+        table: one of tables 2 to 7.
         design: of the profile; rows it leaves out are not in the table.
         root: results directory of the profile.
 

@@ -27,6 +27,8 @@ ERRORS = {
     "bend": "a bend of space",
     "scale": "a wrong scale",
 }
+STARTS = {"pretrained": "transfer learning", "scratch": "from scratch"}
+PARTS = {"": "", "half": ", half of the images", "quarter": ", a quarter of the images"}
 # What has not been trained, printed beside the localizers: columns of metrics.
 REFERENCES = {"baseline": "Mean pose", "floor": "True pose"}
 BLOCKS = {"": "", "orientation": "Ori.", "position": "Pos.", "both": "Pos.+Ori."}
@@ -40,6 +42,8 @@ CAPTIONS = {
     "different size, and the change against the same run with transfer learning.",
     "table6_label_errors": "Median localization error with labels of the same median error and "
     "different kinds of it; this table is not in the paper.",
+    "table7_images_shown": "Median localization error after fewer images, each a training run of "
+    "its own length; this table is not in the paper.",
 }
 HEADINGS = {
     "table2_ground_truth": "Ground truth provided by",
@@ -47,6 +51,7 @@ HEADINGS = {
     "table4_size": "(# train, # test)",
     "table5_from_scratch": "(# train, # test)",
     "table6_label_errors": "Errors of the labels",
+    "table7_images_shown": "Images shown",
 }
 REMARK = (
     "Errors are against the labels the test set carries (the paper's protocol) and against the "
@@ -86,8 +91,14 @@ def scene_title(scene: str) -> str:
     return scene.replace("_", " ").title()
 
 
+def init_title(init: str) -> str:
+    """How a run is trained, e.g. ``from scratch, half of the images``."""
+    start, _, part = init.partition("-")
+    return STARTS[start] + PARTS[part]
+
+
 def sheet_of(name: str, cells: pd.DataFrame) -> Sheet:
-    """Lay out one of tables 2 to 6.
+    """Lay out one of tables 2 to 7.
 
     Args:
         name: the table.
@@ -231,6 +242,8 @@ def row_label(name: str, cell: Any) -> str:
     if name == "table6_label_errors":
         size = f"{_level(cell.noise_m)} m, {cell.noise_deg:g}°"
         return f"{ERRORS[cell.labels]}, {size}" if cell.labels in ERRORS else "none"
+    if name == "table7_images_shown":
+        return init_title(cell.init)
     return f"{cell.size}: ({cell.n_train}, {cell.n_test})"
 
 

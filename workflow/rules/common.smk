@@ -1,6 +1,7 @@
 # What the rules share: the checked configuration, and which files a target needs. No rules here.
 import sys
 from functools import cache
+from typing import get_args
 
 from snakemake.logging import logger
 
@@ -25,7 +26,7 @@ from baselines.training.record import training_parameters
 from synfeal.config import Run, check_mesh_files, parse_config, read_design
 from synfeal.config.load import read_yaml
 from synfeal.config.mesh_files import check_results
-from synfeal.config.experiments import INJECTED
+from synfeal.config.experiments import INJECTED, Init
 from synfeal.config.models import MODELS
 from synfeal.config.robustness import CLEAN, MIXED
 from synfeal.dataset.archive import SUFFIX
@@ -75,7 +76,7 @@ wildcard_constraints:
     camera="network|groundtruth",
     sequence=r"seq-\d+",
     batch=r"\d+",
-    init="pretrained|scratch",
+    init="|".join(get_args(Init)),
     model="|".join(MODELS),
     backbone="|".join(sorted({backbone_of(m, CONFIG.network) for m in MODELS})),
     repetition=r"\d+",
@@ -179,7 +180,7 @@ def unless_restored(output, source):
 
 def backbone_weights(wildcards):
     """The pretrained backbone a run starts from; nothing when it starts from scratch."""
-    if wildcards.init == "scratch":
+    if wildcards.init.startswith("scratch"):
         return []
     return f"{ROOT}/pretrained/{backbone_of(wildcards.model, CONFIG.network)}.pt"
 
@@ -231,12 +232,6 @@ def all_labels():
 def true_labels():
     """The true poses of every data set."""
     return label_files((s, z, "synfeal") for s, z in SIZES)
-
-
-def histories():
-    """What the runs of Table 5, from scratch and with transfer learning, saw on held-out paths."""
-    runs = DESIGN.table_runs("table5_from_scratch")
-    return [f"{ROOT}/runs/{run.directory}/history.csv" for run in runs]
 
 
 def pose_labels():
@@ -526,7 +521,7 @@ def run_plan(workflow):
 def backbones():
     """Backbones that runs start from."""
     return {
-        backbone_of(r.model, CONFIG.network) for r in RUNS if r.init == "pretrained"
+        backbone_of(r.model, CONFIG.network) for r in RUNS if r.start == "pretrained"
     }
 
 

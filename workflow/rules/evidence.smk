@@ -208,7 +208,6 @@ use rule call as claims with:
     input:
         errors=errors_of(RUNS),
         common_errors=errors_of(RUNS, "common_errors.csv"),
-        histories=histories(),
         labels=true_labels(),
         assistance=assistance_files(),
         properties=rules.table1_meshes.input.properties,

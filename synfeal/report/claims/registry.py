@@ -56,7 +56,7 @@ LEARNT: Mapping[str, list[Cell]] = {
     "C10": _cells(sizes=("6k", "20k")),
     "C11": _cells(sizes=("80k",)),
     "C12": _cells(sizes=("80k",)),
-    "C13": _cells(sizes=("80k",)),
+    "C13": _cells(),
 }
 
 

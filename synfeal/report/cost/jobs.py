@@ -14,6 +14,7 @@ import pandas as pd
 from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.methods import METHODS, frame_methods, graph_methods
 from synfeal.config import Config, Design, Experiment
+from synfeal.config.experiments import SHARES
 from synfeal.dataset.sequences import sequences_of
 from synfeal.report.cost.networks import Work, pretext_work, training_work
 
@@ -211,7 +212,8 @@ def _train(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
     train, test = (config.n_frames(part["scene"], size, split) for split in ("train", "test"))
     hyper = config.localizers[part["model"]]  # type: ignore[index]
     work = training_work(part["model"], config.network, hyper)
-    samples, batch = config.training.samples_seen[size], config.training.batch_size
+    share = SHARES[part["init"].partition("-")[2]]
+    samples, batch = round(share * config.training.samples_seen[size]), config.training.batch_size
     return _learning(config, work, samples, batch, test, train)
 
 
