@@ -87,7 +87,8 @@ def write_results(config):
         shutil.copytree(test_labels.parent, folder)
         for name in folder.iterdir():
             name.unlink()
-        shutil.copyfile(test_labels, folder / "predictions.csv")
+        for name in ("predictions.csv", "common_predictions.csv"):
+            shutil.copyfile(test_labels, folder / name)
         (folder / "history.csv").write_text("samples_seen\n320\n")
         (folder / "model.pt").write_bytes(b"large")
         write_training_record(

@@ -28,7 +28,7 @@ def planned_jobs(results, *arguments):
 
 def test_default_profile_plans_the_papers_design(tmp_path):
     jobs = planned_jobs(tmp_path)
-    assert jobs["train"] == jobs["score"] == 155  # 31 distinct data set x initialisation, 5 models
+    assert jobs["train"] == jobs["score"] == 175  # 35 distinct data set x start x images, 5 models
     assert jobs["scene"] == 2
     assert jobs["erroneous_labels"] == (9 + 6) * 2
     assert jobs["sfm"] == jobs["rgbd"] == 24 + 10  # 1,500 and 625 frames in batches of 63

@@ -212,7 +212,7 @@ def _train(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
     train, test = (config.n_frames(part["scene"], size, split) for split in ("train", "test"))
     hyper = config.localizers[part["model"]]  # type: ignore[index]
     work = training_work(part["model"], config.network, hyper)
-    share = SHARES[part["init"].partition("-")[2]]
+    share = SHARES[part.get("init", "").partition("-")[2]]
     samples, batch = round(share * config.training.samples_seen[size]), config.training.batch_size
     return _learning(config, work, samples, batch, test, train)
 
