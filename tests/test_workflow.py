@@ -42,7 +42,7 @@ def test_default_profile_plans_the_papers_design(tmp_path):
     assert jobs["coordinate_references"] == 4  # simulator, largest noise of each block
     assert jobs["descriptors"] == jobs["features"] == jobs["views"] == 2
     assert jobs["correspondences"] == jobs["tracks"] == jobs["references_table"] == 1
-    assert jobs["table"] + jobs["table1_meshes"] == 6
+    assert jobs["table"] + jobs["table1_meshes"] == 7
 
 
 def test_the_record_of_a_run_reads_what_every_job_before_it_took(tmp_path):
