@@ -6,8 +6,7 @@ import pytest
 
 from synfeal.cli import main
 from tests.careless import TABLE, arguments_of, make_folder
-from tests.collected import collect, save_room
-from tests.fuzz_files import _checkpoint
+from tests.fuzz_files import write_checkpoint
 from tests.fuzzing import JARGON, TooSlow, at_most
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
@@ -15,12 +14,11 @@ SECONDS = 20.0
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("made")
-    mesh = save_room(made / "room.glb")
-    assert collect(mesh, made / "set", "--depth") == 0
+def folder(mesh, calm, tmp_path_factory):
+    model = tmp_path_factory.mktemp("made") / "model.pt"
+    write_checkpoint(model)
     folder = tmp_path_factory.mktemp("folder")
-    make_folder(folder, mesh, made / "set", _checkpoint(made))
+    make_folder(folder, mesh, calm, model)
     return folder
 
 
