@@ -9,7 +9,7 @@ from synfeal.evaluation.metrics import cumulative
 from synfeal.report.figures import Results, speed_vs_error
 from synfeal.report.figures.cumulative_error import SceneErrors
 from synfeal.report.figures.cumulative_error import figure_of as cumulative_figure
-from synfeal.report.figures.error_by_design import LEVEL, by_noise, by_size
+from synfeal.report.figures.error_by_design import LEVEL, by_images, by_noise, by_size
 from synfeal.report.figures.localizer_lines import ASIDE, published_values
 from synfeal.report.figures.pareto import pareto_front
 from synfeal.report.figures.reference_lines import SHOWN
@@ -109,6 +109,17 @@ def test_error_by_size_draws_the_true_errors_their_limits_and_the_published_ones
     labels = [label.get_text() for label in panels[1, 1].get_xticklabels()]
     assert labels[0] == "6k\n300 frames"
     assert labels[-1] == "95k\n4,750 frames"
+
+
+def test_error_by_images_draws_each_start_over_the_shares_of_the_images(tables):
+    rows = tables["table7_images_shown"]
+    panels = np.reshape(by_images(rows).axes, (2, 2))
+    for place, start in enumerate(("pretrained", "scratch")):
+        own = rows[rows["init"].str.startswith(start)].assign(start=start)
+        for line, measure in enumerate(("position_m_true", "orientation_deg_true")):
+            check_panel(panels[line, place], own, measure, start=start)
+        labels = [label.get_text() for label in panels[1, place].get_xticklabels()]
+        assert labels == ["quarter", "half", "all"]
 
 
 def test_error_by_noise_draws_both_scores_and_the_published_only_beside_the_papers(tables):

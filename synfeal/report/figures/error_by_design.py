@@ -1,4 +1,4 @@
-"""Error against label noise (Table 3) and against data set size (Table 4)."""
+"""Error against label noise (Table 3), data set size (Table 4) and images shown (Table 7)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from baselines.groundtruth.methods import SIMULATOR
 from synfeal.report.figures.localizer_lines import add_legend, draw_localizers, start_at_zero
 from synfeal.report.figures.reference_lines import draw_references
 from synfeal.report.figures.sources import Results, counted
-from synfeal.report.layouts import scene_title
+from synfeal.report.layouts import STARTS, scene_title
 from synfeal.report.references import NAME, read_references
 
-NOISE, SIZE = "table3_inconsistencies", "table4_size"
+NOISE, SIZE, IMAGES = "table3_inconsistencies", "table4_size", "table7_images_shown"
 BLOCKS = {
     "orientation": "orientation noise",
     "position": "position noise",
@@ -98,6 +98,28 @@ def by_size(rows: pd.DataFrame, references: pd.DataFrame) -> Figure:
         )
         panels[0, column].set_title(scene_title(scene))
     add_legend(figure, panels[0, 0], 3, published=True)
+    return figure
+
+
+def draw_by_images(results: Results) -> Figure | None:
+    """Measures down, starts across; nothing when the design has no rows of Table 7."""
+    return by_images(results.table(IMAGES)) if results.rows_of(IMAGES) else None
+
+
+def by_images(rows: pd.DataFrame) -> Figure:
+    """The figure of the rows of ``table7_images_shown.csv``."""
+    start = rows["init"].str.partition("-")[0]
+    parts = {STARTS[name]: chosen for name, chosen in rows.groupby(start, sort=False)}
+    figure = Figure(figsize=(1.4 + 3.2 * len(parts), 6.6), layout="constrained")
+    names = dict.fromkeys(f"{scene_title(str(row.scene))}, {row.size}" for row in rows.itertuples())
+    figure.suptitle("; ".join(names))
+    panels = _draw_panels(figure, parts, TRUE_UNITS, published=False)
+    for column, (title, chosen) in enumerate(parts.items()):
+        shares = [init.partition("-")[2] or "all" for init in chosen["init"].unique()]
+        panels[1, column].set_xticks(range(len(shares)), shares)
+        panels[1, column].set_xlabel("of the images shown")
+        panels[0, column].set_title(title)
+    add_legend(figure, panels[0, 0], 3, published=False)
     return figure
 
 

@@ -82,6 +82,11 @@ FIGURES: dict[str, Entry] = {
         "meshes and numbers of frames; dark grey lines are the mean training pose, the nearest "
         "training image and, where frames have depth, structure on depth.",
     ),
+    "error_by_images": Entry(
+        error_by_design.draw_by_images,
+        "Median localization error against the true poses after a quarter, half and all of the "
+        "images, each a training run of its own length, with 95 % limits.",
+    ),
     "robustness": Entry(
         robustness.draw,
         "Median error on the same test paths rendered with effects of a camera and of changing "
