@@ -1,9 +1,6 @@
 """What a hasty person types: one table for all commands, and the files that get in the way."""
 
-from __future__ import annotations
-
 import shutil
-from pathlib import Path
 
 from PIL import Image
 
@@ -29,7 +26,7 @@ MESHES = (
 OUTS = ("/", ".", "notes.txt", "notes.txt/x", "loop", "loop/x", "x" * 300, "photos")
 
 # Files that Snakemake reads before the Snakefile can refuse them, a clone's Snakefile, and meshes.
-FILES: dict[str, bytes] = {
+FILES = {
     "Snakefile": b"",
     "deep.yaml": b"{a: " * 5000,
     "dup.yaml": b"seed: 1\nseed: 2\n",
@@ -49,7 +46,7 @@ CONFIGURATION_FILES = (
 
 COLLECT = "collect --mesh room.glb --frames 2 --out new --width 40 --height 33"
 # A command that works, an option of it (or the place of an argument), and values that do not.
-TABLE: dict[str, tuple[str, str, tuple[str, ...]]] = {
+TABLE = {
     "collect mesh": (COLLECT, "--mesh", MESHES),
     "collect out": (COLLECT, "--out", OUTS),
     "collect frames": (COLLECT, "--frames", WHOLE),
@@ -115,7 +112,7 @@ TABLE: dict[str, tuple[str, str, tuple[str, ...]]] = {
 }
 
 
-def make_folder(folder: Path, mesh: Path, data_set: Path, model: Path) -> None:
+def make_folder(folder, mesh, data_set, model):
     """Files that are sound (room.glb, set, model.pt, photos), and others that are not."""
     shutil.copy(mesh, folder / "room.glb")
     shutil.copytree(data_set, folder / "set")
@@ -136,7 +133,7 @@ def make_folder(folder: Path, mesh: Path, data_set: Path, model: Path) -> None:
     (folder / "loop").symlink_to("loop")
 
 
-def arguments_of(name: str, value: str) -> list[str]:
+def arguments_of(name, value):
     """What is typed for a row of the table."""
     command, option, _ = TABLE[name]
     words = [value if word == "{}" else word for word in command.split()]

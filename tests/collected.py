@@ -1,12 +1,8 @@
 """Small collections, and what is on disk after them."""
 
-from __future__ import annotations
-
 import hashlib
-from pathlib import Path
 
 import numpy as np
-import pytest
 import trimesh
 
 from synfeal.cli import main
@@ -16,7 +12,7 @@ from synfeal.mesh.save import save_glb
 SMALL = ("--width", "40", "--height", "33", "--spacing", "0.2", "--sequence-frames", "10")
 
 
-def save_room(path: Path, seed: int = 0) -> Path:
+def save_room(path, seed=0):
     """A closed room of 6 x 5 x 3 m with coloured corners."""
     box = trimesh.creation.box((6.0, 5.0, 3.0))
     colors = np.random.default_rng(seed).integers(0, 256, (8, 3), np.uint8)
@@ -25,18 +21,18 @@ def save_room(path: Path, seed: int = 0) -> Path:
     return path
 
 
-def command(mesh: Path, out: Path, *more: str) -> list[str]:
+def command(mesh, out, *more):
     """24 training and 8 test frames, in four sequences."""
     frames = ("--frames", "24", "--test-frames", "8")
     return ["collect", "--mesh", str(mesh), "--out", str(out), *frames, *SMALL, *more]
 
 
-def collect(mesh: Path, out: Path, *more: str) -> int:
+def collect(mesh, out, *more):
     """Exit status of :func:`command`."""
     return main(command(mesh, out, *more))
 
 
-def tree_of(directory: Path) -> dict[str, str]:
+def tree_of(directory):
     """SHA-256 of every file below a directory, by its path there."""
     return {
         path.relative_to(directory).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
@@ -45,7 +41,7 @@ def tree_of(directory: Path) -> dict[str, str]:
     }
 
 
-def only_error(capfd: pytest.CaptureFixture[str]) -> str:
+def only_error(capfd):
     """The message; before it nothing but lines of progress, and no traceback of any process."""
     *before, last = capfd.readouterr().err.strip().splitlines()
     assert not [line for line in before if not line.startswith("seq-")], before

@@ -1,15 +1,10 @@
 """Frames whose poses can be read off: what localizers are trained on in tests."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import torch
 from scipy.spatial.transform import Rotation
-from torch import Tensor
 
-from baselines.training.data import LabelledFrames, image_statistics, read_labelled_frames
+from baselines.training.data import image_statistics, read_labelled_frames
 from baselines.training.loop import train_localizer
 from synfeal.config.models import LocalizerConfig, NetworkConfig, TrainingConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
@@ -19,10 +14,9 @@ HYPER = LocalizerConfig(learning_rate=2e-3, dropout=0.0, beta=1.0, s_orientation
 TRAINING = TrainingConfig(batch_size=16, samples_seen={}, device="cpu")
 PX = NETWORK.input_px
 CPU = torch.device("cpu")
-Split = tuple[Path, Path]
 
 
-def coloured_frames(count: int, rng: np.random.Generator) -> tuple[np.ndarray, PoseTable]:
+def coloured_frames(count, rng):
     """Frames whose colour is the position and whose gradient is the yaw, with a little noise."""
     position_m = rng.uniform(-1, 1, (count, 3))
     yaw = rng.uniform(-0.5, 0.5, count)
@@ -35,7 +29,7 @@ def coloured_frames(count: int, rng: np.random.Generator) -> tuple[np.ndarray, P
     return images.clip(0, 255).astype(np.uint8), table
 
 
-def write_split(folder: Path, name: str, count: int, seed: int, spare: int = 0) -> Split:
+def write_split(folder, name, count, seed, spare=0):
     """Packed frames, ``spare`` of them without a label, and labels."""
     images, table = coloured_frames(count + spare, np.random.default_rng(seed))
     np.save(folder / f"{name}.npy", images)
@@ -43,12 +37,12 @@ def write_split(folder: Path, name: str, count: int, seed: int, spare: int = 0) 
     return folder / f"{name}.npy", folder / f"{name}.csv"
 
 
-def read_split(split: Split) -> LabelledFrames:
+def read_split(split):
     """A split as training runs read it."""
     return read_labelled_frames(*split, PX, CPU)
 
 
-def statistics_of(frames: LabelledFrames):
+def statistics_of(frames):
     """Image statistics of a split."""
     return image_statistics(frames.images)
 
@@ -68,11 +62,11 @@ def train(
 class Jitter:
     """An augmentation with a generator of its own, which counts its calls and may act on one."""
 
-    def __init__(self, at=0, act=None) -> None:
+    def __init__(self, at=0, act=None):
         self.calls, self._at, self._act = 0, at, act
         self._generator = torch.Generator().manual_seed(5)
 
-    def __call__(self, images: Tensor, quat_wxyz: Tensor) -> tuple[Tensor, Tensor]:
+    def __call__(self, images, quat_wxyz):
         self.calls += 1
         if self.calls == self._at:
             self._act()
@@ -82,5 +76,5 @@ class Jitter:
     def state_dict(self):
         return {"generator": self._generator.get_state()}
 
-    def load_state_dict(self, state) -> None:
+    def load_state_dict(self, state):
         self._generator.set_state(state["generator"])

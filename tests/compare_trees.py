@@ -1,9 +1,5 @@
 """Small result trees whose errors are known, for the tests of ``synfeal compare``."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 
 from baselines.training.score import score_run
@@ -17,14 +13,14 @@ RUN = "runs/room/6k/synfeal/pretrained/posenet/seed0"
 LABEL_OFFSET_M = 2.0
 
 
-def poses(x_m: np.ndarray | float) -> PoseTable:
+def poses(x_m):
     position_m = np.zeros((N, 3))
     position_m[:, 0] = x_m
     index = np.arange(N)
     return PoseTable(index, index // PER_PATH, position_m, np.tile([1.0, 0, 0, 0], (N, 1)))
 
 
-def write_tree(root: Path, error_m: dict[str, np.ndarray], seeds: int = 1) -> Path:
+def write_tree(root, error_m, seeds=1):
     """True poses at the origin, SfM labels 2 m to the left, predictions ``error_m`` to the right.
 
     So errors are ``error_m`` against the true poses, and 2 m more against SfM's labels.

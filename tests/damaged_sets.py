@@ -1,12 +1,8 @@
 """A data set in closed form, and the errors a data set can hide: each changes a copy of it."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import shutil
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 from PIL import Image
@@ -21,7 +17,7 @@ from tests.planar_scene import straight_path, write_frames
 CAMERA = CameraConfig(width=96, height=72, horizontal_fov_deg=60.0)
 
 
-def write_planar_set(folder: Path, camera: CameraConfig = CAMERA) -> None:
+def write_planar_set(folder, camera=CAMERA):
     """24 training and 8 test frames of two planes, as ``synfeal collect`` lays them out."""
     sequences = [Sequence("seq-01", "train", 0, 24), Sequence("seq-02", "test", 0, 8)]
     for sequence, step_m, turn_deg in zip(sequences, (0.04, 0.05), (1.5, 2.0), strict=True):
@@ -36,11 +32,11 @@ def write_planar_set(folder: Path, camera: CameraConfig = CAMERA) -> None:
     write_manifest(folder, sequences, camera, {})
 
 
-def write_pose(path: Path, world_from_cam: np.ndarray) -> None:
+def write_pose(path, world_from_cam):
     np.savetxt(path, world_from_cam, fmt="%.10e", delimiter="\t")
 
 
-def copy_of_first_frames(folder: Path, out: Path, kept: tuple[int, int] = (5, 3)) -> Path:
+def copy_of_first_frames(folder, out, kept=(5, 3)):
     """A data set of few frames, which can be damaged and checked quickly."""
     shutil.copytree(folder, out)
     for sequence, count in zip(("seq-01", "seq-02"), kept, strict=True):
@@ -50,7 +46,7 @@ def copy_of_first_frames(folder: Path, out: Path, kept: tuple[int, int] = (5, 3)
     return out
 
 
-def without_manifest_hashes(folder: Path) -> None:
+def without_manifest_hashes(folder):
     """Leave the camera, so that only geometry can tell what was changed."""
     path = folder / "manifest.json"
     path.write_text(json.dumps({"camera": json.loads(path.read_text())["camera"]}))
@@ -58,17 +54,17 @@ def without_manifest_hashes(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
-def frame_files(folder: Path, kind: str, sequence: str = "seq-01") -> list[Path]:
+def frame_files(folder, kind, sequence="seq-01"):
     return sorted((folder / sequence).glob(f"frame-*.{kind}"))
 
 
-def pose_of_the_neighbour(folder: Path) -> None:
+def pose_of_the_neighbour(folder):
     poses = frame_files(folder, "pose.txt")
     middle = len(poses) // 2
     shutil.copy(poses[middle + 1], poses[middle])
 
 
-def poses_shifted_by_one(folder: Path) -> None:
+def poses_shifted_by_one(folder):
     """Each frame has the pose of the next one; the last frame goes."""
     poses = frame_files(folder, "pose.txt")
     for pose, following in itertools.pairwise(poses):
@@ -77,14 +73,14 @@ def poses_shifted_by_one(folder: Path) -> None:
         frame_files(folder, kind)[-1].unlink()
 
 
-def transposed_rotations(folder: Path) -> None:
+def transposed_rotations(folder):
     for path in folder.glob("seq-*/*.pose.txt"):
         pose = np.loadtxt(path)
         pose[:3, :3] = pose[:3, :3].T
         write_pose(path, pose)
 
 
-def half_pixel(folder: Path) -> None:
+def half_pixel(folder):
     """The camera of OpenCV's convention, whose first pixel is centred at (0, 0)."""
     path = folder / "manifest.json"
     manifest = json.loads(path.read_text())
@@ -93,27 +89,27 @@ def half_pixel(folder: Path) -> None:
     path.write_text(json.dumps(manifest))
 
 
-def _change_depth(folder: Path, change: Callable[[np.ndarray], np.ndarray]) -> None:
+def _change_depth(folder, change):
     for path in folder.glob("seq-*/*.depth.png"):
         depth = np.asarray(Image.open(path)).astype(np.float64)
         changed = np.where(depth == 65535, 65535, change(depth).round().clip(0, 65535))
         Image.fromarray(changed.astype(np.uint16)).save(path)
 
 
-def depth_of_tum(folder: Path) -> None:
+def depth_of_tum(folder):
     """5,000 units to the metre."""
     _change_depth(folder, lambda depth: 5.0 * depth)
 
 
-def depth_in_centimetres(folder: Path) -> None:
+def depth_in_centimetres(folder):
     _change_depth(folder, lambda depth: depth / 10.0)
 
 
-def depth_in_metres(folder: Path) -> None:
+def depth_in_metres(folder):
     _change_depth(folder, lambda depth: depth / 1000.0)
 
 
-def depth_along_the_ray(folder: Path) -> None:
+def depth_along_the_ray(folder):
     camera = json.loads((folder / "manifest.json").read_text())["camera"]
     row, column = np.mgrid[: camera["height"], : camera["width"]] + 0.5
     x = (column - camera["cx"]) / camera["fx"]
@@ -121,7 +117,7 @@ def depth_along_the_ray(folder: Path) -> None:
     _change_depth(folder, lambda depth: depth * np.sqrt(1.0 + x**2 + y**2))
 
 
-def _swap_middle(folder: Path, *kinds: str) -> None:
+def _swap_middle(folder, *kinds):
     for kind in kinds:
         files = frame_files(folder, kind)
         middle = len(files) // 2
@@ -130,15 +126,15 @@ def _swap_middle(folder: Path, *kinds: str) -> None:
         files[middle + 1].write_bytes(first)
 
 
-def swapped_colours(folder: Path) -> None:
+def swapped_colours(folder):
     _swap_middle(folder, "color.png")
 
 
-def swapped_depths(folder: Path) -> None:
+def swapped_depths(folder):
     _swap_middle(folder, "depth.png")
 
 
-def swapped_frames(folder: Path) -> None:
+def swapped_frames(folder):
     _swap_middle(folder, "color.png", "depth.png")
 
 

@@ -1,9 +1,5 @@
 """Poses as other programs write them: by their own writers, or by the rules of their sources."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pycolmap
 from evo.core.trajectory import PoseTrajectory3D
@@ -21,7 +17,7 @@ PER_SEQUENCE, RATE_HZ = 12, 30.0
 TEST = ("seq-02", "seq-03")
 
 
-def random_poses(count: int, seed: int) -> Array:
+def random_poses(count, seed):
     """``world_from_cam`` (N, 4, 4): positions of a metre's spread, any rotation."""
     rng = np.random.default_rng(seed)
     poses = np.tile(np.eye(4), (count, 1, 1))
@@ -30,7 +26,7 @@ def random_poses(count: int, seed: int) -> Array:
     return poses
 
 
-def disturbed(poses: Array, position_m: float, angle_deg: float, seed: int = 1) -> Array:
+def disturbed(poses, position_m, angle_deg, seed=1):
     """Every pose off by random amounts of about this size."""
     rng = np.random.default_rng(seed)
     off = poses.copy()
@@ -40,7 +36,7 @@ def disturbed(poses: Array, position_m: float, angle_deg: float, seed: int = 1) 
     return off
 
 
-def write_dataset(folder: Path) -> Array:
+def write_dataset(folder):
     """Three sequences without images, two of them for test; returns the test poses."""
     poses = random_poses(3 * PER_SEQUENCE, 0)
     names = ("seq-01", *TEST)
@@ -56,12 +52,12 @@ def write_dataset(folder: Path) -> Array:
     return poses[PER_SEQUENCE:]
 
 
-def frame_names() -> list[tuple[str, int]]:
+def frame_names():
     """Sequence and number of the test frames, in order."""
     return [(name, number) for name in TEST for number in range(PER_SEQUENCE)]
 
 
-def write_tum(folder: Path, poses: Array) -> Path:
+def write_tum(folder, poses):
     """By evo's writer: a trajectory for each sequence."""
     folder.mkdir()
     for index, name in enumerate(TEST):
@@ -72,7 +68,7 @@ def write_tum(folder: Path, poses: Array) -> Path:
     return folder
 
 
-def write_colmap(folder: Path, poses: Array, binary: bool) -> Path:
+def write_colmap(folder, poses, binary):
     """By pycolmap's writer."""
     folder.mkdir()
     model = pycolmap.Reconstruction()
@@ -90,7 +86,7 @@ def write_colmap(folder: Path, poses: Array, binary: bool) -> Path:
     return folder
 
 
-def _inverse_lines(poses: Array) -> list[str]:
+def _inverse_lines(poses):
     """``qw qx qy qz tx ty tz`` of ``cam_from_world``."""
     inverse = np.linalg.inv(poses)
     quat = Rotation.from_matrix(inverse[:, :3, :3]).as_quat(scalar_first=True)
@@ -98,7 +94,7 @@ def _inverse_lines(poses: Array) -> list[str]:
     return [" ".join(map(repr, row)) for row in rows.tolist()]
 
 
-def write_ace(path: Path, poses: Array) -> Path:
+def write_ace(path, poses):
     """ACE's rule (``test_ace.py``): image name, pose, rotation and position error, inliers."""
     lines = [
         f"{sequence}-frame-{number:06d}.color.png {line} 1.25 0.5 731"
@@ -108,7 +104,7 @@ def write_ace(path: Path, poses: Array) -> Path:
     return path
 
 
-def write_hloc(path: Path, poses: Array) -> Path:
+def write_hloc(path, poses):
     """hloc's rule (``localize_sfm.main`` with ``prepend_camera_name``)."""
     lines = [
         f"{sequence}/frame-{number:06d}.color.png {line}"
@@ -118,21 +114,21 @@ def write_hloc(path: Path, poses: Array) -> Path:
     return path
 
 
-def write_tree(folder: Path, poses: Array) -> Path:
+def write_tree(folder, poses):
     for (sequence, number), pose in zip(frame_names(), poses, strict=True):
         (folder / sequence).mkdir(parents=True, exist_ok=True)
         (folder / sequence / f"frame-{number:06d}.pose.txt").write_text(pose_text(pose))
     return folder
 
 
-def write_table(path: Path, poses: Array) -> Path:
+def write_table(path, poses):
     frame = np.arange(len(poses))
     quat = Rotation.from_matrix(poses[:, :3, :3]).as_quat(canonical=True, scalar_first=True)
     write_pose_table(path, PoseTable(frame, frame, poses[:, :3, 3], quat))
     return path
 
 
-def write_localized(path: Path, poses: Array) -> Path:
+def write_localized(path, poses):
     """What ``synfeal localize`` writes."""
     quat = Rotation.from_matrix(poses[:, :3, :3]).as_quat(scalar_first=True)
     rows = np.concatenate([poses[:, :3, 3], quat], axis=1).tolist()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,7 +36,7 @@ from synfeal.config.models import CameraConfig, LocalizerConfig, NetworkConfig, 
 from synfeal.dataset.manifest import verify_manifest, write_manifest
 from synfeal.dataset.packed import join_packed, pack_frames, read_packed
 from synfeal.dataset.packed_record import write_packed_record
-from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
+from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.dataset.sequences import Sequence
 from synfeal.dataset.sevenscenes import pose_text, read_depth_m, read_pose, read_split, write_splits
 from synfeal.files import write_json
@@ -80,7 +80,7 @@ class Kind:
     form: str = ""
     n_flips: int = 12
 
-    def make(self, folder: Path) -> Path:
+    def make(self, folder):
         """A sound file in a folder."""
         path = folder / self.file
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -89,7 +89,7 @@ class Kind:
 
 
 @contextmanager
-def removed(*outputs: Path) -> Iterator[None]:
+def removed(*outputs):
     """What a reader writes beside the file goes before the folder is looked at."""
     try:
         yield
@@ -98,17 +98,17 @@ def removed(*outputs: Path) -> Iterator[None]:
             shutil.rmtree(output) if output.is_dir() else output.unlink(missing_ok=True)
 
 
-def is_rigid(pose: np.ndarray) -> bool:
+def is_rigid(pose):
     turned = pose[..., :3, :3] @ np.swapaxes(pose[..., :3, :3], -1, -2)
     return bool(np.isfinite(pose).all() and np.allclose(turned, np.eye(3), atol=1e-6))
 
 
-def is_pose_table(table: PoseTable) -> bool:
+def is_pose_table(table):
     whole = (table.frame >= 0).all() and (table.path >= 0).all()
     return bool(whole and (np.abs(table.frame) < 1e12).all() and is_rigid(table.world_from_cam))
 
 
-def finite_numbers(value: Any) -> bool:
+def finite_numbers(value):
     """No text where numbers are, and all of them finite."""
     if isinstance(value, dict):
         return all(map(finite_numbers, value.values()))
@@ -117,60 +117,60 @@ def finite_numbers(value: Any) -> bool:
     return not isinstance(value, float) or math.isfinite(value)
 
 
-def write_table(path: Path) -> None:
+def write_table(path):
     write_pose_table(path, POSES)
 
 
-def write_pose(path: Path) -> None:
+def write_pose(path):
     path.write_text(pose_text(POSES.world_from_cam[0]))
 
 
-def read_poses_of(path: Path) -> object:
+def read_poses_of(path):
     return read_poses(path, "train")
 
 
-def write_tum(path: Path) -> None:
+def write_tum(path):
     lines = [f"{i} 0.1 0.2 {i} 0 0 0 1\n" for i in range(N)]
     path.write_text("# timestamp tx ty tz qx qy qz qw\n" + "".join(lines))
 
 
-def write_batch(path: Path) -> None:
+def write_batch(path):
     write_trajectory(path, BatchTrajectory(POSES.world_from_cam, np.ones(N, bool)))
 
 
-def write_graph(path: Path) -> None:
+def write_graph(path):
     pose = POSES.world_from_cam
     edges = [Edge(i, i + 1, pose[0], np.eye(6)) for i in range(N - 1)]
     write_g2o(path, PoseGraph(pose, tuple(edges)))
 
 
-def is_graph(graph: PoseGraph) -> bool:
+def is_graph(graph):
     check_connected(graph)
     return is_rigid(graph.first_from_cam) and all(is_rigid(e.i_from_j) for e in graph.edges)
 
 
-def write_color(path: Path) -> None:
+def write_color(path):
     rgb = np.random.default_rng(1).integers(0, 256, (18, 24, 3), dtype=np.uint8)
     Image.fromarray(rgb).save(path)
 
 
-def write_depth(path: Path) -> None:
+def write_depth(path):
     mm = np.random.default_rng(2).integers(500, 4000, (18, 24)).astype(np.uint16)
     Image.fromarray(mm).save(path)
 
 
-def linked(path: Path) -> None:
+def linked(path):
     with removed(images := path.parent / "images"):
         link_images([path], CAMERA, images)
 
 
-def packed(path: Path) -> np.ndarray:
+def packed(path):
     with removed(out := path.parent / "packed.npy"):
         pack_frames([path.parent], 8, out)
         return np.load(out)
 
 
-def write_data_set(folder: Path) -> None:
+def write_data_set(folder):
     sequences = [Sequence("seq-01", "train", 0, 2), Sequence("seq-02", "test", 0, 2)]
     for place, sequence in enumerate(sequences):
         directory = folder / sequence.name
@@ -182,21 +182,21 @@ def write_data_set(folder: Path) -> None:
     write_manifest(folder, sequences, CAMERA, {})
 
 
-def write_packed(path: Path) -> None:
+def write_packed(path):
     np.save(path, np.random.default_rng(3).integers(0, 256, (N, 8, 8, 3), dtype=np.uint8))
 
 
-def is_packed(frames: np.ndarray) -> bool:
+def is_packed(frames):
     return frames.dtype == np.uint8 and frames.ndim == 4 and int(frames.sum()) >= 0
 
 
-def write_record(path: Path) -> None:
+def write_record(path):
     write_packed(path.with_name("train.npy"))
     write_table(path.with_name("train.csv"))
     write_json(path, {"frames": N, "backend": "raycast"})
 
 
-def recorded(path: Path) -> object:
+def recorded(path):
     frames, plan = path.with_name("train.npy"), path.with_name("train.csv")
     with removed(out := frames.with_suffix(".json")):
         write_packed_record(frames, [path], plan, CAMERA, RenderConfig())
@@ -221,30 +221,30 @@ JSON_CAMERA = json.dumps({"K": K, "dist": [0.1, 0, 0, 0, 0], "image_size": [640,
 COLMAP = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS\n1 OPENCV 640 480 500 500 320 240 0.1 0 0 0\n"
 
 
-def text(content: str) -> Callable[[Path], object]:
+def text(content):
     return lambda path: path.write_text(content)
 
 
-def is_camera(calibration: Any) -> bool:
+def is_camera(calibration):
     values = (calibration.fx, calibration.fy, *calibration.distortion)
     return calibration.fx > 0 and calibration.fy > 0 and all(map(math.isfinite, values))
 
 
-def write_gltf(path: Path) -> None:
+def write_gltf(path):
     write_wall(path)
     store_gltf(path.parent, *triangle_gltf(textured(), ["wall.png"]))
 
 
-def write_wall(path: Path) -> None:
+def write_wall(path):
     Image.new("RGB", (4, 4), (9, 99, 199)).save(path.parent / "wall.png")
 
 
-def write_scene(path: Path) -> None:
+def write_scene(path):
     write_wall(path)
     write_obj(path.parent)
 
 
-def write_ply(path: Path) -> None:
+def write_ply(path):
     rows = [f"{x} {y} {x * y} {60 * x} 9 99" for x, y in np.round(4 * UV, 2)]
     names = "".join(f"property float {a}\n" for a in "xyz")
     names += "".join(f"property uchar {c}\n" for c in ("red", "green", "blue"))
@@ -253,22 +253,22 @@ def write_ply(path: Path) -> None:
     path.write_text(head + "\n".join(rows) + "\n3 0 1 2\n")
 
 
-def write_collision(path: Path) -> None:
+def write_collision(path):
     (part,) = box_mesh().parts
     save_collision_mesh(path, Triangles(part.vertices_m, part.faces))
 
 
-def is_triangles(mesh: Triangles) -> bool:
+def is_triangles(mesh):
     in_range = mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices_m)
     return bool(len(mesh.faces) and in_range and np.isfinite(mesh.vertices_m).all())
 
 
-def is_mesh(mesh: Any) -> bool:
+def is_mesh(mesh):
     triangles = [Triangles(part.vertices_m, part.faces) for part in mesh.parts]
     return bool(triangles) and all(map(is_triangles, triangles))
 
 
-def write_checkpoint(path: Path) -> None:
+def write_checkpoint(path):
     statistics = ImageStatistics(torch.zeros(1, 3, 1, 1), torch.ones(1, 3, 1, 1))
     network, hyper = NetworkConfig(input_px=32, width=0.01), LocalizerConfig()
     localizer = build_localizer("posenet2", network, hyper)
@@ -276,16 +276,16 @@ def write_checkpoint(path: Path) -> None:
     save_checkpoint(path, localizer, statistics, description)
 
 
-def is_statistics(found: ImageStatistics) -> bool:
+def is_statistics(found):
     shapes = found.mean.shape == found.deviation.shape == (1, 3, 1, 1)
     return bool(shapes and found.mean.isfinite().all() and (found.deviation > 0).all())
 
 
-def network() -> torch.nn.Module:
+def network():
     return torch.nn.Linear(3, 2)
 
 
-def scored(path: Path) -> object:
+def scored(path):
     errors, metrics = path.with_name("e.csv"), path.with_name("m.json")
     write_table(labels := path.parents[1] / "labels.csv")
     with removed(errors, metrics):
@@ -293,12 +293,12 @@ def scored(path: Path) -> object:
         return json.loads(metrics.read_text())
 
 
-def write_metrics(path: Path) -> None:
+def write_metrics(path):
     write_table(labels := path.with_name("labels.csv"))
     score_run(labels, labels, labels, labels, path.with_name("errors.csv"), path, {})
 
 
-def write_assistance(path: Path) -> None:
+def write_assistance(path):
     record = {
         **{"index": 0, "start": 0, "stop": 4, "registered": 4, "filled": 0},
         **{"lost": False, "assisted": True, "error_before_m": 0.3, "error_before_deg": 1.0},
@@ -312,12 +312,12 @@ COLOR, DEPTH, POSE = (f"frame-000000.{end}" for end in ("color.png", "depth.png"
 OF_SET = "seq-01/frame-000000.pose.txt"
 
 
-def validated(folder: Path) -> object:
+def validated(folder):
     return validate(folder, None, False)
 
 
 # fmt: off
-KINDS: tuple[Kind, ...] = (
+KINDS = (
     Kind("pose table", "train.csv", write_table, read_pose_table, is_pose_table, ","),
     Kind("poses to repeat", "train.csv", write_table, read_poses_of, is_pose_table, ","),
     Kind("TUM trajectory", "poses.txt", write_tum, read_poses_of, is_pose_table, " "),

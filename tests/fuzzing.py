@@ -10,11 +10,9 @@ import resource
 import shutil
 import signal
 import traceback
-from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -29,7 +27,7 @@ WORDS = (
     *("", "x", "nan", "inf", "-inf", "1e400", "1e30", "-1e300", "-1", "0.5", "0", "0x10", "true"),
     *("9" * 400, "9" * 5000, "..", "1;2", "a\0b", "\ufeff1", "'1'", "1 2"),
 )
-JUNK: tuple[Any, ...] = (
+JUNK = (
     *(None, True, -1, 0.5, 1e30, 10**400, float("nan"), float("inf"), "", "x", "..", [], {}),
     *([[]], {"x": 1}, "9" * 5000),
 )
@@ -55,9 +53,7 @@ class Damage:
     special: str = ""
 
 
-def damages(
-    data: bytes, others: Mapping[str, bytes], seed: int, n_flips: int = 40
-) -> Iterator[Damage]:
+def damages(data, others, seed, n_flips=40):
     """What can happen to any file."""
     yield Damage("missing")
     yield Damage("a directory", special="directory")
@@ -84,13 +80,13 @@ def damages(
         yield _flipped(data, int(place), int(rng.integers(1, 256)))
 
 
-def _flipped(data: bytes, place: int, bits: int) -> Damage:
+def _flipped(data, place, bits):
     changed = bytearray(data)
     changed[place] ^= bits
     return Damage(f"byte {place} xor {bits:#x}", bytes(changed))
 
 
-def text_damages(data: bytes, separator: str) -> Iterator[Damage]:
+def text_damages(data, separator):
     """What can happen to a table: its lines, its columns, and the cells of its second line."""
     lines = data.decode().splitlines()
     middle = len(lines) // 2
@@ -128,11 +124,11 @@ def text_damages(data: bytes, separator: str) -> Iterator[Damage]:
             yield Damage(f"column {column} is {word[:20]!r}", _joined(table, separator))
 
 
-def _joined(rows: list[list[str]], separator: str) -> bytes:
+def _joined(rows, separator):
     return "\n".join(separator.join(row) for row in rows).encode() + b"\n"
 
 
-def json_damages(data: bytes) -> Iterator[Damage]:
+def json_damages(data):
     """Each value of a JSON file replaced and removed, and what is no mapping at all."""
     value = json.loads(data)
     for junk in JUNK:
@@ -151,9 +147,9 @@ def json_damages(data: bytes) -> Iterator[Damage]:
         yield Damage(f"more in {name}", json.dumps(beside).encode())
 
 
-def _places(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+def _places(value, place=()):
     """Keys that lead to every value; of a list, its first and its last."""
-    entries: list[tuple[Any, Any]] = []
+    entries = []
     if isinstance(value, dict):
         entries = list(value.items())
     elif isinstance(value, list):
@@ -163,7 +159,7 @@ def _places(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]
         yield from _places(inner, (*place, key))
 
 
-def replaced(value: Any, place: tuple[Any, ...], new: Any) -> Any:
+def replaced(value, place, new):
     """A copy in which another value stands at ``place``."""
     if not place:
         return new
@@ -172,14 +168,14 @@ def replaced(value: Any, place: tuple[Any, ...], new: Any) -> Any:
     return changed
 
 
-def is_mapping(value: Any, place: tuple[Any, ...]) -> bool:
+def is_mapping(value, place):
     """Whether a mapping stands at ``place``."""
     for key in place:
         value = value[key]
     return isinstance(value, dict)
 
 
-def removed(value: Any, place: tuple[Any, ...]) -> Any:
+def removed(value, place):
     """A copy without what stands at ``place``."""
     changed = copy.copy(value)
     if len(place) == 1:
@@ -189,7 +185,7 @@ def removed(value: Any, place: tuple[Any, ...]) -> Any:
     return changed
 
 
-def put(path: Path, damage: Damage) -> None:
+def put(path, damage):
     """Put a damage in the place of a file."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
@@ -203,13 +199,13 @@ def put(path: Path, damage: Damage) -> None:
 
 
 @contextmanager
-def at_most(seconds: float) -> Iterator[None]:
+def at_most(seconds):
     """End what takes longer, with :class:`TooSlow`: processor seconds, as others work here too.
 
     What waits without working is ended after ten times as long.
     """
 
-    def late(*_: object) -> None:
+    def late(*_):
         raise TooSlow
 
     limits = {
@@ -229,7 +225,7 @@ def at_most(seconds: float) -> Iterator[None]:
 
 
 @contextmanager
-def little_memory() -> Iterator[None]:
+def little_memory():
     """No more than 4 GiB beyond what is there: a header that asks for more must not get it."""
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
@@ -241,12 +237,7 @@ def little_memory() -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
-def problem_with(
-    read: Callable[[], object],
-    is_valid: Callable[[Any], bool],
-    names: tuple[str, ...],
-    folder: Path | None = None,
-) -> str | None:
+def problem_with(read, is_valid, names, folder=None):
     """What is wrong with how a reader took an input; None if nothing is.
 
     Args:
@@ -284,7 +275,7 @@ JARGON = re.compile(
 )
 
 
-def problem_with_message(message: str, names: tuple[str, ...]) -> str | None:
+def problem_with_message(message, names):
     if "\n" in message or len(message.splitlines()) > 1:
         return f"more than one line: {message[:90]!r}"
     if len(message) > LONGEST_MESSAGE:
@@ -296,7 +287,7 @@ def problem_with_message(message: str, names: tuple[str, ...]) -> str | None:
     return None
 
 
-def _tree(folder: Path | None) -> dict[str, tuple[int, int]]:
+def _tree(folder):
     if folder is None:
         return {}
     found = ((path, path.lstat()) for path in folder.rglob("*"))

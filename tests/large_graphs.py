@@ -1,7 +1,5 @@
 """Large pose graphs in the style of the public ones: a sphere and a Manhattan world."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -13,9 +11,7 @@ from synfeal.geometry.poses import pose_matrix, relative
 Array = NDArray[np.float64]
 
 
-def sphere(
-    rings: int = 44, ring_nodes: int = 50, radius_m: float = 50.0
-) -> tuple[Array, list[tuple[int, int]]]:
+def sphere(rings=44, ring_nodes=50, radius_m=50.0):
     """Poses (rings * ring_nodes, 4, 4) of a spiral over a sphere, and its edges.
 
     A node is joined to the next one on its ring and to the two nearest of the ring before.
@@ -34,9 +30,7 @@ def sphere(
     return pose_matrix(rotation, radius_m * normal), pairs
 
 
-def manhattan(
-    rng: np.random.Generator, nodes: int = 3500, blocks: int = 18, closure_m: float = 1.1
-) -> tuple[Array, list[tuple[int, int]]]:
+def manhattan(rng, nodes=3500, blocks=18, closure_m=1.1):
     """Poses (nodes, 4, 4) of a walk on a street grid with right-angled turns, and its edges.
 
     A node is joined to the next one and to at most two earlier ones at the same corner or the next.
@@ -57,13 +51,7 @@ def manhattan(
     return pose_matrix(rotation, position), pairs
 
 
-def measured(
-    rng: np.random.Generator,
-    truth: Array,
-    pairs: list[tuple[int, int]],
-    sigma_m: float,
-    sigma_rad: float,
-) -> PoseGraph:
+def measured(rng, truth, pairs, sigma_m, sigma_rad):
     """The graph of noisy measurements; its initial poses chain the edges (k, k + 1)."""
     i, j = np.array(pairs).T
     turn = Rotation.from_rotvec(sigma_rad * rng.normal(size=(len(pairs), 3))).as_matrix()

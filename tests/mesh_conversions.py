@@ -1,20 +1,16 @@
 """A scene written as OBJ and as vertex-coloured PLY, independently of what the loader does."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from PIL import Image
 from scipy.ndimage import map_coordinates
 
-from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.model import TexturedMesh
 
 
-def write_obj_scene(folder: Path, mesh: TexturedMesh) -> Path:
+def write_obj_scene(folder, mesh):
     """OBJ, MTL and PNG textures; what is cut out of a texture is cut out by its alpha."""
     obj, mtl = ["mtllib scene.mtl"], []
     first = 1
@@ -31,7 +27,7 @@ def write_obj_scene(folder: Path, mesh: TexturedMesh) -> Path:
     return folder / "scene.obj"
 
 
-def mtl_lines(folder: Path, part: MeshPart, index: int) -> list[str]:
+def mtl_lines(folder, part, index):
     red, green, blue = part.base_color[:3] / 255.0
     lines = [f"newmtl material{index}", f"Kd {red} {green} {blue}"]
     if part.texture is None:
@@ -46,7 +42,7 @@ def mtl_lines(folder: Path, part: MeshPart, index: int) -> list[str]:
     return [*lines, f"map_Kd {name}"]
 
 
-def without_alpha(mesh: TexturedMesh) -> TexturedMesh:
+def without_alpha(mesh):
     """The scene with nothing cut out, which vertex colours cannot express."""
     return TexturedMesh(
         tuple(
@@ -56,7 +52,7 @@ def without_alpha(mesh: TexturedMesh) -> TexturedMesh:
     )
 
 
-def write_coloured_ply(path: Path, mesh: TexturedMesh, spacing_m: float) -> Path:
+def write_coloured_ply(path, mesh, spacing_m):
     """PLY of a scene, with vertices at most ``spacing_m`` apart that carry its textures."""
     pieces, colours = [], []
     for part in mesh.parts:
@@ -71,9 +67,7 @@ def write_coloured_ply(path: Path, mesh: TexturedMesh, spacing_m: float) -> Path
     return path
 
 
-def vertex_colours(
-    part: MeshPart, corners: NDArray[np.float64], spacing_m: float
-) -> NDArray[np.uint8]:
+def vertex_colours(part, corners, spacing_m):
     """Colours (N, 3): the texture averaged over about half a spacing around each corner."""
     if part.texture is None:
         return np.broadcast_to(part.base_color[:3], (3 * len(corners), 3)).copy()
@@ -89,12 +83,12 @@ def vertex_colours(
     return np.round(np.stack(colours, axis=1) * (part.base_color[:3] / 255)).astype(np.uint8)
 
 
-def areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def areas(corners):
     sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return np.asarray(np.linalg.norm(sides, axis=1) / 2)
 
 
-def bisected(part: MeshPart, spacing_m: float) -> NDArray[np.float64]:
+def bisected(part, spacing_m):
     """Corners (F, 3, 5), position and texture coordinates, cut at the longest edge until short."""
     assert part.uv is not None
     corners = np.dstack([part.vertices_m[part.faces], part.uv[part.faces]])

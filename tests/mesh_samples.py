@@ -1,12 +1,9 @@
 """Small meshes for tests, and glTF and OBJ files written by hand: readers are not tested with our
 own writer."""
 
-from __future__ import annotations
-
 import copy
 import json
 import struct
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,16 +18,16 @@ UV = np.array([[0.0, 0.0], [1.0, 0.0], [0.25, 0.75]])
 Json = dict[str, Any]
 
 
-def part_of(mesh: trimesh.Trimesh, **values: object) -> MeshPart:
-    return MeshPart("part", np.asarray(mesh.vertices), np.asarray(mesh.faces), **values)  # type: ignore[arg-type]
+def part_of(mesh, **values):
+    return MeshPart("part", np.asarray(mesh.vertices), np.asarray(mesh.faces), **values)
 
 
-def box_mesh(extents: tuple[float, float, float] = (2.0, 3.0, 4.0)) -> TexturedMesh:
+def box_mesh(extents=(2.0, 3.0, 4.0)):
     box = trimesh.creation.box(extents)
     return TexturedMesh((part_of(box, vertex_rgb=np.full((8, 3), 99, np.uint8)),))
 
 
-def textured(material: Json | None = None, **slot: object) -> Json:
+def textured(material=None, **slot):
     """A glTF material with the first texture as its base colour."""
     return {
         "name": "Paint",
@@ -39,7 +36,7 @@ def textured(material: Json | None = None, **slot: object) -> Json:
     }
 
 
-def triangle_gltf(material: Json, images: list[str]) -> tuple[Json, bytes]:
+def triangle_gltf(material, images):
     """JSON and buffer of TRIANGLE with UV, moved by a node."""
     binary = TRIANGLE.astype("<f4").tobytes() + UV.astype("<f4").tobytes()
     header = {
@@ -73,9 +70,7 @@ def triangle_gltf(material: Json, images: list[str]) -> tuple[Json, bytes]:
     return header, binary
 
 
-def add_attribute(
-    header: Json, binary: bytes, name: str, values: np.ndarray[Any, Any], **accessor: object
-) -> bytes:
+def add_attribute(header, binary, name, values, **accessor):
     """Give the first primitive another attribute; returns the longer buffer."""
     types = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
     components = {"u1": 5121, "u2": 5123, "u4": 5125, "f4": 5126, "i2": 5122}
@@ -99,14 +94,14 @@ def add_attribute(
     return binary
 
 
-def store_gltf(folder: Path, header: Json, binary: bytes) -> Path:
+def store_gltf(folder, header, binary):
     (folder / "data.bin").write_bytes(binary)
     path = folder / "scene.gltf"
     path.write_text(json.dumps(header))
     return path
 
 
-def store_glb(folder: Path, header: Json, binary: bytes) -> Path:
+def store_glb(folder, header, binary):
     header = copy.deepcopy(header)
     header["buffers"][0].pop("uri", None)
     text = json.dumps(header).encode()
@@ -118,12 +113,12 @@ def store_glb(folder: Path, header: Json, binary: bytes) -> Path:
     return path
 
 
-def write_gltf(folder: Path, material: Json, images: list[str]) -> Path:
+def write_gltf(folder, material, images):
     """A one-triangle glTF."""
     return store_gltf(folder, *triangle_gltf(material, images))
 
 
-def write_obj(folder: Path, mtl: str = "Kd 0.2 0.4 0.6\nmap_Kd wall.png\n") -> Path:
+def write_obj(folder, mtl="Kd 0.2 0.4 0.6\nmap_Kd wall.png\n"):
     """A one-triangle OBJ with one material."""
     (folder / "scene.mtl").write_text("newmtl wall\n" + mtl)
     vertices = "".join(f"v {x} {y} {z}\n" for x, y, z in TRIANGLE)

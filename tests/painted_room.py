@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.config.models import CameraConfig
 
 Array = NDArray[np.float64]
 
@@ -35,7 +34,7 @@ class PaintedRoom:
 
     textures: tuple[Array, ...]
 
-    def render(self, world_from_cam: Array, camera: CameraConfig) -> NDArray[np.uint8]:
+    def render(self, world_from_cam, camera):
         """Antialiased colour image (H, W, 3) of a camera without distortion."""
         direction = _directions(world_from_cam, camera)
         origin = world_from_cam[:3, 3]
@@ -53,12 +52,12 @@ class PaintedRoom:
         return _reduced(grey)
 
 
-def painted_room(rng: np.random.Generator, contrast: float = 1.0) -> PaintedRoom:
+def painted_room(rng, contrast=1.0):
     """A room with another random texture on every wall; without contrast all is grey."""
     return PaintedRoom(tuple(random_texture(rng, contrast) for _ in range(6)))
 
 
-def random_texture(rng: np.random.Generator, contrast: float = 1.0) -> Array:
+def random_texture(rng, contrast=1.0):
     """Random grey values (700, 700) with detail at several scales."""
     image = np.zeros((700, 700))
     for sigma, weight in _DETAIL:
@@ -67,7 +66,7 @@ def random_texture(rng: np.random.Generator, contrast: float = 1.0) -> Array:
     return np.asarray(np.clip(_GREY + contrast * image, 0, 255), dtype=np.float64)
 
 
-def _directions(world_from_cam: Array, camera: CameraConfig) -> Array:
+def _directions(world_from_cam, camera):
     """Directions (H, W, 3) in the world of the rays through all subpixels, length 1 along z."""
     fx, fy, cx, cy = intrinsics_of(camera)
     step = 1.0 / SUPERSAMPLING
@@ -78,7 +77,7 @@ def _directions(world_from_cam: Array, camera: CameraConfig) -> Array:
     return np.asarray(rays @ world_from_cam[:3, :3].T, dtype=np.float64)
 
 
-def _reduced(grey: Array) -> NDArray[np.uint8]:
+def _reduced(grey):
     """The mean of the subpixels of every pixel, three times."""
     height, width = (side // SUPERSAMPLING for side in grey.shape)
     fine = grey.reshape(height, SUPERSAMPLING, width, SUPERSAMPLING)

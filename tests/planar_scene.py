@@ -3,8 +3,6 @@
 Depth is exact, and no renderer has to share the process with Open3D.
 """
 
-from pathlib import Path
-
 import numpy as np
 from PIL import Image
 from scipy.ndimage import gaussian_filter, map_coordinates
@@ -24,7 +22,7 @@ PLANES = [
 ]
 
 
-def straight_path(n_frames: int, step_m: float, turn_deg: float) -> PoseTable:
+def straight_path(n_frames, step_m, turn_deg):
     """Frames along world y, looking along world x, turning a little about the vertical."""
     centre = np.arange(n_frames) - (n_frames - 1) / 2
     yaw = np.radians(turn_deg) * centre
@@ -34,7 +32,7 @@ def straight_path(n_frames: int, step_m: float, turn_deg: float) -> PoseTable:
     return PoseTable(index, 0 * index, position, quat_wxyz_from_matrix(rotation))
 
 
-def depth_map(world_from_cam: np.ndarray, camera: CameraConfig, factor: int = 1):
+def depth_map(world_from_cam, camera, factor=1):
     """Depth (H, W) along the optical axis, the plane seen (H, W) and the points (H, W, 3)."""
     width, height = camera.width * factor, camera.height * factor
     focal = width / 2 / np.tan(np.radians(camera.horizontal_fov_deg) / 2)
@@ -53,7 +51,7 @@ def depth_map(world_from_cam: np.ndarray, camera: CameraConfig, factor: int = 1)
     return depth, seen, world_from_cam[:3, 3] + depth[..., None] * direction
 
 
-def texture(rng: np.random.Generator) -> np.ndarray:
+def texture(rng):
     """Random grey values (700, 700) with detail at several scales."""
     image = np.zeros((700, 700))
     for sigma, weight in ((1.5, 25), (4, 30), (12, 30)):
@@ -62,7 +60,7 @@ def texture(rng: np.random.Generator) -> np.ndarray:
     return np.clip(128 + image, 0, 255)
 
 
-def render(world_from_cam: np.ndarray, camera: CameraConfig, textures: list[np.ndarray]):
+def render(world_from_cam, camera, textures):
     """Colour image (H, W, 3) uint8, antialiased."""
     _, seen, point = depth_map(world_from_cam, camera, SUPERSAMPLING)
     grey = np.zeros(seen.shape)
@@ -75,7 +73,7 @@ def render(world_from_cam: np.ndarray, camera: CameraConfig, textures: list[np.n
     return np.repeat(coarse[..., None], 3, axis=2)
 
 
-def write_frames(folder: Path, truth: PoseTable, camera: CameraConfig = CAMERA):
+def write_frames(folder, truth, camera=CAMERA):
     """Write colour and depth images; returns their paths."""
     textures = [texture(np.random.default_rng(seed)) for seed in range(len(PLANES))]
     color_paths, depth_paths = [], []

@@ -1,9 +1,6 @@
 """What property tests share: how many examples they take, and what they draw."""
 
-from __future__ import annotations
-
 import os
-from typing import Any
 
 import numpy as np
 from hypothesis import Phase, settings
@@ -20,28 +17,28 @@ few = settings(derandomize=True, deadline=None, max_examples=25, database=None, 
 fewer = settings(few, max_examples=6)
 
 
-def unit(vector: Any) -> np.ndarray:
+def unit(vector):
     return np.asarray(vector, dtype=np.float64) / np.linalg.norm(vector)
 
 
-def turn(axis: Any, angle_rad: float) -> np.ndarray:
+def turn(axis, angle_rad):
     """Quaternion (wxyz) of a turn by its definition."""
     return np.array([np.cos(angle_rad / 2), *(np.sin(angle_rad / 2) * np.asarray(axis))])
 
 
-def rotation_of(quat_wxyz: Any) -> np.ndarray:
+def rotation_of(quat_wxyz):
     """Rotation matrix (3, 3) of a quaternion, by SciPy."""
     return Rotation.from_quat(quat_wxyz, scalar_first=True).as_matrix()
 
 
-def pose_of(position_m: Any, quat_wxyz: Any) -> np.ndarray:
+def pose_of(position_m, quat_wxyz):
     """Pose (4, 4) put together by hand."""
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = rotation_of(quat_wxyz), position_m
     return pose
 
 
-def table_of(poses: Any, path: Any = None) -> PoseTable:
+def table_of(poses, path=None):
     """A table of poses (N, 4, 4), quaternions by SciPy; one path unless told."""
     poses = np.asarray(poses)
     quat = Rotation.from_matrix(poses[:, :3, :3]).as_quat(scalar_first=True)
@@ -50,7 +47,7 @@ def table_of(poses: Any, path: Any = None) -> PoseTable:
     return PoseTable(frame, 0 * frame if path is None else path, poses[:, :3, 3].copy(), quat)
 
 
-def vectors(bound: float, size: int = 3) -> st.SearchStrategy[np.ndarray]:
+def vectors(bound, size=3):
     return st.tuples(*[st.floats(-bound, bound)] * size).map(np.array)
 
 

@@ -28,37 +28,35 @@ class Solid:
     scale: float
     offset: Array
 
-    def world(self, points: Array) -> Array:
+    def world(self, points):
         return points @ self.rotation.T * self.scale + self.offset
 
-    def caster(self) -> RayCaster:
+    def caster(self):
         return RayCaster(self.world(self.vertices), self.faces)
 
     @property
-    def triangles(self) -> Array:
+    def triangles(self):
         """(F, 3, 3), world."""
         return self.world(self.vertices)[self.faces]
 
     @property
-    def extent(self) -> float:
+    def extent(self):
         """Longest side of the bounding box, world."""
         return float(np.ptp(self.world(self.vertices), axis=0).max())
 
-    def contains(self, points: Array) -> NDArray[np.bool_]:
+    def contains(self, points):
         """Whether points (N, 3) are inside, in the frame of ``boxes``: the closed form."""
         at = points[:, None, :]
         return ((at > self.boxes[:, 0]) & (at < self.boxes[:, 1])).all(axis=2).any(axis=1)
 
-    def points(self, rng: np.random.Generator, count: int) -> Array:
+    def points(self, rng, count):
         """Points (count, 3) in and around it, in the frame of ``boxes``."""
         lower, upper = self.vertices.min(axis=0), self.vertices.max(axis=0)
         margin = 0.2 * np.max(upper - lower)
         return rng.uniform(lower - margin, upper + margin, (count, 3))
 
 
-def prism(
-    outline: list[tuple[float, float]], height: float, triangles: list[int]
-) -> trimesh.Trimesh:
+def prism(outline, height, triangles):
     """A watertight prism over a counter-clockwise outline with the given floor triangles."""
     n = len(outline)
     floor = np.hstack([np.array(outline), np.zeros((n, 1))])
@@ -72,12 +70,12 @@ def prism(
     )
 
 
-def box(sides: Array) -> tuple[trimesh.Trimesh, Array]:
+def box(sides):
     bounds = np.stack([np.zeros(3), sides])
     return trimesh.creation.box(bounds=bounds), bounds[None]
 
 
-def l_shape(sides: Array) -> tuple[trimesh.Trimesh, Array]:
+def l_shape(sides):
     """An L of two overlapping boxes, each arm a third as wide as the whole."""
     x, y, z = sides
     outline = [(0, 0), (x, 0), (x, y / 3), (x / 3, y / 3), (x / 3, y), (0, y)]
@@ -87,7 +85,7 @@ def l_shape(sides: Array) -> tuple[trimesh.Trimesh, Array]:
 
 
 @st.composite
-def solids(draw: st.DrawFn, watertight: bool = False) -> Solid:
+def solids(draw, watertight=False):
     """Boxes and Ls, from plates to needles, subdivided or not, near and far, small and large.
 
     With ``watertight`` false, shells that lack some of their faces are among them.
@@ -125,17 +123,17 @@ class Crossings:
     possible: NDArray[np.bool_]
 
     @property
-    def upper(self) -> Array:
+    def upper(self):
         """(N,) farthest that a first hit may be."""
         return np.where(self.certain, self.distance + self.slack, np.inf).min(axis=1)
 
     @property
-    def lower(self) -> Array:
+    def lower(self):
         """(N,) nearest that a first hit may be."""
         return np.where(self.possible, self.distance - self.slack, np.inf).min(axis=1)
 
 
-def crossings(origins: Array, directions: Array, triangles: Array, band: float) -> Crossings:
+def crossings(origins, directions, triangles, band):
     """Plane and edge tests in double precision; ``directions`` are unit vectors (N, 3).
 
     A triangle seen edge-on, or thinner than the band, can be met anywhere near its points.
@@ -162,7 +160,7 @@ def crossings(origins: Array, directions: Array, triangles: Array, band: float) 
     )
 
 
-def _depth_in_triangle(at: Array, triangles: Array, edges: Array, normal: Array) -> Array:
+def _depth_in_triangle(at, triangles, edges, normal):
     """Signed distance (N, F) of points in the planes from the triangle's edges, inside positive."""
     inward = np.cross(normal[:, None], edges)
     inward /= np.linalg.norm(inward, axis=2, keepdims=True)
@@ -170,9 +168,7 @@ def _depth_in_triangle(at: Array, triangles: Array, edges: Array, normal: Array)
     return np.einsum("nfec,fec->nfe", offset, inward).min(axis=2)
 
 
-def _near_points(
-    origins: Array, directions: Array, triangles: Array, band: float
-) -> tuple[NDArray[np.bool_], Array]:
+def _near_points(origins, directions, triangles, band):
     """Whether rays pass a triangle's bounding sphere (N, F), and the least distance to it."""
     centre = triangles.mean(axis=1)
     radius = np.linalg.norm(triangles - centre[:, None], axis=2).max(axis=1) + 2 * band
@@ -182,7 +178,7 @@ def _near_points(
     return (across < radius) & (along > -radius), np.maximum(along - radius, 0.0)
 
 
-def directions_of(rng: np.random.Generator, count: int) -> Array:
+def directions_of(rng, count):
     """Unit vectors (count, 3), uniform on the sphere."""
     vectors = rng.normal(size=(count, 3))
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from synfeal.config.models import CameraConfig, RenderConfig
-from synfeal.mesh.model import TexturedMesh
+from synfeal.config.models import RenderConfig
 from synfeal.render.base import Depth, Rgb
 from synfeal.render.choose import BACKENDS
 
@@ -44,7 +41,7 @@ class Agreement(NamedTuple):
     edge_share: float
 
 
-def away_from_edges(depth_m: Depth) -> NDArray[np.bool_]:
+def away_from_edges(depth_m):
     """Pixels (N, H, W) among whose 3 x 3 neighbours depth does not jump; the border is out."""
     least, most = depth_m.copy(), depth_m.copy()
     for axis in (1, 2):
@@ -56,7 +53,7 @@ def away_from_edges(depth_m: Depth) -> NDArray[np.bool_]:
     return np.asarray(smooth, np.bool_)
 
 
-def agreement(first: Frames, second: Frames) -> Agreement:
+def agreement(first, second):
     """Compare the same frames of two backends."""
     level = np.abs(first.rgb.astype(np.int16) - second.rgb)
     sees = np.isfinite(first.depth_m), np.isfinite(second.depth_m)
@@ -73,12 +70,10 @@ def agreement(first: Frames, second: Frames) -> Agreement:
     )
 
 
-def render_all(
-    mesh: TexturedMesh, camera: CameraConfig, poses: NDArray[np.float64], names: Sequence[str]
-) -> dict[str, Frames]:
+def render_all(mesh, camera, poses, names):
     """Frames of every backend named, rendered in turns."""
     opened = {name: BACKENDS[name](mesh, camera, RenderConfig()) for name in names}
-    images: dict[str, list[tuple[Rgb, Depth]]] = {name: [] for name in names}
+    images = {name: [] for name in names}
     for pose in poses:
         for name, renderer in opened.items():
             images[name].append(renderer.render_rgbd(pose))

@@ -4,7 +4,6 @@ A room is the inside of one box with others standing in it, repeated along x if 
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from PIL import Image
@@ -48,7 +47,7 @@ def pose_at(position_m, yaw_deg=0.0, pitch_deg=12.0):
     return pose_matrix(rotation_from_rpy(np.radians([0.0, pitch_deg, yaw_deg])), position_m)
 
 
-def cast(world_from_cam, room: Room, camera: CameraConfig = CAMERA):
+def cast(world_from_cam, room, camera=CAMERA):
     """Depth (H, W) along the optical axis and the points (H, W, 3) hit."""
     fx, fy, cx, cy = intrinsics_of(camera)
     column, row = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
@@ -74,7 +73,7 @@ def _slabs(origin, direction, lower, upper):
     return at.min(axis=0).max(axis=-1), at.max(axis=0).min(axis=-1)
 
 
-def colour_of(point, room: Room):
+def colour_of(point, room):
     """Colour (H, W, 3) uint8 of points (H, W, 3)."""
     if room.plain:
         return np.full(point.shape, 230, dtype=np.uint8)
@@ -85,7 +84,7 @@ def colour_of(point, room: Room):
     return np.repeat(np.round(grey).astype(np.uint8)[..., None], 3, axis=2)
 
 
-def write_room(folder: Path, poses, room: Room = FURNISHED, camera: CameraConfig = CAMERA):
+def write_room(folder, poses, room=FURNISHED, camera=CAMERA):
     """Write colour and depth images; returns their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     color_paths, depth_paths = [], []

@@ -1,17 +1,13 @@
 """A disk that is too small: a file system in memory that tests mount, fill and enlarge."""
 
-from __future__ import annotations
-
 import subprocess
-from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 
 
 @contextmanager
-def mounted(disk: Path, size: str) -> Iterator[Path]:
+def mounted(disk, size):
     """A file system of its own in the new directory ``disk``, e.g. of ``64k``."""
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(disk)]
@@ -23,6 +19,6 @@ def mounted(disk: Path, size: str) -> Iterator[Path]:
         subprocess.run(["umount", "--lazy", str(disk)], check=True)
 
 
-def remount(disk: Path, option: str) -> None:
+def remount(disk, option):
     """Change its size (``size=50m``) or mode (``ro``)."""
     subprocess.run(["mount", "-o", f"remount,{option}", str(disk)], check=True)

@@ -1,13 +1,10 @@
 """A furnished room of 5 x 4 x 2.6 m with painted walls, for tests that compare renders."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from synfeal.geometry.poses import pose_matrix
@@ -31,7 +28,7 @@ SIDES = np.array(
 )
 
 
-def paint(rng: np.random.Generator, sigmas_texels: tuple[float, ...]) -> NDArray[np.uint8]:
+def paint(rng, sigmas_texels):
     """A texture (512, 512, 3) of noise at several scales."""
     image = np.zeros((TEXELS, TEXELS, 3))
     for sigma in sigmas_texels:
@@ -40,13 +37,13 @@ def paint(rng: np.random.Generator, sigmas_texels: tuple[float, ...]) -> NDArray
     return np.clip(128.0 + image, 0, 255).astype(np.uint8)
 
 
-def sides(size_m: NDArray[np.float64]) -> NDArray[np.float64]:
+def sides(size_m):
     """Corners (6, 4, 3) of a box that begins at the origin."""
     return SIDES * size_m
 
 
 @functools.cache
-def furnished_room(sigmas_texels: tuple[float, ...], seed: int = 0) -> TexturedMesh:
+def furnished_room(sigmas_texels, seed=0):
     """Walls and boxes that share four textures, a ball with vertex colours, and a plant.
 
     Args:
@@ -69,14 +66,14 @@ def furnished_room(sigmas_texels: tuple[float, ...], seed: int = 0) -> TexturedM
     return TexturedMesh((*parts, _ball(), _plant()))
 
 
-def _ball() -> MeshPart:
+def _ball():
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.4)
     rgb = (128.0 + 100.0 * np.sin(9.0 * ball.vertices)).astype(np.uint8)
     place = ball.vertices + np.array([1.2, 3.0, 1.0])
     return MeshPart("ball", place, np.asarray(ball.faces, np.int64), vertex_rgb=rgb)
 
 
-def _plant() -> MeshPart:
+def _plant():
     """Round leaves on two crossed sheets."""
     rows, columns = np.indices((128, 128)) / 16.0 % 1.0 - 0.5
     leaf = np.full((128, 128, 4), (40, 160, 60, 255), np.uint8)
@@ -89,7 +86,7 @@ def _plant() -> MeshPart:
     return MeshPart("plant", vertices, faces, uv, leaf, alpha_cutoff=0.5)
 
 
-def room_poses(count: int, seed: int, roll: float = 0.2) -> NDArray[np.float64]:
+def room_poses(count, seed, roll=0.2):
     """Poses (N, 4, 4) about the middle of the room that look all round; ``roll`` in radians."""
     rng = np.random.default_rng(seed)
     yaw = np.arange(count) * 2.0 * np.pi / count

@@ -15,12 +15,7 @@ from synfeal.render.opengl import part as opengl_part
 from synfeal.render.opengl.backend import OpenglRenderer, clip_from_cam
 from synfeal.render.opengl.chunks import FACES_PER_CHUNK, chunks_of, visible_runs
 from synfeal.render.opengl.context import shared_context
-from tests.render_backends import (
-    LOOK_ALONG_X,
-    PYOPENGL_WARNS,
-    camera_of,
-    facing_quad,
-)
+from tests.render_backends import LOOK_ALONG_X, PYOPENGL_WARNS, camera_of, facing_quad
 from tests.triangle_soup import CAMERA, digest, poses, soup
 
 

@@ -1,26 +1,15 @@
 """Localizers for tests: of random weights, or made to answer what a test wants."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-from pathlib import Path
-
 import torch
 
 from baselines.localizers.registry import build_localizer
 from baselines.training.checkpoint import TrainedLocalizer, save_checkpoint
 from baselines.training.data import ImageStatistics
-from baselines.training.description import FrameCamera, ModelDescription
-from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig
+from baselines.training.description import ModelDescription
 from tests.coloured_frames import HYPER, NETWORK
 
 
-def untrained(
-    name: ModelName = "posenet2",
-    network: NetworkConfig = NETWORK,
-    hyper: LocalizerConfig = HYPER,
-    camera: FrameCamera | None = None,
-) -> TrainedLocalizer:
+def untrained(name="posenet2", network=NETWORK, hyper=HYPER, camera=None):
     """A localizer of random weights that looks at each image."""
     torch.manual_seed(0)
     built = build_localizer(name, network, hyper).eval()
@@ -30,10 +19,10 @@ def untrained(
     return TrainedLocalizer(description, built, statistics)
 
 
-def answering(position_m: Sequence[float], quat_wxyz: Sequence[float]) -> TrainedLocalizer:
+def answering(position_m, quat_wxyz):
     """A localizer that gives every image this pose."""
     trained = untrained()
-    head = trained.network.regressor[-1]  # type: ignore[index]
+    head = trained.network.regressor[-1]
     with torch.no_grad():
         for layer, values in ((head.position, position_m), (head.quat, quat_wxyz)):
             layer.weight.zero_()
@@ -41,7 +30,7 @@ def answering(position_m: Sequence[float], quat_wxyz: Sequence[float]) -> Traine
     return trained
 
 
-def save(path: Path, trained: TrainedLocalizer) -> Path:
+def save(path, trained):
     """Write its checkpoint."""
     save_checkpoint(path, trained.network, trained.statistics, trained.description)
     return path

@@ -1,22 +1,18 @@
 """Triangles all over a room, views of them, and digests of what is seen."""
 
-from __future__ import annotations
-
 import hashlib
 
 import numpy as np
-from numpy.typing import NDArray
 
 from synfeal.config.models import CameraConfig
 from synfeal.geometry.poses import pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.render.base import Renderer
 
 CAMERA = CameraConfig(width=64, height=48, fx=45.0, fy=55.0, cx=20.5, cy=33.0)
 
 
-def soup(n_faces: int, seed: int = 0) -> TexturedMesh:
+def soup(n_faces, seed=0):
     """Small triangles all over a room of 8 m, coloured and textured, some of them coincident."""
     rng = np.random.default_rng(seed)
     corners = rng.uniform(-4, 4, (n_faces, 1, 3)) + rng.normal(0, 0.4, (n_faces, 3, 3))
@@ -34,7 +30,7 @@ def soup(n_faces: int, seed: int = 0) -> TexturedMesh:
     )
 
 
-def poses(count: int, seed: int = 1) -> list[NDArray[np.float64]]:
+def poses(count, seed=1):
     rng = np.random.default_rng(seed)
     return [
         pose_matrix(rotation_from_rpy(rng.uniform(-3, 3, 3)), rng.uniform(-3, 3, 3))
@@ -42,6 +38,6 @@ def poses(count: int, seed: int = 1) -> list[NDArray[np.float64]]:
     ]
 
 
-def digest(renderer: Renderer, views: list[NDArray[np.float64]]) -> list[str]:
+def digest(renderer, views):
     images = [renderer.render_rgbd(view) for view in views]
     return [hashlib.sha256(rgb.tobytes() + depth.tobytes()).hexdigest() for rgb, depth in images]

@@ -6,7 +6,6 @@ images can be told apart.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -44,7 +43,7 @@ class Varied:
 PAINTS = [paint(np.random.default_rng(seed), (2.0, 8.0, 24.0)) for seed in range(5)]
 
 
-def block(low: Corners, high: Corners, seed: int = 0) -> list[MeshPart]:
+def block(low, high, seed=0):
     """The six sides of a box, each with a texture that repeats every 2.5 m."""
     corners = np.asarray(low) + SIDES * (np.asarray(high) - np.asarray(low))
     parts = []
@@ -57,7 +56,7 @@ def block(low: Corners, high: Corners, seed: int = 0) -> list[MeshPart]:
     return parts
 
 
-def walls(low: Corners, high: Corners, sides: str, thick: float = 0.3) -> list[MeshPart]:
+def walls(low, high, sides, thick=0.3):
     """Hollow walls (wesn), floor (f) and roof (r) around a room."""
     (x0, y0, z0), (x1, y1, z1) = low, high
     t = thick
@@ -72,13 +71,13 @@ def walls(low: Corners, high: Corners, sides: str, thick: float = 0.3) -> list[M
     return [p for i, side in enumerate(sides) for p in block(*boxes[side], seed=i)]
 
 
-def furniture(x: float, y: float, z: float = 0.0) -> list[MeshPart]:
+def furniture(x, y, z=0.0):
     """A table-high block and a cupboard."""
     low = block((x, y, z), (x + 1.2, y + 0.7, z + 0.75), 2)
     return low + block((x + 1.6, y, z), (x + 2.2, y + 0.4, z + 1.9), 3)
 
 
-def hollow_walls(folder: Path) -> Varied:
+def hollow_walls(folder):
     """Two walls and the ceiling missing; walls 40 cm thick, on a hollow slab of 90 cm."""
     parts = walls((0, 0, 0), (4.0, 3.2, 2.6), "ws", 0.4) + furniture(0.3, 0.3)
     parts += block((-0.4, -0.4, -0.9), (4.4, 3.6, 0.0), 4)
@@ -86,14 +85,14 @@ def hollow_walls(folder: Path) -> Varied:
     return Varied(folder / "hollow walls.glb", inside((0, 0, 0), (4.0, 3.2, 2.6)))
 
 
-def no_ceiling(folder: Path) -> Varied:
+def no_ceiling(folder):
     """A scan with vertex colours, as PLY."""
     mesh = TexturedMesh(tuple(walls((-3, -2, 0), (3, 2.5, 2.7), "wesnf", 0.1) + furniture(-2, -1)))
     write_coloured_ply(folder / "no_ceiling.ply", mesh, 0.2)
     return Varied(folder / "no_ceiling.ply", inside((-3, -2, 0), (3, 2.5, 2.7)))
 
 
-def millimetres(folder: Path) -> Varied:
+def millimetres(folder):
     """A CAD export: OBJ, y up, millimetres."""
     parts = walls((0, 0, 0), (7.0, 4.0, 2.8), "wesnfr") + furniture(1.0, 0.5)
     y_up = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # world from file
@@ -102,7 +101,7 @@ def millimetres(folder: Path) -> Varied:
     return Varied(path, inside((0, 0, 0), (7.0, 4.0, 2.8)), 0.001, "y")
 
 
-def nested(folder: Path) -> Varied:
+def nested(folder):
     """glTF by another writer: centimetres in nodes that scale, turn and move, one in the other."""
     parts = walls((-2.5, -2, 0), (2.5, 2, 2.5), "wesnfr", 0.2) + furniture(-1, 0.8)
     scene = trimesh.Scene()
@@ -126,7 +125,7 @@ def nested(folder: Path) -> Varied:
     return Varied(folder / "nested.glb", inside((-2, -2.5, 0), (2, 2.5, 2.5)))
 
 
-def two_floors(folder: Path) -> Varied:
+def two_floors(folder):
     """Two storeys that a stairwell joins; the lower one is the larger."""
     parts = walls((0, 0, 0), (6, 5, 2.5), "wesnf") + walls((0, 0, 2.8), (6, 3.5, 5.2), "wesnr")
     parts += block((0, 0, 2.5), (4.8, 5, 2.8)) + block((4.8, 0, 2.5), (6, 2, 2.8), 1)
@@ -135,7 +134,7 @@ def two_floors(folder: Path) -> Varied:
     return Varied(folder / "two_floors.glb", inside((0, 0, 0), (6, 5, 2.5)))
 
 
-def outside(folder: Path) -> Varied:
+def outside(folder):
     """A house with a door and a window in a large garden with a hedge and a shed."""
     low, high = (0.0, 0.0, 0.0), (6.0, 5.0, 2.6)
     parts = walls(low, high, "wnr") + block((-15, -15, -0.2), (20, 18, 0.0), 3)
@@ -150,13 +149,13 @@ def outside(folder: Path) -> Varied:
     return Varied(folder / "house.glb", inside(low, high))
 
 
-def inside(low: Corners, high: Corners) -> NDArray[np.float64]:
+def inside(low, high):
     """A room less 30 cm at its walls, at the heights of cameras in hands."""
     z = low[2] + np.array([0.8, 2.0])
     return np.array([[low[0] + 0.3, low[1] + 0.3, z[0]], [high[0] - 0.3, high[1] - 0.3, z[1]]])
 
 
-MESHES: dict[str, Callable[[Path], Varied]] = {
+MESHES = {
     "hollow_walls": hollow_walls,
     "no_ceiling": no_ceiling,
     "millimetres": millimetres,
