@@ -16,6 +16,7 @@ import torch
 from PIL import Image
 
 from baselines.groundtruth.images import read_image
+from baselines.groundtruth.methods import check_sources
 from baselines.groundtruth.posegraph.graph import (
     Edge,
     PoseGraph,
@@ -32,6 +33,7 @@ from baselines.training.data import ImageStatistics, read_images
 from baselines.training.description import ModelDescription
 from baselines.training.score import score_run
 from synfeal.camera.calibration_files import read_calibration
+from synfeal.config import Config, load_config, read_experiments
 from synfeal.config.models import CameraConfig, LocalizerConfig, NetworkConfig, RenderConfig
 from synfeal.dataset.manifest import verify_manifest, write_manifest
 from synfeal.dataset.packed import join_packed, pack_frames, read_packed
@@ -51,6 +53,7 @@ from synfeal.validation.images import read_color, read_depth_mm
 from synfeal.validation.run import validate
 from tests.mesh_samples import UV, box_mesh, store_gltf, textured, triangle_gltf, write_obj
 from tests.planar_scene import straight_path
+from tests.report_results import design_of
 
 CAMERA = CameraConfig(width=24, height=18)
 CPU = torch.device("cpu")
@@ -316,6 +319,30 @@ def validated(folder):
     return validate(folder, None, False)
 
 
+CONFIG = Path(__file__).parent.parent / "config"
+
+
+def copied(name):
+    return lambda path: shutil.copy(CONFIG / name, path)
+
+
+def read_design(path):
+    config = load_config(CONFIG / "config.yaml", CONFIG / "smoke.yaml")
+    rows = read_experiments(config.model_copy(update={"experiments": path}))
+    check_sources(rows, path)
+    return rows
+
+
+def is_design(rows):
+    """Whether every run and label set has a directory of its own below the results."""
+    for run in design_of(rows).runs:
+        assert all(part.strip(".") and "\0" not in part for part in Path(run.directory).parts)
+        assert len(Path(run.directory).parts) == 6
+    label_sets = {(row.scene, row.size, row.label_id) for row in rows}
+    noise = {(row.scene, row.size, row.labels, row.noise_m, row.noise_deg) for row in rows}
+    return len(label_sets) == len(noise)
+
+
 # fmt: off
 KINDS = (
     Kind("pose table", "train.csv", write_table, read_pose_table, is_pose_table, ","),
@@ -375,5 +402,8 @@ KINDS = (
     Kind("assistance", "labels/large_room/6k/sfm/assistance.json", write_assistance,
          lambda p: assistance_record(p.parents[4], "sfm", "large_room", "6k"), finite_numbers,
          "json"),
+    Kind("profile", "mine.yaml", copied("config.yaml"), load_config,
+         lambda config: isinstance(config, Config), n_flips=60),
+    Kind("experiments", "mine.csv", copied("experiments-smoke.csv"), read_design, is_design, ","),
 )
 # fmt: on

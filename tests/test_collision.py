@@ -22,7 +22,6 @@ from synfeal.mesh.triangles import (
     save_collision_mesh,
 )
 from synfeal.planning.questions import draw_questions
-from synfeal.planning.target import admissible, has_free_view
 from synfeal.report.figures import write_figures
 from synfeal.report.speed_vs_error import speeds_of, write_speed_vs_error
 from synfeal.scenes.collision import (
@@ -124,26 +123,6 @@ def test_simplification_is_the_same_at_map_coordinates(furnished):
         starts + offset, far + offset
     )
     assert np.mean(same) > 0.995
-
-
-def test_starts_are_admissible_poses_of_the_room(furnished):
-    caster = RayCaster(*furnished)
-    questions = draw_questions(caster, SCENE, BOX, np.random.default_rng(3), 1000)
-    assert has_free_view(caster, questions.starts, SCENE.min_view_distance_m).all()
-    inside = (questions.starts[:, 0] < -2.0) & (questions.starts[:, 1] > 1.0)
-    assert not inside.any()  # none in the cupboard
-    hidden = (questions.candidates[:, 0] < -2.0) & (questions.candidates[:, 1] > 1.0)
-    assert hidden.any()
-    assert not questions.answers(caster)[hidden].any()
-
-
-def test_starts_for_each_candidate_are_judged_one_by_one(furnished, questions):
-    caster, some = RayCaster(*furnished), range(0, 200)
-    one_by_one = [
-        admissible(caster, questions.starts[i], questions.candidates[i : i + 1], 1.2)[0]
-        for i in some
-    ]
-    assert questions.answers(caster)[:200].tolist() == one_by_one
 
 
 @settings(derandomize=True, deadline=None)

@@ -172,6 +172,7 @@ BAD_ROWS = [
     ("table4_size,,large_room,6k,noise,0,0,pretrained", ["labels", "above 0"]),
     ("table4_size,,large_room,6k,noise,-1,0,pretrained", ["noise_m", "greater than"]),
     ("table4_size,,large_room,6k,noise,nan,0,pretrained", ["noise_m", "finite"]),
+    ("table3_inconsistencies,both,large_room,6k,noise,0.1000001,0,scratch", ["at most six digits"]),
     ("table4_size,both,large_room,6k,synfeal,0,0,pretrained", ["block", "table 3"]),
     ("table3_inconsistencies,,large_room,6k,synfeal,0,0,pretrained", ["block", "three blocks"]),
     ("table4_size,,large_room,6k,synfeal,0,0", ["7 cells", "header has 8"]),

@@ -90,15 +90,6 @@ def test_sequences_cover_every_frame_once(n_train, n_test, shard):
     assert [s.number for s in sequences] == list(range(1, len(sequences) + 1))
 
 
-def test_sequence_names_count_train_first():
-    found = [(s.name, s.split, s.start, s.stop) for s in sequences_of(1200, 300, 1000)]
-    assert found == [
-        ("seq-01", "train", 0, 1000),
-        ("seq-02", "train", 1000, 1200),
-        ("seq-03", "test", 0, 300),
-    ]
-
-
 def test_split_files_are_those_of_7_scenes(tmp_path):
     write_splits(tmp_path, sequences_of(5, 3, 3))
     assert (tmp_path / "TrainSplit.txt").read_text() == "sequence1\nsequence2\n"

@@ -6,11 +6,9 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from baselines.groundtruth.methods import check_sources
-from synfeal.config import Config, load_config, parse_config, read_experiments
+from synfeal.config import Config, load_config, parse_config
 from synfeal.config.collection import ClutterConfig
-from tests.fuzzing import Damage, damages, problem_with, put, removed, replaced, text_damages
-from tests.report_results import design_of
+from tests.fuzzing import problem_with, removed, replaced
 
 pytestmark = pytest.mark.slow
 REPOSITORY = Path(__file__).parent.parent
@@ -127,75 +125,3 @@ def test_no_model_was_left_out():
     for model in models(Config):
         missing = set(model.model_fields) - keys
         assert missing <= {"calibration"}, model
-
-
-def yaml_inputs():
-    data = (CONFIG / "config.yaml").read_bytes()
-    others = {path.name: path.read_bytes() for path in CONFIG.iterdir() if path.is_file()}
-    yield from damages(data, others, seed=5, n_flips=60)
-
-
-def test_every_file_is_a_profile_or_is_refused(tmp_path):
-    path = tmp_path / "mine.yaml"
-    failures = []
-    for damage in yaml_inputs():
-        put(path, damage)
-        problem = problem_with(
-            lambda: load_config(path), lambda c: isinstance(c, Config), (str(path),), tmp_path
-        )
-        failures += [f"{damage.label}: {problem}"] if problem else []
-    assert not failures, "\n".join(failures)
-
-
-def is_design(rows):
-    """Whether every run and label set has a directory of its own below the results."""
-    for run in design_of(rows).runs:
-        assert all(part.strip(".") and "\0" not in part for part in Path(run.directory).parts)
-        assert len(Path(run.directory).parts) == 6
-    label_sets = {(row.scene, row.size, row.label_id): row for row in rows}
-    noise = {(row.scene, row.size, row.labels, row.noise_m, row.noise_deg) for row in rows}
-    assert len(label_sets) == len(noise)
-    return True
-
-
-def design_inputs():
-    data = (CONFIG / "experiments-smoke.csv").read_bytes()
-    others = {"profile": (CONFIG / "config.yaml").read_bytes(), "other": b"a,b\n1,2\n"}
-    header, *rows = data.decode().splitlines()
-    yield_rows = {
-        "row twice": [*rows, rows[0]],
-        "noise that prints alike": [
-            *(f"table3_inconsistencies,both,large_room,6k,noise,{m},0,pretrained" for m in NOISE)
-        ],
-        "semicolons": [row.replace(",", ";") for row in rows],
-        "spaces": [row.replace(",", ", ") for row in rows],
-    }
-    every = [*damages(data, others, seed=7), *text_damages(data, ",")]
-    every += [Damage(k, "\n".join([header, *v]).encode()) for k, v in yield_rows.items()]
-    return every
-
-
-NOISE = ("0.1000001", "0.1000002")
-
-
-def test_every_table_of_experiments_is_a_design_or_is_refused(tmp_path):
-    path = tmp_path / "mine.csv"
-    config = load_config(CONFIG / "config.yaml", CONFIG / "smoke.yaml")
-    config = config.model_copy(update={"experiments": path})
-    failures = []
-
-    def read():
-        rows = read_experiments(config)
-        check_sources(rows, path)
-        return rows
-
-    for damage in design_inputs():
-        put(path, damage)
-        problem = problem_with(read, is_design, (str(path),), tmp_path)
-        failures += [f"{damage.label}: {problem}"] if problem else []
-    assert not failures, "\n".join(failures)
-
-
-def test_there_are_thousands_of_inputs():
-    values = sum(1 for profile in PROFILES for _ in wrong_values(profile))
-    assert values + len(list(yaml_inputs())) + len(design_inputs()) >= LEAST
