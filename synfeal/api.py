@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.collection.collect import CollectJob
+from synfeal.collection.collect import CollectJob, with_backend
 from synfeal.collection.collect import collect as run_collection
-from synfeal.collection.configuration import with_backend
 from synfeal.config.dataset import DatasetConfig
 from synfeal.config.models import CameraConfig, SceneConfig
 from synfeal.dataset.archive import FrameFile
@@ -32,7 +31,7 @@ from synfeal.render import open_renderer
 from synfeal.render.base import Depth, Rgb
 from synfeal.seeds import generator_of
 from synfeal.settings import SCENE, dataset_config, in_words_of_options, render_configs
-from synfeal.validation.camera import camera_of_dataset
+from synfeal.validation.manifest import camera_of_dataset
 
 if TYPE_CHECKING:
     from synfeal.evaluation.run import Evaluation

@@ -6,7 +6,6 @@ option of ``synfeal collect``, as an argument of :func:`synfeal.collect`, or as 
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from synfeal.config.load import describe, read_yaml
 from synfeal.config.mesh_files import check_mesh_file
 from synfeal.config.models import CameraConfig, RenderConfig, SceneConfig
 from synfeal.errors import InputError
+from synfeal.files import file_sha256
 
 SCENE, SIZE = "scan", "all"  # as the configuration of a collection calls its scene and its size
 KEYS: Mapping[str, str] = {
@@ -69,7 +69,7 @@ def dataset_config(options: Mapping[str, Any], out: Path | None = None) -> Datas
     values = _nested(options)
     scene = values["scenes"][SCENE]
     scene |= {"source": "mesh", "path": str(Path(scene["path"]).absolute())}
-    scene["sha256"] = _sha256(Path(scene["path"]))
+    scene["sha256"] = file_sha256(Path(scene["path"]))
     if values.get("collection", {}).get("repeat") is not None:
         values["collection"]["repeat"] = Path(values["collection"]["repeat"]).absolute()
     values.setdefault("collection", {})["collision_agreement"] = None
@@ -167,11 +167,6 @@ def _nested(options: Mapping[str, Any]) -> dict[str, Any]:
             inner = inner.setdefault(parent, {})
         inner[last] = value
     return values
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _slug(name: str) -> str:

@@ -10,8 +10,7 @@ from PIL import Image
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.manifest import write_manifest
 from synfeal.dataset.pose_table import write_pose_table
-from synfeal.dataset.sequences import Sequence
-from synfeal.dataset.sevenscenes import write_splits
+from synfeal.dataset.sevenscenes import Sequence, write_splits
 from tests.planar_scene import straight_path, write_frames
 
 CAMERA = CameraConfig(width=96, height=72, horizontal_fov_deg=60.0)

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
-from synfeal.dataset.sequences import Sequence
-from synfeal.dataset.sevenscenes import pose_text, write_splits
+from synfeal.dataset.sevenscenes import Sequence, pose_text, write_splits
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from baselines.groundtruth.images import read_image
+from baselines.groundtruth.images import link_images, read_image
 from baselines.groundtruth.methods import check_sources
 from baselines.groundtruth.posegraph.graph import (
     Edge,
@@ -24,7 +24,6 @@ from baselines.groundtruth.posegraph.graph import (
     read_g2o,
     write_g2o,
 )
-from baselines.groundtruth.sfm.images import link_images
 from baselines.groundtruth.trajectory import BatchTrajectory, read_trajectory, write_trajectory
 from baselines.localizers.backbones.weights import load_backbone_weights
 from baselines.localizers.registry import build_localizer
@@ -35,12 +34,17 @@ from baselines.training.score import score_run
 from synfeal.camera.calibration_files import read_calibration
 from synfeal.config import Config, load_config, read_experiments
 from synfeal.config.models import CameraConfig, LocalizerConfig, NetworkConfig, RenderConfig
-from synfeal.dataset.manifest import verify_manifest, write_manifest
-from synfeal.dataset.packed import join_packed, pack_frames, read_packed
-from synfeal.dataset.packed_record import write_packed_record
+from synfeal.dataset.manifest import write_manifest
+from synfeal.dataset.packed import join_packed, pack_frames, read_packed, write_packed_record
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
-from synfeal.dataset.sequences import Sequence
-from synfeal.dataset.sevenscenes import pose_text, read_depth_m, read_pose, read_split, write_splits
+from synfeal.dataset.sevenscenes import (
+    Sequence,
+    pose_text,
+    read_depth_m,
+    read_pose,
+    read_split,
+    write_splits,
+)
 from synfeal.files import write_json
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.save import save_glb
@@ -48,8 +52,8 @@ from synfeal.mesh.triangles import Triangles, load_collision_mesh, save_collisio
 from synfeal.planning.repeat import read_poses
 from synfeal.report.assistance import assistance_record
 from synfeal.report.stats import combine, read_metrics
-from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.images import read_color, read_depth_mm
+from synfeal.validation.manifest import camera_of_dataset
 from synfeal.validation.run import validate
 from tests.mesh_samples import UV, box_mesh, store_gltf, textured, triangle_gltf, write_obj
 from tests.planar_scene import straight_path
@@ -368,8 +372,6 @@ KINDS = (
          lambda p: join_packed([p], p.with_name("all.npy"))),
     Kind("packed frames, training", "train.npy", write_packed, lambda p: read_images(p, N, 8, CPU)),
     Kind("record of packed frames", "seq-01.json", write_record, recorded, finite_numbers, "json"),
-    Kind("manifest, hashes", "manifest.json", lambda p: write_data_set(p.parent),
-         lambda p: verify_manifest(p.parent), form="json"),
     Kind("manifest, camera", "manifest.json", lambda p: write_data_set(p.parent),
          lambda p: camera_of_dataset(p.parent, None), form="json"),
     Kind("manifest, validated", "manifest.json", lambda p: write_data_set(p.parent),

@@ -12,8 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from synfeal.camera.intrinsics import intrinsics_of
-
 Array = NDArray[np.float64]
 
 SIZE_M = np.array([5.0, 6.0, 3.0])
@@ -68,7 +66,7 @@ def random_texture(rng, contrast=1.0):
 
 def _directions(world_from_cam, camera):
     """Directions (H, W, 3) in the world of the rays through all subpixels, length 1 along z."""
-    fx, fy, cx, cy = intrinsics_of(camera)
+    fx, fy, cx, cy = camera.intrinsics
     step = 1.0 / SUPERSAMPLING
     column = (np.arange(camera.width * SUPERSAMPLING) + 0.5) * step
     row = (np.arange(camera.height * SUPERSAMPLING) + 0.5) * step

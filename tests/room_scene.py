@@ -9,7 +9,6 @@ import numpy as np
 from PIL import Image
 from scipy.ndimage import map_coordinates
 
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.geometry.poses import pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
@@ -49,7 +48,7 @@ def pose_at(position_m, yaw_deg=0.0, pitch_deg=12.0):
 
 def cast(world_from_cam, room, camera=CAMERA):
     """Depth (H, W) along the optical axis and the points (H, W, 3) hit."""
-    fx, fy, cx, cy = intrinsics_of(camera)
+    fx, fy, cx, cy = camera.intrinsics
     column, row = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     ray = np.stack([(column - cx) / fx, (row - cy) / fy, np.ones_like(row)], axis=-1)
     direction = ray @ world_from_cam[:3, :3].T

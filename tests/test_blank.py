@@ -13,8 +13,8 @@ from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.save import save_glb
-from synfeal.planning.empty_pixels import empty_shares
 from synfeal.planning.plan import plan_split
+from synfeal.planning.seen_surface import empty_shares
 from synfeal.render import open_renderer
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")

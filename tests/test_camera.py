@@ -10,7 +10,6 @@ from pydantic import ValidationError
 
 from baselines.groundtruth.sfm.features import colmap_parameters
 from synfeal.camera.distortion import distort, fold_radius, undistort
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.camera.rays import normalised_of_pixels, pixels_of_normalised
 from synfeal.config.models import CameraConfig
 
@@ -87,7 +86,7 @@ def test_pixels_of_points_are_opencvs_but_for_half_a_pixel():
         width=640, height=480, fx=500, fy=510, cx=330, cy=235, distortion=LENSES["barrel"]
     )
     points = np.random.default_rng(0).uniform([-1, -0.8, 2], [1, 0.8, 4], (50, 3))
-    matrix = intrinsics_of(camera).matrix(centre_shift_px=-0.5)
+    matrix = camera.intrinsics.matrix(centre_shift_px=-0.5)
     expected, _ = cv2.projectPoints(
         points, np.zeros(3), np.zeros(3), matrix, np.array(camera.distortion)
     )

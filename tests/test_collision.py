@@ -12,7 +12,6 @@ from synfeal.config.models import SceneConfig
 from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
 from synfeal.frames import write_frame
-from synfeal.mesh.decimate import simplify
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import (
@@ -20,6 +19,7 @@ from synfeal.mesh.triangles import (
     load_collision_mesh,
     merge_vertices,
     save_collision_mesh,
+    simplify,
 )
 from synfeal.planning.questions import draw_questions
 from synfeal.report.figures import write_figures

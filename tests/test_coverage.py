@@ -12,7 +12,6 @@ from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.triangles import Triangles
-from synfeal.planning.connected import ConnectedSpace
 from synfeal.planning.coverage import (
     MAX_VOXELS,
     VOXEL_M,
@@ -21,18 +20,22 @@ from synfeal.planning.coverage import (
     plan_coverage,
     voxel_centres,
 )
-from synfeal.planning.empty_pixels import COLUMNS, ROWS, empty_pixels, empty_shares
 from synfeal.planning.path import poses_of
 from synfeal.planning.seen_surface import (
+    COLUMNS,
     FARTHEST_M,
     MAX_FRAMES,
     N_POINTS,
+    ROWS,
+    empty_pixels,
+    empty_shares,
     has_line,
     in_image,
     seen_surface,
     shown_frames,
     visible_points,
 )
+from synfeal.planning.start import ConnectedSpace
 from tests.empty_room import (
     EMPTY,
     ROOM,

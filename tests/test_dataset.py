@@ -15,14 +15,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.config.models import CameraConfig, SceneConfig
-from synfeal.dataset.contact_sheet import write_contact_sheet
 from synfeal.dataset.directories import atomic_directory
-from synfeal.dataset.frame_writer import MOST_WAITING
-from synfeal.dataset.manifest import verify_manifest, write_manifest
+from synfeal.dataset.manifest import write_manifest
 from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable
-from synfeal.dataset.render_sequence import render_sequence, write_sequence
-from synfeal.dataset.sequences import sequences_of
+from synfeal.dataset.preview import write_contact_sheet
+from synfeal.dataset.render_sequence import MOST_WAITING, render_sequence, write_sequence
 from synfeal.dataset.sevenscenes import (
     depth_mm_of,
     frame_paths,
@@ -30,6 +28,7 @@ from synfeal.dataset.sevenscenes import (
     read_depth_m,
     read_pose,
     read_split,
+    sequences_of,
     write_splits,
 )
 from synfeal.errors import InputError
@@ -40,6 +39,8 @@ from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.scenes.prepare import prepare_scene
+from synfeal.validation.listing import list_sequences
+from synfeal.validation.manifest import check_manifest
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 
@@ -222,10 +223,10 @@ def test_manifest_finds_a_changed_pixel(tmp_path):
     assert manifest["camera"]["fx"] == pytest.approx(20 / np.tan(np.pi / 6))
     assert (manifest["camera"]["cx"], manifest["camera"]["cy"]) == (20.0, 15.0)
     assert manifest["scene"] == "room"
-    verify_manifest(tmp_path)
+    assert not check_manifest(tmp_path, list_sequences(tmp_path), {}, int).failures
     Image.new("RGB", (40, 30), (9, 9, 9)).save(tmp_path / "seq-02" / "frame-000000.color.png")
-    with pytest.raises(InputError, match="seq-02 differ"):
-        verify_manifest(tmp_path)
+    (failure,) = check_manifest(tmp_path, list_sequences(tmp_path), {}, int).failures
+    assert "seq-02: differs from what was written" in failure
 
 
 def test_contact_sheet_shows_frames_in_reading_order(tmp_path):

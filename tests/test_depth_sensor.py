@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.groundtruth.rgbd.sensor import NOISE_STEPS, STEP_PER_M, frame_generator, kinect_depth
+from baselines.groundtruth.rgbd.frames import NOISE_STEPS, STEP_PER_M, frame_generator, kinect_depth
 
 
 def measured(depth_m):

@@ -6,7 +6,6 @@ import pytest
 import trimesh
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
@@ -38,7 +37,7 @@ def camera_of(lens, width=160, height=120):
 
 def expected_pixels(points_cam, camera):
     """OpenCV's, whose first pixel has its centre at (0, 0)."""
-    matrix = intrinsics_of(camera).matrix(centre_shift_px=-0.5)
+    matrix = camera.intrinsics.matrix(centre_shift_px=-0.5)
     lens = np.array(camera.distortion)
     return cv2.projectPoints(points_cam, np.zeros(3), np.zeros(3), matrix, lens)[0][:, 0] + 0.5
 

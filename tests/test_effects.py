@@ -14,7 +14,6 @@ from synfeal.cli import main
 from synfeal.config import parse_config
 from synfeal.config.load import read_yaml
 from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
-from synfeal.dataset.packed_record import file_sha256
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.dataset.render_sequence import drawn, effects_of
 from synfeal.dataset.sevenscenes import frame_paths, read_split
@@ -23,15 +22,14 @@ from synfeal.effects.light import GROUPS, drawn_light
 from synfeal.effects.relight import open_scene
 from synfeal.effects.transfer import light_of, rgb_of
 from synfeal.errors import InputError
-from synfeal.files import read_json
+from synfeal.files import file_sha256, read_json
 from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.save import save_glb
 from synfeal.scenes.bake import light_shares, scanned_mesh
 from synfeal.scenes.grids import surface_of
 from synfeal.scenes.lighting import Lamp, Lighting, received
-from synfeal.scenes.patches import Item, Patch
-from synfeal.scenes.primitives import level, upright
+from synfeal.scenes.patches import Item, Patch, level, upright
 from synfeal.scenes.scan import Scanner
 from tests.collected import collect, save_room
 

@@ -8,7 +8,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from baselines.training.score import score_run
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config import Design, Experiment
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import write_pose_table
@@ -86,7 +85,7 @@ def random_poses(count, spread_m, angle_deg, seed):
 
 def by_opencv(predicted, reference, depth_m, camera):
     """DCRE of one frame, point by point; OpenCV lifts and projects."""
-    matrix = intrinsics_of(camera).matrix()
+    matrix = camera.intrinsics.matrix()
     lens = np.array(camera.distortion)
     errors = []
     for pixel, z_m in zip(cell_pixels(camera), depth_m, strict=True):

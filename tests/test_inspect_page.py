@@ -15,13 +15,12 @@ import pytest
 import trimesh
 
 from synfeal.errors import InputError
-from synfeal.inspect.page import page_html
+from synfeal.inspect.run import page_html
 from synfeal.inspect.surface import SurfacePoints
 from synfeal.inspect.text import Section
 from synfeal.inspect.viewer_mesh import split_longest_edges, viewer_mesh
-from synfeal.mesh.decimate import simplify
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.mesh.triangles import Triangles
+from synfeal.mesh.triangles import Triangles, simplify
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 FLAGS = (

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from synfeal.inspect.freespace import find_free_space, suggest_box, survey, viewpoint
-from synfeal.inspect.largest_box import UNWANTED_WEIGHT, largest_box
+from synfeal.inspect.freespace import find_free_space, survey, viewpoint
+from synfeal.inspect.suggest import UNWANTED_WEIGHT, largest_box, suggest_box
 from synfeal.mesh.rays import RayCaster
 
 ROOM_M = (6.0, 4.0, 3.0)

@@ -33,7 +33,7 @@ def paths(tmp_path_factory):
 @pytest.fixture(scope="module")
 def graphs(paths):
     return [
-        rgbd_graph(paths[0][b.start : b.stop], paths[1][b.start : b.stop], CAMERA, CFG.rgbd)
+        rgbd_graph(paths[0][b.start : b.stop], paths[1][b.start : b.stop], CAMERA, CFG.rgbd)[0]
         for b in BATCHES
     ]
 

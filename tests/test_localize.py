@@ -9,8 +9,7 @@ import pytest
 import torch
 from PIL import Image
 
-from baselines.localize.pictures import read_picture
-from baselines.localize.run import HEADER
+from baselines.localize import HEADER, read_picture
 from baselines.training.description import frame_camera
 from baselines.training.predict import predict, predict_poses
 from synfeal.cli import main

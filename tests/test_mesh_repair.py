@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from synfeal.mesh.findings import Findings
 from synfeal.mesh.load import load_mesh
-from synfeal.mesh.model import MeshPart
+from synfeal.mesh.model import Findings, MeshPart
 from synfeal.mesh.repair import repaired
 from tests.mesh_samples import FACE, TRIANGLE
 

@@ -12,8 +12,14 @@ from PIL import Image
 from baselines.training import data
 from baselines.training.data import image_statistics, read_images
 from synfeal.config.models import RenderConfig
-from synfeal.dataset.packed import fit_frame, join_packed, new_packed, pack_frames, read_packed
-from synfeal.dataset.packed_record import write_packed_record
+from synfeal.dataset.packed import (
+    fit_frame,
+    join_packed,
+    new_packed,
+    pack_frames,
+    read_packed,
+    write_packed_record,
+)
 from synfeal.dataset.pose_table import write_pose_table
 from synfeal.dataset.render_sequence import render_packed, render_sequence
 from synfeal.mesh.save import save_glb

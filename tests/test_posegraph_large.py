@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from baselines.groundtruth.posegraph.graph import Edge, PoseGraph, chi2
 from baselines.groundtruth.posegraph.lm import optimise_lm
-from baselines.groundtruth.posegraph.open3d_lm import optimise_open3d
+from baselines.groundtruth.posegraph.optimise import optimise_open3d
 from baselines.groundtruth.posegraph.toro import optimise_toro
 from synfeal.geometry.poses import pose_error, pose_matrix, relative
 from tests.large_graphs import manhattan, measured, sphere

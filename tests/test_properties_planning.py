@@ -9,10 +9,8 @@ from scipy.spatial.transform import Rotation
 from synfeal.config.models import CollectionConfig, SceneConfig
 from synfeal.errors import InputError
 from synfeal.mesh.triangles import save_collision_mesh
-from synfeal.planning.candidates import CandidateStream
-from synfeal.planning.connected import connected_space
+from synfeal.planning.candidates import CandidateStream, independent_poses
 from synfeal.planning.coverage import plan_coverage, scene_coverage
-from synfeal.planning.independent import independent_poses
 from synfeal.planning.plan import (
     plan_mesh,
     plan_scene,
@@ -22,7 +20,7 @@ from synfeal.planning.plan import (
 )
 from synfeal.planning.questions import Questions, draw_questions
 from synfeal.planning.space import PoseSpace
-from synfeal.planning.start import largest_group, sample_start, seeing_groups
+from synfeal.planning.start import connected_space, largest_group, sample_start, seeing_groups
 from synfeal.planning.target import admissible, farthest_admissible, has_free_view
 from tests.empty_room import (
     BOUNDS,

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.geometry.poses import inverse, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.model import MeshPart, TexturedMesh
@@ -46,7 +45,7 @@ def test_depth_of_a_slanted_floor_in_closed_form(opened):
     pose = pose_matrix(rotation_from_rpy([0.0, pitch, 0.4]), [1.0, 2.0, height])
     with opened(mesh, camera) as renderer:
         depth = renderer.render_rgbd(pose)[1]
-    _, fy, _, cy = intrinsics_of(camera)
+    _, fy, _, cy = camera.intrinsics
     slope = (np.arange(48) + 0.5 - cy) / fy  # y / z through the pixel centres of each row
     expected = height / (np.sin(pitch) + slope * np.cos(pitch))
     np.testing.assert_allclose(depth, np.repeat(expected[:, None], 64, axis=1), rtol=1e-5)
@@ -76,7 +75,7 @@ def test_a_point_is_seen_at_the_pixel_it_projects_to(opened, seed):
         weight = renderer.render(pose)[..., 0].astype(float)
     rows, columns = np.indices(weight.shape) + 0.5  # pixel centres
     seen = np.array([np.sum(columns * weight), np.sum(rows * weight)]) / weight.sum()
-    fx, fy, cx, cy = intrinsics_of(camera)
+    fx, fy, cx, cy = camera.intrinsics
     x, y, z = (inverse(pose) @ [*(point_cam @ pose[:3, :3].T + pose[:3, 3]), 1.0])[:3]
     np.testing.assert_allclose(seen, [fx * x / z + cx, fy * y / z + cy], atol=0.03)
 
@@ -170,7 +169,7 @@ def test_edges_are_smooth(opened):
     camera = camera_of(width=101, height=101, horizontal_fov_deg=60.0)
     with opened(TexturedMesh((MeshPart("half", edge, TWO),)), camera) as renderer:
         covered = renderer.render(LOOK_ALONG_X)[..., 0] / 255.0
-    fx, fy, cx, cy = intrinsics_of(camera)
+    fx, fy, cx, cy = camera.intrinsics
     # The edge runs through y = (9 - z) / 18 at x = 2; columns grow towards -y.
     fine = (np.arange(101 * 16) + 0.5) / 16.0
     y, z = -(fine - cx) / fx * 2.0, -(fine - cy) / fy * 2.0

@@ -7,7 +7,6 @@ import sys
 import numpy as np
 import pytest
 
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.errors import InputError
 from synfeal.mesh.model import TexturedMesh
 from synfeal.render.opengl import backend as opengl
@@ -133,7 +132,7 @@ def hit_depth_m(mesh, camera):
 
     The camera stands at the origin and looks along world x.
     """
-    fx, fy, cx, cy = intrinsics_of(camera)
+    fx, fy, cx, cy = camera.intrinsics
     row, column = np.indices((camera.height, camera.width)) + 0.5
     rays = np.stack([np.ones_like(row), -(column - cx) / fx, -(row - cy) / fy], axis=-1)
     depth = np.full(row.shape, np.inf)

@@ -9,7 +9,7 @@ import pytest
 from synfeal.config.models import RenderConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
-from synfeal.frames import write_frame
+from synfeal.frames import read_frame, records_of, write_frame
 from synfeal.geometry.rotations import quat_wxyz_from_matrix
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.save import save_glb
@@ -19,7 +19,7 @@ from synfeal.report.figures.sources import Results
 from synfeal.report.figures.write import write_figures
 from synfeal.report.speed_vs_error import render_rows, speeds_of
 from synfeal.scenes import render_speed as speed
-from synfeal.scenes.render_speed_table import SCHEMA, Measured, read_speed, write_speed
+from synfeal.scenes.render_speed_table import SCHEMA, Measured, write_speed
 from tests.render_backends import BACKENDS, PYOPENGL_WARNS, camera_of
 from tests.report_results import design_of, read
 from tests.small_room import furnished_room, room_poses
@@ -158,7 +158,7 @@ def test_a_scene_is_measured_from_its_files(tmp_path):
     speed.write_render_speed(
         tmp_path / "mesh.glb", tmp_path / "test.csv", [SMALL], 2, RenderConfig(), out
     )
-    found = read_speed(out)
+    found = [Measured(**row) for row in records_of(read_frame(out, SCHEMA))]
     assert found[0].backend == choose.fastest_working()
     assert [line.chosen for line in found] == [1] + [0] * (len(found) - 1)
     write_speed(tmp_path / "again.csv", found)

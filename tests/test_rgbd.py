@@ -6,7 +6,7 @@ from baselines.groundtruth.features import FeatureOdometry
 from baselines.groundtruth.rgbd import dense, rgbd_graph, surface
 from baselines.groundtruth.rgbd.agreement import depth_agreement
 from baselines.groundtruth.rgbd.frames import read_frame
-from baselines.groundtruth.rgbd.loops import loop_candidates
+from baselines.groundtruth.rgbd.tracks import loop_candidates
 from synfeal.config.models import RgbdConfig
 from synfeal.geometry.poses import inverse, pose_error, pose_matrix, relative
 from synfeal.geometry.rotations import rotation_from_rpy
@@ -25,7 +25,7 @@ def paths(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def graph(paths):
-    return rgbd_graph(*paths, CAMERA, CFG)
+    return rgbd_graph(*paths, CAMERA, CFG)[0]
 
 
 def true_first_from_cam():
@@ -55,7 +55,7 @@ def test_odometry_drifts_by_less_than_a_percent_of_the_way(tmp_path):
         ]
     )
     paths = write_room(tmp_path, poses)
-    graph = rgbd_graph(*paths, ROOM_CAMERA, RgbdConfig(loops_per_keyframe=0))
+    graph = rgbd_graph(*paths, ROOM_CAMERA, RgbdConfig(loops_per_keyframe=0))[0]
     way_m = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum()
     assert way_m > 1.2
     assert [(edge.i, edge.j) for edge in graph.edges] == [(k, k + 1) for k in step[:-1]]
@@ -84,14 +84,14 @@ def test_unmeasurable_pair_keeps_a_weak_edge(paths, tmp_path):
     Image.new("RGB", (CAMERA.width, CAMERA.height)).save(color_paths[3])
     empty = np.full((CAMERA.height, CAMERA.width), 65535, dtype=np.uint16)
     Image.fromarray(empty).save(depth_paths[3])
-    graph = rgbd_graph(color_paths, depth_paths, CAMERA, RgbdConfig(keyframe_every=4))
+    graph = rgbd_graph(color_paths, depth_paths, CAMERA, RgbdConfig(keyframe_every=4))[0]
     weights = [edge.information[0, 0] for edge in graph.edges[:5]]
     assert max(weights[2:4]) < 0.01 * min(weights[0], weights[1], weights[4])
     np.testing.assert_array_equal(graph.edges[2].i_from_j, graph.edges[1].i_from_j)
 
 
 def test_depth_beyond_the_limit_is_not_used(paths):
-    with_limit = rgbd_graph(paths[0][:2], paths[1][:2], CAMERA, RgbdConfig(max_depth_m=0.5))
+    with_limit = rgbd_graph(paths[0][:2], paths[1][:2], CAMERA, RgbdConfig(max_depth_m=0.5))[0]
     assert with_limit.edges[0].information[0, 0] < 1e3
 
 

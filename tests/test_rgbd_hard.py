@@ -6,8 +6,7 @@ from PIL import Image
 
 from baselines.groundtruth.kinect_fusion import kinect_fusion_batch
 from baselines.groundtruth.posegraph.lm import optimise_lm
-from baselines.groundtruth.rgbd import rgbd_graph_with_facts
-from synfeal.camera.intrinsics import intrinsics_of
+from baselines.groundtruth.rgbd import rgbd_graph
 from synfeal.config.models import CameraConfig, KinectFusionConfig, RgbdConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error, relative
@@ -16,7 +15,7 @@ from tests.room_scene import CAMERA, FURNISHED, Room, pose_at, write_room
 
 def rgbd(paths, camera=CAMERA):
     """Poses, which of them follow measured motions, and the graph."""
-    graph, facts = rgbd_graph_with_facts(*paths, camera, RgbdConfig(keyframe_every=3))
+    graph, facts = rgbd_graph(*paths, camera, RgbdConfig(keyframe_every=3))
     guessed = np.array([edge.information[0, 0] < 1e3 for edge in graph.edges[: facts.pairs]])
     assert facts.pairs_accepted == facts.pairs - guessed.sum()
     return optimise_lm(graph, 20), np.concatenate([[True], ~guessed]), graph
@@ -140,7 +139,7 @@ def test_a_damaged_image_is_named(method, kind, damage, tmp_path):
 
 @METHODS
 def test_a_principal_point_off_the_centre_costs_nothing_only_when_it_is_known(method, write_once):
-    fx, fy, cx, cy = intrinsics_of(CAMERA)
+    fx, fy, cx, cy = CAMERA.intrinsics
     off = CameraConfig(width=CAMERA.width, height=CAMERA.height, fx=fx, fy=fy, cx=cx + 20, cy=cy)
     poses = [pose_at([-1.0 + 0.02 * k, 0.01 * k, 1.4], yaw_deg=30 + k) for k in range(12)]
     paths = write_once(poses, camera=off)

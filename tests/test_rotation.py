@@ -18,7 +18,6 @@ from baselines.training.rotation import (
     random_rotation,
     rotation_of,
 )
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import AugmentationConfig, CameraConfig, NetworkConfig
 from synfeal.dataset.packed import fit_frame
 from synfeal.errors import InputError
@@ -40,7 +39,7 @@ INSIDE = slice(20, PX - 20)
 def frame_camera(camera):
     """As packed frames record it."""
     size = {"width": camera.width, "height": camera.height}
-    return FrameCamera(**size, **intrinsics_of(camera)._asdict())
+    return FrameCamera(**size, **camera.intrinsics._asdict())
 
 
 def rotation(seed=0, tilt_deg=8.0, roll_deg=15.0):

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from synfeal.mesh.triangles import weld
-from synfeal.scenes.atlas import ATLAS_PX, GUTTER_PX, laid_out, pack
-from synfeal.scenes.bake import scanned_mesh
+from synfeal.scenes.bake import ATLAS_PX, GUTTER_PX, laid_out, pack, scanned_mesh
 from synfeal.scenes.grids import jittered, refined, surface_of
 from synfeal.scenes.lighting import Lamp, Lighting, Sun, baked
-from synfeal.scenes.patches import Item, Patch
-from synfeal.scenes.primitives import box, level, tube, turned, upright
+from synfeal.scenes.patches import Item, Patch, box, level, tube, turned, upright
 from synfeal.scenes.scan import Scanner, rounded, seen_faces, stations
 
 GREY = np.full((8, 8, 3), 128, np.uint8)

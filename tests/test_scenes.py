@@ -10,7 +10,7 @@ from synfeal.errors import InputError
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import weld
 from synfeal.scenes import BUILDERS, build_scene
-from synfeal.scenes.atlas import ATLAS_PX
+from synfeal.scenes.bake import ATLAS_PX
 
 VOLUMES_M3 = {"large_room": 89.4, "sanctuary": 183.18}  # the paper's table 1
 COUNTS = {"large_room": (122_000, 192_000), "sanctuary": (199_000, 398_000)}  # likewise

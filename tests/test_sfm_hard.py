@@ -14,7 +14,6 @@ from PIL import Image
 
 from baselines.groundtruth.chain import fill_gaps
 from baselines.groundtruth.sfm import mapping, sfm_batch
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig, SfmConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error, pose_matrix, relative
@@ -143,7 +142,7 @@ def test_a_pattern_that_repeats_within_a_view_misleads_and_the_mapper_starts_aga
 
 def shifted(px):
     """The camera with its principal point moved to the right."""
-    fx, fy, cx, cy = intrinsics_of(CAMERA)
+    fx, fy, cx, cy = CAMERA.intrinsics
     return CAMERA.model_copy(update={"fx": fx, "fy": fy, "cx": cx + px, "cy": cy})
 
 

@@ -12,9 +12,9 @@ from synfeal.config.models import Angles, CameraConfig
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.rays import RayCaster
-from synfeal.planning.empty_pixels import empty_shares
 from synfeal.planning.path import poses_of
 from synfeal.planning.sampling import pose_bounds, sample_poses
+from synfeal.planning.seen_surface import empty_shares
 from tests.varied_meshes import MESHES
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")

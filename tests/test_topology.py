@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from synfeal.mesh.topology import mesh_topology
+from synfeal.mesh.properties import mesh_topology
 
 
 def arrays(mesh):

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 from baselines.localizers.losses import PosePrediction
 from baselines.localizers.registry import build_localizer
 from baselines.training import selection
+from baselines.training.data import BatchOrder, held_out_paths
 from baselines.training.fit import fit
 from baselines.training.optimizer import Schedule, optimisation_of
-from baselines.training.order import BatchOrder, held_out_paths
 from baselines.training.protocol import HALVE_EVERY, PROTOCOLS
 from baselines.training.selection import HeldOutErrors, Selection, held_out_errors
 from synfeal.config.models import MODELS

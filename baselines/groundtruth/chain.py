@@ -10,7 +10,7 @@ interpolated (straight line, constant angular velocity); after the last one its 
 first frame always counts as known, since it is shared with the batch before.
 
 A batch whose first frame was not registered is assisted whatever its error: where its first
-registered frame stands was taken from the true poses (``sfm/scale.py``).
+registered frame stands was taken from the true poses (``sfm/batch.py``).
 
 A batch with no registered frame besides the first is lost. It is assisted whatever its error, and
 its frames are interpolated between its start and the true last pose, so that no frame is ever

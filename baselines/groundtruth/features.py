@@ -12,7 +12,6 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.geometry.poses import inverse, pose_matrix
 
@@ -50,7 +49,7 @@ class FeatureOdometry:
         matching = pycolmap.FeatureMatchingOptions(num_threads=1, use_gpu=False)
         self._extractor = pycolmap.FeatureExtractor.create(extraction, pycolmap.Device.cpu)
         self._matcher = pycolmap.FeatureMatcher.create(matching, pycolmap.Device.cpu)
-        fx, fy, cx, cy = intrinsics_of(camera)
+        fx, fy, cx, cy = camera.intrinsics
         self._focal_px, self._centre_px = np.array([fx, fy]), np.array([cx, cy])
         self._camera = pycolmap.Camera(
             model="PINHOLE",

@@ -1,34 +1,46 @@
-"""Images of a camera, checked as they are read."""
+"""Images of a camera, checked as they are read, and put where COLMAP finds them in order."""
 
 from __future__ import annotations
 
-import io
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from synfeal.config.models import CameraConfig
-from synfeal.dataset.archive import FrameFile
-from synfeal.dataset.png import IMAGE_DAMAGE
-from synfeal.errors import InputError, why
+from synfeal.dataset import png
+from synfeal.dataset.archive import FrameFile, link_or_unpack
+from synfeal.errors import InputError
 
 
 def read_image(path: FrameFile, camera: CameraConfig, mode: str | None = None) -> NDArray[Any]:
     """An image of the camera's size as an array, converted to ``mode`` if one is given.
 
     Raises:
-        InputError: it cannot be read, or has another size.
+        InputError: it is missing, cannot be read, or has another size.
     """
-    try:
-        with Image.open(io.BytesIO(path.read_bytes())) as image:
-            pixels = np.asarray(image.convert(mode) if mode else image)
-    except IMAGE_DAMAGE as error:
-        raise InputError(f"{path}: cannot be read as an image ({why(error)})") from None
+    if not path.is_file():
+        raise InputError(f"{path}: no such image; collect the data set again")
+    pixels = np.asarray(png.read_image(path, mode))
     if pixels.shape[:2] != (camera.height, camera.width):
         raise InputError(
-            f"{path}: is {pixels.shape[1]}x{pixels.shape[0]}, the camera of the configuration"
+            f"{path}: is {pixels.shape[1]}x{pixels.shape[0]}, the camera has"
             f" {camera.width}x{camera.height}; collect the data set again"
         )
     return pixels
+
+
+def link_images(color_paths: Sequence[FrameFile], camera: CameraConfig, images: Path) -> None:
+    """A new directory ``images`` in which the order of the names is the order of the frames.
+
+    COLMAP leaves out an image that it cannot read, which would look like a frame without texture.
+
+    Raises:
+        InputError: as :func:`read_image`.
+    """
+    images.mkdir()
+    for frame, path in enumerate(color_paths):
+        read_image(path, camera)
+        link_or_unpack(path, images / f"{frame:06d}{path.suffix}")

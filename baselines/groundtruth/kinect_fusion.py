@@ -24,7 +24,6 @@ from baselines.groundtruth.rgbd.agreement import matched_depths
 from baselines.groundtruth.rgbd.dense import near
 from baselines.groundtruth.rgbd.frames import RgbdFrame, open3d_depth, read_frame
 from baselines.groundtruth.trajectory import BatchTrajectory
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig, KinectFusionConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.geometry.poses import inverse
@@ -58,7 +57,7 @@ class FusedModel:
         self._camera, self._cfg = camera, cfg
         # Fusing cuts projected positions to whole pixels instead of rounding them: with the centre
         # of the first pixel at (0.5, 0.5) that is the nearest pixel (Open3D issue 7580).
-        self._fused = o3d.core.Tensor.from_numpy(intrinsics_of(camera).matrix())
+        self._fused = o3d.core.Tensor.from_numpy(camera.intrinsics.matrix())
         kind, scalar = o3d.core.float32, o3d.core.SizeVector([1])
         self._grid = o3d.t.geometry.VoxelBlockGrid(
             ("tsdf", "weight"), (kind, kind), (scalar, scalar), cfg.voxel_m, _BLOCK_VOXELS, _BLOCKS
@@ -85,7 +84,7 @@ class FusedModel:
         shifted[:3, 3] += self._cfg.voxel_m / 2
         known = self._grid.hashmap()
         blocks = known.key_tensor()[known.active_buf_indices().to(o3d.core.int64)]
-        matrix = intrinsics_of(self._camera).matrix(centre_shift_px=-0.5)
+        matrix = self._camera.intrinsics.matrix(centre_shift_px=-0.5)
         size_px = self._camera.width, self._camera.height
         # Open3D first finds the range of depth in square tiles, and reads beyond them where they
         # do not divide the image.
@@ -128,7 +127,7 @@ class FusedModel:
         self._reserved = 2 * self._grid.hashmap().size()
         repeated = np.tile(seen.numpy(), (-(-_PARTS * self._reserved // len(seen)), 1))
         tiny = np.diag([16 / self._camera.width, 16 / self._camera.height, 1.0])
-        matrix = tiny @ intrinsics_of(self._camera).matrix()
+        matrix = tiny @ self._camera.intrinsics.matrix()
         self._cast(o3d.core.Tensor.from_numpy(repeated), matrix, first_from_cam, (16, 16), 1)
 
     def track(self, frame: RgbdFrame, last: Array, min_fitness: float) -> Array | None:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from baselines.groundtruth.rgbd.agreement import points_of
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.geometry.poses import pose_error, pose_matrix
 
@@ -83,7 +82,7 @@ def register(
     """
     motion = np.eye(4)
     for (stride, steps), target, source in zip(LEVELS, shown, seen, strict=True):
-        fx, fy, cx, cy = intrinsics_of(camera)
+        fx, fy, cx, cy = camera.intrinsics
         projection = np.array([fx, fy, cx - 0.5, cy - 0.5]) / stride
         for _ in range(steps):
             system, right = _normal_equations(*target, *source, projection, motion)

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from baselines.localizers.backbones.resnet import ResNet34
 from baselines.localizers.backbones.weights import build_inception
 from baselines.localizers.base import Localizer, learned_loss
 from baselines.localizers.heads import PooledRegressor
@@ -38,3 +39,20 @@ class PoseNet2(Localizer):
     def forward(self, images: Tensor) -> list[PosePrediction]:
         """One prediction."""
         return [self.regressor(self.backbone(images).last)]
+
+
+class PoseNet2ResNet(Localizer):
+    """The same on ResNet-34, the variant that Synfeal adds to the comparison.
+
+    The Synfeal authors' code has the same layers.
+    """
+
+    def __init__(self, network: NetworkConfig, hyper: LocalizerConfig) -> None:
+        super().__init__()
+        self.backbone = ResNet34(network.width)
+        self.regressor = PooledRegressor(self.backbone.n_out, network.width, hyper.dropout)
+        self.criterion = learned_loss(hyper)
+
+    def forward(self, images: Tensor) -> list[PosePrediction]:
+        """One prediction."""
+        return [self.regressor(self.backbone(images).layer4)]

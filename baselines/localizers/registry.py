@@ -8,8 +8,7 @@ from baselines.localizers.base import Localizer
 from baselines.localizers.hourglass import Hourglass
 from baselines.localizers.poselstm import PoseLstm
 from baselines.localizers.posenet import PoseNet
-from baselines.localizers.posenet2 import PoseNet2
-from baselines.localizers.posenet2resnet import PoseNet2ResNet
+from baselines.localizers.posenet2 import PoseNet2, PoseNet2ResNet
 from synfeal.config.models import LocalizerConfig, NetworkConfig
 
 LOCALIZERS: dict[str, Callable[[NetworkConfig, LocalizerConfig], Localizer]] = {

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from baselines.references.correspondences import Correspondences
 from baselines.references.evidence import Evidence
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import inverse, pose_matrix
@@ -88,6 +87,6 @@ def absolute_pose(
 
 def pinhole(camera: CameraConfig) -> pycolmap.Camera:
     """A camera without distortion and with its principal point at (0, 0)."""
-    fx, fy, _, _ = intrinsics_of(camera)
+    fx, fy, _, _ = camera.intrinsics
     size = {"width": camera.width, "height": camera.height}
     return pycolmap.Camera(model="PINHOLE", params=[fx, fy, 0.0, 0.0], **size)

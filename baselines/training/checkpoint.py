@@ -12,7 +12,7 @@ from baselines.localizers.base import Localizer
 from baselines.localizers.registry import build_localizer
 from baselines.training.data import ImageStatistics
 from baselines.training.description import ModelDescription, parse_description
-from baselines.training.serial import serialised
+from baselines.training.resume import serialised
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
 

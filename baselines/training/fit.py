@@ -9,10 +9,9 @@ import torch
 from torch import Tensor
 
 from baselines.localizers.base import Localizer
-from baselines.training.data import ImageStatistics, LabelledFrames
+from baselines.training.data import BatchOrder, ImageStatistics, LabelledFrames
 from baselines.training.device import Precision, autocast
 from baselines.training.optimizer import Optimisation, Schedule, optimisation_of
-from baselines.training.order import BatchOrder
 from baselines.training.progress import HistoryRow, Progress
 from baselines.training.protocol import PROTOCOLS, Protocol
 from baselines.training.resume import RandomState, Restorable, ResumeFile, stop_signals

@@ -15,6 +15,7 @@ from baselines.training.checkpoint import save_checkpoint
 from baselines.training.data import (
     ImageStatistics,
     LabelledFrames,
+    held_out_paths,
     image_statistics,
     read_labelled_frames,
 )
@@ -22,7 +23,6 @@ from baselines.training.description import ModelDescription, frame_camera
 from baselines.training.device import memory_errors, open_device, precision_on
 from baselines.training.fit import Augmentation, fit
 from baselines.training.optimizer import Schedule
-from baselines.training.order import held_out_paths
 from baselines.training.progress import HistoryRow, write_history
 from baselines.training.protocol import HALVE_EVERY, PROTOCOLS, Protocol
 from baselines.training.resume import ResumeFile, digest

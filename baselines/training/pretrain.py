@@ -26,10 +26,14 @@ from baselines.localizers.heads import OutputLayer, PooledFeature
 from baselines.localizers.losses import LearnedWeightLoss, PosePrediction
 from baselines.localizers.names import BackboneName
 from baselines.training.checkpoint import save_atomically
-from baselines.training.data import LabelledFrames, image_statistics, read_labelled_frames
+from baselines.training.data import (
+    BatchOrder,
+    LabelledFrames,
+    image_statistics,
+    read_labelled_frames,
+)
 from baselines.training.device import autocast, memory_errors, open_device, precision_on
 from baselines.training.optimizer import Schedule, optimisation_of
-from baselines.training.order import BatchOrder
 from baselines.training.progress import Progress
 from baselines.training.resume import Restorable, ResumeFile, digest, stop_signals
 from baselines.training.rotation import random_rotation

@@ -12,9 +12,8 @@ from typing import Any, cast
 
 from synfeal.config import Config, Run
 from synfeal.config.models import ModelName
-from synfeal.dataset.packed_record import file_sha256
 from synfeal.errors import InputError, why
-from synfeal.files import read_json, write_json
+from synfeal.files import file_sha256, read_json, write_json
 from synfeal.provenance import provenance
 
 RECORD = "training.json"

@@ -16,7 +16,6 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor
 
-from baselines.training.serial import serialised
 from synfeal.errors import why
 from synfeal.files import atomic_path
 
@@ -152,3 +151,14 @@ def _add(total: Any, value: object) -> None:
             _add(total, item)
     else:
         total.update(repr(value).encode() + b"\x1f")
+
+
+def serialised(value: Any) -> memoryview:
+    """What ``torch.save`` writes, made in memory: the same value gives the same bytes.
+
+    Writing to a path, torch puts the name of the file, here a temporary one, into every record, and
+    what it says of a full disk is ``unexpected pos``.
+    """
+    buffer = io.BytesIO()
+    torch.save(value, buffer)
+    return buffer.getbuffer()

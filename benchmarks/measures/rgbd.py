@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from baselines.groundtruth.posegraph.optimise import optimise
-from baselines.groundtruth.rgbd import rgbd_graph_with_facts
+from baselines.groundtruth.rgbd import rgbd_graph
 from benchmarks.measures.batches import BatchCase, errors, open_batch
 from synfeal.seeds import seed_of
 
@@ -19,7 +19,7 @@ def run(case: BatchCase, seed: int) -> dict[str, float]:
         InputError: the frames cannot be used.
     """
     batch, cfg = open_batch(case), case.groundtruth
-    graph, facts = rgbd_graph_with_facts(
+    graph, facts = rgbd_graph(
         batch.color, batch.depth, case.groundtruth_camera, cfg.rgbd, seed_of(seed, "rgbd")
     )
     begin_s = time.process_time()

@@ -3,34 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
-
-
-class Camera(Protocol):
-    """What this package asks of a camera, whatever configures it."""
-
-    @property
-    def width(self) -> int:
-        """Image width, pixels."""
-
-    @property
-    def height(self) -> int:
-        """Image height, pixels."""
-
-    @property
-    def horizontal_fov_deg(self) -> float:
-        """Of square pixels about the centre; unused where the intrinsics are given."""
-
-    @property
-    def given_intrinsics(self) -> tuple[float, float, float, float] | None:
-        """fx, fy, cx, cy in pixels, if they are known."""
-
-    @property
-    def distortion(self) -> tuple[float, float, float, float, float]:
-        """Brown-Conrady coefficients: k1, k2, p1, p2, k3."""
 
 
 class Intrinsics(NamedTuple):
@@ -52,10 +28,28 @@ class Intrinsics(NamedTuple):
         cx, cy = self.cx + centre_shift_px, self.cy + centre_shift_px
         return np.array([[self.fx, 0.0, cx], [0.0, self.fy, cy], [0.0, 0.0, 1.0]])
 
+    @classmethod
+    def of_view(cls, width: int, height: int, horizontal_fov_deg: float) -> Self:
+        """Square pixels, the principal point in the middle of the image."""
+        focal = width / 2.0 / math.tan(math.radians(horizontal_fov_deg) / 2.0)
+        return cls(focal, focal, width / 2.0, height / 2.0)
 
-def intrinsics_of(camera: Camera) -> Intrinsics:
-    """The intrinsics given, or those of square pixels with the principal point in the centre."""
-    if camera.given_intrinsics is not None:
-        return Intrinsics(*camera.given_intrinsics)
-    focal = camera.width / 2.0 / math.tan(math.radians(camera.horizontal_fov_deg) / 2.0)
-    return Intrinsics(focal, focal, camera.width / 2.0, camera.height / 2.0)
+
+class Camera(Protocol):
+    """What this package asks of a camera, whatever configures it."""
+
+    @property
+    def width(self) -> int:
+        """Image width, pixels."""
+
+    @property
+    def height(self) -> int:
+        """Image height, pixels."""
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """Resolved, whichever way they were given."""
+
+    @property
+    def distortion(self) -> tuple[float, float, float, float, float]:
+        """Brown-Conrady coefficients: k1, k2, p1, p2, k3."""

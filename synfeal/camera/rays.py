@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.camera.distortion import distort, undistort
-from synfeal.camera.intrinsics import Camera, intrinsics_of
+from synfeal.camera.intrinsics import Camera
 
 Array = NDArray[np.float64]
 
@@ -18,13 +18,13 @@ def normalised_of_pixels(camera: Camera, pixel: Array) -> Array:
 
     NaN where the lens folds over before it reaches the pixel.
     """
-    fx, fy, cx, cy = intrinsics_of(camera)
+    fx, fy, cx, cy = camera.intrinsics
     return undistort((pixel - [cx, cy]) / [fx, fy], camera.distortion)
 
 
 def pixels_of_normalised(camera: Camera, normalised: Array) -> Array:
     """The inverse of :func:`normalised_of_pixels`."""
-    fx, fy, cx, cy = intrinsics_of(camera)
+    fx, fy, cx, cy = camera.intrinsics
     return distort(normalised, camera.distortion) * [fx, fy] + [cx, cy]
 
 
@@ -40,7 +40,7 @@ def refuse_fold(camera: Camera) -> None:
     pixel = np.stack([column, row], axis=-1)
     folded = pixel[np.isnan(normalised_of_pixels(camera, pixel)).any(axis=-1)]
     if len(folded):
-        _, _, cx, cy = intrinsics_of(camera)
+        _, _, cx, cy = camera.intrinsics
         x, y = folded[np.argmin(np.hypot(*(folded - [cx, cy]).T))]
         raise ValueError(
             f"distortion: folds over inside the image at pixel ({x:.0f}, {y:.0f}); the coefficients"

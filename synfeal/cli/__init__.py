@@ -8,34 +8,15 @@ import sys
 from collections.abc import Sequence
 
 from synfeal import __version__
-from synfeal.cli import (
-    collect,
-    compare,
-    evaluate,
-    export,
-    inspect,
-    keep,
-    localize,
-    plan,
-    preview,
-    run,
-    validate,
-)
+from synfeal.cli import datasets, meshes, runs
 from synfeal.cli.options import numbers_apart
 from synfeal.errors import exit_status
 
 COMMANDS = (
-    collect.COMMAND,
-    inspect.COMMAND,
-    preview.COMMAND,
-    validate.COMMAND,
-    export.COMMAND,
-    evaluate.COMMAND,
-    localize.COMMAND,
-    plan.COMMAND,
-    run.COMMAND,
-    compare.COMMAND,
-    *keep.COMMANDS,
+    *(meshes.collect, meshes.inspect),
+    *(datasets.preview, datasets.validate, datasets.export, datasets.evaluate),
+    datasets.localize,
+    *(runs.plan, runs.run, runs.compare, runs.keep, runs.restore),
 )
 
 
@@ -53,7 +34,7 @@ def build_parser() -> argparse.ArgumentParser:
         )
         for flag, details in command.options:
             added.add_argument(flag, **details)
-        added.set_defaults(action=command.run)
+        added.set_defaults(action=command)
     return parser
 
 

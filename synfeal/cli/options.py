@@ -1,4 +1,4 @@
-"""What the commands share: how options are declared, and the options that describe a mesh."""
+"""What the commands share: how they and their options are declared, and options of a mesh."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 # Flag, and what argparse is told about it.
-Options = tuple[tuple[str, dict[str, Any]], ...]
+Option = tuple[str, dict[str, Any]]
+Action = Callable[[argparse.Namespace], None]
 
 
 @dataclass(frozen=True)
@@ -21,31 +22,48 @@ class Command:
         description: a sentence for its own help.
         example: a line a person may type.
         options: its options.
-        run: carries it out; imports what it needs when it is called, so that ``--help`` is quick.
+        action: carries it out; imports what it needs when it is called: ``--help`` is quick.
     """
 
     name: str
     summary: str
     description: str
     example: str
-    options: Options
-    run: Callable[[argparse.Namespace], None]
+    options: tuple[Option, ...]
+    action: Action
+
+    def __call__(self, arguments: argparse.Namespace) -> None:
+        """Carry it out."""
+        self.action(arguments)
 
 
-MESH_OPTIONS: Options = (
-    (
+def option(flag: str, text: str, **details: Any) -> Option:
+    """A flag, or the name of what stands without one, and its help; ``details`` are argparse's."""
+    return flag, {"help": text, **details}
+
+
+def command(summary: str, example: str, *options: Option) -> Callable[[Action], Command]:
+    """Makes a command of a function, which gives its name and, in its docstring, what it does."""
+
+    def of(action: Action) -> Command:
+        description = " ".join((action.__doc__ or "").split())
+        return Command(action.__name__, summary, description, example, options, action)
+
+    return of
+
+
+MESH_OPTIONS = (
+    option(
         "--box",
-        {
-            "type": float,
-            "nargs": 6,
-            "action": "append",
-            "metavar": ("X0", "X1", "Y0", "Y1", "Z0", "Z1"),
-            "help": "where camera centres may be, metres (the mesh's bounds); again for each"
-            " further room or floor",
-        },
+        "where camera centres may be, metres (the mesh's bounds); again for each further room or"
+        " floor",
+        type=float,
+        nargs=6,
+        action="append",
+        metavar=("X0", "X1", "Y0", "Y1", "Z0", "Z1"),
     ),
-    ("--up-axis", {"choices": ("auto", "y", "z"), "help": "up in the file (auto)"}),
-    ("--unit-m", {"type": float, "help": "metres per unit of the file (1)"}),
+    option("--up-axis", "up in the file (auto)", choices=("auto", "y", "z")),
+    option("--unit-m", "metres per unit of the file (1)", type=float),
 )
 
 
@@ -54,7 +72,7 @@ def options_among(arguments: argparse.Namespace, names: Collection[str]) -> dict
     return {name: value for name, value in vars(arguments).items() if name in names}
 
 
-def numbers_apart(arguments: Sequence[str], options: Options) -> Iterator[str]:
+def numbers_apart(arguments: Sequence[str], options: Sequence[Option]) -> Iterator[str]:
     """Arguments as argparse reads negative numbers of all forms, and ``--box=0 1 ...`` too.
 
     It takes ``-1e0`` for an option; a blank before it makes it a value.

@@ -9,12 +9,12 @@ import numpy as np
 
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
-from synfeal.dataset.sequences import Split
+from synfeal.dataset.sevenscenes import Split
 from synfeal.errors import InputError
 from synfeal.mesh.checks import shows_one_colour
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
-from synfeal.planning.empty_pixels import empty_pixels
+from synfeal.planning.seen_surface import empty_pixels
 
 WARN_ABOVE = 0.1  # of all pixels: more than windows let through
 REFUSE_ABOVE = 0.95  # of all pixels: nobody wants a data set of the background

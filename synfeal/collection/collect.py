@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 import synfeal
 from synfeal.collection.blank import refuse_blank, refuse_invisible
 from synfeal.config.dataset import DatasetConfig
@@ -19,7 +21,8 @@ from synfeal.dataset.finish import finish, origin_of
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.progress import Progress
 from synfeal.dataset.render_pool import Studio, Task, render_sequences
-from synfeal.dataset.sequences import Split, sequences_of
+from synfeal.dataset.render_sequence import resolved
+from synfeal.dataset.sevenscenes import Split, sequences_of
 from synfeal.dataset.unfinished import WORK, clean_up, growing, place_of
 from synfeal.errors import InputError
 from synfeal.files import write_json
@@ -157,3 +160,31 @@ def _tasks(job: CollectJob, plans: dict[Split, PoseTable], part: Path) -> Iterat
     for sequence in sequences_of(job.counts["train"], job.counts["test"], job.config.shard_frames):
         poses = plans[sequence.split].between(sequence.start, sequence.stop)
         yield Task(part / f"{sequence.name}{suffix}", poses)
+
+
+LEAST_INPUT_PX = 32
+HEADER = """\
+# The data set of `synfeal collect` with the same options, made by the workflow:
+#   synfeal run --profile THIS_FILE -- datasets
+# It appears in {directory}
+"""
+
+
+def with_backend(config: DatasetConfig) -> DatasetConfig:
+    """The settings with the backend that ``auto`` stands for here: images depend on it.
+
+    Raises:
+        InputError: no backend works on this machine.
+    """
+    return config.model_copy(update={"render": resolved(config.render)})
+
+
+def configuration_text(job: CollectJob) -> str:
+    """The profile as YAML; every key is given, as keys that are not come from the default one."""
+    camera = job.config.network_camera
+    values = job.config.model_dump(mode="json")
+    # The side of packed frames, which the workflow makes for networks, has to fit into the image.
+    input_px = job.packed_px or max(LEAST_INPUT_PX, min(64, camera.width - 1, camera.height - 1))
+    values |= {"datasets": [job.scene], "network": {"input_px": input_px}}
+    directory = job.config.root / "datasets" / job.scene / "network"
+    return HEADER.format(directory=directory) + yaml.safe_dump(values, sort_keys=False)

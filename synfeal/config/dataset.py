@@ -7,14 +7,8 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from synfeal.config.collection import (
-    CameraConfig,
-    CollectionConfig,
-    Count,
-    SceneConfig,
-    Slug,
-    Strict,
-)
+from synfeal.config.camera import CameraConfig
+from synfeal.config.collection import CollectionConfig, Count, SceneConfig, Slug, Strict
 from synfeal.config.rendering import EffectsConfig, RenderConfig
 
 

@@ -7,10 +7,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from synfeal.config.camera import CameraConfig
 from synfeal.config.collection import (
     Angles,
     Box,
-    CameraConfig,
     CollectionConfig,
     Count,
     Fraction,
@@ -25,12 +25,13 @@ from synfeal.config.dataset import DatasetConfig
 from synfeal.config.learning import (
     SHIPPED_WIDTH,
     AugmentationConfig,
+    ExternalConfig,
     LocalizerConfig,
     NetworkConfig,
     PretrainingConfig,
+    ReferencesConfig,
     TrainingConfig,
 )
-from synfeal.config.references import ExternalConfig, ReferencesConfig
 from synfeal.config.rendering import EffectsConfig, RenderConfig, RenderSpeedConfig
 from synfeal.config.robustness import RobustnessConfig
 

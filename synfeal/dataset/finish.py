@@ -9,14 +9,12 @@ from typing import Any
 from synfeal.config.dataset import DatasetConfig
 from synfeal.config.models import CameraConfig, EffectsConfig
 from synfeal.dataset.archive import sequence_at
-from synfeal.dataset.contact_sheet import write_contact_sheet
 from synfeal.dataset.manifest import write_manifest
 from synfeal.dataset.packed import pack_frames
-from synfeal.dataset.packed_record import file_sha256
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
-from synfeal.dataset.sequences import Split, sequences_of
-from synfeal.dataset.sevenscenes import frame_paths, write_splits
-from synfeal.files import read_json
+from synfeal.dataset.preview import write_contact_sheet
+from synfeal.dataset.sevenscenes import Split, frame_paths, sequences_of, write_splits
+from synfeal.files import file_sha256, read_json
 from synfeal.frames import write_frame
 
 CLUTTER = "clutter.json"  # beside the mesh: which objects stand about in it, and where

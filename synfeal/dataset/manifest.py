@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
@@ -11,15 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import synfeal
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.archive import frame_file, sequence_at, sequence_names
-from synfeal.dataset.sequences import Sequence
-from synfeal.errors import InputError, why
-from synfeal.files import read_json, write_json
+from synfeal.dataset.sevenscenes import Sequence
+from synfeal.files import write_json
 
 MANIFEST = "manifest.json"
-NAME = re.compile(r"seq-[0-9]{2,9}")
 LIBRARIES = ("deflate", "numpy", "pillow", "pyrender", "trimesh")
 
 
@@ -55,12 +51,12 @@ def write_manifest(
 def _camera(camera: CameraConfig) -> dict[str, Any]:
     """All values of a camera, intrinsics included, without the field of view that they replaced."""
     unused = {"horizontal_fov_deg"} if camera.fx is not None else set()
-    return {**camera.model_dump(exclude=unused), **intrinsics_of(camera)._asdict()}
+    return {**camera.model_dump(exclude=unused), **camera.intrinsics._asdict()}
 
 
 def camera_record(camera: CameraConfig) -> dict[str, Any]:
     """A camera with its intrinsics, ready for JSON."""
-    return {**camera.model_dump(mode="json"), **intrinsics_of(camera)._asdict()}
+    return {**camera.model_dump(mode="json"), **camera.intrinsics._asdict()}
 
 
 def versions() -> dict[str, str]:
@@ -70,33 +66,6 @@ def versions() -> dict[str, str]:
         with suppress(PackageNotFoundError):  # not every renderer has to be installed
             found[name] = version(name)
     return found
-
-
-def verify_manifest(dataset_dir: Path) -> None:
-    """Check every sequence against the hash in the manifest.
-
-    Raises:
-        InputError: the manifest is missing or unreadable, or names the sequences that differ.
-    """
-    path = dataset_dir / MANIFEST
-    try:
-        entries = [(str(e["name"]), e["sha256"]) for e in read_json(path)["sequences"]]
-        unknown = [name for name, _ in entries if not NAME.fullmatch(name)]
-        if unknown:
-            raise ValueError(f"'{unknown[0]}' is not the name of a sequence")
-    except (OSError, ValueError, TypeError, LookupError) as error:
-        raise InputError(f"{path}: cannot be read as a manifest ({why(error)})") from None
-    bad = [name for name, found in entries if _sha256_or_none(dataset_dir / name) != found]
-    if bad:
-        raise InputError(f"{path}: {', '.join(bad)} differ from what was written; copy them again")
-
-
-def _sha256_or_none(directory: Path) -> str | None:
-    """Of a sequence, None where it is missing or damaged."""
-    try:
-        return sequence_sha256(sequence_at(directory))
-    except OSError:
-        return None
 
 
 def sequence_sha256(sequence: Path) -> str:

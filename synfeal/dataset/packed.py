@@ -1,11 +1,13 @@
-"""Frames at network resolution in one array: read by memory map, decoded once for all runs."""
+"""Frames at network resolution in one array: read by memory map, decoded once for all runs.
+
+A file beside it says what they are: enough to know them apart and to check a copy.
+"""
 
 from __future__ import annotations
 
-import io
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -14,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from synfeal.dataset.archive import FrameFile
-from synfeal.dataset.png import IMAGE_DAMAGE
+from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.dataset.manifest import camera_record, versions
+from synfeal.dataset.png import read_image
 from synfeal.dataset.sevenscenes import frame_paths
 from synfeal.errors import InputError, why
-from synfeal.files import atomic_path
+from synfeal.files import atomic_path, file_sha256, read_json, write_json
 
 COPIED_BYTES = 2**24  # at a time
 
@@ -46,7 +49,7 @@ def pack_frames(sequences: list[Path], input_px: int, out: Path, view: View = "s
     paths = frame_paths(sequences, "color.png")
     with new_packed(out, len(paths), input_px) as packed:
         for index, path in enumerate(paths):
-            packed[index] = fit_frame(_open(path), input_px, view)
+            packed[index] = fit_frame(read_image(path, "RGB"), input_px, view)
 
 
 def join_packed(parts: list[Path], out: Path) -> None:
@@ -120,9 +123,56 @@ def fit_frame(image: Image.Image, input_px: int, view: View = "square") -> NDArr
     return np.asarray(small.crop((left, top, left + input_px, top + input_px)))
 
 
-def _open(path: FrameFile) -> Image.Image:
+FORMATS: dict[View, str] = {
+    "square": "uint8 (N, S, S, 3); short side resized to S + 1 px, then centre crop",
+    "whole": "uint8 (N, S, S, 3); the whole frame resized to S x S px",
+}
+
+
+def write_packed_record(
+    frames: Path,
+    shards: Sequence[Path],
+    plan: Path,
+    camera: CameraConfig,
+    render: RenderConfig,
+    view: View = "square",
+) -> None:
+    """Write ``<frames>.json`` in place of ``.npy``.
+
+    Args:
+        frames: packed frames.
+        shards: records of the parts they were joined from, in order.
+        plan: pose table of the frames.
+        camera: what they were rendered through, before they were made smaller.
+        render: how they were rendered.
+        view: what of a frame was packed.
+
+    Raises:
+        InputError: frames or the record of a shard cannot be read.
+    """
+    packed = read_packed(frames)
+    record = {
+        "format": FORMATS[view],
+        "frames": len(packed),
+        "input_px": packed.shape[1],
+        "camera": camera_record(camera),
+        "render": render.model_dump(mode="json"),
+        "plan_sha256": file_sha256(plan),
+        "sha256": file_sha256(frames),
+        "shards": [{"name": path.stem, **_read_shard(path)} for path in shards],
+        "versions": versions(),
+    }
+    write_json(frames.with_suffix(".json"), record)
+
+
+def _read_shard(path: Path) -> dict[str, object]:
     try:
-        with Image.open(io.BytesIO(path.read_bytes())) as image:
-            return image.convert("RGB")
-    except IMAGE_DAMAGE as error:
-        raise InputError(f"{path}: cannot be read as an image ({why(error)})") from None
+        record = read_json(path)
+        frames, backend = record["frames"], record["backend"]
+        if type(frames) is not int or type(backend) is not str:
+            raise ValueError("frames must be a whole number, backend a name")
+        return {"frames": frames, "backend": backend}
+    except (OSError, ValueError, TypeError, LookupError) as error:
+        raise InputError(
+            f"{path}: cannot be read as the record of a shard ({why(error)}); render it again"
+        ) from None

@@ -1,12 +1,14 @@
-"""PNG files, encoded several times as fast as an imaging library does it, at the same size.
+"""Images of frames: read, and as PNG files encoded several times as fast as libraries do it.
 
-Pillow tries every filter on every row and compresses with zlib. In rendered frames one fixed filter
-does as well, and libdeflate is the faster compressor. ISA-L takes half the time of libdeflate, but
-now and then, once in tens of thousands of frames, gave other bytes for the same pixels.
+At the same size: Pillow tries every filter on every row and compresses with zlib. In such frames
+one fixed filter does as well, and libdeflate is the faster compressor. ISA-L takes half the time of
+libdeflate, but now and then, once in tens of thousands of frames, gave other bytes for the same
+pixels.
 """
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 
@@ -14,6 +16,9 @@ import deflate
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+
+from synfeal.dataset.archive import FrameFile
+from synfeal.errors import InputError, why
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 GREY, RGB = 0, 2  # colour types of the format
@@ -56,3 +61,17 @@ def _filtered(pixels: Pixels) -> NDArray[np.uint8]:
 
 def _chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def read_image(path: FrameFile, mode: str | None = None) -> Image.Image:
+    """A decoded image, converted to ``mode`` if one is given.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    try:
+        with Image.open(io.BytesIO(path.read_bytes())) as image:
+            image.load()
+            return image.convert(mode) if mode else image.copy()
+    except IMAGE_DAMAGE as error:
+        raise InputError(f"{path}: cannot be read as an image ({why(error)})") from None

@@ -1,21 +1,20 @@
-"""The paths of data sets as a moving picture, side by side."""
+"""Data sets at a glance: their paths as a moving picture, side by side, and many frames as one."""
 
 from __future__ import annotations
 
 import importlib.util
+import math
 import shutil
 import subprocess
 from collections.abc import Iterator, Sequence
-from io import BytesIO
 from pathlib import Path
 
 from PIL import Image, ImageDraw
 
 from synfeal.dataset.archive import FrameFile
-from synfeal.dataset.png import IMAGE_DAMAGE
-from synfeal.dataset.sequences import Split
-from synfeal.dataset.sevenscenes import frame_paths, read_split
-from synfeal.errors import InputError, why
+from synfeal.dataset.png import read_image
+from synfeal.dataset.sevenscenes import Split, frame_paths, read_split
+from synfeal.errors import InputError
 from synfeal.files import atomic_path
 
 TILE_WIDTH_PX = 320
@@ -108,9 +107,26 @@ def _rows(columns: Sequence[Sequence[FrameFile]], names: Sequence[str]) -> Itera
 
 
 def _tile(file: FrameFile) -> Image.Image:
-    try:
-        with Image.open(BytesIO(file.read_bytes())) as frame:
-            height = max(1, round(frame.height * TILE_WIDTH_PX / frame.width))
-            return frame.convert("RGB").resize((TILE_WIDTH_PX, height), Image.Resampling.LANCZOS)
-    except IMAGE_DAMAGE as error:
-        raise InputError(f"{file}: cannot be read as an image ({why(error)})") from None
+    frame = read_image(file, "RGB")
+    height = max(1, round(frame.height * TILE_WIDTH_PX / frame.width))
+    return frame.resize((TILE_WIDTH_PX, height), Image.Resampling.LANCZOS)
+
+
+SHEET_FRAMES = 24
+SHEET_COLUMNS = 6
+SHEET_TILE_PX = 240
+
+
+def write_contact_sheet(frames: Sequence[FrameFile], out: Path) -> None:
+    """A grid of at most 24 frames, evenly spaced over ``frames`` (at least one)."""
+    count = min(SHEET_FRAMES, len(frames))
+    chosen = [frames[index * len(frames) // count] for index in range(count)]
+    first = read_image(chosen[0])
+    tile = (SHEET_TILE_PX, max(1, round(first.height * SHEET_TILE_PX / first.width)))
+    columns = min(SHEET_COLUMNS, count)
+    sheet = Image.new("RGB", (columns * tile[0], math.ceil(count / columns) * tile[1]))
+    for index, path in enumerate(chosen):
+        small = read_image(path).resize(tile, Image.Resampling.LANCZOS)
+        sheet.paste(small, (index % columns * tile[0], index // columns * tile[1]))
+    with atomic_path(out) as temporary:
+        sheet.save(temporary)

@@ -6,18 +6,17 @@ Depth is along the optical axis, 16-bit PNG in millimetres, 65535 where nothing 
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from synfeal.dataset.archive import FrameFile, frame_file, sequence_at, sequence_names
-from synfeal.dataset.png import IMAGE_DAMAGE
-from synfeal.dataset.sequences import Sequence
+from synfeal.dataset.png import read_image
 from synfeal.errors import InputError, why
 from synfeal.files import atomic_path
 
@@ -36,13 +35,9 @@ def read_depth_m(path: FrameFile) -> NDArray[np.float32]:
     """Depth (H, W) in metres along the optical axis, inf where it is invalid.
 
     Raises:
-        InputError: the file is no 16-bit image.
+        InputError: the file cannot be read, or is no 16-bit image.
     """
-    try:
-        with Image.open(io.BytesIO(path.read_bytes())) as image:
-            depth_mm = np.asarray(image)
-    except IMAGE_DAMAGE as error:
-        raise InputError(f"{path}: cannot be read as a depth image ({why(error)})") from None
+    depth_mm = np.asarray(read_image(path))
     if depth_mm.ndim != 2 or depth_mm.dtype == np.uint8:
         raise InputError(f"{path}: must be a 16-bit grey image, millimetres")
     depth_m = (depth_mm / 1000.0).astype(np.float32)
@@ -117,3 +112,42 @@ def read_split(dataset_dir: Path, split: str) -> list[Path]:
         raise InputError(f"{path}: '{bad[0][:40]}' names no sequence; lines look like 'sequence1'")
     numbers = [int(line.removeprefix("sequence")) for line in lines]
     return [sequence_at(dataset_dir / f"seq-{number:02d}") for number in numbers]
+
+
+Split = Literal["train", "test"]
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """Frames ``start`` to ``stop`` (exclusive) of a split, in a directory called ``name``."""
+
+    name: str
+    split: Split
+    start: int
+    stop: int
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+    @property
+    def images(self) -> list[str]:
+        """Its colour images, as the data set's directory has them."""
+        return [f"{self.name}/frame-{number:06d}.color.png" for number in range(len(self))]
+
+    @property
+    def number(self) -> int:
+        """Number of the sequence, from 1, train and test counted together."""
+        return int(self.name.removeprefix("seq-"))
+
+
+def sequences_of(n_train: int, n_test: int, shard_frames: int) -> list[Sequence]:
+    """Sequences of at most ``shard_frames`` frames: those of train first, then those of test."""
+    if shard_frames < 1 or min(n_train, n_test) < 0:
+        raise ValueError(f"cannot divide {n_train} + {n_test} frames by {shard_frames}")
+    sequences: list[Sequence] = []
+    counts: tuple[tuple[Split, int], ...] = (("train", n_train), ("test", n_test))
+    for split, count in counts:
+        for start in range(0, count, shard_frames):
+            name = f"seq-{len(sequences) + 1:02d}"
+            sequences.append(Sequence(name, split, start, min(start + shard_frames, count)))
+    return sequences

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from synfeal.bootstrap import FEWEST_PATHS
-from synfeal.config.collection import CameraConfig
+from synfeal.config.camera import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.errors import InputError, why
-from synfeal.evaluation.convention import checked_convention
-from synfeal.evaluation.estimates import CONVENTIONS, Convention, Estimates
+from synfeal.evaluation.estimates import CONVENTIONS, Convention, Estimates, checked_convention
 from synfeal.evaluation.formats import read_estimates
 from synfeal.evaluation.frames import Matched, ScoredFrames, match, read_scored_frames
 from synfeal.evaluation.metrics import (
@@ -30,8 +29,8 @@ from synfeal.evaluation.metrics import (
 from synfeal.evaluation.reprojection import dcre, dcre_summary, depth_of_images
 from synfeal.geometry.alignment import umeyama_sim3
 from synfeal.geometry.poses import quat_wxyz_of
-from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.listing import DEPTH
+from synfeal.validation.manifest import camera_of_dataset
 
 Array = NDArray[np.float64]
 Align = Literal["none", "se3", "sim3"]

@@ -8,46 +8,44 @@ is read by modes that ACE itself does not use. It knows one focal length and no 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.dataset.sevenscenes import pose_text
 from synfeal.errors import InputError
-from synfeal.export.depth import rewrite_depth
-from synfeal.export.frames import ExportFrame, ExportSet, need_splits, place
+from synfeal.export.frames import (
+    ExportFrame,
+    ExportSet,
+    Place,
+    need_splits,
+    rewrite_depth,
+    write_lines,
+)
 
 UNITS_PER_M = 1000
 
 
-def export_ace(data: ExportSet, out: Path, copy: bool, on_frame: Callable[[], object]) -> list[str]:
-    """Write the splits; returns no warnings.
+def export_ace(data: ExportSet, out: Path, place: Place) -> None:
+    """Write the splits.
 
     Raises:
         InputError: there are no splits, or the camera is more than ACE knows.
     """
     need_splits(data)
-    camera = intrinsics_of(data.camera)
+    camera = data.camera.intrinsics
     if any(data.camera.distortion) or abs(camera.fx - camera.fy) > 1e-5 * camera.fx:
         raise InputError(
             f"{data.path}: ACE knows one focal length and no distortion; undistort the images first"
         )
-    matrix = "".join(" ".join(map(repr, row)) + "\n" for row in camera.matrix().tolist())
+    matrix = [" ".join(map(repr, row)) for row in camera.matrix().tolist()]
     for frame in data.frames:
         folder = out / str(frame.split)
-        place(frame.color, folder / "rgb" / f"{_stem(frame)}.color.png", copy)
-        _write(folder / "poses" / f"{_stem(frame)}.pose.txt", pose_text(frame.world_from_cam))
-        _write(folder / "calibration" / f"{_stem(frame)}.calibration.txt", matrix)
+        place(frame.color, folder / "rgb" / f"{_stem(frame)}.color.png")
+        pose = pose_text(frame.world_from_cam).splitlines()
+        write_lines(folder / "poses" / f"{_stem(frame)}.pose.txt", pose)
+        write_lines(folder / "calibration" / f"{_stem(frame)}.calibration.txt", matrix)
         if data.has_depth:
             rewrite_depth(frame.depth, folder / "depth" / f"{_stem(frame)}.depth.png", UNITS_PER_M)
-        on_frame()
-    return []
 
 
 def _stem(frame: ExportFrame) -> str:
     return f"{frame.sequence}-{frame.color.name.removesuffix('.color.png')}"
-
-
-def _write(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
-from synfeal.config.collection import CameraConfig
-from synfeal.dataset.archive import FrameFile, link_or_unpack
-from synfeal.dataset.sevenscenes import SPLIT_FILES
+from synfeal.config.camera import CameraConfig
+from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.sevenscenes import INVALID_MM, SPLIT_FILES
 from synfeal.errors import InputError
-from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.frames import check_names, kinds_of, read_poses
-from synfeal.validation.images import read_color
+from synfeal.validation.images import read_color, read_depth_mm
 from synfeal.validation.listing import COLOR, DEPTH, Frame, list_sequences
-from synfeal.validation.poses import check_rigid
-from synfeal.validation.splits import check_splits, read_splits
+from synfeal.validation.manifest import camera_of_dataset
+from synfeal.validation.poses import check_rigid, check_splits, read_splits
+
+# Links or copies the image of a frame.
+Place = Callable[[FrameFile, Path], None]
 
 
 @dataclass(frozen=True)
@@ -124,10 +126,34 @@ def _check_size(path: FrameFile, camera: CameraConfig) -> None:
         )
 
 
-def place(source: FrameFile, target: Path, copy: bool) -> None:
-    """Link ``target`` to ``source``, by its absolute path, or copy it; what is archived, always."""
-    if copy and isinstance(source, Path):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source, target)
-    else:
-        link_or_unpack(source, target)
+def frame_name(frame: ExportFrame) -> str:
+    """What an image is called below ``images``."""
+    return f"{frame.sequence}/{frame.color.name}"
+
+
+def write_lines(path: Path, lines: Iterable[str]) -> None:
+    """Write a text file, and the directory it is in."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+
+
+def rewrite_depth(source: FrameFile, target: Path, units_per_m: int) -> float:
+    """Write a depth image anew; returns the share of known depths that are too large for it.
+
+    Args:
+        source: 16-bit PNG in millimetres, 0 or 65535 where there is no depth.
+        target: 16-bit PNG to write, 0 where there is no depth or it is beyond 65535 units.
+        units_per_m: units of ``target`` in a metre.
+
+    Raises:
+        InputError: ``source`` cannot be read.
+    """
+    depth_mm = read_depth_mm(source)
+    known = (depth_mm > 0) & (depth_mm < INVALID_MM)
+    units = np.round(depth_mm.astype(np.float64) * (units_per_m / 1000.0))
+    fits = known & (units <= 65535)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    image = Image.fromarray(np.where(fits, units, 0).astype(np.uint16))
+    image.save(target, compress_level=1)  # others take several times as long
+    n_known = int(np.count_nonzero(known))
+    return 1.0 - int(np.count_nonzero(fits)) / max(n_known, 1)

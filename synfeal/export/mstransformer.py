@@ -7,22 +7,18 @@ quaternions ``wxyz``, image paths below the data set's directory. There is no ca
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
 
-from synfeal.export.colmap import frame_name
-from synfeal.export.frames import ExportSet, need_splits, place
+from synfeal.export.frames import ExportSet, Place, frame_name, need_splits
 from synfeal.geometry.poses import quat_wxyz_of
 
 COLUMNS = ("scene", "split", "seq", "img_path", "t1", "t2", "t3", "q1", "q2", "q3", "q4")
 
 
-def export_mstransformer(
-    data: ExportSet, out: Path, copy: bool, on_frame: Callable[[], object]
-) -> list[str]:
-    """Write ``images/``, ``train.csv`` and ``test.csv``; returns no warnings.
+def export_mstransformer(data: ExportSet, out: Path, place: Place) -> None:
+    """Write ``images/``, ``train.csv`` and ``test.csv``.
 
     Raises:
         InputError: there are no splits.
@@ -32,10 +28,8 @@ def export_mstransformer(
         rows = []
         for frame in data.of_split(split):
             path = f"images/{frame_name(frame)}"
-            place(frame.color, out / path, copy)
+            place(frame.color, out / path)
             pose = (*frame.world_from_cam[:3, 3], *quat_wxyz_of(frame.world_from_cam))
             rows.append((data.path.resolve().name, split, frame.sequence, path, *pose))
-            on_frame()
-        table = pd.DataFrame(rows, columns=list(COLUMNS))
+            table = pd.DataFrame(rows, columns=list(COLUMNS))
         table.to_csv(out / f"{split}.csv", index=False, lineterminator="\n")
-    return []

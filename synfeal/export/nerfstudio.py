@@ -8,16 +8,13 @@ and evaluation during training reads ``val_filenames``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.config.collection import CameraConfig
-from synfeal.export.depth import rewrite_depth
-from synfeal.export.frames import ExportFrame, ExportSet, place
+from synfeal.config.camera import CameraConfig
+from synfeal.export.frames import ExportFrame, ExportSet, Place, rewrite_depth
 from synfeal.files import write_json
 
 # OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
@@ -25,19 +22,15 @@ CAM_FROM_GL = np.diag([1.0, -1.0, -1.0, 1.0])
 UNITS_PER_M = 1000  # Nerfstudio's depth_unit_scale_factor is 1e-3 by default
 
 
-def export_nerfstudio(
-    data: ExportSet, out: Path, copy: bool, on_frame: Callable[[], object]
-) -> list[str]:
+def export_nerfstudio(data: ExportSet, out: Path, place: Place) -> None:
     """Write ``transforms.json``, ``images/`` and, if there is depth, ``depth/``."""
     frames = []
     for frame in data.frames:
         frames.append(_frame(frame, data.has_depth))
-        place(frame.color, out / _image(frame), copy)
+        place(frame.color, out / _image(frame))
         if data.has_depth:
             rewrite_depth(frame.depth, out / _depth(frame), UNITS_PER_M)
-        on_frame()
     write_json(out / "transforms.json", {**_camera(data.camera), **_splits(data), "frames": frames})
-    return []
 
 
 def _image(frame: ExportFrame) -> str:
@@ -55,7 +48,7 @@ def _frame(frame: ExportFrame, has_depth: bool) -> dict[str, Any]:
 
 
 def _camera(camera: CameraConfig) -> dict[str, Any]:
-    intrinsics = intrinsics_of(camera)
+    intrinsics = camera.intrinsics
     k1, k2, p1, p2, k3 = camera.distortion
     return {
         "camera_model": "OPENCV",

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 from tqdm import tqdm
 
+from synfeal.dataset.archive import FrameFile, link_or_unpack
 from synfeal.dataset.directories import atomic_directory, refuse_existing
 from synfeal.export.ace import export_ace
-from synfeal.export.colmap import export_colmap
-from synfeal.export.frames import ExportSet, read_export_set
-from synfeal.export.hloc import export_hloc
+from synfeal.export.colmap import export_colmap, export_hloc
+from synfeal.export.frames import ExportSet, Place, read_export_set
 from synfeal.export.mstransformer import export_mstransformer
 from synfeal.export.nerfstudio import export_nerfstudio
 from synfeal.export.tum import export_tum
 
-Exporter = Callable[[ExportSet, Path, bool, Callable[[], object]], list[str]]
+Exporter = Callable[[ExportSet, Path, Place], None]
 
 FORMATS: dict[str, Exporter] = {
     "ace": export_ace,
@@ -28,10 +29,8 @@ FORMATS: dict[str, Exporter] = {
 }
 
 
-def export(
-    dataset: Path, to: str, out: Path, copy: bool, camera_file: Path | None
-) -> tuple[int, list[str]]:
-    """Write a data set in another format; returns the number of frames, and warnings.
+def export(dataset: Path, to: str, out: Path, copy: bool, camera_file: Path | None) -> int:
+    """Write a data set in another format; returns the number of frames.
 
     Args:
         dataset: directory with ``seq-01``.
@@ -51,5 +50,15 @@ def export(
             total=len(data.frames), unit="frame", desc="export", leave=False, disable=None
         ) as progress,
     ):
-        warnings = FORMATS[to](data, directory, copy, progress.update)
-    return len(data.frames), warnings
+
+        def place(source: FrameFile, target: Path) -> None:
+            """Link to an absolute path, or copy; what is archived, always."""
+            if copy and isinstance(source, Path):
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(source, target)
+            else:
+                link_or_unpack(source, target)
+            progress.update()
+
+        FORMATS[to](data, directory, place)
+    return len(data.frames)

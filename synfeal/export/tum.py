@@ -8,25 +8,25 @@ says it. It has none for splits either: the files that list them are copied.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import logging
+import shutil
 from pathlib import Path
 
-from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.config.collection import CameraConfig
+from synfeal.config.camera import CameraConfig
 from synfeal.dataset.sevenscenes import SPLIT_FILES
-from synfeal.export.depth import rewrite_depth
-from synfeal.export.frames import ExportFrame, ExportSet, place
+from synfeal.export.frames import ExportFrame, ExportSet, Place, rewrite_depth, write_lines
 from synfeal.geometry.poses import quat_wxyz_of
 
 FRAMES_PER_S = 30.0
 UNITS_PER_M = 5000
 MOST_M = 65535 / UNITS_PER_M
 
+log = logging.getLogger("synfeal")
 Lists = dict[str, list[str]]
 
 
-def export_tum(data: ExportSet, out: Path, copy: bool, on_frame: Callable[[], object]) -> list[str]:
-    """Write ``seq-XX/{rgb.txt,depth.txt,groundtruth.txt,rgb/,depth/}``; returns warnings."""
+def export_tum(data: ExportSet, out: Path, place: Place) -> None:
+    """Write ``seq-XX/{rgb.txt,depth.txt,groundtruth.txt,rgb/,depth/}``; warns of lost depths."""
     lists: dict[str, Lists] = {}
     lost = 0.0
     for frame in data.frames:
@@ -35,25 +35,20 @@ def export_tum(data: ExportSet, out: Path, copy: bool, on_frame: Callable[[], ob
         time = f"{frame.frame.number / FRAMES_PER_S:.6f}"
         sequence["groundtruth"].append(f"{time} {_pose(frame)}")
         sequence["rgb"].append(f"{time} rgb/{time}.png")
-        place(frame.color, directory / "rgb" / f"{time}.png", copy)
+        place(frame.color, directory / "rgb" / f"{time}.png")
         if data.has_depth:
             sequence["depth"].append(f"{time} depth/{time}.png")
             lost += rewrite_depth(frame.depth, directory / "depth" / f"{time}.png", UNITS_PER_M)
-        on_frame()
     for name, sequence in lists.items():
         _write_lists(out / name, sequence, data.camera)
     if data.has_splits:
         for name in SPLIT_FILES.values():
-            place(data.path / name, out / name, copy=True)
-    return _warnings(lost / len(data.frames))
-
-
-def _warnings(lost: float) -> list[str]:
-    if not lost:
-        return []
-    return [
-        f"{lost:.2%} of the depths are beyond {MOST_M:.1f} m, more than TUM's images hold: now 0"
-    ]
+            shutil.copyfile(data.path / name, out / name)
+    if lost:
+        log.warning(
+            "%.2f%% of the depths are beyond %.1f m, more than TUM's images hold: now 0",
+            *(100 * lost / len(data.frames), MOST_M),
+        )
 
 
 def _pose(frame: ExportFrame) -> str:
@@ -71,12 +66,11 @@ def _write_lists(directory: Path, lists: Lists, camera: CameraConfig) -> None:
     for kind, lines in lists.items():
         if lines:
             header = [f"# {kind}", f"# {_camera(camera)}", f"# {columns[kind]}"]
-            text = "".join(f"{line}\n" for line in [*header, *lines])
-            (directory / f"{kind}.txt").write_text(text, encoding="utf-8")
+            write_lines(directory / f"{kind}.txt", [*header, *lines])
 
 
 def _camera(camera: CameraConfig) -> str:
-    fx, fy, cx, cy = intrinsics_of(camera)
+    fx, fy, cx, cy = camera.intrinsics
     values = f"fx {fx!r} fy {fy!r} cx {cx - 0.5!r} cy {cy - 0.5!r}"
     coefficients = " ".join(map(repr, camera.distortion))
     return f"OpenCV camera, first pixel's centre at (0, 0): {values}; k1 k2 p1 p2 k3 {coefficients}"

@@ -3,30 +3,84 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 import synfeal
-from synfeal.inspect.density import detail_of
-from synfeal.inspect.doubts import colour_doubts, doubts_of, floor_areas_m2, suggestion_doubts
-from synfeal.inspect.freespace import DEFINITION
-from synfeal.inspect.inspection import Inspection
-from synfeal.inspect.sides import back_face_share
-from synfeal.inspect.suggest import N_FRAMES, Suggestion
-from synfeal.inspect.surface import triangle_areas_m2
+from synfeal.config.models import SceneConfig
+from synfeal.files import file_sha256
+from synfeal.inspect.doubts import (
+    colour_doubts,
+    doubts_of,
+    floor_areas_m2,
+    load_as_meant,
+    suggestion_doubts,
+)
+from synfeal.inspect.freespace import DEFINITION, FreeSpace, survey, viewpoint
+from synfeal.inspect.suggest import N_FRAMES, Suggestion, suggest
+from synfeal.inspect.surface import SurfacePoints, back_face_share, detail_of, triangle_areas_m2
+from synfeal.mesh.gltf import slug_of, title_of
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.mesh.properties import mesh_properties
-from synfeal.mesh.title import slug_of, title_of
-from synfeal.mesh.topology import mesh_topology
+from synfeal.mesh.properties import mesh_properties, mesh_topology
+from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import merge_vertices
+from synfeal.planning.plan import sampling_box_of
+from synfeal.seeds import generator_of
 
 Array = NDArray[np.float64]
 
 N_HOLES = 10  # of which the length is told
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What is known of a mesh.
+
+    Attributes:
+        scene: path, axis and unit as they were taken.
+        mesh: the mesh.
+        assumed: sentences about what the file did not say.
+        surface: points spread over the mesh.
+        caster: rays against it.
+        box_m: (2, 3) the box that was searched.
+        space: its free space.
+        suggestion: a sampling box that works, if one was found.
+    """
+
+    scene: SceneConfig
+    mesh: TexturedMesh
+    assumed: tuple[str, ...]
+    surface: SurfacePoints
+    caster: RayCaster
+    box_m: Array
+    space: FreeSpace
+    suggestion: Suggestion | None
+
+    @classmethod
+    def of(cls, scene: SceneConfig, unit_is_given: bool) -> Self:
+        """Load and look at a mesh; see :func:`synfeal.inspect.run.inspect_mesh`."""
+        scene, mesh, assumed = load_as_meant(scene, unit_is_given)
+        box_m = sampling_box_of(scene, mesh.bounds_m, str(scene.path))
+        surface = SurfacePoints.of(mesh, generator_of(0, "inspect"))
+        caster = RayCaster(*mesh.merged())
+        found = survey(caster, surface.position_m, box_m)
+        space, suggestion = suggest(caster, found, scene)
+        return cls(scene, mesh, tuple(assumed), surface, caster, box_m, space, suggestion)
+
+    @property
+    def suggested_m(self) -> Array | None:
+        """The suggested box (2, 3)."""
+        return None if self.suggestion is None else self.suggestion.box_m
+
+    @property
+    def viewpoint_m(self) -> Array:
+        """Where the pictures are taken from, (3,): in the free space if there is any."""
+        found_m = viewpoint(self.space, self.suggested_m)
+        return self.mesh.bounds_m.mean(axis=0) if found_m is None else found_m
 
 
 def facts_of(found: Inspection) -> dict[str, Any]:
@@ -38,7 +92,7 @@ def facts_of(found: Inspection) -> dict[str, Any]:
         "title": title,
         "mesh": {
             "path": str(scene.path),
-            "sha256": sha256_of(Path(str(scene.path))),
+            "sha256": file_sha256(Path(str(scene.path))),
             "up_axis": scene.up_axis,
             "unit_m": scene.unit_m,
         },
@@ -89,12 +143,6 @@ def _collect(suggestion: Suggestion, title: str) -> dict[str, Any]:
 def as_box(box_m: Array) -> dict[str, list[float]]:
     """A box (2, 3) as the mapping a configuration file holds."""
     return {axis: box_m[:, index].tolist() for index, axis in enumerate("xyz")}
-
-
-def sha256_of(path: Path) -> str:
-    """Hash of the mesh file itself, as ``sha256`` of a scene expects it."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _topology(mesh: TexturedMesh) -> dict[str, Any]:

@@ -8,10 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from synfeal.inspect.largest_box import largest_box
 from synfeal.mesh.rays import RayCaster
-from synfeal.planning.connected import ConnectedSpace
-from synfeal.planning.start import seeing_groups
+from synfeal.planning.start import ConnectedSpace, seeing_groups
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -104,7 +102,7 @@ def survey(caster: RayCaster, surface_m: Array, box_m: Array) -> Survey:
     is_clear[is_clear] = distance_m >= CLEARANCE_M + step_m / 4.0
     is_stand = is_clear.copy()
     height_m = points[is_clear, 2] - _floors_m(caster, points[is_clear])
-    half_m = _step(axes[2]) / 2.0
+    half_m = step_m_of(axes[2]) / 2.0
     low, high = CAMERA_HEIGHT_M
     is_stand[is_clear] = (height_m >= low - half_m) & (height_m <= high + half_m)
     return Survey(axes, points, enclosure, is_clear, is_stand)
@@ -148,26 +146,6 @@ def _largest_space(caster: RayCaster, stands_m: Array) -> tuple[Array, float]:
     return largest[:N_HUBS], len(largest) / len(places)
 
 
-def suggest_box(space: FreeSpace) -> Array | None:
-    """A box (2, 3) at camera heights to sample in: as large as can be while mostly clear.
-
-    None if no clear point lies 0.8 to 2.0 m above the floor.
-    """
-    if space.floor_m is None:
-        return None
-    z_m = space.axes_m[2] - space.floor_m
-    at_height = (z_m >= CAMERA_HEIGHT_M[0]) & (z_m <= CAMERA_HEIGHT_M[1])
-    is_candidate = space.is_clear & at_height
-    if not is_candidate.any():
-        return None
-    lower, upper = largest_box(is_candidate)
-    reach_m = [_step(axis) / 4.0 for axis in space.axes_m]
-    axes = list(zip(space.axes_m, lower, upper, reach_m, strict=True))
-    low = [axis[first] - reach for axis, first, _, reach in axes]
-    high = [axis[last] + reach for axis, _, last, reach in axes]
-    return np.round(np.array([low, high]), 2)
-
-
 def viewpoint(space: FreeSpace, box_m: Array | None) -> Array | None:
     """The clear point (3,) nearest to the middle of the box; of the clear space without a box."""
     if not space.is_clear.any():
@@ -204,7 +182,8 @@ def _grid(box_m: Array) -> tuple[tuple[Array, Array, Array], float]:
     return (x, y, z), float(np.max(extents / counts))
 
 
-def _step(axis: Array) -> float:
+def step_m_of(axis: Array) -> float:
+    """Distance of neighbouring points along an axis of a grid."""
     return float(axis[1] - axis[0]) if len(axis) > 1 else 0.1
 
 

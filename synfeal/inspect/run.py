@@ -1,25 +1,28 @@
-"""A first look at a mesh: what ``synfeal inspect`` does."""
+"""A first look at a mesh: what ``synfeal inspect`` finds out once, draws and writes."""
 
 from __future__ import annotations
 
+import base64
+import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from jinja2 import Environment, PackageLoader
 from numpy.typing import NDArray
 
 from synfeal.config.models import SceneConfig
 from synfeal.dataset.directories import refuse_foreign
 from synfeal.files import atomic_path, write_json
-from synfeal.inspect.facts import facts_of
-from synfeal.inspect.inspection import Inspection
-from synfeal.inspect.page import page_html
-from synfeal.inspect.picture import picture_png
-from synfeal.inspect.text import Facts, how_to_go_on, plain_text, sections_of
-from synfeal.inspect.viewer_mesh import ACROSS_RAD, viewer_mesh
-from synfeal.inspect.views import inside_views, top_view
+from synfeal.inspect.facts import Inspection, facts_of
+from synfeal.inspect.picture import inside_views, picture_png, top_view
+from synfeal.inspect.text import Facts, Section, how_to_go_on, plain_text, sections_of
+from synfeal.inspect.viewer_mesh import ACROSS_RAD, viewer_js, viewer_mesh
 from synfeal.mesh.rays import RayCaster
 
 Array = NDArray[np.float64]
+
 
 OUTPUTS = ("inspect.json", "inspect.png", "inspect.html")
 N_LEVEL_RAYS = 64
@@ -99,3 +102,34 @@ def _picture(facts: Facts, found: Inspection) -> bytes:
 def _write(path: Path, content: bytes) -> None:
     with atomic_path(path) as temporary:
         temporary.write_bytes(content)
+
+
+def page_html(
+    title: str,
+    doubts: Sequence[str],
+    sections: Sequence[Section],
+    snippet: str,
+    picture_png: bytes,
+    scene: dict[str, Any],
+) -> str:
+    """The page as HTML, with nothing to load from elsewhere.
+
+    Args:
+        title: heading.
+        doubts: sentences to stand out at the top.
+        sections: tables of numbers.
+        snippet: lines for a configuration file and for a shell.
+        picture_png: the picture.
+        scene: what :meth:`synfeal.inspect.viewer_mesh.ViewerMesh.scene` returns.
+    """
+    loader = PackageLoader("synfeal.inspect", ".")
+    pages = Environment(loader=loader, autoescape=True, keep_trailing_newline=True)
+    return pages.get_template("page.html").render(
+        title=title,
+        doubts=doubts,
+        sections=sections,
+        snippet=snippet,
+        picture=base64.b64encode(picture_png).decode("ascii"),
+        scene=json.dumps(scene, allow_nan=False).replace("<", "\\u003c"),
+        viewer=viewer_js(),
+    )

@@ -8,7 +8,7 @@ from itertools import zip_longest
 from textwrap import wrap
 from typing import Any, NamedTuple
 
-from synfeal.mesh.title import slug_of
+from synfeal.mesh.gltf import slug_of
 
 Facts = Mapping[str, Any]
 

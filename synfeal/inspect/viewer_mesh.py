@@ -14,9 +14,8 @@ from scipy.spatial import cKDTree
 from trimesh.triangles import cross
 
 from synfeal.inspect.surface import SurfacePoints
-from synfeal.mesh.decimate import simplify
 from synfeal.mesh.model import TexturedMesh
-from synfeal.mesh.triangles import merge_vertices
+from synfeal.mesh.triangles import merge_vertices, simplify
 
 Array = NDArray[np.float64]
 

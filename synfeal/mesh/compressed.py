@@ -3,7 +3,7 @@
 ``pip install synfeal[meshes]`` installs the libraries: meshoptimizer (EXT_meshopt_compression),
 DracoPy (KHR_draco_mesh_compression) and opengl_basisu (KHR_texture_basisu: KTX2). Quantised
 attributes (KHR_mesh_quantization) need none. What cannot be decoded here stays as it is, and
-:mod:`synfeal.mesh.refuse` says what to do.
+:mod:`synfeal.mesh.checks` says what to do.
 """
 
 from __future__ import annotations
@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from synfeal.mesh.extensions import BASISU, DRACO, MESHOPT, stand_alone
-from synfeal.mesh.gltf import DECODED_URI, Gltf, Json
+from synfeal.mesh.gltf import BASISU, DECODED_URI, DRACO, MESHOPT, Gltf, Json, stand_alone
 
 LIBRARIES = dict.fromkeys(MESHOPT, "meshoptimizer")
 LIBRARIES |= {DRACO: "DracoPy", BASISU: "opengl_basisu"}

@@ -64,7 +64,7 @@ def with_fewer_faces(mesh: TexturedMesh, n_faces: int) -> TexturedMesh:
     first = np.cumsum([0, *(len(part.vertices_m) for part in mesh.parts)])
     of_part = np.searchsorted(first, kept[:, 0], side="right") - 1
     parts = (
-        _subset(part, kept[of_part == index] - first[index])
+        part.over(kept[of_part == index] - first[index])
         for index, part in enumerate(mesh.parts)
         if (of_part == index).any()
     )
@@ -89,15 +89,3 @@ def _simplified(
         target_error=NO_LIMIT,
     )
     return kept[:count].reshape(-1, 3).astype(np.int64)
-
-
-def _subset(part: MeshPart, faces: NDArray[np.int64]) -> MeshPart:
-    """The part with other faces (F, 3) over its vertices, without those that none uses."""
-    used, index = np.unique(faces, return_inverse=True)
-    return replace(
-        part,
-        vertices_m=part.vertices_m[used],
-        faces=index.reshape(-1, 3).astype(np.int64),
-        uv=None if part.uv is None else part.uv[used],
-        vertex_rgb=None if part.vertex_rgb is None else part.vertex_rgb[used],
-    )

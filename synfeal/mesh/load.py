@@ -14,14 +14,11 @@ import trimesh
 from numpy.typing import NDArray
 
 from synfeal.errors import InputError, why
-from synfeal.mesh.checks import check_indices, check_mesh
-from synfeal.mesh.colours import part_colours
+from synfeal.mesh.checks import check_indices, check_mesh, refuse_extensions, refuse_kind
 from synfeal.mesh.compressed import decoded
-from synfeal.mesh.findings import Findings
 from synfeal.mesh.gltf import Gltf, read_gltf, simplified
-from synfeal.mesh.materials import BaseMaterial, MaterialReader
-from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.mesh.refuse import refuse_extensions, refuse_kind
+from synfeal.mesh.materials import BaseMaterial, MaterialReader, part_colours
+from synfeal.mesh.model import Findings, MeshPart, TexturedMesh
 from synfeal.mesh.repair import repaired
 from synfeal.mesh.resolver import RecordingResolver, report_missing
 from synfeal.mesh.textures import large_images_allowed

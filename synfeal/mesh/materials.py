@@ -1,4 +1,4 @@
-"""Materials reduced to what an unlit render shows: a base colour, a texture, an alpha cutoff.
+"""Materials and colours reduced to what an unlit render shows: base colour, texture, alpha cutoff.
 
 Metalness, roughness, normals and light are dropped on purpose: the light of a reconstruction is in
 its texture. Blended materials (glass, light shafts) become alpha-tested at one half, so that every
@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import trimesh
 from numpy.typing import ArrayLike, NDArray
 
-from synfeal.mesh.findings import Findings
 from synfeal.mesh.gltf import Json, base_color
-from synfeal.mesh.model import WHITE
+from synfeal.mesh.model import WHITE, Findings
 from synfeal.mesh.textures import Pixels, decode
 
 BLEND_CUTOFF = 0.5
@@ -159,3 +159,33 @@ def linear_from_srgb(rgba: ArrayLike) -> NDArray[np.float64]:
     curve = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
     curve[..., 3:] = value[..., 3:]
     return curve
+
+
+SRGB_ATTRIBUTE = "_SRGB"  # beside glTF's linear colours: the display colours, exact in 8 bits
+
+
+def part_colours(geometry: trimesh.Trimesh, is_linear: bool) -> Pixels | None:
+    """Display colours (V, 3) uint8 of the vertices of a trimesh geometry, if it has any.
+
+    Args:
+        geometry: as parsed.
+        is_linear: whether the file stores linear colours, as glTF does.
+    """
+    exact = geometry.vertex_attributes.get(SRGB_ATTRIBUTE)
+    if exact is not None:
+        return np.asarray(exact, dtype=np.uint8)[:, :3]
+    visual = geometry.visual
+    is_plain = visual.kind == "vertex"
+    extra = getattr(visual, "vertex_attributes", {})
+    stored: Any = visual.vertex_colors if is_plain else extra.get("color")
+    if stored is None:
+        return None
+    colours = as_fraction(stored)[:, :3]
+    return srgb_from_linear(colours) if is_linear else np.round(255.0 * colours).astype(np.uint8)
+
+
+def as_fraction(stored: Any) -> NDArray[np.float64]:
+    """Values in 0 to 1 of integers, which span the range of their type, or of floats."""
+    values = np.asarray(stored)
+    largest = np.iinfo(values.dtype).max if values.dtype.kind in "iu" else 1
+    return np.asarray(np.clip(np.nan_to_num(values / largest), 0.0, 1.0), dtype=np.float64)

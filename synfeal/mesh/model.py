@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import logging
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +46,17 @@ class MeshPart:
             alpha *= self.texture[..., 3].max() / 255.0
         return bool(alpha >= self.alpha_cutoff)
 
+    def over(self, faces: NDArray[np.int64]) -> MeshPart:
+        """Other faces (F, 3) over the same vertices, without those that none of them uses."""
+        used, index = np.unique(faces, return_inverse=True)
+        return replace(
+            self,
+            vertices_m=self.vertices_m[used],
+            faces=index.reshape(-1, 3).astype(np.int64),
+            uv=None if self.uv is None else self.uv[used],
+            vertex_rgb=None if self.vertex_rgb is None else self.vertex_rgb[used],
+        )
+
 
 @dataclass(frozen=True)
 class TexturedMesh:
@@ -81,3 +94,30 @@ class TexturedMesh:
         vertices = np.concatenate([part.vertices_m for part in self.parts])
         shifted = [part.faces + offset for part, offset in zip(self.parts, offsets, strict=True)]
         return vertices, np.concatenate(shifted)
+
+
+log = logging.getLogger("synfeal")
+
+
+class Findings:
+    """Sentences in the order they were found, each once."""
+
+    def __init__(self, path: Path) -> None:
+        """Collect what is found in the file at ``path``."""
+        self._path = path
+        self._sentences: dict[str, None] = {}
+
+    def note(self, sentence: str) -> None:
+        """Keep a sentence: what was done is what its author would expect."""
+        self._sentences.setdefault(sentence)
+
+    def warn(self, sentence: str) -> None:
+        """Keep a sentence and log it at once: the images differ from what the author sees."""
+        if sentence not in self._sentences:
+            log.warning("%s: %s", self._path, sentence)
+        self.note(sentence)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """All findings so far."""
+        return tuple(self._sentences)

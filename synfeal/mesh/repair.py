@@ -11,8 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.mesh.findings import Findings
-from synfeal.mesh.model import MeshPart
+from synfeal.mesh.model import Findings, MeshPart
 
 # A face is without area if its height is rounding: of its longest edge, or of its coordinates.
 RELATIVE_HEIGHT = 1e-12
@@ -79,18 +78,9 @@ def _finite_uv(part: MeshPart, findings: Findings) -> MeshPart:
 
 def _compact(part: MeshPart, findings: Findings) -> MeshPart:
     """The part without the vertices that no face names; they would stretch its bounds."""
-    used = np.zeros(len(part.vertices_m), dtype=np.bool_)
-    used[part.faces] = True
-    unused = int((~used).sum())
+    unused = len(part.vertices_m) - len(np.unique(part.faces))
     if not unused:
         return part
     noun = "vertex" if unused == 1 else "vertices"
     findings.note(f"part '{part.name}': {unused} unused {noun} removed")
-    index = np.cumsum(used) - 1
-    return replace(
-        part,
-        vertices_m=part.vertices_m[used],
-        faces=index[part.faces],
-        uv=None if part.uv is None else part.uv[used],
-        vertex_rgb=None if part.vertex_rgb is None else part.vertex_rgb[used],
-    )
+    return part.over(part.faces)

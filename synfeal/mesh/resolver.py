@@ -9,8 +9,8 @@ from urllib.parse import unquote
 from PIL import Image
 from trimesh.resolvers import FilePathResolver
 
-from synfeal.mesh.findings import Findings
 from synfeal.mesh.gltf import BIN_URI, DECODED_URI, Gltf, Json, base_color, image_uri
+from synfeal.mesh.model import Findings
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tga", ".tif", ".tiff")
 

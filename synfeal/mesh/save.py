@@ -15,8 +15,7 @@ from trimesh.visual.material import PBRMaterial
 
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
-from synfeal.mesh.colours import SRGB_ATTRIBUTE
-from synfeal.mesh.materials import linear_from_srgb
+from synfeal.mesh.materials import SRGB_ATTRIBUTE, linear_from_srgb
 from synfeal.mesh.model import MeshPart, TexturedMesh
 
 # glTF is y-up: what is (x, y, z) in the world is stored as (x, z, -y).

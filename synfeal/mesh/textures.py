@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.errors import why
-from synfeal.mesh.findings import Findings
+from synfeal.mesh.model import Findings
 
 Pixels = NDArray[np.uint8]
 

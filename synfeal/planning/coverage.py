@@ -15,13 +15,19 @@ from synfeal.dataset.pose_table import PoseTable
 from synfeal.errors import InputError
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, load_collision_mesh
-from synfeal.planning.connected import ConnectedSpace, connected_space
-from synfeal.planning.empty_pixels import MOSTLY, empty_pixels
 from synfeal.planning.plan import sampling_boxes_of
 from synfeal.planning.sampling import pose_bounds
-from synfeal.planning.seen_surface import FARTHEST_M, OFTEN, seen_surface, shown_frames
+from synfeal.planning.seen_surface import (
+    FARTHEST_M,
+    MOSTLY,
+    OFTEN,
+    empty_pixels,
+    seen_surface,
+    shown_frames,
+)
 from synfeal.planning.seen_surface import N_POINTS as N_SURFACE_POINTS
 from synfeal.planning.space import PoseSpace
+from synfeal.planning.start import ConnectedSpace, connected_space
 
 Array = NDArray[np.float64]
 

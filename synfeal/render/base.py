@@ -15,7 +15,11 @@ DEFAULT_SUPERSAMPLING = RenderConfig().supersampling
 
 
 class Renderer(Protocol):
-    """Unlit images of one mesh through one camera."""
+    """Unlit images of one mesh through one camera.
+
+    What draws a mesh takes ``(mesh, camera, supersampling, background_rgb)``: the camera without
+    distortion, samples per pixel along each axis of the image, the colour where nothing is.
+    """
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         """Colours (H, W, 3) seen from a pose (4, 4)."""

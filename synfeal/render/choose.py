@@ -8,10 +8,11 @@ from __future__ import annotations
 import functools
 import logging
 from collections.abc import Callable
+from pkgutil import resolve_name
 
 import numpy as np
 
-from synfeal.config.collection import CameraConfig
+from synfeal.config.camera import CameraConfig
 from synfeal.config.rendering import RenderConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
@@ -22,29 +23,21 @@ Opener = Callable[[TexturedMesh, CameraConfig, RenderConfig], Renderer]
 EGL_PACKAGES = "on Debian and Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri"
 
 
-def _open_opengl(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) -> Renderer:
-    from synfeal.render.opengl.backend import OpenglRenderer
+def _opener(place: str) -> Opener:
+    """Opens the class at ``module:name``, which is loaded by then: backends take up to a second."""
 
-    return OpenglRenderer(mesh, camera, render.supersampling, render.background_rgb)
+    def opened(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) -> Renderer:
+        backend: Callable[..., Renderer] = resolve_name(place)
+        return backend(mesh, camera, render.supersampling, render.background_rgb)
 
-
-def _open_pyrender(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) -> Renderer:
-    from synfeal.render.pyrender_backend import PyrenderRenderer  # takes a second: only when needed
-
-    return PyrenderRenderer(mesh, camera, render.supersampling, render.background_rgb)
-
-
-def _open_raycast(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) -> Renderer:
-    from synfeal.render.raycast_backend import RaycastRenderer
-
-    return RaycastRenderer(mesh, camera, render.supersampling, render.background_rgb)
+    return opened
 
 
 # Fastest first; results/benchmarks/rendering.md says by how much.
 BACKENDS: dict[str, Opener] = {
-    "opengl": _open_opengl,
-    "pyrender": _open_pyrender,
-    "raycast": _open_raycast,
+    "opengl": _opener("synfeal.render.opengl.backend:OpenglRenderer"),
+    "pyrender": _opener("synfeal.render.pyrender_backend:PyrenderRenderer"),
+    "raycast": _opener("synfeal.render.raycast_backend:RaycastRenderer"),
 }
 INSTALL = {
     "opengl": f"pip install moderngl; {EGL_PACKAGES}",

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
@@ -70,7 +69,7 @@ def covering_camera(camera: CameraConfig) -> CameraConfig:
         InputError: the view is so wide that the pinhole image would exceed 8192 pixels.
     """
     edge = _edge_normalised(camera)
-    fx, fy, _, _ = intrinsics_of(camera)
+    fx, fy, _, _ = camera.intrinsics
     extent = np.ptp(edge, axis=0) * [fx, fy]
     scale = min(_OVERSAMPLING, (_LONGEST_SIDE_PX - 2 * _MARGIN_PX - 2) / extent.max())
     if scale < 1.0:
@@ -140,7 +139,7 @@ def _seen_at(
     """Where rows ``start`` to ``stop`` of the image lie in the pinhole image: (rows, W, 2)."""
     column, row = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(start, stop) + 0.5)
     normalised = normalised_of_pixels(camera, np.stack([column, row], axis=-1) + offset)
-    fx, fy, cx, cy = intrinsics_of(pinhole)
+    fx, fy, cx, cy = pinhole.intrinsics
     return normalised * [fx, fy] + [cx, cy]
 
 

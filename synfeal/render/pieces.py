@@ -1,11 +1,11 @@
-"""Parts too large for a driver, in pieces."""
+"""Parts as backends take them: not too large for a driver, alpha tests decided in the texture."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from synfeal.mesh.model import MeshPart
 
@@ -20,11 +20,20 @@ def pieces(part: MeshPart, most_vertices: int = MOST_VERTICES) -> Iterator[MeshP
         return
     step = max(1, most_vertices // 3)
     for start in range(0, len(part.faces), step):
-        used, faces = np.unique(part.faces[start : start + step], return_inverse=True)
-        yield replace(
-            part,
-            vertices_m=part.vertices_m[used],
-            faces=faces.reshape(-1, 3),
-            uv=None if part.uv is None else part.uv[used],
-            vertex_rgb=None if part.vertex_rgb is None else part.vertex_rgb[used],
-        )
+        yield part.over(part.faces[start : start + step])
+
+
+def thresholded(part: MeshPart) -> NDArray[np.uint8]:
+    """The part's texture with alpha 0 or 255, or without alpha where the part is opaque.
+
+    Texels that are not drawn take the mean colour of those that are: filtering mixes them in at the
+    edges and in every mip level, and their own colour is arbitrary.
+    """
+    assert part.texture is not None
+    if part.texture.shape[2] == 3 or part.alpha_cutoff is None:
+        return np.ascontiguousarray(part.texture[..., :3])
+    alpha = part.texture[..., 3] / 255.0 * (part.base_color[3] / 255.0)
+    drawn = alpha >= part.alpha_cutoff
+    rgba = np.dstack([part.texture[..., :3], np.where(drawn, 255, 0).astype(np.uint8)])
+    rgba[~drawn, :3] = rgba[drawn, :3].mean(axis=0)
+    return rgba

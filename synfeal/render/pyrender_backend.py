@@ -14,13 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render.base import DEFAULT_SUPERSAMPLING, Depth, Renderer, Rgb
-from synfeal.render.cutouts import thresholded
-from synfeal.render.pieces import pieces
+from synfeal.render.pieces import pieces, thresholded
 
 # OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
 CAM_FROM_GL: NDArray[np.float64] = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -93,12 +91,6 @@ class PyrenderRenderer(Renderer):
     ) -> None:
         """Prepare the mesh, which is uploaded by the first render.
 
-        Args:
-            mesh: what is drawn.
-            camera: a camera without distortion.
-            supersampling: samples per pixel along each axis of the image.
-            background_rgb: colour where nothing is.
-
         Raises:
             InputError: EGL does not work here.
         """
@@ -108,7 +100,7 @@ class PyrenderRenderer(Renderer):
         flags = pyrender.RenderFlags
         self._flags = flags.FLAT | flags.SKIP_CULL_FACES | flags.OFFSCREEN
         self._size = (camera.width, camera.height)
-        self._intrinsics = intrinsics_of(camera)
+        self._intrinsics = camera.intrinsics
         self._background = np.array([*background_rgb, 0]) / 255.0
         self._scene = pyrender.Scene()
         # Vertex buffers hold single precision: exact around the scene's own centre, wherever it is.

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.mesh.model import TexturedMesh
 from synfeal.render.base import DEFAULT_SUPERSAMPLING, Depth, Renderer, Rgb
@@ -31,17 +30,10 @@ class RaycastRenderer(Renderer):
         supersampling: int = DEFAULT_SUPERSAMPLING,
         background_rgb: tuple[int, int, int] = (0, 0, 0),
     ) -> None:
-        """Prepare triangles and textures.
-
-        Args:
-            mesh: what is drawn.
-            camera: a camera without distortion.
-            supersampling: samples per pixel along each axis of the image.
-            background_rgb: colour where nothing is.
-        """
+        """Prepare triangles and textures."""
         self._triangles = TexturedTriangles(mesh)
         self._camera = camera
-        self._intrinsics = intrinsics_of(camera)
+        self._intrinsics = camera.intrinsics
         steps = (np.arange(supersampling) + 0.5) / supersampling
         self._samples_px: Floats = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         self._background = np.array(background_rgb, np.float32)

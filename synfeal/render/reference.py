@@ -12,8 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.config.collection import CameraConfig
+from synfeal.config.camera import CameraConfig
 from synfeal.render.base import Renderer
 
 SAMPLES_PER_AXIS = 8
@@ -38,7 +37,7 @@ def reference_images(
 
 def magnified(camera: CameraConfig, factor: int) -> CameraConfig:
     """The camera with every pixel split into ``factor`` by ``factor``."""
-    fx, fy, cx, cy = (factor * value for value in intrinsics_of(camera))
+    fx, fy, cx, cy = (factor * value for value in camera.intrinsics)
     size = {"width": factor * camera.width, "height": factor * camera.height}
     return CameraConfig.model_validate(
         {**camera.model_dump(), **size, "fx": fx, "fy": fy, "cx": cx, "cy": cy}

@@ -9,9 +9,8 @@ import numpy as np
 from synfeal.scenes import fronts, materials
 from synfeal.scenes.canvas import Colour, pick, shade
 from synfeal.scenes.materials import painted
-from synfeal.scenes.patches import Item, joined, paint
+from synfeal.scenes.patches import Item, box, joined, paint, turned
 from synfeal.scenes.pictures import VIVID
-from synfeal.scenes.primitives import box, turned
 
 Generator = np.random.Generator
 BOTTLES: tuple[Colour, ...] = (

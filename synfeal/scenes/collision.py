@@ -19,10 +19,9 @@ from scipy.stats import binomtest
 
 from synfeal.config.models import SceneConfig
 from synfeal.dataset.number_table import write_numbers
-from synfeal.mesh.decimate import simplify
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
-from synfeal.mesh.triangles import Triangles, merge_vertices
+from synfeal.mesh.triangles import Triangles, merge_vertices, simplify
 from synfeal.planning.questions import Questions, draw_questions
 
 SMALLEST = 100

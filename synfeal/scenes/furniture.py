@@ -9,8 +9,7 @@ import numpy as np
 from synfeal.scenes import clutter, fronts, materials
 from synfeal.scenes.canvas import Colour, Painter, shade
 from synfeal.scenes.materials import painted
-from synfeal.scenes.patches import Item, joined, paint
-from synfeal.scenes.primitives import box, sheet, turned
+from synfeal.scenes.patches import Item, box, joined, paint, sheet, turned
 
 Generator = np.random.Generator
 METAL: Colour = (0.55, 0.56, 0.58)

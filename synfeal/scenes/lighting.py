@@ -200,3 +200,15 @@ def _sun_light(sun: Sun, origins: Vectors, normals: Vectors, caster: RayCaster) 
         visible = caster.sees(origins[lit], origins[lit] + reach * towards)
         light[lit] += (strength[lit] * visible)[:, None] * _single(sun.colour)
     return light
+
+
+def ambient_corners(
+    near_left: Colour, far_left: Colour, near_right: Colour, far_right: Colour, top: float
+) -> NDArray[np.float32]:
+    """Ambient light (2, 2, 2, 3) by x, y, z from the colours at the corners of the floor.
+
+    ``left`` and ``right`` are low and high x, ``near`` and ``far`` low and high y; the light at the
+    ceiling is ``top`` times that at the floor.
+    """
+    floor = np.array([[near_left, far_left], [near_right, far_right]], np.float32)
+    return np.stack([floor, np.float32(top) * floor], axis=2)

@@ -22,8 +22,8 @@ from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.scenes import fronts
 from synfeal.scenes.canvas import pick
+from synfeal.scenes.patches import box
 from synfeal.scenes.pictures import VIVID
-from synfeal.scenes.primitives import box
 
 Array = NDArray[np.float64]
 CARTONS = 8  # that differ

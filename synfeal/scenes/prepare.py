@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ from synfeal.config.mesh_files import check_mesh_file
 from synfeal.config.models import SceneConfig
 from synfeal.dataset.finish import CLUTTER
 from synfeal.errors import InputError
-from synfeal.files import write_json
+from synfeal.files import file_sha256, write_json
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.properties import mesh_properties
@@ -114,8 +113,7 @@ def check_sha256(path: Path, expected: str, name: str) -> None:
         InputError: the file is missing or is not the expected one.
     """
     check_mesh_file(path, f"scenes.{name}.path")
-    with path.open("rb") as file:
-        found = hashlib.file_digest(file, "sha256").hexdigest()
+    found = file_sha256(path)
     if found != expected:
         raise InputError(
             f"scenes.{name}.sha256: {path} has {found}, expected {expected}; download it again,"

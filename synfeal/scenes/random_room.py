@@ -15,12 +15,10 @@ import numpy as np
 
 from synfeal.mesh.model import TexturedMesh
 from synfeal.scenes import clutter, fronts, furniture, materials, murals, pictures
-from synfeal.scenes.ambient import ambient_corners
 from synfeal.scenes.bake import scanned_mesh
 from synfeal.scenes.canvas import Colour, Painter
-from synfeal.scenes.lighting import Lamp, Lighting
-from synfeal.scenes.patches import Item, joined, paint
-from synfeal.scenes.primitives import box, level, on_wall, upright
+from synfeal.scenes.lighting import Lamp, Lighting, ambient_corners
+from synfeal.scenes.patches import Item, box, joined, level, on_wall, paint, upright
 from synfeal.scenes.scan import Scanner, stations
 from synfeal.seeds import generator_of
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.collection import CameraConfig
+from synfeal.config.camera import CameraConfig
 from synfeal.config.rendering import RenderConfig
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.render_sequence import resolved

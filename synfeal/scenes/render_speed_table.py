@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from synfeal.frames import COUNT, NUMBER, TEXT, frame_of, read_frame, records_of, write_frame
+from synfeal.frames import COUNT, NUMBER, TEXT, frame_of, write_frame
 
 
 @dataclass(frozen=True)
@@ -49,13 +49,3 @@ SCHEMA = {name: KINDS[str(kind)] for name, kind in Measured.__annotations__.item
 def write_speed(path: Path, lines: Iterable[Measured]) -> None:
     """Write one line per camera and variant; the times differ between runs."""
     write_frame(path, frame_of(map(asdict, lines), SCHEMA), float_format=None)
-
-
-def read_speed(path: Path) -> list[Measured]:
-    """Read what :func:`write_speed` wrote.
-
-    Raises:
-        InputError: the file is missing, lacks a column, or holds what is not a measurement.
-    """
-    frame = read_frame(path, SCHEMA, "measure again")
-    return [Measured(**row) for row in records_of(frame)]

@@ -14,23 +14,19 @@ from statistics import median_low
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
-from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.config.collection import CameraConfig
+from synfeal.config.camera import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
-from synfeal.validation.camera import KnownCamera
 from synfeal.validation.check import Check
 from synfeal.validation.frames import Poses
 from synfeal.validation.images import read_color, read_depth_mm
 from synfeal.validation.lens import Lens
-from synfeal.validation.listing import COLOR, DEPTH, Frame, SequenceListing
+from synfeal.validation.listing import COLOR, DEPTH, Frame
+from synfeal.validation.manifest import KnownCamera
+from synfeal.validation.pairs import GAPS
 from synfeal.validation.reprojection import Residual, View, camera_normal, compare
 
-GAPS = (1, 5, 20)  # frames apart: neighbours see the most, distant ones tell angles and lengths
-N_NEAREST = 2  # frames of the most similar pose, which of independent poses see the most
-PAIRS_PER_GAP = 200  # evenly spread over larger sets
 GRID_PIXELS = 5000  # of each frame are moved to the other one
 MIN_OVERLAP = 0.2
 # Frames that moved and turned by less must share most of what they see, in any scene.
@@ -90,53 +86,6 @@ class Pair:
     a: Frame
     b: Frame
     residual: Residual | None
-
-
-def choose_pairs(
-    sequences: Iterable[SequenceListing], usable: Poses, every: bool
-) -> list[tuple[Frame, Frame]]:
-    """Pairs ``GAPS`` frames apart, and each frame with those of the most similar poses.
-
-    Of a sequence each; at most ``PAIRS_PER_GAP`` of each kind unless ``every``.
-    """
-    sequences = list(sequences)
-    kinds = [
-        [
-            (frame, Frame(frame.sequence, frame.number + gap))
-            for sequence in sequences
-            for frame in sequence.frames
-            if frame in usable and Frame(frame.sequence, frame.number + gap) in usable
-        ]
-        for gap in GAPS
-    ]
-    kinds.append([pair for sequence in sequences for pair in _nearest(sequence, usable)])
-    chosen: set[tuple[Frame, Frame]] = set()
-    for pairs in kinds:
-        index = np.arange(len(pairs))
-        if not every and len(pairs) > PAIRS_PER_GAP:
-            index = np.linspace(0, len(pairs) - 1, PAIRS_PER_GAP).round().astype(int)
-        chosen.update(pairs[i] for i in index)
-    order = {sequence.path: index for index, sequence in enumerate(sequences)}
-    return sorted(chosen, key=lambda p: (order[p[0].sequence], p[0].number, p[1].number))
-
-
-def _nearest(sequence: SequenceListing, usable: Poses) -> list[tuple[Frame, Frame]]:
-    """Each frame with the ``N_NEAREST`` of the most similar poses, the earlier frame first.
-
-    A turn by a radian counts as much as a step across the space that the cameras are in.
-    """
-    frames = [frame for frame in sequence.frames if frame in usable]
-    if len(frames) <= N_NEAREST:
-        return []
-    poses = np.array([usable[frame] for frame in frames])
-    position, axes = poses[:, :3, 3], poses[:, :3, [0, 2]].reshape(-1, 6)
-    extent_m = max(float(np.linalg.norm(np.ptp(position, axis=0))), 1e-6)
-    features = np.column_stack([position / extent_m, axes])
-    _, found = KDTree(features).query(features, k=N_NEAREST + 1)
-    numbers = {
-        (min(i, j), max(i, j)) for i, row in enumerate(found.tolist()) for j in row if i != j
-    }
-    return [(frames[i], frames[j]) for i, j in sorted(numbers)]
 
 
 def check_consistency(
@@ -223,7 +172,7 @@ def _overlap_check(pairs: list[Pair], poses: Poses, camera: CameraConfig) -> Che
 
 def _are_neighbours(pair: Pair, poses: Poses, camera: CameraConfig) -> bool:
     step_m, turn_rad = pose_error(poses[pair.a], poses[pair.b])
-    view_rad = 2.0 * math.atan(camera.width / 2.0 / intrinsics_of(camera).fx)
+    view_rad = 2.0 * math.atan(camera.width / 2.0 / camera.intrinsics.fx)
     return bool(step_m <= SMALL_STEP_M and turn_rad <= SMALL_TURN * view_rad)
 
 

@@ -8,8 +8,7 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
-from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.config.collection import CameraConfig
+from synfeal.config.camera import CameraConfig
 
 Array = NDArray[np.float64]
 
@@ -26,7 +25,7 @@ class Lens:
     def __init__(
         self, camera: CameraConfig, step: int, moved: tuple[float, float, float] = (0.0, 0.0, 0.0)
     ) -> None:
-        fx, fy, cx, cy = intrinsics_of(camera)
+        fx, fy, cx, cy = camera.intrinsics
         self.focal_px = np.array([fx, fy])
         scale = float(np.exp(moved[2]))
         k1, k2, p1, p2, k3 = camera.distortion

@@ -1,14 +1,19 @@
-"""The manifest: hashes of the sequences, their frames and splits."""
+"""The manifest: hashes of sequences, their frames and splits; and which camera took the frames."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
+from synfeal.config.camera import CameraConfig
+from synfeal.config.load import describe
 from synfeal.dataset.manifest import MANIFEST, sequence_sha256
 from synfeal.errors import InputError, why
-from synfeal.validation.camera import read_manifest
+from synfeal.files import read_json
 from synfeal.validation.check import Check
 from synfeal.validation.listing import SequenceListing
 
@@ -77,3 +82,67 @@ def _wrong_counts(
         count = sum(frames for name, frames, _ in entries.values() if name == split)
         if not isinstance(said, dict) or said.get(split) != count:
             yield f"{path}: frames: {split} must be {count}, the sum over its sequences"
+
+
+# Depth and colour of 7-Scenes come from a Kinect; its authors give this for both.
+SEVEN_SCENES = CameraConfig(width=640, height=480, fx=585.0, fy=585.0, cx=320.0, cy=240.0)
+
+
+@dataclass(frozen=True)
+class KnownCamera:
+    """A camera and where it is known from.
+
+    Attributes:
+        config: its intrinsics and distortion.
+        source: for the report.
+        assumed: nothing says that this is the camera.
+    """
+
+    config: CameraConfig
+    source: str
+    assumed: bool = False
+
+
+def camera_of_dataset(dataset: Path, camera_file: Path | None) -> KnownCamera:
+    """The camera of a data set.
+
+    Args:
+        dataset: directory of the data set.
+        camera_file: calibration file that goes before the manifest.
+
+    Raises:
+        InputError: the file or the manifest is there and cannot be used.
+    """
+    if camera_file is not None:
+        from synfeal.camera.calibration_files import read_calibration
+
+        return KnownCamera(
+            _config(camera_file, asdict(read_calibration(camera_file))), str(camera_file)
+        )
+    path = dataset / MANIFEST
+    if not path.exists():
+        return KnownCamera(SEVEN_SCENES, "assumed: that of 7-Scenes", assumed=True)
+    return KnownCamera(_config(path, read_manifest(dataset).get("camera")), MANIFEST)
+
+
+def _config(path: Path, values: object) -> CameraConfig:
+    try:
+        return CameraConfig.model_validate(values)
+    except ValidationError as error:
+        raise InputError(f"{path}: camera: {describe(error, CameraConfig)}") from None
+
+
+def read_manifest(dataset: Path) -> dict[str, Any]:
+    """The manifest as it stands.
+
+    Raises:
+        InputError: it cannot be read as a JSON object.
+    """
+    path = dataset / MANIFEST
+    try:
+        manifest = read_json(path)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as a manifest ({why(error)})") from None
+    if not isinstance(manifest, dict):
+        raise InputError(f"{path}: cannot be read as a manifest (no JSON object)")
+    return manifest

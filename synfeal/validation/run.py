@@ -9,14 +9,21 @@ import numpy as np
 from tqdm import tqdm
 
 from synfeal.errors import InputError
-from synfeal.validation.camera import KnownCamera, camera_of_dataset
 from synfeal.validation.check import Check
-from synfeal.validation.consistency import check_consistency, choose_pairs
+from synfeal.validation.consistency import check_consistency
 from synfeal.validation.frames import Poses, check_images, check_names, kinds_of, read_poses
 from synfeal.validation.listing import DEPTH, SequenceListing, list_sequences
-from synfeal.validation.manifest import check_manifest
-from synfeal.validation.poses import ORTHONORMAL_BOUND, check_rigid, check_tables, rigid_defects
-from synfeal.validation.splits import check_leaks, check_splits, read_splits
+from synfeal.validation.manifest import KnownCamera, camera_of_dataset, check_manifest
+from synfeal.validation.pairs import choose_pairs
+from synfeal.validation.poses import (
+    ORTHONORMAL_BOUND,
+    check_leaks,
+    check_rigid,
+    check_splits,
+    check_tables,
+    read_splits,
+    rigid_defects,
+)
 
 
 def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[Check]:

@@ -31,7 +31,7 @@ from synfeal.config.models import MODELS
 from synfeal.config.robustness import CLEAN, MIXED
 from synfeal.dataset.archive import SUFFIX
 from synfeal.dataset.finish import origin_of
-from synfeal.dataset.sequences import sequences_of
+from synfeal.dataset.sevenscenes import sequences_of
 from synfeal.effects.light import GROUPS as LIGHT_GROUPS
 from synfeal.errors import InputError
 from synfeal.labels.errors import seed_names

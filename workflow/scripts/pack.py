@@ -1,8 +1,7 @@
 from pathlib import Path
 
 from synfeal.config.models import CameraConfig, RenderConfig
-from synfeal.dataset.packed import join_packed
-from synfeal.dataset.packed_record import write_packed_record
+from synfeal.dataset.packed import join_packed, write_packed_record
 from synfeal.job import job
 
 with job(snakemake.log[0]):

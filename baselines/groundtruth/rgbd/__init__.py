@@ -11,6 +11,6 @@ starting point. A consecutive pair that fails keeps its starting point as an edg
 that the graph stays connected; a loop closure that fails is dropped.
 """
 
-from baselines.groundtruth.rgbd.graph import rgbd_graph, rgbd_graph_with_facts
+from baselines.groundtruth.rgbd.graph import rgbd_graph
 
-__all__ = ["rgbd_graph", "rgbd_graph_with_facts"]
+__all__ = ["rgbd_graph"]

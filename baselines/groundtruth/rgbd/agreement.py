@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 
 Array = NDArray[np.float64]
@@ -46,7 +45,7 @@ def matched_depths(
         For the points inside image i the depth (n,) measured there, inf where there is none, and
         their own (n,); and the number of all points of j.
     """
-    fx, fy, cx, cy = intrinsics_of(camera)
+    fx, fy, cx, cy = camera.intrinsics
     focal, centre = np.array([fx, fy]), np.array([cx, cy])
     point = points_of(depth_j_m[::_STRIDE, ::_STRIDE], camera, _STRIDE).reshape(-1, 3)
     point = point[np.isfinite(point[:, 2])]
@@ -68,7 +67,7 @@ def points_of(depth_m: Depth, camera: CameraConfig, stride: int, first: float = 
         stride: in pixels.
         first: position in the full image of the first row and column given.
     """
-    fx, fy, cx, cy = intrinsics_of(camera)
+    fx, fy, cx, cy = camera.intrinsics
     row, column = np.indices(depth_m.shape) * stride + first
     z = depth_m.astype(np.float64)
     with np.errstate(invalid="ignore"):  # 0 * inf on the optical axis of an empty pixel

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from baselines.groundtruth.rgbd.agreement import constraint, depth_agreement
 from baselines.groundtruth.rgbd.frames import RgbdFrame
 from baselines.groundtruth.rgbd.surface import align
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig, RgbdConfig
 from synfeal.geometry.poses import pose_error
 
@@ -67,7 +66,7 @@ def register(
     By Open3D's own loop over scales, which knows all its methods.
     """
     odometry = o3d.t.pipelines.odometry
-    matrix = o3d.core.Tensor.from_numpy(intrinsics_of(camera).matrix(centre_shift_px=-0.5))
+    matrix = o3d.core.Tensor.from_numpy(camera.intrinsics.matrix(centre_shift_px=-0.5))
     i_from_j = o3d.core.Tensor.from_numpy(np.ascontiguousarray(start))
     try:
         for steps, huber_m in _PASSES:

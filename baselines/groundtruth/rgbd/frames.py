@@ -11,11 +11,11 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from baselines.groundtruth.images import read_image
-from baselines.groundtruth.rgbd.sensor import frame_generator, kinect_depth
 from baselines.groundtruth.rgbd.surface import Surfaces, surfaces_of
 from synfeal.config.models import CameraConfig, DepthConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.errors import InputError
+from synfeal.seeds import generator_of
 
 # Depth images hold millimetres; 0 and 65535 mean that nothing was hit.
 _INVALID_MM = (0, 65535)
@@ -82,3 +82,29 @@ def open3d_depth(depth_m: NDArray[np.float32]) -> o3d.t.geometry.Image:
 def open3d_image(pixels: NDArray[Any]) -> o3d.t.geometry.Image:
     """An array (H, W) or (H, W, C) as an Open3D image."""
     return o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(np.ascontiguousarray(pixels)))
+
+
+# One step of normalised disparity (1/m) and the standard deviation of the noise, in steps.
+STEP_PER_M, NOISE_STEPS = 2.85e-3, 0.5
+# Outside this range (metres) the sensor sees nothing.
+RANGE_M = (0.5, 4.5)
+
+
+def kinect_depth(depth_m: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.float32]:
+    """What a Kinect measures where the depth is ``depth_m`` (H, W); inf where it sees nothing.
+
+    It measures disparity: inverse depth in steps of fixed size, with noise of about half a step
+    that grows with the square of the depth once it is converted (Khoshelham and Elberink, Sensors
+    12(2), 2012). Noise is independent from pixel to pixel; the wrong depth that real sensors show
+    along edges is not modelled.
+    """
+    near_m, far_m = RANGE_M
+    steps = 1 / (depth_m.astype(np.float64) * STEP_PER_M)
+    steps = np.maximum(np.round(steps + rng.normal(0, NOISE_STEPS, depth_m.shape)), 1)
+    seen = (depth_m >= near_m) & (depth_m <= far_m)
+    return np.where(seen, 1 / (steps * STEP_PER_M), np.inf).astype(np.float32)
+
+
+def frame_generator(seed: int, path: FrameFile) -> np.random.Generator:
+    """Noise of one image: the same wherever it is read, for batches share a frame."""
+    return generator_of(seed, "depth-sensor", path.parent.name, path.name)

@@ -15,8 +15,13 @@ from baselines.groundtruth.features import FeatureOdometry
 from baselines.groundtruth.posegraph.graph import Edge, PoseGraph
 from baselines.groundtruth.rgbd.dense import DenseOdometry
 from baselines.groundtruth.rgbd.frames import read_frame
-from baselines.groundtruth.rgbd.loops import loop_candidates, most_telling
-from baselines.groundtruth.rgbd.tracks import View, closure, neighbour
+from baselines.groundtruth.rgbd.tracks import (
+    View,
+    closure,
+    loop_candidates,
+    most_telling,
+    neighbour,
+)
 from synfeal.config.models import CameraConfig, RgbdConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.geometry.poses import relative
@@ -58,17 +63,6 @@ class _Track:
 
 
 def rgbd_graph(
-    color_paths: Sequence[FrameFile],
-    depth_paths: Sequence[FrameFile],
-    camera: CameraConfig,
-    cfg: RgbdConfig,
-    seed: int = 0,
-) -> PoseGraph:
-    """The graph of :func:`rgbd_graph_with_facts`."""
-    return rgbd_graph_with_facts(color_paths, depth_paths, camera, cfg, seed)[0]
-
-
-def rgbd_graph_with_facts(
     color_paths: Sequence[FrameFile],
     depth_paths: Sequence[FrameFile],
     camera: CameraConfig,

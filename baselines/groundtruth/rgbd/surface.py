@@ -14,7 +14,6 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.geometry.poses import pose_error
 
@@ -65,7 +64,7 @@ Surfaces = dict[int, Surface]
 def surfaces_of(depth_m: NDArray[np.float32], camera: CameraConfig) -> Surfaces:
     """A depth image (H, W), not finite where nothing was measured, as all stages take it."""
     measured = np.where(np.isfinite(depth_m), depth_m, np.float32(np.nan))
-    matrix = intrinsics_of(camera).matrix(centre_shift_px=-0.5)
+    matrix = camera.intrinsics.matrix(centre_shift_px=-0.5)
     strides = {stage.stride for stage in STAGES}
     return {stride: _surface(measured, matrix, stride) for stride in strides}
 

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pycolmap
 
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig, SfmConfig
 
 
@@ -40,7 +39,7 @@ def match_features(database: Path, cfg: SfmConfig, seed: int) -> None:
 
 def colmap_parameters(camera: CameraConfig) -> list[float]:
     """Parameters of COLMAP's PINHOLE or, where there is distortion, FULL_OPENCV."""
-    pinhole = list(intrinsics_of(camera))
+    pinhole = list(camera.intrinsics)
     return [*pinhole, *camera.distortion, 0.0, 0.0, 0.0] if any(camera.distortion) else pinhole
 
 

@@ -15,8 +15,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.camera.intrinsics import intrinsics_of
-from synfeal.config.collection import CameraConfig
+from synfeal.config.camera import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import TexturedMesh
@@ -38,12 +37,6 @@ class OpenglRenderer(Renderer):
         background_rgb: tuple[int, int, int] = (0, 0, 0),
     ) -> None:
         """Upload the mesh.
-
-        Args:
-            mesh: what is drawn.
-            camera: a camera without distortion.
-            supersampling: samples per pixel along each axis of the image.
-            background_rgb: colour where nothing is.
 
         Raises:
             InputError: OpenGL does not work here, or draws no images as large as this.
@@ -154,7 +147,7 @@ def clip_from_cam(camera: CameraConfig) -> NDArray[np.float64]:
 
     The top row of the image comes out as OpenGL's bottom row, which is read first.
     """
-    fx, fy, cx, cy = intrinsics_of(camera)
+    fx, fy, cx, cy = camera.intrinsics
     width, height, near, far = camera.width, camera.height, camera.near_m, camera.far_m
     return np.array(
         [

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.mesh.model import MeshPart
-from synfeal.render.cutouts import thresholded
 from synfeal.render.opengl import shaders
 from synfeal.render.opengl.chunks import chunks_of, visible_runs
+from synfeal.render.pieces import thresholded
 
 # Textures are read from the mip level nearest to what the samples ask for, half a level sharper.
 # Trilinear filtering takes a sixth longer for a mean error 4 % smaller; without the shift the error

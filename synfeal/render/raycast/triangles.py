@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
-from synfeal.render.cutouts import thresholded
+from synfeal.render.pieces import thresholded
 from synfeal.render.raycast.mipmaps import MipMaps
 
 Floats = NDArray[np.float64]

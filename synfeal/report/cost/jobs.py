@@ -15,7 +15,7 @@ from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.methods import METHODS, frame_methods, graph_methods
 from synfeal.config import Config, Design, Experiment
 from synfeal.config.experiments import SHARES
-from synfeal.dataset.sequences import sequences_of
+from synfeal.dataset.sevenscenes import sequences_of
 from synfeal.report.cost.networks import Work, pretext_work, training_work
 
 # Stages under one law cost the same per unit.

@@ -9,7 +9,6 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from synfeal.camera.intrinsics import intrinsics_of
 from synfeal.config.models import CameraConfig
 from synfeal.mesh import rays
 from synfeal.mesh.model import MeshPart, TexturedMesh
@@ -135,7 +134,7 @@ def buffered(depth_m: Array) -> Array:
 
 def _depths_m(corners: Array) -> list[Any]:
     """Where the rays of all pixels meet the plane ``z = a + b x`` of the corners."""
-    fx, _, cx, _ = map(Fraction, intrinsics_of(CAMERA))
+    fx, _, cx, _ = map(Fraction, CAMERA.intrinsics)
     (x0, _, z0), (x1, _, z1) = ([Fraction(float(v)) for v in corner] for corner in corners[:2])
     b = (z1 - z0) / (x1 - x0)
     columns = [

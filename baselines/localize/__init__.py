@@ -1,1 +1,0 @@
-"""A trained localizer on a person's own pictures."""

@@ -1,0 +1,212 @@
+"""Commands about frames: ``synfeal preview``, validate, export, evaluate and localize."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from synfeal.cli.options import command, option
+from synfeal.errors import InputError
+
+if TYPE_CHECKING:
+    from baselines.localize import Localized
+    from baselines.training.description import FrameCamera, ModelDescription
+    from synfeal.dataset.packed import View
+    from synfeal.evaluation.run import Evaluation
+
+FORMATS = ("ace", "colmap", "hloc", "mstransformer", "nerfstudio", "tum")
+CONVENTIONS = tuple(
+    f"{direction}-{order}"
+    for direction in ("world_from_cam", "cam_from_world")
+    for order in ("wxyz", "xyzw")
+)
+FILES = ("scores.csv", "errors.csv", "errors.png")
+DATASET = option("dataset", "directory of seq-01 or seq-01.zip", type=Path, metavar="DATASET")
+CAMERA = option("--camera", "calibration file (manifest.json)", type=Path, metavar="FILE")
+
+log = logging.getLogger("synfeal")
+
+
+@command(
+    "see the paths of a data set as a moving picture",
+    "synfeal preview clean blurred --out both.gif",
+    option(
+        "datasets",
+        "data set of collect; several are shown side by side",
+        type=Path,
+        nargs="+",
+        metavar="DATASET",
+    ),
+    option("--out", "GIF or MP4 to write (preview.gif in the first data set)", type=Path),
+    option("--frames", "frames to show, from the first (120)", type=int, default=120),
+    option("--fps", "frames a second, at most 50 (12)", type=float, default=12.0),
+    option("--split", "(train)", choices=("train", "test"), default="train"),
+)
+def preview(arguments: argparse.Namespace) -> None:
+    """Writes a GIF or MP4 of the first frames of a data set.
+
+    Several, with other effects on the same paths for example, stand side by side under their names.
+    """
+    from synfeal.dataset.preview import write_preview
+
+    out = arguments.out or arguments.datasets[0] / "preview.gif"
+    shown = write_preview(arguments.datasets, out, arguments.frames, arguments.fps, arguments.split)
+    print(f"{out}: {shown} frames")
+
+
+@command(
+    "is a data set whole and consistent?",
+    "synfeal validate mydata",
+    DATASET,
+    CAMERA,
+    option("--all", "compare every pair of frames, not a sample of 600", action="store_true"),
+)
+def validate(arguments: argparse.Namespace) -> None:
+    """Checks files, poses, splits, hashes and geometry of a data set; exit 1 if one fails."""
+    from synfeal.validation.run import error_lines, report
+    from synfeal.validation.run import validate as run_checks
+
+    checks = run_checks(arguments.dataset, arguments.camera, arguments.all)
+    print(report(arguments.dataset, checks), end="", flush=True)
+    errors = error_lines(checks)
+    for line in errors[:-1]:
+        print(f"error: {' '.join(line.split())}", file=sys.stderr)
+    if errors:
+        raise InputError(errors[-1])
+
+
+@command(
+    "a data set for ACE, COLMAP, hloc, Nerfstudio and others",
+    "synfeal export mydata --to colmap --out mydata-colmap",
+    DATASET,
+    option("--to", "format to write", choices=FORMATS, required=True),
+    option("--out", "directory to create", type=Path, required=True),
+    option("--copy", "copy colour images instead of linking to them", action="store_true"),
+    CAMERA,
+)
+def export(arguments: argparse.Namespace) -> None:
+    """Writes a 7-Scenes data set in the format of another program."""
+    from synfeal.export.run import export as write
+
+    out: Path = arguments.out
+    n_frames = write(arguments.dataset, arguments.to, out, arguments.copy, arguments.camera)
+    print(f"{out}: {n_frames} frames for {arguments.to}")
+
+
+@command(
+    "how good are these poses? yours or another program's",
+    "synfeal evaluate mydata results_ace.txt --out scores",
+    DATASET,
+    option(
+        "poses",
+        "7-Scenes tree, TUM trajectory (or a directory of seq-01.txt, ...), COLMAP model, result"
+        " file of hloc or ACE, pose table, poses.csv of synfeal localize",
+        type=Path,
+        metavar="POSES",
+    ),
+    option("--split", "frames to score (test)", choices=("test", "train", "all"), default="test"),
+    option(
+        "--align",
+        "move all poses onto the data set's first, as a whole (none)",
+        choices=("none", "se3", "sim3"),
+        default="none",
+    ),
+    option("--labels", "poses as a second yardstick, in any format", type=Path, metavar="POSES"),
+    option(
+        "--convention",
+        "what POSES hold, where it is not what their format says",
+        choices=CONVENTIONS,
+    ),
+    option("--rate", "TUM: frames a second (30)", type=float, default=30.0, metavar="HZ"),
+    CAMERA,
+    option("--out", "directory for scores.csv, errors.csv and errors.png", type=Path),
+)
+def evaluate(arguments: argparse.Namespace) -> None:
+    """Scores poses of any common format against a data set: errors, recalls, reprojection error."""
+    from synfeal.dataset.directories import refuse_foreign
+    from synfeal.evaluation.run import Settings
+    from synfeal.evaluation.run import evaluate as score
+    from synfeal.evaluation.text import report_text
+
+    out: Path | None = arguments.out
+    if out:
+        refuse_foreign(out, FILES, "an evaluation")
+    names = ("split", "align", "convention", "rate", "labels", "camera")
+    settings = Settings(*(getattr(arguments, name) for name in names))
+    found = score(arguments.dataset, arguments.poses, settings)
+    print(report_text(arguments.poses, settings, found), end="")
+    if out:
+        _write(out, f"{arguments.poses} on {arguments.dataset}", found)
+        print(f"\n{out}: {', '.join(FILES)}")
+
+
+def _write(out: Path, title: str, found: Evaluation) -> None:
+    from synfeal.evaluation.figure import figure_of
+    from synfeal.evaluation.text import errors_table, scores_table
+    from synfeal.files import atomic_path
+
+    for name, table in zip(FILES, (scores_table(found), errors_table(found)), strict=False):
+        with atomic_path(out / name) as temporary:
+            table.to_csv(temporary, index=False, lineterminator="\n")
+    with atomic_path(out / FILES[2]) as temporary:
+        figure_of(title, found).savefig(temporary, dpi=150)
+
+
+@command(
+    "poses of your own pictures by a trained model",
+    "synfeal localize results/mini/runs/.../model.pt photos/ --out poses.csv",
+    option("model", "model.pt of a training run in this place", type=Path, metavar="MODEL"),
+    option(
+        "images",
+        "PNG or JPEG of any size, or a directory of them; their short side must have the field of"
+        " view of the training frames' short side, or be whole as those were: what the model says,"
+        " cropping and shrinking is all that is done to them",
+        type=Path,
+        nargs="+",
+        metavar="IMAGE",
+    ),
+    option("--out", "file to write (poses.csv)", type=Path, default=Path("poses.csv")),
+    option("--device", "where to run (auto)", choices=("auto", "cpu", "cuda"), default="auto"),
+)
+def localize(arguments: argparse.Namespace) -> None:
+    """Estimates where pictures were taken, with a model trained in that place."""
+    from baselines.localize import localize as estimate
+
+    out: Path = arguments.out
+    done = estimate(arguments.model, arguments.images, out, arguments.device)
+    if done.n_failed:
+        message = "%d of %d poses are not finite: the training of %s diverged"
+        log.warning(message, done.n_failed, done.n_images, arguments.model)
+    print(f"{arguments.model}: {model_text(done.description)}")
+    print(f"{out}: {poses_text(done)}")
+
+
+def model_text(description: ModelDescription) -> str:
+    """Which localizer it is, and which pictures it can read."""
+    px, camera = description.network.input_px, description.camera
+    if camera is None:
+        view = "the field of view of its training frames is not known"
+    else:
+        lens = ", through the same distorting lens" if any(camera.distortion) else ""
+        view = f"{_seen(camera, description.network.view)}{lens}"
+    return f"{description.localizer}, pictures shrunk to {px} x {px} pixels; {view}"
+
+
+def _seen(camera: FrameCamera, view: View) -> str:
+    """What of the world a picture must show."""
+    if view == "square":
+        return f"the short side must see {camera.short_side_fov_deg:.1f} degrees"
+    across, down = camera.fov_deg
+    return f"they must see {across:.1f} x {down:.1f} degrees, as the training frames do"
+
+
+def poses_text(done: Localized) -> str:
+    """How many poses, and what they took."""
+    alone_ms = done.read_ms + done.network_ms
+    parts = f"median: read {done.read_ms:.2f}, network {done.network_ms:.2f}"
+    rate = f"{done.images_per_s:.0f} pictures/s in batches, on {done.device}"
+    poses = "1 pose" if done.n_images == 1 else f"{done.n_images} poses"
+    return f"{poses}; {alone_ms:.2f} ms for one picture ({parts}), {rate}"
