@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from synfeal.bootstrap import limits
-from synfeal.report.claims.model import HOLDS, MIXED, NO_EFFECT, OPPOSITE, SMALLER, UNDECIDED
+from synfeal.report.claims.model import HOLDS, LESS, MIXED, NO_EFFECT, OPPOSITE, SMALLER, UNDECIDED
 from synfeal.report.claims.text import ERRORS, PERCENT, limits_text, values_text
 from synfeal.report.claims.verdicts import Condition, all_of, at_least, verdict_of
 
@@ -38,11 +38,13 @@ def test_the_samples_are_what_they_are_said_to_be():
         (30, 50, 55, UNDECIDED),
         (10, 30, 55, SMALLER),
         (5, 36, 55, SMALLER),  # the bounds themselves
-        (2, 36, 55, UNDECIDED),  # perhaps none
+        (2, 36, 55, LESS),  # perhaps none
+        (-2, 37, 55, UNDECIDED),
         (-4, 4, 55, NO_EFFECT),
         (2, 4, 55, NO_EFFECT),  # not zero, and smaller than anybody cares for
         (-30, -10, 55, OPPOSITE),
-        (-30, -4, 55, UNDECIDED),
+        (-30, -4, 55, LESS),
+        (-30, -4, 0, UNDECIDED),  # nothing is published that it could be less than
         (-60, 60, 55, UNDECIDED),
         # The sign of a published fall is taken out before.
         (40, 50, -55, HOLDS),
@@ -75,6 +77,7 @@ def test_what_is_unknown_is_undecided():
 
 
 GOOD, SMALL, NONE = effect(50, 60, 55), effect(10, 30, 55), effect(-1, 1, 55)
+LITTLE = effect(2, 14, 55)  # and at the level of two conditions from -10 to 26
 AGAINST, OPEN = effect(-30, -20, 55), effect(-60, 60, 55)
 
 
@@ -88,6 +91,9 @@ AGAINST, OPEN = effect(-30, -20, 55), effect(-60, 60, 55)
         ([NONE, OPEN], NO_EFFECT),  # whatever the other one is, the claim cannot hold any more
         ([NONE, AGAINST], MIXED),
         ([AGAINST, AGAINST], OPPOSITE),
+        ([LITTLE, NONE], LESS),
+        ([LITTLE, GOOD], MIXED),
+        ([LITTLE, AGAINST], MIXED),
         # Refuting needs the corrected level, where an interval 20 wide becomes one 60 wide.
         ([SMALL, SMALL], UNDECIDED),
         ([SMALL], SMALLER),
@@ -132,7 +138,7 @@ def test_more_data_only_ever_makes_the_right_verdict_likelier(truth, right):
     Wrong verdicts are as rare as 5 % allow at every size, and the right one comes more often.
     """
     rng = np.random.default_rng(100 + truth)
-    trials, shares = 400, []
+    trials, shares, not_open = 400, [], []
     for standard_error in (16.0, 8.0, 4.0, 2.0, 1.0, 0.5):
         measured = truth + standard_error * rng.normal(size=trials)
         noise = standard_error * rng.normal(size=400)
@@ -140,10 +146,13 @@ def test_more_data_only_ever_makes_the_right_verdict_likelier(truth, right):
             verdict_of(Condition("", np.concatenate([[m], m + noise]), PUBLISHED)) for m in measured
         ]
         shares.append(found.count(right) / trials)
-        wrong = trials - found.count(right) - found.count(UNDECIDED)
+        coarse = found.count(LESS) if truth < PUBLISHED * 2 / 3 else 0
+        wrong = trials - found.count(right) - coarse - found.count(UNDECIDED)
         assert wrong / trials < 0.08
+        not_open.append(1 - found.count(UNDECIDED) / trials)
     error = 3 * np.sqrt(0.5 / trials)  # of a difference of two shares
-    assert all(after > before - error for before, after in pairwise(shares))
+    for rising in (shares, not_open):
+        assert all(after > before - error for before, after in pairwise(rising))
     assert shares[-1] > 0.97
 
 

@@ -14,6 +14,7 @@ Verdict = Literal[
     "same direction but smaller",
     "mixed",
     "no effect",
+    "smaller than published",
     "opposite",
     "undecided",
     "not learnt at this scale",
@@ -23,11 +24,12 @@ HOLDS: Verdict = "holds"
 SMALLER: Verdict = "same direction but smaller"
 MIXED: Verdict = "mixed"
 NO_EFFECT: Verdict = "no effect"
+LESS: Verdict = "smaller than published"
 OPPOSITE: Verdict = "opposite"
 UNDECIDED: Verdict = "undecided"
 NOT_LEARNT: Verdict = "not learnt at this scale"
 NOT_TESTABLE: Verdict = "not testable here"
-DECIDED = (HOLDS, SMALLER, MIXED, NO_EFFECT, OPPOSITE)
+DECIDED = (HOLDS, SMALLER, MIXED, NO_EFFECT, LESS, OPPOSITE)
 
 
 @dataclass(frozen=True)

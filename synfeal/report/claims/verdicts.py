@@ -14,11 +14,16 @@ at or above 2/3 of the published    holds (where no size was published: above `s
 from `smallest` to that             same direction but smaller
 within ± `smallest`                 no effect
 at or below -`smallest`             opposite
+below 2/3 of the published alone    smaller than published
 =================================== ====================================================
 
+The last is coarser than those above it, and takes what none of them does: the published effect is
+not replicated, and whether there is a smaller one stays open (an informative failure, as Simonsohn
+calls it in "Small Telescopes", Psychological Science 2015). It needs a published size.
+
 A claim of several conditions holds when all do. It is refuted by one that is decided otherwise at
-the level corrected for their number (Bonferroni); then the verdict is that condition's, or *mixed*
-where others hold or are refuted in another way.
+the level corrected for their number (Bonferroni); then the verdict is that condition's, *smaller
+than published* where they are that in several ways, or *mixed* where others hold or are opposite.
 
 A claim about every localizer is judged by the mean effect over the localizers, which a few runs
 can settle; that of a single localizer can refute the claim, at the corrected level, and only that.
@@ -35,6 +40,7 @@ from typing import NamedTuple
 from synfeal.bootstrap import Array, limits
 from synfeal.report.claims.model import (
     HOLDS,
+    LESS,
     MIXED,
     NO_EFFECT,
     OPPOSITE,
@@ -46,7 +52,7 @@ from synfeal.report.claims.model import (
 # Percent. The paper prints 0.01 m, which is 5 % of its median cell, 0.20 m: it resolves no less.
 SMALLEST = 5.0
 ENOUGH = 2 / 3
-REFUTED = (SMALLER, NO_EFFECT, OPPOSITE)
+REFUTED = (SMALLER, NO_EFFECT, LESS, OPPOSITE)
 
 
 class Condition(NamedTuple):
@@ -76,7 +82,9 @@ def verdict_of(condition: Condition, comparisons: int = 1) -> Verdict:
         return OPPOSITE
     if -smallest <= low and high <= smallest:
         return NO_EFFECT
-    return SMALLER if smallest <= low and high <= enough else UNDECIDED
+    if smallest <= low and high <= enough:
+        return SMALLER
+    return LESS if condition.published and high <= enough else UNDECIDED
 
 
 def all_of(conditions: Sequence[Condition], each: Sequence[Condition] = ()) -> tuple[Verdict, str]:
@@ -91,11 +99,17 @@ def all_of(conditions: Sequence[Condition], each: Sequence[Condition] = ()) -> t
     single = [verdict_of(condition, len(each)) for condition in each]
     refuted = {part for part in (*corrected, *single) if part in REFUTED}
     if refuted:
-        one = len(refuted) == 1 and HOLDS not in (*parts, *single)
-        verdict: Verdict = next(iter(refuted)) if one else MIXED
+        verdict = MIXED if HOLDS in (*parts, *single) else _together(refuted)
     else:
         verdict = HOLDS if all(part == HOLDS for part in parts) else UNDECIDED
     return verdict, _parts_text(conditions, parts) + _singles_text(each, single)
+
+
+def _together(refuted: set[Verdict]) -> Verdict:
+    """One verdict for conditions that are refuted, each in its way."""
+    if len(refuted) == 1:
+        return next(iter(refuted))
+    return LESS if LESS in refuted and OPPOSITE not in refuted else MIXED
 
 
 def at_least(sample: Array, number: float) -> Verdict:

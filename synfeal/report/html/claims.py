@@ -13,6 +13,7 @@ from synfeal.errors import InputError
 from synfeal.frames import TEXT, read_frame, records_of
 from synfeal.report.claims.model import (
     HOLDS,
+    LESS,
     MIXED,
     NO_EFFECT,
     NOT_LEARNT,
@@ -30,6 +31,7 @@ BADGES: Mapping[str, tuple[str, str]] = {
     HOLDS: ("✓", "holds"),
     SMALLER: ("↘", "partly"),
     MIXED: ("±", "partly"),
+    LESS: ("<", "fails"),
     NO_EFFECT: ("=", "fails"),
     OPPOSITE: ("✗", "fails"),
     UNDECIDED: ("?", "undecided"),
