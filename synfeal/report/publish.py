@@ -1,8 +1,9 @@
 """Copying a finished run to where the pages read it: ``results/published/<profile>``, tracked.
 
 ``python -m synfeal.report.publish --profile mini`` takes tables, claims, summary, provenance, job
-times and predictions from ``results/mini``, and of its figures those that a page shows. Nothing
-else of a run is tracked, so making results never changes the repository; publishing does.
+times and, where they are small, predictions from ``results/mini``, and of its figures those that a
+page shows. Nothing else of a run is tracked, so making results never changes the repository;
+publishing does.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from synfeal.report.results import read_result, read_text
 
 RESULTS = Path("results")
 PUBLISHED = RESULTS / "published"
+# Larger ones stay beside the results, for the page of a release.
+TRACKED_MB = 16
 FINISHED = ("claims.csv", "summary.md", "provenance.json", "benchmarks.csv")
 
 
@@ -68,11 +71,11 @@ def _records(root: Path) -> list[Path]:
 
 
 def _predictions(root: Path) -> list[Path]:
-    """The run's predictions in one file (docs/kept.md); nothing for a run of labels alone."""
+    """The run's predictions in one small file (docs/kept.md); none for a run of labels alone."""
     if not any(root.glob(f"runs/**/{PREDICTIONS}")):
         return []
     keep(root, root / PACKAGE)
-    return [root / PACKAGE]
+    return [root / PACKAGE] if (root / PACKAGE).stat().st_size <= TRACKED_MB * 1e6 else []
 
 
 def _shown_figures(root: Path, target: Path, pages: Iterable[Path]) -> list[Path]:
