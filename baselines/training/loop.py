@@ -34,6 +34,26 @@ log = logging.getLogger(__name__)
 # Images that tell the frames of this run from others, beside the statistics of all of them.
 FINGERPRINT_IMAGES = 64
 
+FramesAndLabels = tuple[Path, Path] | None
+
+
+class Job(NamedTuple):
+    """What is trained, and how; parameters of :func:`train_localizer`."""
+
+    name: ModelName
+    network: NetworkConfig
+    hyper: LocalizerConfig
+    training: TrainingConfig
+    protocol: Protocol
+    samples_seen: int
+    seed: int
+
+    @property
+    def schedule(self) -> Schedule:
+        """How long and how fast."""
+        rates = self.hyper.learning_rate, self.hyper.weight_decay, HALVE_EVERY[self.name]
+        return Schedule(self.samples_seen, self.training.batch_size, *rates)
+
 
 class Material(NamedTuple):
     """What a training run begins with: a network, and frames that it learns from.
@@ -76,7 +96,7 @@ def train_localizer(
     out_model: Path,
     out_history: Path,
     *,
-    test: tuple[Path, Path] | None = None,
+    test: FramesAndLabels = None,
     protocol: Protocol | None = None,
     augment: Augmentation | None = None,
 ) -> None:
@@ -105,68 +125,60 @@ def train_localizer(
         InputError: one of the files cannot be used.
         MemoryError: there is too little memory; no checkpoint is written.
     """
-    protocol = protocol or PROTOCOLS[training.protocol]
-    device = open_device(training.device)
-    data = read_labelled_frames(frames, labels, network.input_px, device)
-    learned, held_out = _split(data, protocol, training.validation_share, seed, test)
-    localizer = _initial(name, network, hyper, backbone_weights, seed, learned)
-    material = Material(localizer, image_statistics(data.images), learned, held_out)
-    log.info("%s: %d frames, %d samples, on %s", name, len(learned), samples_seen, device)
-    if augment is None and protocol.images == "rotated":
+    chosen = protocol or PROTOCOLS[training.protocol]
+    job = Job(name, network, hyper, training, chosen, samples_seen, seed)
+    material = _material(job, frames, labels, backbone_weights, test)
+    if augment is None and chosen.images == "rotated":
         augment = random_rotation(frames, network, training.augmentation, seed)
-    settings = (name, network, hyper, training, protocol, samples_seen, seed)
-    identity = digest(*settings, augment and augment.state_dict(), *material.fingerprints())
+    identity = digest(*job, augment and augment.state_dict(), *material.fingerprints())
     resume = ResumeFile(out_model.with_name("resume.pt"), identity)
-    rates = hyper.learning_rate, hyper.weight_decay, HALVE_EVERY[name]
-    schedule = Schedule(samples_seen, training.batch_size, *rates)
-    rows = _fit(material, schedule, seed, training, protocol, augment, resume)
+    rows = _fit(job, material, augment, resume)
     camera = frame_camera(frames)
     description = ModelDescription(localizer=name, network=network, hyper=hyper, camera=camera)
-    save_checkpoint(out_model, localizer, material.statistics, description)
+    save_checkpoint(out_model, material.localizer, material.statistics, description)
     write_history(out_history, rows)
     resume.remove()
 
 
+def _material(
+    job: Job, frames: Path, labels: Path, backbone_weights: Path | None, test: FramesAndLabels
+) -> Material:
+    """What the run begins with, on its device."""
+    device = open_device(job.training.device)
+    data = read_labelled_frames(frames, labels, job.network.input_px, device)
+    learned, held_out = _split(job, data, test)
+    localizer = _initial(job, backbone_weights, learned)
+    log.info("%s: %d frames, %d samples, on %s", job.name, len(learned), job.samples_seen, device)
+    return Material(localizer, image_statistics(data.images), learned, held_out)
+
+
 def _fit(
-    material: Material,
-    schedule: Schedule,
-    seed: int,
-    training: TrainingConfig,
-    protocol: Protocol,
-    augment: Augmentation | None,
-    resume: ResumeFile,
+    job: Job, material: Material, augment: Augmentation | None, resume: ResumeFile
 ) -> list[HistoryRow]:
     """Train the network in place; the history."""
     localizer, statistics, learned, held_out = material
     if held_out is None:
         log.info("no frames are held out: the last weights are kept")
     else:
-        log.info("weights are chosen on %d frames (%s)", len(held_out), protocol.selection)
+        log.info("weights are chosen on %d frames (%s)", len(held_out), job.protocol.selection)
     return fit(
-        *(localizer, learned, statistics, schedule, seed),
-        protocol=protocol,
+        *(localizer, learned, statistics, job.schedule, job.seed),
+        protocol=job.protocol,
         held_out=held_out,
-        patience=training.patience,
-        precision=precision_on(learned.images.device, training.precision),
+        patience=job.training.patience,
+        precision=precision_on(learned.images.device, job.training.precision),
         augment=augment,
         resume=resume,
     )
 
 
-def _initial(
-    name: ModelName,
-    network: NetworkConfig,
-    hyper: LocalizerConfig,
-    backbone_weights: Path | None,
-    seed: int,
-    learned: LabelledFrames,
-) -> Localizer:
+def _initial(job: Job, backbone_weights: Path | None, learned: LabelledFrames) -> Localizer:
     """The localizer that training starts from, on the device of the frames it learns from.
 
     Seeds the generator that dropout draws from too.
     """
-    torch.manual_seed(seed)
-    localizer = build_localizer(name, network, hyper)
+    torch.manual_seed(job.seed)
+    localizer = build_localizer(job.name, job.network, job.hyper)
     if backbone_weights is not None:
         load_backbone_weights(localizer.backbone, backbone_weights)
     localizer.place_on(learned.images.device)
@@ -175,18 +187,13 @@ def _initial(
 
 
 def _split(
-    data: LabelledFrames,
-    protocol: Protocol,
-    validation_share: float,
-    seed: int,
-    test: tuple[Path, Path] | None,
+    job: Job, data: LabelledFrames, test: FramesAndLabels
 ) -> tuple[LabelledFrames, LabelledFrames | None]:
     """The frames to learn from, and those that choose the weights."""
-    if protocol.selection == "test":
+    if job.protocol.selection == "test":
         if test is None:
             raise ValueError("this protocol chooses weights by the test set, which is not given")
-        input_px, device = data.images.shape[-1], data.images.device
-        return data, read_labelled_frames(*test, input_px, device)
-    share = validation_share if protocol.selection == "validation" else 0.0
-    mask = held_out_paths(data.path, share, seed)
+        return data, read_labelled_frames(*test, data.images.shape[-1], data.images.device)
+    share = job.training.validation_share if job.protocol.selection == "validation" else 0.0
+    mask = held_out_paths(data.path, share, job.seed)
     return (data.part(~mask), data.part(mask)) if mask.any() else (data, None)
