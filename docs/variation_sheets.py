@@ -13,16 +13,17 @@ from synfeal.config.collection import ClutterConfig
 from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.dataset.render_sequence import drawn
-from synfeal.effects.relight import LitRenderer
+from synfeal.effects.relight import LitRenderer, open_scene
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.render import open_renderer
 from synfeal.scenes import large_room
 from synfeal.scenes.bake import light_shares
-from synfeal.scenes.objects import cluttered
+from synfeal.scenes.objects import cluttered, save_cartons
 
 CAMERA, RENDER = CameraConfig(width=320, height=240), RenderConfig(backend="opengl")
 SHOWN = (3, 10, 30, 47)  # paths of the test set, their second frame
+PATHS = (53, 135, 118)  # of which four frames are shown, with objects of their own
 TITLE_PX = 14
 
 
@@ -33,7 +34,7 @@ def main(root: Path, wanted: list[str]) -> None:
     poses = [plan.between(row, row + 1) for path in SHOWN for row in second_of(plan, path)]
     mesh = load_mesh(root / "scenes/large_room/mesh.glb")
     names = list(dict.fromkeys(key.rpartition("_")[0] for key in settings))
-    for name in [name for name in [*names, "clutter"] if not wanted or name in wanted]:
+    for name in [name for name in [*names, "clutter", "paths"] if not wanted or name in wanted]:
         rows = [("ideal", None), *((key, settings.get(key)) for key in (f"{name}_1", f"{name}_2"))]
         sheet = [row_of(mesh, poses, *row) for row in rows if row[1] or row[0] == "ideal"]
         if name == "clutter":  # on the floor and on tables
@@ -45,8 +46,25 @@ def main(root: Path, wanted: list[str]) -> None:
             rng = np.random.default_rng(0)
             objects, _ = cluttered(mesh, bounds, ClutterConfig(count=14), rng, "clutter")
             sheet.append(row_of(TexturedMesh((*mesh.parts, *objects.parts)), poses, name, None))
+        if name == "paths":  # objects of their own: four positions of two paths
+            save_cartons(root / "scenes/large_room/mesh.glb")
+            sheet = path_rows(root, plan)
         file = Path(__file__).parent / f"images/variation_{name}.jpg"
         Image.fromarray(np.concatenate(sheet)).save(file, quality=85)
+
+
+def path_rows(root: Path, plan: PoseTable) -> list:
+    """Frames along some paths with what stands there (H, W, 3)."""
+    effects = EffectsConfig.model_validate({"clutter": {"count": 12}})
+    render = RENDER.model_copy(update={"effects": effects})
+    sheet = []
+    with open_scene(root / "scenes/large_room/mesh.glb", CAMERA, render) as renderer:
+        for path in PATHS:
+            first = int(np.flatnonzero(plan.path == path)[0])
+            poses = plan.between(first, first + 10)
+            frames = list(drawn(renderer, poses, False, (CAMERA, effects)))
+            sheet.append(np.hstack([rgb for rgb, _ in frames[::3]]))
+    return sheet
 
 
 def second_of(plan: PoseTable, path: int) -> list[int]:

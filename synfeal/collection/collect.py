@@ -24,6 +24,7 @@ from synfeal.dataset.render_pool import Studio, Task, render_sequences
 from synfeal.dataset.render_sequence import resolved
 from synfeal.dataset.sevenscenes import Split, sequences_of
 from synfeal.dataset.unfinished import WORK, clean_up, growing, place_of
+from synfeal.effects.crowd import crowd_of
 from synfeal.errors import InputError
 from synfeal.files import write_json
 from synfeal.mesh.rays import RayCaster
@@ -112,6 +113,13 @@ def _prepare(job: CollectJob, scene: Path) -> None:
         agreement = config.collection.collision_agreement
         mesh, _ = prepare_mesh(job.scene, settings, agreement, config.seed, scene)
         refuse_invisible(mesh, config.network_camera, str(settings.path))
+    effects = job.config.render.effects
+    if effects and effects.clutter:
+        if not effects.clutter.files:
+            from synfeal.scenes.objects import save_cartons  # paints, so takes time to load
+
+            save_cartons(scene / "mesh.glb")
+        crowd_of(scene / "mesh.glb", job.config.render)  # what cannot be used is refused first
 
 
 def _plan(job: CollectJob, scene: Path, part: Path) -> dict[Split, PoseTable]:

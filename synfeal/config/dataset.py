@@ -45,6 +45,11 @@ class DatasetConfig(Strict):
                     "render.effects.light.states: nothing is known of the lamps of a mesh of your"
                     " own; use ev, temperature_k and field_ev"
                 )
+            if light and light.states and any(s.clutter for s in self.scenes.values()):
+                raise ValueError(
+                    "render.effects.light.states: nothing is known of the light on objects; leave"
+                    " out the clutter of the scenes"
+                )
         return self
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
@@ -75,6 +76,15 @@ class NoiseConfig(Strict):
     read_e: NonNegative = Field(5.0, description="noise of reading out, electrons rms")
 
 
+class PathObjectsConfig(Strict):
+    """Objects that stand about, differently along every path, none in the way of the camera."""
+
+    count: Annotated[int, Field(ge=1, le=100)] = Field(8, description="how many, where they fit")
+    files: tuple[Path, ...] = Field(
+        (), description="meshes to choose from in turn, metres; none: cartons"
+    )
+
+
 class EffectsConfig(Strict):
     """What is added to ideal frames, in the order of the keys; what is absent is not added."""
 
@@ -99,6 +109,24 @@ class EffectsConfig(Strict):
     jpeg_quality: Annotated[int, Field(ge=1, le=95)] | None = Field(
         None, description="JPEG compression, libjpeg's scale, before frames are written"
     )
+    clutter: PathObjectsConfig | None = Field(
+        None, description="objects that stand about, placed anew for every path"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.clutter and self.light and self.light.states:
+            raise ValueError(
+                "clutter: of objects it is not known how much of their light comes from where;"
+                " leave light.states out"
+            )
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_clutter(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without the key where nothing stands about: older records stay the same."""
+        values: dict[str, Any] = handler(self)
+        return {k: v for k, v in values.items() if k != "clutter" or v is not None}
 
 
 class RenderConfig(Strict):

@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from synfeal.config.dataset import DatasetConfig
-from synfeal.config.models import CameraConfig, EffectsConfig
+from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
 from synfeal.dataset.archive import sequence_at
 from synfeal.dataset.manifest import write_manifest
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.dataset.preview import write_contact_sheet
 from synfeal.dataset.sevenscenes import Split, frame_paths, sequences_of, write_splits
+from synfeal.effects.crowd import crowd_of
 from synfeal.files import file_sha256, read_json
 from synfeal.frames import write_frame
 
@@ -54,26 +55,34 @@ def finish(
             chosen = [path for s, path in paths.items() if s.split == split]
             pack_frames(chosen, packed_px, directory / f"{split}.npy")
     write_contact_sheet(frame_paths(list(paths.values()), "color.png"), directory / "preview.png")
-    about = {"mesh_sha256": file_sha256(mesh), **origin, **_write_effects(directory, origin)}
+    about = {"mesh_sha256": file_sha256(mesh), **origin, **_write_effects(directory, origin, mesh)}
     if mesh.with_name(CLUTTER).is_file():
         about["clutter"] = read_json(mesh.with_name(CLUTTER))
     write_manifest(directory, sequences, camera, about)
 
 
-def _write_effects(directory: Path, origin: Mapping[str, Any]) -> dict[str, Any]:
-    """Write ``<split>.effects.csv`` where there are effects; their hashes for the manifest."""
+def _write_effects(directory: Path, origin: Mapping[str, Any], mesh: Path) -> dict[str, Any]:
+    """Write ``<split>.effects.csv`` where there are effects; hashes for the manifest.
+
+    Which objects stand along the paths is in ``<split>.objects.csv``.
+    """
     settings = origin["render"].get("effects")
     if settings is None:
         return {}
-    from synfeal.effects.table import effects_table  # pandas takes time to load
+    from synfeal.effects.table import effects_table, objects_table  # pandas takes time to load
 
-    hashes = {}
+    effects, hashes = EffectsConfig(**settings), {}
+    crowd = crowd_of(mesh, RenderConfig(effects=effects))
     for plan in sorted(directory / f"{split}.csv" for split in ("test", "train")):
         if plan.is_file():
-            table = effects_table(EffectsConfig(**settings), read_pose_table(plan))
-            path = plan.with_suffix(".effects.csv")
-            write_frame(path, table)
-            hashes[path.name] = file_sha256(path)
+            poses = read_pose_table(plan)
+            tables = {".effects.csv": effects_table(effects, poses)}
+            if crowd is not None:
+                tables[".objects.csv"] = objects_table(effects, poses, crowd)
+            for suffix, table in tables.items():
+                write_frame(plan.with_suffix(suffix), table)
+                name = plan.with_suffix(suffix).name
+                hashes[name] = file_sha256(plan.with_suffix(suffix))
     return {"effects_sha256": hashes}
 
 

@@ -7,6 +7,7 @@ at the frames before it, and with auto-exposure draws them.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig, EffectsConfig
 from synfeal.effects.camera import AutoExposure, channel_gains, compressed, with_noise
+from synfeal.effects.crowd import CrowdedRenderer
 from synfeal.effects.light import LightState, drawn_light
 from synfeal.effects.relight import LitRenderer
 from synfeal.effects.transfer import Light, light_of, rgb_of
@@ -24,7 +26,10 @@ from synfeal.geometry.poses import interpolate
 from synfeal.render.base import Depth, Renderer, Rgb
 from synfeal.seeds import generator_of
 
-EFFECTS = ("light", "motion_blur", "exposure", "noise", "white_balance_k", "jpeg_quality")
+EFFECTS = (
+    *("light", "motion_blur", "exposure", "noise", "white_balance_k", "jpeg_quality"),
+    "clutter",  # last: what was drawn before there was it stays the same
+)
 Frame = tuple[Rgb, Depth | None]
 
 
@@ -95,8 +100,28 @@ def varied_frames(
     """
     for first, last in paths_of(poses):
         if first < end and last > begin:
-            path = _Path(renderer, camera, config, poses, first, last)
-            yield from path.frames(max(begin, first), min(end, last), with_depth)
+            with _world_of(renderer, config, poses, first, last) as world:
+                path = _Path(world, camera, config, poses, first, last)
+                yield from path.frames(max(begin, first), min(end, last), with_depth)
+
+
+@contextmanager
+def _world_of(
+    renderer: Renderer, config: EffectsConfig, poses: Poses, first: int, last: int
+) -> Iterator[Renderer]:
+    """What a path is drawn by: with objects that stand about, a renderer of its own."""
+    if path_effects(config, poses, first).clutter is None:
+        yield renderer
+        return
+    if not isinstance(renderer, CrowdedRenderer):
+        raise TypeError("clutter: the renderer must come from open_scene")
+    with renderer.along(poses.position_m[first:last], crowd_generator(config, poses, first)) as own:
+        yield own
+
+
+def crowd_generator(config: EffectsConfig, poses: Poses, first: int) -> np.random.Generator:
+    """What places of objects along the path that begins at row ``first`` are drawn from."""
+    return _generator("clutter", config, poses, first)
 
 
 @dataclass(frozen=True)

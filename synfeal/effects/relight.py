@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.effects.crowd import CrowdedRenderer, crowd_of
 from synfeal.effects.light import GROUPS
 from synfeal.effects.transfer import Light
 from synfeal.errors import InputError
@@ -51,11 +52,13 @@ class LitRenderer(Renderer):
 
 
 def open_scene(mesh: Path, camera: CameraConfig, render: RenderConfig | None) -> Renderer:
-    """A renderer of a mesh, and of the shares of its light beside it where states are asked for.
+    """A renderer of a mesh, which knows what else effects ask for: shares of light, objects.
 
     Raises:
-        InputError: a mesh cannot be read, or its shares are not there.
+        InputError: a mesh cannot be read, its shares are not there, or objects cannot be used.
     """
+    if render and (crowd := crowd_of(mesh, render)):
+        return CrowdedRenderer(crowd, camera, render)
     light = render and render.effects and render.effects.light
     if not (render and light and light.states):
         return open_renderer(load_mesh(mesh), camera, render)

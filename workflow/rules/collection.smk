@@ -107,7 +107,7 @@ rule render:
     input:
         mesh=rules.scene.output.mesh,
         plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w).split}.csv",
-        light=lambda w: shares_for(w.scene, CONFIG.render.effects),
+        extras=lambda w: beside_mesh(w.scene, CONFIG.render.effects),
     output:
         frames=sequence_output(f"{ROOT}/datasets/{{scene}}/{{camera}}/{{sequence}}"),
     log:
@@ -126,6 +126,25 @@ rule render:
         render=dump(CONFIG.render),
     script:
         "../scripts/render.py"
+
+
+# Built-in objects, where effects place some along every path.
+rule cartons:
+    input:
+        mesh=rules.scene.output.mesh,
+    output:
+        cartons=cartons_of("{scene}"),
+    log:
+        f"{ROOT}/logs/cartons/{{scene}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/cartons/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    threads: 1
+    resources:
+        mem_mb=grown(1000),
+    script:
+        "../scripts/cartons.py"
 
 
 rule render_speed:
@@ -180,7 +199,7 @@ rule render_packed:
     input:
         mesh=rules.scene.output.mesh,
         plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w, 'network').split}.csv",
-        light=lambda w: shares_for(w.scene, CONFIG.render.effects),
+        extras=lambda w: beside_mesh(w.scene, CONFIG.render.effects),
     output:
         frames=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.npy"),
         record=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.json"),
@@ -233,6 +252,7 @@ rule dataset:
         sequences=lambda w: sequence_dirs(w.scene, w.camera),
         plans=lambda w: plans_with_frames(w.scene, w.camera, "csv"),
         coverage=lambda w: plans_with_frames(w.scene, w.camera, "coverage.json"),
+        extras=lambda w: beside_mesh(w.scene, CONFIG.render.effects),
     output:
         manifest=f"{ROOT}/datasets/{{scene}}/{{camera}}/manifest.json",
         train=f"{ROOT}/datasets/{{scene}}/{{camera}}/TrainSplit.txt",

@@ -32,6 +32,7 @@ from synfeal.config.robustness import CLEAN, MIXED
 from synfeal.dataset.archive import SUFFIX
 from synfeal.dataset.finish import origin_of
 from synfeal.dataset.sevenscenes import sequences_of
+from synfeal.effects.crowd import carton_files
 from synfeal.effects.light import GROUPS as LIGHT_GROUPS
 from synfeal.errors import InputError
 from synfeal.labels.errors import seed_names
@@ -363,11 +364,24 @@ def files_of_references():
     ]
 
 
-def shares_for(scene, effects):
-    """The shares of a scene's light, where effects switch its lamps."""
-    if not (effects and effects.light and effects.light.states):
-        return []
-    return [f"{ROOT}/scenes/{scene}/light_{group}.glb" for group in LIGHT_GROUPS]
+def beside_mesh(scene, effects):
+    """What effects need of a scene: the shares of its light, where its lamps are switched, and
+    built-in objects."""
+    lights = LIGHT_GROUPS if effects and effects.light and effects.light.states else []
+    clutter = effects.clutter if effects else None
+    return [
+        *(f"{ROOT}/scenes/{scene}/light_{group}.glb" for group in lights),
+        *(map(str, clutter.files) if clutter else []),
+        *(cartons_of(scene) if clutter and not clutter.files else []),
+    ]
+
+
+def cartons_of(scene):
+    """The built-in objects of a scene."""
+    return [
+        path.as_posix()
+        for path in carton_files(CONFIG.root / f"scenes/{scene}/mesh.glb")
+    ]
 
 
 def has_path(scene):
@@ -406,13 +420,13 @@ def varied_render(wildcards):
     return dump(CONFIG.render.model_copy(update={"effects": effects}))
 
 
-def varied_shares(names):
-    """The shares of the scene's light, where one of these variations switches its lamps."""
+def varied_extras(names):
+    """What one of these variations needs of the scene beside its mesh."""
     usual = CONFIG.render.effects
     files = [
-        shares_for(ROBUSTNESS.scene, VARIATIONS.get(name, usual)) for name in names
+        beside_mesh(ROBUSTNESS.scene, VARIATIONS.get(name, usual)) for name in names
     ]
-    return sorted({file for shares in files for file in shares})
+    return sorted({file for extras in files for file in extras})
 
 
 def varied_tests(clean, varied):
@@ -439,7 +453,7 @@ def robustness_files():
     if not sets:
         return []
     return [
-        *varied_shares(VARIATIONS),
+        *varied_extras(VARIATIONS),
         *(f"{ROOT}/robustness/frames/{name}/{split}.npy" for name, split in sets),
         *(f"{ROOT}/robustness/runs/{model}/model.pt" for model in MODELS),
         *(f"{ROOT}/robustness/descriptors/{t}.npz" for t in (CLEAN, MIXED)),

@@ -26,7 +26,7 @@ rule light_shares:
 
 rule render_varied:
     input:
-        light=lambda w: varied_shares([w.effects]),
+        extras=lambda w: varied_extras([w.effects]),
         mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
         plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/{{split}}.csv",
     output:
@@ -141,7 +141,7 @@ rule varied_descriptors:
 # A sample of the test frames, large enough for features, against the map of the ideal frames.
 rule varied_structure:
     input:
-        light=lambda w: varied_shares([w.effects]),
+        extras=lambda w: varied_extras([w.effects]),
         mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
         plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/test.csv",
         descriptors=f"{VARIED}/descriptors/clean.npz",
@@ -170,7 +170,7 @@ rule varied_structure:
 
 rule effects_speed:
     input:
-        light=varied_shares(VARIATIONS),
+        extras=varied_extras(VARIATIONS),
         mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
         plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/test.csv",
     output:

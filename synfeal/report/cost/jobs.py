@@ -92,7 +92,7 @@ STAGES: dict[str, Stage] = {
     "views": Stage("scene/size/split", "Mpx"),
     "coordinate_references": _REFERENCE._replace(unit="images"),
     **dict.fromkeys(("external_reference", "coverage", "cell_depth"), Stage()),
-    "light_shares": Stage(),
+    **dict.fromkeys(("light_shares", "cartons"), Stage()),
     "render_varied": Stage("effects/split", "Msamples"),
     "pack_varied": Stage("effects/split", "MB"),
     "train_varied": Stage("model", "TFLOP"),

@@ -1,0 +1,132 @@
+"""Objects that stand about along one path, and its frames with them.
+
+Where they stand is drawn from the path alone, so all shards of it see the same ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.errors import InputError
+from synfeal.mesh.load import load_mesh
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.standing import Ground, described, moved
+from synfeal.render import open_renderer
+from synfeal.render.base import Depth, Renderer, Rgb
+
+Array = NDArray[np.float64]
+REACH_M = 3.0  # from a path, sideways
+TRIES = 200  # places, before an object is left out
+CARTONS = 8  # beside the mesh of a scene, where no files are named
+
+
+def carton_files(mesh: Path) -> tuple[Path, ...]:
+    """Where the built-in objects of a scene lie."""
+    return tuple(mesh.with_name(f"carton_{number}.glb") for number in range(CARTONS))
+
+
+@dataclass(frozen=True)
+class Crowd:
+    """A scene, and the objects that may stand about in it.
+
+    Attributes:
+        mesh: the scene.
+        kinds: the objects by name, in turn.
+        count: how many stand along a path, if there is place for them.
+    """
+
+    mesh: TexturedMesh
+    kinds: Sequence[tuple[str, TexturedMesh]]
+    count: int
+
+    @cached_property
+    def _corners(self) -> Array:
+        vertices, faces = self.mesh.merged()
+        return np.asarray(vertices[faces])
+
+    def along(
+        self, path_m: Array, rng: np.random.Generator
+    ) -> tuple[list[MeshPart], list[dict[str, Any]]]:
+        """What stands along a path of camera centres (P, 3), and where; none touches another."""
+        bounds_m = np.array([path_m.min(axis=0), path_m.max(axis=0)])
+        bounds_m[:, :2] += np.array([[-REACH_M], [REACH_M]])
+        widest_m = max(float(np.ptp(kind.bounds_m, axis=0).max()) for _, kind in self.kinds)
+        near = self._near(bounds_m[:, :2] + np.array([[-widest_m], [widest_m]]))
+        parts: list[MeshPart] = []
+        places = []
+        ground = Ground(near, path_m)
+        for number in range(self.count):
+            name, kind = self.kinds[number % len(self.kinds)]
+            found = ground.place(kind, bounds_m, rng, TRIES)
+            if found is None:
+                continue
+            standing = moved(kind, *found, f"object-{number}")
+            parts += standing
+            near = np.concatenate([near, *(p.vertices_m[p.faces] for p in standing)])
+            ground = Ground(near, path_m)
+            places.append(described(name, kind, *found))
+        return parts, places
+
+    def _near(self, bounds_m: Array) -> Array:
+        """Triangles (N, 3, 3) that reach into bounds (2, 2) in x and y."""
+        flat = self._corners[:, :, :2]
+        inside = (flat.min(axis=1) <= bounds_m[1]) & (flat.max(axis=1) >= bounds_m[0])
+        return np.asarray(self._corners[inside.all(axis=1)])
+
+
+def crowd_of(mesh: Path, render: RenderConfig) -> Crowd | None:
+    """What may stand about in a scene, if anything does.
+
+    Raises:
+        InputError: a file cannot be read, or an object is larger than the scene.
+    """
+    settings = render.effects and render.effects.clutter
+    if not settings:
+        return None
+    scene = load_mesh(mesh)
+    kinds = [(f.stem, load_mesh(f)) for f in settings.files or carton_files(mesh)]
+    room_m = np.sort(np.ptp(scene.bounds_m, axis=0))
+    for name, kind in kinds:
+        size_m = np.ptp(kind.bounds_m, axis=0)
+        if (np.sort(size_m) > room_m).any():
+            shown = " x ".join(f"{side:.3g}" for side in size_m)
+            where = f"render.effects.clutter.files: {name}"
+            raise InputError(f"{where} is {shown} m, larger than the scene; check its unit")
+    return Crowd(scene, kinds, settings.count)
+
+
+class CrowdedRenderer(Renderer):
+    """A renderer of a scene that can be opened once more with objects in it."""
+
+    def __init__(self, crowd: Crowd, camera: CameraConfig, render: RenderConfig) -> None:
+        self.crowd, self._camera, self._render = crowd, camera, render
+        self._ideal = open_renderer(crowd.mesh, camera, render)
+
+    def render(self, world_from_cam: Array) -> Rgb:
+        """Colours (H, W, 3) of the scene alone."""
+        return self._ideal.render(world_from_cam)
+
+    def render_rgbd(self, world_from_cam: Array) -> tuple[Rgb, Depth]:
+        """Colours (H, W, 3) and depth (H, W) of the scene alone."""
+        return self._ideal.render_rgbd(world_from_cam)
+
+    @contextmanager
+    def along(self, path_m: Array, rng: np.random.Generator) -> Iterator[Renderer]:
+        """A renderer of the scene with what stands along a path (P, 3)."""
+        parts, _ = self.crowd.along(path_m, rng)
+        both = TexturedMesh((*self.crowd.mesh.parts, *parts))
+        with open_renderer(both, self._camera, self._render) as renderer:
+            yield renderer
+
+    def close(self) -> None:
+        """Give the memory of the mesh back."""
+        self._ideal.close()
