@@ -232,7 +232,7 @@ def test_without_effects_nothing_is_recorded_or_drawn_anew():
         ({"light": {"ev": [1, -1]}}, "light.ev: the first number"),
         ({"light": {"states": ["disco"]}}, "light.states.0.*'night'"),
         ({"clutter": {}, "light": {"states": ["night"]}}, "effects.clutter: of objects"),
-        ({"vignette": 1}, "vignette: unknown key; allowed here: exposure"),
+        ({"vignette": 1}, "vignette: unknown key; allowed here: clutter"),
     ],
 )
 def test_bad_settings_are_one_line(changes, message):
