@@ -60,7 +60,7 @@ def test_seed_decides_and_both_parts_keep_their_directions():
     np.testing.assert_array_equal(alone.position_m, one.position_m)
 
 
-@pytest.mark.parametrize(("noise_m", "noise_deg"), [(-0.1, 0.0), (0.0, -5.0), (-0.1, -5.0)])
+@pytest.mark.parametrize(("noise_m", "noise_deg"), [(-0.1, 0.0), (0.0, -0.5), (-0.1, -5.0)])
 def test_negative_noise_is_refused(noise_m, noise_deg):
     with pytest.raises(ValueError, match=f"must not be negative: {noise_m} m, {noise_deg} deg$"):
         add_noise(table_of(2), noise_m, noise_deg, np.random.default_rng(0))

@@ -174,7 +174,8 @@ def test_poses_outside_the_mesh_are_a_warning(tmp_path, caplog):
         ("poses.csv", "frame,path,tx,ty,tz,qw,qx,qy,qz\n0,0,0,0,0,0,0,0,0\n", "line 2 .* length 0"),
         ("poses.json", "[]", "must be a directory, a .csv pose table or a .txt"),
         ("frame-000000.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n", "not a rigid pose"),
-        ("frame-000000.pose.txt", "2 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n", "not a rigid pose"),
+        ("frame-000000.pose.txt", "1.01 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n", "not a rigid pose"),
+        ("frame-000000.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1.01\n", "not a rigid pose"),
         ("frame-000000.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n1 0 0 1\n", "not a rigid pose"),
     ],
 )

@@ -181,7 +181,8 @@ def test_held_out_errors_are_those_of_another_implementation(splits, monkeypatch
     answer = PosePrediction(
         *(torch.tensor(v, dtype=torch.float32) for v in (position_m, quat_wxyz))
     )
-    monkeypatch.setattr(localizer, "forward", lambda images: [answer])
+    auxiliary = PosePrediction(answer.position_m + 9, -answer.quat_wxyz.roll(1, 1))
+    monkeypatch.setattr(localizer, "forward", lambda images: [answer, auxiliary])
     found = held_out_errors(localizer, frames, statistics_of(frames), "float32")
     true = Rotation.from_quat(frames.quat_wxyz.numpy(), scalar_first=True)
     distance = np.linalg.norm(position_m - frames.position_m.numpy(), axis=1)
