@@ -137,15 +137,16 @@ def swapped_frames(folder):
     _swap_middle(folder, "color.png", "depth.png")
 
 
-HIDDEN_ERRORS = (
-    pose_of_the_neighbour,
-    poses_shifted_by_one,
-    transposed_rotations,
-    half_pixel,
-    depth_of_tum,
-    depth_in_centimetres,
-    depth_in_metres,
-    depth_along_the_ray,
-    swapped_colours,
-    swapped_depths,
-)
+# What each error must be found by; other checks may fail too.
+FOUND_BY = {
+    pose_of_the_neighbour: "depth",
+    poses_shifted_by_one: "depth",
+    transposed_rotations: "depth",
+    half_pixel: "camera",
+    depth_of_tum: "depth",
+    depth_in_centimetres: "depth",
+    depth_in_metres: "pairs",
+    depth_along_the_ray: "depth",
+    swapped_colours: "colours",
+    swapped_depths: "depth",
+}

@@ -13,7 +13,7 @@ import yaml
 from PIL import Image
 from snakemake.iocontainers import Namedlist
 
-from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table, write_pose_table
+from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table
 from synfeal.errors import InputError, why
 from synfeal.files import atomic_path, write_json
 from synfeal.job import call
@@ -26,14 +26,6 @@ def random_table(n):
     quat = rng.normal(size=(n, 4))
     quat /= np.linalg.norm(quat, axis=1, keepdims=True) * np.sign(quat[:, :1])
     return PoseTable(np.arange(n), np.arange(n) // 3, rng.normal(size=(n, 3)) * 1e3, quat)
-
-
-def test_pose_table_round_trip_is_exact(tmp_path):
-    table = random_table(10)
-    write_pose_table(tmp_path / "poses.csv", table)
-    read = read_pose_table(tmp_path / "poses.csv")
-    for name in ("frame", "path", "position_m", "quat_wxyz"):
-        np.testing.assert_array_equal(getattr(read, name), getattr(table, name))
 
 
 def test_first_frames_are_a_prefix_and_too_many_are_refused():
