@@ -15,8 +15,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from synfeal.config.dataset import DatasetConfig
-from synfeal.config.load import describe, read_yaml
-from synfeal.config.mesh_files import check_mesh_file
+from synfeal.config.load import check_mesh_file, describe, read_yaml
 from synfeal.config.models import CameraConfig, RenderConfig, SceneConfig
 from synfeal.errors import InputError
 from synfeal.files import file_sha256

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from synfeal.cli import main
-from synfeal.config.mesh_files import check_mesh_files, check_results
+from synfeal.config.load import check_mesh_files, check_results
 from synfeal.report.cost.profiles import read_profile
 from tests.careless import FILES
 from tests.fuzzing import problem_with

@@ -10,10 +10,9 @@ from tqdm import tqdm
 
 from synfeal.dataset.archive import FrameFile, link_or_unpack
 from synfeal.dataset.directories import atomic_directory, refuse_existing
-from synfeal.export.ace import export_ace
 from synfeal.export.colmap import export_colmap, export_hloc
 from synfeal.export.frames import ExportSet, Place, read_export_set
-from synfeal.export.mstransformer import export_mstransformer
+from synfeal.export.learned import export_ace, export_mstransformer
 from synfeal.export.nerfstudio import export_nerfstudio
 from synfeal.export.tum import export_tum
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.mesh_files import check_mesh_file
+from synfeal.config.load import check_mesh_file
 from synfeal.config.models import SceneConfig
 from synfeal.dataset.finish import CLUTTER
 from synfeal.errors import InputError

@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 from synfeal.config.camera import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
-from synfeal.validation.check import Check
 from synfeal.validation.frames import Poses
 from synfeal.validation.images import read_color, read_depth_mm
 from synfeal.validation.lens import Lens
-from synfeal.validation.listing import COLOR, DEPTH, Frame
+from synfeal.validation.listing import COLOR, DEPTH, Check, Frame
 from synfeal.validation.manifest import KnownCamera
 from synfeal.validation.pairs import GAPS
 from synfeal.validation.reprojection import Residual, View, camera_normal, compare

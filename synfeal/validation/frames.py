@@ -12,9 +12,8 @@ from synfeal.config.camera import CameraConfig
 from synfeal.dataset.archive import FrameFile, foreign_members, is_archive
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError
-from synfeal.validation.check import Check
 from synfeal.validation.images import Pixels, read_color, read_depth_mm
-from synfeal.validation.listing import COLOR, DEPTH, POSE, Frame, SequenceListing
+from synfeal.validation.listing import COLOR, DEPTH, POSE, Check, Frame, SequenceListing
 
 Poses = dict[Frame, NDArray[np.float64]]
 

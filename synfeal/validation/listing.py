@@ -1,4 +1,4 @@
-"""Which frames a directory holds: names only, nothing is opened."""
+"""Which frames a directory holds: names only, nothing is opened; and the outcome of a check."""
 
 from __future__ import annotations
 
@@ -83,3 +83,27 @@ def _list(path: Path) -> SequenceListing:
         if match:
             numbers[match[2]].add(int(match[1]))
     return SequenceListing(path, {kind: frozenset(found) for kind, found in numbers.items()})
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of the report.
+
+    Attributes:
+        name: what was checked, one or two words.
+        text: how much was checked, and the worst value beside its bound.
+        failures: one sentence each, naming the file; the first is printed.
+        skipped: nothing was checked, and ``text`` says why.
+    """
+
+    name: str
+    text: str
+    failures: tuple[str, ...] = ()
+    skipped: bool = False
+
+    @property
+    def verdict(self) -> str:
+        """``ok``, ``FAILED`` or ``not checked``."""
+        if self.skipped:
+            return "not checked"
+        return "FAILED" if self.failures else "ok"

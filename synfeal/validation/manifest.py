@@ -14,8 +14,7 @@ from synfeal.config.load import describe
 from synfeal.dataset.manifest import MANIFEST, sequence_sha256
 from synfeal.errors import InputError, why
 from synfeal.files import read_json
-from synfeal.validation.check import Check
-from synfeal.validation.listing import SequenceListing
+from synfeal.validation.listing import Check, SequenceListing
 
 
 def check_manifest(

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
 from synfeal.errors import InputError, why
-from synfeal.validation.check import Check
 from synfeal.validation.frames import Poses
-from synfeal.validation.listing import POSE, Frame, SequenceListing
+from synfeal.validation.listing import POSE, Check, Frame, SequenceListing
 
 # Text with ten decimals is exact to 1e-10; 7-Scenes' own poses have eight significant digits.
 ORTHONORMAL_BOUND = 1e-6

@@ -9,10 +9,9 @@ import numpy as np
 from tqdm import tqdm
 
 from synfeal.errors import InputError
-from synfeal.validation.check import Check
 from synfeal.validation.consistency import check_consistency
 from synfeal.validation.frames import Poses, check_images, check_names, kinds_of, read_poses
-from synfeal.validation.listing import DEPTH, SequenceListing, list_sequences
+from synfeal.validation.listing import DEPTH, Check, SequenceListing, list_sequences
 from synfeal.validation.manifest import KnownCamera, camera_of_dataset, check_manifest
 from synfeal.validation.pairs import choose_pairs
 from synfeal.validation.poses import (

@@ -25,7 +25,7 @@ from baselines.training.memory import training_mb
 from baselines.training.record import training_parameters
 from synfeal.config import Run, check_mesh_files, parse_config, read_design
 from synfeal.config.load import read_yaml
-from synfeal.config.mesh_files import check_results
+from synfeal.config.load import check_results
 from synfeal.config.experiments import INJECTED, Init
 from synfeal.config.models import MODELS
 from synfeal.config.robustness import CLEAN, MIXED
