@@ -60,14 +60,8 @@ def write_assistance_table(
 ) -> None:
     """Write one row per re-estimated label set and split, and one of both splits together.
 
-    Args:
-        rows: the design; rows with other label sources are passed over.
-        root: results directory of the profile, where ``labels`` is.
-        out_csv: counts of batches and frames, and how far off the last poses of batches were.
-        out_tex: the rows of both splits together, as a table environment.
-
-    Raises:
-        InputError: a record of assistance is missing or unreadable.
+    Counts of batches and frames, and how far off the last poses of batches were; in LaTeX the rows
+    of both splits together. Of the design, ``rows`` with other labels are passed over.
     """
     records = [
         assistance_record(root, *names, split)
@@ -109,11 +103,7 @@ def assistance_record(
 
 
 def batch_records(root: Path, method: str, scene: str, size: str, split: str) -> Records:
-    """What happened to each batch of a split, in order.
-
-    Raises:
-        InputError: the record of assistance is missing or unreadable.
-    """
+    """What happened to each batch of a split, in order."""
     path = root / "labels" / scene / size / method / "assistance.json"
     remedy = "chain these labels again"
     splits = read_result(path, ["splits"], remedy)["splits"]

@@ -47,20 +47,12 @@ PUBLISHED = {name: f"published_{name}" for name in SCHEMA if name not in KEY}
 
 
 def read_cells(table: str, design: Design, root: Path) -> pd.DataFrame:
-    """Read the cells of one table, row by row, five localizers each.
-
-    Args:
-        table: one of tables 2 to 7.
-        design: of the profile; rows it leaves out are not in the table.
-        root: results directory of the profile.
+    """Read the cells of one of tables 2 to 7, row by row, five localizers each.
 
     Returns:
         Columns ``CELL`` (``row`` counts the rows of the table, ``n_finished`` the runs that have a
         score, ``failed`` the predictions that were not finite) and ``PUBLISHED``, of which the text
         is empty and the rest missing where the paper has no such cell.
-
-    Raises:
-        InputError: a run's scores are missing or unreadable.
     """
     records = [
         {"row": place, "model": model, "label_id": row.label_id}

@@ -25,16 +25,7 @@ HEADINGS = (
 
 
 def write_report_document(root: Path, tables: Sequence[Path], out_tex: Path) -> None:
-    """Write the document into ``root``; its figures are taken from ``root/figures``.
-
-    Args:
-        root: results directory of the profile, with ``claims.csv``, ``figures`` and ``tables``.
-        tables: the LaTeX tables, in order.
-        out_tex: the document; it compiles where it lies.
-
-    Raises:
-        InputError: ``claims.csv`` is missing, or it or ``hard_cases.csv`` is unreadable.
-    """
+    """Write claims, ``tables`` in their order and figures as one document that compiles there."""
     claims = _rows(root / "claims.csv", [*CLAIM_COLUMNS, "footnote"])
     hard_cases = root / "tables" / f"{HARD_CASES}.csv"
     names = [name for name in CAPTIONS if (root / "figures" / f"{name}.png").is_file()]

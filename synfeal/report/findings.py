@@ -33,9 +33,6 @@ def effects(root: Path) -> pd.DataFrame:
     Returns:
         Columns ``COLUMNS``, one row per change (in the order of the tables), localizer, measure
         (``MEASURES``) and source (``HERE`` or ``PAPER``), where both errors are known.
-
-    Raises:
-        InputError: a table is missing or cannot be read.
     """
     size = _table(root, "table4_size")
     found = [*_of_size(size), *_of_labels(root), *_of_noise(root), *_of_start(root, size)]
@@ -49,11 +46,7 @@ def mean_factor(found: pd.DataFrame, change: str, measure: str, source: str) -> 
 
 
 def sentences(root: Path) -> list[str]:
-    """What there is to say: each group of changes in one sentence, and how the claims fared.
-
-    Raises:
-        InputError: a table is missing or cannot be read.
-    """
+    """What there is to say: each group of changes in one sentence, and how the claims fared."""
     groups = effects(root).groupby("group", sort=False)
     return [*(_group_sentence(found) for _, found in groups), _claims_sentence(root)]
 

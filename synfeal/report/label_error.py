@@ -60,14 +60,8 @@ def write_label_error_table(
 ) -> None:
     """Write two rows, before and after assistance, per re-estimated label set and split.
 
-    Args:
-        rows: the design; rows with other label sources are passed over.
-        root: results directory of the profile, where ``labels`` and ``groundtruth`` are.
-        out_csv: errors of the labels against the true poses, and what a frame took.
-        out_tex: the rows of both splits together, as a table environment.
-
-    Raises:
-        InputError: labels, a record of assistance, or the facts of a batch cannot be read.
+    Errors of the labels against the true poses, and what a frame took; in LaTeX the rows of both
+    splits together. Of the design, ``rows`` with other labels are passed over.
     """
     records = [
         record

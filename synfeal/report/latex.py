@@ -30,11 +30,7 @@ def write_document(tables: Sequence[Path], out_tex: Path) -> None:
 
 
 def table_bodies(tables: Sequence[Path]) -> list[str]:
-    """The table environments of files that :func:`synfeal.report.sheet.write_latex` wrote.
-
-    Raises:
-        InputError: one of them cannot be read.
-    """
+    """The table environments of files that :func:`synfeal.report.sheet.write_latex` wrote."""
     return [read_text(table).removeprefix(HEADER).rstrip() for table in tables]
 
 

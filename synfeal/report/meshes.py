@@ -30,17 +30,7 @@ REMARK = (
 
 
 def write_meshes_table(scenes: Sequence[str], root: Path, out_csv: Path, out_tex: Path) -> None:
-    """Write Table 1 from the properties of the scenes' meshes.
-
-    Args:
-        scenes: the scenes of the tables, in order.
-        root: results directory of the profile, where ``scenes`` is.
-        out_csv: one row per scene, columns ``SCHEMA``.
-        out_tex: a table environment.
-
-    Raises:
-        InputError: a scene's properties are missing or unreadable.
-    """
+    """Write Table 1 from the properties of the scenes' meshes: a row per scene, ``SCHEMA``."""
     meshes = read_meshes(scenes, root)
     write_frame(out_csv, meshes)
     write_latex(out_tex, meshes_sheet(meshes))

@@ -47,15 +47,8 @@ REMARK = (
 def write_recall_table(design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
     """Write one row per cell of any table, and the rows of Table 4 as LaTeX.
 
-    Args:
-        design: of the profile.
-        root: results directory of the profile, where ``runs`` is.
-        out_csv: scores against the labels, under names that end in ``_true`` against the true
-            poses, each with 95 % limits; empty where a run failed.
-        out_tex: a table environment.
-
-    Raises:
-        InputError: a run's scores are missing or unreadable.
+    Scores against the labels, under names that end in ``_true`` against the true poses, each with
+    95 % limits; empty where a run failed.
     """
     table = recall_table(design, root)
     write_frame(out_csv, table)
@@ -89,11 +82,7 @@ def _read(path: Path) -> dict[str, float | None]:
 
 
 def read_recall_table(path: Path) -> pd.DataFrame:
-    """What :func:`write_recall_table` wrote.
-
-    Raises:
-        InputError: it cannot be read, or is another table.
-    """
+    """What :func:`write_recall_table` wrote."""
     return read_frame(path, SCHEMA)
 
 

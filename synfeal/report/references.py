@@ -53,15 +53,7 @@ def write_references_table(
 ) -> None:
     """Write the scores of all reference methods and localizers, data set by data set.
 
-    Args:
-        design: of the profile; localizers are those that start pretrained.
-        external: localizers of somebody else's.
-        root: results directory of the profile, where ``references`` and ``runs`` are.
-        out_csv: one row per data set and method.
-        out_tex: the same as a table environment, a line per method.
-
-    Raises:
-        InputError: scores are missing or unreadable.
+    Localizers are those that start pretrained; ``external`` ones are somebody else's.
     """
     table = references_table(design, external, root)
     write_frame(out_csv, table)
@@ -93,11 +85,7 @@ def references_table(design: Design, external: Externals, root: Path) -> pd.Data
 
 
 def read_references(path: Path) -> pd.DataFrame:
-    """The table that :func:`write_references_table` wrote.
-
-    Raises:
-        InputError: it cannot be read or lacks a column.
-    """
+    """The table that :func:`write_references_table` wrote."""
     return read_frame(path, SCHEMA)
 
 

@@ -30,11 +30,7 @@ def write_robustness(table: pd.DataFrame, out_csv: Path, out_tex: Path) -> None:
 
 
 def read_robustness(path: Path) -> pd.DataFrame:
-    """The table that :func:`write_robustness` wrote.
-
-    Raises:
-        InputError: it cannot be read or lacks a column.
-    """
+    """The table that :func:`write_robustness` wrote."""
     return read_frame(path, SCHEMA)
 
 

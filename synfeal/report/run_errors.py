@@ -15,10 +15,6 @@ COMMON_COLUMNS = COLUMNS[:3]
 
 
 def read_errors(path: Path, columns: Sequence[str] = COLUMNS) -> pd.DataFrame:
-    """A row per test frame; not finite where a prediction failed.
-
-    Raises:
-        InputError: it is missing, or holds anything but these columns of numbers.
-    """
+    """A row per test frame; not finite where a prediction failed."""
     values = read_numbers(path, ",".join(columns), "table of errors", finite=False)
     return pd.DataFrame(values, columns=list(columns))

@@ -45,14 +45,6 @@ def write_speed_vs_error(scenes: Sequence[str], root: Path, out_csv: Path) -> No
     """Write one row per stage, scene and variant; ``chosen`` is 1 where the pipeline uses it.
 
     Speeds are measured, so this table is not the same in every run.
-
-    Args:
-        scenes: the scenes of the tables, in order.
-        root: results directory of the profile.
-        out_csv: the table.
-
-    Raises:
-        InputError: a stage's measurements are missing or unreadable.
     """
     write_frame(out_csv, pd.concat([speeds_of(stage, scenes, root) for stage in READERS]))
 
@@ -90,11 +82,7 @@ def collision_rows(root: Path, scene: str) -> pd.DataFrame:
 
 
 def render_rows(root: Path, scene: str) -> pd.DataFrame:
-    """Ways to draw a frame, by camera; an item is a colour image, an error is in levels of 0-255.
-
-    Raises:
-        InputError: the measurements are missing or unreadable.
-    """
+    """Ways to draw a frame, by camera; an item is a colour image, an error in levels of 0-255."""
     lines = read_frame(root / "scenes" / scene / "render_speed.csv", RENDERED, "measure again")
     camera = lines.width.astype(str) + "x" + lines.height.astype(str) + ", "
     return lines.assign(

@@ -35,17 +35,7 @@ frame counts are in `tables/*.csv`, and as LaTeX in `tables/*.tex`.
 
 
 def write_summary(design: Design, root: Path, out_md: Path, out_txt: Path) -> None:
-    """Write the summary of a profile's results.
-
-    Args:
-        design: of the profile.
-        root: results directory of the profile.
-        out_md: the page: checks, then every table beside the paper's.
-        out_txt: what a person sees when the run ends.
-
-    Raises:
-        InputError: a result file is missing or unreadable.
-    """
+    """Write checks, then every table beside the paper's; and what a person sees when a run ends."""
     cells = {name: read_cells(name, design, root) for name in design.tables}
     findings = run_sentences(cells)
     meshes = read_meshes([*dict.fromkeys(row.scene for row in design.rows)], root)

@@ -23,18 +23,7 @@ def write_table(
     out_csv: Path,
     out_tex: Path,
 ) -> None:
-    """Write one of tables 2 to 6 from the scores of its runs.
-
-    Args:
-        table: e.g. ``table4_size``.
-        design: of the profile, the rows of this table among others.
-        root: results directory of the profile, where ``runs`` is.
-        out_csv: one row per cell.
-        out_tex: a table environment; the packages it needs are named in its first lines.
-
-    Raises:
-        InputError: a run's scores are missing or unreadable.
-    """
+    """Write one of tables 2 to 6 from the scores of its runs: a row per cell, and LaTeX."""
     cells = read_cells(table, design, root)
     write_frame(out_csv, cells[[*schema_of(table, repeated=bool((cells.n_seeds > 1).any()))]])
     write_latex(out_tex, sheet_of(table, cells))

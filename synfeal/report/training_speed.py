@@ -29,9 +29,6 @@ def training_rows(root: Path, scene: str) -> pd.DataFrame:
     the processor in the whole job, over all seeds: starting up, reading frames, and predicting the
     test set are in it. Nothing is chosen: the paper compares the localizers. No rows where the
     design has no Table 4, and none for a localizer of which all seeds failed.
-
-    Raises:
-        InputError: the table, the history of a run or its measurement cannot be read.
     """
     path = root / "tables" / f"{TABLE}.csv"
     cells = read_frame(path, CELL) if path.exists() else frame_of((), CELL)

@@ -28,11 +28,7 @@ REMEDY = "run that job again, or leave its measurement out"
 
 
 def read_measured(root: Path) -> pd.DataFrame:
-    """Jobs of a run: from ``<root>/benchmarks``, else from ``<root>/benchmarks.csv``.
-
-    Raises:
-        InputError: there is neither, or a measurement cannot be read.
-    """
+    """Jobs of a run: from ``<root>/benchmarks``, else from ``<root>/benchmarks.csv``."""
     folder, table = root / "benchmarks", root / "benchmarks.csv"
     paths = sorted(folder.rglob("*.tsv"))
     if paths:
@@ -47,9 +43,6 @@ def read_jobs(paths: Iterable[Path], folder: Path) -> pd.DataFrame:
 
     Processor time is completed up to the end, at the share of a core a job had when last seen. What
     was too short to tell is taken to have had the run's median share.
-
-    Raises:
-        InputError: a measurement cannot be read.
     """
     records = [_read_tsv(path, folder) for path in paths]
     jobs = pd.DataFrame.from_records(records, columns=list(SCHEMA)).astype({"cpu_s": float})

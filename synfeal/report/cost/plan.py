@@ -70,9 +70,6 @@ def plan_of(
         measured: results of runs that the prediction is made from.
         machines: what it is planned for.
         time_steps: time some training steps here, on the GPU if there is one, and use these.
-
-    Raises:
-        InputError: a profile or a run cannot be read.
     """
     profile = read_profile(profile_name)
     pairs, unknown = read_runs(measured)
@@ -105,9 +102,6 @@ def compare_runs(measured: Sequence[Path], compared: Path, time_steps: bool = Fa
     """What the measured runs predict for another beside what it took, and the other way round.
 
     With ``time_steps`` training steps of the run that is predicted are timed here, on a core.
-
-    Raises:
-        InputError: a profile or a run cannot be read.
     """
     named, name = ", ".join(map(str, measured)), str(compared)
     pairs, _ = read_runs(measured)

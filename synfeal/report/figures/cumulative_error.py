@@ -52,11 +52,7 @@ def draw(results: Results) -> Figure | None:
 
 
 def scene_errors(results: Results, row: Experiment) -> SceneErrors:
-    """The errors of the five localizers on one data set.
-
-    Raises:
-        InputError: a run's errors are missing or unreadable.
-    """
+    """The errors of the five localizers on one data set."""
     errors: dict[str, dict[str, Array]] = {}
     for model in MODELS:
         parts = []

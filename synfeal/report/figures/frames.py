@@ -41,11 +41,7 @@ def draw(results: Results) -> Figure | None:
 
 
 def test_frames(results: Results, scene: str) -> NDArray[np.uint8]:
-    """All test frames of a scene (N, H, W, 3), as a memory map.
-
-    Raises:
-        InputError: they are missing or unreadable.
-    """
+    """All test frames of a scene (N, H, W, 3), as a memory map."""
     return read_packed(results.root / "frames" / scene / "test.npy")
 
 

@@ -46,11 +46,7 @@ class LabelledSet:
 
 
 def read_labelled_set(results: Results) -> LabelledSet | None:
-    """The first data set of the design that ground-truth methods label; none if there is none.
-
-    Raises:
-        InputError: labels or a record of assistance are missing or unreadable.
-    """
+    """The first data set of the design that ground-truth methods label; none if there is none."""
     sets = estimated_sets(results.rows)
     if not sets:
         return None

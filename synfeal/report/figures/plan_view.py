@@ -33,11 +33,7 @@ class Plan:
 
 
 def read_plan(results: Results, scene: str) -> Plan:
-    """The plan of a scene, cut above the highest camera of its true poses.
-
-    Raises:
-        InputError: the collision mesh or the labels are missing or unreadable.
-    """
+    """The plan of a scene, cut above the highest camera of its true poses."""
     mesh = load_collision_mesh(results.root / "scenes" / scene / "collision.ply")
     largest = results.sizes(scene)[-1]
     return plan_of(mesh, results.labels(scene, largest, "synfeal", "train").position_m[:, 2].max())

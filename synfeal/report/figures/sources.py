@@ -46,39 +46,23 @@ class Results:
         return self.design.rows_of(table)
 
     def table(self, name: str) -> pd.DataFrame:
-        """``tables/<name>.csv``.
-
-        Raises:
-            InputError: the table is missing or unreadable.
-        """
+        """``tables/<name>.csv``."""
         schema = speed_vs_error.SCHEMA if name == speed_vs_error.NAME else schema_of(name)
         # What is drawn is a number or a gap, a count too.
         kinds = {column: MAYBE if kind.optional else kind for column, kind in schema.items()}
         return read_frame(self.root / "tables" / f"{name}.csv", kinds)
 
     def speeds(self, stage: str) -> pd.DataFrame:
-        """The rows of ``speed_vs_error.csv`` of one stage.
-
-        Raises:
-            InputError: the table is missing or unreadable.
-        """
+        """The rows of ``speed_vs_error.csv`` of one stage."""
         table = self.table(speed_vs_error.NAME)
         return table[table["stage"] == stage]
 
     def labels(self, scene: str, size: str, labels: str, split: str) -> PoseTable:
-        """The poses a data set carries; those of ``synfeal`` are the true ones.
-
-        Raises:
-            InputError: the labels are missing or unreadable.
-        """
+        """The poses a data set carries; those of ``synfeal`` are the true ones."""
         return read_pose_table(self.root / "labels" / scene / size / labels / f"{split}.csv")
 
     def sizes(self, scene: str) -> list[str]:
-        """Data set sizes of a scene in the design, the smallest first.
-
-        Raises:
-            InputError: the labels of a size are missing or unreadable.
-        """
+        """Data set sizes of a scene in the design, the smallest first."""
         names = dict.fromkeys(row.size for row in self.rows if row.scene == scene)
         return sorted(names, key=lambda size: len(self.labels(scene, size, "synfeal", "train")))
 

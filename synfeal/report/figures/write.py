@@ -18,15 +18,9 @@ METADATA: dict[str, dict[str, str | None]] = {".png": {"Software": None}, ".svg"
 
 
 def write_figures(design: Design, root: Path, out_dir: Path) -> list[str]:
-    """Write every figure of the registry whose inputs the design makes, as SVG and PNG.
+    """Write every figure whose inputs the design makes, as SVG and PNG; their names.
 
     Equal results give equal files.
-
-    Returns:
-        The names of the figures written.
-
-    Raises:
-        InputError: a result file that the design makes is missing or unreadable.
     """
     results, written = Results(root, design), []
     for name, entry in FIGURES.items():

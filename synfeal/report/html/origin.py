@@ -43,11 +43,7 @@ _SHAPE = TypeAdapter(_Origin)
 
 
 def read_origin(path: Path) -> Record:
-    """``provenance.json``.
-
-    Raises:
-        InputError: it is unreadable, lacks a key, or holds something of another type.
-    """
+    """``provenance.json``."""
     record = read_result(path, (*NEEDED, "machine", "stages"), "make it again")
     check_result(path, record, _SHAPE, "make it again")
     return record

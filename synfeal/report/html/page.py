@@ -28,16 +28,9 @@ CLAIMS, PROVENANCE = "claims.csv", "provenance.json"
 
 
 def write_report(design: Design, root: Path, out_html: Path) -> None:
-    """Write the page.
+    """Write the page, one file that opens without a network.
 
-    Args:
-        design: of the profile.
-        root: results directory of the profile. Without claims, provenance or figures, their
-            sections say so.
-        out_html: one file; it opens without a network.
-
-    Raises:
-        InputError: a run's scores, a mesh or a plan are missing, or a file cannot be read.
+    Without claims, provenance or figures, their sections say so.
     """
     cells = {table: read_cells(table, design, root) for table in design.tables}
     claims = read_claims(root / CLAIMS) if (root / CLAIMS).exists() else []

@@ -44,16 +44,7 @@ class Trajectory:
 
 
 def room_html(scene: str, root: Path, rows: Sequence[Experiment]) -> Markup:
-    """The view of one scene, ready for ``report.js``.
-
-    Args:
-        scene: its name.
-        root: results directory of the profile.
-        rows: the design, which says what label sets there are.
-
-    Raises:
-        InputError: the mesh, a plan or a label set cannot be read.
-    """
+    """The view of one scene, ready for ``report.js``; the design says what label sets there are."""
     mesh = load_mesh(root / "scenes" / scene / "mesh.glb")
     small = viewer_mesh(mesh, SurfacePoints.of(mesh, generator_of(0, "report", scene)))
     return _html(scene, small, trajectories(scene, root, rows))

@@ -31,11 +31,7 @@ class FirstScores:
         self._scores: dict[Run, tuple[float, float] | None] = {}
 
     def add(self, metrics: Path) -> Row | None:
-        """Read the scores of a run; its row, or None where the file is of no run of the design.
-
-        Raises:
-            InputError: the file cannot be read.
-        """
+        """Read the scores of a run; its row, or None where the file is of no run of the design."""
         run = self._run_of.get(metrics)
         if run is None:
             return None
