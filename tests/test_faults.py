@@ -30,7 +30,7 @@ from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import Triangles, load_collision_mesh, save_collision_mesh
-from synfeal.report.figures.write import save
+from synfeal.report.figures.registry import save
 from synfeal.report.latex import write_text
 from synfeal.run_lock import begin_run
 from tests.small_disk import mounted, remount

@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from synfeal.frames import read_records
 from synfeal.report import stats
+from synfeal.report.document import hard_cases_latex
 from synfeal.report.hard_cases import case as cases
 from synfeal.report.hard_cases import estimates, exact, scenes
 from synfeal.report.hard_cases import table as hard_table
-from synfeal.report.hard_cases.latex import hard_cases_latex
 from synfeal.report.hard_cases.table import CASES, COLUMNS, row_of, rows_of, write_hard_cases
 from synfeal.report.html.side_tables import hard_cases_table
 from synfeal.report.tables import write_rows

@@ -15,8 +15,8 @@ from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.render import choose
 from synfeal.report.figures import render_speed
+from synfeal.report.figures.registry import write_figures
 from synfeal.report.figures.sources import Results
-from synfeal.report.figures.write import write_figures
 from synfeal.report.speed_vs_error import render_rows, speeds_of
 from synfeal.scenes import render_speed as speed
 from synfeal.scenes.render_speed_table import SCHEMA, Measured, write_speed

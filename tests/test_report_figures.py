@@ -10,9 +10,8 @@ from synfeal.report.figures import Results, speed_vs_error
 from synfeal.report.figures.cumulative_error import SceneErrors
 from synfeal.report.figures.cumulative_error import figure_of as cumulative_figure
 from synfeal.report.figures.error_by_design import LEVEL, by_images, by_noise, by_size
-from synfeal.report.figures.localizer_lines import ASIDE, published_values
+from synfeal.report.figures.localizer_lines import ASIDE, SHOWN, published_values
 from synfeal.report.figures.pareto import pareto_front
-from synfeal.report.figures.reference_lines import SHOWN
 from synfeal.report.figures.style import METHOD_STYLES, MODEL_STYLES, PUBLISHED, SPLIT_STYLES
 from synfeal.report.layouts import TITLES
 from tests.report_results import ROWS, design_of

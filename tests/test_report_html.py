@@ -16,8 +16,13 @@ from synfeal.errors import InputError
 from synfeal.report.cells import read_cells
 from synfeal.report.html import page
 from synfeal.report.html.claims import claims_table, read_claims
-from synfeal.report.html.figures import LARGEST_SIDE_PX, data_address, figure_files
-from synfeal.report.html.skipped import missing_figures, missing_rows
+from synfeal.report.html.page import (
+    LARGEST_SIDE_PX,
+    data_address,
+    figure_files,
+    missing_figures,
+    missing_rows,
+)
 from synfeal.report.html.tables import score_table
 from tests.report_page import edit_json, large_room_design, page_results
 from tests.report_results import TABLE4, design_of, failed_metrics, fill, shipped_design, write_run

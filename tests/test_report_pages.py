@@ -6,11 +6,10 @@ import subprocess
 import pytest
 
 from synfeal.config import MODELS
-from synfeal.report.alive import alive_sentences
 from synfeal.report.assistance import write_assistance_table
 from synfeal.report.cells import read_cells
 from synfeal.report.latex import escape, write_document
-from synfeal.report.summary import write_summary
+from synfeal.report.summary import alive_sentences, write_summary
 from tests.report_results import (
     ROWS,
     TABLE4,

@@ -7,8 +7,12 @@ import pytest
 from synfeal.errors import InputError
 from synfeal.provenance import processor_name
 from synfeal.report.cost.measured import read_jobs
-from synfeal.report.html.origin import cost_sentence, origin_html
-from synfeal.report.html.provenance import stages_of, write_provenance
+from synfeal.report.html.provenance import (
+    cost_sentence,
+    origin_html,
+    stages_of,
+    write_provenance,
+)
 
 HEADER = "s\th:m:s\tmax_rss\tcpu_time\n"
 

@@ -13,10 +13,8 @@ from rich.console import Console
 
 from synfeal.config import MODELS, Run, load_config, read_experiments
 from synfeal.files import write_json
-from synfeal.report.progress.first_scores import FirstScores
-from synfeal.report.progress.plan import RunPlan, job_name, plan_run
-from synfeal.report.progress.time_left import TimeLeft
-from synfeal.report.progress.view import RunView
+from synfeal.report.progress.plan import RunPlan, TimeLeft, job_name, plan_run
+from synfeal.report.progress.view import FirstScores, RunView
 from tests.planned_runs import planned
 from tests.report_results import failed_metrics, metrics
 

@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from synfeal.frames import read_records
 from synfeal.report.figures import CAPTIONS
-from synfeal.report.hard_cases.latex import hard_cases_latex
+from synfeal.report.hard_cases.case import Row, error_text, judged, short
 from synfeal.report.hard_cases.table import COLUMNS
 from synfeal.report.hard_cases.table import NAME as HARD_CASES
-from synfeal.report.latex import PACKAGES, document_latex, escape, table_bodies, write_text
+from synfeal.report.latex import (
+    PACKAGES,
+    TONES,
+    document_latex,
+    escape,
+    table_bodies,
+    write_text,
+)
 
-CLAIM_PACKAGES = (*PACKAGES, "longtable", "array")
-WIDTHS_MM = (8, 42, 24, 30, 30, 20, 20)
+LONG_PACKAGES = (*PACKAGES, "longtable", "array")
+# Headings and widths in millimetres.
+CLAIMS = {
+    **{"": 8, "Claim": 42, "Published": 24},
+    "Measured against the labels (the paper's protocol)": 30,
+    **{"Measured against the true poses": 30, "Verdict, labels": 20, "Verdict, true poses": 20},
+}
+CASES = {"": 22, "Case": 48, "First thought": 36, "its error": 18, "Our error": 18, "Bound": 18}
 CLAIM_COLUMNS = (
     *("id", "statement", "published", "measured_labels", "measured_true"),
     *("verdict_labels", "verdict_true"),
 )
-HEADINGS = (
-    *("", "Claim", "Published", "Measured against the labels (the paper's protocol)"),
-    *("Measured against the true poses", "Verdict, labels", "Verdict, true poses"),
+CASES_CAPTION = (
+    r"\noindent\textbf{Hard cases.} Errors against exact answers, of the formula somebody would"
+    r" write first and of ours; in colour: above the bound that ours promises."
 )
 
 
@@ -35,7 +48,7 @@ def write_report_document(root: Path, tables: Sequence[Path], out_tex: Path) -> 
         *([hard_cases_latex(_rows(hard_cases, COLUMNS))] if hard_cases.is_file() else []),
         *(figure_latex(name, CAPTIONS[name]) for name in names),
     ]
-    write_text(out_tex, document_latex(pages, CLAIM_PACKAGES))
+    write_text(out_tex, document_latex(pages, LONG_PACKAGES))
 
 
 def _rows(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
@@ -47,28 +60,53 @@ def title_latex(profile: str) -> str:
     return rf"\section*{{Synfeal, reproduced: profile {escape(profile)}}}"
 
 
-def claims_latex(claims: Sequence[Mapping[str, str]]) -> str:
-    """The claims as a table that may run over pages, footnotes below."""
-    columns = "".join(rf">{{\raggedright\arraybackslash}}p{{{width}mm}}" for width in WIDTHS_MM)
+def claims_latex(claims: Sequence[Row]) -> str:
+    """The claims, footnotes below."""
+    lines = [
+        " & ".join(escape(row[name]) for name in CLAIM_COLUMNS) + r" \\ \addlinespace"
+        for row in claims
+    ]
     notes = [
         rf"\noindent {row['id']}: {escape(row['footnote'])}" for row in claims if row["footnote"]
     ]
-    lines = [
+    return long_table(CLAIMS, lines, "\n\n".join(notes))
+
+
+def hard_cases_latex(rows: Sequence[Row]) -> str:
+    """Rows of ``hard_cases.csv``: errors only, no times."""
+    return f"{CASES_CAPTION}\n\n{long_table(CASES, map(_case, rows))}"
+
+
+def long_table(widths_mm: Mapping[str, int], lines: Iterable[str], *below: str) -> str:
+    """A table over as many pages as it takes, widths of its columns by heading."""
+    columns = "".join(
+        rf">{{\raggedright\arraybackslash}}p{{{width}mm}}" for width in widths_mm.values()
+    )
+    parts = [
         r"{\scriptsize\setlength{\tabcolsep}{1mm}",
         rf"\begin{{longtable}}{{{columns}}}",
-        rf"\toprule {' & '.join(map(escape, HEADINGS))} \\ \midrule \endhead",
-        *map(_claim, claims),
+        rf"\toprule {' & '.join(map(escape, widths_mm))} \\ \midrule \endhead",
+        *lines,
         r"\bottomrule",
         r"\end{longtable}",
         r"\addtocounter{table}{-1}",  # the paper's tables keep their numbers
-        "\n\n".join(notes),
+        *below,
         "}",
     ]
-    return "\n".join(lines)
+    return "\n".join(parts)
 
 
-def _claim(row: Mapping[str, str]) -> str:
-    return " & ".join(escape(row[name]) for name in CLAIM_COLUMNS) + r" \\ \addlinespace"
+def _case(row: Row) -> str:
+    texts = (row["family"], f"{row['case']} ({judged(row)})", row["naive"])
+    errors = [_error(row, column) for column in ("naive_error", "our_error")]
+    return " & ".join([*map(escape, texts), *errors, escape(short(float(row["bound"])))]) + r" \\"
+
+
+def _error(row: Row, column: str) -> str:
+    text = escape(error_text(row, column))
+    if float(row[column]) <= float(row["bound"]):
+        return text
+    return rf"\textcolor{{{TONES['worse']}}}{{\textbf{{{text}}}}}"
 
 
 def figure_latex(name: str, caption: str) -> str:

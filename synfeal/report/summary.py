@@ -9,11 +9,10 @@ import pandas as pd
 
 from synfeal.config import Design
 from synfeal.frames import rows_of
-from synfeal.report.alive import alive_sentences
 from synfeal.report.cells import read_cells
 from synfeal.report.crossing import crossing_findings
 from synfeal.report.latex import write_text
-from synfeal.report.layouts import sheet_of
+from synfeal.report.layouts import TITLES, scene_title, sheet_of
 from synfeal.report.meshes import meshes_sheet, read_meshes
 from synfeal.report.recall import NAME as RECALL
 from synfeal.report.recall import read_recall_table, recall_sheet
@@ -86,3 +85,45 @@ def terminal_text(root: Path, summary: Path, findings: Sequence[str]) -> str:
     lines = [f"{name + ':':<8} {path}" for name, path in places.items()]
     lines[0] += "   (one page with everything; open it in a browser)"
     return "\n".join([*(f"- {finding}" for finding in findings), *lines]) + "\n"
+
+
+POSITION, ORIENTATION = "position_m_true", "orientation_deg_true"
+
+
+def alive_sentences(cells: pd.DataFrame) -> list[str]:
+    """What the cells of Table 4 say about each scene, by the errors against the true poses."""
+    scenes = cells.groupby("scene", sort=False)
+    return [text for scene, found in scenes for text in _sentences(scene_title(str(scene)), found)]
+
+
+def _sentences(title: str, cells: pd.DataFrame) -> list[str]:
+    """Errors at the largest size below half of the mean pose's, and what more frames change."""
+    n_train = cells.groupby("size", sort=False).n_train.first()
+    sizes = n_train.idxmin(), n_train.idxmax()
+    first, last = (cells[cells["size"] == size].set_index("model") for size in sizes)
+    half_m = last[f"baseline_{POSITION}"].iloc[0] / 2
+    below = int((last[POSITION] < half_m).sum())
+    lines = [
+        f"{title}, {sizes[1]}: {below} of {len(last)} localizers have a median position error below"
+        f" half of the mean-pose baseline ({half_m:.2f} m): {_errors(last[POSITION])}."
+    ]
+    if pd.isna(half_m):
+        lines = [f"{title}, {sizes[1]}: the mean-pose baseline could not be computed."]
+    if sizes[0] != sizes[1]:
+        falls = [_falls(last[measure] < first[measure]) for measure in (POSITION, ORIENTATION)]
+        lines.append(
+            f"{title}, {sizes[0]} to {sizes[1]}: the position error falls for {falls[0]}, the"
+            f" orientation error for {falls[1]}."
+        )
+    return lines
+
+
+def _errors(errors_m: pd.Series) -> str:
+    texts = {m: "failed" if pd.isna(e) else f"{e:.2f} m" for m, e in errors_m.items()}
+    return ", ".join(f"{TITLES[str(model)]} {text}" for model, text in texts.items())
+
+
+def _falls(falls: pd.Series) -> str:
+    others = [TITLES[str(model)] for model in falls.index[~falls]]
+    exceptions = f" (not {', '.join(others)})" if others else ""
+    return f"{falls.sum()} of {len(falls)}{exceptions}"

@@ -181,7 +181,7 @@ use rule call as figures with:
     resources:
         mem_mb=grown(2000),
     params:
-        function="synfeal.report.figures.write:write_figures",
+        function="synfeal.report.figures.registry:write_figures",
         design=dump(DESIGN),
 
 

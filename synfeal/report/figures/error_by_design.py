@@ -9,8 +9,12 @@ from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
 from baselines.groundtruth.methods import SIMULATOR
-from synfeal.report.figures.localizer_lines import add_legend, draw_localizers, start_at_zero
-from synfeal.report.figures.reference_lines import draw_references
+from synfeal.report.figures.localizer_lines import (
+    add_legend,
+    draw_localizers,
+    draw_references,
+    start_at_zero,
+)
 from synfeal.report.figures.sources import Results, counted
 from synfeal.report.layouts import STARTS, scene_title
 from synfeal.report.references import NAME, read_references

@@ -8,8 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from synfeal.report.figures.label_sets import LabelledSet, LabelledSplit, read_labelled_set
-from synfeal.report.figures.sources import SPLITS, Results, counted
+from synfeal.report.figures.sources import (
+    SPLITS,
+    LabelledSet,
+    LabelledSplit,
+    Results,
+    counted,
+    read_labelled_set,
+)
 from synfeal.report.figures.style import METHOD_STYLES, Style
 from synfeal.report.layouts import SOURCES, scene_title
 

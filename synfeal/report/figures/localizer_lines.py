@@ -1,9 +1,9 @@
-"""Panels with one line per localizer, 95 % limits, and the published line in light grey."""
+"""Lines of localizers with 95 % limits, of the paper in light grey, of references in dark grey."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -11,9 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from synfeal.config import MODELS
+from synfeal.report.crossing import STRUCTURE
 from synfeal.report.figures.sources import Array
-from synfeal.report.figures.style import MODEL_STYLES, PUBLISHED
+from synfeal.report.figures.style import MODEL_STYLES, PUBLISHED, reference_styles
 from synfeal.report.layouts import TITLES
+from synfeal.report.references import titles_in
 
 PUBLISHED_TITLE = "published (light grey; positions × √3,\nsince print has RMS over the axes)"
 # Localizers stand side by side so that their limits can be told apart; in widths of a place.
@@ -78,3 +80,35 @@ def add_legend(figure: Figure | SubFigure, axes: Axes, columns: int, published: 
         (reference,) = axes.plot([], [], linestyle="-", **PUBLISHED)
         handles, labels = [*handles, reference], [*labels, PUBLISHED_TITLE]
     figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+
+
+# Nothing learnt, a training pose copied, and geometry.
+SHOWN = ("constant", "nearest-vlad", STRUCTURE)
+
+
+def draw_references(axes: Axes, data_sets: Sequence[pd.DataFrame], measure: str) -> None:
+    """Grey lines over the places 0, 1, ... on axes whose limits stand; they do not change them.
+
+    Args:
+        axes: where to draw; a line that lies above them is said in words.
+        data_sets: rows of ``references.csv``, of the data set at each place.
+        measure: column of the error.
+    """
+    titles = titles_in(pd.concat(data_sets))
+    styles = reference_styles(name for name in titles if name not in MODELS)
+    above = []
+    for name in SHOWN:
+        if name not in titles:
+            continue
+        found = [rows.loc[rows.method == name, measure] for rows in data_sets]
+        values = np.array([float(v.iloc[0]) if len(v) else np.nan for v in found])
+        look = styles[name] | {"color": "0.35", "linewidth": 1.0, "markersize": 5}
+        places = range(len(values))
+        axes.plot(places, values, label=titles[name], scalex=False, scaley=False, **look)
+        if np.nanmin(values, initial=np.inf) > axes.get_ylim()[1]:
+            form = "{:.2f} m" if measure.startswith("position_m") else "{:.0f}°"
+            ends = [form.format(end) for end in (np.nanmin(values), np.nanmax(values))]
+            above.append(f"↑ {titles[name]}: {' – '.join(dict.fromkeys(ends))}")
+    behind = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
+    place = {"transform": axes.transAxes, "va": "top", "bbox": behind}
+    axes.text(0.02, 0.99, "\n".join(above), None, fontsize=7, color="0.35", **place)

@@ -1,13 +1,17 @@
-"""All figures, in the order a report shows them."""
+"""All figures, in the order a report shows them, and drawing them to files."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
+import matplotlib
 from matplotlib.figure import Figure
 
+from synfeal.config import Design
+from synfeal.files import atomic_path
 from synfeal.report.figures import (
     cumulative_error,
     error_by_design,
@@ -21,6 +25,7 @@ from synfeal.report.figures import (
     trajectories,
 )
 from synfeal.report.figures.sources import Results
+from synfeal.report.figures.style import RC
 
 
 @dataclass(frozen=True)
@@ -124,3 +129,30 @@ FIGURES: dict[str, Entry] = {
     ),
 }
 CAPTIONS: dict[str, str] = {name: entry.caption for name, entry in FIGURES.items()}
+
+
+DPI = 150
+METADATA: dict[str, dict[str, str | None]] = {".png": {"Software": None}, ".svg": {"Date": None}}
+
+
+def write_figures(design: Design, root: Path, out_dir: Path) -> list[str]:
+    """Write every figure whose inputs the design makes, as SVG and PNG; their names.
+
+    Equal results give equal files.
+    """
+    results, written = Results(root, design), []
+    for name, entry in FIGURES.items():
+        with matplotlib.rc_context(rc=RC):
+            figure = entry.draw(results)
+            if figure is None:
+                continue
+            for suffix in entry.suffixes:
+                save(figure, (out_dir / name).with_suffix(suffix))
+            written.append(name)
+    return written
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write one file, without a date."""
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=DPI, metadata=METADATA[path.suffix])

@@ -8,9 +8,15 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure, SubFigure
 
-from synfeal.report.figures.label_sets import LabelledSet, LabelledSplit, read_labelled_set
 from synfeal.report.figures.plan_view import Plan, draw_plan, draw_scale_bar, read_plan
-from synfeal.report.figures.sources import SPLITS, Array, Results
+from synfeal.report.figures.sources import (
+    SPLITS,
+    Array,
+    LabelledSet,
+    LabelledSplit,
+    Results,
+    read_labelled_set,
+)
 from synfeal.report.figures.style import METHOD_STYLES, TRUTH, Style
 from synfeal.report.layouts import SOURCES, scene_title
 

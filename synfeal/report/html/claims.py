@@ -23,8 +23,7 @@ from synfeal.report.claims.model import (
     UNDECIDED,
 )
 from synfeal.report.claims.table import COLUMNS
-from synfeal.report.html.render import render
-from synfeal.report.html.sortable import SCORES, Column
+from synfeal.report.html.render import SCORES, Column, render
 
 # A sign, a border and the words themselves tell verdicts apart without colour.
 BADGES: Mapping[str, tuple[str, str]] = {

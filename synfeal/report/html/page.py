@@ -2,27 +2,65 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import base64
+import io
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
 from markupsafe import Markup
+from PIL import Image
 
-from synfeal.config import Design
+from synfeal.config import Design, Experiment
+from synfeal.config.tables import KEYS
 from synfeal.files import atomic_path
 from synfeal.inspect.viewer_mesh import viewer_js
 from synfeal.report import meshes
 from synfeal.report.cells import read_cells
+from synfeal.report.claims.model import NOT_TESTABLE
 from synfeal.report.figures import CAPTIONS
-from synfeal.report.html.claims import claims_table, read_claims, verdict_counts
-from synfeal.report.html.figures import data_address, figure_files
-from synfeal.report.html.origin import cost_sentence, origin_html, read_origin
+from synfeal.report.html.claims import Claims, claims_table, read_claims, verdict_counts
+from synfeal.report.html.provenance import cost_sentence, origin_html, read_origin
 from synfeal.report.html.render import render
 from synfeal.report.html.rooms import room_html
 from synfeal.report.html.side_tables import SIDE_TABLES, meshes_table
-from synfeal.report.html.skipped import missing_figures, missing_rows, untested_claims
 from synfeal.report.html.tables import score_table, table_title
+from synfeal.report.layouts import BLOCKS, SOURCES, scene_title
+from synfeal.report.published import key_of, published_cells
 from synfeal.report.summary import run_sentences
+
+LARGEST_SVG = 1_000_000  # bytes; clouds of points are smaller as a picture
+LARGEST_PNG = 250_000
+LARGEST_SIDE_PX = 1800
+
+
+def figure_files(folder: Path, captions: Mapping[str, str]) -> dict[str, Path]:
+    """One file per figure of a folder, those with captions first and in their order."""
+    found: dict[str, Path] = {}
+    for path in sorted(folder.glob("*.png")) + sorted(folder.glob("*.svg")):
+        is_large = path.suffix == ".svg" and path.stat().st_size > LARGEST_SVG
+        if not (is_large and path.stem in found):
+            found[path.stem] = path
+    order = [*(name for name in captions if name in found), *sorted(found)]
+    return {name: found[name] for name in dict.fromkeys(order)}
+
+
+def data_address(path: Path) -> str:
+    """A picture as a ``data:`` address; large PNG files become WebP."""
+    content, kind = path.read_bytes(), "svg+xml" if path.suffix == ".svg" else "png"
+    if kind == "png" and len(content) > LARGEST_PNG:
+        content, kind = _smaller(content), "webp"
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
+
+
+def _smaller(png: bytes) -> bytes:
+    with Image.open(io.BytesIO(png)) as image:
+        picture = image.convert("RGB")
+    picture.thumbnail((LARGEST_SIDE_PX, LARGEST_SIDE_PX))
+    buffer = io.BytesIO()
+    picture.save(buffer, "WEBP", quality=85, method=4)
+    return buffer.getvalue()
+
 
 CLAIMS, PROVENANCE = "claims.csv", "provenance.json"
 
@@ -75,3 +113,46 @@ def _tables(cells: Mapping[str, pd.DataFrame], root: Path) -> Iterator[dict[str,
         if name == meshes.NAME:
             for score_name, (score_title, body) in scored.items():
                 yield {"name": score_name, "title": score_title, "body": body}
+
+
+RowKey = tuple[str, str, str, str, float, float, str]
+
+
+def missing_rows(rows: Sequence[Experiment]) -> list[str]:
+    """By table, the paper's rows that this run's table of experiments leaves out."""
+    sentences = []
+    for table in KEYS:
+        own = {key_of(row, "")[:-1] for row in rows if row.table == table}
+        printed = dict.fromkeys(key[:-1] for key in published_cells(table))
+        absent = [_row_name(table, key) for key in printed if key not in own]
+        if absent:
+            number = table.split("_")[0].removeprefix("table")
+            sentences.append(
+                f"Table {number}: {len(absent)} of the paper's {len(printed)} rows are not in this"
+                f" profile's table of experiments: {'; '.join(absent)}."
+            )
+    return sentences
+
+
+def untested_claims(claims: Claims) -> list[str]:
+    """Claims that this run cannot test under one of the two scores, and why."""
+    return [
+        f"{claim['id']} is not testable here: {claim['reason'] or 'no reason given'}"
+        for claim in claims
+        if NOT_TESTABLE in (claim["verdict_labels"], claim["verdict_true"])
+    ]
+
+
+def missing_figures(captions: Mapping[str, str], found: Iterable[str]) -> list[str]:
+    """Figures that have a caption and were not drawn."""
+    names = [name for name in captions if name not in set(found)]
+    return [f"Not drawn, for lack of its data in this profile: figure {name}." for name in names]
+
+
+def _row_name(table: str, key: RowKey) -> str:
+    block, scene, size, labels, noise_m, noise_deg, _ = key
+    if table == "table2_ground_truth":
+        return f"{scene_title(scene)}, {SOURCES[labels]}"
+    if block:
+        return f"{BLOCKS[block]} {noise_m:g} m, {noise_deg:g}°"
+    return f"{scene_title(scene)} {size}"

@@ -22,8 +22,8 @@ from synfeal.report import (
     speed_vs_error,
 )
 from synfeal.report.hard_cases import table as hard_cases
-from synfeal.report.hard_cases.text import Row, error_text, judged, short
-from synfeal.report.html.sortable import Column, sortable
+from synfeal.report.hard_cases.case import Row, error_text, judged, short
+from synfeal.report.html.render import Column, sortable
 from synfeal.report.layouts import SOURCES, TITLES, scene_title
 
 DATA_SET, LABELS = Column("Data set", "data_set"), Column("Labels", "labels")

@@ -10,8 +10,7 @@ from markupsafe import Markup
 
 from synfeal.config.experiments import FROM_SCRATCH
 from synfeal.frames import rows_of
-from synfeal.report.html.render import render
-from synfeal.report.html.sortable import Column
+from synfeal.report.html.render import Column, render
 from synfeal.report.layouts import (
     CHANGE,
     HEADINGS,

@@ -1,4 +1,4 @@
-"""What a run is going to do: which jobs, how long each may take, and which scores come of it."""
+"""What a run is going to do, and how long it still takes."""
 
 from __future__ import annotations
 
@@ -68,3 +68,85 @@ def _expected_s(profile: Profile, benchmarks: Iterable[str]) -> dict[str, float]
     jobs = jobs_of(profile, filter(None, map(key_of, benchmarks)))
     names = jobs["stage"].str.cat(jobs["job"], sep="/").str.rstrip("/")
     return dict(seconds_of(jobs, laws).set_axis(names).dropna())
+
+
+# So many expected seconds count as much as what was measured: the first short jobs, which mostly
+# wait for the disk, do not decide what hours of training will take.
+TRUSTED_S = 60.0
+
+
+class TimeLeft:
+    """Time left of a run, from what its jobs were expected to take and what they have taken.
+
+    The ratio of measured to expected seconds is known for the whole run and for each stage; both
+    start at what is expected (the stages at the ratio of the run), with a weight of ``TRUSTED_S``.
+
+    One thread may ask while another tells: what changes is copied before it is gone through.
+
+    Args:
+        expected_s: seconds by job, ``stage/name``.
+        cores: jobs at a time.
+    """
+
+    def __init__(self, expected_s: Mapping[str, float], cores: int) -> None:
+        self.expected_s = dict(expected_s)
+        self._cores = max(cores, 1)
+        self._began: dict[str, float] = {}
+        self._taken_s: dict[str, float] = {}
+
+    def started(self, job: str, now_s: float) -> None:
+        """A job began."""
+        self._began[job] = now_s
+
+    def finished(self, job: str, now_s: float) -> None:
+        """A job ended."""
+        self._taken_s[job] = now_s - self._began.pop(job, now_s)
+        self.expected_s.setdefault(job, self._taken_s[job])
+
+    @property
+    def running(self) -> tuple[str, ...]:
+        """Jobs that began and did not end, in that order."""
+        return tuple(self._began)
+
+    def count(self, stage: str) -> tuple[int, int]:
+        """Jobs of a stage that are done, and all of them."""
+        jobs = [job for job in tuple(self.expected_s) if _stage(job) == stage]
+        return sum(job in self._taken_s for job in jobs), len(jobs)
+
+    def seconds(self, now_s: float) -> float:
+        """Seconds left: the work there is on all cores, or the longest job on one."""
+        left = list(self._left_s(now_s).values())
+        return max(sum(left) / self._cores, max(left, default=0.0))
+
+    def share(self) -> float:
+        """Part of the expected work that is done, from 0 to 1: it never falls."""
+        expected_s = dict(self.expected_s)
+        done_s = sum(expected_s[job] for job in tuple(self._taken_s))
+        return done_s / sum(expected_s.values()) if expected_s else 1.0
+
+    def _left_s(self, now_s: float) -> dict[str, float]:
+        ratio, ratios = self._ratios()
+        left = {}
+        for job, expected_s in tuple(self.expected_s.items()):
+            if job not in self._taken_s:
+                likely_s = expected_s * ratios.get(_stage(job), ratio)
+                left[job] = max(likely_s - (now_s - self._began.get(job, now_s)), 0.0)
+        return left
+
+    def _ratios(self) -> tuple[float, dict[str, float]]:
+        """Measured over expected seconds: of the run, and of each stage that has finished jobs."""
+        expected_s: dict[str, float] = {}
+        taken_s: dict[str, float] = {}
+        for job, seconds in tuple(self._taken_s.items()):
+            stage = _stage(job)
+            expected_s[stage] = expected_s.get(stage, 0.0) + self.expected_s[job]
+            taken_s[stage] = taken_s.get(stage, 0.0) + seconds
+        ratio = (sum(taken_s.values()) + TRUSTED_S) / (sum(expected_s.values()) + TRUSTED_S)
+        return ratio, {
+            stage: (taken_s[stage] + ratio * TRUSTED_S) / (expected_s[stage] + TRUSTED_S)
+            for stage in expected_s
+        }
+
+
+def _stage(job: str) -> str:
+    return job.partition("/")[0]
