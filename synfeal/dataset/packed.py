@@ -176,3 +176,17 @@ def _read_shard(path: Path) -> dict[str, object]:
         raise InputError(
             f"{path}: cannot be read as the record of a shard ({why(error)}); render it again"
         ) from None
+
+
+def write_packed(
+    plan: Path,
+    shards: list[Path],
+    records: list[Path],
+    camera: CameraConfig,
+    render: RenderConfig,
+    view: View,
+    out_frames: Path,
+) -> None:
+    """Join parts of packed frames, in order, and write their record."""
+    join_packed(shards, out_frames)
+    write_packed_record(out_frames, records, plan, camera, render, view)

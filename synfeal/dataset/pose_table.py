@@ -140,3 +140,8 @@ def check_unit(quat_wxyz: NDArray[np.float64], path: Path, line_of: NDArray[np.i
             f"{path}: line {line_of[bad]} holds a quaternion of length {length[bad]:.3g};"
             " a rotation has length 1"
         )
+
+
+def write_first_frames(plan: Path, n_frames: int, out_labels: Path) -> None:
+    """Write the first frames of a pose table as one of their own."""
+    write_pose_table(out_labels, read_frames(plan, 0, n_frames))

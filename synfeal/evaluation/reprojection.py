@@ -22,13 +22,14 @@ from synfeal.bootstrap import medians
 from synfeal.camera.rays import normalised_of_pixels, pixels_of_normalised
 from synfeal.config.camera import CameraConfig
 from synfeal.dataset.archive import FrameFile
-from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.dataset.sevenscenes import INVALID_MM
 from synfeal.errors import InputError, why
 from synfeal.evaluation.metrics import Metrics, draws, is_pose, means, with_limits
 from synfeal.files import atomic_path
 from synfeal.geometry.poses import pose_from_quat, relative
 from synfeal.mesh.rays import RayCaster
+from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.validation.images import read_depth_mm
 
 Array = NDArray[np.float64]
@@ -162,3 +163,10 @@ def depth_of_images(paths: Iterable[FrameFile], camera: CameraConfig) -> Iterato
             raise InputError(f"{path}: is not {camera.width} x {camera.height}; give --camera")
         values = depth_mm[row, column]
         yield np.where((values > 0) & (values < INVALID_MM), values / 1000.0, np.inf)
+
+
+def write_scene_depth(collision: Path, plan: Path, camera: CameraConfig, out_depth: Path) -> None:
+    """Write what planned frames show, as depths of a collision mesh."""
+    caster = RayCaster(*load_collision_mesh(collision))
+    poses = read_pose_table(plan).world_from_cam
+    write_cell_depth(out_depth, cell_depth_m(caster, camera, poses))

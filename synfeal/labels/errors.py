@@ -17,12 +17,13 @@ the training poses. A scale turns nothing, so it has no orientation error.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.experiments import INJECTED
-from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.labels.noise import add_noise, displaced, unit_vectors
 
 Array = NDArray[np.float64]
@@ -118,3 +119,17 @@ def _smooth_field(
 Kind = Callable[[PoseTable, PoseTable, float, float, np.random.Generator], PoseTable]
 _KINDS: Mapping[str, Kind] = {"noise": _noise, "offset": _offset, "bend": _bend, "scale": _scale}
 assert set(_KINDS) == set(INJECTED)
+
+
+def write_erroneous_labels(
+    error_kind: str,
+    truth: Path,
+    train: Path,
+    noise_m: float,
+    noise_deg: float,
+    seed: int,
+    out_labels: Path,
+) -> None:
+    """Write the true poses of a split with an error (:func:`with_error`)."""
+    tables, rng = (read_pose_table(truth), read_pose_table(train)), np.random.default_rng(seed)
+    write_pose_table(out_labels, with_error(error_kind, *tables, noise_m, noise_deg, rng))

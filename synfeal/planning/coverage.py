@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from synfeal.config.models import CameraConfig, SceneConfig
-from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
+from synfeal.files import write_json
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, load_collision_mesh
 from synfeal.planning.plan import sampling_boxes_of
@@ -156,3 +157,10 @@ def headings(plan: PoseTable) -> NDArray[np.int64]:
     forward = plan.world_from_cam[:, :3, 2]
     turn = np.arctan2(forward[:, 1], forward[:, 0]) / (2.0 * np.pi)
     return np.asarray(np.floor(turn * N_HEADINGS) % N_HEADINGS, dtype=np.int64)
+
+
+def write_coverage(
+    collision: Path, scene: SceneConfig, plan: Path, camera: CameraConfig, out_coverage: Path
+) -> None:
+    """Write what a plan covers as JSON."""
+    write_json(out_coverage, scene_coverage(collision, scene, read_pose_table(plan), camera))

@@ -61,7 +61,7 @@ rule plan:
         "../scripts/plan.py"
 
 
-rule coverage:
+use rule call as coverage with:
     input:
         collision=rules.scene.output.collision,
         plan=rules.plan.output.plan,
@@ -71,19 +71,14 @@ rule coverage:
         f"{ROOT}/logs/coverage/{{scene}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/coverage/{{scene}}/{{split}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="synfeal.planning.coverage:write_coverage",
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
         camera=dump(CONFIG.network_camera),
-    script:
-        "../scripts/plan_coverage.py"
 
 
 # What test frames show, at a few points of each: for the reprojection error of predicted poses.
-rule cell_depth:
+use rule call as cell_depth with:
     input:
         collision=rules.scene.output.collision,
         plan=f"{ROOT}/plans/{{scene}}/test.csv",
@@ -93,14 +88,9 @@ rule cell_depth:
         f"{ROOT}/logs/cell_depth/{{scene}}.log",
     benchmark:
         f"{ROOT}/benchmarks/cell_depth/{{scene}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="synfeal.evaluation.reprojection:write_scene_depth",
         camera=dump(CONFIG.network_camera),
-    script:
-        "../scripts/cell_depth.py"
 
 
 rule render:
@@ -222,7 +212,7 @@ rule render_packed:
         "../scripts/render_packed.py"
 
 
-rule pack:
+use rule call as pack with:
     input:
         plan=rules.plan.output.plan,
         shards=lambda w: packed_shards(w.scene, w.split, "npy"),
@@ -234,16 +224,13 @@ rule pack:
         f"{ROOT}/logs/pack/{{scene}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/pack/{{scene}}/{{split}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(2000),
     params:
+        function="synfeal.dataset.packed:write_packed",
         camera=dump(CONFIG.network_camera),
         render=dump(CONFIG.render),
         view=CONFIG.network.view,
-    script:
-        "../scripts/pack.py"
 
 
 rule dataset:
@@ -274,7 +261,7 @@ rule dataset:
         "../scripts/dataset.py"
 
 
-rule true_labels:
+use rule call as true_labels with:
     input:
         plan=f"{ROOT}/plans/{{scene}}/{{split}}.csv",
     output:
@@ -283,11 +270,6 @@ rule true_labels:
         f"{ROOT}/logs/labels/{{scene}}/{{size}}/synfeal/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/labels/{{scene}}/{{size}}/synfeal/{{split}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="synfeal.dataset.pose_table:write_first_frames",
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
-    script:
-        "../scripts/true_labels.py"

@@ -3,7 +3,7 @@
 CHAINED = f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/assistance.json"
 
 
-rule erroneous_labels:
+use rule call as erroneous_labels with:
     input:
         truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/{{split}}.csv",
         train=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
@@ -13,16 +13,11 @@ rule erroneous_labels:
         f"{ROOT}/logs/labels/{{scene}}/{{size}}/{{error_kind}}-p{{noise_m}}-r{{noise_deg}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/labels/{{scene}}/{{size}}/{{error_kind}}-p{{noise_m}}-r{{noise_deg}}/{{split}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="synfeal.labels.errors:write_erroneous_labels",
         seed=lambda w: seed_of(
             CONFIG.seed, *seed_names(w.error_kind, w.split), w.scene, w.size
         ),
-    script:
-        "../scripts/erroneous_labels.py"
 
 
 rule sfm:

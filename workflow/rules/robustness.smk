@@ -51,7 +51,7 @@ rule render_varied:
         "../scripts/render_packed.py"
 
 
-rule pack_varied:
+use rule call as pack_varied with:
     input:
         plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/{{split}}.csv",
         shards=[f"{VARIED}/shards/{{effects}}/{{split}}.npy"],
@@ -63,16 +63,13 @@ rule pack_varied:
         f"{ROOT}/logs/pack_varied/{{effects}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/pack_varied/{{effects}}/{{split}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(2000),
     params:
+        function="synfeal.dataset.packed:write_packed",
         camera=dump(CONFIG.network_camera),
         render=varied_render,
         view=CONFIG.network.view,
-    script:
-        "../scripts/pack.py"
 
 
 rule train_varied:
@@ -168,27 +165,24 @@ rule varied_structure:
         "../scripts/varied_structure.py"
 
 
-rule effects_speed:
+use rule call as effects_speed with:
     input:
         extras=varied_extras(VARIATIONS),
         mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
         plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/test.csv",
     output:
-        speed=f"{ROOT}/scenes/{ROBUSTNESS.scene}/effects_speed.csv",
+        csv=f"{ROOT}/scenes/{ROBUSTNESS.scene}/effects_speed.csv",
     log:
         f"{ROOT}/logs/effects_speed.log",
     benchmark:
         f"{ROOT}/benchmarks/effects_speed.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
     params:
+        function="synfeal.scenes.effects_speed:write_effects_speed",
         camera=dump(CONFIG.network_camera),
         render=dump(CONFIG.render),
         effects={name: dump(VARIATIONS[name]) for name in ROBUST_EFFECTS},
-    script:
-        "../scripts/effects_speed.py"
 
 
 rule robustness:
