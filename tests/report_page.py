@@ -16,8 +16,7 @@ from synfeal.report.claims.table import COLUMNS
 from synfeal.report.label_error import SCHEMA as LABEL_ERROR_SCHEMA
 from synfeal.report.recall import COLUMNS as RECALL_COLUMNS
 from synfeal.report.speed_vs_error import SCHEMA as SPEEDS
-from synfeal.report.tables import write_rows
-from tests.report_results import METHODS_RUN, complete_results, shipped_design
+from tests.report_results import METHODS_RUN, complete_results, shipped_design, write_rows
 
 RED = (220, 20, 20)
 PLANS = {"train": [[1.0, 1.0, 1.0], [3.0, 1.0, 1.0]], "test": [[1.0, 2.0, 1.0], [3.0, 2.0, 1.5]]}

@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+import pandas as pd
+
 from synfeal.config import MODELS, Design, Experiment, load_config, read_experiments
 from synfeal.files import write_json
-from synfeal.frames import read_records
+from synfeal.frames import read_records, write_frame
 from synfeal.report.meshes import write_meshes_table
 from synfeal.report.tables import write_table
 
@@ -175,3 +177,8 @@ def lines_of(tex, against):
         for line in tex.splitlines()
         if against in line.split(" & ")
     ]
+
+
+def write_rows(path, columns, rows):
+    """A table of some columns; what a row lacks is an empty cell."""
+    write_frame(path, pd.DataFrame(rows, columns=list(columns)))

@@ -14,9 +14,9 @@ from synfeal.report.document import hard_cases_latex
 from synfeal.report.hard_cases import case as cases
 from synfeal.report.hard_cases import estimates, exact, scenes
 from synfeal.report.hard_cases import table as hard_table
-from synfeal.report.hard_cases.table import CASES, COLUMNS, row_of, rows_of, write_hard_cases
+from synfeal.report.hard_cases.table import CASES, SCHEMA, row_of, rows_of, write_hard_cases
 from synfeal.report.html.side_tables import hard_cases_table
-from synfeal.report.tables import write_rows
+from tests.report_results import write_rows
 
 ALL = {(family.name, name): family for family in CASES for name in family.cases}
 FAMILIES = list(dict.fromkeys(family.name for family in CASES))
@@ -101,14 +101,14 @@ def test_the_table_has_the_same_errors_every_time(tmp_path, monkeypatch):
     for name in ("once.csv", "twice.csv"):
         write_hard_cases(tmp_path / name)
         lines = (tmp_path / name).read_text().splitlines()
-        assert lines[0] == ",".join(COLUMNS)
+        assert lines[0] == ",".join(SCHEMA)
         texts.append([line.rsplit(",", 2)[0] for line in lines])
     assert texts[0] == texts[1]
     assert len(texts[0]) == sum(len(family.cases) for family in some) + 1
 
 
 def test_pages_mark_what_exceeds_the_bound(tmp_path, all_rows):
-    write_rows(tmp_path / "table.csv", COLUMNS, all_rows)
+    write_rows(tmp_path / "table.csv", SCHEMA, all_rows)
     lines = ET.fromstring(hard_cases_table(tmp_path / "table.csv")).findall(".//tbody/tr")
     for row, line in zip(all_rows, lines, strict=True):
         assert ("✗" in "".join(line[2].itertext())) == (row["naive_error"] > row["bound"])

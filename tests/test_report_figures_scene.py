@@ -27,7 +27,6 @@ from synfeal.report.figures.style import METHOD_STYLES, RC
 from synfeal.report.layouts import SOURCES
 from synfeal.report.references import SCHEMA as REFERENCE
 from synfeal.report.speed_vs_error import SCHEMA as SPEED
-from synfeal.report.tables import write_rows
 from tests.figure_results import (
     LOOKS_ALONG_X,
     METHODS,
@@ -40,7 +39,7 @@ from tests.figure_results import (
     true_poses,
     wrong_poses,
 )
-from tests.report_results import TABLE4, design_of, fill, make
+from tests.report_results import TABLE4, design_of, fill, make, write_rows
 
 SPEED_KEYS = ("stage", "scene", "variant", "faces", "items_per_s", "error", "chosen")
 SPEEDS = (

@@ -6,7 +6,7 @@ from synfeal.errors import InputError
 from synfeal.frames import records_of
 from synfeal.report.cells import schema_of
 from synfeal.report.speed_vs_error import training_rows
-from synfeal.report.tables import write_rows
+from tests.report_results import write_rows
 
 HEADER = "s\th:m:s\tmax_rss\tcpu_time\n"
 COLUMNS = [*schema_of("table4_size", True)]

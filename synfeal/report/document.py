@@ -8,8 +8,8 @@ from pathlib import Path
 from synfeal.frames import read_records
 from synfeal.report.figures import CAPTIONS
 from synfeal.report.hard_cases.case import Row, error_text, judged, short
-from synfeal.report.hard_cases.table import COLUMNS
 from synfeal.report.hard_cases.table import NAME as HARD_CASES
+from synfeal.report.hard_cases.table import SCHEMA
 from synfeal.report.latex import (
     PACKAGES,
     TONES,
@@ -45,7 +45,7 @@ def write_report_document(root: Path, tables: Sequence[Path], out_tex: Path) -> 
     pages = [
         f"{title_latex(root.name)}\n{claims_latex(claims)}",
         *table_bodies(tables),
-        *([hard_cases_latex(_rows(hard_cases, COLUMNS))] if hard_cases.is_file() else []),
+        *([hard_cases_latex(_rows(hard_cases, [*SCHEMA]))] if hard_cases.is_file() else []),
         *(figure_latex(name, CAPTIONS[name]) for name in names),
     ]
     write_text(out_tex, document_latex(pages, LONG_PACKAGES))

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import pandas as pd
+
 from synfeal.config import Design
+from synfeal.frames import write_frame
 from synfeal.report.claims.evidence import Evidence, evidence_of
 from synfeal.report.claims.model import NOT_LEARNT, NOT_TESTABLE, Claim, published_claims
 from synfeal.report.claims.registry import judge, views
-from synfeal.report.tables import write_rows
 
 COLUMNS = (
     *("id", "section", "statement", "published", "measured_labels", "measured_true"),
@@ -34,7 +36,7 @@ def write_claims(design: Design, root: Path, out_csv: Path) -> None:
     Raises:
         InputError: a result file is missing or cannot be read.
     """
-    write_rows(out_csv, COLUMNS, claim_rows(evidence_of(design, root)))
+    write_frame(out_csv, pd.DataFrame(claim_rows(evidence_of(design, root)), columns=list(COLUMNS)))
 
 
 def claim_rows(evidence: Evidence) -> list[dict[str, str]]:

@@ -7,16 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
+from synfeal.frames import COUNT, NUMBER, TEXT, frame_of, write_frame
 from synfeal.report.hard_cases import estimates, noise, rotations, scenes
 from synfeal.report.hard_cases.case import REFUSAL, Family, examine
 from synfeal.report.hard_cases.exact import MPMATH, RATIONAL
-from synfeal.report.tables import Value, write_rows
 
 NAME = "hard_cases"
-COLUMNS = (
-    *("family", "case", "quantity", "unit", "naive", "ours", "naive_error", "our_error"),
-    *("bound", "ok", "reference", "naive_seconds", "our_seconds"),
-)
+SCHEMA = {
+    **dict.fromkeys(("family", "case", "quantity", "unit", "naive", "ours"), TEXT),
+    **dict.fromkeys(("naive_error", "our_error", "bound"), NUMBER),
+    **{"ok": COUNT, "reference": TEXT, "naive_seconds": NUMBER, "our_seconds": NUMBER},
+}
 PI, NEARLY_PI, INF = rotations.PI, rotations.NEARLY_PI, np.inf
 GRAPH = ("pose graphs", "position", "m", "Gauss-Newton")
 BY_CONSTRUCTION, EXACT_GRAPH = "by construction", "poses the edges were made of"
@@ -142,15 +143,15 @@ CASES = (
 
 def write_hard_cases(out_csv: Path) -> None:
     """Examine all cases and write one row for each; only the times differ between runs."""
-    write_rows(out_csv, COLUMNS, rows_of(CASES))
+    write_frame(out_csv, frame_of(rows_of(CASES), SCHEMA))
 
 
-def rows_of(families: Iterable[Family]) -> list[dict[str, Value]]:
+def rows_of(families: Iterable[Family]) -> list[dict[str, object]]:
     """Rows by column; ``ok`` is 1 where our error is within the bound. Errors may be ``inf``."""
     return [row_of(family, name) for family in families for name in family.cases]
 
 
-def row_of(family: Family, name: str) -> dict[str, Value]:
+def row_of(family: Family, name: str) -> dict[str, object]:
     """The row of one case."""
     outcome = examine(family.cases[name]())
     columns = dict(zip(family._fields[:-1], family[:-1], strict=True))

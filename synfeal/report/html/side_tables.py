@@ -207,7 +207,7 @@ def hard_cases_table(path: Path) -> Markup:
         " the bound that ours promises; “none” is no answer or no number. Cases without one right"
         " answer are to be refused. Times are those of one call, medians, and differ between runs."
     )
-    frame = pd.DataFrame([_case(row) for _, row in read_records(path, hard_cases.COLUMNS)])
+    frame = pd.DataFrame([_case(row) for _, row in read_records(path, hard_cases.SCHEMA)])
     starts = frame.family != frame.family.shift()
     frame = frame.assign(style=starts.map({True: "first", False: ""}))
     return sortable(hard_cases.NAME, caption, columns, frame)
