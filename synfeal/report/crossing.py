@@ -35,7 +35,10 @@ def crossing_finding(table: pd.DataFrame) -> str:
     if len(levels) < 2 or not {STRUCTURE, *MODELS} <= set(noisy.method):
         return ""
     first, *later = [_level(noisy, *level) for level in levels.itertuples(index=False)]
-    parts = [f"{_of(level.better)} {level.name}" for level in later]
+    parts = [
+        "{} in position and {} in orientation {}".format(*level.better, level.name)
+        for level in later
+    ]
     structure_m, structure_deg = first.structure
     best_m, best_deg = first.best
     return (
@@ -58,10 +61,6 @@ def _adjusted(table: pd.DataFrame, noise_m: float, noise_deg: float) -> str:
         f" On a map that was bundle-adjusted from labels with {noise_m:g} m and {noise_deg:g}°,"
         f" structure-based poses are off by {100 * off_m:.2g} cm and {off_deg:.2g}°."
     )
-
-
-def _of(better: tuple[int, int]) -> str:
-    return f"{better[0]} in position and {better[1]} in orientation"
 
 
 class _Level(NamedTuple):

@@ -42,8 +42,9 @@ def write_report_document(root: Path, tables: Sequence[Path], out_tex: Path) -> 
     claims = _rows(root / "claims.csv", [*CLAIM_COLUMNS, "footnote"])
     hard_cases = root / "tables" / f"{HARD_CASES}.csv"
     names = [name for name in CAPTIONS if (root / "figures" / f"{name}.png").is_file()]
+    title = rf"\section*{{Synfeal, reproduced: profile {escape(root.name)}}}"
     pages = [
-        f"{title_latex(root.name)}\n{claims_latex(claims)}",
+        f"{title}\n{claims_latex(claims)}",
         *table_bodies(tables),
         *([hard_cases_latex(_rows(hard_cases, [*SCHEMA]))] if hard_cases.is_file() else []),
         *(figure_latex(name, CAPTIONS[name]) for name in names),
@@ -53,11 +54,6 @@ def write_report_document(root: Path, tables: Sequence[Path], out_tex: Path) -> 
 
 def _rows(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
     return [row for _, row in read_records(path, columns)]
-
-
-def title_latex(profile: str) -> str:
-    """What the document is."""
-    return rf"\section*{{Synfeal, reproduced: profile {escape(profile)}}}"
 
 
 def claims_latex(claims: Sequence[Row]) -> str:

@@ -262,10 +262,6 @@ def _train_varied(profile: Profile, part: Part, kind: Stage) -> dict[str, float]
     return _train(profile, {**part, "scene": robust.scene, "size": robust.size}, kind)
 
 
-def _render_speed(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
-    return {"size": profile.config.render_speed.sizes}
-
-
 def _claims(profile: Profile, _: Part, __: Stage) -> dict[str, float]:
     config = profile.config
     runs = Design(rows=profile.experiments, repetitions=config.training.repetitions).runs
@@ -281,6 +277,6 @@ OWN_SIZES: dict[str, Callable[[Profile, Part, Stage], dict[str, float]]] = {
     **dict.fromkeys(("render_varied", "pack_varied"), _varied),
     "train_varied": _train_varied,
     **dict.fromkeys(("varied_descriptors", "varied_structure"), _varied_tests),
-    "render_speed": _render_speed,
+    "render_speed": lambda profile, *_: {"size": profile.config.render_speed.sizes},
     "claims": _claims,
 }
