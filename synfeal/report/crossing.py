@@ -23,11 +23,8 @@ def crossing_findings(table: pd.DataFrame) -> list[str]:
 def crossing_finding(table: pd.DataFrame) -> str:
     """Where structure-based poses stop being the better ones, from noise in both parts of a pose.
 
-    Args:
-        table: rows of ``references.csv`` of one scene and size.
-
-    Returns:
-        A sentence; empty where the design has no noise in both, or no structure.
+    A sentence on the rows of ``references.csv`` of one scene and size; empty where the design has
+    no noise in both, or no structure.
     """
     both = table.labels.str.startswith("noise-") & (table.noise_m > 0) & (table.noise_deg > 0)
     noisy = table[both | (table.labels == "synfeal")]

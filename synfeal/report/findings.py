@@ -25,14 +25,10 @@ COLUMNS = ("group", "change", "spoken", "model", "measure", "source", "factor")
 
 
 def effects(root: Path) -> pd.DataFrame:
-    """Factors by which the median errors change.
+    """Factors by which the median errors of published results change.
 
-    Args:
-        root: published results of a profile.
-
-    Returns:
-        Columns ``COLUMNS``, one row per change (in the order of the tables), localizer, measure
-        (``MEASURES``) and source (``HERE`` or ``PAPER``), where both errors are known.
+    Columns ``COLUMNS``, one row per change (in the order of the tables), localizer, measure
+    (``MEASURES``) and source (``HERE`` or ``PAPER``), where both errors are known.
     """
     size = _table(root, "table4_size")
     found = [*_of_size(size), *_of_labels(root), *_of_noise(root), *_of_start(root, size)]

@@ -98,12 +98,7 @@ def init_title(init: str) -> str:
 
 
 def sheet_of(name: str, cells: pd.DataFrame) -> Sheet:
-    """Lay out one of tables 2 to 7.
-
-    Args:
-        name: the table.
-        cells: what :func:`synfeal.report.cells.read_cells` read for it.
-    """
+    """Lay out one of tables 2 to 7, from what :func:`synfeal.report.cells.read_cells` read."""
     one_truth = bool((cells.labels == "synfeal").all())
     values = printed_values(name, cells)
     if one_truth:  # both scores are one line, and the true poses score zero

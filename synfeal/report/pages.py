@@ -155,12 +155,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
 
 
 def rewritten(text: str, part: Callable[[str, str], str]) -> str:
-    """The text with each of its generated parts replaced.
-
-    Args:
-        text: a page in Markdown.
-        part: what stands there instead, by name and profile.
-    """
+    """A page with its generated parts replaced by ``part``, called with name and profile."""
     pattern = re.compile(r"<!-- (\w+) (\w+) -->.*?<!-- /\1 -->", re.DOTALL)
 
     def fresh(found: re.Match[str]) -> str:

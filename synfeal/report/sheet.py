@@ -59,12 +59,8 @@ def sheet_of_texts(
 ) -> Sheet:
     """A sheet of cells that are text.
 
-    Args:
-        name: of the sheet.
-        caption: of the sheet.
-        texts: columns ``block``, ``row`` and ``kind`` where the sheet has them (one block, a row
-            per line, nothing grey), then one per heading.
-        remarks: of the sheet.
+    ``texts`` has columns ``block``, ``row`` and ``kind`` where the sheet has them (one block, a row
+    per line, nothing grey), then one per heading.
     """
     texts = texts.reset_index(drop=True)
     usual = {"block": "", "row": texts.index, "kind": "", "label_note": ""}

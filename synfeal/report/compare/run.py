@@ -171,13 +171,10 @@ OUTPUTS = ("compare.csv", "compare.md", "compare.png")
 
 
 def compare(root_a: Path, root_b: Path, out: Path | None) -> str:
-    """Compare two result trees; the text to print.
+    """Compare two result trees, before and after; the text to print.
 
-    Args:
-        root_a: results before, e.g. ``results/mini``.
-        root_b: results after.
-        out: directory for ``compare.csv``, ``compare.md`` and ``compare.png``, made if need be;
-            earlier files of these names are replaced.
+    ``compare.csv``, ``compare.md`` and ``compare.png`` go into ``out``, made if need be; earlier
+    files of these names are replaced.
 
     Raises:
         InputError: the trees cannot be compared, or ``out`` holds other files.

@@ -29,11 +29,9 @@ def matched(jobs: pd.DataFrame, measured: pd.DataFrame) -> pd.DataFrame:
 
 
 def fit_laws(pairs: pd.DataFrame, training: tuple[float, ...] | None = None) -> pd.DataFrame:
-    """A law (columns :data:`LAW`) by its name, for everything that was measured.
+    """A law (columns :data:`LAW`) by its name, for all measured jobs that :func:`matched` gives.
 
-    Args:
-        pairs: what :func:`matched` gives.
-        training: parts per unit of training runs, where they are known better.
+    ``training`` are the parts per unit of training runs, where they are known better.
     """
     start_s = _start(pairs)
     laws = {

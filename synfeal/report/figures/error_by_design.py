@@ -53,13 +53,7 @@ def draw_by_noise(results: Results) -> Figure | None:
 
 
 def by_noise(rows: pd.DataFrame, references: pd.DataFrame, title: str) -> Figure:
-    """The figure of the rows of ``table3_inconsistencies.csv``.
-
-    Args:
-        rows: of that table.
-        references: rows of ``references.csv`` on its data sets.
-        title: of the figure.
-    """
+    """The figure of ``table3_inconsistencies.csv``, and of ``references.csv`` on its data sets."""
     blocks = {block: rows[rows["block"] == block] for block in BLOCKS}
     blocks = {block: chosen for block, chosen in blocks.items() if len(chosen)}
     figure = Figure(figsize=(1.6 + 2.9 * len(blocks), 9.0), layout="constrained")

@@ -7,14 +7,10 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def pareto_front(seconds: ArrayLike, errors: ArrayLike) -> NDArray[np.bool_]:
-    """Which of N variants no other one dominates.
+    """Which of N variants (costs and errors (N,), less is better) no other one dominates.
 
     A variant dominates another when it is at least as good in both and better in one; of equal
     variants none dominates the other.
-
-    Args:
-        seconds: (N,) cost of each variant, less is better.
-        errors: (N,) error of each, less is better.
     """
     cost = np.stack([np.asarray(seconds, np.float64), np.asarray(errors, np.float64)], axis=1)
     order = np.lexsort((cost[:, 1], cost[:, 0]))

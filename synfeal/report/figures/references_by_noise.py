@@ -38,12 +38,7 @@ def draw(results: Results) -> Figure | None:
 
 
 def figure_of(table: pd.DataFrame, rows: Sequence[Experiment]) -> Figure:
-    """The figure of one data set size.
-
-    Args:
-        table: its rows of ``references.csv``.
-        rows: of Tables 2 and 3: which label sets stand side by side.
-    """
+    """The figure of one data set size: rows of ``references.csv``, and the label sets to show."""
     blocks = [block for block in BLOCKS if any(row.block == block for row in rows)]
     figure = Figure(figsize=(1.6 + 2.9 * len(blocks), 6.8), layout="constrained")
     finding = crossing_finding(table)

@@ -58,9 +58,7 @@ def figure_of(rows: pd.DataFrame) -> Figure:
 def draw_panel(axes: Axes, rows: pd.DataFrame) -> None:
     """The full mesh joined by backend, less detail joined to the choice, which is ringed.
 
-    Args:
-        axes: where to draw.
-        rows: the variants of one scene and one size of the image; one of them is chosen.
+    ``rows`` are the variants of one scene and one size of the image; one of them is chosen.
     """
     chosen = rows[rows["chosen"] == 1].iloc[0]
     rows = rows.assign(ms=1e3 * rows["seconds_per_item"], left_out=left_out(rows, chosen["faces"]))

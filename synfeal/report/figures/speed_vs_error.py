@@ -93,11 +93,7 @@ def figure_of(rows: pd.DataFrame, stage: Stage) -> Figure:
 def draw_scene(axes: Axes, rows: pd.DataFrame, stage: Stage, style: Style) -> None:
     """All variants small and open, those on the Pareto front filled and joined, the choice ringed.
 
-    Args:
-        axes: where to draw.
-        rows: the variants of one scene, of which at most one is chosen.
-        stage: axes and their units.
-        style: colour, marker and dashes of the scene.
+    ``rows`` are the variants of one scene, of which at most one is chosen.
     """
     speed, error = (rows["items_per_s"] / stage.per).to_numpy(), rows["error"].to_numpy()
     error = error * stage.factor

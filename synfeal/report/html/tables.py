@@ -33,12 +33,7 @@ Values = Mapping[tuple[int, str, str, int], Any]
 
 
 def score_table(name: str, cells: pd.DataFrame) -> Markup:
-    """One of tables 2 to 6.
-
-    Args:
-        name: the table.
-        cells: what :func:`synfeal.report.cells.read_cells` read for it.
-    """
+    """One of tables 2 to 7, from what :func:`synfeal.report.cells.read_cells` read for it."""
     sheet = sheet_of(name, cells)
     printed = rows_of(printed_values(name, cells))
     values = {(v.row, v.kind, v.column, v.place): v for v in printed}

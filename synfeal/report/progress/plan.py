@@ -38,14 +38,7 @@ class RunPlan:
 def plan_run(
     config: Config, experiments: tuple[Experiment, ...], benchmarks: Iterable[str], cores: int
 ) -> RunPlan:
-    """The plan of a run.
-
-    Args:
-        config: the profile.
-        experiments: its design.
-        benchmarks: ``<root>/benchmarks/<stage>/<name>.tsv`` of the jobs that are to run.
-        cores: jobs at a time.
-    """
+    """The plan of a run on ``cores`` whose jobs write ``<root>/benchmarks/<stage>/<name>.tsv``."""
     paths = list(benchmarks)
     known = _expected_s(Profile(config, experiments), paths)
     usual = median(known.values()) if known else 1.0

@@ -31,12 +31,7 @@ MISSING = "…"
 
 
 class FirstScores:
-    """Median errors against the true poses, one line per data set, one column per localizer.
-
-    Args:
-        root: results of the profile.
-        runs: training runs of the design.
-    """
+    """Median errors against the true poses, one line per data set, one column per localizer."""
 
     def __init__(self, root: Path, runs: Sequence[Run]) -> None:
         self._run_of = {root / "runs" / run.directory / "metrics.json": run for run in runs}
@@ -94,12 +89,7 @@ LINES_BELOW = 4  # of a small terminal: heading, line, and some room
 
 
 class RunView:
-    """Shows a run as its events come in.
-
-    Args:
-        console: where to.
-        clock: seconds, monotonic.
-    """
+    """Shows a run on a console as its events come in; ``clock`` gives seconds, monotonic."""
 
     def __init__(self, console: Console, clock: Callable[[], float] = time.monotonic) -> None:
         self._console = console
