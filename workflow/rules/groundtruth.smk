@@ -1,18 +1,24 @@
 # Label sets other than the simulator's: reconstructed in batches with assistance, or with errors.
 
-CHAINED = f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/assistance.json"
+ESTIMATED = f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}"
+CHAINED = f"{ESTIMATED}/assistance.json"
+TRUE = f"{ROOT}/labels/{{scene}}/{{size}}/synfeal"
+ERRONEOUS = "{scene}/{size}/{error_kind}-p{noise_m}-r{noise_deg}/{split}"
+STEM = f"{ROOT}/groundtruth/{{scene}}/{{size}}"
+BATCH = "{split}/batch-{batch}"
+BATCH_LOG = "{scene}/{size}/{split}/batch-{batch}"
 
 
 use rule call as erroneous_labels with:
     input:
-        truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/{{split}}.csv",
-        train=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
+        truth=f"{TRUE}/{{split}}.csv",
+        train=f"{TRUE}/train.csv",
     output:
-        labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{error_kind}}-p{{noise_m}}-r{{noise_deg}}/{{split}}.csv",
+        labels=f"{ROOT}/labels/{ERRONEOUS}.csv",
     log:
-        f"{ROOT}/logs/labels/{{scene}}/{{size}}/{{error_kind}}-p{{noise_m}}-r{{noise_deg}}/{{split}}.log",
+        f"{ROOT}/logs/labels/{ERRONEOUS}.log",
     benchmark:
-        f"{ROOT}/benchmarks/labels/{{scene}}/{{size}}/{{error_kind}}-p{{noise_m}}-r{{noise_deg}}/{{split}}.tsv"
+        f"{ROOT}/benchmarks/labels/{ERRONEOUS}.tsv"
     params:
         function="synfeal.labels.errors:write_erroneous_labels",
         seed=lambda w: seed_of(
@@ -22,21 +28,15 @@ use rule call as erroneous_labels with:
 
 rule sfm:
     input:
-        sequences=unless_restored(
-            f"{ROOT}/groundtruth/{{scene}}/{{size}}/sfm/{{split}}/batch-{{batch}}.json",
-            batch_sequences,
-        ),
-        truth=unless_restored(
-            f"{ROOT}/groundtruth/{{scene}}/{{size}}/sfm/{{split}}/batch-{{batch}}.json",
-            f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/{{split}}.csv",
-        ),
+        sequences=unless_restored(f"{STEM}/sfm/{BATCH}.json", batch_sequences),
+        truth=unless_restored(f"{STEM}/sfm/{BATCH}.json", f"{TRUE}/{{split}}.csv"),
     output:
-        trajectory=f"{ROOT}/groundtruth/{{scene}}/{{size}}/sfm/{{split}}/batch-{{batch}}.csv",
-        facts=f"{ROOT}/groundtruth/{{scene}}/{{size}}/sfm/{{split}}/batch-{{batch}}.json",
+        trajectory=f"{STEM}/sfm/{BATCH}.csv",
+        facts=f"{STEM}/sfm/{BATCH}.json",
     log:
-        f"{ROOT}/logs/sfm/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
+        f"{ROOT}/logs/sfm/{BATCH_LOG}.log",
     benchmark:
-        f"{ROOT}/benchmarks/sfm/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
+        f"{ROOT}/benchmarks/sfm/{BATCH_LOG}.tsv"
     conda:
         "../envs/synfeal.yaml"
     resources:
@@ -53,17 +53,14 @@ rule sfm:
 
 rule rgbd:
     input:
-        sequences=unless_restored(
-            f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd/{{split}}/batch-{{batch}}.json",
-            batch_sequences,
-        ),
+        sequences=unless_restored(f"{STEM}/rgbd/{BATCH}.json", batch_sequences),
     output:
-        graph=f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd/{{split}}/batch-{{batch}}.g2o",
-        facts=f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd/{{split}}/batch-{{batch}}.json",
+        graph=f"{STEM}/rgbd/{BATCH}.g2o",
+        facts=f"{STEM}/rgbd/{BATCH}.json",
     log:
-        f"{ROOT}/logs/rgbd/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
+        f"{ROOT}/logs/rgbd/{BATCH_LOG}.log",
     benchmark:
-        f"{ROOT}/benchmarks/rgbd/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
+        f"{ROOT}/benchmarks/rgbd/{BATCH_LOG}.tsv"
     conda:
         "../envs/synfeal.yaml"
     resources:
@@ -81,16 +78,15 @@ rule rgbd:
 rule estimate:
     input:
         sequences=unless_restored(
-            f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{frame_method}}/{{split}}/batch-{{batch}}.json",
-            batch_sequences,
+            f"{STEM}/{{frame_method}}/{BATCH}.json", batch_sequences
         ),
     output:
-        trajectory=f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{frame_method}}/{{split}}/batch-{{batch}}.csv",
-        facts=f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{frame_method}}/{{split}}/batch-{{batch}}.json",
+        trajectory=f"{STEM}/{{frame_method}}/{BATCH}.csv",
+        facts=f"{STEM}/{{frame_method}}/{BATCH}.json",
     log:
-        f"{ROOT}/logs/{{frame_method}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
+        f"{ROOT}/logs/{{frame_method}}/{BATCH_LOG}.log",
     benchmark:
-        f"{ROOT}/benchmarks/{{frame_method}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
+        f"{ROOT}/benchmarks/{{frame_method}}/{BATCH_LOG}.tsv"
     conda:
         "../envs/synfeal.yaml"
     resources:
@@ -110,16 +106,15 @@ rule estimate:
 rule posegraph:
     input:
         graph=unless_restored(
-            f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{graph_method}}/{{split}}/batch-{{batch}}.json",
-            f"{ROOT}/groundtruth/{{scene}}/{{size}}/rgbd/{{split}}/batch-{{batch}}.g2o",
+            f"{STEM}/{{graph_method}}/{BATCH}.json", f"{STEM}/rgbd/{BATCH}.g2o"
         ),
     output:
-        trajectory=f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{graph_method}}/{{split}}/batch-{{batch}}.csv",
-        facts=f"{ROOT}/groundtruth/{{scene}}/{{size}}/{{graph_method}}/{{split}}/batch-{{batch}}.json",
+        trajectory=f"{STEM}/{{graph_method}}/{BATCH}.csv",
+        facts=f"{STEM}/{{graph_method}}/{BATCH}.json",
     log:
-        f"{ROOT}/logs/{{graph_method}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
+        f"{ROOT}/logs/{{graph_method}}/{BATCH_LOG}.log",
     benchmark:
-        f"{ROOT}/benchmarks/{{graph_method}}/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
+        f"{ROOT}/benchmarks/{{graph_method}}/{BATCH_LOG}.tsv"
     conda:
         "../envs/synfeal.yaml"
     resources:
@@ -134,19 +129,15 @@ rule chain:
     input:
         train_batches=unless_restored(CHAINED, lambda w: batch_files(w, "train")),
         test_batches=unless_restored(CHAINED, lambda w: batch_files(w, "test")),
-        train_truth=unless_restored(
-            CHAINED, f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv"
-        ),
-        test_truth=unless_restored(
-            CHAINED, f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv"
-        ),
+        train_truth=unless_restored(CHAINED, f"{TRUE}/train.csv"),
+        test_truth=unless_restored(CHAINED, f"{TRUE}/test.csv"),
     output:
-        train=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/train.csv",
-        test=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/test.csv",
-        train_unassisted=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/train-unassisted.csv",
-        test_unassisted=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/test-unassisted.csv",
+        train=f"{ESTIMATED}/train.csv",
+        test=f"{ESTIMATED}/test.csv",
+        train_unassisted=f"{ESTIMATED}/train-unassisted.csv",
+        test_unassisted=f"{ESTIMATED}/test-unassisted.csv",
         assistance=CHAINED,
-        record=f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}/estimation.json",
+        record=f"{ESTIMATED}/estimation.json",
     log:
         f"{ROOT}/logs/chain/{{scene}}/{{size}}/{{reconstructed}}.log",
     benchmark:

@@ -2,6 +2,13 @@
 # are found once per scene or data set and serve all of its label sets.
 REFERENCE = f"{ROOT}/references/{{scene}}/{{size}}/{{labels}}"
 REFERENCE_LOG = "{scene}/{size}/{labels}"
+POSES = {
+    **{s: f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/{s}.csv" for s in SPLITS},
+    **{
+        f"{s}_truth": f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/{s}.csv"
+        for s in SPLITS
+    },
+}
 
 
 rule descriptors:
@@ -87,11 +94,8 @@ use rule call as tracks with:
 
 rule image_references:
     input:
+        **POSES,
         descriptors=rules.descriptors.output.descriptors,
-        train=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
-        test=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
-        train_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
-        test_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
     output:
         reference_files(REFERENCE, in_group("images")),
     log:
@@ -112,12 +116,9 @@ rule image_references:
 
 rule structure_references:
     input:
+        **POSES,
         correspondences=rules.correspondences.output.matches,
         tracks=rules.tracks.output.tracks,
-        train=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
-        test=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
-        train_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
-        test_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
     output:
         reference_files(REFERENCE, in_group("structure")),
     log:
@@ -173,12 +174,9 @@ rule views:
 
 rule coordinate_references:
     input:
+        **POSES,
         train_views=f"{ROOT}/references/{{scene}}/{{size}}/views-train.npz",
         test_views=f"{ROOT}/references/{{scene}}/{{size}}/views-test.npz",
-        train=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
-        test=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
-        train_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
-        test_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
     output:
         reference_files(REFERENCE, in_group("coordinates")),
     log:
@@ -201,13 +199,10 @@ rule coordinate_references:
 
 rule external_reference:
     input:
+        **POSES,
         poses=external_poses,
         train_frames=f"{ROOT}/frames/{{scene}}/train.npy",
         test_frames=f"{ROOT}/frames/{{scene}}/test.npy",
-        train=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
-        test=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
-        train_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
-        test_truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
     output:
         reference_files(REFERENCE, ["{external}"]),
     log:
