@@ -9,7 +9,7 @@ from synfeal.config.robustness import CLEAN, MIXED
 from synfeal.dataset.packed import new_packed, read_packed
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.frames import read_frame
-from synfeal.report.robustness import robustness_sheet, write_robustness
+from synfeal.report.robustness import printed, robustness_sheet, write_robustness
 from tests.trained_localizers import answering, save
 
 PX = 32
@@ -73,6 +73,7 @@ def test_errors_are_those_of_known_answers(tmp_path):
     }
     sheet = robustness_sheet(again)
     assert "1 of the 2 test frames" in sheet.remarks[0]
+    assert [printed(v, 2) for v in (1.234, 0.1, 0.00212)] == ["1.23", "0.10", "0.0021"]
     assert sheet.lines.groupby("block", sort=False).size().tolist() == [3, 3]
     assert sheet.lines.label[1] == "dark, strength 2"
     assert "swapped, strength 1" in (tmp_path / "r.tex").read_text()

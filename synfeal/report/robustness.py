@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -16,7 +17,7 @@ from synfeal.report.sheet import LINE, VALUE, Sheet, with_bold, write_latex
 NAME = "robustness"
 BLOCKS = {CLEAN: "Trained on ideal frames", MIXED: "Trained on frames with effects mixed in"}
 METHODS = {name: reference.title for name, reference in REFERENCES.items()} | TITLES
-FORMS = {"position_m": ("{:.2f} m", 2), "orientation_deg": ("{:.1f}°", 1)}
+UNITS = {"position_m": (" m", 2), "orientation_deg": ("°", 1)}  # and digits after the point
 CAPTION = (
     "The same test paths rendered with effects of a camera and of changing light (config, "
     "robustness): median errors against the true poses."
@@ -41,7 +42,7 @@ def robustness_sheet(table: pd.DataFrame) -> Sheet:
     blocks = rows.groupby("trained_on", sort=False).ngroup()
     rows = rows.iloc[blocks.argsort(kind="stable")].reset_index(drop=True)
     cells = table.merge(rows.rename_axis(index="line").reset_index())
-    failed = cells[list(FORMS)].isna().any(axis=1)
+    failed = cells[list(UNITS)].isna().any(axis=1)
     parts = [
         pd.DataFrame(
             {
@@ -49,13 +50,16 @@ def robustness_sheet(table: pd.DataFrame) -> Sheet:
                 "column": cells.method.map(titles),
                 "place": place,
                 "text": cells[measure]
-                .map(form.format)
+                .map(partial(printed, digits=digits))
+                .add(unit)
                 .where(~failed, "failed" if not place else ""),
-                "number": cells[measure].round(digits).where(~failed),
+                "number": cells[measure]
+                .map(lambda v, n=digits: float(printed(v, n)))
+                .where(~failed),
                 **{"tone": "", "note": "", "block": cells.trained_on},
             }
         )[~(failed & (place > 0))]
-        for place, (measure, (form, digits)) in enumerate(FORMS.items())
+        for place, (measure, (unit, digits)) in enumerate(UNITS.items())
     ]
     values = pd.concat(parts, ignore_index=True)
     lines = pd.DataFrame(
@@ -74,6 +78,11 @@ def robustness_sheet(table: pd.DataFrame) -> Sheet:
         with_bold(values, [values[key] for key in ("block", "column", "place")])[list(VALUE)],
         remarks(table),
     )
+
+
+def printed(value: float, digits: int) -> str:
+    """A number with so many digits after the point; small ones with two that count."""
+    return f"{value:.{digits}f}" if value >= 10.0 ** (1 - digits) else f"{value:.2g}"
 
 
 def remarks(table: pd.DataFrame) -> tuple[str, ...]:

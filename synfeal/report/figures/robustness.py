@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from baselines.references.robustness import STRUCTURE
 from synfeal.config.robustness import CLEAN, MIXED
 from synfeal.report.figures.sources import Results
 from synfeal.report.figures.style import BLUE, ORANGE, Style
@@ -32,10 +33,13 @@ def figure_of(table: pd.DataFrame) -> Figure:
     effects, methods = list(table.effects.unique()), list(table.method.unique())
     size = (1.9 + 1.55 * len(methods), 1.4 + 0.4 * len(effects))
     figure = Figure(figsize=size, layout="constrained")
-    panels = figure.subplots(2, len(methods), squeeze=False, sharey=True, sharex="row")
+    panels = figure.subplots(2, len(methods), squeeze=False, sharey=True)
     for column, method in enumerate(methods):
         panels[0, column].set_title(METHODS[method].replace(", ", ",\n"), fontsize=9)
-        for axes, (measure, unit) in zip(panels[:, column], UNITS.items(), strict=True):
+        for row, (measure, unit) in enumerate(UNITS.items()):
+            axes = panels[row, column]
+            if column and method != STRUCTURE:  # which is off by a hundredth of the others
+                axes.sharex(panels[row, 0])
             rows = table[table.method == method]
             for trained_on, style in STYLES.items():
                 own = rows[rows.trained_on == trained_on].set_index("effects").reindex(effects)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
+from functools import partial
 from html import escape
 from pathlib import Path
 
@@ -99,7 +100,10 @@ def recall_table(path: Path) -> Markup:
 def robustness_table(path: Path) -> Markup:
     """A row for each training set and each of the effects; both errors in a cell."""
     table = robustness.read_robustness(path)
-    texts = [table[measure].map(form.format) for measure, (form, _) in robustness.FORMS.items()]
+    texts = [
+        table[measure].map(partial(robustness.printed, digits=digits)) + unit
+        for measure, (unit, digits) in robustness.UNITS.items()
+    ]
     text = texts[0].str.cat(texts[1], ", ").where(table.position_m.notna(), "failed")
     rows = pd.MultiIndex.from_frame(table[["trained_on", "effects"]].drop_duplicates())
     wide = table.assign(text=text).pivot(index=rows.names, columns="method").reindex(rows)
