@@ -76,7 +76,7 @@ def test_frames_are_reduced_and_cells_have_the_depth_behind_their_middle(tmp_pat
         assert views.depth_m[frame, 2, 3] == pytest.approx(depth_m[42, 62], abs=6e-4)
         blocks = colour_of(point_m, FURNISHED).reshape(24, 5, 32, 5, 3).astype(float)
         np.testing.assert_allclose(views.images[frame], blocks.mean((1, 3)), atol=1)
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="no such image"):
         read_frames([tmp_path / "none.png"], None, CAMERA, 32, 24)
     write_views(tmp_path / "views.npz", views)
     np.testing.assert_array_equal(read_views(tmp_path / "views.npz").point_m, views.point_m)
