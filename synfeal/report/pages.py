@@ -71,19 +71,21 @@ def findings(root: Path) -> str:
 def origin(root: Path) -> str:
     """Which run the numbers are of."""
     record = read_result(root / "provenance.json", ("commit", "machine", "stages"), "publish again")
-    first = _table(root, "table4_size", {"size": TEXT, "n_train": COUNT, "n_seeds": COUNT}).iloc[0]
+    cells = _table(root, "table4_size", {"size": TEXT, "n_train": COUNT, "n_seeds": COUNT})
+    first, seeds = cells.iloc[0], sorted(set(cells.n_seeds))
     share = PAPER_FRAMES[first["size"]] / first.n_train
     frames = "the paper's frames" if share == 1 else f"1/{share:.3g} of the paper's frames"
     return (
-        f"Profile `{root.name}`: {frames}, {counted_seeds(first.n_seeds)}, at commit"
+        f"Profile `{root.name}`: {frames}, {counted_seeds(seeds)}, at commit"
         f" `{record['commit'][:9]}` on {record['machine']['usable_cores']} cores"
         f" ({record['machine']['processor']})."
     )
 
 
-def counted_seeds(n_seeds: int) -> str:
-    """As in ``3 training runs per cell``."""
-    return f"{n_seeds} training run{'' if n_seeds == 1 else 's'} per cell"
+def counted_seeds(n_seeds: Sequence[int]) -> str:
+    """As in ``1 to 3 training runs per cell``, from the numbers there are, in order."""
+    span = " to ".join(map(str, dict.fromkeys((n_seeds[0], n_seeds[-1]))))
+    return f"{span} training run{'' if span == '1' else 's'} per cell"
 
 
 def size_table(root: Path) -> str:
