@@ -58,7 +58,9 @@ except InputError as error:
     sys.exit(f"error: {error}")
 
 ROOT = CONFIG.root.as_posix()
-config["results"] = CONFIG.results.as_posix()  # jobs look for it where the profile has none
+config["results"] = (
+    CONFIG.results.as_posix()
+)  # jobs look for it where the profile has none
 ARCHIVE = SUFFIX if CONFIG.archive_sequences else ""
 SPLITS = ("train", "test")
 SCENES = sorted({e.scene for e in EXPERIMENTS})
