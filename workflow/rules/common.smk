@@ -58,9 +58,8 @@ except InputError as error:
     sys.exit(f"error: {error}")
 
 ROOT = CONFIG.root.as_posix()
-config["results"] = (
-    CONFIG.results.as_posix()
-)  # jobs look for it where the profile has none
+# Jobs look for it in the configuration, also where the profile does not name it.
+config["results"] = CONFIG.results.as_posix()
 ARCHIVE = SUFFIX if CONFIG.archive_sequences else ""
 SPLITS = ("train", "test")
 SCENES = sorted({e.scene for e in EXPERIMENTS})
