@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, cast
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -99,12 +99,12 @@ class Run:
     @property
     def start(self) -> Start:
         """Where its weights come from."""
-        return "scratch" if self.init.startswith("scratch") else "pretrained"
+        return split_init(self.init)[0]
 
     @property
     def share(self) -> float:
         """Share of the images of its size that it is shown."""
-        return SHARES[self.init.partition("-")[2]]
+        return SHARES[split_init(self.init)[1]]
 
     def seed(self, profile_seed: int) -> int:
         """Seed of what the run draws, its labels and how many images it is shown left out.
@@ -121,6 +121,12 @@ class Run:
         return (
             f"{self.scene}/{self.size}/{self.labels}/{self.init}/{self.model}/seed{self.repetition}"
         )
+
+
+def split_init(init: str) -> tuple[Start, str]:
+    """Where an ``init`` starts from, and how it ends, a key of ``SHARES``."""
+    start, _, part = init.partition("-")
+    return cast(Start, start), part
 
 
 def read_experiments(config: Config) -> tuple[Experiment, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from baselines.groundtruth.methods import METHODS
-from synfeal.config.experiments import FROM_SCRATCH
+from synfeal.config.experiments import FROM_SCRATCH, split_init
 from synfeal.frames import rows_of
 from synfeal.report.cells import CHANGES
 from synfeal.report.sheet import LINE, PAPER, VALUE, Sheet, with_bold
@@ -93,7 +93,7 @@ def scene_title(scene: str) -> str:
 
 def init_title(init: str) -> str:
     """How a run is trained, e.g. ``from scratch, half of the images``."""
-    start, _, part = init.partition("-")
+    start, part = split_init(init)
     return STARTS[start] + PARTS[part]
 
 

@@ -26,7 +26,7 @@ from baselines.training.record import training_parameters
 from synfeal.config import Run, check_mesh_files, parse_config, read_design
 from synfeal.config.load import read_yaml
 from synfeal.config.load import check_results
-from synfeal.config.experiments import INJECTED, Init
+from synfeal.config.experiments import INJECTED, Init, split_init
 from synfeal.config.models import MODELS
 from synfeal.config.robustness import CLEAN, MIXED
 from synfeal.dataset.archive import SUFFIX
@@ -183,7 +183,7 @@ def unless_restored(output, source):
 
 def backbone_weights(wildcards):
     """The pretrained backbone a run starts from; nothing when it starts from scratch."""
-    if wildcards.init.startswith("scratch"):
+    if split_init(wildcards.init)[0] == "scratch":
         return []
     return f"{ROOT}/pretrained/{backbone_of(wildcards.model, CONFIG.network)}.pt"
 

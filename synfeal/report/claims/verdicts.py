@@ -23,7 +23,7 @@ calls it in "Small Telescopes", Psychological Science 2015). It needs a publishe
 
 A claim of several conditions holds when all do. It is refuted by one that is decided otherwise at
 the level corrected for their number (Bonferroni); then the verdict is that condition's, *smaller
-than published* where they are that in several ways, or *mixed* where others hold or are opposite.
+than published* where one is that and the others are refuted too, none as opposite, else *mixed*.
 
 A claim about every localizer is judged by the mean effect over the localizers, which a few runs
 can settle; that of a single localizer can refute the claim, at the corrected level, and only that.

@@ -14,7 +14,7 @@ import pandas as pd
 from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.methods import METHODS, frame_methods, graph_methods
 from synfeal.config import Config, Design, Experiment
-from synfeal.config.experiments import SHARES
+from synfeal.config.experiments import SHARES, split_init
 from synfeal.dataset.sevenscenes import sequences_of
 from synfeal.report.cost.networks import Work, pretext_work, training_work
 
@@ -212,7 +212,7 @@ def _train(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
     train, test = (config.n_frames(part["scene"], size, split) for split in ("train", "test"))
     hyper = config.localizers[part["model"]]  # type: ignore[index]
     work = training_work(part["model"], config.network, hyper)
-    share = SHARES[part.get("init", "").partition("-")[2]]
+    share = SHARES[split_init(part.get("init", "pretrained"))[1]]
     samples, batch = round(share * config.training.samples_seen[size]), config.training.batch_size
     return _learning(config, work, samples, batch, test, train)
 

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
 from baselines.groundtruth.methods import SIMULATOR
+from synfeal.config.experiments import split_init
 from synfeal.report.figures.localizer_lines import (
     add_legend,
     draw_localizers,
@@ -106,14 +107,14 @@ def draw_by_images(results: Results) -> Figure | None:
 
 def by_images(rows: pd.DataFrame) -> Figure:
     """The figure of the rows of ``table7_images_shown.csv``."""
-    start = rows["init"].str.partition("-")[0]
+    start = rows["init"].map(lambda init: split_init(init)[0])
     parts = {STARTS[name]: chosen for name, chosen in rows.groupby(start, sort=False)}
     figure = Figure(figsize=(1.4 + 3.2 * len(parts), 6.6), layout="constrained")
     names = dict.fromkeys(f"{scene_title(str(row.scene))}, {row.size}" for row in rows.itertuples())
     figure.suptitle("; ".join(names))
     panels = _draw_panels(figure, parts, TRUE_UNITS, published=False)
     for column, (title, chosen) in enumerate(parts.items()):
-        shares = [init.partition("-")[2] or "all" for init in chosen["init"].unique()]
+        shares = [split_init(init)[1] or "all" for init in chosen["init"].unique()]
         panels[1, column].set_xticks(range(len(shares)), shares)
         panels[1, column].set_xlabel("of the images shown")
         panels[0, column].set_title(title)
