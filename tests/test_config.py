@@ -234,7 +234,7 @@ def test_a_spreadsheets_byte_order_mark_does_no_harm(tmp_path):
 
 
 def test_documentation_that_drifted_is_noticed(tmp_path, capsys):
-    for name in ("config.yaml", "smoke.yaml", "gpu.yaml", "paper.yaml"):
+    for name in ("config.yaml", "smoke.yaml", "night.yaml", "gpu.yaml", "paper.yaml"):
         (tmp_path / name).write_bytes((CONFIG / name).read_bytes())
     assert main(["--folder", str(tmp_path)]) == 0
     assert main(["--check", "--folder", str(tmp_path)]) == 0

@@ -26,25 +26,24 @@ class CameraConfig(Strict):
     calibration: Path | None = Field(
         None,
         exclude=True,
-        description="file of a calibration (OpenCV or ROS .yaml or .json, COLMAP cameras.txt);"
-        " gives intrinsics and distortion, and the size unless width or height is given,"
-        " to which it is then scaled",
+        description="file of intrinsics and distortion (docs/cameras.md), scaled to width and"
+        " height where given",
     )
-    width: Annotated[int, Field(ge=16, le=8192)] = Field(640, description="image width, pixels")
-    height: Annotated[int, Field(ge=16, le=8192)] = Field(480, description="image height, pixels")
+    width: Annotated[int, Field(ge=16, le=8192)] = Field(640, description="pixels")
+    height: Annotated[int, Field(ge=16, le=8192)] = Field(480, description="pixels")
     horizontal_fov_deg: Annotated[float, Field(gt=1, lt=170)] = Field(
-        60.0, description="horizontal field of view, degrees; unused where fx is given"
+        60.0, description="field of view; unused with fx"
     )
-    fx: Positive | None = Field(None, description="focal length along x, pixels")
-    fy: Positive | None = Field(None, description="focal length along y, pixels")
-    cx: Finite | None = Field(None, description="principal point, pixels from the left edge")
-    cy: Finite | None = Field(None, description="principal point, pixels from the top edge")
+    fx: Positive | None = Field(None, description="focal length, pixels")
+    fy: Positive | None = Field(None, description="focal length, pixels")
+    cx: Finite | None = Field(None, description="principal point, pixels")
+    cy: Finite | None = Field(None, description="principal point, pixels")
     distortion: tuple[Finite, Finite, Finite, Finite, Finite] = Field(
         (0.0, 0.0, 0.0, 0.0, 0.0),
-        description="Brown-Conrady coefficients in OpenCV's order: k1, k2, p1, p2, k3",
+        description="k1, k2, p1, p2, k3 (Brown-Conrady, as OpenCV)",
     )
-    near_m: Positive = Field(0.05, description="near clip plane, metres")
-    far_m: Positive = Field(100.0, description="far clip plane, metres")
+    near_m: Positive = Field(0.05, description="near clip plane")
+    far_m: Positive = Field(100.0, description="far clip plane")
 
     @model_validator(mode="before")
     @classmethod

@@ -60,9 +60,9 @@ def _ordered(name: str, interval: Interval) -> None:
 class Box(Strict):
     """An axis-aligned box in the world, metres."""
 
-    x: Interval = Field(description="lower and upper bound along x, metres")
-    y: Interval = Field(description="lower and upper bound along y, metres")
-    z: Interval = Field(description="lower and upper bound along z, metres")
+    x: Interval = Field(description="bounds, metres")
+    y: Interval = Field(description="bounds, metres")
+    z: Interval = Field(description="bounds, metres")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -74,9 +74,9 @@ class Box(Strict):
 class Angles(Strict):
     """Admissible angles of the camera, degrees."""
 
-    roll_deg: Interval = Field((-29.8, 29.8), description="roll bounds, degrees")
-    pitch_deg: Interval = Field((-29.8, 29.8), description="pitch bounds, degrees")
-    yaw_deg: Interval = Field((0.0, 360.0), description="yaw bounds, degrees")
+    roll_deg: Interval = Field((-29.8, 29.8), description="bounds, degrees")
+    pitch_deg: Interval = Field((-29.8, 29.8), description="bounds, degrees")
+    yaw_deg: Interval = Field((0.0, 360.0), description="bounds, degrees")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -103,7 +103,7 @@ class ClutterConfig(Strict):
 
     count: Annotated[int, Field(ge=1, le=1000)] = Field(10, description="how many")
     files: tuple[Path, ...] = Field(
-        (), description="meshes to choose from in turn, metres; none: cartons"
+        (), description="meshes in metres, taken in turn; none: cartons"
     )
     size_m: tuple[Positive, Positive] = Field(
         (0.12, 0.4), description="cartons: shortest and longest side, metres"
@@ -120,44 +120,39 @@ class SceneConfig(Strict):
     """One scene: where its mesh comes from and where the camera may go."""
 
     source: Literal["procedural", "mesh"] = Field(
-        description="`procedural` builds the stand-in of this name; `mesh` reads `path`"
+        description="`procedural`: a stand-in; `mesh`: a file"
     )
     builder: Literal["large_room", "sanctuary", "random_room"] | None = Field(
-        None, description="procedural scenes: which stand-in to build"
+        None, description="procedural: which stand-in"
     )
     seed: Annotated[int, Field(ge=0, lt=2**63)] | None = Field(
-        None, description="procedural scenes: their own seed, in place of the profile's"
+        None, description="procedural: in place of the profile's seed"
     )
-    path: Path | None = Field(
-        None, description="mesh scenes: the file to read (.glb, .gltf, .obj, .ply)"
-    )
+    path: Path | None = Field(None, description="mesh: the file (.glb, .gltf, .obj, .ply)")
     sha256: str | None = Field(
         None,
         pattern=r"^[0-9a-f]{64}$",
-        description="mesh scenes: expected hash of the file, if any",
+        description="mesh: expected hash of the file",
     )
     up_axis: Literal["auto", "y", "z"] = Field(
-        "auto", description="axis that points up in the file; `auto` takes y for glTF, z otherwise"
+        "auto", description="mesh: axis that points up; `auto`: y for glTF, else z"
     )
     unit_m: Annotated[float, Field(ge=1e-6, le=1e6)] = Field(
-        1.0, description="length of one unit of the file in metres"
+        1.0, description="mesh: one unit of the file, metres"
     )
-    sampling_box: Box | None = Field(
-        None, description="where camera centres are sampled; the mesh's bounds when absent"
-    )
+    sampling_box: Box | None = Field(None, description="bounds of camera centres; null: the mesh's")
     further_boxes: tuple[Box, ...] = Field(
         (),
-        description="more of them: other rooms or floors, which no camera path has to reach from"
-        " `sampling_box`; frames are shared out by volume",
+        description="other rooms or floors, each with paths of its own; frames by volume",
     )
-    angles: Angles = Field(default_factory=Angles, description="angle bounds of sampled poses")
+    angles: Angles = Field(default_factory=Angles, description="bounds of the camera's angles")
     min_view_distance_m: NonNegative = Field(
         1.2,
-        description="least free distance along the optical axis of a target pose (the paper's d)",
+        description="least free distance ahead of a target pose (the paper's d)",
     )
     clutter: ClutterConfig | None = Field(None, description="objects that stand about")
     sizes: dict[SizeName, SizeConfig] = Field(
-        default_factory=dict, description="data set sizes by the paper's names, at scale 1"
+        default_factory=dict, description="data sets by the paper's names"
     )
 
     @model_serializer(mode="wrap")
@@ -184,33 +179,32 @@ class CollectionConfig(Strict):
 
     mode: Literal["path", "random", "repeat"] = Field(
         "path",
-        description="`path` is the paper's; `random` takes independent admissible poses; `repeat`"
-        " takes those of an earlier data set",
+        description="`path`: the paper's; `random`: independent poses; `repeat`: those of another"
+        " data set",
     )
     repeat: Path | None = Field(
         None,
-        description="mode `repeat`: a data set, a directory of 7-Scenes frames, a pose table (.csv)"
-        " or a TUM trajectory (.txt)",
+        description="mode `repeat`: data set, directory of 7-Scenes frames, pose table (.csv) or"
+        " TUM trajectory (.txt)",
     )
     candidates: Annotated[int, Field(ge=1, le=10**4)] = Field(
-        8, description="target pose candidates per path (the paper's k)"
+        8, description="target poses tried per path (the paper's k)"
     )
     frame_spacing_m: Annotated[float, Field(ge=1e-4, le=1e4)] = Field(
         0.03, description="distance between frames (the paper's other d)"
     )
     min_path_m: NonNegative = Field(1.5, description="shorter paths are drawn again")
     max_tries: Annotated[int, Field(ge=1, le=10**6)] = Field(
-        2000, description="rounds of candidates before a scene is called too narrow"
+        2000, description="rounds of candidates before a scene counts as too narrow"
     )
     interpolation: Literal["rpy", "slerp"] = Field(
         "rpy",
-        description="`rpy` is the paper's component-wise interpolation, each angle the short way",
+        description="`rpy`: the paper's, angle by angle, each the short way",
     )
     collision_agreement: Annotated[float, Field(gt=0.5, le=1)] | None = Field(
         0.995,
-        description="share of a planner's decisions on which the decimated collision mesh must"
-        " agree with the full mesh; 1 keeps all that any of 10,000 decisions needs, null takes the"
-        " mesh as it is",
+        description="share of 10,000 planner decisions in which the decimated collision mesh must"
+        " agree with the full mesh; null: no decimation",
     )
 
     @model_validator(mode="after")

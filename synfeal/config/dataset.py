@@ -15,25 +15,21 @@ from synfeal.config.rendering import EffectsConfig, RenderConfig
 class DatasetConfig(Strict):
     """Scenes, how many frames of them, and how they are planned and drawn."""
 
-    profile: Slug = Field(description="name of the profile and of its directory under `results`")
+    profile: Slug = Field(description="name, and directory under `results`")
     seed: int = Field(0, ge=0, lt=2**63, description="root of all seeds")
     scale: Annotated[float, Field(gt=0, le=1)] = Field(description="share of the paper's frames")
-    results: Path = Field(Path("results"), description="where everything is written")
-    shard_frames: Count = Field(500, description="frames per render job and sequence directory")
-    archive_sequences: bool = Field(
-        False, description="write each sequence of image files as one `seq-XX.zip`"
-    )
+    results: Path = Field(Path("results"), description="where runs are written")
+    shard_frames: Count = Field(500, description="frames of a render job, and of a sequence")
+    archive_sequences: bool = Field(False, description="write a sequence as one `seq-XX.zip`")
     scenes: dict[Slug, SceneConfig] = Field(description="scenes by name")
     collection: CollectionConfig = Field(
         default_factory=CollectionConfig, description="camera movement"
     )
     network_camera: CameraConfig = Field(
-        default_factory=CameraConfig, description="camera of the frames the localizers see"
+        default_factory=CameraConfig, description="camera of the localizers' frames"
     )
-    network_depth: bool = Field(
-        False, description="depth images of that camera too, where image files are written"
-    )
-    render: RenderConfig = Field(default_factory=RenderConfig, description="how images are drawn")
+    network_depth: bool = Field(False, description="write its depth images too")
+    render: RenderConfig = Field(default_factory=RenderConfig, description="how frames are drawn")
 
     @model_validator(mode="after")
     def _check_effects(self) -> Self:

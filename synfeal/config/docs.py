@@ -16,14 +16,28 @@ from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
 
 from synfeal.config.experiments import Experiment
 from synfeal.config.load import read_yaml
 from synfeal.config.models import Config
 from synfeal.files import atomic_path
 
-FILES = ("config.yaml", "smoke.yaml", "gpu.yaml", "paper.yaml")
+PROFILES = ("smoke", "mini", "night", "gpu", "paper")
+DEFAULT_PROFILE = "mini"
+COMPARED = (
+    "scale",
+    "experiments",
+    "collection.frame_spacing_m",
+    "groundtruth_camera.width",
+    "groundtruth.batch_frames",
+    "network.input_px",
+    "network.width",
+    "network.view",
+    "training.samples_seen.6k",
+    "training.repetitions.table2_ground_truth",
+    "pretraining.source",
+)
+STORAGE_LIMIT = 1e9  # larger bounds are those of a file or a data type: schema.json has them
 INTRO = """\
 # Configuration
 
@@ -37,26 +51,23 @@ that differ, merged over it key by key; lists and single values are replaced who
     synfeal run --profile my.yaml --cores 2 -- tables         # a file of yours; one target
     snakemake --cores 2 --config seed=1 profile=seed1 -- all  # one key over config.yaml
 
-`synfeal run` starts Snakemake with what stands after `--`, and shows one line that stays and a
-table of scores; the rest is in `.snakemake/log`. `snakemake --configfile FILE` does the same in
-Snakemake's own words. It reads the file before the workflow can: one that is missing, a directory,
-not UTF-8 or nested too deeply ends there in a traceback, whose last line says which.
+`synfeal run` hands Snakemake what stands after `--` and shows one line of progress; Snakemake's own
+words are in `.snakemake/log`. `snakemake --configfile FILE` does the same without that line.
 
 Give every variant a `profile` of its own: results go to `<results>/<profile>`. Unknown keys, wrong
-types and values out of range stop the run before it starts, with one line that names file and key.
+types and values out of range stop the run before it starts, in one line that names file and key.
 Editors that read JSON Schema can check a complete profile against `schema.json`.
 """
 EXPERIMENTS = """\
 ## The table of experiments
 
-`experiments` names a CSV file with one row per table row of the paper; each row is trained with all
-five localizers. Rows may share runs: a run is made once. Columns:
+`experiments` names a CSV file with one row per table row of the paper, trained with all five
+localizers. A run that several rows share is made once. Columns:
 """
 SETTINGS = """\
-## What the profiles set
+## The shipped profiles
 
-A dash means that the profile does not set the key: `smoke`, `gpu` and `paper` then take the value
-of `mini`, and `mini` takes the default.
+Where they differ most (a dash is the default); their files have the rest.
 """
 
 
@@ -85,13 +96,12 @@ def documents(folder: Path) -> dict[str, str]:
     """Contents of the generated files by name; ``folder`` holds the shipped profiles."""
     schema = json.dumps(Config.model_json_schema(), indent=2) + "\n"
     keys = table(("key", "type", "default", "meaning"), key_rows(Config))
-    profiles = [flattened(read_yaml(folder / name)) for name in FILES]
     parts = [
         INTRO,
         "## Keys\n",
         keys,
         SETTINGS,
-        table(("key", "mini", "smoke", "gpu", "paper"), setting_rows(profiles)),
+        table(("key", *PROFILES), setting_rows(folder)),
         EXPERIMENTS,
         table(("column", "type", "meaning"), experiment_rows()),
     ]
@@ -109,14 +119,15 @@ def key_rows(
     for name, field in model.model_fields.items():
         inner, key = _model_below(field.annotation, f"{prefix}{name}")
         if inner is None:
-            yield f"`{key}`", type_name(field), _default(field), str(field.description)
+            yield f"`{key}`", type_name(field), _default(field), _text(field)
             continue
         default = "required" if field.is_required() else ""
         if inner in told:
-            yield f"`{key}`", f"mapping, keys as under `{told[inner]}`", default, _text(field)
+            kind = "list, " if get_origin(field.annotation) is tuple else ""
+            yield f"`{key}`", f"{kind}as `{told[inner]}`", default, _text(field)
         else:
             told[inner] = key
-            yield f"`{key}`", "mapping", default, _text(field)
+            yield f"`{key}`", "", default, _text(field)
             yield from key_rows(inner, f"{key}.", told)
 
 
@@ -126,10 +137,14 @@ def experiment_rows() -> Iterator[tuple[str, ...]]:
         yield f"`{name}`", type_name(field), _text(field)
 
 
-def setting_rows(profiles: Sequence[Mapping[str, str]]) -> Iterator[tuple[str, ...]]:
-    """Every key that a shipped profile sets, with its value in each."""
-    for key in dict.fromkeys(key for profile in profiles for key in profile):
-        yield (f"`{key}`", *(profile.get(key, "-") for profile in profiles))
+def setting_rows(folder: Path) -> Iterator[tuple[str, ...]]:
+    """What the shipped profiles set for the keys that tell them apart."""
+    base = flattened(read_yaml(folder / "config.yaml"))
+    others = {name: folder / f"{name}.yaml" for name in PROFILES if name != DEFAULT_PROFILE}
+    set_by = {name: base | flattened(read_yaml(path)) for name, path in others.items()}
+    set_by[DEFAULT_PROFILE] = base
+    for key in COMPARED:
+        yield (f"`{key}`", *(set_by[name].get(key, "-") for name in PROFILES))
 
 
 def flattened(values: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
@@ -150,19 +165,26 @@ def table(heading: Sequence[str], rows: Iterator[tuple[str, ...]]) -> str:
 
 
 def type_name(field: FieldInfo) -> str:
-    """A field's type and bounds in words, e.g. ``integer, at least 1``."""
-    bounds = [note for item in field.metadata for note in _bounds(item)]
-    return ", ".join([_name(field.annotation), *dict.fromkeys(bounds)])
+    """A field's type and bounds, e.g. ``integer ≥ 1``; ``or null`` if not the default."""
+    name = _bounded(_name(field.annotation), field.metadata)
+    return name.removesuffix(" or null") if field.default is None else name
+
+
+def _bounded(name: str, metadata: Sequence[Any]) -> str:
+    bounds = ", ".join(dict.fromkeys(note for item in metadata for note in _bounds(item)))
+    return f"{name} {bounds}".rstrip()
 
 
 def _name(annotation: Any) -> str:
-    names = {int: "integer", float: "number", str: "text", Path: "path", type(None): "nothing"}
+    names = {int: "integer", float: "number", str: "text", Path: "path", bool: "boolean"}
+    names[type(None)] = "null"
     if annotation in names:
         return names[annotation]
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        notes = [note for item in arguments[1:] for note in _bounds(item)]
-        return ", ".join([_name(arguments[0]), *notes])
+        return _bounded(_name(arguments[0]), arguments[1:])
+    if origin is list or (origin is tuple and arguments[-1] is Ellipsis):
+        return f"list of {_name(arguments[0])}"
     if origin is tuple:
         return f"list of {len(arguments)}: {_name(arguments[0])}"
     if origin is dict:
@@ -175,13 +197,13 @@ def _name(annotation: Any) -> str:
 def _bounds(item: Any) -> list[str]:
     """Bounds in a pydantic ``Field`` or in one of its unpacked constraints."""
     constraints = item.metadata if isinstance(item, FieldInfo) else [item]
-    words = {"ge": "at least", "gt": "above", "le": "at most", "lt": "below"}
-    return [
-        f"{word} {getattr(constraint, name):g}"
+    signs = {"ge": "≥", "gt": ">", "le": "≤", "lt": "<"}
+    found = [
+        (sign, getattr(constraint, name, None))
         for constraint in constraints
-        for name, word in words.items()
-        if getattr(constraint, name, None) is not None
+        for name, sign in signs.items()
     ]
+    return [f"{sign} {b:g}" for sign, b in found if b is not None and b < STORAGE_LIMIT]
 
 
 def _model_below(annotation: Any, key: str) -> tuple[type[BaseModel] | None, str]:
@@ -195,14 +217,12 @@ def _model_below(annotation: Any, key: str) -> tuple[type[BaseModel] | None, str
 
 
 def _default(field: FieldInfo) -> str:
+    """The default as YAML has it; nothing for an empty text."""
     if field.is_required():
         return "required"
-    if field.default_factory is not None:
-        return f"`{field.get_default(call_default_factory=True)}`"
-    if field.default is PydanticUndefined or field.default is None:
-        return "none"
-    value = list(field.default) if isinstance(field.default, tuple) else field.default
-    return f"`{value}`"
+    value = field.get_default(call_default_factory=True)
+    text = str(value) if isinstance(value, str | Path) else json.dumps(value)
+    return f"`{text}`" if text else ""
 
 
 def _text(field: FieldInfo) -> str:

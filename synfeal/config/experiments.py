@@ -36,23 +36,20 @@ COLUMNS = ("table", "block", "scene", "size", "labels", "noise_m", "noise_deg", 
 class Experiment(Strict):
     """One table row: five cells, one per localizer."""
 
-    table: TableName = Field(description="the table the row belongs to; tables 6 and 7 are our own")
+    table: TableName = Field(description="tables 6 and 7 are our own")
     block: Literal["", "orientation", "position", "both"] = Field(
-        description="rows of table 3: its block; empty in the other tables"
+        description="of table 3; else empty"
     )
     scene: str = Field(description="a key of `scenes`")
     size: str = Field(description="a key of `scenes.<scene>.sizes` and of `training.samples_seen`")
     labels: str = Field(
-        description="where the labels come from: `synfeal` the simulator's own poses; the same "
-        "with errors: `noise` of each frame's own, `offset` one of each path, `bend` a smooth "
-        "deformation of space, `scale` too large a scale; or a key of `METHODS` in "
-        "`baselines/groundtruth/methods.py`: re-estimated"
+        description="`synfeal`: true poses; `noise`, `offset`, `bend`, `scale`: with an error"
+        " (docs/tables.md); or a key of `METHODS` in `baselines/groundtruth/methods.py`"
     )
     noise_m: NonNegative = Field(description="median position error put into labels, metres")
     noise_deg: NonNegative = Field(description="the same of orientation, degrees; 0 with `scale`")
     init: Init = Field(
-        description="weights a training run starts from: `pretrained` or `scratch`; ending in "
-        "`-half` or `-quarter` where it is shown that share of `training.samples_seen`"
+        description="start; `-half`, `-quarter`: with that share of `training.samples_seen`"
     )
 
     @model_validator(mode="after")

@@ -22,19 +22,17 @@ class NetworkConfig(Strict):
 
     backbone: InceptionName = Field(
         "googlenet",
-        description="what PoseNet, PoseLSTM and PoseNet2 stand on: `googlenet` as in their papers,"
-        " `inception_v3` as in the Synfeal authors' code (299 pixels there, at least 75)",
+        description="of PoseNet, PoseLSTM and PoseNet2; `inception_v3` needs 75 px",
     )
     input_px: Annotated[int, Field(ge=32, le=1024)] = Field(
         224, description="side of the square input"
     )
     view: Literal["square", "whole"] = Field(
         "square",
-        description="what of a frame the network sees: its central `square`, as in the authors'"
-        " code, or the `whole` of it, squeezed into a square",
+        description="what it sees: a frame's central square, or the whole of it, squeezed",
     )
     width: Annotated[float, Field(gt=0, le=1)] = Field(
-        1.0, description="factor on the channels of every backbone; only 1 loads ImageNet weights"
+        1.0, description="factor on all channels; ImageNet weights need 1"
     )
 
     @model_validator(mode="after")
@@ -50,21 +48,16 @@ class NetworkConfig(Strict):
 class LocalizerConfig(Strict):
     """Hyper-parameters of one localizer."""
 
-    learning_rate: Positive = Field(
-        1e-4, description="highest learning rate; Muon's is 20 times as high"
-    )
+    learning_rate: Positive = Field(1e-4, description="peak; Muon's is 20 times as high")
     weight_decay: NonNegative = Field(1e-4, description="decoupled weight decay")
     dropout: Fraction = Field(0.5, description="dropout before the regressors")
     skip: Literal["sum", "concatenation"] = Field(
         "sum",
-        description="Hourglass alone: how its decoder joins the encoder's maps; the Synfeal"
-        " authors' code concatenates",
+        description="Hourglass: how its decoder joins the encoder's maps",
     )
-    beta: Positive | None = Field(None, description="weight of the orientation term (beta losses)")
-    s_position: Finite = Field(0.0, description="initial log-variance of position (learned losses)")
-    s_orientation: Finite = Field(
-        -3.0, description="initial log-variance of orientation (learned losses)"
-    )
+    beta: Positive | None = Field(None, description="weight of the orientation (beta losses)")
+    s_position: Finite = Field(0.0, description="initial log-variance (learned losses)")
+    s_orientation: Finite = Field(-3.0, description="initial log-variance (learned losses)")
 
 
 class AugmentationConfig(Strict):
@@ -75,10 +68,10 @@ class AugmentationConfig(Strict):
     """
 
     tilt_deg: Annotated[float, Field(ge=0, le=45)] = Field(
-        0.0, description="largest turn about the camera's x and y axes"
+        0.0, description="largest rotation about the camera's x and y axes"
     )
     roll_deg: Annotated[float, Field(ge=0, le=180)] = Field(
-        0.0, description="largest turn about its optical axis"
+        0.0, description="largest rotation about its optical axis"
     )
 
     @property
@@ -92,37 +85,30 @@ class TrainingConfig(Strict):
 
     protocol: Literal["corrected", "published"] = Field(
         "corrected",
-        description="`corrected`: frames shuffled, weights chosen on training paths that are held"
-        " out, Euclidean norms, Muon, a rate that rises and falls; `published`, as in the Synfeal"
-        " authors' code: frames in the order of collection, weights chosen on the test set, mean"
-        " squared errors, learning rate halved at intervals",
+        description="docs/localizers.md; `published`: as the Synfeal authors' code",
     )
     validation_share: Annotated[float, Field(ge=0, lt=1)] = Field(
         0.1,
-        description="`corrected`: share of the training paths that are held out to choose the"
-        " weights (at least one path); 0 learns from all and keeps the last weights",
+        description="`corrected`: share of the training paths held out to choose weights; 0: keep"
+        " the last weights",
     )
     patience: Count | None = Field(
         None,
-        description="`published`: evaluations (20 in a training run) without a new best after which"
-        " training stops; not with `corrected`, whose cycle makes most of its gain at the end,"
-        " when the rate falls",
+        description="`published`: stop after so many evaluations (of 20) without a new best",
     )
     augmentation: AugmentationConfig = Field(
         default_factory=AugmentationConfig,
-        description="`corrected`: random rotations of the camera",
+        description="`corrected`: rotation augmentation",
     )
     precision: Literal["auto", "float32", "bfloat16"] = Field(
         "auto",
-        description="what networks compute in; `auto`: bfloat16 where the device multiplies in it,"
-        " else float32",
+        description="`auto`: bfloat16 where the device multiplies in it",
     )
     batch_size: Count = Field(32, description="images per step")
-    samples_seen: dict[str, Count] = Field(description="images shown in all, by data set size")
+    samples_seen: dict[str, Count] = Field(description="images shown in all, by size")
     repetitions: Repetitions = Field(
         default_factory=once,
-        description="seeds per cell, by table (`table2_ground_truth`, ...), `default` for the rest;"
-        " a run that several tables show is repeated as often as any of them asks",
+        description="seeds per run, by table; of several that show a run the most counts",
     )
     device: Literal["auto", "cpu", "cuda"] = Field("auto", description="where to train")
 
@@ -141,18 +127,17 @@ class PretrainingConfig(Strict):
 
     source: Literal["shipped", "rooms", "imagenet"] = Field(
         "shipped",
-        description="`shipped`: weights that come with the package (docs/start.md), of a quarter of"
-        " the width; `rooms` makes such weights anew, on all scenes with `builder: random_room`;"
-        " `imagenet` downloads weights",
+        description="`shipped`: the package's weights; `rooms`: made anew, on scenes with"
+        " `builder: random_room`; `imagenet`: downloaded",
     )
-    frames: Count = Field(3000, description="rooms: frames to render of each (not scaled)")
+    frames: Count = Field(3000, description="rooms: frames of each (not scaled)")
     samples_seen: Count = Field(64_000, description="rooms: images shown in all")
     batch_size: Count = Field(64, description="rooms: images per step")
     learning_rate: Positive = Field(1e-3, description="rooms: peak learning rate")
     augmentation: AugmentationConfig = Field(
-        default_factory=AugmentationConfig, description="rooms: random rotations of the camera"
+        default_factory=AugmentationConfig, description="rooms: rotation augmentation"
     )
-    weights_dir: Path = Field(Path("weights"), description="imagenet: where the files are kept")
+    weights_dir: Path = Field(Path("weights"), description="imagenet: where files are kept")
 
 
 class ExternalConfig(Strict):
@@ -164,16 +149,14 @@ class ExternalConfig(Strict):
     title: str = Field(description="as tables and figures call it")
     poses: str = Field(
         "",
-        description="path of its answers, a table of poses (docs/references.md), e.g."
-        " `mine/{scene}-{size}-{labels}.csv`",
+        description="path of its answers, e.g. `mine/{scene}-{size}-{labels}.csv`",
     )
     command: str = Field(
         "",
-        description="what writes them instead, with `{train_frames}`, `{train_labels}`,"
-        " `{test_frames}`, `{n_test}` and `{out}` filled in too",
+        description="or what writes them",
     )
     labels: list[str] = Field(
-        default_factory=list, description="label sets it answers for; empty: all of the design"
+        default_factory=list, description="label sets it answers for; none: all"
     )
 
     @model_validator(mode="after")
@@ -188,14 +171,14 @@ class ReferencesConfig(Strict):
 
     max_features: Count = Field(1000, description="structure: SIFT features per image")
     contrast: Positive = Field(
-        0.013, description="structure: least contrast of a feature, on OpenCV's scale (its 0.04)"
+        0.013, description="structure: least contrast of a feature (OpenCV's default is 0.04)"
     )
     retrieved: Count = Field(
-        20, description="structure: training images that a test image is matched with"
+        20, description="structure: training images a test image is matched with"
     )
     coordinate_samples: Count = Field(
-        2000, description="scene coordinates: images shown to the network in all"
+        2000, description="scene coordinates: images shown in training"
     )
     external: dict[Slug, ExternalConfig] = Field(
-        default_factory=dict, description="localizers of somebody else's, by name"
+        default_factory=dict, description="localizers of somebody else's"
     )

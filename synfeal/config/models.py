@@ -74,32 +74,28 @@ class SfmConfig(Strict):
     """Structure from motion with pycolmap."""
 
     max_features: Count = Field(2000, description="SIFT features per image")
-    peak_threshold: Positive = Field(
-        0.0067, description="SIFT features: least contrast, on a scale where white is 1"
-    )
-    overlap: Count = Field(
-        5, description="sequential matching: images further on that each image is matched with"
-    )
+    peak_threshold: Positive = Field(0.0067, description="SIFT: least contrast; white is 1")
+    overlap: Count = Field(5, description="images further on that each image is matched with")
     quadratic_overlap: bool = Field(
-        True, description="which ones: 1, 2, 4, 8, ... further on, else 1, 2, 3, 4, ..."
+        True, description="these: 1, 2, 4, 8, … further on, else 1, 2, 3, 4, …"
     )
     guided_matching: bool = Field(
-        False, description="match again along the epipolar lines of a verified pair"
+        False, description="match a verified pair again along epipolar lines"
     )
     min_num_inliers: Count = Field(15, description="least inliers of a verified pair")
     mapper: Literal["incremental", "global"] = Field(
-        "incremental", description="COLMAP's mapper: image by image, or all at once (GLOMAP)"
+        "incremental", description="COLMAP's: image by image, or all at once (GLOMAP)"
     )
     init_min_tri_angle_deg: Positive = Field(
-        4.0, description="incremental mapper: least angle of the initial pair"
+        4.0, description="incremental: least angle of the initial pair"
     )
     min_explained: Annotated[float, Field(ge=0, le=1)] = Field(
         0.67,
-        description="incremental mapper: a model that explains a smaller share of the matched image"
-        " points is doubtful, and another start is tried, up to four",
+        description="incremental: a model that explains less of the matched points is tried anew"
+        " from another start, up to four",
     )
     max_mapping_s: Count = Field(
-        1800, description="incremental mapper: stop after this time with the best model so far"
+        1800, description="incremental: stop then with the best model so far"
     )
 
 
@@ -107,23 +103,23 @@ class DepthConfig(Strict):
     """Depth images as a method reads them."""
 
     sensor: Literal["ideal", "kinect"] = Field(
-        "ideal", description="`kinect` quantises disparity, adds its noise and sees 0.5 to 4.5 m"
+        "ideal", description="`kinect`: quantised, noisy disparity, 0.5 to 4.5 m"
     )
-    max_depth_m: Positive = Field(20.0, description="depth beyond this is not used")
+    max_depth_m: Positive = Field(20.0, description="depth beyond is not used")
 
 
 class RgbdConfig(DepthConfig):
     """RGB-D odometry and loop closures with Open3D."""
 
     method: Literal["point-to-plane", "hybrid", "intensity"] = Field(
-        "point-to-plane", description="what the dense odometry compares: depth, both, colour"
+        "point-to-plane", description="what dense odometry compares: depth, both, colour"
     )
     start: Literal["motion", "features", "identity"] = Field(
-        "motion", description="first guess: motion of the pair before, feature matches, no motion"
+        "motion", description="first guess: the motion before, feature matches, none"
     )
-    keyframe_every: Count = Field(10, description="frames between keyframes for loop closures")
+    keyframe_every: Count = Field(10, description="frames between keyframes")
     loops_per_keyframe: Annotated[int, Field(ge=0, le=10**9)] = Field(
-        3, description="most loop closures from a keyframe to earlier ones; 0 closes none"
+        3, description="most loop closures of a keyframe"
     )
     max_rmse_m: Positive = Field(0.05, description="motions with a larger residual are rejected")
     min_fitness: Fraction = Field(0.3, description="motions with less overlap are rejected")
@@ -132,16 +128,16 @@ class RgbdConfig(DepthConfig):
 class KinectFusionConfig(DepthConfig):
     """Frame-to-model tracking as in KinectFusion."""
 
-    voxel_m: Positive = Field(0.02, description="edge of a voxel of the model")
+    voxel_m: Positive = Field(0.02, description="edge of a voxel")
     min_fitness: Fraction = Field(0.3, description="tracking with less overlap is lost")
 
 
 class PoseGraphConfig(Strict):
     """The two optimisers, with RTAB-Map's settings."""
 
-    toro_iterations: Count = Field(100, description="TORO: passes over all edges")
-    toro_epsilon: Positive = Field(1e-5, description="TORO: stop when the error changes less")
-    lm_iterations: Count = Field(20, description="Levenberg-Marquardt (the g2o row): iterations")
+    toro_iterations: Count = Field(100, description="passes over all edges")
+    toro_epsilon: Positive = Field(1e-5, description="stop when the error changes less")
+    lm_iterations: Count = Field(20, description="iterations of Levenberg-Marquardt (g2o)")
 
 
 class GroundTruthConfig(Strict):
@@ -149,11 +145,9 @@ class GroundTruthConfig(Strict):
 
     batch_frames: Annotated[int, Field(ge=2, le=10**9)] = Field(250, description="frames per batch")
     assist_position_m: Positive = Field(
-        0.20, description="assist when the last position is off by more"
+        0.20, description="assist a batch whose last position is off by more"
     )
-    assist_orientation_deg: Positive = Field(
-        10.0, description="assist when the last orientation is"
-    )
+    assist_orientation_deg: Positive = Field(10.0, description="or whose last orientation is")
     sfm: SfmConfig = Field(default_factory=SfmConfig, description="structure from motion")
     rgbd: RgbdConfig = Field(default_factory=RgbdConfig, description="RGB-D odometry")
     kinect_fusion: KinectFusionConfig = Field(
@@ -169,31 +163,34 @@ class Config(DatasetConfig):
 
     experiments: Path = Field(Path("config/experiments.csv"), description="the design as a table")
     datasets: tuple[Slug, ...] | None = Field(
-        None, description="scenes that the target `datasets` makes; null: those of the design"
+        None, description="scenes of the target `datasets`; null: those of the design"
     )
     groundtruth_camera: CameraConfig = Field(
-        default_factory=CameraConfig, description="camera of the frames SfM and RGB-D SLAM see"
+        default_factory=CameraConfig,
+        description="camera of the frames that labels are estimated from",
     )
     render_speed: RenderSpeedConfig = Field(
         default_factory=RenderSpeedConfig, description="what rendering is measured on"
     )
     groundtruth: GroundTruthConfig = Field(
-        default_factory=GroundTruthConfig, description="label replacement"
+        default_factory=GroundTruthConfig, description="estimated labels (docs/groundtruth.md)"
     )
     references: ReferencesConfig = Field(
-        default_factory=ReferencesConfig, description="what localizers are compared with"
+        default_factory=ReferencesConfig,
+        description="what localizers are compared with (docs/references.md)",
     )
     robustness: RobustnessConfig = Field(
-        default_factory=RobustnessConfig, description="tests with effects of camera and light"
+        default_factory=RobustnessConfig, description="tests with effects (docs/variation.md)"
     )
-    network: NetworkConfig = Field(default_factory=NetworkConfig, description="network shape")
-    training: TrainingConfig = Field(description="training protocol")
+    network: NetworkConfig = Field(
+        default_factory=NetworkConfig, description="shape of all localizers"
+    )
+    training: TrainingConfig = Field(description="docs/localizers.md")
     pretraining: PretrainingConfig = Field(
-        default_factory=PretrainingConfig, description="what pretrained runs start from"
+        default_factory=PretrainingConfig,
+        description="what pretrained runs start from (docs/start.md)",
     )
-    localizers: dict[ModelName, LocalizerConfig] = Field(
-        description="hyper-parameters by localizer"
-    )
+    localizers: dict[ModelName, LocalizerConfig] = Field(description="hyper-parameters of each")
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -17,20 +17,20 @@ class LightConfig(Strict):
     """The light of a path: drawn once for each, the same for all of its frames."""
 
     states: tuple[Literal["all", "lamps", "daylight", "dusk", "night"], ...] = Field(
-        (), description="stand-ins: which of their lights are on, one of these drawn for each path"
+        (), description="stand-ins: which lights are on; one drawn per path"
     )
     ev: tuple[Stops, Stops] = Field(
-        (0.0, 0.0), description="brightness of all light: drawn between these, stops"
+        (0.0, 0.0), description="brightness, stops, drawn per path between these"
     )
     temperature_k: tuple[Kelvin, Kelvin] = Field(
         (6500.0, 6500.0),
-        description="its colour temperature: drawn between these, kelvin, uniform in mired; a mesh"
-        " shows itself as it is at 6500",
+        description="colour temperature, drawn between these, uniform in mired; 6500 leaves the"
+        " mesh as it is",
     )
     field_ev: Annotated[float, Field(ge=0, le=5)] = Field(
-        0.0, description="smooth change across the scene, standard deviation in stops"
+        0.0, description="smooth change across the scene: standard deviation, stops"
     )
-    field_m: Positive = Field(3.0, description="shortest wavelength of that change, metres")
+    field_m: Positive = Field(3.0, description="its shortest wavelength")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -44,9 +44,9 @@ class LightConfig(Strict):
 class MotionBlurConfig(Strict):
     """The path of the camera during one exposure, centred on the pose of the frame."""
 
-    exposure_s: Positive = Field(0.02, description="exposure time, seconds")
+    exposure_s: Positive = Field(0.02, description="exposure time")
     subframes: Annotated[int, Field(ge=2, le=64)] = Field(
-        8, description="frames, evenly spaced in time, whose light is averaged"
+        8, description="frames whose light is averaged"
     )
 
 
@@ -56,14 +56,13 @@ class ExposureConfig(Strict):
     ev: Stops = Field(0.0, description="compensation, stops: 1 doubles the light")
     time_constant_s: Positive | None = Field(
         None,
-        description="auto-exposure follows the mean light of the frames before with this lag,"
-        " seconds; a path begins settled. Null: no auto-exposure",
+        description="lag of auto-exposure; null: none",
     )
     target: Annotated[float, Field(gt=0, lt=1)] = Field(
         0.18, description="auto-exposure: mean light aimed at, white is 1"
     )
     most_ev: Annotated[float, Field(ge=0, le=10)] = Field(
-        3.0, description="auto-exposure: largest correction either way, stops"
+        3.0, description="auto-exposure: largest correction, stops"
     )
 
 
@@ -73,7 +72,7 @@ class NoiseConfig(Strict):
     full_well_e: Annotated[float, Field(ge=1, le=1e7)] = Field(
         10_000.0, description="electrons of a white pixel"
     )
-    read_e: NonNegative = Field(5.0, description="noise of reading out, electrons rms")
+    read_e: NonNegative = Field(5.0, description="read noise, electrons RMS")
 
 
 class PathObjectsConfig(Strict):
@@ -81,7 +80,7 @@ class PathObjectsConfig(Strict):
 
     count: Annotated[int, Field(ge=1, le=100)] = Field(8, description="how many, where they fit")
     files: tuple[Path, ...] = Field(
-        (), description="meshes to choose from in turn, metres; none: cartons"
+        (), description="meshes in metres, taken in turn; none: cartons"
     )
 
 
@@ -89,28 +88,27 @@ class EffectsConfig(Strict):
     """What is added to ideal frames, in the order of the keys; what is absent is not added."""
 
     seed: Annotated[int, Field(ge=0, lt=2**63)] = Field(
-        0, description="of noise, lights and which paths an effect acts on"
+        0, description="of noise, lights and the choice of paths"
     )
     share: Annotated[float, Field(gt=0, le=1)] = Field(
-        1.0, description="share of the paths that each effect acts on, drawn by path and effect"
+        1.0, description="share of the paths that each effect acts on"
     )
     speed_m_s: Positive = Field(
-        0.5, description="of the camera along its path: time between frames is distance by speed"
+        0.5, description="speed of the camera: gives the time between frames"
     )
-    light: LightConfig | None = Field(None, description="light that differs from path to path")
-    motion_blur: MotionBlurConfig | None = Field(None, description="movement while exposing")
-    exposure: ExposureConfig | None = Field(None, description="exposure, fixed or automatic")
+    light: LightConfig | None = Field(None, description="light by path")
+    motion_blur: MotionBlurConfig | None = Field(None, description="movement during exposure")
+    exposure: ExposureConfig | None = Field(None, description="fixed or automatic")
     noise: NoiseConfig | None = Field(None, description="shot and read noise")
     white_balance_k: Kelvin | None = Field(
         None,
-        description="colour temperature the camera takes for white, kelvin, in light of 6500:"
-        " below is bluish, above reddish",
+        description="colour temperature taken for white, in light of 6500",
     )
     jpeg_quality: Annotated[int, Field(ge=1, le=95)] | None = Field(
-        None, description="JPEG compression, libjpeg's scale, before frames are written"
+        None, description="libjpeg's scale"
     )
     clutter: PathObjectsConfig | None = Field(
-        None, description="objects that stand about, placed anew for every path"
+        None, description="objects that stand about, other ones along each path"
     )
 
     @model_validator(mode="after")
@@ -133,15 +131,17 @@ class RenderConfig(Strict):
     """How images are drawn."""
 
     backend: Literal["auto", "opengl", "pyrender", "raycast"] = Field(
-        "auto", description="`auto` takes the fastest that works on this machine, and says which"
+        "auto", description="`auto`: the fastest that works here"
     )
     supersampling: Annotated[int, Field(ge=1, le=4)] = Field(
-        2, description="samples per pixel along each axis; 1 is fastest and aliases"
+        2, description="samples per pixel along each axis"
     )
     background_rgb: tuple[Channel, Channel, Channel] = Field(
-        (0, 0, 0), description="colour where nothing is: red, green, blue, each 0 to 255"
+        (0, 0, 0), description="where nothing is hit"
     )
-    effects: EffectsConfig | None = Field(None, description="what is added to ideal frames")
+    effects: EffectsConfig | None = Field(
+        None, description="what is added to ideal frames (docs/variation.md)"
+    )
 
     @model_serializer(mode="wrap")
     def _without_absent(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -155,5 +155,6 @@ class RenderSpeedConfig(Strict):
 
     poses: Count = Field(6, description="views of each scene; half as many at the larger sizes")
     sizes: Annotated[int, Field(ge=1, le=3)] = Field(
-        3, description="of network_camera, groundtruth_camera and 640 x 480, the smallest first"
+        3,
+        description="how many of network_camera, groundtruth_camera and 640 × 480, smallest first",
     )

@@ -16,21 +16,19 @@ class RobustnessConfig(Strict):
     Exposures end where the next frame begins: one setting serves profiles of any frame spacing.
     """
 
-    scene: Slug = Field("large_room", description="scene of the data set")
-    size: SizeName = Field("6k", description="its size")
+    scene: Slug = Field("large_room", description="of the data set")
+    size: SizeName = Field("6k", description="of the data set")
     effects: dict[Slug, EffectsConfig] = Field(
         default_factory=dict,
-        description="what the test frames are rendered with, by the name of the table's row; empty:"
-        " no table",
+        description="rows of the table: effects on the test frames",
     )
     mixed: EffectsConfig = Field(
         default_factory=EffectsConfig,
-        description="what the frames of a second training set are rendered with",
+        description="effects on the second training set",
     )
     structure_frames: Count = Field(
         250,
-        description="test frames, spread evenly, that structure-based poses are tested on: they are"
-        " drawn anew, as large as features need",
+        description="test frames for structure-based poses, spread evenly",
     )
 
     @field_validator("effects")
