@@ -70,6 +70,11 @@ class Experiment(Strict):
         return self
 
     @property
+    def estimated(self) -> bool:
+        """Whether a method re-estimated the labels."""
+        return self.labels not in ("synfeal", *INJECTED)
+
+    @property
     def label_id(self) -> str:
         """Directory name of the label set, e.g. ``sfm`` or ``noise-p0.1-r5``."""
         if self.labels not in INJECTED:
@@ -162,7 +167,7 @@ def _refuse_repeats(experiments: Sequence[Experiment], places: Sequence[str]) ->
 def _refuse_depth_methods(experiments: Sequence[Experiment], places: Sequence[str]) -> None:
     """Refuse labels that are estimated from depth; of the estimators only SfM knows distortion."""
     for experiment, where in zip(experiments, places, strict=True):
-        if experiment.labels not in ("synfeal", "sfm", *INJECTED):
+        if experiment.estimated and experiment.labels != "sfm":
             raise InputError(
                 f"{where}: labels '{experiment.labels}' need pinhole images; leave"
                 " groundtruth_camera.distortion at zero (a calibration sets it) or drop the row"
@@ -199,6 +204,14 @@ class Design(Strict):
 
     rows: tuple[Experiment, ...] = Field(description="in the order of the file")
     repetitions: Repetitions = Field(description="`training.repetitions`")
+    more_scenes: tuple[str, ...] = Field((), description="`groundtruth.more_scenes`")
+
+    @property
+    def estimated(self) -> list[tuple[str, str, str]]:
+        """Scene, size and labels of every label set that a method re-estimates."""
+        own = [(row.scene, row.size, row.labels) for row in self.rows if row.estimated]
+        more = [(scene, size, labels) for scene in self.more_scenes for _, size, labels in own]
+        return list(dict.fromkeys([*own, *more]))
 
     @property
     def tables(self) -> list[str]:
@@ -247,7 +260,16 @@ def read_design(config: Config) -> Design:
     Raises:
         InputError: naming file, row and column of the first problem.
     """
-    return Design(rows=read_experiments(config), repetitions=config.training.repetitions)
+    rows, more_scenes = read_experiments(config), config.groundtruth.more_scenes
+    design = Design(rows=rows, repetitions=config.training.repetitions, more_scenes=more_scenes)
+    known = {(row.scene, row.size) for row in rows}
+    for scene, size, _ in design.estimated:
+        if (scene, size) not in known:
+            raise InputError(
+                f"groundtruth.more_scenes: '{scene}': {config.experiments} has no row of size"
+                f" '{size}' in that scene"
+            )
+    return design
 
 
 def _compared(row: Experiment) -> list[Experiment]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from pydantic import BaseModel, TypeAdapter
 
 from baselines.groundtruth.chain import BatchRecord
 from baselines.groundtruth.methods import METHODS
-from synfeal.config import Experiment
+from synfeal.config import Design
 from synfeal.frames import COUNT, MAYBE, MAYBE_COUNT, TEXT, frame_of, write_frame
 from synfeal.report.layouts import SOURCES, scene_title
 from synfeal.report.results import check_result, read_result
@@ -23,8 +22,8 @@ PUBLISHED_ASSISTED = {
     for name, method in METHODS.items()
     if method.published_assisted is not None
 }
-# 8,500 images in batches of 250; section 4.1 counts 64.
-PUBLISHED_BATCHES = 34
+# 8,500 images of one room in batches of 250; section 4.1 counts 64.
+PUBLISHED_SCENE, PUBLISHED_BATCHES = "large_room", 34
 SPLITS = ("train", "test")
 TOTAL = "total"
 COUNTS = ("batches", "assisted", "lost", "frames", "registered", "filled")
@@ -55,17 +54,15 @@ class _Splits(BaseModel):
 _SHAPE = TypeAdapter(_Splits)
 
 
-def write_assistance_table(
-    rows: Sequence[Experiment], root: Path, out_csv: Path, out_tex: Path
-) -> None:
+def write_assistance_table(design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
     """Write one row per re-estimated label set and split, and one of both splits together.
 
     Counts of batches and frames, and how far off the last poses of batches were; in LaTeX the rows
-    of both splits together. Of the design, ``rows`` with other labels are passed over.
+    of both splits together.
     """
     records = [
-        assistance_record(root, *names, split)
-        for names in estimated_sets(rows)
+        assistance_record(root, *label_set, split)
+        for label_set in design.estimated
         for split in (*SPLITS, TOTAL)
     ]
     table = frame_of(records, SCHEMA)
@@ -73,17 +70,12 @@ def write_assistance_table(
     write_latex(out_tex, assistance_sheet(table[table.split == TOTAL]))
 
 
-def estimated_sets(rows: Sequence[Experiment]) -> list[tuple[str, str, str]]:
-    """Method, scene and size of every label set of a design that a method re-estimated."""
-    return list(dict.fromkeys((r.labels, r.scene, r.size) for r in rows if r.labels in METHODS))
-
-
 def assistance_record(
-    root: Path, method: str, scene: str, size: str, split: str = TOTAL
+    root: Path, scene: str, size: str, method: str, split: str = TOTAL
 ) -> dict[str, Any]:
     """One row of the table, by column; both splits together unless one is named."""
     splits = SPLITS if split == TOTAL else (split,)
-    found = [r for name in splits for r in batch_records(root, method, scene, size, name)]
+    found = [r for name in splits for r in batch_records(root, scene, size, method, name)]
     batches = pd.DataFrame(found, columns=[*BatchRecord.__annotations__])
     # A batch shares its first frame with the one before; the first of a split shares none.
     frames = int((batches.stop - batches.start - (batches.start > 0)).sum())
@@ -96,13 +88,13 @@ def assistance_record(
             errors = batches[f"error_{when}_{unit}"].astype(float)
             record[f"last_{unit}_{when}_median"] = errors.median()
             record[f"last_{unit}_{when}_max"] = errors.max()
-    if split == TOTAL and method in PUBLISHED_ASSISTED:
+    if split == TOTAL and method in PUBLISHED_ASSISTED and scene == PUBLISHED_SCENE:
         record["published_assisted"] = PUBLISHED_ASSISTED[method]
         record["published_batches"] = PUBLISHED_BATCHES
     return record
 
 
-def batch_records(root: Path, method: str, scene: str, size: str, split: str) -> Records:
+def batch_records(root: Path, scene: str, size: str, method: str, split: str) -> Records:
     """What happened to each batch of a split, in order."""
     path = root / "labels" / scene / size / method / "assistance.json"
     remedy = "chain these labels again"

@@ -20,12 +20,12 @@ from baselines.groundtruth.label_error import (
     spread,
 )
 from baselines.groundtruth.methods import METHODS, stages_of
-from synfeal.config import Experiment
+from synfeal.config import Design
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.errors import InputError, why
 from synfeal.files import read_json
 from synfeal.frames import COUNT, MAYBE, NUMBER, TEXT, frame_of, write_frame
-from synfeal.report.assistance import SPLITS, TOTAL, batch_records, estimated_sets
+from synfeal.report.assistance import SPLITS, TOTAL, batch_records
 from synfeal.report.layouts import SOURCES, scene_title
 from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
 
@@ -55,19 +55,17 @@ SCHEMA = {
 }
 
 
-def write_label_error_table(
-    rows: Sequence[Experiment], root: Path, out_csv: Path, out_tex: Path
-) -> None:
+def write_label_error_table(design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
     """Write two rows, before and after assistance, per re-estimated label set and split.
 
     Errors of the labels against the true poses, and what a frame took; in LaTeX the rows of both
-    splits together. Of the design, ``rows`` with other labels are passed over.
+    splits together.
     """
     records = [
         record
-        for names in estimated_sets(rows)
+        for label_set in design.estimated
         for split in (*SPLITS, TOTAL)
-        for record in label_records(root, *names, split)
+        for record in label_records(root, *label_set, split)
     ]
     table = frame_of(records, SCHEMA)
     write_frame(out_csv, table)
@@ -75,14 +73,14 @@ def write_label_error_table(
 
 
 def label_records(
-    root: Path, method: str, scene: str, size: str, split: str
+    root: Path, scene: str, size: str, method: str, split: str
 ) -> list[dict[str, Any]]:
     """Both rows of a label set and a split, or of both splits together."""
     splits = SPLITS if split == TOTAL else (split,)
     filled = sum(
         int(batch["filled"])
         for s in splits
-        for batch in batch_records(root, method, scene, size, s)
+        for batch in batch_records(root, scene, size, method, s)
     )
     folder, records = root / "labels" / scene / size, []
     for state, stem in STATES.items():
@@ -97,7 +95,7 @@ def label_records(
         record: dict[str, Any] = {"scene": scene, "size": size, "method": method}
         record |= {"split": split, "assistance": state, "frames": frames}
         record |= error_record(pairs) | {"share_filled": filled / frames}
-        records.append(record | cost_record(root, method, scene, size, splits, frames))
+        records.append(record | cost_record(root, scene, size, method, splits, frames))
     return records
 
 
@@ -120,14 +118,14 @@ def error_record(pairs: Sequence[Pair]) -> dict[str, Any]:
 
 
 def cost_record(
-    root: Path, method: str, scene: str, size: str, splits: Sequence[str], frames: int
+    root: Path, scene: str, size: str, method: str, splits: Sequence[str], frames: int
 ) -> dict[str, Any]:
     """Processor seconds per frame and the largest memory, over all stages and batches."""
     seconds, peaks = 0.0, [0.0]
     for stage in stages_of(method):
         for split in splits:
             folder = root / "groundtruth" / scene / size / stage / split
-            for batch, _ in enumerate(batch_records(root, method, scene, size, split)):
+            for batch, _ in enumerate(batch_records(root, scene, size, method, split)):
                 facts = _read_facts(folder / f"batch-{batch:03d}.json")
                 unused = METHODS[method].unused
                 seconds += sum(v for k, v in facts.items() if k.endswith("_s") and k not in unused)

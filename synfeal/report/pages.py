@@ -106,7 +106,7 @@ def labels_table(root: Path) -> str:
 def assistance(root: Path) -> str:
     """Batches that needed assistance, and how good the labels are."""
     errors = _table(root, "label_error", LABEL_ERROR)
-    errors = errors[errors.assistance == "after"].set_index(["method", "split"])
+    errors = errors[errors.assistance == "after"].set_index(["scene", "method", "split"])
     median = errors.apply(
         lambda e: f"{100 * e.position_m_median:.1f} cm, {e.orientation_deg_median:.2f}°", axis=1
     )
@@ -121,11 +121,15 @@ def assistance(root: Path) -> str:
     return markdown_table(
         pd.DataFrame(
             {
+                "scene": counts.scene.map(scene_title),
                 "labels from": counts.method.map(SOURCES),
                 "batches": counts.batches,
                 "assisted": counts.assisted.astype(str) + published,
                 **{
-                    f"median error, {title}": [median[method, split] for method in counts.method]
+                    f"median error, {title}": [
+                        median[scene, method, split]
+                        for scene, method in zip(counts.scene, counts.method, strict=True)
+                    ]
                     for split, title in {"train": "training", "test": "test"}.items()
                 },
             }

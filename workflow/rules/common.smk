@@ -101,9 +101,7 @@ def n_frames(scene, camera, split):
     """Frames of a split that have to be rendered with a camera: no more than a consumer asks for."""
     if camera == "network":
         return CONFIG.n_largest(scene, split)
-    sizes = {
-        e.size for e in EXPERIMENTS if e.scene == scene and e.labels in RECONSTRUCTED
-    }
+    sizes = {size for s, size, _ in DESIGN.estimated if s == scene}
     return max((CONFIG.n_frames(scene, size, split) for size in sizes), default=0)
 
 
@@ -239,7 +237,7 @@ def true_labels():
 
 def pose_labels():
     """The true poses of every data set, and those that ground-truth methods estimated."""
-    return label_files({(s, z, "synfeal") for s, z in SIZES} | {*estimated_sets()})
+    return label_files({(s, z, "synfeal") for s, z in SIZES} | {*DESIGN.estimated})
 
 
 def errors_of(runs, file="errors.csv"):
@@ -289,10 +287,9 @@ def passing_files():
 
 def manifests(camera):
     """Data sets of image files; those of the network camera are made on demand only."""
-    scenes = {
-        e.scene for e in EXPERIMENTS if camera == "network" or e.labels in RECONSTRUCTED
-    }
-    return [f"{ROOT}/datasets/{s}/{camera}/manifest.json" for s in sorted(scenes)]
+    labelled = sorted({scene for scene, _, _ in DESIGN.estimated})
+    scenes = SCENES if camera == "network" else labelled
+    return [f"{ROOT}/datasets/{s}/{camera}/manifest.json" for s in scenes]
 
 
 def asked_datasets():
@@ -300,12 +297,6 @@ def asked_datasets():
     if CONFIG.datasets is None:
         return manifests("network") + manifests("groundtruth")
     return [f"{ROOT}/datasets/{s}/network/manifest.json" for s in CONFIG.datasets]
-
-
-def estimated_sets():
-    """Scene, size and method of every label set that is re-estimated, each once."""
-    sets = {(e.scene, e.size, e.labels) for e in EXPERIMENTS}
-    return sorted(s for s in sets if s[2] in RECONSTRUCTED)
 
 
 def common_test_set(scene):
@@ -496,12 +487,12 @@ def coverages():
 
 def assistance_files():
     return [
-        f"{ROOT}/labels/{s}/{z}/{l}/assistance.json" for s, z, l in estimated_sets()
+        f"{ROOT}/labels/{s}/{z}/{l}/assistance.json" for s, z, l in DESIGN.estimated
     ]
 
 
 def unassisted_labels():
-    return label_files(estimated_sets(), "-unassisted")
+    return label_files(DESIGN.estimated, "-unassisted")
 
 
 def batch_facts():
@@ -509,7 +500,7 @@ def batch_facts():
     return sorted(
         {
             f"{ROOT}/groundtruth/{scene}/{size}/{stage}/{split}/batch-{b.index:03d}.json"
-            for scene, size, method in estimated_sets()
+            for scene, size, method in DESIGN.estimated
             for stage in stages_of(method)
             for split in SPLITS
             for b in batches_of(
@@ -526,7 +517,7 @@ def run_plan(workflow):
     def plan():
         from synfeal.report.progress.plan import plan_run
 
-        return plan_run(CONFIG, EXPERIMENTS, map(str, jobs), workflow.cores or 1)
+        return plan_run(CONFIG, DESIGN, map(str, jobs), workflow.cores or 1)
 
     return plan
 

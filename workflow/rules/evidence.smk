@@ -72,7 +72,7 @@ use rule call as assistance with:
         f"{ROOT}/benchmarks/tables/assistance.tsv"
     params:
         function="synfeal.report.assistance:write_assistance_table",
-        rows=[dump(e) for e in EXPERIMENTS if e.labels in RECONSTRUCTED],
+        design=dump(DESIGN),
 
 
 use rule call as label_error with:
@@ -90,7 +90,7 @@ use rule call as label_error with:
         f"{ROOT}/benchmarks/tables/label_error.tsv"
     params:
         function="synfeal.report.label_error:write_label_error_table",
-        rows=[dump(e) for e in EXPERIMENTS if e.labels in RECONSTRUCTED],
+        design=dump(DESIGN),
 
 
 use rule call as speed_vs_error with:

@@ -72,6 +72,7 @@ class Evidence:
     Attributes:
         root: results directory of the profile.
         runs: by cell of the profile, its runs.
+        estimated: scene, size and labels of its re-estimated label sets.
         end: ``""`` for errors against the labels, ``"_true"`` against the true poses.
         common: whether errors are those on the common test set; they are against the true poses.
         used: files read so far, relative to ``root``.
@@ -80,6 +81,7 @@ class Evidence:
 
     root: Path
     runs: Mapping[Cell, Sequence[Run]]
+    estimated: Sequence[tuple[str, str, str]] = ()
     end: str = ""
     common: bool = False
     used: dict[str, None] = field(default_factory=dict)
@@ -208,7 +210,7 @@ def evidence_of(design: Design, root: Path) -> Evidence:
     for run in design.runs:
         cell = Cell(run.model, run.scene, run.size, run.labels, run.init)
         runs.setdefault(cell, []).append(run)
-    return Evidence(root, runs)
+    return Evidence(root, runs, design.estimated)
 
 
 def _name(cell: Cell) -> str:

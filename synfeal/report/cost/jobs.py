@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from baselines.groundtruth.batches import batches_of
-from baselines.groundtruth.methods import METHODS, frame_methods, graph_methods
-from synfeal.config import Config, Design, Experiment
+from baselines.groundtruth.methods import frame_methods, graph_methods
+from synfeal.config import Config, Design
 from synfeal.config.experiments import SHARES, split_init
 from synfeal.dataset.sevenscenes import sequences_of
 from synfeal.report.cost.networks import Work, pretext_work, training_work
@@ -42,7 +42,7 @@ class Profile(NamedTuple):
     """A configuration and its design."""
 
     config: Config
-    experiments: tuple[Experiment, ...]
+    design: Design
 
 
 class Stage(NamedTuple):
@@ -165,10 +165,8 @@ def _frames(profile: Profile, part: Part, kind: Stage) -> int:
     config, scene = profile.config, part["scene"]
     sizes = [part["size"]] if "size" in part else list(config.scenes[scene].sizes)
     if part.get("camera") == "groundtruth":
-        estimated = {
-            e.size for e in profile.experiments if (e.scene, e.labels in METHODS) == (scene, True)
-        }
-        sizes = [size for size in sizes if size in estimated]
+        estimated = profile.design.estimated
+        sizes = [size for size in sizes if any((scene, size) == s[:2] for s in estimated)]
 
     def count(split: str) -> int:
         if scene in config.rooms:
@@ -263,9 +261,8 @@ def _train_varied(profile: Profile, part: Part, kind: Stage) -> dict[str, float]
 
 
 def _claims(profile: Profile, _: Part, __: Stage) -> dict[str, float]:
-    config = profile.config
-    runs = Design(rows=profile.experiments, repetitions=config.training.repetitions).runs
-    return {"size": sum(config.n_frames(run.scene, run.size, "test") for run in runs)}
+    frames = [profile.config.n_frames(r.scene, r.size, "test") for r in profile.design.runs]
+    return {"size": sum(frames)}
 
 
 OWN_SIZES: dict[str, Callable[[Profile, Part, Stage], dict[str, float]]] = {

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from baselines.groundtruth.methods import check_sources
-from synfeal.config import load_config, read_experiments
+from synfeal.config import load_config, read_design
 from synfeal.config.load import read_yaml
 from synfeal.errors import InputError
 from synfeal.report.cost.jobs import Profile, jobs_of
@@ -29,9 +29,9 @@ def read_profile(name: str) -> Profile:
     path = profile_path(name)
     paths = [path] if is_default(path) else [DEFAULT, path]
     config = load_config(*paths)
-    experiments = read_experiments(config)
-    check_sources(experiments, config.experiments)
-    return Profile(config, experiments)
+    design = read_design(config)
+    check_sources(design.rows, config.experiments)
+    return Profile(config, design)
 
 
 def is_default(path: Path) -> bool:

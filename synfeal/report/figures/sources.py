@@ -16,7 +16,7 @@ from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.frames import MAYBE, read_frame
 from synfeal.geometry.poses import pose_error
 from synfeal.report import speed_vs_error
-from synfeal.report.assistance import batch_records, estimated_sets
+from synfeal.report.assistance import batch_records
 from synfeal.report.cells import schema_of
 
 Array = NDArray[np.float64]
@@ -109,11 +109,11 @@ class LabelledSet:
 
 def read_labelled_set(results: Results) -> LabelledSet | None:
     """The first data set of the design that ground-truth methods label; none if there is none."""
-    sets = estimated_sets(results.rows)
+    sets = results.design.estimated
     if not sets:
         return None
-    _, scene, size = sets[0]
-    methods = [method for method, *data_set in sets if data_set == [scene, size]]
+    scene, size, _ = sets[0]
+    methods = [method for *data_set, method in sets if data_set == [scene, size]]
     return LabelledSet(scene, size, {m: _read(results, scene, size, m) for m in methods})
 
 
@@ -122,7 +122,7 @@ def _read(results: Results, scene: str, size: str, method: str) -> dict[str, Lab
         split: LabelledSplit(
             results.labels(scene, size, method, split),
             results.labels(scene, size, "synfeal", split),
-            batch_records(results.root, method, scene, size, split),
+            batch_records(results.root, scene, size, method, split),
         )
         for split in SPLITS
     }

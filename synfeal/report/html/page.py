@@ -88,7 +88,7 @@ def write_report(design: Design, root: Path, out_html: Path) -> None:
             for name, path in figures.items()
         ],
         rooms=[
-            room_html(scene, root, design.rows)
+            room_html(scene, root, design)
             for scene in dict.fromkeys(row.scene for row in design.rows)
         ],
         origin=origin_html(origin) if origin else "",

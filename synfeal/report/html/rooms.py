@@ -10,8 +10,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from baselines.groundtruth.methods import METHODS
-from synfeal.config import Experiment
+from synfeal.config import Design
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.inspect.surface import SurfacePoints
 from synfeal.inspect.viewer_mesh import ViewerMesh, viewer_mesh
@@ -43,23 +42,21 @@ class Trajectory:
     is_shown: bool
 
 
-def room_html(scene: str, root: Path, rows: Sequence[Experiment]) -> Markup:
+def room_html(scene: str, root: Path, design: Design) -> Markup:
     """The view of one scene, ready for ``report.js``; the design says what label sets there are."""
     mesh = load_mesh(root / "scenes" / scene / "mesh.glb")
     small = viewer_mesh(mesh, SurfacePoints.of(mesh, generator_of(0, "report", scene)))
-    return _html(scene, small, trajectories(scene, root, rows))
+    return _html(scene, small, trajectories(scene, root, design))
 
 
-def trajectories(scene: str, root: Path, rows: Sequence[Experiment]) -> list[Trajectory]:
+def trajectories(scene: str, root: Path, design: Design) -> list[Trajectory]:
     """The planned cameras of both splits, then every estimated label set of the scene."""
     found = [
         Trajectory(title, rgb, paths_of(read_pose_table(path)), True)
         for split, (title, rgb) in SPLITS.items()
         if (path := root / "plans" / scene / f"{split}.csv").exists()
     ]
-    sets = dict.fromkeys(
-        (row.size, row.labels) for row in rows if row.scene == scene and row.labels in METHODS
-    )
+    sets = [(size, labels) for where, size, labels in design.estimated if where == scene]
     for (size, labels), rgb in zip(sets, LABEL_RGB * len(sets), strict=False):
         folder = root / "labels" / scene / size / labels
         tables = [read_pose_table(folder / f"{split}.csv") for split in SPLITS]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-from synfeal.config import Config, Design, Experiment, Run
+from synfeal.config import Config, Design, Run
 from synfeal.errors import InputError
 from synfeal.report.cost.dry_run import key_of
 from synfeal.report.cost.jobs import Profile, jobs_of
@@ -35,15 +35,12 @@ class RunPlan:
     cores: int
 
 
-def plan_run(
-    config: Config, experiments: tuple[Experiment, ...], benchmarks: Iterable[str], cores: int
-) -> RunPlan:
+def plan_run(config: Config, design: Design, benchmarks: Iterable[str], cores: int) -> RunPlan:
     """The plan of a run on ``cores`` whose jobs write ``<root>/benchmarks/<stage>/<name>.tsv``."""
     paths = list(benchmarks)
-    known = _expected_s(Profile(config, experiments), paths)
+    known = _expected_s(Profile(config, design), paths)
     usual = median(known.values()) if known else 1.0
     expected_s = {job: known.get(job, usual) for job in map(job_name, paths)}
-    design = Design(rows=experiments, repetitions=config.training.repetitions)
     return RunPlan(config.root, expected_s, tuple(design.runs), cores)
 
 
