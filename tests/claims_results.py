@@ -30,6 +30,7 @@ class Results:
     design: tuple = field(default_factory=shipped_design)
     n_paths: int = N_PATHS
     spread: tuple = (2.0, 80.0)
+    more_scenes: tuple = ()
 
     def __post_init__(self):
         self.table = far_apart(self.n_paths, *self.spread)
@@ -53,9 +54,8 @@ class Results:
 
     def rows(self):
         """``claims.csv`` by claim."""
-        return {
-            row["id"]: row for row in claim_rows(evidence_of(design_of(self.design), self.root))
-        }
+        design = design_of(self.design, more_scenes=self.more_scenes)
+        return {row["id"]: row for row in claim_rows(evidence_of(design, self.root))}
 
 
 def far_apart(n_paths, metres, degrees):

@@ -402,7 +402,7 @@ KINDS = (
     Kind("metrics", "metrics.json", write_metrics, lambda p: combine([read_metrics(p)]),
          form="json"),
     Kind("assistance", "labels/large_room/6k/sfm/assistance.json", write_assistance,
-         lambda p: assistance_record(p.parents[4], "sfm", "large_room", "6k"), finite_numbers,
+         lambda p: assistance_record(p.parents[4], "large_room", "6k", "sfm"), finite_numbers,
          "json"),
     Kind("profile", "mine.yaml", copied("config.yaml"), load_config,
          lambda config: isinstance(config, Config), n_flips=60),

@@ -73,8 +73,9 @@ def references():
     return baseline | {"floor_position_m": 0.25, "floor_orientation_deg": 15.0}
 
 
-def design_of(rows, repetitions=1):
-    return Design(rows=tuple(rows), repetitions={"default": repetitions})
+def design_of(rows, repetitions=1, more_scenes=()):
+    repeated = {"default": repetitions}
+    return Design(rows=tuple(rows), repetitions=repeated, more_scenes=more_scenes)
 
 
 def write_run(root, row, model, values, repetition=0):
@@ -117,7 +118,7 @@ def batch_record(index, assisted=False, **values):
 METHODS_RUN = ("sfm", "rgbd-toro", "rgbd-g2o", "kinect-fusion")
 
 
-def fill_assistance(root, assisted=None, size="6k", batches=(12, 5)):
+def fill_assistance(root, assisted=None, size="6k", batches=(12, 5), scene="large_room"):
     """Records of the paper's methods; by method, how many batches were assisted, from the first.
 
     The first batch of the training split registered six frames fewer, which were filled.
@@ -128,7 +129,7 @@ def fill_assistance(root, assisted=None, size="6k", batches=(12, 5)):
         records = {s: [batch_record(k, f) for k, f in enumerate(fs)] for s, fs in splits.items()}
         records["train"][0] |= {"registered": 20, "filled": 6}
         value = {"method": method, "splits": {s: {"records": r} for s, r in records.items()}}
-        write_json(root / "labels" / "large_room" / size / method / "assistance.json", value)
+        write_json(root / "labels" / scene / size / method / "assistance.json", value)
 
 
 def shipped_design():

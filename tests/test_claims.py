@@ -262,6 +262,21 @@ def test_kinectfusion_copes_when_most_batches_need_no_assistance(results, assist
     assert row["measured_labels"] == f"{assisted} of 17 batches assisted"
 
 
+def test_batches_of_further_scenes_count_as_well(results):
+    results.more_scenes = ("sanctuary",)
+    fill_assistance(results.root, {"sfm": 4, "kinect-fusion": 8}, batches=(17, 0))
+    others = {"sfm": 1, "rgbd-toro": 0, "rgbd-g2o": 0, "kinect-fusion": 1}
+    fill_assistance(results.root, others, batches=(17, 0), scene="sanctuary")
+    rows = results.rows()
+    # Clopper-Pearson of 5 in 34 at 90 %, of 9 in 34 at 95 %.
+    assert "SfM 5 of 34 (Large Room 4 of 17, Sanctuary 1 of 17)" in rows["C4"]["measured_labels"]
+    assert "SfM 6 to 28 %" in rows["C4"]["interval_labels"]
+    assert verdicts(rows["C15"]) == (OPPOSITE, OPPOSITE)
+    assert rows["C15"]["interval_labels"] == "13 to 44 %"
+    paths = [f"labels/{s}/6k/kinect-fusion/assistance.json" for s in ("large_room", "sanctuary")]
+    assert set(paths) <= set(rows["C15"]["evidence"].split(";"))
+
+
 def test_kinectfusion_is_not_judged_by_frames_that_no_tracker_follows(results, monkeypatch):
     monkeypatch.setattr(label_claims, "FARTHEST_M", 0.04)
     fill_assistance(results.root, {"kinect-fusion": 17}, batches=(17, 0))

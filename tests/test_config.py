@@ -123,6 +123,18 @@ def test_repetitions_of_an_unknown_table_are_refused(tmp_path):
     assert max(run.repetition for run in design.runs) == 2
 
 
+def test_further_scenes_are_labelled_as_the_rows_are():
+    config = load_config(CONFIG / "config.yaml", CONFIG / "night.yaml")
+    design = read_design(config)
+    own = [row for row in design.rows if row.table == "table2_ground_truth" and row.estimated]
+    methods = [row.labels for row in own]
+    rooms = ("large_room", "sanctuary")
+    assert design.estimated == [(room, "6k", method) for room in rooms for method in methods]
+    groundtruth = config.groundtruth.model_copy(update={"more_scenes": ("attic",)})
+    with pytest.raises(InputError, match=r"more_scenes: 'attic': .* no row of size '6k'"):
+        read_design(config.model_copy(update={"groundtruth": groundtruth}))
+
+
 @pytest.mark.parametrize("name", ["mini", "paper"])
 def test_the_design_is_the_papers(name):
     config = profile(name)

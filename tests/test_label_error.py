@@ -19,7 +19,7 @@ from synfeal.geometry.poses import pose_matrix
 from synfeal.report.label_error import SCHEMA, label_records, write_label_error_table
 from synfeal.report.speed_vs_error import speeds_of
 from tests.property_support import table_of
-from tests.report_results import experiment
+from tests.report_results import design_of, experiment
 
 STEP_M, BATCH = 0.1, 10
 CFG = GroundTruthConfig(batch_frames=BATCH)
@@ -168,7 +168,7 @@ def results(tmp_path):
 
 def test_the_table_holds_what_was_put_into_the_labels(results):
     root, rows = results
-    write_label_error_table(rows, root, root / "tables/label_error.csv", root / "t.tex")
+    write_label_error_table(design_of(rows), root, root / "tables/label_error.csv", root / "t.tex")
     table = [row for _, row in read_records(root / "tables/label_error.csv", SCHEMA)]
     keys = [(row["method"], row["split"], row["assistance"]) for row in table]
     states = [(s, a) for s in ("train", "test", "total") for a in ("before", "after")]
@@ -189,9 +189,9 @@ def test_the_table_holds_what_was_put_into_the_labels(results):
 
 def test_a_frame_costs_what_its_stages_took_without_what_the_method_does_not_need(results):
     root, _ = results
-    by_method = {m: label_records(root, m, "large_room", "6k", "total")[0] for m in ("sfm",)}
+    by_method = {m: label_records(root, "large_room", "6k", m, "total")[0] for m in ("sfm",)}
     assert by_method["sfm"]["seconds_per_frame"] == pytest.approx(3 * 7.0 / 27)
-    alone = label_records(root, "rgbd-odometry", "large_room", "6k", "train")[0]
+    alone = label_records(root, "large_room", "6k", "rgbd-odometry", "train")[0]
     # Two batches, the times of odometry and of the method itself, no loop closures.
     assert alone["seconds_per_frame"] == pytest.approx(2 * 2 * 2.0 / 21)
     assert alone["peak_memory_mb"] == 7.0
@@ -199,7 +199,7 @@ def test_a_frame_costs_what_its_stages_took_without_what_the_method_does_not_nee
 
 def test_speed_vs_error_has_a_row_per_method(results):
     root, rows = results
-    write_label_error_table(rows, root, root / "tables/label_error.csv", root / "t.tex")
+    write_label_error_table(design_of(rows), root, root / "tables/label_error.csv", root / "t.tex")
     found = speeds_of("labels", ["large_room", "sanctuary"], root)
     assert found.variant.tolist() == ["SfM", "RGB-D odometry alone"]
     assert found.items_per_s[0] == pytest.approx(27 / 21, rel=1e-5)
@@ -214,7 +214,7 @@ def test_facts_that_cannot_be_read_are_named(results, content):
     if content is not None:
         path.write_text(content)
     with pytest.raises(InputError, match=r"batch-000\.json: cannot be read") as refusal:
-        write_label_error_table(rows, root, root / "t.csv", root / "t.tex")
+        write_label_error_table(design_of(rows), root, root / "t.csv", root / "t.tex")
     assert "\n" not in str(refusal.value)
     assert not (root / "t.csv").exists()
 

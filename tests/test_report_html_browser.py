@@ -159,7 +159,7 @@ def test_paths_are_cut_where_their_number_changes():
 
 
 def test_trajectories_are_those_of_the_files(page):
-    found = trajectories("large_room", page.parent, large_room_design())
+    found = trajectories("large_room", page.parent, design_of(large_room_design()))
     assert [t.title for t in found] == [
         *(title for title, _ in SPLITS.values()),
         *("SfM labels, 6k", "RGB-D SLAM w/ TORO labels, 6k", "RGB-D SLAM w/ g2o labels, 6k"),

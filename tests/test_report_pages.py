@@ -107,7 +107,9 @@ def test_the_checks_presume_no_outcome(tmp_path):
 
 
 def test_assistance_counts_each_split_and_both_beside_the_papers_counts(results, tmp_path):
-    write_assistance_table(shipped_design(), results, tmp_path / "a.csv", tmp_path / "a.tex")
+    write_assistance_table(
+        design_of(shipped_design()), results, tmp_path / "a.csv", tmp_path / "a.tex"
+    )
     rows = read(tmp_path / "a.csv")
     assert [(r["method"], r["split"]) for r in rows[:3]] == [
         ("sfm", "train"),

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from synfeal.config import MODELS, Run, load_config, read_experiments
+from synfeal.config import MODELS, Run, load_config, read_design
 from synfeal.files import write_json
 from synfeal.report.progress.plan import RunPlan, TimeLeft, job_name, plan_run
 from synfeal.report.progress.view import FirstScores, RunView
@@ -57,9 +57,9 @@ def test_the_time_left_finds_the_speed_of_the_machine(factor):
 def test_every_job_of_a_profile_has_an_expected_time(monkeypatch):
     monkeypatch.chdir(REPOSITORY)
     config = load_config(REPOSITORY / "config/config.yaml", REPOSITORY / "config/smoke.yaml")
-    experiments = read_experiments(config)
+    design = read_design(config)
     keys = ["/".join(filter(None, key)) for key in planned("smoke")[1].keys]
-    plan = plan_run(config, experiments, [f"results/smoke/benchmarks/{k}.tsv" for k in keys], 2)
+    plan = plan_run(config, design, [f"results/smoke/benchmarks/{k}.tsv" for k in keys], 2)
     assert set(plan.expected_s) == set(keys)
     assert len(set(plan.expected_s.values())) > 10  # laws, not one number for all
     assert plan.expected_s["train/large_room/6k/synfeal/pretrained/posenet/seed0"] > 2
