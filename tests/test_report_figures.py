@@ -201,7 +201,7 @@ def test_speed_vs_error_joins_the_front_and_rings_the_choice():
     measured = ((1e6, 0.0, 0), (1.5e6, 0.004, 0), (1.2e6, 0.005, 1), (3e6, 0.2, 0))
     rows = pd.DataFrame(measured, columns=["items_per_s", "error", "chosen"])
     rows = rows.assign(scene="large_room", faces=[1000, 990, 980, 970])
-    (axes,) = speed_vs_error.figure_of(rows, speed_vs_error.STAGES["collision"]).axes
+    (axes,) = speed_vs_error.collision_figure(rows).axes
     open_marks, front, ring = axes.lines
     np.testing.assert_allclose(open_marks.get_xydata(), [[1.2, 0.5]])
     np.testing.assert_allclose(front.get_xydata(), [[1.0, 0.0], [1.5, 0.4], [3.0, 20.0]])

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from synfeal.config import MODELS, Experiment
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import cumulative, joint_error
 from synfeal.report.figures.sources import Array, Results, counted
-from synfeal.report.figures.style import MODEL_STYLES
+from synfeal.report.figures.style import MODEL_STYLES, add_legend, set_log
 from synfeal.report.layouts import TITLES, scene_title
 from synfeal.report.run_errors import read_errors
 
@@ -79,8 +78,7 @@ def figure_of(scenes: list[SceneErrors]) -> Figure:
             axes.set_xlabel(label)
     for axes in panels[:, 0]:
         axes.set_ylabel("test frames with at most this error (%)")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2 if len(scenes) == 1 else 5)
+    add_legend(figure, panels[0, 0], 2 if len(scenes) == 1 else 5)
     return figure
 
 
@@ -99,13 +97,9 @@ def draw_curves(axes: Axes, errors: Mapping[str, Array]) -> None:
             markevery=marked,
             **MODEL_STYLES[model],
         )
-    axes.set_xscale("log")
+    set_log(axes, "x")
     axes.set_ylim(0, 100)
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.grid(axis="x", color="0.93")
-    axes.set_axisbelow(True)
 
 
 def _largest(results: Results, rows: list[Experiment]) -> Experiment:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import pandas as pd
 from matplotlib.figure import Figure, SubFigure
@@ -10,13 +10,9 @@ from numpy.typing import NDArray
 
 from baselines.groundtruth.methods import SIMULATOR
 from synfeal.config.experiments import split_init
-from synfeal.report.figures.localizer_lines import (
-    add_legend,
-    draw_localizers,
-    draw_references,
-    start_at_zero,
-)
+from synfeal.report.figures.localizer_lines import PAPER, draw_localizers, draw_references
 from synfeal.report.figures.sources import Results, counted
+from synfeal.report.figures.style import add_legend
 from synfeal.report.layouts import STARTS, scene_title
 from synfeal.report.references import NAME, read_references
 
@@ -27,6 +23,7 @@ BLOCKS = {
     "both": "noise in both",
 }
 LEVEL = ["noise_m", "noise_deg"]
+DATA_SET = ["scene", "size"]
 UNITS = {"position_m": "position error (m)", "orientation_deg": "orientation error (°)"}
 TRUE_UNITS = {
     "position_m_true": "position error against\nthe true poses (m)",
@@ -55,23 +52,25 @@ def draw_by_noise(results: Results) -> Figure | None:
 
 def by_noise(rows: pd.DataFrame, references: pd.DataFrame, title: str) -> Figure:
     """The figure of ``table3_inconsistencies.csv``, and of ``references.csv`` on its data sets."""
-    blocks = {block: rows[rows["block"] == block] for block in BLOCKS}
-    blocks = {block: chosen for block, chosen in blocks.items() if len(chosen)}
+    blocks = {name: rows[rows["block"] == block] for block, name in BLOCKS.items()}
+    blocks = {name: chosen for name, chosen in blocks.items() if len(chosen)}
     figure = Figure(figsize=(1.6 + 2.9 * len(blocks), 9.0), layout="constrained")
     figure.suptitle(title)
     halves = figure.subfigures(2, 1, squeeze=False, hspace=0.04)[:, 0]
     for half, (end, title) in zip(halves, PROTOCOLS.items(), strict=True):
         half.suptitle(title, weight="bold", fontsize=10)
         units = {f"{measure}{end}": unit for measure, unit in UNITS.items()}
-        panels = _draw_panels(half, blocks, units, published=not end)
+        panels = _draw_panels(half, blocks, units, _levels, published=not end)
         _draw_references(panels, blocks, units, references, LEVEL)
-        for column, (block, chosen) in enumerate(blocks.items()):
-            levels = chosen[LEVEL].drop_duplicates().to_numpy()
-            labels = [f"{metres:g} m\n{degrees:g}°" for metres, degrees in levels]
-            panels[0, column].set_title(BLOCKS[block], fontsize=9)
-            panels[1, column].set_xticks(range(len(labels)), labels)
-    add_legend(figure, halves[0].axes[0], 3, published=True)
+        for axes in panels[0]:
+            axes.title.set_size(9)
+    add_legend(figure, halves[0].axes[0], 3, PAPER)
     return figure
+
+
+def _levels(rows: pd.DataFrame) -> list[str]:
+    levels = rows[LEVEL].drop_duplicates().to_numpy()
+    return [f"{metres:g} m\n{degrees:g}°" for metres, degrees in levels]
 
 
 def draw_by_size(results: Results) -> Figure | None:
@@ -84,20 +83,18 @@ def draw_by_size(results: Results) -> Figure | None:
 
 def by_size(rows: pd.DataFrame, references: pd.DataFrame) -> Figure:
     """The figure of the rows of ``table4_size.csv``, and of ``references.csv`` on true labels."""
-    scenes = {str(scene): chosen for scene, chosen in rows.groupby("scene", sort=False)}
+    scenes = {scene_title(str(name)): chosen for name, chosen in rows.groupby("scene", sort=False)}
     figure = Figure(figsize=(1.4 + 3.9 * len(scenes), 6.6), layout="constrained")
-    panels = _draw_panels(figure, scenes, TRUE_UNITS, published=True)
-    _draw_references(panels, scenes, TRUE_UNITS, references, ["scene", "size"])
-    for column, (scene, chosen) in enumerate(scenes.items()):
-        sizes = chosen.drop_duplicates("size")
-        labels = [f"{row.size}\n{row.n_train:,} frames" for row in sizes.itertuples()]
-        panels[1, column].set_xticks(range(len(labels)), labels)
-        panels[1, column].set_xlabel(
-            "data set as the paper calls it, and training frames used here"
-        )
-        panels[0, column].set_title(scene_title(scene))
-    add_legend(figure, panels[0, 0], 3, published=True)
+    panels = _draw_panels(figure, scenes, TRUE_UNITS, _sizes, published=True)
+    _draw_references(panels, scenes, TRUE_UNITS, references, DATA_SET)
+    for axes in panels[1]:
+        axes.set_xlabel("data set as the paper calls it, and training frames used here")
+    add_legend(figure, panels[0, 0], 3, PAPER)
     return figure
+
+
+def _sizes(rows: pd.DataFrame) -> list[str]:
+    return [f"{r.size}\n{r.n_train:,} frames" for r in rows.drop_duplicates("size").itertuples()]
 
 
 def draw_by_images(results: Results) -> Figure | None:
@@ -112,43 +109,48 @@ def by_images(rows: pd.DataFrame) -> Figure:
     figure = Figure(figsize=(1.4 + 3.2 * len(parts), 6.6), layout="constrained")
     names = dict.fromkeys(f"{scene_title(str(row.scene))}, {row.size}" for row in rows.itertuples())
     figure.suptitle("; ".join(names))
-    panels = _draw_panels(figure, parts, TRUE_UNITS, published=False)
-    for column, (title, chosen) in enumerate(parts.items()):
-        shares = [split_init(init)[1] or "all" for init in chosen["init"].unique()]
-        panels[1, column].set_xticks(range(len(shares)), shares)
-        panels[1, column].set_xlabel("of the images shown")
-        panels[0, column].set_title(title)
-    add_legend(figure, panels[0, 0], 3, published=False)
+    panels = _draw_panels(figure, parts, TRUE_UNITS, _shares, published=False)
+    for axes in panels[1]:
+        axes.set_xlabel("of the images shown")
+    add_legend(figure, panels[0, 0], 3)
     return figure
+
+
+def _shares(rows: pd.DataFrame) -> list[str]:
+    return [split_init(init)[1] or "all" for init in rows["init"].unique()]
 
 
 def _draw_panels(
     figure: Figure | SubFigure,
     parts: Mapping[str, pd.DataFrame],
     units: Mapping[str, str],
+    places: Callable[[pd.DataFrame], list[str]],
     published: bool,
 ) -> NDArray:  # type: ignore[type-arg]
-    """Measures down, parts of a table across; the axes (2, N)."""
+    """Measures down, parts of a table by title across, ``places`` below; the axes (2, N)."""
     panels = figure.subplots(2, len(parts), squeeze=False, sharey="row", sharex="col")
-    for column, rows in enumerate(parts.values()):
-        for axes, measure in zip(panels[:, column], units, strict=True):
+    for column, (title, rows) in zip(panels.T, parts.items(), strict=True):
+        for axes, measure in zip(column, units, strict=True):
             draw_localizers(axes, rows, measure, published)
-    start_at_zero(panels.flat)
-    for axes, label in zip(panels[:, 0], units.values(), strict=True):
-        axes.set_ylabel(label)
+        names = places(rows)
+        column[1].set_xticks(range(len(names)), names)
+        column[0].set_title(title)
+    for line, unit in zip(panels, units.values(), strict=True):
+        line[0].set_ylim(bottom=0)  # when all is drawn: it ends the adapting to data
+        line[0].set_ylabel(unit)
     return panels
 
 
 def _draw_references(
     panels: NDArray,  # type: ignore[type-arg]
     parts: Mapping[str, pd.DataFrame],
-    measures: Iterable[str],
+    measures: Mapping[str, str],
     references: pd.DataFrame,
-    keys: list[str],
+    keys: Sequence[str],
 ) -> None:
     """Lines of ``references`` into panels; data sets are told apart by the columns ``keys``."""
-    for column, rows in enumerate(parts.values()):
-        places = rows[keys].drop_duplicates()
-        same = [references.merge(places.iloc[[place]], on=keys) for place in range(len(places))]
-        for axes, measure in zip(panels[:, column], measures, strict=True):
+    for column, rows in zip(panels.T, parts.values(), strict=True):
+        places = rows[[*keys]].drop_duplicates()
+        same = [references.merge(places.iloc[[place]]) for place in range(len(places))]
+        for axes, measure in zip(column, measures, strict=True):
             draw_references(axes, same, measure)

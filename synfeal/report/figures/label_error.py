@@ -16,7 +16,7 @@ from synfeal.report.figures.sources import (
     counted,
     read_labelled_set,
 )
-from synfeal.report.figures.style import METHOD_STYLES, Style
+from synfeal.report.figures.style import METHOD_STYLES, Style, add_legend
 from synfeal.report.layouts import SOURCES, scene_title
 
 UNITS = ("position error\nof the label (m)", "orientation error\nof the label (°)")
@@ -24,6 +24,11 @@ MARKS = 24  # along a line, the lines one after another: optimisers often coinci
 FLOORS = (0.01, 0.1)  # below these the axes are linear, so that an error of 0 can be shown
 STRIP = 0.3  # height of a method's bar, where a panel of errors has 3
 LOST: Style = {"facecolor": "white", "hatch": "xxxx"}
+MARKED = {
+    "assisted batch: last pose replaced": Patch(facecolor="0.4", edgecolor="0.4"),
+    "lost batch: no motion found, assisted": Patch(edgecolor="0.4", **LOST),
+    "batch without assistance": Patch(facecolor="white", edgecolor="0.4"),
+}
 
 
 def draw(results: Results) -> Figure | None:
@@ -55,7 +60,7 @@ def figure_of(data: LabelledSet) -> Figure:
     for axes, label in zip(panels[:2, 0], UNITS, strict=True):
         axes.set_ylabel(label)
         axes.set_ylim(bottom=0)  # of both splits, once all lines are drawn
-    _add_legend(figure, panels[0, 0])
+    add_legend(figure, panels[0, 0], 3, MARKED)
     return figure
 
 
@@ -73,7 +78,6 @@ def _draw_errors(position: Axes, orientation: Axes, methods: Mapping[str, Labell
         axes.set_yscale("symlog", linthresh=floor, linscale=0.4)
         axes.yaxis.set_major_formatter("{x:g}")
         axes.grid(axis="y", color="0.93")
-        axes.set_axisbelow(True)
 
 
 def _marked(n_frames: int, place: int, n_lines: int) -> tuple[int, int]:
@@ -106,15 +110,3 @@ def _draw_borders(axes: Axes, part: LabelledSplit) -> None:
     for frame in sorted({batch["start"] for batch in part.batches} - {0}):
         axes.axvline(frame, color="0.82", linewidth=0.7, zorder=0)
     axes.set_xlim(0, len(part.labels) - 1)
-
-
-def _add_legend(figure: Figure, axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    marks = {
-        "assisted batch: last pose replaced": Patch(facecolor="0.4", edgecolor="0.4"),
-        "lost batch: no motion found, assisted": Patch(edgecolor="0.4", **LOST),
-        "batch without assistance": Patch(facecolor="white", edgecolor="0.4"),
-    }
-    figure.legend(
-        [*handles, *marks.values()], [*labels, *marks], loc="outside lower center", ncols=3
-    )

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
 
 from synfeal.config import MODELS
 from synfeal.report.crossing import STRUCTURE
@@ -17,7 +17,11 @@ from synfeal.report.figures.style import MODEL_STYLES, PUBLISHED, reference_styl
 from synfeal.report.layouts import TITLES
 from synfeal.report.references import titles_in
 
-PUBLISHED_TITLE = "published (light grey; positions × √3,\nsince print has RMS over the axes)"
+PAPER = {
+    "published (light grey; positions × √3,\nsince print has RMS over the axes)": Line2D(
+        [], [], linestyle="-", **PUBLISHED
+    )
+}
 # Localizers stand side by side so that their limits can be told apart; in widths of a place.
 ASIDE = dict(zip(MODELS, np.linspace(-0.16, 0.16, len(MODELS)), strict=True))
 
@@ -53,13 +57,6 @@ def draw_localizers(axes: Axes, rows: pd.DataFrame, measure: str, published: boo
             **style,
         )
     axes.grid(axis="y", color="0.92")
-    axes.set_axisbelow(True)
-
-
-def start_at_zero(panels: Iterable[Axes]) -> None:
-    """Let the error axes begin at 0; only when all is drawn, for it ends their adapting to data."""
-    for axes in panels:
-        axes.set_ylim(bottom=0)
 
 
 def published_values(rows: pd.DataFrame, measure: str) -> Array:
@@ -71,15 +68,6 @@ def published_values(rows: pd.DataFrame, measure: str) -> Array:
     if measure == "orientation_deg":
         return values.mask(rows["published_flag"] == "misprint").to_numpy()
     return math.sqrt(3) * values.to_numpy()
-
-
-def add_legend(figure: Figure | SubFigure, axes: Axes, columns: int, published: bool) -> None:
-    """A legend below everything: the localizers of ``axes``, and how the paper's are drawn."""
-    handles, labels = axes.get_legend_handles_labels()
-    if published:
-        (reference,) = axes.plot([], [], linestyle="-", **PUBLISHED)
-        handles, labels = [*handles, reference], [*labels, PUBLISHED_TITLE]
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
 # Nothing learnt, a training pose copied, and geometry.

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from synfeal.config import MODELS, Experiment
 from synfeal.report.crossing import STRUCTURE, crossing_finding
 from synfeal.report.figures.sources import Results
-from synfeal.report.figures.style import MODEL_STYLES, reference_styles
+from synfeal.report.figures.style import MODEL_STYLES, add_legend, reference_styles
 from synfeal.report.references import NAME, label_title, read_references, titles_in
 
 TABLE2, TABLE3 = "table2_ground_truth", "table3_inconsistencies"
@@ -55,8 +55,7 @@ def figure_of(table: pd.DataFrame, rows: Sequence[Experiment]) -> Figure:
             _draw_methods(axes, table, labels, measure, joined=bool(block))
     for axes, title in zip(panels[:, 0], UNITS.values(), strict=True):
         axes.set_ylabel(title)
-    handles, titles = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, titles, loc="outside lower center", ncols=4)
+    add_legend(figure, panels[0, 0], 4)
     return figure
 
 
@@ -89,4 +88,3 @@ def _draw_methods(
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
     axes.grid(axis="y", color="0.92", which="both")
-    axes.set_axisbelow(True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import matplotlib
@@ -105,7 +104,7 @@ FIGURES: dict[str, Entry] = {
         "at the largest size of each scene; the grey line is the median.",
     ),
     "speed_vs_error_collision": Entry(
-        partial(speed_vs_error.draw, stage="collision"),
+        speed_vs_error.draw_collision,
         "How fast rays are answered against how many decisions of the planner differ from the full "
         "mesh's, for the face counts of the collision mesh that were tried; filled marks form the "
         "Pareto front, the ring is the mesh that is used.",
@@ -117,7 +116,7 @@ FIGURES: dict[str, Entry] = {
         "the ring is what frames are rendered with.",
     ),
     "speed_vs_error_labels": Entry(
-        partial(speed_vs_error.draw, stage="labels"),
+        speed_vs_error.draw_labels,
         "Frames that each ground-truth method labels per second of processor time against the "
         "median position error of its labels after assistance; filled marks form the Pareto front.",
     ),

@@ -8,23 +8,26 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullFormatter
 
+from synfeal.report.figures import speed_vs_error
 from synfeal.report.figures.sources import Results
-from synfeal.report.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILION, Style
+from synfeal.report.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    VERMILION,
+    Style,
+    set_log,
+)
 from synfeal.report.layouts import scene_title
 
 COLOURS = {"opengl": BLUE, "pyrender": VERMILION, "raycast": GREEN}
 MARKERS = {1: "o", 2: "s", 3: "^", 4: "D"}
 TEXTURES, FACES = "smaller textures", "fewer triangles"
 DETAIL_COLOURS = {TEXTURES: ORANGE, FACES: PURPLE}
-TICKS = (1.0, 2.0, 5.0)
-
-
-RING: Style = {
-    **{"marker": "o", "markersize": 13, "linestyle": ""},
-    **{"markerfacecolor": "none", "markeredgecolor": BLACK},
-}
+RING = speed_vs_error.RING | {"markeredgecolor": BLACK}
 
 
 def draw(results: Results) -> Figure | None:
@@ -77,7 +80,9 @@ def draw_panel(axes: Axes, rows: pd.DataFrame) -> None:
             _mark(axes, row, colour, filled=False)
             _name(axes, row, chosen["faces"], side)
     axes.plot(*ring, **RING)
-    _scales(axes)
+    set_log(axes, "x", "y")
+    axes.margins(0.12)
+    axes.grid(color="0.94")
     size = f"{chosen['width']:.0f} × {chosen['height']:.0f}"
     axes.set_title(f"{scene_title(chosen['scene'])}, {size}")
 
@@ -104,18 +109,6 @@ def left_out(rows: pd.DataFrame, faces: float) -> pd.Series[str]:
 def _face(marker: str, colour: str, filled: bool) -> Style:
     face = colour if filled else "white"
     return {"marker": marker, "markeredgecolor": colour, "markerfacecolor": face, "zorder": 3}
-
-
-def _scales(axes: Axes) -> None:
-    """Logarithmic, with ticks at 1, 2 and 5 that are read as plain numbers."""
-    for axis, set_scale in ((axes.xaxis, axes.set_xscale), (axes.yaxis, axes.set_yscale)):
-        set_scale("log")
-        axis.set_major_locator(LogLocator(subs=TICKS))
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter(NullFormatter())
-    axes.margins(0.12)
-    axes.grid(color="0.94")
-    axes.set_axisbelow(True)
 
 
 def _legend(rows: pd.DataFrame) -> list[Line2D]:

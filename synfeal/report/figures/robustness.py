@@ -6,12 +6,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from baselines.references.robustness import STRUCTURE
 from synfeal.config.robustness import CLEAN, MIXED
 from synfeal.report.figures.sources import Results
-from synfeal.report.figures.style import BLUE, ORANGE, Style
+from synfeal.report.figures.style import BLUE, ORANGE, Style, add_legend, set_log
 from synfeal.report.robustness import BLOCKS, METHODS, NAME, effects_title, read_robustness
 
 UNITS = {"position_m": "position error (m)", "orientation_deg": "orientation error (°)"}
@@ -44,20 +43,15 @@ def figure_of(table: pd.DataFrame) -> Figure:
             for trained_on, style in STYLES.items():
                 own = rows[rows.trained_on == trained_on].set_index("effects").reindex(effects)
                 _draw_errors(axes, own, measure, style, BLOCKS[trained_on])
-            axes.set_xscale("log")
-            axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-            axes.xaxis.set_major_formatter("{x:g}")
-            axes.xaxis.set_minor_formatter(NullFormatter())
+            set_log(axes, "x")
             axes.grid(axis="x", color="0.92")
-            axes.set_axisbelow(True)
             axes.set_xlabel(unit)
     for axes in panels.flat:
         for place in range(1, len(effects), 2):
             axes.axhspan(place - 0.5, place + 0.5, color="0.96", zorder=0)
     panels[0, 0].set_yticks(range(len(effects)), [effects_title(name) for name in effects])
     panels[0, 0].set_ylim(len(effects) - 0.5, -0.5)
-    handles, titles = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, titles, loc="outside lower center", ncols=2)
+    add_legend(figure, panels[0, 0], 2)
     return figure
 
 

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from itertools import cycle
 from typing import Any
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from baselines.groundtruth.methods import METHODS
 
@@ -69,6 +74,7 @@ TRUTH: Style = {"color": "0.68", "linewidth": 3.0, "linestyle": "-"}
 # Text stays text in SVG; a fixed salt gives equal numbers equal identifiers.
 RC: dict[Any, Any] = {
     "font.size": 9,
+    "axes.axisbelow": True,
     "axes.titlesize": 10,
     "axes.labelsize": 9,
     "axes.spines.top": False,
@@ -82,3 +88,22 @@ RC: dict[Any, Any] = {
     "xtick.labelsize": 8,
     "ytick.labelsize": 8,
 }
+
+
+def add_legend(figure: Figure, axes: Axes, columns: int, more: Mapping[str, Artist] = {}) -> None:
+    """A legend below everything: what ``axes`` shows, each title once, and ``more`` by title."""
+    entries: dict[str, Artist] = {}
+    for handle, title in zip(*axes.get_legend_handles_labels(), strict=True):
+        entries.setdefault(title, handle)
+    entries |= more
+    figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns)
+
+
+def set_log(axes: Axes, *which: str) -> None:
+    """Make ``x``, ``y`` or both logarithmic, with ticks at 1, 2 and 5 read as plain numbers."""
+    for name in which:
+        axes.set(**{f"{name}scale": "log"})
+        axis = {"x": axes.xaxis, "y": axes.yaxis}[name]
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure, SubFigure
@@ -17,7 +16,7 @@ from synfeal.report.figures.sources import (
     Results,
     read_labelled_set,
 )
-from synfeal.report.figures.style import METHOD_STYLES, TRUTH, Style
+from synfeal.report.figures.style import METHOD_STYLES, TRUTH, Style, add_legend
 from synfeal.report.layouts import SOURCES, scene_title
 
 ACROSS = 6
@@ -44,7 +43,7 @@ def figure_of(data: LabelledSet, plan: Plan) -> Figure:
     halves = figure.subfigures(len(SPLITS), 1, squeeze=False)[:, 0]
     for part, split in zip(halves, SPLITS, strict=True):
         _draw_split(part, data, plan, split, (down, across))
-    _add_legend(figure)
+    add_legend(figure, figure.axes[0], 3)  # colours as in the first panel
     return figure
 
 
@@ -96,11 +95,3 @@ def _mark(axes: Axes, points: Array, label: str, size: float, face: str) -> None
     style: Style = {"marker": "o", "markersize": size, "markerfacecolor": face, "linestyle": ""}
     edge: Style = {"markeredgecolor": "black", "markeredgewidth": 0.7}
     axes.plot(*points.T, zorder=5, label=label, **style, **edge)
-
-
-def _add_legend(figure: Figure) -> None:
-    """One entry per kind of mark, coloured as in the first panel."""
-    entries: dict[str, Artist] = {}
-    for handle, label in zip(*figure.axes[0].get_legend_handles_labels(), strict=True):
-        entries.setdefault(label, handle)
-    figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=3)
