@@ -172,11 +172,7 @@ def rewritten(text: str, part: Callable[[str, str], str]) -> str:
 
 
 def part_of(name: str, profile: str) -> str:
-    """A part of a page.
-
-    Raises:
-        InputError: there is no such part, or its results are not published.
-    """
+    """A part of a page."""
     if name not in PARTS:
         raise InputError(f"<!-- {name} {profile} -->: no such part; known: {', '.join(PARTS)}")
     return PARTS[name](PUBLISHED / (headline() if profile == "headline" else profile))

@@ -26,23 +26,15 @@ PAPER = "paper"
 
 @dataclass(frozen=True)
 class Sheet:
-    """A table and what stands around it.
+    """A table and what stands around it."""
 
-    Attributes:
-        name: file name without suffix; also the label references use.
-        caption: one or two sentences.
-        headings: of the label, of what errors are against, and of every column.
-        lines: columns ``LINE``, one row per printed line; those of kind ``PAPER`` are grey.
-        values: columns ``VALUE``; a ``tone`` is ``better``, ``worse`` or empty.
-        remarks: sentences below the table that belong to no single cell.
-    """
-
-    name: str
-    caption: str
-    headings: tuple[str, ...]
+    name: str  # file name without suffix; also the label references use
+    caption: str  # one or two sentences
+    headings: tuple[str, ...]  # of the label, of what errors are against, and of every column
+    # Columns ``LINE``, one row per printed line; those of kind ``PAPER`` are grey.
     lines: pd.DataFrame
-    values: pd.DataFrame
-    remarks: tuple[str, ...] = ()
+    values: pd.DataFrame  # columns ``VALUE``; a ``tone`` is ``better``, ``worse`` or empty
+    remarks: tuple[str, ...] = ()  # sentences below the table that belong to no single cell
 
 
 @dataclass(frozen=True)

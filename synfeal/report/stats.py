@@ -26,11 +26,7 @@ _SCORES = TypeAdapter(dict[str, Annotated[FiniteFloat, Field(ge=0)] | None])
 
 
 def read_metrics(path: Path) -> Metrics:
-    """The scores of one run.
-
-    Raises:
-        InputError: the file is missing, is not JSON, lacks a key, or holds no numbers there.
-    """
+    """The scores of one run."""
     limits = [f"{measure}_{end}" for measure in MEASURES for end in ("low", "high")]
     scores = (*MEASURES, *limits, "position_rms_m", *BASELINES, *FLOORS)
     values = read_result(path, (*COUNTS, *scores), REMEDY)

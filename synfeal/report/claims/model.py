@@ -34,42 +34,25 @@ DECIDED = (HOLDS, SMALLER, MIXED, NO_EFFECT, LESS, OPPOSITE)
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim as printed.
+    """One claim as printed."""
 
-    Attributes:
-        id: ``C1`` to ``C16``.
-        section: of the paper.
-        statement: the claim in our words.
-        published: its figures, as printed.
-        numbers: those of the figures that the test compares with.
-        test: how it is tested and by which rule it is decided.
-        footnote: what is wrong or unclear in print, else empty.
-    """
-
-    id: str
-    section: str
-    statement: str
-    published: str
-    numbers: tuple[float, ...]
-    test: str
-    footnote: str
+    id: str  # ``C1`` to ``C16``
+    section: str  # of the paper
+    statement: str  # the claim in our words
+    published: str  # its figures, as printed
+    numbers: tuple[float, ...]  # those of the figures that the test compares with
+    test: str  # how it is tested and by which rule it is decided
+    footnote: str  # what is wrong or unclear in print, else empty
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run says about a claim, under one of the two scores.
+    """What a run says about a claim, under one of the two scores."""
 
-    Attributes:
-        verdict: decided by the rule of the claim's test.
-        measured: the statistic, as text.
-        interval: its 95 % limits, as text; empty where it has none.
-        reason: why the verdict is not the other one.
-    """
-
-    verdict: Verdict
-    measured: str = ""
-    interval: str = ""
-    reason: str = ""
+    verdict: Verdict  # decided by the rule of the claim's test
+    measured: str = ""  # the statistic, as text
+    interval: str = ""  # its 95 % limits, as text; empty where it has none
+    reason: str = ""  # why the verdict is not the other one
 
 
 class Missing(Exception):  # noqa: N818 - not an error: it ends in the verdict `not testable here`

@@ -79,9 +79,6 @@ def judge(claim: Claim, evidence: Evidence) -> Outcome:
     What the profile does not make leaves it ``not testable here``. Where the localizers it rests on
     have not learnt it is ``not learnt at this scale``, and with fewer than ten paths in a test set
     nothing is decided, whatever the rule says.
-
-    Raises:
-        InputError: a result file is missing or cannot be read.
     """
     try:
         outcome = JUDGES[claim.id](claim, evidence)

@@ -32,9 +32,6 @@ def write_claims(design: Design, root: Path, out_csv: Path) -> None:
         design: of the profile.
         root: results directory of the profile.
         out_csv: the table, columns :data:`COLUMNS`.
-
-    Raises:
-        InputError: a result file is missing or cannot be read.
     """
     write_frame(out_csv, pd.DataFrame(claim_rows(evidence_of(design, root)), columns=list(COLUMNS)))
 

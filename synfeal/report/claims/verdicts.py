@@ -56,19 +56,12 @@ REFUTED = (SMALLER, NO_EFFECT, LESS, OPPOSITE)
 
 
 class Condition(NamedTuple):
-    """One effect that a claim asserts.
+    """One effect that a claim asserts."""
 
-    Attributes:
-        name: in the reason of the verdict.
-        effect: sample, percent, positive in the claimed direction.
-        published: its size in print, percent; 0 where the paper claims a direction alone.
-        smallest: effect below which there is none; 0 for a mere order.
-    """
-
-    name: str
-    effect: Array
-    published: float = 0.0
-    smallest: float = SMALLEST
+    name: str  # in the reason of the verdict
+    effect: Array  # sample, percent, positive in the claimed direction
+    published: float = 0.0  # its size in print, percent; 0 where the paper claims a direction alone
+    smallest: float = SMALLEST  # effect below which there is none; 0 for a mere order
 
 
 def verdict_of(condition: Condition, comparisons: int = 1) -> Verdict:

@@ -175,9 +175,6 @@ def compare(root_a: Path, root_b: Path, out: Path | None) -> str:
 
     ``compare.csv``, ``compare.md`` and ``compare.png`` go into ``out``, made if need be; earlier
     files of these names are replaced.
-
-    Raises:
-        InputError: the trees cannot be compared, or ``out`` holds other files.
     """
     if out is not None:
         refuse_foreign(out, OUTPUTS, "a comparison")

@@ -24,17 +24,12 @@ RunKey = tuple[str, ...]
 
 @dataclass(frozen=True)
 class RunErrors:
-    """The errors of one run over its test frames.
+    """The errors of one run over its test frames."""
 
-    Attributes:
-        frame: (N,) index in the test split.
-        path: (N,) index of the straight path the frame belongs to.
-        errors: (seeds, 4, N) by :data:`~synfeal.report.stats.MEASURES`; a prediction that was not
-            finite has infinite errors.
-    """
-
-    frame: NDArray[np.int64]
-    path: NDArray[np.int64]
+    frame: NDArray[np.int64]  # (N,) index in the test split
+    path: NDArray[np.int64]  # (N,) index of the straight path the frame belongs to
+    # (seeds, 4, N) by :data:`~synfeal.report.stats.MEASURES`; a prediction that was not finite has
+    # infinite errors.
     errors: NDArray[np.float64]
 
     def counts(self) -> dict[str, int]:
@@ -45,11 +40,7 @@ class RunErrors:
 
 
 def find_runs(root: Path) -> dict[RunKey, list[Path]]:
-    """The directories of all seeds of every scored run of a tree, in the order of their names.
-
-    Raises:
-        InputError: there is no such directory, or no scored run in it.
-    """
+    """The directories of all seeds of every scored run of a tree, in the order of their names."""
     found: dict[RunKey, list[Path]] = {}
     for path in sorted(root.glob("runs/*/*/*/*/*/seed*/metrics.json")):
         key = path.parent.relative_to(root / "runs").parts[:-1]
@@ -63,12 +54,7 @@ def find_runs(root: Path) -> dict[RunKey, list[Path]]:
 
 
 def read_run(seeds: Sequence[Path]) -> RunErrors:
-    """The errors of a run from the directories of its seeds.
-
-    Raises:
-        InputError: a file is missing or broken, the seeds were tested on different frames, or
-            ``metrics.json`` does not belong to ``errors.csv``.
-    """
+    """The errors of a run from the directories of its seeds."""
     index = [_read_index(seed) for seed in seeds]
     for seed, found in zip(seeds, index, strict=True):
         if not np.array_equal(found, index[0]):

@@ -34,21 +34,16 @@ ORDER = (
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two trees side by side.
+    """Two trees side by side."""
 
-    Attributes:
-        names: the directories as they were given.
-        table: a row per run in both trees and measure. Columns are those of a run's directory, of
-            :func:`~synfeal.report.compare.stats.compare_errors`, ``test_frames`` and
-            ``test_labels``, which say whether both trees have the same, and counts of either.
-        only: how many runs are in A only and in B only.
-        changes: keys of the provenance of the trees that differ, with the value in each, NaN where
-            one lacks it; None where either has no provenance.
-    """
-
-    names: tuple[str, str]
+    names: tuple[str, str]  # the directories as they were given
+    # A row per run in both trees and measure. Columns are those of a run's directory, of
+    # :func:`~synfeal.report.compare.stats.compare_errors`, ``test_frames`` and ``test_labels``,
+    # which say whether both trees have the same, and counts of either.
     table: pd.DataFrame
-    only: tuple[int, int]
+    only: tuple[int, int]  # how many runs are in A only and in B only
+    # Keys of the provenance of the trees that differ, with the value in each, NaN where one lacks
+    # it; None where either has no provenance.
     changes: pd.DataFrame | None
 
     @property
@@ -65,11 +60,7 @@ def one_yardstick(run: pd.DataFrame) -> bool:
 
 
 def compare_trees(root_a: Path, root_b: Path) -> Comparison:
-    """Compare every run that is in both trees.
-
-    Raises:
-        InputError: a directory is no results tree, they share no run, or a file is broken.
-    """
+    """Compare every run that is in both trees."""
     found_a, found_b = find_runs(root_a), find_runs(root_b)
     shared = [key for key in found_a if key in found_b]
     if not shared:

@@ -24,23 +24,15 @@ Key = tuple[str, str]
 
 @dataclass(frozen=True)
 class PlannedJobs:
-    """Jobs of the target ``all`` that are measured.
+    """Jobs of the target ``all`` that are measured."""
 
-    Attributes:
-        keys: stage and name of each, as below ``<root>/benchmarks``.
-        needed: by table of the paper, the jobs it needs, that which writes it included.
-    """
-
-    keys: tuple[Key, ...]
+    keys: tuple[Key, ...]  # stage and name of each, as below ``<root>/benchmarks``
+    # By table of the paper, the jobs it needs, that which writes it included.
     needed: Mapping[str, frozenset[Key]]
 
 
 def planned_jobs(profile: Path) -> PlannedJobs:
-    """All jobs of a run that begins with nothing.
-
-    Raises:
-        InputError: the workflow is not here, or cannot be planned with this profile.
-    """
+    """All jobs of a run that begins with nothing."""
     with tempfile.TemporaryDirectory(prefix="plan-") as folder:
         out = Path(folder) / "jobs.json"
         command = [sys.executable, "-m", __spec__.name, str(profile), folder, str(out)]

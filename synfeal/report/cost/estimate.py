@@ -28,19 +28,12 @@ STAGE, ALONE, OWN, RUN = "stage", "table alone", "table", "run"
 
 @dataclass(frozen=True)
 class Machine:
-    """What a run is planned for.
+    """What a run is planned for."""
 
-    Attributes:
-        cores: jobs at a time.
-        gpus: training runs at a time; 0 trains on the processor.
-        gpu_tflops: sustained by a run on a GPU, in 10^12 operations per second: an
-            assumption.
-        gpu_rates: seconds of a training run on a GPU per layer and step, and per TFLOP, if timed.
-    """
-
-    cores: int
-    gpus: int
-    gpu_tflops: float
+    cores: int  # jobs at a time
+    gpus: int  # training runs at a time; 0 trains on the processor
+    gpu_tflops: float  # sustained by a run on a GPU, in 10^12 operations per second: an assumption
+    # Seconds of a training run on a GPU per layer and step, and per TFLOP, if timed.
     gpu_rates: tuple[float, float] | None = None
 
     def gpu_s(self, layer_steps: Any, tflop: Any) -> Any:

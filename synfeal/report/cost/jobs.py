@@ -46,21 +46,13 @@ class Profile(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """How the jobs of a stage are named, and what they count.
+    """How the jobs of a stage are named, and what they count."""
 
-    Attributes:
-        parts: of a job's name; None where all jobs are alike, whatever their names.
-        unit: of the size.
-        splits: whose frames count where the name says no split.
-        disk: bytes that a frame leaves behind.
-        held_per_px: bytes of memory for each pixel of the frames.
-    """
-
-    parts: str | None = None
-    unit: str = ""
-    splits: tuple[str, ...] = ("train", "test")
-    disk: float = 0.0
-    held_per_px: float = 0.0
+    parts: str | None = None  # of a job's name; None where all jobs are alike, whatever their names
+    unit: str = ""  # of the size
+    splits: tuple[str, ...] = ("train", "test")  # whose frames count where the name says no split
+    disk: float = 0.0  # bytes that a frame leaves behind
+    held_per_px: float = 0.0  # bytes of memory for each pixel of the frames
 
 
 _FRAME_STAGE = Stage(BATCH, "Mpx", disk=POSE, held_per_px=RGBD_PER_PX)

@@ -22,19 +22,12 @@ PARAMETER_COPIES = 4
 
 @dataclass(frozen=True)
 class Work:
-    """A network.
+    """A network."""
 
-    Attributes:
-        flop: of one image forward; a multiply-add is two.
-        layers: layers with weights.
-        parameter_bytes: of its weights.
-        activation_bytes: of what these layers put out for one image.
-    """
-
-    flop: float
-    layers: int
-    parameter_bytes: float
-    activation_bytes: float
+    flop: float  # of one image forward; a multiply-add is two
+    layers: int  # layers with weights
+    parameter_bytes: float  # of its weights
+    activation_bytes: float  # of what these layers put out for one image
 
     def size(self, samples: int, batch_size: int, predicted: int) -> tuple[float, float]:
         """Layers times steps, and TFLOP, of training on ``samples`` and predicting frames."""

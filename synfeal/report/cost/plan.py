@@ -42,19 +42,13 @@ Comparisons = dict[tuple[str, str], pd.DataFrame]
 
 @dataclass(frozen=True)
 class Plan:
-    """What a run of a profile costs on a machine.
+    """What a run of a profile costs on a machine."""
 
-    Attributes:
-        profile: its name.
-        machine: what it is planned for.
-        costs: a row for each stage, for each table, and last for the run; see ``estimate.py``.
-        origin: what the laws were fitted to.
-    """
-
-    profile: str
-    machine: Machine
+    profile: str  # its name
+    machine: Machine  # what it is planned for
+    # A row for each stage, for each table, and last for the run; see ``estimate.py``.
     costs: pd.DataFrame
-    origin: str
+    origin: str  # what the laws were fitted to
 
 
 def plan_of(

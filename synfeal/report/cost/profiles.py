@@ -21,11 +21,7 @@ DEFAULT = FOLDER / "config.yaml"
 
 
 def read_profile(name: str) -> Profile:
-    """A profile by its name in a file of ``config/``, or by the path of its file.
-
-    Raises:
-        InputError: there is none, or it cannot be read.
-    """
+    """A profile by its name in a file of ``config/``, or by the path of its file."""
     path = profile_path(name)
     paths = [path] if is_default(path) else [DEFAULT, path]
     config = load_config(*paths)
@@ -40,11 +36,7 @@ def is_default(path: Path) -> bool:
 
 
 def profile_path(name: str) -> Path:
-    """The file of a profile, by name or path.
-
-    Raises:
-        InputError: no file of ``config/`` has this name.
-    """
+    """The file of a profile, by name or path."""
     if name.endswith((".yaml", ".yml")):
         return Path(name)
     found = {str(read_yaml(p).get("profile")): p for p in sorted(FOLDER.glob("*.yaml"))}
@@ -58,9 +50,6 @@ def read_run(root: Path) -> tuple[pd.DataFrame, int]:
     """Measured jobs of a run with their sizes, and how many the profile cannot have.
 
     The run's directory is called like its profile, as the workflow calls it.
-
-    Raises:
-        InputError: it was not measured, or the profile is not known.
     """
     measured = read_measured(root)
     profile = read_profile(root.resolve().name)

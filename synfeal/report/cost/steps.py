@@ -27,23 +27,14 @@ STEPS = 4
 
 @dataclass(frozen=True)
 class StepRates:
-    """How fast networks are trained.
+    """How fast networks are trained."""
 
-    Attributes:
-        rates: seconds of a training run per layer and step, and per TFLOP.
-        on_gpu: seconds from start to end on a GPU, else of processor time.
-    """
-
-    rates: tuple[float, float]
-    on_gpu: bool
+    rates: tuple[float, float]  # seconds of a training run per layer and step, and per TFLOP
+    on_gpu: bool  # seconds from start to end on a GPU, else of processor time
 
 
 def timed_rates(config: Config) -> StepRates:
-    """Rates at which a profile's networks are trained here, its batches on random images.
-
-    Raises:
-        InputError: the profile asks for a GPU that is not there.
-    """
+    """Rates at which a profile's networks are trained here, its batches on random images."""
     device = open_device(config.training.device)
     batch = config.training.batch_size
     sizes, seconds = [], []

@@ -28,15 +28,11 @@ MARKED_AT = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 @dataclass(frozen=True)
 class SceneErrors:
-    """Errors at the largest size of a scene.
+    """Errors at the largest size of a scene."""
 
-    Attributes:
-        title: scene, size and frames.
-        errors: by localizer and measure, the errors (N,) of all test frames of all repetitions;
-            infinite where a prediction failed.
-    """
-
-    title: str
+    title: str  # scene, size and frames
+    # By localizer and measure, the errors (N,) of all test frames of all repetitions; infinite
+    # where a prediction failed.
     errors: dict[str, dict[str, Array]]
 
 

@@ -21,15 +21,10 @@ FLOOR_SHARE = 0.02  # of the surface lies below the floor's height: holes dig, a
 
 @dataclass(frozen=True)
 class Plan:
-    """What of a scene a plan shows.
+    """What of a scene a plan shows."""
 
-    Attributes:
-        corners_m: (N, 3, 2) triangles from above, world x and y.
-        bounds_m: (2, 2) lower and upper corner of the whole mesh, world x and y.
-    """
-
-    corners_m: Array
-    bounds_m: Array
+    corners_m: Array  # (N, 3, 2) triangles from above, world x and y
+    bounds_m: Array  # (2, 2) lower and upper corner of the whole mesh, world x and y
 
 
 def read_plan(results: Results, scene: str) -> Plan:

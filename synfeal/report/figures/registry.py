@@ -29,17 +29,12 @@ from synfeal.report.figures.style import RC
 
 @dataclass(frozen=True)
 class Entry:
-    """A figure.
+    """A figure."""
 
-    Attributes:
-        draw: makes it, or returns None when the design does not make what it shows.
-        caption: one sentence.
-        suffixes: the files it is written to.
-    """
-
+    # Makes it, or returns None when the design does not make what it shows.
     draw: Callable[[Results], Figure | None]
-    caption: str
-    suffixes: tuple[str, ...] = (".svg", ".png")
+    caption: str  # one sentence
+    suffixes: tuple[str, ...] = (".svg", ".png")  # the files it is written to
 
 
 FIGURES: dict[str, Entry] = {

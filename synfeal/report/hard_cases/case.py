@@ -22,43 +22,28 @@ REFUSAL = "refusal"  # the quantity of cases without an answer: 0 when refused, 
 
 @dataclass(frozen=True)
 class Trial:
-    """What a case asks.
+    """What a case asks."""
 
-    Attributes:
-        naive: the answer of the formula somebody would write first.
-        ours: the answer of the project's function.
-        truth: the exact answer, as numbers of mpmath or fractions; :data:`REFUSED` where no
-            answer is the only right one.
-        error: how far an answer is from the truth, in the unit of the case.
-    """
-
-    naive: Callable[[], Any]
-    ours: Callable[[], Any]
+    naive: Callable[[], Any]  # the answer of the formula somebody would write first
+    ours: Callable[[], Any]  # the answer of the project's function
+    # The exact answer, as numbers of mpmath or fractions; :data:`REFUSED` where no answer is the
+    # only right one.
     truth: Any
+    # How far an answer is from the truth, in the unit of the case.
     error: Callable[[Any, Any], float] = max_abs
 
 
 class Family(NamedTuple):
-    """Rows of the table that differ only in their inputs.
+    """Rows of the table that differ only in their inputs."""
 
-    Attributes:
-        name: what is computed.
-        quantity: what the error is measured in.
-        unit: of the error.
-        naive: the naive formula, in words.
-        ours: the function that is judged.
-        reference: how the truth is computed.
-        bound: the largest error we promise.
-        cases: by name, what makes inputs and truth; nothing is random but by a fixed seed.
-    """
-
-    name: str
-    quantity: str
-    unit: str
-    naive: str
-    ours: str
-    reference: str
-    bound: float
+    name: str  # what is computed
+    quantity: str  # what the error is measured in
+    unit: str  # of the error
+    naive: str  # the naive formula, in words
+    ours: str  # the function that is judged
+    reference: str  # how the truth is computed
+    bound: float  # the largest error we promise
+    # By name, what makes inputs and truth; nothing is random but by a fixed seed.
     cases: dict[str, Callable[[], Trial]]
 
 

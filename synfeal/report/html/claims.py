@@ -42,11 +42,7 @@ Claims = Sequence[Mapping[str, str]]
 
 
 def read_claims(path: Path) -> Claims:
-    """The rows of ``claims.csv``.
-
-    Raises:
-        InputError: it cannot be read, lacks a column, or holds a verdict that is none.
-    """
+    """The rows of ``claims.csv``."""
     rows = records_of(read_frame(path, dict.fromkeys(COLUMNS, TEXT)))
     for row in rows:
         for score in SCORES:

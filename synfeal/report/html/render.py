@@ -30,29 +30,18 @@ SCORES = {"labels": "", "true": "_true"}
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table on the page.
+    """A column of a table on the page."""
 
-    Attributes:
-        title: its heading.
-        name: of the frame's column that it shows.
-        form: how its numbers are written, for :meth:`str.format`; empty for text.
-        factor: so many times the number is shown.
-        text: column of the frame that says how a number is written, in place of ``form``.
-        paper: column with the paper's number, set below.
-        small: column with more text, set small below.
-        bad: column that says whether a number is marked as bad.
-        scored: there are two numbers, against the labels and the true poses (``<name>_true``),
-            with 95 % limits (``_low``, ``_high``).
-    """
-
-    title: str
-    name: str = ""
-    form: str = ""
-    factor: float = 1.0
-    text: str = ""
-    paper: str = ""
-    small: str = ""
-    bad: str = ""
+    title: str  # its heading
+    name: str = ""  # of the frame's column that it shows
+    form: str = ""  # how its numbers are written, for :meth:`str.format`; empty for text
+    factor: float = 1.0  # so many times the number is shown
+    text: str = ""  # column of the frame that says how a number is written, in place of ``form``
+    paper: str = ""  # column with the paper's number, set below
+    small: str = ""  # column with more text, set small below
+    bad: str = ""  # column that says whether a number is marked as bad
+    # There are two numbers, against the labels and the true poses (``<name>_true``), with 95 %
+    # limits (``_low``, ``_high``).
     scored: bool = False
 
     @property

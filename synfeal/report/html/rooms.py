@@ -27,19 +27,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Camera paths that are shown or hidden together.
+    """Camera paths that are shown or hidden together."""
 
-    Attributes:
-        title: what stands beside the box to tick.
-        rgb: colour, 0 to 255.
-        paths_m: one polyline (N, 3) per path, world, metres.
-        is_shown: from the start.
-    """
-
-    title: str
-    rgb: tuple[int, int, int]
-    paths_m: tuple[Array, ...]
-    is_shown: bool
+    title: str  # what stands beside the box to tick
+    rgb: tuple[int, int, int]  # colour, 0 to 255
+    paths_m: tuple[Array, ...]  # one polyline (N, 3) per path, world, metres
+    is_shown: bool  # from the start
 
 
 def room_html(scene: str, root: Path, design: Design) -> Markup:

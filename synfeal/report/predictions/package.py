@@ -46,18 +46,12 @@ DAMAGE = (OSError, *ARCHIVE_DAMAGE, lzma.LZMAError, KeyError, TypeError)
 
 @dataclass(frozen=True)
 class Resource:
-    """A file of a package.
+    """A file of a package."""
 
-    Attributes:
-        path: below the results directory, with ``/``.
-        sha256: of what it holds.
-        member: name in the ZIP file.
-        n_bytes: how much of that member it is; a smaller data set is the beginning of a larger one.
-    """
-
-    path: str
-    sha256: str
-    member: str
+    path: str  # below the results directory, with ``/``
+    sha256: str  # of what it holds
+    member: str  # name in the ZIP file
+    # How much of that member it is; a smaller data set is the beginning of a larger one.
     n_bytes: int
 
 

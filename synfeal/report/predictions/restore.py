@@ -51,11 +51,7 @@ def restore(package: Path, root: Path) -> tuple[int, int]:
 
 
 def _is_new(path: Path, content: bytes) -> bool:
-    """Whether a file has to be written.
-
-    Raises:
-        InputError: it is there and holds something else.
-    """
+    """Whether a file has to be written; it may be there, but hold nothing else."""
     if path.is_file() and path.read_bytes() != content:
         raise InputError(
             f"{path}: exists and differs from what would be restored; delete it, or restore into"

@@ -18,11 +18,7 @@ ESTIMATION = "estimation.json"
 
 
 def restored_files(config: Config) -> frozenset[str]:
-    """Paths of the restored files that are still there, as the workflow names them.
-
-    Raises:
-        InputError: one was made with other settings than the configuration has now.
-    """
+    """Paths of the restored files that are still there, as the workflow names them."""
     root = config.root
     found = {path for path in listed_files(root) if (root / path).is_file()}
     for path in sorted(found):

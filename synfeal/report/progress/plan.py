@@ -19,20 +19,13 @@ MEASURED = Path("results/published/mini")
 
 @dataclass(frozen=True)
 class RunPlan:
-    """What the workflow tells of a run at its start.
+    """What the workflow tells of a run at its start."""
 
-    Attributes:
-        root: results of the profile.
-        expected_s: seconds each job that is to run may take, by ``stage/name`` as in
-            ``<root>/benchmarks``.
-        runs: training runs of the design, whether they are to run or have run.
-        cores: jobs at a time.
-    """
-
-    root: Path
+    root: Path  # results of the profile
+    # Seconds each job that is to run may take, by ``stage/name`` as in ``<root>/benchmarks``.
     expected_s: Mapping[str, float]
-    runs: tuple[Run, ...]
-    cores: int
+    runs: tuple[Run, ...]  # training runs of the design, whether they are to run or have run
+    cores: int  # jobs at a time
 
 
 def plan_run(config: Config, design: Design, benchmarks: Iterable[str], cores: int) -> RunPlan:
