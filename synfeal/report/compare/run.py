@@ -1,8 +1,9 @@
-"""What ``synfeal compare`` does and says: in the terminal, as Markdown, as files."""
+"""What ``synfeal compare`` does and says: in the terminal, and as files."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,12 @@ from synfeal.bootstrap import FEWEST_PATHS
 from synfeal.dataset.directories import refuse_foreign
 from synfeal.files import atomic_path
 from synfeal.frames import write_frame
-from synfeal.report.aligned import aligned, aligned_sections, markdown
+from synfeal.report.aligned import MARKDOWN, PLAIN, text_table
 from synfeal.report.compare.figure import comparison_figure
 from synfeal.report.compare.runs import KEY
 from synfeal.report.compare.summary import groups_of, remarks_of, summarise
 from synfeal.report.compare.trees import Comparison, compare_trees, one_yardstick
+from synfeal.report.latex import write_text
 from synfeal.report.stats import MEASURES
 
 TITLES = {
@@ -35,86 +37,69 @@ LEGEND = (
 )
 # Keys of provenance that are printed, and letters of their values.
 MOST_CHANGES, WIDEST_VALUE = 30, 40
-Sheet = tuple[tuple[str, ...], dict[str, list[tuple[str, ...]]], int]  # headings, sections, n_left
+Rows = list[Sequence[str]]
 
 
-def text_of(comparison: Comparison) -> str:
-    """Table, summary and remarks for the terminal, ending in a newline."""
-    parts = [
-        f"A = {comparison.names[0]}\nB = {comparison.names[1]}\n",
-        LEGEND.replace("`", "") + "\n",
-        aligned_sections(*runs_sheet(comparison)),
-        _plain(summary_sheet(comparison)),
-        aligned_sections(*groups_sheet(comparison)),
-        "".join(f"- {remark}\n" for remark in remarks_of(comparison)),
-    ]
+def text_of(comparison: Comparison, form: str = PLAIN) -> str:
+    """Summary, remarks, changes by group, every run, and provenance: for the terminal or a page."""
+    page = form == MARKDOWN
+    figure = "![B−A of every run with its 95 % limits](compare.png)\n\n" if page else ""
+    parts = {
+        "Comparison": "A = `{}`  \nB = `{}`\n\n".format(*comparison.names)
+        + text_table(summary_rows(comparison), 1, form)
+        + "\n"
+        + "".join(f"- {remark}\n" for remark in remarks_of(comparison)),
+        "Mean relative change": text_table(group_rows(comparison), 2, form),
+        "Runs": f"{LEGEND}\n\n{figure}{text_table(run_rows(comparison), 3, form)}",
+    }
     if comparison.changes is not None and len(comparison.changes):
-        parts.append(_plain(changes_sheet(comparison.changes)))
-    return "\n".join(parts)
+        rows = change_rows(comparison.changes)
+        parts["What differs in provenance"] = text_table(rows, 3, form)
+    text = "\n".join(f"{'## ' * page}{title}\n\n{part}" for title, part in parts.items())
+    return text.removeprefix("#") if page else text.replace("`", "")
 
 
-def markdown_of(comparison: Comparison) -> str:
-    """The same as a page: first what it comes to, then every run."""
-    name_a, name_b = comparison.names
-    parts = [
-        f"# Comparison\n\nA = `{name_a}`  \nB = `{name_b}`\n",
-        markdown(*summary_sheet(comparison)),
-        "".join(f"- {remark}\n" for remark in remarks_of(comparison)),
-        "## Mean relative change\n",
-        markdown(*groups_sheet(comparison)),
-        f"## Runs\n\n{LEGEND}\n",
-        markdown(*runs_sheet(comparison)),
-        "![B−A of every run with its 95 % limits](compare.png)\n",
-    ]
-    if comparison.changes is not None and len(comparison.changes):
-        parts += ["## What differs in provenance\n", markdown(*changes_sheet(comparison.changes))]
-    return "\n".join(parts)
-
-
-def _plain(sheet: Sheet) -> str:
-    """A table of one section for the terminal."""
-    headings, sections, n_left = sheet
-    return aligned([headings, *sections[""]], range(n_left))
-
-
-def runs_sheet(comparison: Comparison) -> Sheet:
-    """One row per run and yardstick, in sections of one data set each."""
+def run_rows(comparison: Comparison) -> Rows:
+    """A row per run and yardstick, below its heading; a data set is named in its first row."""
     errors = ("position A", "B", "B−A", "95 %", "", "orientation A", "B", "B−A", "95 %", "")
-    sections: dict[str, list[tuple[str, ...]]] = {}
+    rows: Rows = [("data set", "model", "against", *errors, "paths")]
+    shown = ""
     for key, run in comparison.table.groupby(list(KEY), sort=False):
-        sections.setdefault("/".join(map(str, key[:-1])), []).extend(_run_rows(run))
-    return ("model", "against", *errors, "paths"), sections, 2
+        data_set = "/".join(map(str, key[:-1]))
+        for row in _run_rows(run):
+            rows.append(("" if data_set == shown else data_set, *row))
+            shown = data_set
+    return rows
 
 
-def summary_sheet(comparison: Comparison) -> Sheet:
+def summary_rows(comparison: Comparison) -> Rows:
     """One row per measure: verdicts, signs and the mean relative change."""
-    rows = []
+    headings = ("runs", "better", "worse", "no difference seen", "lower", "higher", "sign test p")
+    rows: Rows = [(*headings, "mean change")]
     for s in summarise(comparison.table).to_dict("records"):
         counts = (str(s[name]) for name in ("better", "worse", "unseen", "lower", "higher"))
         tests = f"{s['p_sign']:.2g}", percent_text(s["percent"])
         rows.append((TITLES[s["measure"]], *counts, *tests))
-    headings = ("runs", "better", "worse", "no difference seen", "lower", "higher", "sign test p")
-    return (*headings, "mean change"), {"": rows}, 1
+    return rows
 
 
-def groups_sheet(comparison: Comparison) -> Sheet:
+def group_rows(comparison: Comparison) -> Rows:
     """Mean relative changes by scene, label source and model."""
-    groups = groups_of(comparison.table)
-    sections: dict[str, list[tuple[str, ...]]] = {}
-    for group in groups.to_dict("records"):
+    rows: Rows = [("by", "", "runs", *SHORT)]
+    for group in groups_of(comparison.table).to_dict("records"):
         changes = (percent_text(group[measure]) for measure in MEASURES)
-        section = sections.setdefault(f"mean change by {group['grouping']}", [])
-        section.append((group["name"], str(group["n_runs"]), *changes))
-    return ("", "runs", *SHORT), sections, 1
+        rows.append((group["grouping"], group["name"], str(group["n_runs"]), *changes))
+    return rows
 
 
-def changes_sheet(changes: pd.DataFrame) -> Sheet:
+def change_rows(changes: pd.DataFrame) -> Rows:
     """Keys of ``provenance.json`` that differ, the first of them."""
     shown = changes[["key", "a", "b"]].head(MOST_CHANGES).itertuples(index=False)
-    rows = [(key, *map(_value_text, values)) for key, *values in shown]
+    rows: Rows = [("provenance.json", "A", "B")]
+    rows += [(key, *map(_value_text, values)) for key, *values in shown]
     if len(changes) > MOST_CHANGES:
         rows.append((f"… and {len(changes) - MOST_CHANGES} more", "", ""))
-    return ("provenance.json", "A", "B"), {"": rows}, 3
+    return rows
 
 
 def percent_text(percent: float) -> str:
@@ -132,7 +117,7 @@ def _run_rows(run: pd.DataFrame) -> list[tuple[str, ...]]:
     doubt = "?" if paths < FEWEST_PATHS else ""
     return [
         (
-            *(first["model"] if i == 0 else "", against),
+            *("" if i else first["model"], against),
             *_cells(by_measure[f"position_m{end}"], 3, doubt),
             *_cells(by_measure[f"orientation_deg{end}"], 2, doubt),
             str(paths),
@@ -180,14 +165,8 @@ def compare(root_a: Path, root_b: Path, out: Path | None) -> str:
         refuse_foreign(out, OUTPUTS, "a comparison")
     comparison = compare_trees(root_a, root_b)
     if out is not None:
-        _write(comparison, out)
+        with atomic_path(out / "compare.png") as temporary:
+            comparison_figure(comparison).savefig(temporary, dpi=150)
+        write_text(out / "compare.md", text_of(comparison, MARKDOWN))
+        write_frame(out / "compare.csv", comparison.table)
     return text_of(comparison)
-
-
-def _write(comparison: Comparison, out: Path) -> None:
-    figure = comparison_figure(comparison)
-    with atomic_path(out / "compare.png") as temporary:
-        figure.savefig(temporary, dpi=150)
-    with atomic_path(out / "compare.md") as temporary:
-        temporary.write_text(markdown_of(comparison), encoding="utf-8")
-    write_frame(out / "compare.csv", comparison.table)

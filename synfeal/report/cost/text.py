@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from synfeal.report.aligned import aligned
+from synfeal.report.aligned import text_table
 from synfeal.report.cost.estimate import ALONE, LAUNCH_S, OWN, RUN, STAGE
 from synfeal.report.cost.plan import Comparisons, Plan
 
@@ -31,7 +31,7 @@ def comparison_text(comparisons: Comparisons) -> str:
             span = _span(r["low"], r["mid"], r["high"])
             factor = f"{r['factor']:.2f}"
             rows.append([r["stage"], str(r["jobs"]), *span, duration(r["cpu_s"]), factor])
-        parts.append(f"{predicted} predicted from {source}\n\n{aligned(rows)}")
+        parts.append(f"{predicted} predicted from {source}\n\n{text_table(rows)}")
     return "\n".join(parts)
 
 
@@ -56,16 +56,16 @@ def _stage_table(plan: Plan) -> str:
     """One line per stage, and the sum."""
     on_gpu = bool(plan.machine.gpus)
     gpu = ["GPU time", "range"] if on_gpu else []
-    head = ["stage", "jobs", "work", "", "CPU time", "range", *gpu, "wall time"]
+    head = ["stage", "jobs", "work", "CPU time", "range", *gpu, "wall time"]
     rows = [[*head, "disk", "memory", "x measured"]]
     shown = plan.costs[plan.costs["part"].isin([STAGE, RUN])]
-    return aligned(rows + [_row(r, on_gpu) for r in shown.to_dict("records")], left=(0, 3))
+    return text_table(rows + [_row(r, on_gpu) for r in shown.to_dict("records")])
 
 
 def _row(r: dict[Any, Any], on_gpu: bool) -> list[str]:
     is_stage, unknown = r["part"] == STAGE, r["measured"] == "no"
-    work = [number(r["work"]), r["unit"]] if is_stage and r["unit"] else ["", ""]
-    row = [r["name"], f"{r['jobs']:,}", *work]
+    work = f"{number(r['work'])} {r['unit']}" if is_stage and r["unit"] else ""
+    row = [r["name"], f"{r['jobs']:,}", work]
     disk = scaled(r["disk_bytes"], SIZES) if r["disk_bytes"] or not is_stage else ""
     if unknown:
         return [*row, "not measured", "", *([""] * 2 * on_gpu), "", disk, "", ""]
@@ -90,7 +90,7 @@ def _table_table(plan: Plan) -> str:
             row += times[: 1 + on_gpu]
         whole = alone.get(r["name"])
         rows.append([*row, *(["", ""] if whole is None else _time(whole, "wall"))])
-    return aligned(rows)
+    return text_table(rows)
 
 
 def _notes(plan: Plan) -> Iterator[str]:
