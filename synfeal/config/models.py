@@ -145,9 +145,7 @@ class GroundTruthConfig(Strict):
 
     batch_frames: Annotated[int, Field(ge=2, le=10**9)] = Field(250, description="frames per batch")
     more_scenes: tuple[Slug, ...] = Field(
-        (),
-        description="scenes whose poses the methods estimate as well, at the same size, though no"
-        " run is trained on them: more batches to count assistance in",
+        (), description="further scenes whose labels are estimated, to count assistance in"
     )
     assist_position_m: Positive = Field(
         0.20, description="assist a batch whose last position is off by more"
