@@ -9,7 +9,7 @@ from synfeal.mesh.triangles import weld
 from synfeal.scenes.bake import ATLAS_PX, GUTTER_PX, laid_out, pack, scanned_mesh
 from synfeal.scenes.grids import jittered, refined, surface_of
 from synfeal.scenes.lighting import Lamp, Lighting, Sun, baked
-from synfeal.scenes.patches import Item, Patch, box, level, tube, turned, upright
+from synfeal.scenes.patches import Item, Maker, Patch, level, upright
 from synfeal.scenes.scan import Scanner, rounded, seen_faces, stations
 
 GREY = np.full((8, 8, 3), 128, np.uint8)
@@ -22,7 +22,7 @@ def rng():
 
 
 def grey_box(size_m):
-    return box(rng(), size_m, lambda c: c.plain((0.5, 0.5, 0.5)), 20)
+    return Maker(rng()).box(size_m, lambda c: c.plain((0.5, 0.5, 0.5)), 20)
 
 
 def room():
@@ -48,10 +48,10 @@ def area_of(points, faces):
 def test_round_things_face_outwards(shape):
     if shape == "turned":
         profile = [(0.5, 1.0), (0.5, 0.0)]
-        (patch,) = turned(rng(), profile, lambda c: c.plain((1, 0, 0)), 50, 64).patches
+        (patch,) = Maker(rng()).turned(profile, lambda c: c.plain((1, 0, 0)), 50, 64).patches
     else:
         path = [(0, 0, z) for z in (0, 0.5, 1)]
-        patch = tube(rng(), path, 0.5, lambda c: c.plain((1, 0, 0)), 50, 64)
+        (patch,) = Maker(rng()).tube(path, 0.5, lambda c: c.plain((1, 0, 0)), 50, 64).patches
     grid = refined(patch, 0.1)
     radial = grid.points_m[..., :2] / np.linalg.norm(grid.points_m[..., :2], axis=-1, keepdims=True)
     assert (np.sum(radial * grid.normals[..., :2], axis=-1) > 0.99).all()

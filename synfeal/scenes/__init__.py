@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from synfeal.errors import InputError
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.scenes import large_room, random_room, sanctuary
-from synfeal.scenes.bake import light_shares
+from synfeal.scenes.bake import light_shares, scanned_mesh
 
-BUILDERS: dict[str, Callable[[int], TexturedMesh]] = {
-    "large_room": large_room.build,
-    "sanctuary": sanctuary.build,
-    "random_room": random_room.build,
+# What each is scanned from, by seed.
+BUILDERS = {
+    "large_room": large_room.ingredients,
+    "sanctuary": sanctuary.ingredients,
+    "random_room": random_room.ingredients,
 }
-
-
 # Scenes whose lights can be switched.
-INGREDIENTS = {"large_room": large_room.ingredients, "sanctuary": sanctuary.ingredients}
+SWITCHED = ("large_room", "sanctuary")
 
 
 def save_light_shares(builder: str, seed: int, directory: Path) -> None:
@@ -28,9 +26,9 @@ def save_light_shares(builder: str, seed: int, directory: Path) -> None:
     Raises:
         InputError: its lights cannot be switched.
     """
-    if builder not in INGREDIENTS:
+    if builder not in SWITCHED:
         raise InputError(f"builder: the lights of {builder} cannot be switched; leave states out")
-    for group, mesh in light_shares(*INGREDIENTS[builder](seed)).items():
+    for group, mesh in light_shares(*BUILDERS[builder](seed)).items():
         save_glb(directory / f"light_{group}.glb", mesh)
 
 
@@ -44,4 +42,4 @@ def build_scene(builder: str, seed: int) -> TexturedMesh:
         raise InputError(
             f"builder: no procedural scene '{builder}'; choose one of {sorted(BUILDERS)}"
         )
-    return BUILDERS[builder](seed)
+    return scanned_mesh(*BUILDERS[builder](seed))

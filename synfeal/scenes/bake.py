@@ -31,7 +31,7 @@ def scanned_mesh(
     """
     surface = surface_of(rng, item.patches, scanner.cell_m)
     log.info("%d patches, %d faces", len(item.patches), len(surface.faces))
-    tones = _tones(surface, item.patches, lighting)
+    tones = surface.per_patch(baked(surface, *_reflecting(surface, item.patches), lighting))
     pictures = [
         _lit(patch, grid, tone)
         for patch, grid, tone in zip(item.patches, surface.grids, tones, strict=True)
@@ -66,12 +66,10 @@ def light_shares(
     *others, _ = np.round(255 * np.stack(shown) / np.maximum(sum(shown), 1e-9)).astype(np.uint8)
     points, _ = _moved(rng, surface, scanned(rng, surface, scanner))
     faces = surface.faces[seen_faces(points, surface.faces, scanner.stations_m)]
-    used, compact = np.unique(faces, return_inverse=True)
-    corners = points[used], compact.reshape(-1, 3)
     # The last is what remains, so that all together are 1 whatever is rounded.
     shares = [*others, np.clip(255 - np.sum(others, axis=0, dtype=int), 0, 255).astype(np.uint8)]
     return {
-        group: TexturedMesh((MeshPart(group, *corners, vertex_rgb=share[used]),))
+        group: TexturedMesh((MeshPart(group, points, faces, vertex_rgb=share).over(faces),))
         for group, share in zip(GROUPS, shares, strict=True)
     }
 
@@ -89,13 +87,6 @@ def _moved(
     pieces = zip(surface.grids, surface.per_patch(points_m), strict=True)
     moved = [jittered(rng, grid, piece) for grid, piece in pieces]
     return np.concatenate([points for points, _ in moved]), [shares for _, shares in moved]
-
-
-def _tones(
-    surface: Surface, patches: Sequence[Patch], lighting: Lighting
-) -> list[NDArray[np.float32]]:
-    """Light (R, C, 3) at the vertices of every patch."""
-    return surface.per_patch(baked(surface, *_reflecting(surface, patches), lighting))
 
 
 def _reflecting(
@@ -131,33 +122,18 @@ def _textured(
 ) -> TexturedMesh:
     """The seen faces, one part for each texture."""
     places, textures = laid_out(pictures)
-    uv = np.concatenate(
-        [
-            _uv(share, picture.shape, place, textures[place[0]].shape)
-            for share, picture, place in zip(shares, pictures, places, strict=True)
-        ]
-    )
+    uv = []
+    for share, picture, (atlas, *corner) in zip(shares, pictures, places, strict=True):
+        sides = textures[atlas].shape[:2]
+        row, column = ((corner + share * picture.shape[:2]) / sides).T
+        uv.append(np.stack([column, 1 - row], axis=-1))  # its origin is at the bottom left
     atlas_of_face = np.repeat([place[0] for place in places], surface.n_faces)
     parts = []
     for index, texture in enumerate(textures):
         faces = surface.faces[seen & (atlas_of_face == index)]
-        used, compact = np.unique(faces, return_inverse=True)
-        compact = compact.reshape(-1, 3)
-        parts.append(MeshPart(f"scan-{index}", points_m[used], compact, uv[used], texture))
+        whole = MeshPart(f"scan-{index}", points_m, faces, np.concatenate(uv), texture)
+        parts.append(whole.over(faces))
     return TexturedMesh(tuple(parts))
-
-
-def _uv(
-    shares: NDArray[np.float64],
-    picture: tuple[int, ...],
-    place: tuple[int, int, int],
-    texture: tuple[int, ...],
-) -> NDArray[np.float64]:
-    """Texture coordinates (V, 2), origin bottom left, of places on a picture (row, column)."""
-    _, row, column = place
-    u = (column + shares[:, 1] * picture[1]) / texture[1]
-    v = 1 - (row + shares[:, 0] * picture[0]) / texture[0]
-    return np.stack([u, v], axis=-1)
 
 
 ATLAS_PX = 4096

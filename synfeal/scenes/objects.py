@@ -18,7 +18,7 @@ from synfeal.mesh.save import save_glb
 from synfeal.mesh.standing import Ground, described, moved
 from synfeal.scenes import fronts
 from synfeal.scenes.canvas import pick
-from synfeal.scenes.patches import box
+from synfeal.scenes.patches import Maker
 from synfeal.scenes.pictures import VIVID
 from synfeal.seeds import generator_of
 
@@ -87,7 +87,7 @@ def _carton(clutter: ClutterConfig, rng: np.random.Generator) -> TexturedMesh:
     wide, deep, high = rng.uniform(*clutter.size_m, 3)
     painter = partial(fronts.label, colour=pick(rng, VIVID))
     parts = []
-    for patch in box(rng, (wide, deep, high), painter, 120).patches:
+    for patch in Maker(rng).box((wide, deep, high), painter, 120).patches:
         rows, columns = patch.points_m.shape[:2]
         index = np.arange(rows * columns).reshape(rows, columns)
         a, b, c, d = (i.ravel() for i in (index[:-1, :-1], index[:-1, 1:], index[1:, :-1],

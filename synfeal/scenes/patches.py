@@ -1,11 +1,11 @@
 """Patches, the one element of a procedural scene: grids of points with a picture on each.
 
-Then grids for the shapes a room is made of, and boxes and turned shapes as items.
+Then grids for the shapes a room is made of, and boxes, turned shapes and pipes as items.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -65,30 +65,6 @@ def bilinear(
     return mixed.astype(grid.dtype, copy=False)
 
 
-def extent_m(points: Points) -> tuple[float, float]:
-    """Height and width of a grid along its surface: mean length of its columns and of its rows."""
-    height = np.linalg.norm(np.diff(points, axis=0), axis=-1).sum(axis=0).mean()
-    width = np.linalg.norm(np.diff(points, axis=1), axis=-1).sum(axis=1).mean()
-    return float(height), float(width)
-
-
-def paint(
-    rng: np.random.Generator, points_m: Points, painter: Painter, px_per_m: float, glow: float = 0.0
-) -> Patch:
-    """A patch whose picture has ``DETAIL * px_per_m`` texels per metre, at least 4 a side.
-
-    Whatever the painter draws gets a fine grain, so that no surface is flat from nearby.
-    """
-    scale = DETAIL * px_per_m
-    height_m, width_m = extent_m(points_m)
-    canvas = Canvas(rng, max(4, round(height_m * scale)), max(4, round(width_m * scale)), scale)
-    picture = painter(canvas)
-    if not glow:
-        picture = picture * (1 + np.float32(GRAIN) * canvas.noise(GRAIN_M, 2))[..., None]
-    quantised = np.round(np.clip(picture, 0, 1) * 255).astype(np.uint8)
-    return Patch(np.asarray(points_m, np.float64), quantised, glow)
-
-
 @dataclass(frozen=True)
 class Item:
     """A thing in a room: its patches."""
@@ -101,25 +77,19 @@ class Item:
         cos, sin = np.cos(yaw), np.sin(yaw)
         world_from_item = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         offset = np.array([x_m, y_m, z_m])
-        return Item(
-            tuple(
-                replace(patch, points_m=patch.points_m @ world_from_item.T + offset)
-                for patch in self.patches
-            )
-        )
+        return self._with(lambda points_m: points_m @ world_from_item.T + offset)
 
     def clipped(self, lower_m: tuple[float, ...], upper_m: tuple[float, ...]) -> Item:
         """The item pressed flat where it would stick out of a box, as leaves are by a wall."""
-        return Item(
-            tuple(
-                replace(patch, points_m=np.clip(patch.points_m, lower_m, upper_m))
-                for patch in self.patches
-            )
-        )
+        return self._with(lambda points_m: np.clip(points_m, lower_m, upper_m))
+
+    def _with(self, moved: Callable[[Points], Points]) -> Item:
+        return Item(tuple(replace(p, points_m=moved(p.points_m)) for p in self.patches))
 
 
-def joined(items: Iterable[Item]) -> Item:
-    """Several items as one."""
+def joined(*things: Item | Iterable[Item]) -> Item:
+    """Several items as one, in their order."""
+    items = (each for thing in things for each in ([thing] if isinstance(thing, Item) else thing))
     return Item(tuple(patch for item in items for patch in item.patches))
 
 
@@ -133,13 +103,10 @@ def sheet(corners_m: ArrayLike) -> Points:
 
 
 def upright(
-    start_xy: tuple[float, float], end_xy: tuple[float, float], low_m: float, high_m: float,
-    end_high_m: float | None = None,
-) -> Points:  # fmt: skip
+    start_xy: tuple[float, float], end_xy: tuple[float, float], low_m: float, high_m: float
+) -> Points:
     """A vertical sheet; from its front, ``start_xy`` is on the left and ``end_xy`` on the right."""
-    top_right = high_m if end_high_m is None else end_high_m
-    corners = [(*start_xy, high_m), (*end_xy, top_right), (*end_xy, low_m), (*start_xy, low_m)]
-    return sheet(corners)
+    return sheet([(*start_xy, high_m), (*end_xy, high_m), (*end_xy, low_m), (*start_xy, low_m)])
 
 
 def level(
@@ -151,79 +118,89 @@ def level(
     return sheet([(x0, y1, z_m), (x1, y1, z_m), (x1, y0, z_m), (x0, y0, z_m)])
 
 
-def box(
-    rng: np.random.Generator, size_m: tuple[float, float, float], painter: Painter, px_per_m: float,
-    faces: str = "fblrtu", front: Painter | None = None,
-) -> Item:  # fmt: skip
-    """A box on z = 0, centred in x and y.
+@dataclass(frozen=True)
+class Maker:
+    """The shapes that rooms are made of, each painted with the next numbers of a generator."""
 
-    ``faces`` names those built: front (−y), back, left (−x), right, top, under. ``front`` paints
-    the front differently.
-    """
-    half_x, half_y, high = size_m[0] / 2, size_m[1] / 2, size_m[2]
-    sides = {
-        "f": upright((-half_x, -half_y), (half_x, -half_y), 0, high),
-        "b": upright((half_x, half_y), (-half_x, half_y), 0, high),
-        "l": upright((-half_x, half_y), (-half_x, -half_y), 0, high),
-        "r": upright((half_x, -half_y), (half_x, half_y), 0, high),
-        "t": level((-half_x, half_x), (-half_y, half_y), high),
-        "u": level((-half_x, half_x), (-half_y, half_y), 0, face_down=True),
-    }
-    patches = tuple(
-        paint(rng, sides[face], front if face == "f" and front is not None else painter, px_per_m)
-        for face in faces
-    )
-    return Item(patches)
+    rng: np.random.Generator
 
+    def sheet(self, points_m: Points, painter: Painter, px_per_m: float, glow: float = 0.0) -> Item:
+        """A grid of points (R, C, 3) with a picture of ``DETAIL * px_per_m`` texels per metre.
 
-def turned(
-    rng: np.random.Generator, profile_m: ArrayLike, painter: Painter, px_per_m: float,
-    segments: int = 16,
-) -> Item:  # fmt: skip
-    """A surface of revolution about z: ``profile_m`` (K, 2) is (radius, z) from top to bottom."""
-    profile = np.asarray(profile_m, np.float64)
-    angle = np.linspace(-np.pi, np.pi, segments + 1)
-    ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    points = np.concatenate(
-        [
-            profile[:, None, :1] * ring,
-            np.broadcast_to(profile[:, None, 1:], (len(profile), segments + 1, 1)),
-        ],
-        axis=-1,
-    )
-    points[:, -1] = points[:, 0]
-    return Item((paint(rng, points, painter, px_per_m),))
+        At least 4 a side. Whatever the painter draws gets a fine grain, so that no surface is flat
+        from nearby.
+        """
+        scale = DETAIL * px_per_m
+        height_px, width_px = (
+            max(4, round(float(step.sum(axis=axis).mean()) * scale))
+            for axis in (0, 1)
+            for step in [np.linalg.norm(np.diff(points_m, axis=axis), axis=-1)]
+        )
+        canvas = Canvas(self.rng, height_px, width_px, scale)
+        picture = painter(canvas)
+        if not glow:
+            picture = picture * (1 + np.float32(GRAIN) * canvas.noise(GRAIN_M, 2))[..., None]
+        quantised = np.round(np.clip(picture, 0, 1) * 255).astype(np.uint8)
+        return Item((Patch(np.asarray(points_m, np.float64), quantised, glow),))
 
+    def box(
+        self, size_m: tuple[float, float, float], painter: Painter, px_per_m: float,
+        faces: str = "fblrtu", front: Painter | None = None,
+    ) -> Item:  # fmt: skip
+        """A box on z = 0, centred in x and y.
 
-def tube(
-    rng: np.random.Generator, path_m: ArrayLike, radius_m: float, painter: Painter, px_per_m: float,
-    segments: int = 8,
-) -> Patch:  # fmt: skip
-    """A pipe of constant radius along a polyline (K, 3)."""
-    path = np.asarray(path_m, np.float64)
-    tangent = np.gradient(path, axis=0)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    helper = np.eye(3)[np.argmin(np.abs(tangent).max(axis=0))]
-    side = np.cross(tangent, helper)
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    other = np.cross(tangent, side)
-    angle = np.linspace(0, 2 * np.pi, segments + 1)[None, :, None]
-    points = path[:, None] + radius_m * (
-        np.cos(angle) * side[:, None] - np.sin(angle) * other[:, None]
-    )
-    points[:, -1] = points[:, 0]
-    return paint(rng, points, painter, px_per_m)
+        ``faces`` names those built: front (−y), back, left (−x), right, top, under. ``front``
+        paints the front differently.
+        """
+        x, y, high = size_m[0] / 2, size_m[1] / 2, size_m[2]
+        sides = {
+            "f": upright((-x, -y), (x, -y), 0, high),
+            "b": upright((x, y), (-x, y), 0, high),
+            "l": upright((-x, y), (-x, -y), 0, high),
+            "r": upright((x, -y), (x, y), 0, high),
+            "t": level((-x, x), (-y, y), high),
+            "u": level((-x, x), (-y, y), 0, face_down=True),
+        }
+        painters = {"f": front or painter}
+        return joined(self.sheet(sides[f], painters.get(f, painter), px_per_m) for f in faces)
 
+    def turned(
+        self, profile_m: ArrayLike, painter: Painter, px_per_m: float, segments: int = 16
+    ) -> Item:
+        """A surface of revolution about z: ``profile_m`` (K, 2) is (radius, z), top to bottom."""
+        profile = np.asarray(profile_m, np.float64)
+        angle = np.linspace(-np.pi, np.pi, segments + 1)
+        ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        height = np.broadcast_to(profile[:, None, 1:], (len(profile), segments + 1, 1))
+        points = np.concatenate([profile[:, None, :1] * ring, height], axis=-1)
+        points[:, -1] = points[:, 0]
+        return self.sheet(points, painter, px_per_m)
 
-def on_wall(
-    rng: np.random.Generator, centre_m: tuple[float, float, float], yaw_deg: float,
-    size_m: tuple[float, float], painter: Painter, px_per_m: float, depth_m: float = 0.02,
-    glow: float = 0.0,
-) -> Item:  # fmt: skip
-    """A flat picture with a thin rim, its back at ``centre_m``; at yaw 0 it faces −y."""
-    width, height = size_m
-    face = upright((-width / 2, -depth_m), (width / 2, -depth_m), -height / 2, height / 2)
-    front = paint(rng, face, painter, px_per_m, glow)
-    rim = box(rng, (width, depth_m, height), lambda c: c.plain((0.3, 0.3, 0.3)), 40, "lrtu")
-    rim = rim.placed(0, -depth_m / 2, -height / 2)
-    return Item((front, *rim.patches)).placed(*centre_m, yaw_deg)
+    def tube(
+        self, path_m: ArrayLike, radius_m: float, painter: Painter, px_per_m: float,
+        segments: int = 8,
+    ) -> Item:  # fmt: skip
+        """A pipe of constant radius along a polyline (K, 3)."""
+        path = np.asarray(path_m, np.float64)
+        tangent = np.gradient(path, axis=0)
+        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+        helper = np.eye(3)[np.argmin(np.abs(tangent).max(axis=0))]
+        side = np.cross(tangent, helper)
+        side /= np.linalg.norm(side, axis=1, keepdims=True)
+        other = np.cross(tangent, side)
+        angle = np.linspace(0, 2 * np.pi, segments + 1)[None, :, None]
+        ring = np.cos(angle) * side[:, None] - np.sin(angle) * other[:, None]
+        points = path[:, None] + radius_m * ring
+        points[:, -1] = points[:, 0]
+        return self.sheet(points, painter, px_per_m)
+
+    def on_wall(
+        self, centre_m: tuple[float, float, float], yaw_deg: float, size_m: tuple[float, float],
+        painter: Painter, px_per_m: float, depth_m: float = 0.02, glow: float = 0.0,
+    ) -> Item:  # fmt: skip
+        """A flat picture with a thin rim, its back at ``centre_m``; at yaw 0 it faces −y."""
+        width, height = size_m
+        face = upright((-width / 2, -depth_m), (width / 2, -depth_m), -height / 2, height / 2)
+        front = self.sheet(face, painter, px_per_m, glow)
+        rim = self.box((width, depth_m, height), lambda c: c.plain((0.3, 0.3, 0.3)), 40, "lrtu")
+        return joined(front, rim.placed(0, -depth_m / 2, -height / 2)).placed(*centre_m, yaw_deg)

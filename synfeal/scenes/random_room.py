@@ -7,22 +7,20 @@ so that a backbone trained on several of them learns what rooms have in common.
 from __future__ import annotations
 
 import colorsys
-from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from synfeal.mesh.model import TexturedMesh
 from synfeal.scenes import clutter, fronts, furniture, materials, murals, pictures
-from synfeal.scenes.bake import scanned_mesh
 from synfeal.scenes.canvas import Colour, Painter
 from synfeal.scenes.lighting import Lamp, Lighting, ambient_corners
-from synfeal.scenes.patches import Item, box, joined, level, on_wall, paint, upright
+from synfeal.scenes.patches import Item, Maker, joined, level, upright
 from synfeal.scenes.scan import Scanner, stations
 from synfeal.seeds import generator_of
 
 Generator = np.random.Generator
+Size = tuple[float, float, float]
 CELL_M = 0.1  # nobody compares these rooms with a scan, so they may be coarse
 PX_PER_M = 60  # for images of 100 pixels: a pixel covers 1 cm at 1 m
 GAP_M = (0.15, 0.6)  # between two things along a wall
@@ -44,17 +42,15 @@ class Wall(NamedTuple):
         )
 
 
-def build(seed: int) -> TexturedMesh:
-    """A furnished room of 12 to 50 square metres with its corner at the origin."""
+def ingredients(seed: int) -> tuple[Generator, Item, Lighting, Scanner]:
+    """What is scanned: a furnished room of 12 to 50 square metres with its corner at the origin."""
     rng = generator_of("scene", "random_room", seed)
     size = (rng.uniform(3.4, 6.5), rng.uniform(3.6, 7.5), rng.uniform(2.4, 3.6))
-    walls = _walls(size[0], size[1])
-    parts = [_shell(rng, size, walls), _free_standing(rng, size)]
-    parts += [thing for wall in walls for thing in _along(rng, wall, size[2])]
-    lower = (0.0, 0.0, 0.0)
-    inside = joined(parts).clipped(lower, size)
+    make, walls, lower = Maker(rng), _walls(size[0], size[1]), (0.0, 0.0, 0.0)
+    shell, inner = _shell(make, size, walls), _free_standing(make, size)
+    along = [thing for wall in walls for thing in _along(make, wall, size[2])]
     scanner = Scanner(CELL_M, stations(lower, size, (2, 2, 1)), lower, size)
-    return scanned_mesh(rng, inside, _lighting(rng, size), scanner)
+    return rng, joined(shell, inner, along).clipped(lower, size), _lighting(rng, size), scanner
 
 
 def _walls(x_m: float, y_m: float) -> tuple[Wall, ...]:
@@ -92,23 +88,18 @@ def _surface(rng: Generator) -> Painter:
     return choices[int(rng.integers(len(choices)))]
 
 
-def _shell(rng: Generator, size: tuple[float, float, float], walls: tuple[Wall, ...]) -> Item:
+def _shell(make: Maker, size: Size, walls: tuple[Wall, ...]) -> Item:
     x, y, z = size
-    patches = [
-        paint(rng, level((0, x), (0, y), 0.0), _surface(rng), PX_PER_M),
-        paint(rng, level((0, x), (0, y), z, face_down=True), _surface(rng), PX_PER_M),
-    ]
+    sheets = [level((0, x), (0, y), 0.0), level((0, x), (0, y), z, face_down=True)]
     for wall in walls:
-        start = np.array(wall.start_m)
-        end = start + wall.length_m * np.array(wall.along)
-        sheet = upright((start[0], start[1]), (end[0], end[1]), 0.0, z)
-        patches.append(paint(rng, sheet, _surface(rng), PX_PER_M))
-    return Item(tuple(patches))
+        end = np.array(wall.start_m) + wall.length_m * np.array(wall.along)
+        sheets.append(upright(wall.start_m, (end[0], end[1]), 0.0, z))
+    return joined(make.sheet(sheet, _surface(make.rng), PX_PER_M) for sheet in sheets)
 
 
-def _along(rng: Generator, wall: Wall, high_m: float) -> list[Item]:
+def _along(make: Maker, wall: Wall, high_m: float) -> list[Item]:
     """What stands along a wall and hangs above it, from its left end to its right one."""
-    things: list[Item] = []
+    rng, things = make.rng, list[Item]()
     at = rng.uniform(*GAP_M)
     while True:
         wide = rng.uniform(0.5, 1.6)
@@ -116,7 +107,7 @@ def _along(rng: Generator, wall: Wall, high_m: float) -> list[Item]:
             return things
         middle = at + wide / 2
         if rng.random() < 0.45:
-            item, deep, tall = _standing(rng, wide)
+            item, deep, tall = _standing(make, wide)
             things.append(wall.place(item, middle, deep / 2 + 0.01))
         else:
             tall = 0.6
@@ -124,13 +115,12 @@ def _along(rng: Generator, wall: Wall, high_m: float) -> list[Item]:
         if room_m > 0.5 and rng.random() < 0.85:
             hung = rng.uniform(0.4, min(room_m, 1.4))
             z = tall + 0.15 + rng.uniform(hung / 2, room_m - hung / 2)
-            picture = on_wall(rng, (0, 0, 0), 0, (wide, hung), _picture(rng), 150, 0.03, _glow(rng))
-            things.append(wall.place(picture, middle, 0.0, z))
+            painter, glow = _picture(rng), 0.0
+            if rng.random() < 0.2:
+                glow = rng.uniform(0.4, 0.9)
+            hanging = make.on_wall((0, 0, 0), 0, (wide, hung), painter, 150, 0.03, glow)
+            things.append(wall.place(hanging, middle, 0.0, z))
         at += wide + rng.uniform(*GAP_M)
-
-
-def _glow(rng: Generator) -> float:
-    return float(rng.uniform(0.4, 0.9)) if rng.random() < 0.2 else 0.0
 
 
 def _picture(rng: Generator) -> Painter:
@@ -149,67 +139,57 @@ def _picture(rng: Generator) -> Painter:
     return choices[int(rng.integers(len(choices)))]
 
 
-def _standing(rng: Generator, wide_m: float) -> tuple[Item, float, float]:
+def _standing(make: Maker, wide_m: float) -> tuple[Item, float, float]:
     """Something with its back to a wall, its depth and its height."""
+    rng = make.rng
     deep, tall = rng.uniform(0.3, 0.6), rng.uniform(0.5, 2.1)
     cloth = partial(materials.fabric, colour=_colour(rng), stripe=_colour(rng))
     doors, rows = int(rng.integers(1, 4)), int(rng.integers(1, 4))
-    shelves = max(2, round(tall / 0.4))
-    makers: list[Callable[[], tuple[Item, float, float]]] = [
-        lambda: (
-            furniture.cabinet(rng, (wide_m, deep, tall), _colour(rng), doors, rows),
-            deep,
-            tall,
-        ),
-        lambda: (furniture.bookshelf(rng, (wide_m, 0.3, tall), shelves), 0.3, tall),
-        lambda: (furniture.sofa(rng, max(wide_m, 1.0), cloth), 0.8, 0.8),
-        lambda: (clutter.plant(rng, min(tall, 1.4), _colour(rng), 30), 0.5, 1.4),
-    ]
-    return makers[int(rng.integers(len(makers)))]()
+    match int(rng.integers(4)):
+        case 0:
+            size = (wide_m, deep, tall)
+            return furniture.cabinet(make, size, _colour(rng), doors, rows), deep, tall
+        case 1:
+            shelves = max(2, round(tall / 0.4))
+            return furniture.bookshelf(make, (wide_m, 0.3, tall), shelves), 0.3, tall
+        case 2:
+            return furniture.sofa(make, max(wide_m, 1.0), cloth), 0.8, 0.8
+        case _:
+            return clutter.plant(make, min(tall, 1.4), _colour(rng), 30), 0.5, 1.4
 
 
-def _free_standing(rng: Generator, size: tuple[float, float, float]) -> Item:
+def _free_standing(make: Maker, size: Size) -> Item:
     """Rugs, tables with what lies on them, and chairs, away from the walls."""
-    things: list[Item] = []
+    rng, things = make.rng, list[Item]()
     for _ in range(int(rng.integers(1, 4))):
         x, y = rng.uniform((1.1, 1.1), (size[0] - 1.1, size[1] - 1.1))
         yaw, tall = rng.uniform(0, 360), rng.uniform(0.4, 0.78)
         wide, deep = rng.uniform(0.7, 1.5), rng.uniform(0.6, 0.9)
         top = partial(materials.wood, colour=_colour(rng), contrast=0.18)
-        table = [
-            furniture.table(rng, (wide, deep, tall), top, _colour(rng)),
-            clutter.on_table(rng, wide, deep).placed(0, 0, tall),
-        ]
-        seats = [
-            furniture.chair(rng, _colour(rng)).placed(
+        table = furniture.table(make, (wide, deep, tall), top, _colour(rng))
+        stuff = clutter.on_table(make, wide, deep).placed(0, 0, tall)
+        seats = (
+            furniture.chair(make, _colour(rng)).placed(
                 rng.uniform(-0.9, 0.9), rng.uniform(-0.9, 0.9), 0, rng.uniform(0, 360)
             )
             for _ in range(int(rng.integers(0, 3)))
-        ]
-        things.append(joined([*table, *seats]).placed(x, y, 0, yaw))
+        )
+        things.append(joined(table, stuff, seats).placed(x, y, 0, yaw))
     half = rng.uniform(0.6, 1.2, 2)
-    middle = rng.uniform((1.2, 1.2), (size[0] - 1.2, size[1] - 1.2))
+    x, y = rng.uniform((1.2, 1.2), (size[0] - 1.2, size[1] - 1.2))
     rug = partial(materials.rug, palette=_palette(rng, 4))
-    spread = level(
-        (middle[0] - half[0], middle[0] + half[0]),
-        (middle[1] - half[1], middle[1] + half[1]),
-        0.012,
-    )
-    things.append(Item((paint(rng, spread, rug, PX_PER_M),)))
-    post = box(rng, (0.2, 0.2, size[2]), _surface(rng), PX_PER_M, "fblr")
+    spread = level((x - half[0], x + half[0]), (y - half[1], y + half[1]), 0.012)
+    things.append(make.sheet(spread, rug, PX_PER_M))
+    post = make.box((0.2, 0.2, size[2]), _surface(rng), PX_PER_M, "fblr")
     if rng.random() < 0.3:
         things.append(post.placed(*rng.uniform((1, 1), (size[0] - 1, size[1] - 1))))
     return joined(things)
 
 
-def _lighting(rng: Generator, size: tuple[float, float, float]) -> Lighting:
-    def tint() -> Colour:
-        warm = rng.uniform(0.75, 1.25)
-        return (warm, 1.0, 2.0 - warm)
-
+def _lighting(rng: Generator, size: Size) -> Lighting:
     def scaled(share: float) -> Colour:
-        red, green, blue = tint()
-        return (share * red, share * green, share * blue)
+        warm = rng.uniform(0.75, 1.25)
+        return (share * warm, share, share * (2.0 - warm))
 
     lamps = [
         Lamp(
