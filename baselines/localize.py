@@ -24,7 +24,7 @@ from baselines.training.predict import BATCH, predict
 from synfeal.dataset.directories import writing_to
 from synfeal.dataset.packed import View, fit_frame
 from synfeal.dataset.pose_table import COLUMNS
-from synfeal.dataset.progress import Progress, Stopwatch
+from synfeal.dataset.progress import Progress
 from synfeal.errors import InputError, why
 from synfeal.frames import write_frame
 
@@ -81,9 +81,9 @@ def localize(
     _check_out(out, [model, *pictures])
     network_ms = _alone_ms(trained, _batch(trained, pictures[:1], []))
     read_s: list[float] = []
-    watch = Stopwatch()
+    began = time.perf_counter()
     position_m, quat_wxyz = _predict_all(trained, pictures, read_s)
-    seconds = watch.seconds
+    seconds = time.perf_counter() - began
     _write(out, pictures, np.concatenate([position_m, quat_wxyz], axis=1))
     good = np.isfinite(position_m).all(axis=1) & np.isfinite(quat_wxyz).all(axis=1)
     return Localized(
@@ -104,13 +104,13 @@ def _predict_all(
     poses = []
     with Progress(len(pictures), "localize") as progress:
         for start in range(0, len(pictures), BATCH):
-            watch = Stopwatch()
+            began = time.perf_counter()
             batch = pictures[start : start + BATCH]
             poses.append(predict(trained, _batch(trained, batch, read_s)))
             progress.update(len(batch))
             if len(pictures) > BATCH:
                 name = f"picture {start + len(batch)} of {len(pictures)}"
-                progress.part_done(name, len(batch), watch.seconds)
+                progress.part_done(name, len(batch), time.perf_counter() - began)
     position_m, quat_wxyz = zip(*poses, strict=True)
     return np.concatenate(position_m), np.concatenate(quat_wxyz)
 
@@ -121,9 +121,9 @@ def _batch(trained: TrainedLocalizer, pictures: Sequence[Path], read_s: list[flo
     px = network.input_px
     frames = np.empty((len(pictures), px, px, 3), np.uint8)
     for frame, path in zip(frames, pictures, strict=True):
-        watch = Stopwatch()
+        began = time.perf_counter()
         frame[:] = read_picture(path, px, network.view)
-        read_s.append(watch.seconds)
+        read_s.append(time.perf_counter() - began)
     return torch.from_numpy(frames).to(trained.device).permute(0, 3, 1, 2)
 
 

@@ -1,7 +1,6 @@
 """What rendering costs and is worth: errors in closed form, which variants, files, rows, figure."""
 
 import importlib.util
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ import pytest
 from synfeal.config.models import RenderConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
-from synfeal.frames import read_frame, records_of, write_frame
+from synfeal.frames import frame_of, read_frame, rows_of, write_frame
 from synfeal.geometry.rotations import quat_wxyz_from_matrix
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.save import save_glb
@@ -19,7 +18,7 @@ from synfeal.report.figures.registry import write_figures
 from synfeal.report.figures.sources import Results
 from synfeal.report.speed_vs_error import render_rows, speeds_of
 from synfeal.scenes import render_speed as speed
-from synfeal.scenes.render_speed_table import SCHEMA, Measured, write_speed
+from synfeal.scenes.render_speed import SCHEMA
 from tests.render_backends import BACKENDS, PYOPENGL_WARNS, camera_of
 from tests.report_results import design_of, read
 from tests.small_room import furnished_room, room_poses
@@ -27,7 +26,9 @@ from tests.small_room import furnished_room, room_poses
 pytestmark = pytest.mark.filterwarnings(PYOPENGL_WARNS)
 SMALL, LARGE = camera_of(width=48, height=36), camera_of(width=80, height=60)
 SIMPLIFIES = importlib.util.find_spec("meshoptimizer") is not None
-LINE = Measured("opengl", 128, 96, 2, 1.0, 1000, 8.0, 2.0, 35.0, 0.0, 0.0, 1)
+LINE = dict(
+    zip(SCHEMA, ("opengl", 128, 96, 2, 1.0, 1000, 8.0, 2.0, 35.0, 0.0, 0.0, 1), strict=True)
+)
 
 
 def room():
@@ -69,7 +70,7 @@ def test_depth_errors_look_where_both_hit():
 @pytest.fixture(scope="module")
 def lines():
     render = RenderConfig.model_validate({"backend": BACKENDS[0], "supersampling": 2})
-    return speed.measure_speed(room(), [SMALL, LARGE], room_poses(3, seed=1), render)
+    return rows_of(speed.measure_speed(room(), [SMALL, LARGE], room_poses(3, seed=1), render))
 
 
 def drawn_by(lines, camera, name):
@@ -158,10 +159,10 @@ def test_a_scene_is_measured_from_its_files(tmp_path):
     speed.write_render_speed(
         tmp_path / "mesh.glb", tmp_path / "test.csv", [SMALL], 2, RenderConfig(), out
     )
-    found = [Measured(**row) for row in records_of(read_frame(out, SCHEMA))]
-    assert found[0].backend == choose.fastest_working()
-    assert [line.chosen for line in found] == [1] + [0] * (len(found) - 1)
-    write_speed(tmp_path / "again.csv", found)
+    found = read_frame(out, SCHEMA)
+    assert found.backend[0] == choose.fastest_working()
+    assert list(found.chosen) == [1] + [0] * (len(found) - 1)
+    write_frame(tmp_path / "again.csv", found, float_format=None)
     assert (tmp_path / "again.csv").read_bytes() == out.read_bytes()
 
 
@@ -186,17 +187,25 @@ def test_a_file_that_is_no_measurement_is_named_in_one_line(tmp_path, text):
 
 MADE_UP = [
     LINE,
-    replace(LINE, supersampling=1, ms_per_frame=4.0, mean_abs_error=5.0, chosen=0),
-    replace(LINE, backend="raycast", ms_per_frame=32.0, chosen=0),
-    replace(LINE, texture_scale=0.25, ms_per_frame=7.0, mean_abs_error=3.0, chosen=0),
-    replace(LINE, faces=250, ms_per_frame=6.0, mean_abs_error=2.5, depth_error_mm=0.5, chosen=0),
-    replace(LINE, width=640, height=480, ms_per_frame=40.0, mean_abs_error=0.5),
+    LINE | {"supersampling": 1, "ms_per_frame": 4.0, "mean_abs_error": 5.0, "chosen": 0},
+    LINE | {"backend": "raycast", "ms_per_frame": 32.0, "chosen": 0},
+    LINE | {"texture_scale": 0.25, "ms_per_frame": 7.0, "mean_abs_error": 3.0, "chosen": 0},
+    LINE
+    | {
+        "faces": 250,
+        "ms_per_frame": 6.0,
+        "mean_abs_error": 2.5,
+        "depth_error_mm": 0.5,
+        "chosen": 0,
+    },
+    LINE | {"width": 640, "height": 480, "ms_per_frame": 40.0, "mean_abs_error": 0.5},
 ]
 
 
 @pytest.fixture
 def made_up(tmp_path):
-    write_speed(tmp_path / "scenes" / "large_room" / "render_speed.csv", MADE_UP)
+    path = tmp_path / "scenes" / "large_room" / "render_speed.csv"
+    write_frame(path, frame_of(MADE_UP, SCHEMA), float_format=None)
     speeds = speeds_of("render", ["large_room"], tmp_path)
     write_frame(tmp_path / "tables" / "speed_vs_error.csv", speeds)
     return tmp_path

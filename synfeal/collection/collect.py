@@ -156,8 +156,8 @@ def _render(
     """Render the sequences that are not there."""
     config = job.config
     tasks = list(_tasks(job, plans, part))
-    missing = [task for task in tasks if not task.out.exists()]
-    n_frames, n_missing = (sum(len(task.poses) for task in some) for some in (tasks, missing))
+    missing = [(out, poses) for out, poses in tasks if not out.exists()]
+    n_frames, n_missing = (sum(len(poses) for _, poses in some) for some in (tasks, missing))
     studio = Studio(mesh, config.network_camera, config.render, config.network_depth)
     with Progress(n_frames, "collect", n_frames - n_missing) as progress:
         render_sequences(studio, missing, workers, progress)
@@ -167,7 +167,7 @@ def _tasks(job: CollectJob, plans: dict[Split, PoseTable], part: Path) -> Iterat
     suffix = SUFFIX if job.config.archive_sequences else ""
     for sequence in sequences_of(job.counts["train"], job.counts["test"], job.config.shard_frames):
         poses = plans[sequence.split].between(sequence.start, sequence.stop)
-        yield Task(part / f"{sequence.name}{suffix}", poses)
+        yield part / f"{sequence.name}{suffix}", poses
 
 
 LEAST_INPUT_PX = 32

@@ -26,10 +26,12 @@ def write_manifest(
     extra: Mapping[str, Any],
 ) -> None:
     """Write ``manifest.json``: camera, frame counts, hash of each sequence, versions, ``extra``."""
-    sequences = list(sequences)
+    sequences, record = list(sequences), camera_record(camera)
+    if camera.fx is not None:  # which replaced the field of view
+        del record["horizontal_fov_deg"]
     manifest = {
         "format": "7-Scenes; depth along the optical axis, millimetres, 65535 invalid",
-        "camera": _camera(camera),
+        "camera": record,
         "frames": {
             split: sum(len(s) for s in sequences if s.split == split) for split in ("train", "test")
         },
@@ -46,12 +48,6 @@ def write_manifest(
         **extra,
     }
     write_json(dataset_dir / MANIFEST, manifest)
-
-
-def _camera(camera: CameraConfig) -> dict[str, Any]:
-    """All values of a camera, intrinsics included, without the field of view that they replaced."""
-    unused = {"horizontal_fov_deg"} if camera.fx is not None else set()
-    return {**camera.model_dump(exclude=unused), **camera.intrinsics._asdict()}
 
 
 def camera_record(camera: CameraConfig) -> dict[str, Any]:

@@ -159,7 +159,7 @@ def write_packed_record(
         "render": render.model_dump(mode="json"),
         "plan_sha256": file_sha256(plan),
         "sha256": file_sha256(frames),
-        "shards": [{"name": path.stem, **_read_shard(path)} for path in shards],
+        "shards": [_read_shard(path) for path in shards],
         "versions": versions(),
     }
     write_json(frames.with_suffix(".json"), record)
@@ -171,7 +171,7 @@ def _read_shard(path: Path) -> dict[str, object]:
         frames, backend = record["frames"], record["backend"]
         if type(frames) is not int or type(backend) is not str:
             raise ValueError("frames must be a whole number, backend a name")
-        return {"frames": frames, "backend": backend}
+        return {"name": path.stem, "frames": frames, "backend": backend}
     except (OSError, ValueError, TypeError, LookupError) as error:
         raise InputError(
             f"{path}: cannot be read as the record of a shard ({why(error)}); render it again"

@@ -97,7 +97,7 @@ WRITERS = {".gif": _write_gif, ".mp4": _write_mp4}
 def _rows(columns: Sequence[Sequence[FrameFile]], names: Sequence[str]) -> Iterator[Image.Image]:
     """The frames of all data sets at one moment, until the shortest ends."""
     for moment in zip(*columns, strict=False):
-        tiles = [_tile(file) for file in moment]
+        tiles = [_tile(read_image(file, "RGB"), TILE_WIDTH_PX) for file in moment]
         height = max(tile.height for tile in tiles)
         row = Image.new("RGB", (TILE_WIDTH_PX * len(tiles), height + TITLE_PX))
         for index, (tile, name) in enumerate(zip(tiles, names, strict=True)):
@@ -106,10 +106,9 @@ def _rows(columns: Sequence[Sequence[FrameFile]], names: Sequence[str]) -> Itera
         yield row
 
 
-def _tile(file: FrameFile) -> Image.Image:
-    frame = read_image(file, "RGB")
-    height = max(1, round(frame.height * TILE_WIDTH_PX / frame.width))
-    return frame.resize((TILE_WIDTH_PX, height), Image.Resampling.LANCZOS)
+def _tile(frame: Image.Image, width: int) -> Image.Image:
+    height = max(1, round(frame.height * width / frame.width))
+    return frame.resize((width, height), Image.Resampling.LANCZOS)
 
 
 SHEET_FRAMES = 24
@@ -121,12 +120,11 @@ def write_contact_sheet(frames: Sequence[FrameFile], out: Path) -> None:
     """A grid of at most 24 frames, evenly spaced over ``frames`` (at least one)."""
     count = min(SHEET_FRAMES, len(frames))
     chosen = [frames[index * len(frames) // count] for index in range(count)]
-    first = read_image(chosen[0])
-    tile = (SHEET_TILE_PX, max(1, round(first.height * SHEET_TILE_PX / first.width)))
+    tiles = [_tile(read_image(path), SHEET_TILE_PX) for path in chosen]
+    width, height = tiles[0].size
     columns = min(SHEET_COLUMNS, count)
-    sheet = Image.new("RGB", (columns * tile[0], math.ceil(count / columns) * tile[1]))
-    for index, path in enumerate(chosen):
-        small = read_image(path).resize(tile, Image.Resampling.LANCZOS)
-        sheet.paste(small, (index % columns * tile[0], index // columns * tile[1]))
+    sheet = Image.new("RGB", (columns * width, math.ceil(count / columns) * height))
+    for index, tile in enumerate(tiles):
+        sheet.paste(tile, (index % columns * width, index // columns * height))
     with atomic_path(out) as temporary:
         sheet.save(temporary)

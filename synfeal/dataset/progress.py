@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from typing import Self
 
 from tqdm import tqdm
@@ -14,13 +13,7 @@ class Progress:
 
     def __init__(self, n_frames: int, name: str, n_done: int = 0) -> None:
         self._on_terminal = sys.stderr.isatty()
-        self._bar = tqdm(
-            total=n_frames,
-            initial=n_done,
-            unit="frame",
-            desc=name,
-            disable=not self._on_terminal,
-        )
+        self._bar = tqdm(total=n_frames, initial=n_done, unit="frame", desc=name, disable=None)
 
     def update(self, n_frames: int = 1) -> None:
         """Some more frames are done."""
@@ -38,15 +31,3 @@ class Progress:
 
     def __exit__(self, *_: object) -> None:
         self._bar.close()
-
-
-class Stopwatch:
-    """Seconds since it was made."""
-
-    def __init__(self) -> None:
-        self._begin = time.perf_counter()
-
-    @property
-    def seconds(self) -> float:
-        """Seconds so far."""
-        return time.perf_counter() - self._begin

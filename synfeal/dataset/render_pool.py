@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -16,21 +17,14 @@ from typing import Any
 
 from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable
-from synfeal.dataset.progress import Progress, Stopwatch
+from synfeal.dataset.progress import Progress
 from synfeal.dataset.render_sequence import effects_of, write_sequence
 from synfeal.effects.relight import open_scene
 from synfeal.errors import InputError
 from synfeal.render.base import Renderer
 
 POLL_S = 0.2
-
-
-@dataclass(frozen=True)
-class Task:
-    """A sequence to render: ``seq-01`` or ``seq-01.zip``, and its poses."""
-
-    out: Path
-    poses: PoseTable
+Task = tuple[Path, PoseTable]  # `seq-01` or `seq-01.zip`, and its poses
 
 
 @dataclass(frozen=True)
@@ -48,10 +42,10 @@ class Studio:
 
     def carry_out(self, renderer: Renderer, task: Task, on_frame: Callable[[], object]) -> float:
         """Render a sequence; seconds it took."""
-        watch = Stopwatch()
+        began, (out, poses) = time.perf_counter(), task
         effects = effects_of(self.camera, self.render)
-        write_sequence(renderer, task.poses, task.out, self.with_depth, on_frame, effects)
-        return watch.seconds
+        write_sequence(renderer, poses, out, self.with_depth, on_frame, effects)
+        return time.perf_counter() - began
 
 
 def render_sequences(studio: Studio, tasks: list[Task], workers: int, progress: Progress) -> None:
@@ -68,7 +62,7 @@ def render_sequences(studio: Studio, tasks: list[Task], workers: int, progress: 
         with studio.open() as renderer:
             for task in tasks:
                 seconds = studio.carry_out(renderer, task, progress.update)
-                progress.part_done(task.out.name, len(task.poses), seconds)
+                progress.part_done(task[0].name, len(task[1]), seconds)
 
 
 def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: Progress) -> None:
@@ -85,8 +79,8 @@ def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: 
             progress.update(n_seen - n_shown)
             n_shown = n_seen
             for future in ended:
-                task = running.pop(future)
-                progress.part_done(task.out.name, len(task.poses), future.result())
+                out, poses = running.pop(future)
+                progress.part_done(out.name, len(poses), future.result())
     except BrokenProcessPool:
         raise InputError(
             "collect: a worker process was killed, perhaps for lack of memory; what is done is"
@@ -97,35 +91,24 @@ def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: 
         executor.shutdown(cancel_futures=True)
 
 
-class _Worker:
-    """What a worker process keeps between sequences."""
-
-    def __init__(self, studio: Studio, n_done: Any, stop: Any) -> None:
-        self.studio = studio
-        self.n_done = n_done
-        self.stop = stop
-        self.renderer: Renderer | None = None
-
-    def on_frame(self) -> None:
-        """Count a frame, or give up when another worker failed or the person interrupted."""
-        with self.n_done.get_lock():
-            self.n_done.value += 1
-        if self.stop.is_set():
-            raise InputError("collect: stopped")
-
-
-_worker: _Worker | None = None
+_worker: dict[str, Any] = {}  # what a worker process keeps between sequences
 
 
 def _start_worker(studio: Studio, workers: int, n_done: Any, stop: Any) -> None:
     """Set up a worker process: it ends with its parent, and leaves Ctrl-C to it."""
-    global _worker
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     # Read by Mesa's software renderer when it starts.
     cpus = len(os.sched_getaffinity(0))
     os.environ.setdefault("LP_NUM_THREADS", str(max(1, cpus // workers)))
-    _worker = _Worker(studio, n_done, stop)
+
+    def on_frame() -> None:
+        with n_done.get_lock():
+            n_done.value += 1
+        if stop.is_set():  # another worker failed, or the person interrupted
+            raise InputError("collect: stopped")
+
+    _worker.update(studio=studio, on_frame=on_frame)
 
 
 def _end_with_parent() -> None:
@@ -136,7 +119,7 @@ def _end_with_parent() -> None:
 
 
 def _carry_out(task: Task) -> float:
-    assert _worker is not None
-    if _worker.renderer is None:
-        _worker.renderer = _worker.studio.open()
-    return _worker.studio.carry_out(_worker.renderer, task, _worker.on_frame)
+    studio: Studio = _worker["studio"]
+    if "renderer" not in _worker:
+        _worker["renderer"] = studio.open()
+    return studio.carry_out(_worker["renderer"], task, _worker["on_frame"])

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import tempfile
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from synfeal.dataset.directories import atomic_directory, refuse_existing, writi
 from synfeal.dataset.packed import View, fit_frame, new_packed
 from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable
-from synfeal.dataset.progress import Progress, Stopwatch
+from synfeal.dataset.progress import Progress
 from synfeal.dataset.sevenscenes import depth_mm_of, pose_text
 from synfeal.effects.apply import Frame, varied_frames
 from synfeal.effects.relight import open_scene
@@ -50,7 +49,7 @@ def render_sequence(
     Raises:
         InputError: the mesh cannot be read, or ``out`` is not empty.
     """
-    watch = Stopwatch()
+    began = time.perf_counter()
     with (
         writing_to(out, lambda: REMEDY),
         open_scene(mesh_path, camera, render) as renderer,
@@ -59,7 +58,11 @@ def render_sequence(
         write_sequence(
             renderer, poses, out, with_depth, progress.update, effects_of(camera, render)
         )
-    progress.part_done(out.name, len(poses), watch.seconds)
+    progress.part_done(out.name, len(poses), time.perf_counter() - began)
+
+
+THREADS = 4
+MOST_WAITING = 2 * THREADS  # frames in memory, whatever the length of the sequence
 
 
 def write_sequence(
@@ -72,13 +75,34 @@ def write_sequence(
 ) -> None:
     """Render every pose of the table; files are written while the next frames are rendered.
 
+    The directory they are written to gets its name when they are whole, so they need no temporary
+    ones. ``on_frame`` is called for each frame that is whole.
+
     Raises:
         OSError: a file cannot be written.
     """
-    with _new_sequence(out) as directory, FrameWriter(on_frame) as writer:
+    with _new_sequence(out) as directory, ThreadPoolExecutor(THREADS) as threads:
+        waiting: deque[Future[None]] = deque()
         frames = drawn(renderer, poses, with_depth, effects)
-        for number, (pose, frame) in enumerate(zip(poses.world_from_cam, frames, strict=True)):
-            writer.add(directory / f"frame-{number:06d}", pose, *frame)
+        try:
+            for number, (pose, frame) in enumerate(zip(poses.world_from_cam, frames, strict=True)):
+                stem = directory / f"frame-{number:06d}"
+                waiting.append(threads.submit(_write_frame, stem, pose, *frame))
+                while len(waiting) > (MOST_WAITING if number + 1 < len(poses) else 0):
+                    waiting.popleft().result()
+                    on_frame()
+        finally:
+            threads.shutdown(cancel_futures=True)
+
+
+def _write_frame(
+    stem: Path, world_from_cam: NDArray[np.float64], rgb: Rgb, depth_m: Depth | None
+) -> None:
+    """Write ``<stem>.color.png``, ``.pose.txt`` and, with depth, ``.depth.png``."""
+    if depth_m is not None:
+        stem.with_suffix(".depth.png").write_bytes(encode_png(depth_mm_of(depth_m)))
+    stem.with_suffix(".pose.txt").write_bytes(pose_text(world_from_cam).encode())
+    stem.with_suffix(".color.png").write_bytes(encode_png(rgb))
 
 
 def drawn(
@@ -154,69 +178,10 @@ def render_packed(
         new_packed(out, len(poses), input_px) as packed,
         Progress(len(poses), out.stem) as progress,
     ):
-        watch = Stopwatch()
+        began = time.perf_counter()
         frames = drawn(renderer, poses, False, effects_of(camera, chosen))
         for index, (rgb, _) in enumerate(frames):
             packed[index] = fit_frame(Image.fromarray(rgb), input_px, view)
             progress.update()
         write_json(out.with_suffix(".json"), {"frames": len(poses), "backend": chosen.backend})
-    progress.part_done(out.stem, len(poses), watch.seconds)
-
-
-THREADS = 4
-MOST_WAITING = 2 * THREADS  # frames in memory, whatever the length of the sequence
-
-
-class FrameWriter:
-    """Writes the files of frames; what went wrong on a thread is raised by the next call.
-
-    The directory they are written to gets its name when they are whole, so they need no temporary
-    ones. Leaving the context waits for what is under way.
-    """
-
-    def __init__(self, on_frame: Callable[[], object] = lambda: None) -> None:
-        """Call ``on_frame`` for each frame that is whole."""
-        self._on_frame = on_frame
-        self._threads = ThreadPoolExecutor(THREADS, thread_name_prefix="frames")
-        self._waiting: deque[Future[None]] = deque()
-
-    def add(
-        self, stem: Path, world_from_cam: NDArray[np.float64], rgb: Rgb, depth_m: Depth | None
-    ) -> None:
-        """Write ``<stem>.color.png``, ``.pose.txt`` and, with depth, ``.depth.png``.
-
-        Waits while too many frames are under way.
-
-        Raises:
-            OSError: an earlier frame could not be written.
-        """
-        while len(self._waiting) >= MOST_WAITING:
-            self._finish_one()
-        self._waiting.append(self._threads.submit(self._write, stem, world_from_cam, rgb, depth_m))
-
-    def _write(
-        self, stem: Path, world_from_cam: NDArray[np.float64], rgb: Rgb, depth_m: Depth | None
-    ) -> None:
-        if depth_m is not None:
-            stem.with_suffix(".depth.png").write_bytes(encode_png(depth_mm_of(depth_m)))
-        stem.with_suffix(".pose.txt").write_bytes(pose_text(world_from_cam).encode())
-        stem.with_suffix(".color.png").write_bytes(encode_png(rgb))
-
-    def _finish_one(self) -> None:
-        self._waiting.popleft().result()
-        self._on_frame()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        try:
-            while kind is None and self._waiting:
-                self._finish_one()
-        finally:
-            self._threads.shutdown(cancel_futures=True)
+    progress.part_done(out.stem, len(poses), time.perf_counter() - began)

@@ -82,11 +82,10 @@ def place_of(out: Path) -> Path:
 
 def clean_up(out: Path) -> bool:
     """Finish what a command left that was killed when ``out`` was complete; whether it was."""
-    left = out / WORK
-    if left.is_dir():
-        shutil.rmtree(left)
-        return True
-    return False
+    was_complete = (out / WORK).is_dir()
+    if was_complete:
+        shutil.rmtree(out / WORK)
+    return was_complete
 
 
 def _kept(part: Path) -> str:

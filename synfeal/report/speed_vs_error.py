@@ -30,7 +30,7 @@ from synfeal.report.label_error import SCHEMA as LABEL_ERROR
 from synfeal.report.layouts import SOURCES, TITLES
 from synfeal.scenes.collision import CURVE_HEADER
 from synfeal.scenes.effects_speed import SCHEMA as EFFECTS_SPEED
-from synfeal.scenes.render_speed_table import SCHEMA as RENDERED
+from synfeal.scenes.render_speed import SCHEMA as RENDERED
 
 # The table whose training runs are shown, and the part of their names that all of them share.
 TABLE = "table4_size"

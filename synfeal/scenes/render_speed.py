@@ -10,19 +10,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from synfeal.config.camera import CameraConfig
 from synfeal.config.rendering import RenderConfig
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.render_sequence import resolved
+from synfeal.frames import COUNT, NUMBER, TEXT, frame_of, write_frame
 from synfeal.mesh.detail import with_fewer_faces, with_smaller_textures
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.render import choose, open_renderer
 from synfeal.render.base import Depth, Renderer, Rgb
 from synfeal.render.reference import SAMPLES_PER_AXIS, reference_images
-from synfeal.scenes.render_speed_table import Measured, write_speed
 
 PAPER_CAMERA = CameraConfig(width=640, height=480)
 LARGEST_PX = 8192 // SAMPLES_PER_AXIS  # of a side, so that the reference is an image in OpenGL
@@ -30,6 +31,17 @@ SUPERSAMPLING = {"opengl": (1, 2, 3), "pyrender": (1, 2, 3), "raycast": (1, 2)}
 FACTORS = (2, 4)  # that textures are made smaller by, and triangles fewer
 ROUNDS = 2
 DEPTH_OFF_MM = 10.0
+
+# A row of ``render_speed.csv``: one way to draw the frames of one camera. ``texture_scale`` is the
+# side of the textures over that of the scene's own; errors of colour are from 64 samples per pixel,
+# in levels of 0 to 255 and as peak signal-to-noise ratio; those of depth from the full mesh's at
+# the same pixel centres, where both hit, and the share of these pixels off by more than 10 mm.
+SCHEMA = {
+    **{"backend": TEXT, "width": COUNT, "height": COUNT, "supersampling": COUNT},
+    **{"texture_scale": NUMBER, "faces": COUNT, "ms_per_frame": NUMBER},
+    **{"mean_abs_error": NUMBER, "psnr_db": NUMBER},
+    **{"depth_error_mm": NUMBER, "depth_off_share": NUMBER, "chosen": COUNT},
+}
 
 log = logging.getLogger("synfeal")
 Poses = NDArray[np.float64]
@@ -65,7 +77,7 @@ def write_render_speed(
     render: RenderConfig,
     out_csv: Path,
 ) -> None:
-    """Measure on poses spread evenly over a plan, and write one line per camera and variant.
+    """Measure on poses spread evenly over a plan, and write the rows; times differ between runs.
 
     Args:
         mesh_path: a mesh in the world frame.
@@ -73,14 +85,15 @@ def write_render_speed(
         cameras: as :func:`measured_cameras` gives them, smallest first.
         n_poses: views through the smallest; half as many through the others.
         render: what the profile renders with.
-        out_csv: the lines of :class:`synfeal.scenes.render_speed_table.Measured`.
+        out_csv: one row per camera and variant, columns :data:`SCHEMA`.
 
     Raises:
         InputError: the mesh or the plan cannot be read, or no backend works here.
     """
     plan = read_pose_table(plan_path).world_from_cam
     poses = plan[np.linspace(0, len(plan) - 1, min(n_poses, len(plan))).astype(int)]
-    write_speed(out_csv, measure_speed(load_mesh(mesh_path), cameras, poses, resolved(render)))
+    rows = measure_speed(load_mesh(mesh_path), cameras, poses, resolved(render))
+    write_frame(out_csv, rows, float_format=None)
 
 
 def measured_cameras(
@@ -97,8 +110,8 @@ def measured_cameras(
 
 def measure_speed(
     mesh: TexturedMesh, cameras: Sequence[CameraConfig], poses: Poses, render: RenderConfig
-) -> list[Measured]:
-    """Every variant through every camera, the chosen one of each camera first.
+) -> pd.DataFrame:
+    """Every variant through every camera, the chosen one of each camera first: ``SCHEMA``.
 
     Args:
         mesh: the scene.
@@ -108,12 +121,12 @@ def measure_speed(
     """
     chosen = Variant(mesh, render)
     details = less_detailed(chosen)
-    lines = []
+    rows = []
     for index, camera in enumerate(cameras):
         others = [*other_settings(chosen, with_slow=index == 0), *details]
-        lines += measure_camera(chosen, others, camera, poses if index == 0 else poses[::2])
+        rows += measure_camera(chosen, others, camera, poses if index == 0 else poses[::2])
         log.info("%dx%d: %d variants measured", camera.width, camera.height, len(others) + 1)
-    return lines
+    return frame_of(rows, SCHEMA)
 
 
 def other_settings(chosen: Variant, with_slow: bool) -> list[Variant]:
@@ -143,14 +156,14 @@ def less_detailed(chosen: Variant) -> list[Variant]:
 
 def measure_camera(
     chosen: Variant, others: Sequence[Variant], camera: CameraConfig, poses: Poses
-) -> list[Measured]:
+) -> list[dict[str, object]]:
     """Each variant beside the chosen one, in turns with it.
 
     What else the machine does slows both: their ratio is free of that, and is applied to the median
     of all times of the chosen one.
     """
     truth = truth_of(chosen, camera, poses)
-    beside, lines = [], []
+    beside = []
     with chosen.opened(camera) as yardstick:
         errors = [errors_of(yardstick, poses, truth)]
         for variant in others:
@@ -159,21 +172,19 @@ def measure_camera(
                 beside.append(seconds_of([yardstick, renderer], poses))
     chosen_ms = 1e3 * float(np.median([seconds[:, 0] for seconds in beside]))
     ratios = [1.0, *(float(np.median(seconds[:, 1] / seconds[:, 0])) for seconds in beside)]
-    for variant, ratio, wrong in zip([chosen, *others], ratios, errors, strict=True):
-        lines.append(
-            Measured(
-                backend=variant.render.backend,
-                width=camera.width,
-                height=camera.height,
-                supersampling=variant.render.supersampling,
-                texture_scale=variant.texture_scale,
-                faces=variant.mesh.n_faces,
-                ms_per_frame=round(chosen_ms * ratio, 4),
-                **wrong,
-                chosen=int(variant is chosen),
-            )
-        )
-    return lines
+    return [
+        {
+            "backend": variant.render.backend,
+            **{"width": camera.width, "height": camera.height},
+            "supersampling": variant.render.supersampling,
+            "texture_scale": variant.texture_scale,
+            "faces": variant.mesh.n_faces,
+            "ms_per_frame": round(chosen_ms * ratio, 4),
+            **wrong,
+            "chosen": int(variant is chosen),
+        }
+        for variant, ratio, wrong in zip([chosen, *others], ratios, errors, strict=True)
+    ]
 
 
 def truth_of(chosen: Variant, camera: CameraConfig, poses: Poses) -> Truth:
