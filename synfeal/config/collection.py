@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_origin
+from typing import Annotated, Any, ClassVar, Literal, Self, get_origin
 
 from pydantic import (
     BaseModel,
@@ -34,6 +34,12 @@ class Strict(BaseModel):
     """A model that refuses unknown keys and cannot be changed after it was checked."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+    unless_none: ClassVar[tuple[str, ...]] = ()  # keys that came later: older records lack them
+
+    @model_serializer(mode="wrap")
+    def _without_absent(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        values: dict[str, Any] = handler(self)
+        return {k: v for k, v in values.items() if v is not None or k not in self.unless_none}
 
     @field_validator("*", mode="before")
     @classmethod
@@ -119,6 +125,8 @@ class ClutterConfig(Strict):
 class SceneConfig(Strict):
     """One scene: where its mesh comes from and where the camera may go."""
 
+    unless_none = ("clutter",)
+
     source: Literal["procedural", "mesh"] = Field(
         description="`procedural`: a stand-in; `mesh`: a file"
     )
@@ -154,12 +162,6 @@ class SceneConfig(Strict):
     sizes: dict[SizeName, SizeConfig] = Field(
         default_factory=dict, description="data sets by the paper's names"
     )
-
-    @model_serializer(mode="wrap")
-    def _without_absent(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without the key where nothing stands about: records of such scenes stay the same."""
-        values: dict[str, Any] = handler(self)
-        return {k: v for k, v in values.items() if k != "clutter" or v is not None}
 
     @model_validator(mode="after")
     def _check(self) -> Self:

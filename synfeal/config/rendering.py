@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, model_validator
 
 from synfeal.config.collection import Channel, Count, NonNegative, Positive, Strict
 
@@ -87,6 +87,8 @@ class PathObjectsConfig(Strict):
 class EffectsConfig(Strict):
     """What is added to ideal frames, in the order of the keys; what is absent is not added."""
 
+    unless_none = ("clutter",)
+
     seed: Annotated[int, Field(ge=0, lt=2**63)] = Field(
         0, description="of noise, lights and the choice of paths"
     )
@@ -120,15 +122,11 @@ class EffectsConfig(Strict):
             )
         return self
 
-    @model_serializer(mode="wrap")
-    def _without_clutter(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without the key where nothing stands about: older records stay the same."""
-        values: dict[str, Any] = handler(self)
-        return {k: v for k, v in values.items() if k != "clutter" or v is not None}
-
 
 class RenderConfig(Strict):
     """How images are drawn."""
+
+    unless_none = ("effects",)
 
     backend: Literal["auto", "opengl", "pyrender", "raycast"] = Field(
         "auto", description="`auto`: the fastest that works here"
@@ -142,12 +140,6 @@ class RenderConfig(Strict):
     effects: EffectsConfig | None = Field(
         None, description="what is added to ideal frames (docs/variation.md)"
     )
-
-    @model_serializer(mode="wrap")
-    def _without_absent(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without the key where there are none: what is recorded of ideal frames stays the same."""
-        values: dict[str, Any] = handler(self)
-        return {k: v for k, v in values.items() if k != "effects" or v is not None}
 
 
 class RenderSpeedConfig(Strict):
