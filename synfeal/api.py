@@ -130,15 +130,10 @@ def _config(
 
 @dataclass(frozen=True)
 class Split:
-    """The frames of a split, in order.
+    """The frames of a split, in order."""
 
-    Attributes:
-        poses: their poses as a table; ``poses.path`` tells which straight path each is on.
-        images: files of the colour images; ``read_bytes()`` gives what one holds.
-    """
-
-    poses: PoseTable
-    images: list[FrameFile]
+    poses: PoseTable  # their poses as a table; ``poses.path`` tells which straight path each is on
+    images: list[FrameFile]  # files of the colour images; ``read_bytes()`` gives what one holds
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -151,18 +146,12 @@ class Split:
 
 @dataclass(frozen=True)
 class Dataset:
-    """A data set in the format of 7-Scenes.
-
-    Attributes:
-        path: its directory.
-        camera: intrinsics; of 7-Scenes where nothing says.
-        train, test: its splits.
-    """
+    """A data set in the format of 7-Scenes."""
 
     path: Path
-    camera: CameraConfig
-    train: Split
-    test: Split
+    camera: CameraConfig  # intrinsics; of 7-Scenes where nothing says
+    train: Split  # its splits
+    test: Split  # its splits
 
 
 def open_dataset(path: AnyPath) -> Dataset:

@@ -28,17 +28,11 @@ REMEDY = "make that table again"
 
 @dataclass(frozen=True)
 class Kind:
-    """What the cells of a column hold.
+    """What the cells of a column hold."""
 
-    Attributes:
-        dtype: of the column in memory.
-        optional: cells may be empty; in memory they are missing values.
-        expected: files must have the column; without it, all its cells are missing.
-    """
-
-    dtype: str
-    optional: bool = False
-    expected: bool = True
+    dtype: str  # of the column in memory
+    optional: bool = False  # cells may be empty; in memory they are missing values
+    expected: bool = True  # files must have the column; without it, all its cells are missing
 
 
 TEXT = Kind("str")

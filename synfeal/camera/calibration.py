@@ -12,26 +12,17 @@ Distortion = tuple[float, float, float, float, float]
 class Calibration:
     """Intrinsics in pixels of an image of ``width`` x ``height``.
 
-    Attributes:
-        width: pixels.
-        height: pixels.
-        fx: focal length along x, pixels.
-        fy: focal length along y, pixels.
-        cx: principal point from the left edge, pixels: the first pixel's centre is at 0.5.
-        cy: principal point from the top edge, pixels.
-        distortion: k1, k2, p1, p2, k3.
-
     Raises:
         ValueError: a value that no camera has; the message begins with the attribute.
     """
 
     width: int
     height: int
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    distortion: Distortion
+    fx: float  # focal length along x, pixels
+    fy: float  # focal length along y, pixels
+    cx: float  # principal point from the left edge, pixels: the first pixel's centre is at 0.5
+    cy: float  # principal point from the top edge, pixels
+    distortion: Distortion  # k1, k2, p1, p2, k3
 
     def __post_init__(self) -> None:
         for name in ("fx", "fy"):

@@ -14,23 +14,14 @@ Action = Callable[[argparse.Namespace], None]
 
 @dataclass(frozen=True)
 class Command:
-    """One sub-command of ``synfeal``.
+    """One sub-command of ``synfeal``."""
 
-    Attributes:
-        name: as it is typed.
-        summary: a few words for ``synfeal --help``.
-        description: a sentence for its own help.
-        example: a line a person may type.
-        options: its options.
-        action: carries it out; imports what it needs when it is called: ``--help`` is quick.
-    """
-
-    name: str
-    summary: str
-    description: str
-    example: str
-    options: tuple[Option, ...]
-    action: Action
+    name: str  # as it is typed
+    summary: str  # a few words for ``synfeal --help``
+    description: str  # a sentence for its own help
+    example: str  # a line a person may type
+    options: tuple[Option, ...]  # its options
+    action: Action  # carries it out; imports what it needs when it is called: ``--help`` is quick
 
     def __call__(self, arguments: argparse.Namespace) -> None:
         """Carry it out."""

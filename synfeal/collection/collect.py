@@ -39,17 +39,11 @@ SPLITS: tuple[Split, ...] = ("train", "test")
 
 @dataclass(frozen=True)
 class CollectJob:
-    """What to collect.
+    """What to collect."""
 
-    Attributes:
-        config: settings with one scene, of one size.
-        packed_px: side of packed frames that are written too, pixels, if any.
-        out: directory to create.
-    """
-
-    config: DatasetConfig
-    packed_px: int | None
-    out: Path
+    config: DatasetConfig  # settings with one scene, of one size
+    packed_px: int | None  # side of packed frames that are written too, pixels, if any
+    out: Path  # directory to create
 
     @property
     def scene(self) -> str:

@@ -37,15 +37,10 @@ ARCHIVE_DAMAGE = (
 
 @dataclass(frozen=True)
 class ArchivedFile:
-    """A file of an archived sequence, read like the path it has when it is unpacked.
+    """A file of an archived sequence, read like the path it has when it is unpacked."""
 
-    Attributes:
-        archive: ``<data set>/seq-01.zip``.
-        name: ``frame-000000.color.png``.
-    """
-
-    archive: Path
-    name: str
+    archive: Path  # ``<data set>/seq-01.zip``
+    name: str  # ``frame-000000.color.png``
 
     def __str__(self) -> str:
         return str(self.archive / self.name)

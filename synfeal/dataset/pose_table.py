@@ -26,20 +26,13 @@ UNIT_TOLERANCE = 1e-2
 
 @dataclass(frozen=True)
 class PoseTable:
-    """Poses of consecutive frames.
+    """Poses of consecutive frames."""
 
-    Attributes:
-        frame: (N,) index within the split.
-        path: (N,) index of the straight path.
-        position_m: (N, 3) camera centres in the world.
-        quat_wxyz: (N, 4) unit quaternions of ``world_from_cam``, w >= 0.
-        whole: the paths that the frames are of, all of their frames, where these are but a part.
-    """
-
-    frame: NDArray[np.int64]
-    path: NDArray[np.int64]
-    position_m: NDArray[np.float64]
-    quat_wxyz: NDArray[np.float64]
+    frame: NDArray[np.int64]  # (N,) index within the split
+    path: NDArray[np.int64]  # (N,) index of the straight path
+    position_m: NDArray[np.float64]  # (N, 3) camera centres in the world
+    quat_wxyz: NDArray[np.float64]  # (N, 4) unit quaternions of ``world_from_cam``, w >= 0
+    # the paths that the frames are of, all of their frames, where these are but a part
     whole: PoseTable | None = None
 
     def __len__(self) -> int:

@@ -36,17 +36,11 @@ def carton_files(mesh: Path) -> tuple[Path, ...]:
 
 @dataclass(frozen=True)
 class Crowd:
-    """A scene, and the objects that may stand about in it.
-
-    Attributes:
-        mesh: the scene.
-        kinds: the objects by name, in turn.
-        count: how many stand along a path, if there is place for them.
-    """
+    """A scene, and the objects that may stand about in it."""
 
     mesh: TexturedMesh
-    kinds: Sequence[tuple[str, TexturedMesh]]
-    count: int
+    kinds: Sequence[tuple[str, TexturedMesh]]  # the objects by name, in turn
+    count: int  # how many stand along a path, if there is place for them
 
     @cached_property
     def _corners(self) -> Array:

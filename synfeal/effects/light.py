@@ -25,23 +25,14 @@ STATES: dict[str, tuple[float, float, float]] = {
 
 @dataclass(frozen=True)
 class LightState:
-    """What the light of a path is.
+    """What the light of a path is."""
 
-    Attributes:
-        ev: brightness beside the scene's own, stops.
-        temperature_k: colour temperature; the scene's own is 6500.
-        wave_vectors: (K, 3) of the smooth change, radians per metre.
-        phases: (K,) radians.
-        amplitude_ev: of each of its waves, stops.
-        state: name in ``STATES``, where the scene's lights are switched.
-    """
-
-    ev: float
-    temperature_k: float
-    wave_vectors: NDArray[np.float64]
-    phases: NDArray[np.float64]
-    amplitude_ev: float
-    state: str | None = None
+    ev: float  # brightness beside the scene's own, stops
+    temperature_k: float  # colour temperature; the scene's own is 6500
+    wave_vectors: NDArray[np.float64]  # (K, 3) of the smooth change, radians per metre
+    phases: NDArray[np.float64]  # (K,) radians
+    amplitude_ev: float  # of each of its waves, stops
+    state: str | None = None  # name in ``STATES``, where the scene's lights are switched
 
     @property
     def weights(self) -> dict[str, float] | None:

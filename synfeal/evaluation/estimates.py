@@ -40,26 +40,16 @@ CONVENTIONS = {
 
 @dataclass(frozen=True)
 class Estimates:
-    """Poses read from a file or a directory.
+    """Poses read from a file or a directory."""
 
-    Attributes:
-        kind: what it was read as, e.g. ``an ACE result file``.
-        convention: that of ``kind``, which is how its poses are taken.
-        names: (N) what each pose is called, or the index of its frame.
-        places: (N) where each stands, for messages.
-        translation: (N, 3) fourth columns of the matrices.
-        quat: (N, 4) quaternions in the order of ``convention``; not a number where a matrix is no
-            rotation.
-        ordered: names are indices of frames within the split (our own tables).
-    """
-
-    kind: str
-    convention: Convention
-    names: tuple[str, ...]
-    places: tuple[str, ...]
-    translation: Array
+    kind: str  # what it was read as, e.g. ``an ACE result file``.
+    convention: Convention  # that of ``kind``, which is how its poses are taken
+    names: tuple[str, ...]  # (N) what each pose is called, or the index of its frame
+    places: tuple[str, ...]  # (N) where each stands, for messages
+    translation: Array  # (N, 3) fourth columns of the matrices
+    # (N, 4) quaternions in the order of ``convention``; not a number where a matrix is no rotation
     quat: Array
-    ordered: bool = False
+    ordered: bool = False  # names are indices of frames within the split (our own tables)
 
     def is_rotation(self) -> NDArray[np.bool_]:
         """Which poses (N,) are finite with a quaternion of unit length."""

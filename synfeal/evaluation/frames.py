@@ -26,18 +26,12 @@ TIME_SLACK = 0.25  # of a frame
 
 @dataclass(frozen=True)
 class ScoredFrames:
-    """Frames of a split in order.
+    """Frames of a split in order."""
 
-    Attributes:
-        split: ``test``, ``train`` or ``all``.
-        frames: (N) their files.
-        world_from_cam: (N, 4, 4).
-        path: (N,) what the bootstrap draws: straight paths of our data sets, else sequences.
-    """
-
-    split: str
-    frames: tuple[Frame, ...]
-    world_from_cam: Array
+    split: str  # ``test``, ``train`` or ``all``
+    frames: tuple[Frame, ...]  # (N) their files
+    world_from_cam: Array  # (N, 4, 4)
+    # (N,) what the bootstrap draws: straight paths of our data sets, else sequences
     path: NDArray[np.int64]
 
     @property
@@ -89,15 +83,10 @@ def _paths(dataset: Path, split: str, frames: Sequence[Frame]) -> NDArray[np.int
 
 @dataclass(frozen=True)
 class Matched:
-    """Which estimate belongs to which frame.
+    """Which estimate belongs to which frame."""
 
-    Attributes:
-        row: (N,) of each frame, the estimate's row, -1 where there is none.
-        foreign: estimates of frames that are not scored.
-    """
-
-    row: NDArray[np.int64]
-    foreign: int
+    row: NDArray[np.int64]  # (N,) of each frame, the estimate's row, -1 where there is none
+    foreign: int  # estimates of frames that are not scored
 
 
 def match(frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float) -> Matched:

@@ -31,15 +31,10 @@ RESAMPLES = 1000
 
 @dataclass(frozen=True)
 class Bound:
-    """A bound on both errors.
+    """A bound on both errors."""
 
-    Attributes:
-        position_m: least position error that is outside.
-        orientation_deg: least orientation error that is outside.
-    """
-
-    position_m: float
-    orientation_deg: float
+    position_m: float  # least position error that is outside
+    orientation_deg: float  # least orientation error that is outside
 
     @property
     def _distance(self) -> tuple[str, str]:

@@ -40,49 +40,30 @@ DATASET, LABELS = "", "_labels"
 
 
 class Settings(NamedTuple):
-    """What a person may choose.
+    """What a person may choose."""
 
-    Attributes:
-        split: ``test``, ``train`` or ``all``.
-        align: whether estimates are first moved onto the yardstick, as a whole.
-        convention: a key of ``CONVENTIONS``; None takes the format's and checks it.
-        rate_hz: frames a second of time stamps.
-        labels: poses of the same frames as a second yardstick.
-        camera: calibration file, for the DCRE.
-    """
-
-    split: str = "test"
-    align: Align = "none"
-    convention: str | None = None
-    rate_hz: float = 30.0
-    labels: Path | None = None
-    camera: Path | None = None
+    split: str = "test"  # ``test``, ``train`` or ``all``
+    align: Align = "none"  # whether estimates are first moved onto the yardstick, as a whole
+    convention: str | None = None  # a key of ``CONVENTIONS``; None takes the format's and checks it
+    rate_hz: float = 30.0  # frames a second of time stamps
+    labels: Path | None = None  # poses of the same frames as a second yardstick
+    camera: Path | None = None  # calibration file, for the DCRE
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What was found.
+    """What was found."""
 
-    Attributes:
-        frames: what was scored.
-        estimates: what was read.
-        convention: as which its poses were taken.
-        matched: which estimate is of which frame.
-        rotations: (N,) frames whose estimate is a rotation.
-        errors: (N,) of all frames by name, infinite where there is no pose: ``position_m``,
-            ``orientation_deg``, ``dcre``, and the same ending in ``_labels``.
-        metrics: medians, means, recalls, with limits where there are enough paths.
-        scales: by ending, the scale of the alignment.
-    """
-
-    frames: ScoredFrames
-    estimates: Estimates
-    convention: Convention
-    matched: Matched
-    rotations: NDArray[np.bool_]
+    frames: ScoredFrames  # what was scored
+    estimates: Estimates  # what was read
+    convention: Convention  # as which its poses were taken
+    matched: Matched  # which estimate is of which frame
+    rotations: NDArray[np.bool_]  # (N,) frames whose estimate is a rotation
+    # (N,) of all frames by name, infinite where there is no pose: ``position_m``,
+    # ``orientation_deg``, ``dcre``, and the same ending in ``_labels``
     errors: dict[str, Array]
-    metrics: Metrics
-    scales: dict[str, float]
+    metrics: Metrics  # medians, means, recalls, with limits where there are enough paths
+    scales: dict[str, float]  # by ending, the scale of the alignment
 
     @property
     def ends(self) -> tuple[str, ...]:

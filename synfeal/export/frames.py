@@ -26,17 +26,11 @@ Place = Callable[[FrameFile, Path], None]
 
 @dataclass(frozen=True)
 class ExportFrame:
-    """One frame of a data set.
+    """One frame of a data set."""
 
-    Attributes:
-        frame: its files.
-        world_from_cam: (4, 4).
-        split: ``train`` or ``test``; None where the data set has no splits.
-    """
-
-    frame: Frame
-    world_from_cam: NDArray[np.float64]
-    split: str | None
+    frame: Frame  # its files
+    world_from_cam: NDArray[np.float64]  # (4, 4)
+    split: str | None  # ``train`` or ``test``; None where the data set has no splits
 
     @property
     def sequence(self) -> str:

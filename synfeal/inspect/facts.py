@@ -38,27 +38,16 @@ N_HOLES = 10  # of which the length is told
 
 @dataclass(frozen=True)
 class Inspection:
-    """What is known of a mesh.
+    """What is known of a mesh."""
 
-    Attributes:
-        scene: path, axis and unit as they were taken.
-        mesh: the mesh.
-        assumed: sentences about what the file did not say.
-        surface: points spread over the mesh.
-        caster: rays against it.
-        box_m: (2, 3) the box that was searched.
-        space: its free space.
-        suggestion: a sampling box that works, if one was found.
-    """
-
-    scene: SceneConfig
+    scene: SceneConfig  # path, axis and unit as they were taken
     mesh: TexturedMesh
-    assumed: tuple[str, ...]
-    surface: SurfacePoints
-    caster: RayCaster
-    box_m: Array
-    space: FreeSpace
-    suggestion: Suggestion | None
+    assumed: tuple[str, ...]  # sentences about what the file did not say
+    surface: SurfacePoints  # points spread over the mesh
+    caster: RayCaster  # rays against it
+    box_m: Array  # (2, 3) the box that was searched
+    space: FreeSpace  # its free space
+    suggestion: Suggestion | None  # a sampling box that works, if one was found
 
     @classmethod
     def of(cls, scene: SceneConfig, unit_is_given: bool) -> Self:

@@ -39,42 +39,27 @@ DEFINITION = (
 
 @dataclass(frozen=True)
 class Survey:
-    """What rays tell of a regular grid of points in a box; nothing is decided yet.
+    """What rays tell of a regular grid of points in a box; nothing is decided yet."""
 
-    Attributes:
-        axes_m: coordinates along x, y and z.
-        points_m: (N, 3) all points, x slowest.
-        enclosure: (N,) share of the rays that hit the mesh.
-        is_clear: (N,) at least 0.3 m from any surface.
-        is_stand: (N,) clear, and 0.8 to 2.0 m above what lies straight below.
-    """
-
-    axes_m: tuple[Array, Array, Array]
-    points_m: Array
-    enclosure: Array
-    is_clear: Mask
-    is_stand: Mask
+    axes_m: tuple[Array, Array, Array]  # coordinates along x, y and z
+    points_m: Array  # (N, 3) all points, x slowest
+    enclosure: Array  # (N,) share of the rays that hit the mesh
+    is_clear: Mask  # (N,) at least 0.3 m from any surface
+    is_stand: Mask  # (N,) clear, and 0.8 to 2.0 m above what lies straight below
 
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """A regular grid of points in a box, and which of them are free.
+    """A regular grid of points in a box, and which of them are free."""
 
-    Attributes:
-        axes_m: coordinates along x, y and z.
-        is_free: (X, Y, Z); see ``DEFINITION``.
-        is_clear: (X, Y, Z); free points at least 0.3 m from any surface.
-        enclosure: median over free points; 1 in a closed room.
-        floor_m: height at which most of the places to stand find a surface below; None without any.
-        elsewhere: places to stand as enclosed as these that cannot be seen from here, as a share
-            of all of them: other floors, other rooms.
-    """
-
-    axes_m: tuple[Array, Array, Array]
-    is_free: Mask
-    is_clear: Mask
-    enclosure: float
+    axes_m: tuple[Array, Array, Array]  # coordinates along x, y and z
+    is_free: Mask  # (X, Y, Z); see ``DEFINITION``
+    is_clear: Mask  # (X, Y, Z); free points at least 0.3 m from any surface
+    enclosure: float  # median over free points; 1 in a closed room
+    # height at which most of the places to stand find a surface below; None without any
     floor_m: float | None
+    # places to stand as enclosed as these that cannot be seen from here, as a share of all of them:
+    # other floors, other rooms
     elsewhere: float = 0.0
 
     @property

@@ -33,17 +33,12 @@ NARROW_M = 0.6  # least path and view in a space too narrow for the defaults
 
 @dataclass(frozen=True)
 class Suggestion:
-    """What was planned, and what came of it.
+    """What was planned, and what came of it."""
 
-    Attributes:
-        scene: with the suggested sampling box.
-        collection: how the camera moves; the defaults unless the space is too narrow for them.
-        empty: how much of the images would show nothing.
-    """
-
-    scene: SceneConfig
+    scene: SceneConfig  # with the suggested sampling box
+    # how the camera moves; the defaults unless the space is too narrow for them
     collection: CollectionConfig
-    empty: EmptyPixels
+    empty: EmptyPixels  # how much of the images would show nothing
 
     @property
     def box_m(self) -> Array:

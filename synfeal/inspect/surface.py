@@ -20,19 +20,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Points on the triangles of a mesh.
+    """Points on the triangles of a mesh."""
 
-    Attributes:
-        position_m: (N, 3), world, metres.
-        normal: (N, 3), unit length, of the triangle.
-        rgb: (N, 3) uint8.
-        is_drawn: (N,), False where the alpha test cuts the surface out.
-    """
-
-    position_m: Array
-    normal: Array
-    rgb: NDArray[np.uint8]
-    is_drawn: NDArray[np.bool_]
+    position_m: Array  # (N, 3), world, metres
+    normal: Array  # (N, 3), unit length, of the triangle
+    rgb: NDArray[np.uint8]  # (N, 3) uint8
+    is_drawn: NDArray[np.bool_]  # (N,), False where the alpha test cuts the surface out
 
     @classmethod
     def of(cls, mesh: TexturedMesh, rng: np.random.Generator, count: int = N_POINTS) -> Self:

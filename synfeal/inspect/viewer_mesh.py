@@ -30,21 +30,14 @@ STEPS = 32_000  # int16 on either side of the middle
 
 @dataclass(frozen=True)
 class ViewerMesh:
-    """What :file:`viewer.js` draws.
+    """What :file:`viewer.js` draws."""
 
-    Attributes:
-        positions: (V, 3) int16; metres are ``offset_m + step_m * positions``, world, z up.
-        rgb: (V, 3) uint8.
-        faces: (F, 3) uint32.
-        offset_m: (3,) middle of the mesh.
-        step_m: metres per unit of ``positions``.
-    """
-
+    # (V, 3) int16; metres are ``offset_m + step_m * positions``, world, z up
     positions: NDArray[np.int16]
-    rgb: NDArray[np.uint8]
-    faces: NDArray[np.uint32]
-    offset_m: Array
-    step_m: float
+    rgb: NDArray[np.uint8]  # (V, 3) uint8
+    faces: NDArray[np.uint32]  # (F, 3) uint32
+    offset_m: Array  # (3,) middle of the mesh
+    step_m: float  # metres per unit of ``positions``
 
     def scene(
         self, polylines: Sequence[tuple[ArrayLike, Sequence[int]]] = (), yaw_rad: float = ACROSS_RAD

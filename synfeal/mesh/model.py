@@ -14,26 +14,18 @@ WHITE = np.full(4, 255, np.uint8)
 
 @dataclass(frozen=True)
 class MeshPart:
-    """Triangles that share one material, in the world frame.
+    """Triangles that share one material, in the world frame."""
 
-    Attributes:
-        name: name of the part in its file, for messages.
-        vertices_m: (V, 3) float64, world, z up, metres.
-        faces: (F, 3) int64, indices into ``vertices_m``.
-        uv: (V, 2) float64 texture coordinates, origin at the BOTTOM left, or None.
-        texture: (H, W, 3 | 4) uint8, first row at the top, or None.
-        vertex_rgb: (V, 3) uint8, or None.
-        base_color: (4,) uint8; multiplies the texture or the vertex colours.
-        alpha_cutoff: fragments with less alpha than this are not drawn; None draws all of them.
-    """
-
-    name: str
-    vertices_m: NDArray[np.float64]
-    faces: NDArray[np.int64]
+    name: str  # name of the part in its file, for messages
+    vertices_m: NDArray[np.float64]  # (V, 3) float64, world, z up, metres
+    faces: NDArray[np.int64]  # (F, 3) int64, indices into ``vertices_m``
+    # (V, 2) float64 texture coordinates, origin at the BOTTOM left, or None
     uv: NDArray[np.float64] | None = None
-    texture: NDArray[np.uint8] | None = None
-    vertex_rgb: NDArray[np.uint8] | None = None
+    texture: NDArray[np.uint8] | None = None  # (H, W, 3 | 4) uint8, first row at the top, or None
+    vertex_rgb: NDArray[np.uint8] | None = None  # (V, 3) uint8, or None
+    # (4,) uint8; multiplies the texture or the vertex colours
     base_color: NDArray[np.uint8] = field(default_factory=WHITE.copy)
+    # fragments with less alpha than this are not drawn; None draws all of them
     alpha_cutoff: float | None = None
 
     @property
@@ -60,14 +52,10 @@ class MeshPart:
 
 @dataclass(frozen=True)
 class TexturedMesh:
-    """A scene: one or more parts in one world frame.
+    """A scene: one or more parts in one world frame."""
 
-    Attributes:
-        parts: what is drawn.
-        findings: what was named or repaired when the mesh was read, one sentence each.
-    """
-
-    parts: tuple[MeshPart, ...]
+    parts: tuple[MeshPart, ...]  # what is drawn
+    # what was named or repaired when the mesh was read, one sentence each
     findings: tuple[str, ...] = ()
 
     @property

@@ -45,24 +45,17 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Topology:
-    """What edges say about a mesh whose seam copies are merged.
+    """What edges say about a mesh whose seam copies are merged."""
 
-    Attributes:
-        components: pieces of triangles joined at vertices.
-        boundary_edges: edges of exactly one triangle.
-        non_manifold_edges: edges of more than two triangles.
-        hole_lengths_m: length of the rim of each hole, longest first; a hole is a set of boundary
-            edges joined at vertices, so holes that touch count as one.
-        watertight: whether every edge belongs to exactly two triangles.
-        enclosed_volume_m3: the signed volume inside, negative where triangles face inwards, as the
-            walls of a room do; None unless the mesh is watertight and neighbours face one side.
-    """
-
-    components: int
-    boundary_edges: int
-    non_manifold_edges: int
+    components: int  # pieces of triangles joined at vertices
+    boundary_edges: int  # edges of exactly one triangle
+    non_manifold_edges: int  # edges of more than two triangles
+    # length of the rim of each hole, longest first; a hole is a set of boundary edges joined at
+    # vertices, so holes that touch count as one
     hole_lengths_m: tuple[float, ...]
-    watertight: bool
+    watertight: bool  # whether every edge belongs to exactly two triangles
+    # the signed volume inside, negative where triangles face inwards, as the walls of a room do;
+    # None unless the mesh is watertight and neighbours face one side
     enclosed_volume_m3: float | None
 
 

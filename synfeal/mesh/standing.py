@@ -26,15 +26,10 @@ PATH_CLEARANCE_M = 0.25  # between an object and a camera that passes
 
 @dataclass(frozen=True)
 class Ground:
-    """What objects stand on, and must not touch.
+    """What objects stand on, and must not touch."""
 
-    Attributes:
-        corners: (N, 3, 3) of its triangles.
-        path_m: (P, 3) positions that a camera passes one after the other.
-    """
-
-    corners: Array
-    path_m: Array | None = None
+    corners: Array  # (N, 3, 3) of its triangles
+    path_m: Array | None = None  # (P, 3) positions that a camera passes one after the other
 
     @cached_property
     def _caster(self) -> RayCaster:

@@ -26,17 +26,11 @@ LIFT_M = 0.01  # rays stop this far in front of the surface they are to reach
 
 
 class SeenSurface(NamedTuple):
-    """Counts of surface points.
+    """Counts of surface points."""
 
-    Attributes:
-        visible: those that can be seen from the free space at all.
-        seen: of these, those in at least one frame.
-        seen_often: of these, those in at least ``OFTEN`` frames.
-    """
-
-    visible: int
-    seen: int
-    seen_often: int
+    visible: int  # those that can be seen from the free space at all
+    seen: int  # of these, those in at least one frame
+    seen_often: int  # of these, those in at least ``OFTEN`` frames
 
 
 def seen_surface(
@@ -107,17 +101,11 @@ MOSTLY = 0.5  # of a frame
 
 @dataclass(frozen=True)
 class EmptyPixels:
-    """Shares of what a plan's frames would see that is nothing.
+    """Shares of what a plan's frames would see that is nothing."""
 
-    Attributes:
-        share: of all pixels.
-        worst_frame_share: of the pixels of the emptiest frame.
-        mostly_empty_frames: share of the frames of which more than half is empty.
-    """
-
-    share: float
-    worst_frame_share: float
-    mostly_empty_frames: float
+    share: float  # of all pixels
+    worst_frame_share: float  # of the pixels of the emptiest frame
+    mostly_empty_frames: float  # share of the frames of which more than half is empty
 
 
 def empty_pixels(caster: RayCaster, plan: PoseTable, camera: CameraConfig) -> EmptyPixels:

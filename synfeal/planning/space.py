@@ -16,19 +16,12 @@ from synfeal.planning.target import admissible, has_free_view
 
 @dataclass(frozen=True)
 class PoseSpace:
-    """The poses of one sampling box in a mesh.
+    """The poses of one sampling box in a mesh."""
 
-    Attributes:
-        caster: rays against the mesh.
-        bounds: (2, 6) least and greatest value of each element of a pose vector.
-        min_view_distance_m: least free view, the paper's ``d``.
-        rng: where samples come from; each takes the next numbers.
-    """
-
-    caster: RayCaster
-    bounds: NDArray[np.float64]
-    min_view_distance_m: float
-    rng: np.random.Generator
+    caster: RayCaster  # rays against the mesh
+    bounds: NDArray[np.float64]  # (2, 6) least and greatest value of each element of a pose vector
+    min_view_distance_m: float  # least free view, the paper's ``d``
+    rng: np.random.Generator  # where samples come from; each takes the next numbers
 
     @classmethod
     def of_scene(

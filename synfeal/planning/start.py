@@ -69,15 +69,10 @@ N_CONNECTED = 256  # enough that a free place that sees none of their largest gr
 
 @dataclass(frozen=True)
 class ConnectedSpace:
-    """The largest free space of a scene, as what can be seen from places in it.
+    """The largest free space of a scene, as what can be seen from places in it."""
 
-    Attributes:
-        caster: rays against the mesh.
-        hubs_m: (H, 3) places connected to each other by free lines of sight.
-    """
-
-    caster: RayCaster
-    hubs_m: NDArray[np.float64]
+    caster: RayCaster  # rays against the mesh
+    hubs_m: NDArray[np.float64]  # (H, 3) places connected to each other by free lines of sight
 
     def contains(self, points_m: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether a free line joins each point (N, 3) to one of the hubs, (N,)."""

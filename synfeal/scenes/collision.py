@@ -33,30 +33,18 @@ log = logging.getLogger("synfeal")
 
 @dataclass(frozen=True)
 class Rung:
-    """What one face count was measured to cost and to be worth; a line of the curve.
+    """What one face count was measured to cost and to be worth; a line of the curve."""
 
-    Attributes:
-        faces: triangles of the mesh.
-        agreement: share of decisions equal to the full mesh's.
-        agreement_low, agreement_high: its 95 % limits (Wilson).
-        wrongly_admitted: candidates only this mesh admits; a camera would pass a surface.
-        wrongly_refused: candidates only the full mesh admits.
-        rays_per_s: rays answered per second within those decisions, median of several runs.
-        full_rays_per_s: the same of the full mesh, in turns with this one.
-        build_s: time simplification took, from the full mesh on.
-        chosen: 1 for the mesh that is used, else 0.
-    """
-
-    faces: int
-    agreement: float
-    agreement_low: float
-    agreement_high: float
-    wrongly_admitted: int
-    wrongly_refused: int
-    rays_per_s: int
-    full_rays_per_s: int
-    build_s: float
-    chosen: int = 0
+    faces: int  # triangles of the mesh
+    agreement: float  # share of decisions equal to the full mesh's
+    agreement_low: float  # its 95 % limits (Wilson)
+    agreement_high: float  # its 95 % limits (Wilson)
+    wrongly_admitted: int  # candidates only this mesh admits; a camera would pass a surface
+    wrongly_refused: int  # candidates only the full mesh admits
+    rays_per_s: int  # rays answered per second within those decisions, median of several runs
+    full_rays_per_s: int  # the same of the full mesh, in turns with this one
+    build_s: float  # time simplification took, from the full mesh on
+    chosen: int = 0  # 1 for the mesh that is used, else 0
 
 
 CURVE_HEADER = ",".join(field.name for field in fields(Rung))

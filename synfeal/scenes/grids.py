@@ -19,20 +19,13 @@ Shares = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Grid:
-    """Vertices of one patch, row by row.
+    """Vertices of one patch, row by row."""
 
-    Attributes:
-        points_m: (R, C, 3) metres.
-        normals: (R, C, 3) unit, towards the front.
-        inner_m: (R, C, 3) the points, those on the rim a little off the neighbouring patch.
-        rows, columns: (R,) and (C,) where they lie on the picture, from 0 (top, left) to 1.
-    """
-
-    points_m: Points
-    normals: Points
-    inner_m: Points
-    rows: Shares
-    columns: Shares
+    points_m: Points  # (R, C, 3) metres
+    normals: Points  # (R, C, 3) unit, towards the front
+    inner_m: Points  # (R, C, 3) the points, those on the rim a little off the neighbouring patch
+    rows: Shares  # (R,) and (C,) where they lie on the picture, from 0 (top, left) to 1
+    columns: Shares  # (R,) and (C,) where they lie on the picture, from 0 (top, left) to 1
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -125,23 +118,15 @@ def albedo_of(patch: Patch, grid: Grid) -> NDArray[np.float32]:
 
 @dataclass(frozen=True)
 class Surface:
-    """The grids of many patches as one surface, vertices in the order of the patches.
+    """The grids of many patches as one surface, vertices in the order of the patches."""
 
-    Attributes:
-        grids: the grid of every patch.
-        points_m, normals, inner_m: (V, 3), see :class:`Grid`.
-        faces: (F, 3) indices of vertices.
-        edges: (E, 2) vertices that are neighbours in a row or in a column.
-        n_faces: how many of them belong to each patch, in order.
-    """
-
-    grids: tuple[Grid, ...]
-    points_m: Points
-    normals: Points
-    inner_m: Points
-    faces: NDArray[np.int64]
-    edges: NDArray[np.int64]
-    n_faces: tuple[int, ...]
+    grids: tuple[Grid, ...]  # the grid of every patch
+    points_m: Points  # (V, 3), see :class:`Grid`
+    normals: Points  # (V, 3), see :class:`Grid`
+    inner_m: Points  # (V, 3), see :class:`Grid`
+    faces: NDArray[np.int64]  # (F, 3) indices of vertices
+    edges: NDArray[np.int64]  # (E, 2) vertices that are neighbours in a row or in a column
+    n_faces: tuple[int, ...]  # how many of them belong to each patch, in order
 
     def per_patch(self, values: NDArray[Real]) -> list[NDArray[Real]]:
         """Values (V, K) of all vertices as grids (R, C, K), one for each patch."""

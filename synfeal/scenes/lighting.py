@@ -49,22 +49,15 @@ class Sun:
 
 @dataclass(frozen=True)
 class Lighting:
-    """All light of a scene.
+    """All light of a scene."""
 
-    Attributes:
-        lower_m, upper_m: corners of the space the ambient light is given for.
-        ambient: (2, 2, 2, 3) ambient light at its corners by x, y, z; linear in between.
-        lamps: local sources.
-        sun: sunlight through openings, if any.
-        reach_m: how far away something still darkens the ambient light.
-    """
-
-    lower_m: tuple[float, float, float]
-    upper_m: tuple[float, float, float]
+    lower_m: tuple[float, float, float]  # corners of the space the ambient light is given for
+    upper_m: tuple[float, float, float]  # corners of the space the ambient light is given for
+    # (2, 2, 2, 3) ambient light at its corners by x, y, z; linear in between
     ambient: NDArray[np.float32]
-    lamps: Sequence[Lamp]
-    sun: Sun | None
-    reach_m: float = 1.5
+    lamps: Sequence[Lamp]  # local sources
+    sun: Sun | None  # sunlight through openings, if any
+    reach_m: float = 1.5  # how far away something still darkens the ambient light
 
     def ambient_at(self, points: Vectors) -> Vectors:
         """Ambient light (N, 3) at points (N, 3)."""

@@ -24,17 +24,12 @@ GRAIN_M = 0.006
 
 @dataclass(frozen=True)
 class Patch:
-    """A grid of points seen from its front: rows run down, columns run to the right.
+    """A grid of points seen from its front: rows run down, columns run to the right."""
 
-    Attributes:
-        points_m: (R, C, 3) metres.
-        picture: (H, W, 3) uint8 albedo that is stretched over the grid, proportional to length.
-        glow: 0 for a surface that only reflects light, 1 for one that shines by itself.
-    """
-
-    points_m: Points
+    points_m: Points  # (R, C, 3) metres
+    # (H, W, 3) uint8 albedo that is stretched over the grid, proportional to length
     picture: NDArray[np.uint8]
-    glow: float = 0.0
+    glow: float = 0.0  # 0 for a surface that only reflects light, 1 for one that shines by itself
 
     @property
     def row_shares(self) -> NDArray[np.float64]:

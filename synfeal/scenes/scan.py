@@ -24,18 +24,12 @@ LIFT_M = 0.01  # rays start this far in front of their surface
 
 @dataclass(frozen=True)
 class Scanner:
-    """How a scene is scanned.
+    """How a scene is scanned."""
 
-    Attributes:
-        cell_m: side of the cells the surface is divided into.
-        stations_m: (S, 3) where the scanner stood; what none of them sees becomes a hole.
-        lower_m, upper_m: corners of the room: the bounding box of the mesh.
-    """
-
-    cell_m: float
-    stations_m: Points
-    lower_m: tuple[float, float, float]
-    upper_m: tuple[float, float, float]
+    cell_m: float  # side of the cells the surface is divided into
+    stations_m: Points  # (S, 3) where the scanner stood; what none of them sees becomes a hole
+    lower_m: tuple[float, float, float]  # corners of the room: the bounding box of the mesh
+    upper_m: tuple[float, float, float]  # corners of the room: the bounding box of the mesh
 
 
 def stations(

@@ -87,19 +87,12 @@ def _list(path: Path) -> SequenceListing:
 
 @dataclass(frozen=True)
 class Check:
-    """One line of the report.
+    """One line of the report."""
 
-    Attributes:
-        name: what was checked, one or two words.
-        text: how much was checked, and the worst value beside its bound.
-        failures: one sentence each, naming the file; the first is printed.
-        skipped: nothing was checked, and ``text`` says why.
-    """
-
-    name: str
-    text: str
-    failures: tuple[str, ...] = ()
-    skipped: bool = False
+    name: str  # what was checked, one or two words
+    text: str  # how much was checked, and the worst value beside its bound
+    failures: tuple[str, ...] = ()  # one sentence each, naming the file; the first is printed
+    skipped: bool = False  # nothing was checked, and ``text`` says why
 
     @property
     def verdict(self) -> str:

@@ -89,17 +89,11 @@ SEVEN_SCENES = CameraConfig(width=640, height=480, fx=585.0, fy=585.0, cx=320.0,
 
 @dataclass(frozen=True)
 class KnownCamera:
-    """A camera and where it is known from.
+    """A camera and where it is known from."""
 
-    Attributes:
-        config: its intrinsics and distortion.
-        source: for the report.
-        assumed: nothing says that this is the camera.
-    """
-
-    config: CameraConfig
-    source: str
-    assumed: bool = False
+    config: CameraConfig  # its intrinsics and distortion
+    source: str  # for the report
+    assumed: bool = False  # nothing says that this is the camera
 
 
 def camera_of_dataset(dataset: Path, camera_file: Path | None) -> KnownCamera:

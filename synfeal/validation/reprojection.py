@@ -35,17 +35,11 @@ MAX_SHIFT_ERROR_PX = 0.05
 
 @dataclass(frozen=True)
 class View:
-    """One frame.
+    """One frame."""
 
-    Attributes:
-        world_from_cam: (4, 4).
-        depth_m: (H, W), inf where there is none.
-        grey: (H, W), 0 to 255.
-    """
-
-    world_from_cam: Array
-    depth_m: NDArray[Any]
-    grey: NDArray[Any]
+    world_from_cam: Array  # (4, 4)
+    depth_m: NDArray[Any]  # (H, W), inf where there is none
+    grey: NDArray[Any]  # (H, W), 0 to 255
 
     @cached_property
     def is_surface(self) -> NDArray[np.bool_]:
@@ -62,40 +56,28 @@ class View:
 
 @dataclass(frozen=True)
 class Residual:
-    """How far a pair of frames is from agreement; medians over the pixels both see.
+    """How far a pair of frames is from agreement; medians over the pixels both see."""
 
-    Attributes:
-        overlap: share of the pixels of a with depth that b sees, hidden ones included.
-        hidden: whether so many of them are behind what b sees that all that follows is NaN.
-        depth_mm: median difference in depth.
-        depth: the same, each difference as a multiple of what may differ there.
-        in_front: share of points that lie in front of what b sees, which cannot be.
-        grey: median difference of grey levels.
-        shift_px: by how much b's image must be moved, turned and zoomed to explain the differences
-            of grey best; NaN where there is too little texture to tell to 0.05 pixels.
-    """
-
-    overlap: float
+    overlap: float  # share of the pixels of a with depth that b sees, hidden ones included
+    # whether so many of them are behind what b sees that all that follows is NaN
     hidden: bool = True
-    depth_mm: float = math.nan
-    depth: float = math.nan
-    in_front: float = math.nan
-    grey: float = math.nan
+    depth_mm: float = math.nan  # median difference in depth
+    depth: float = math.nan  # the same, each difference as a multiple of what may differ there
+    in_front: float = math.nan  # share of points that lie in front of what b sees, which cannot be
+    grey: float = math.nan  # median difference of grey levels
+    # by how much b's image must be moved, turned and zoomed to explain the differences of grey
+    # best; NaN where there is too little texture to tell to 0.05 pixels
     shift_px: float = math.nan
 
 
 @dataclass(frozen=True)
 class _Seen:
-    """The pixels of a that b sees: predicted depth, depth and grey of b there, its gradient.
-
-    Attributes:
-        tolerance_m: by how much the two depths may differ.
-    """
+    """The pixels of a that b sees: predicted depth, depth and grey of b there, its gradient."""
 
     mask: NDArray[np.bool_]
     predicted_m: Array
     depth_m: Array
-    tolerance_m: Array
+    tolerance_m: Array  # by how much the two depths may differ
     grey: Array
     gradient: Array
 

@@ -20,19 +20,12 @@ MARGIN = 1e-4  # of the part's size: far beyond what single precision on the dev
 
 
 class Chunks(NamedTuple):
-    """Spatially sorted faces and the boxes around each run of ``FACES_PER_CHUNK`` of them.
+    """Spatially sorted faces and the boxes around each run of ``FACES_PER_CHUNK`` of them."""
 
-    Attributes:
-        vertices: (V,) which vertices are used, in the order of their first use.
-        faces: (F, 3) indices into ``vertices``.
-        lower_m: (C, 3) lower corners of the boxes.
-        upper_m: (C, 3) upper corners.
-    """
-
-    vertices: NDArray[np.int64]
-    faces: NDArray[np.int64]
-    lower_m: Floats
-    upper_m: Floats
+    vertices: NDArray[np.int64]  # (V,) which vertices are used, in the order of their first use
+    faces: NDArray[np.int64]  # (F, 3) indices into ``vertices``
+    lower_m: Floats  # (C, 3) lower corners of the boxes
+    upper_m: Floats  # (C, 3) upper corners
 
 
 def chunks_of(vertices_m: Floats, faces: NDArray[np.int64]) -> Chunks:

@@ -31,36 +31,22 @@ WHITE = np.full((1, 1, 3), 255, np.uint8)
 
 
 class View(NamedTuple):
-    """Where from and how finely the triangles are looked at, in their frame.
+    """Where from and how finely the triangles are looked at, in their frame."""
 
-    Attributes:
-        origin_m: (3,) position of the camera.
-        per_px: (2, 3) how rays change from pixel to pixel along x and y.
-        near_m: least depth.
-        far_m: greatest depth.
-    """
-
-    origin_m: Floats
-    per_px: Floats
-    near_m: float
-    far_m: float
+    origin_m: Floats  # (3,) position of the camera
+    per_px: Floats  # (2, 3) how rays change from pixel to pixel along x and y
+    near_m: float  # least depth
+    far_m: float  # greatest depth
 
 
 class Points(NamedTuple):
-    """Points on triangles.
+    """Points on triangles."""
 
-    Attributes:
-        rays: (N, 3) through which they are seen.
-        face: (N,) index of the triangle.
-        part: (N,) index of the drawn part.
-        depth_m: (N,) along the optical axis.
-        values: (N, 2 | 5) texture coordinates and, if any part has them, vertex colours, 0 to 1.
-    """
-
-    rays: Floats
-    face: Faces
-    part: NDArray[np.intp]
-    depth_m: Floats
+    rays: Floats  # (N, 3) through which they are seen
+    face: Faces  # (N,) index of the triangle
+    part: NDArray[np.intp]  # (N,) index of the drawn part
+    depth_m: Floats  # (N,) along the optical axis
+    # (N, 2 | 5) texture coordinates and, if any part has them, vertex colours, 0 to 1
     values: Floats
 
 
