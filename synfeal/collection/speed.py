@@ -24,26 +24,18 @@ FRAMES, PARTS = 100, 4
 
 
 def write_collection_speed(
-    mesh: Path,
-    collision: Path,
-    scene: SceneConfig,
-    collection: CollectionConfig,
-    render: RenderConfig,
-    seed: int,
+    mesh: Path,  # textured, in the world frame
+    collision: Path,  # mesh that rays are cast against
+    scene: SceneConfig,  # its sampling box
+    collection: CollectionConfig,  # how paths are planned
+    render: RenderConfig,  # how frames are drawn
+    seed: int,  # of the plan
+    # ``width``, ``height``, ``frames_per_s`` of each part, ``processor``, ``cores``
     out_json: Path,
 ) -> None:
     """Collect 100 frames of 640 x 480 in four parts and write how fast each was.
 
     A frame is a PNG file and its pose. The mesh is loaded once before, as in a job of any length.
-
-    Args:
-        mesh: textured, in the world frame.
-        collision: mesh that rays are cast against.
-        scene: its sampling box.
-        collection: how paths are planned.
-        render: how frames are drawn.
-        seed: of the plan.
-        out_json: ``width``, ``height``, ``frames_per_s`` of each part, ``processor``, ``cores``.
 
     Raises:
         InputError: a mesh cannot be read, or nothing can be collected there.

@@ -22,26 +22,17 @@ CLUTTER = "clutter.json"  # beside the mesh: which objects stand about in it, an
 
 
 def finish(
-    directory: Path,
-    counts: Mapping[Split, int],
-    shard_frames: int,
-    camera: CameraConfig,
-    mesh: Path,
-    origin: Mapping[str, Any],
-    packed_px: int | None = None,
+    directory: Path,  # where the sequences lie
+    counts: Mapping[Split, int],  # frames of each split
+    shard_frames: int,  # frames of a sequence
+    camera: CameraConfig,  # the camera of the frames
+    mesh: Path,  # ``mesh.glb`` of the scene; the manifest names its hash
+    origin: Mapping[str, Any],  # where they come from, see :func:`origin_of`
+    packed_px: int | None = None,  # side of packed frames that are written too, pixels, if any
 ) -> None:
     """Write split files, contact sheet and manifest beside the sequences of a data set.
 
     Its tables of poses name the images from then on.
-
-    Args:
-        directory: where the sequences lie.
-        counts: frames of each split.
-        shard_frames: frames of a sequence.
-        camera: the camera of the frames.
-        mesh: ``mesh.glb`` of the scene; the manifest names its hash.
-        origin: where they come from, see :func:`origin_of`.
-        packed_px: side of packed frames that are written too, pixels, if any.
     """
     sequences = sequences_of(counts["train"], counts["test"], shard_frames)
     paths = {s: sequence_at(directory / s.name) for s in sequences}

@@ -130,22 +130,14 @@ FORMATS: dict[View, str] = {
 
 
 def write_packed_record(
-    frames: Path,
-    shards: Sequence[Path],
-    plan: Path,
-    camera: CameraConfig,
-    render: RenderConfig,
-    view: View = "square",
+    frames: Path,  # packed frames
+    shards: Sequence[Path],  # records of the parts they were joined from, in order
+    plan: Path,  # pose table of the frames
+    camera: CameraConfig,  # what they were rendered through, before they were made smaller
+    render: RenderConfig,  # how they were rendered
+    view: View = "square",  # what of a frame was packed
 ) -> None:
     """Write ``<frames>.json`` in place of ``.npy``.
-
-    Args:
-        frames: packed frames.
-        shards: records of the parts they were joined from, in order.
-        plan: pose table of the frames.
-        camera: what they were rendered through, before they were made smaller.
-        render: how they were rendered.
-        view: what of a frame was packed.
 
     Raises:
         InputError: frames or the record of a shard cannot be read.

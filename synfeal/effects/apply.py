@@ -79,25 +79,15 @@ def _generator(what: str, config: EffectsConfig, poses: Poses, row: int) -> np.r
 
 
 def varied_frames(
-    renderer: Renderer,
-    camera: CameraConfig,
-    config: EffectsConfig,
-    poses: Poses,
-    begin: int,
-    end: int,
-    with_depth: bool,
+    renderer: Renderer,  # of the scene, through ``camera``
+    camera: CameraConfig,  # whose frames they are
+    config: EffectsConfig,  # what is added
+    poses: Poses,  # whole paths
+    begin: int,  # first row that is asked for
+    end: int,  # row after the last
+    with_depth: bool,  # whether depth is asked for; it is that of the middle of the exposure
 ) -> Iterator[Frame]:
-    """Draw the rows ``begin`` to ``end`` (exclusive) of ``poses`` with effects.
-
-    Args:
-        renderer: of the scene, through ``camera``.
-        camera: whose frames they are.
-        config: what is added.
-        poses: whole paths.
-        begin: first row that is asked for.
-        end: row after the last.
-        with_depth: whether depth is asked for; it is that of the middle of the exposure.
-    """
+    """Draw the rows ``begin`` to ``end`` (exclusive) of ``poses`` with effects."""
     for first, last in paths_of(poses):
         if first < end and last > begin:
             with _world_of(renderer, config, poses, first, last) as world:

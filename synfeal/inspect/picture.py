@@ -29,25 +29,15 @@ OUTLINE = [withStroke(linewidth=3, foreground="white")]
 
 
 def picture_png(
-    title: str,
-    caption: str,
-    top: TopView,
-    cut_m: float,
-    box_m: Array | None,
-    position_m: Array,
-    views: Sequence[Rgb],
+    title: str,  # heading
+    caption: str,  # one line below it
+    top: TopView,  # the mesh from above
+    cut_m: float,  # height above which ``top`` shows nothing
+    box_m: Array | None,  # (2, 3) the suggested sampling box, if there is one
+    position_m: Array,  # (3,) where ``views`` were taken
+    views: Sequence[Rgb],  # one image for each of ``YAWS_DEG``
 ) -> bytes:
-    """The picture as PNG, 1600 x 880 pixels.
-
-    Args:
-        title: heading.
-        caption: one line below it.
-        top: the mesh from above.
-        cut_m: height above which ``top`` shows nothing.
-        box_m: (2, 3) the suggested sampling box, if there is one.
-        position_m: (3,) where ``views`` were taken.
-        views: one image for each of ``YAWS_DEG``.
-    """
+    """The picture as PNG, 1600 x 880 pixels."""
     figure = Figure(figsize=SIZE_INCH, dpi=DPI)
     figure.text(0.02, 0.96, title, fontsize=17, weight="bold", va="center", parse_math=False)
     figure.text(0.02, 0.92, caption, fontsize=11, color="0.35", va="center", parse_math=False)

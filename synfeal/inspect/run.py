@@ -105,23 +105,14 @@ def _write(path: Path, content: bytes) -> None:
 
 
 def page_html(
-    title: str,
-    doubts: Sequence[str],
-    sections: Sequence[Section],
-    snippet: str,
-    picture_png: bytes,
-    scene: dict[str, Any],
+    title: str,  # heading
+    doubts: Sequence[str],  # sentences to stand out at the top
+    sections: Sequence[Section],  # tables of numbers
+    snippet: str,  # lines for a configuration file and for a shell
+    picture_png: bytes,  # the picture
+    scene: dict[str, Any],  # what :meth:`synfeal.inspect.viewer_mesh.ViewerMesh.scene` returns
 ) -> str:
-    """The page as HTML, with nothing to load from elsewhere.
-
-    Args:
-        title: heading.
-        doubts: sentences to stand out at the top.
-        sections: tables of numbers.
-        snippet: lines for a configuration file and for a shell.
-        picture_png: the picture.
-        scene: what :meth:`synfeal.inspect.viewer_mesh.ViewerMesh.scene` returns.
-    """
+    """The page as HTML, with nothing to load from elsewhere."""
     loader = PackageLoader("synfeal.inspect", ".")
     pages = Environment(loader=loader, autoescape=True, keep_trailing_newline=True)
     return pages.get_template("page.html").render(

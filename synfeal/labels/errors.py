@@ -32,24 +32,16 @@ OF_SPACE = ("bend", "scale")
 
 
 def with_error(
-    kind: str,
-    table: PoseTable,
-    train: PoseTable,
-    noise_m: float,
-    noise_deg: float,
+    kind: str,  # one of ``INJECTED``
+    table: PoseTable,  # true poses of a split
+    train: PoseTable,  # true poses of the training split
+    noise_m: float,  # median position error, metres
+    noise_deg: float,  # median orientation error, degrees; 0 with `scale`
+    # source of directions and shapes. In the same state for both splits where the error is one of
+    # space, in another for each split elsewhere.
     rng: np.random.Generator,
 ) -> PoseTable:
-    """The same frames with erroneous poses.
-
-    Args:
-        kind: one of ``INJECTED``.
-        table: true poses of a split.
-        train: true poses of the training split.
-        noise_m: median position error, metres.
-        noise_deg: median orientation error, degrees; 0 with `scale`.
-        rng: source of directions and shapes. In the same state for both splits where the error is
-            one of space, in another for each split elsewhere.
-    """
+    """The same frames with erroneous poses."""
     return _KINDS[kind](table, train, noise_m, noise_deg, rng)
 
 

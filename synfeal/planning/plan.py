@@ -78,29 +78,22 @@ def box_array(box: Box) -> Array:
 
 
 def plan_split(
-    caster: RayCaster,
+    caster: RayCaster,  # rays against the collision mesh
+    # (B, 2, 3), or (2, 3) for one: lower and upper corners of the spaces that camera centres are
+    # sampled in, metres
     boxes: Array,
-    scene: SceneConfig,
+    scene: SceneConfig,  # angle bounds and least view distance
+    # mode, candidates, frame spacing, least path length, interpolation
     collection: CollectionConfig,
-    n_frames: int,
-    rng: np.random.Generator,
-    split: str = "train",
+    n_frames: int,  # frames wanted, at least 1
+    rng: np.random.Generator,  # the only source of randomness; not used to repeat
+    split: str = "train",  # ``train`` or ``test``; which poses to repeat
 ) -> PoseTable:
     """Poses of ``n_frames`` frames of a split, as ``collection.mode`` says.
 
     ``path``: connected straight paths; the last may be cut short. ``random``: independent
     admissible poses, each a path of its own. ``repeat``: the poses of an earlier data set. Every
     box has paths of its own, and frames in proportion to its volume in every prefix of the plan.
-
-    Args:
-        caster: rays against the collision mesh.
-        boxes: (B, 2, 3), or (2, 3) for one: lower and upper corners of the spaces that camera
-            centres are sampled in, metres.
-        scene: angle bounds and least view distance.
-        collection: mode, candidates, frame spacing, least path length, interpolation.
-        n_frames: frames wanted, at least 1.
-        rng: the only source of randomness; not used to repeat.
-        split: ``train`` or ``test``; which poses to repeat.
 
     Raises:
         InputError: no frames wanted; no admissible pose found, which says what to relax; or the

@@ -39,23 +39,17 @@ class Questions:
 
 
 def draw_questions(
-    caster: RayCaster,
-    scene: SceneConfig,
-    box_m: NDArray[np.float64],
-    rng: np.random.Generator,
+    caster: RayCaster,  # rays against the undecimated mesh
+    scene: SceneConfig,  # angle bounds and least view distance
+    box_m: NDArray[np.float64],  # (2, 3) lower and upper corner of the space that is sampled
+    rng: np.random.Generator,  # the only source of randomness
+    # number of questions; all are independent of each other but for the first pose
     count: int = N_QUESTIONS,
 ) -> Questions:
     """Questions that planners of a scene would ask: the last candidates of ``count`` short walks.
 
     Each walk leaves the planner's first pose and goes to every admissible candidate it draws, so a
     start is always an admissible pose: no question starts in a cupboard or outside the room.
-
-    Args:
-        caster: rays against the undecimated mesh.
-        scene: angle bounds and least view distance.
-        box_m: (2, 3) lower and upper corner of the space that is sampled.
-        rng: the only source of randomness.
-        count: number of questions; all are independent of each other but for the first pose.
 
     Raises:
         InputError: the scene has no pose with a free view.

@@ -36,23 +36,16 @@ def admissible(
 
 
 def farthest_admissible(
-    caster: RayCaster,
-    start: NDArray[np.float64],
-    rounds: PoseVectors,
-    has_view: NDArray[np.bool_],
-    min_path_m: float,
+    caster: RayCaster,  # rays against the collision mesh
+    start: NDArray[np.float64],  # where the path starts, (6,)
+    rounds: PoseVectors,  # (R, k, 6) rounds of candidates
+    has_view: NDArray[np.bool_],  # (R, k) which have a free view, see :func:`has_free_view`
+    min_path_m: float,  # least length of a path
 ) -> tuple[int, int] | None:
     """Index of the first round with an admissible candidate, and there of the farthest.
 
     None if no round has an admissible candidate at least ``min_path_m`` from ``start`` (6,). The
     least length is the published collector's: a path of a few centimetres adds no new view.
-
-    Args:
-        caster: rays against the collision mesh.
-        start: where the path starts, (6,).
-        rounds: (R, k, 6) rounds of candidates.
-        has_view: (R, k) which have a free view, see :func:`has_free_view`.
-        min_path_m: least length of a path.
     """
     length_m = np.linalg.norm(rounds[..., :3] - start[:3], axis=-1)
     fit = has_view & (length_m >= min_path_m)

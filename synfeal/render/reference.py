@@ -19,17 +19,12 @@ SAMPLES_PER_AXIS = 8
 
 
 def reference_images(
+    # opens a renderer for a camera; best one without anti-aliasing of its own
     opened: Callable[[CameraConfig], Renderer],
-    camera: CameraConfig,
-    poses: Iterable[NDArray[np.float64]],
+    camera: CameraConfig,  # at most 1024 pixels wide and high
+    poses: Iterable[NDArray[np.float64]],  # ``world_from_cam``
 ) -> Iterator[NDArray[np.float32]]:
-    """Colours (H, W, 3) in 0 to 255, not rounded, seen from each pose (4, 4).
-
-    Args:
-        opened: opens a renderer for a camera; best one without anti-aliasing of its own.
-        camera: at most 1024 pixels wide and high.
-        poses: ``world_from_cam``.
-    """
+    """Colours (H, W, 3) in 0 to 255, not rounded, seen from each pose (4, 4)."""
     with opened(magnified(camera, SAMPLES_PER_AXIS)) as renderer:
         for world_from_cam in poses:
             yield box_means(renderer.render(world_from_cam), SAMPLES_PER_AXIS)

@@ -59,22 +59,17 @@ class Trial:
 
 
 def collision_mesh(
-    mesh: TexturedMesh,
-    scene: SceneConfig,
+    mesh: TexturedMesh,  # the scene
+    scene: SceneConfig,  # angle bounds and least view distance of its poses
+    # (2, 3) lower and upper corner of the space camera centres are sampled in
     box_m: NDArray[np.float64],
-    min_agreement: float,
+    min_agreement: float,  # least share of decisions that must be those of the full mesh
+    # draws the questions, see :func:`synfeal.planning.questions.draw_questions`
     rng: np.random.Generator,
 ) -> tuple[Triangles, list[Rung]]:
     """The smallest mesh on which a planner decides as on ``mesh``, and how it was chosen.
 
     Alpha-tested surfaces block as a whole: a camera does not fly through foliage.
-
-    Args:
-        mesh: the scene.
-        scene: angle bounds and least view distance of its poses.
-        box_m: (2, 3) lower and upper corner of the space camera centres are sampled in.
-        min_agreement: least share of decisions that must be those of the full mesh.
-        rng: draws the questions, see :func:`synfeal.planning.questions.draw_questions`.
 
     Raises:
         InputError: the scene has no pose with a free view.

@@ -70,22 +70,14 @@ class Truth:
 
 
 def write_render_speed(
-    mesh_path: Path,
-    plan_path: Path,
-    cameras: Sequence[CameraConfig],
-    n_poses: int,
-    render: RenderConfig,
-    out_csv: Path,
+    mesh_path: Path,  # a mesh in the world frame
+    plan_path: Path,  # table of poses
+    cameras: Sequence[CameraConfig],  # as :func:`measured_cameras` gives them, smallest first
+    n_poses: int,  # views through the smallest; half as many through the others
+    render: RenderConfig,  # what the profile renders with
+    out_csv: Path,  # one row per camera and variant, columns :data:`SCHEMA`
 ) -> None:
     """Measure on poses spread evenly over a plan, and write the rows; times differ between runs.
-
-    Args:
-        mesh_path: a mesh in the world frame.
-        plan_path: table of poses.
-        cameras: as :func:`measured_cameras` gives them, smallest first.
-        n_poses: views through the smallest; half as many through the others.
-        render: what the profile renders with.
-        out_csv: one row per camera and variant, columns :data:`SCHEMA`.
 
     Raises:
         InputError: the mesh or the plan cannot be read, or no backend works here.
