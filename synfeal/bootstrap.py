@@ -50,9 +50,8 @@ def seed_weights(n_seeds: int, rng: np.random.Generator, resamples: int = RESAMP
 def over_seeds(samples: Sequence[Array], weights: Array) -> Array:
     """Weighted mean of samples, resample by resample; a failed run among those drawn makes it fail.
 
-    Args:
-        samples: medians (1 + resamples,) of each seed.
-        weights: (1 + resamples, K) from :func:`seed_weights`.
+    Of medians (1 + resamples,) of each seed, with weights (1 + resamples, K) of
+    :func:`seed_weights`.
     """
     weighed = np.where(weights.T > 0, np.asarray(samples), 0.0) * weights.T
     return np.asarray(weighed.sum(axis=0))

@@ -35,15 +35,11 @@ class InputError(Exception):
 
 
 def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
-    """Carry out ``action``: 0, or 1 with ``error: ...`` for what a person can fix.
+    """Carry out what a command does: 0, or 1 with ``error: ...`` for what a person can fix.
 
     That is an :class:`InputError`, and what the system refuses: a full or read-only disk, a name
-    that is too long, links that lead in a circle.
-
-    Args:
-        action: what a command does.
-        if_interrupted: what Ctrl-C leaves behind, for the message of exit status 130, unless the
-            ``KeyboardInterrupt`` says it itself.
+    that is too long, links that lead in a circle. Ctrl-C is 130, with what it leaves behind:
+    ``if_interrupted``, unless the ``KeyboardInterrupt`` says it itself.
     """
     try:
         action()

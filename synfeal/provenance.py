@@ -30,12 +30,7 @@ CPU_INFO = Path("/proc/cpuinfo")
 
 
 def provenance(seed: int, config_hash: str) -> dict[str, Any]:
-    """What a sidecar file records, ready for JSON.
-
-    Args:
-        seed: root of all seeds.
-        config_hash: :func:`config_hash` of the configuration that was used.
-    """
+    """What a sidecar file records, ready for JSON; see :func:`config_hash`."""
     return {
         "commit": git_commit(Path(__file__).parent),
         "config_sha256": config_hash,

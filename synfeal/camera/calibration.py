@@ -40,11 +40,9 @@ class Calibration:
             raise ValueError(f"distortion: must be finite, found {list(self.distortion)}")
 
     def scaled(self, width: int | None, height: int | None) -> Calibration:
-        """The same lens before an image of another size, as when the image is resized.
+        """The same lens with an image of another size, in pixels, as when the image is resized.
 
-        Args:
-            width: pixels; follows from ``height`` when None.
-            height: pixels; follows from ``width`` when None.
+        A side that is None follows from the other.
 
         Raises:
             ValueError: the two sides would not keep the aspect ratio to the pixel.

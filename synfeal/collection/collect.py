@@ -66,11 +66,8 @@ class CollectJob:
 def collect(job: CollectJob, workers: int = 1) -> None:
     """Plan and render a data set into ``job.out``, which appears when it is complete.
 
-    What an earlier attempt made is kept and not made again.
-
-    Args:
-        job: what to collect.
-        workers: processes that render, each a sequence at a time.
+    ``workers`` processes render, each a sequence at a time. What an earlier attempt made is kept
+    and not made again.
 
     Raises:
         InputError: ``out`` is not empty, the mesh cannot be used, no admissible pose is found, an

@@ -66,9 +66,7 @@ def merge(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, Any
 def describe(error: ValidationError, model: type[BaseModel] = Config) -> str:
     """The first problem in one line: dotted key, what is wrong, what was found, what is allowed.
 
-    Args:
-        error: from the validation of ``model``.
-        model: whose keys are named where one is unknown.
+    ``model`` is what was validated: its keys are named where one is unknown.
     """
     first = error.errors()[0]
     key = ".".join(str(part) or "''" for part in first["loc"] if part != "[key]")

@@ -141,11 +141,9 @@ def _is_plain(name: str, prefix: str) -> bool:
 
 
 def write_archive(directory: Path, archive: Path) -> None:
-    """Pack the frames of a sequence; the archive appears, safe on the disk, when it is complete.
+    """Pack ``frame-*`` of a directory; the archive appears, safe on the disk, when it is complete.
 
-    Args:
-        directory: where ``frame-*`` lie.
-        archive: ``<data set>/seq-01.zip``; the same frames always give the same bytes.
+    The same frames always give the same bytes.
     """
     with atomic_path(archive) as temporary:
         with zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as packed:

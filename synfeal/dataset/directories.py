@@ -27,10 +27,8 @@ def refuse_existing(path: Path) -> None:
 def refuse_foreign(out: Path, own: Collection[str], origin: str) -> None:
     """Refuse a directory with anything but what an earlier command of the same kind wrote.
 
-    Args:
-        out: the directory, which need not exist.
-        own: names of the files that may be replaced.
-        origin: what writes them, as in "is not from a comparison".
+    ``own`` names the files that may be replaced; ``origin`` says what writes them, as in "is not
+    from a comparison".
 
     Raises:
         InputError: ``out`` is a file or holds other files.
@@ -49,9 +47,7 @@ def refuse_foreign(out: Path, own: Collection[str], origin: str) -> None:
 def writing_to(path: Path, remedy: Callable[[], str]) -> Iterator[None]:
     """Say in one line that a file could not be written: a full disk, a read-only one.
 
-    Args:
-        path: named where the system names no file.
-        remedy: what to do then.
+    Names ``path`` where the system names no file, and what to do then.
 
     Raises:
         InputError: in place of any OSError.

@@ -22,14 +22,9 @@ def write_numbers(path: Path, header: str, rows: Iterable[Sequence[float | str]]
 def read_numbers(
     path: Path, header: str, kind: str, finite: bool = True, passed_over: str = ""
 ) -> NDArray[np.float64]:
-    """Values (N, columns of ``header``) of a file.
+    """Values (N, columns of ``header``) of a file, whose ``kind`` messages name.
 
-    Args:
-        path: the file.
-        header: of its columns.
-        kind: names it in messages.
-        finite: whether all must be.
-        passed_over: a further, last column that it may have, of names.
+    It may have a further, last column of names, which is ``passed_over``.
 
     Raises:
         InputError: the file is missing, has another header, or holds anything but numbers; with

@@ -73,10 +73,7 @@ class PoseTable:
 def write_pose_table(path: Path, table: PoseTable, images: Sequence[str] = ()) -> None:
     """Write the table with enough digits to read back the same float64 values.
 
-    Args:
-        path: the file.
-        table: the poses.
-        images: names of the frames' images, if they are files.
+    ``images`` are names of the frames' images, if they are files.
     """
     arrays = [table.frame, table.path, *table.position_m.T, *table.quat_wxyz.T]
     columns = [*(array.tolist() for array in arrays), *([images] if images else [])]

@@ -110,11 +110,7 @@ def drawn(
 ) -> Iterator[Frame]:
     """Colours, and depth if it is asked for, of every pose: all frames of data sets come from here.
 
-    Args:
-        renderer: of the scene.
-        poses: what is drawn, as a part of the whole paths.
-        with_depth: whether depth is asked for.
-        effects: what is added to ideal frames, and through which camera; None draws them ideal.
+    ``effects`` are added to ideal frames, through their camera; None draws them ideal.
     """
     if effects is None:
         for pose in poses.world_from_cam:

@@ -27,9 +27,8 @@ SETTINGS, LOCK = "settings.json", "lock"
 def growing(out: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
     """The directory that becomes ``out`` when the block ends, with what earlier commands made.
 
-    Args:
-        out: from :func:`place_of`; must not exist yet, or be an empty directory.
-        settings: what decides its bytes, ready for JSON; another command's must be the same.
+    ``out`` is from :func:`place_of`, and must not exist yet or be an empty directory; ``settings``
+    are what decides its bytes, ready for JSON, and another command's must be the same.
 
     Raises:
         InputError: ``out`` is there already, cannot be written, grows from other settings, or

@@ -76,11 +76,8 @@ def checked_convention(
 ) -> None:
     """Refuse poses that another convention fits far better.
 
-    Args:
-        path: for the message.
-        estimates: all poses of the file.
-        rows: (M,) those that belong to a frame.
-        reference: (M, 4, 4) ``world_from_cam`` of these frames.
+    ``rows`` (M,) are those that belong to a frame, ``reference`` (M, 4, 4) the ``world_from_cam``
+    of these frames.
 
     Raises:
         InputError: naming the better convention, for ``--convention``.

@@ -68,15 +68,10 @@ def cell_depth_m(caster: RayCaster, camera: CameraConfig, world_from_cam: Array)
 
 
 def dcre(predicted: PoseTable, reference: PoseTable, depth_m: Array, camera: CameraConfig) -> Array:
-    """DCRE (N,) of predictions, as shares of the image's diagonal.
+    """DCRE (N,) of predictions against labels or true poses, as shares of the image's diagonal.
 
-    Infinite where a prediction is no pose, not a number where a frame shows nothing.
-
-    Args:
-        predicted: poses of the frames.
-        reference: labels or true poses of the same frames.
-        depth_m: (N, 48) of the frames' cells, from :func:`cell_depth_m`.
-        camera: pinhole and lens.
+    Infinite where a prediction is no pose, not a number where a frame shows nothing. ``depth_m`` is
+    (N, 48), of the frames' cells, from :func:`cell_depth_m`.
     """
     errors = np.full(len(predicted), np.inf)
     good = np.flatnonzero(is_pose(predicted))

@@ -66,9 +66,7 @@ class ExportSet:
 def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
     """The frames of a data set, all of which must be there with rigid poses.
 
-    Args:
-        dataset: directory with ``seq-01``.
-        camera_file: calibration file; without it the manifest says which camera.
+    Without ``camera_file``, a calibration, the manifest says which camera.
 
     Raises:
         InputError: frames or poses are missing or damaged, splits contradict each other, or the
@@ -134,10 +132,8 @@ def write_lines(path: Path, lines: Iterable[str]) -> None:
 def rewrite_depth(source: FrameFile, target: Path, units_per_m: int) -> float:
     """Write a depth image anew; returns the share of known depths that are too large for it.
 
-    Args:
-        source: 16-bit PNG in millimetres, 0 or 65535 where there is no depth.
-        target: 16-bit PNG to write, 0 where there is no depth or it is beyond 65535 units.
-        units_per_m: units of ``target`` in a metre.
+    From a 16-bit PNG in millimetres, 0 or 65535 where there is no depth, to one of ``units_per_m``,
+    0 where there is none or it is beyond 65535 units.
 
     Raises:
         InputError: ``source`` cannot be read.

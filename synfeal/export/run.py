@@ -29,14 +29,9 @@ FORMATS: dict[str, Exporter] = {
 
 
 def export(dataset: Path, to: str, out: Path, copy: bool, camera_file: Path | None) -> int:
-    """Write a data set in another format; returns the number of frames.
+    """Write a data set in another format, a key of ``FORMATS``; returns the number of frames.
 
-    Args:
-        dataset: directory with ``seq-01``.
-        to: one of ``FORMATS``.
-        out: directory to create.
-        copy: copy the colour images instead of linking to them.
-        camera_file: calibration file, where the data set has no manifest.
+    Colour images are linked to, or copied. A calibration file is needed where there is no manifest.
 
     Raises:
         InputError: ``out`` holds something, or the data set is damaged or its camera not known.

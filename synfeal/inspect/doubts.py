@@ -31,10 +31,7 @@ MAX_ELSEWHERE = 0.1
 def doubts_of(extents_m: Array, floors_m2: Array, space: FreeSpace) -> list[str]:
     """Sentences, each with what to try; empty if nothing looks wrong.
 
-    Args:
-        extents_m: (3,) size of the mesh.
-        floors_m2: (3,) what :func:`floor_areas_m2` found along x, y and z.
-        space: the free space of the mesh.
+    ``floors_m2`` (3,) is what :func:`floor_areas_m2` found along x, y and z.
     """
     doubts = [*_unit(extents_m), *_up_axis(floors_m2)]
     if space.floor_m is None:
@@ -57,12 +54,7 @@ def doubts_of(extents_m: Array, floors_m2: Array, space: FreeSpace) -> list[str]
 
 
 def colour_doubts(mesh: TexturedMesh, area_m2: dict[str, float]) -> list[str]:
-    """Whether there is anything to see.
-
-    Args:
-        mesh: the mesh.
-        area_m2: its surface by what colours it, from :func:`synfeal.inspect.surface.detail_of`.
-    """
+    """Whether there is anything to see; ``area_m2`` is the surface by what colours it."""
     if shows_one_colour(mesh):
         return [
             "the mesh is of one colour, and collect refuses it; put its texture files (of an OBJ"
@@ -95,12 +87,7 @@ def floor_areas_m2(normal: Array, position_m: Array, area_m2: float) -> Array:
     """Area (3,) of the largest floor if x, y or z pointed up.
 
     A floor is surface within 15 degrees of perpendicular to the axis, within 10 cm along it, in the
-    lower half of the mesh.
-
-    Args:
-        normal: (N, 3) of points spread evenly over the mesh.
-        position_m: (N, 3) of the same points.
-        area_m2: area of the mesh.
+    lower half of the mesh. From normals and positions (N, 3) of points spread evenly over it.
     """
     middle_m = (position_m.min(axis=0) + position_m.max(axis=0)) / 2.0
     areas = np.zeros(3)
@@ -143,11 +130,8 @@ def load_as_meant(
 ) -> tuple[SceneConfig, TexturedMesh, list[str]]:
     """The mesh in the unit and with the axis up that make a room of it.
 
-    What the person said is not changed, and nothing is while the mesh makes sense as it is.
-
-    Args:
-        scene: path, up axis and unit of the mesh.
-        unit_is_given: whether ``scene.unit_m`` is what the person said.
+    What the person said, such as the unit if it is given, is not changed, and nothing is while the
+    mesh makes sense as it is.
 
     Returns:
         The scene as it was taken, the mesh, and a sentence for each thing that was assumed.

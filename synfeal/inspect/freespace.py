@@ -69,14 +69,10 @@ class FreeSpace:
 
 
 def survey(caster: RayCaster, surface_m: Array, box_m: Array) -> Survey:
-    """Cast rays from a grid of points in a box.
+    """Cast rays from a grid of points in a box (2, 3), metres.
 
     Winding cannot tell inside from outside in a scan, which is open; what rays hit can.
-
-    Args:
-        caster: rays against the mesh.
-        surface_m: (N, 3) points spread densely over the mesh, metres.
-        box_m: (2, 3) lower and upper corner of the box to look in, metres.
+    ``surface_m`` (N, 3) are points spread densely over the mesh.
     """
     axes, step_m = _grid(box_m)
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -96,10 +92,7 @@ def survey(caster: RayCaster, surface_m: Array, box_m: Array) -> Survey:
 def find_free_space(caster: RayCaster, found: Survey, slack: float = SLACK) -> FreeSpace:
     """The largest space in which cameras see each other; see ``DEFINITION``.
 
-    Args:
-        caster: rays against the mesh.
-        found: what :func:`survey` found.
-        slack: by how much less enclosed a point may be than the best places to stand.
+    ``slack`` is by how much less enclosed a point may be than the best places to stand.
     """
     shape = tuple(len(axis) for axis in found.axes_m)
     nothing = np.zeros(shape, dtype=np.bool_)

@@ -32,12 +32,8 @@ BOX_RGB = (213, 94, 0)
 def inspect_mesh(scene: SceneConfig, out: Path, unit_is_given: bool = True) -> str:
     """Write ``inspect.json``, ``inspect.png`` and ``inspect.html`` into ``out``; the text to print.
 
-    Earlier files of these names are replaced.
-
-    Args:
-        scene: ``source`` is ``mesh``; a ``sampling_box`` confines the search for free space.
-        out: directory, made if need be.
-        unit_is_given: whether ``scene.unit_m`` may not be doubted.
+    Earlier files of these names are replaced. A ``sampling_box`` of the scene confines the search
+    for free space; its unit may be doubted unless it is given.
 
     Raises:
         InputError: the mesh cannot be used, the box misses it, or ``out`` holds other files.

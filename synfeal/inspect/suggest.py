@@ -72,11 +72,6 @@ def suggest(
 
     Boxes are tried in the most enclosed part of the space first, then in more of it, then with
     shorter paths. What is planned is what ``synfeal collect`` plans.
-
-    Args:
-        caster: rays against the mesh.
-        found: what :func:`synfeal.inspect.freespace.survey` found.
-        scene: path, axis, unit and angles.
     """
     spaces = [find_free_space(caster, found, slack) for slack in SLACKS]
     narrow = CollectionConfig(min_path_m=NARROW_M)
@@ -122,11 +117,9 @@ UNWANTED_WEIGHT = 2.0
 def largest_box(is_wanted: Mask) -> tuple[Corner, Corner]:
     """First and last indices, both included, of the box with the greatest worth.
 
-    Worth is the number of wanted points less twice the number of others. Every pair of limits
-    along x and z is tried; along y the best run of layers is found in one pass (Kadane).
-
-    Args:
-        is_wanted: (X, Y, Z) with at least one True.
+    Worth is the number of wanted points less twice the number of others; at least one of (X, Y, Z)
+    is wanted. Every pair of limits along x and z is tried; along y the best run of layers is found
+    in one pass (Kadane).
     """
     worth = np.where(is_wanted, 1.0, -UNWANTED_WEIGHT)
     best: tuple[float, Corner, Corner] = (-np.inf, (0, 0, 0), (0, 0, 0))

@@ -159,11 +159,6 @@ def back_face_share(mesh: TexturedMesh, caster: RayCaster, space: FreeSpace) -> 
     """Share of what random rays from the clear points of a space hit that is a back side.
 
     A face shows its front where its vertices run counter-clockwise. None if nothing is hit.
-
-    Args:
-        mesh: the mesh.
-        caster: rays against all of its faces, in their order.
-        space: where cameras can be.
     """
     index = np.argwhere(space.is_clear)
     if not len(index):

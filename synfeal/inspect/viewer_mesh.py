@@ -44,9 +44,8 @@ class ViewerMesh:
     ) -> dict[str, Any]:
         """The argument of ``synfealViewer``, ready for JSON.
 
-        Args:
-            polylines: points (N, 3) in world metres, and their colour (red, green, blue, 0 to 255).
-            yaw_rad: heading of the first view, 0 along x.
+        With lines through points (N, 3), metres, of a colour (0 to 255 each), and the heading of
+        the first view, 0 along x.
         """
         return {
             "positions": _base64(self.positions, "<i2"),

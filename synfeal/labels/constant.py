@@ -14,11 +14,7 @@ def constant_pose(train: PoseTable, frames: PoseTable) -> PoseTable:
 
     The mean rotation is the one with the least sum of squared chords (Markley et al., "Averaging
     Quaternions", JGCD 2007). Cameras that look all round have hardly a mean; then any rotation does
-    about as well.
-
-    Args:
-        train: labels that are averaged.
-        frames: what is predicted; its poses are not looked at.
+    about as well. The poses of the frames are not looked at.
     """
     mean = Rotation.from_quat(train.quat_wxyz, scalar_first=True).mean()
     quat_wxyz = canonical_quat_wxyz(mean.as_quat(scalar_first=True))

@@ -26,14 +26,9 @@ def add_noise(
 ) -> PoseTable:
     """The same frames with noisy poses; a noise of 0 leaves its part bit-identical.
 
-    Both sets of directions are drawn whatever the sizes, so with the same seed a variant with
-    position noise alone has the same displacements as the one with both.
-
-    Args:
-        table: clean labels.
-        noise_m: displacement of every position, metres.
-        noise_deg: rotation of every orientation, degrees.
-        rng: source of the directions.
+    Every position is displaced by ``noise_m``, every orientation turned by ``noise_deg``. Both sets
+    of directions are drawn whatever the sizes, so with the same seed a variant with position noise
+    alone has the same displacements as the one with both.
 
     Raises:
         ValueError: a size is negative.

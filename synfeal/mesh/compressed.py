@@ -43,9 +43,7 @@ def can_decode(extension: str) -> bool:
 def decoded(gltf: Gltf, read: Callable[[str], bytes]) -> Gltf:
     """The glTF with everything plain that can be decoded here; itself if nothing needs it.
 
-    Args:
-        gltf: as stored.
-        read: gives the content of a file the glTF refers to.
+    ``read`` gives the content of a file the glTF refers to.
 
     Raises:
         Exception: of any kind, as decoders of foreign files do on damaged ones.
@@ -210,9 +208,7 @@ class _Decoder:
 def decode_meshopt(data: bytes, stored: Json) -> bytes:
     """The plain content of a view compressed by meshoptimizer.
 
-    Args:
-        data: as stored.
-        stored: the extension of the view: ``count``, ``byteStride``, ``mode`` and ``filter``.
+    ``stored`` is its extension: ``count``, ``byteStride``, ``mode`` and ``filter``.
     """
     import meshoptimizer as meshopt
 

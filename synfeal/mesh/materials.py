@@ -167,9 +167,7 @@ SRGB_ATTRIBUTE = "_SRGB"  # beside glTF's linear colours: the display colours, e
 def part_colours(geometry: trimesh.Trimesh, is_linear: bool) -> Pixels | None:
     """Display colours (V, 3) uint8 of the vertices of a trimesh geometry, if it has any.
 
-    Args:
-        geometry: as parsed.
-        is_linear: whether the file stores linear colours, as glTF does.
+    ``is_linear`` says whether the file stores linear colours, as glTF does.
     """
     exact = geometry.vertex_attributes.get(SRGB_ATTRIBUTE)
     if exact is not None:

@@ -48,11 +48,7 @@ class Ground:
     ) -> tuple[Array, float] | None:
         """Where an object can stand (3,), and how it is turned; None after so many tries.
 
-        Args:
-            kind: the object.
-            bounds_m: (2, 3) corners of the space that it is let down from.
-            rng: of place and turn.
-            tries: before it is given up.
+        It is let down from a random place between the corners ``bounds_m`` (2, 3).
         """
         half_m = np.ptp(kind.bounds_m, axis=0) / 2
         base = np.array([(x, y, 0.0) for x in (-1, 0, 1) for y in (-1, 0, 1)]) * half_m

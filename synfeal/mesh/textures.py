@@ -35,10 +35,8 @@ def large_images_allowed() -> Iterator[None]:
 def decode(image: Image.Image, owner: str, findings: Findings) -> Pixels | None:
     """Pixels (H, W, 3 | 4) uint8 of any image Pillow opens; None where it is broken or too large.
 
-    Args:
-        image: opened, perhaps not yet read.
-        owner: what it belongs to, such as ``material 'Wall'``, for the findings.
-        findings: takes what was converted, made smaller or given up.
+    What was converted, made smaller or given up goes to the findings, as ``owner``'s, such as
+    ``material 'Wall'``.
     """
     width, height = image.size
     if width * height > MAX_PIXELS:

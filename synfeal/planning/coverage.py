@@ -70,12 +70,8 @@ def plan_coverage(
 ) -> dict[str, object]:
     """What a plan covers, as the content of ``coverage.json``; see ``DEFINITIONS``.
 
-    Args:
-        mesh: the scene, or its collision mesh.
-        boxes_m: (B, 2, 3) or (2, 3), corners of the spaces that camera centres are sampled in.
-        scene: angle bounds.
-        plan: all poses.
-        camera: what it sees.
+    ``mesh`` is the scene or its collision mesh, ``boxes_m`` (B, 2, 3) or (2, 3) the corners of the
+    spaces that camera centres are sampled in.
     """
     caster = RayCaster(*mesh)
     boxes_m = np.reshape(boxes_m, (-1, 2, 3))

@@ -39,14 +39,8 @@ def seen_surface(
     """Look at ``N_POINTS`` points, uniform over the surface, from up to ``MAX_FRAMES`` frames.
 
     A point is in a frame if it is projected into the image, no farther than ``FARTHEST_M``, and
-    nothing is before it. From either side: scans have holes, and walls without thickness.
-
-    Args:
-        mesh: the surface.
-        caster: rays against it.
-        hubs_m: (H, 3) places in the free space: what none of them sees cannot be seen.
-        plan: the poses; frames spread evenly over them are looked at.
-        camera: size, intrinsics and distortion.
+    nothing is in front of it. From either side: scans have holes, and walls without thickness. What
+    none of the places ``hubs_m`` (H, 3) in the free space sees cannot be seen.
     """
     surface = trimesh.Trimesh(mesh.vertices_m, mesh.faces, process=False)
     points, _ = trimesh.sample.sample_surface(surface, N_POINTS, seed=0)
@@ -109,15 +103,10 @@ class EmptyPixels:
 
 
 def empty_pixels(caster: RayCaster, plan: PoseTable, camera: CameraConfig) -> EmptyPixels:
-    """Cast a grid of rays through up to 1,000 frames, spread evenly over the plan.
+    """Cast a grid of rays through up to 1,000 frames, spread evenly over a plan of at least one.
 
     A pixel is empty where nothing is between the near and the far plane. What an alpha test cuts
     out counts as solid.
-
-    Args:
-        caster: rays against the mesh.
-        plan: the poses, at least one.
-        camera: size, intrinsics, distortion and clip planes.
     """
     shares = empty_shares(caster, plan.world_from_cam[shown_frames(len(plan))], camera)
     return EmptyPixels(

@@ -102,11 +102,8 @@ def received(
 ) -> Vectors:
     """Linear light (V, 3) that arrives; the sum of what every source alone gives.
 
-    Args:
-        surface: what receives, blocks and passes on the light.
-        albedo: (V, 3) linear.
-        glow: (V,) see :class:`synfeal.scenes.patches.Patch`.
-        lighting: where the light comes from.
+    The surface receives, blocks and passes it on, with linear ``albedo`` (V, 3) and ``glow`` (V,)
+    of :class:`synfeal.scenes.patches.Patch`.
     """
     caster = RayCaster(surface.points_m, surface.faces)
     normals = surface.normals.astype(np.float32)

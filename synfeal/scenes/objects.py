@@ -32,12 +32,8 @@ def cluttered(
 ) -> tuple[TexturedMesh, list[dict[str, Any]]]:
     """The objects placed in a scene, and where each stands.
 
-    Args:
-        mesh: the scene.
-        bounds_m: (2, 3) corners of the space that objects are let down from.
-        clutter: how many, and which.
-        rng: of sizes, places and turns.
-        key: of the scene's settings, for messages.
+    They are let down from the space between the corners ``bounds_m`` (2, 3); ``key`` is that of the
+    scene's settings, for messages.
 
     Raises:
         InputError: an object is larger than the scene, cannot be read, or finds no place.

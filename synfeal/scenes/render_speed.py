@@ -105,11 +105,8 @@ def measure_speed(
 ) -> pd.DataFrame:
     """Every variant through every camera, the chosen one of each camera first: ``SCHEMA``.
 
-    Args:
-        mesh: the scene.
-        cameras: smallest first; backends that take seconds per frame draw through that one alone.
-        poses: (P, 4, 4) ``world_from_cam``; every other one is used with the larger cameras.
-        render: what the profile renders with; names its backend.
+    Backends that take seconds per frame draw through the first camera, the smallest, alone; the
+    larger ones take every other pose (P, 4, 4). ``render`` names its backend.
     """
     chosen = Variant(mesh, render)
     details = less_detailed(chosen)

@@ -28,10 +28,8 @@ from synfeal.validation.poses import (
 def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[Check]:
     """Check a data set; what is wrong with it is in the checks.
 
-    Args:
-        dataset: directory with ``seq-01``.
-        camera_file: calibration file, where the data set has no manifest or another camera.
-        every_pair: compare all pairs, not a sample of a large set.
+    A calibration file is for a data set without a manifest, or with another camera; ``every_pair``
+    compares all pairs, not a sample of a large set.
 
     Raises:
         InputError: there is no data set, or ``camera_file`` cannot be read.

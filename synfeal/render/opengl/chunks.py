@@ -62,9 +62,7 @@ def _morton_codes(points_m: Floats) -> NDArray[np.int64]:
 def visible_runs(chunks: Chunks, clip_from_mesh: Floats) -> list[tuple[int, int]]:
     """First index and number of indices of each run of chunks that may be in the frustum.
 
-    Args:
-        chunks: the chunks of a part.
-        clip_from_mesh: (4, 4) to OpenGL's clip coordinates, where -w <= x, y, z <= w is drawn.
+    ``clip_from_mesh`` (4, 4) maps to OpenGL's clip coordinates: -w <= x, y, z <= w is drawn.
     """
     seen = np.ones(len(chunks.lower_m), bool)
     for axis in range(3):
