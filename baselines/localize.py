@@ -144,7 +144,7 @@ def _check_out(out: Path, inputs: Sequence[Path]) -> None:
     if out.exists() and any(path.exists() and out.samefile(path) for path in inputs):
         raise InputError(f"{out}: is one of the inputs; choose another file with --out")
     if os.path.lexists(out) and not _holds_poses(out):
-        raise InputError(f"{out}: is there and holds no poses; choose another file with --out")
+        raise InputError(f"{out}: exists and holds no poses; choose another file with --out")
 
 
 def _holds_poses(out: Path) -> bool:

@@ -242,7 +242,7 @@ def test_runs_are_predicted_from_each_other(made_up_run, tmp_path, capsys):
     [
         (
             ["--profile", "large"],
-            r"profile 'large': no file of config/ is called so; known: .*mini",
+            r"profile 'large': no such profile in config/; known: .*mini",
         ),
         (["--profile", "absent.yaml"], r"absent\.yaml: cannot be read as YAML"),
         (["--measured", "{tmp}"], r"holds no benchmarks/\*\*/\*\.tsv and no benchmarks\.csv"),

@@ -77,7 +77,7 @@ HEADER = "frame,tx,ty,tz,qw,qx,qy,qz\n"
         (None, "cannot be read"),
         ("frame,tx,ty,tz\n0,1,2,3\n", "columns frame,tx,ty,tz,qw"),
         (HEADER + "0,1,2,3,1,0,0,zero\n", "cannot be read"),
-        (HEADER + "0,1,2,3,1,0,0,0\n0,1,2,3,1,0,0,0\n", "frame 0 stands in it twice"),
+        (HEADER + "0,1,2,3,1,0,0,0\n0,1,2,3,1,0,0,0\n", "frame 0 appears twice"),
         (HEADER + "4,1,2,3,1,0,0,0\n", "frame 4 is not in the test set of 4"),
     ],
 )

@@ -107,7 +107,7 @@ def read_answers(path: Path, frames: PoseTable) -> PoseTable:
         raise InputError(message) from None
     twice = found.frame[found.frame.duplicated()]
     if len(twice):
-        raise InputError(f"{path}: frame {twice.iloc[0]:g} stands in it twice; keep one answer")
+        raise InputError(f"{path}: frame {twice.iloc[0]:g} appears twice; keep one answer")
     unknown = found.frame[~found.frame.isin(frames.frame)]
     if len(unknown):
         raise InputError(

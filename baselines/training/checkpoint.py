@@ -99,5 +99,5 @@ def _checked(statistics: ImageStatistics) -> ImageStatistics:
         if value.shape != (1, 3, 1, 1) or not value.isfinite().all():
             raise ValueError("its image statistics are damaged")
     if not (statistics.deviation > 0).all():
-        raise ValueError("its image statistics have no deviation")
+        raise ValueError("its image statistics have no standard deviation")
     return statistics

@@ -161,9 +161,8 @@ def _write(out: Path, title: str, found: Evaluation) -> None:
     option("model", "model.pt of a training run in this place", type=Path, metavar="MODEL"),
     option(
         "images",
-        "PNG or JPEG of any size, or a directory of them; their short side must have the field of"
-        " view of the training frames' short side, or be whole as those were: what the model says,"
-        " cropping and shrinking is all that is done to them",
+        "PNG or JPEG of any size, or a directory of them; they must have the field of view of the"
+        " training frames, which is printed",
         type=Path,
         nargs="+",
         metavar="IMAGE",

@@ -35,7 +35,7 @@ FILE: dict[str, Any] = {"type": Path, "metavar": "FILE"}
     option("--yaw", "bounds of its heading; 0 is world x, 90 is y (0 360)", **RANGE),
     option(
         "--min-view-distance",
-        "metres of free view that a path ends with, at least (1.2)",
+        "least free view at the end of a path, metres (1.2)",
         type=float,
     ),
     option("--min-path", "metres; shorter paths are drawn again (1.5)", type=float),
@@ -49,11 +49,11 @@ FILE: dict[str, Any] = {"type": Path, "metavar": "FILE"}
     option("--width", "image width, pixels (640, or that of --camera)", type=int),
     option("--height", "image height, pixels (480, or that of --camera)", type=int),
     option("--fov", "horizontal field of view, degrees (60)", type=float),
-    option("--backend", "what draws (auto)", choices=BACKENDS),
-    option("--supersampling", "N x N samples a pixel, 1 - 4 (2)", type=int, metavar="N"),
+    option("--backend", "renderer (auto)", choices=BACKENDS),
+    option("--supersampling", "N x N samples per pixel, 1 - 4 (2)", type=int, metavar="N"),
     option(
         "--background",
-        "colour where nothing is, 0 - 255 each (0 0 0)",
+        "colour where nothing is hit, 0 - 255 each (0 0 0)",
         type=int,
         nargs=3,
         metavar=("R", "G", "B"),
@@ -69,22 +69,20 @@ FILE: dict[str, Any] = {"type": Path, "metavar": "FILE"}
         **FILE,
     ),
     option("--workers", "processes that render (1)", type=int, default=1),
-    option(
-        "--sequence-frames", "frames of a sequence, rendered at once (500)", type=int, metavar="N"
-    ),
+    option("--sequence-frames", "frames per sequence (500)", type=int, metavar="N"),
     option("--archive", "write each sequence as one seq-XX.zip", action="store_true"),
     option("--packed", "write frames of PX x PX in one .npy too", type=int, metavar="PX"),
     option(
         "--print-config",
-        "make nothing; print a configuration with which the workflow makes the same data set, on"
+        "make nothing; print a configuration from which the workflow makes the same data set, on"
         " several machines if need be (docs/collecting.md)",
         action="store_true",
     ),
 )
 def collect(arguments: argparse.Namespace) -> None:
-    """Plans camera paths through the free space of a mesh and renders them.
+    """Plans camera paths through the free space of a mesh and renders them as a 7-Scenes data set.
 
-    It makes a 7-Scenes data set with exact poses; started again after an interruption, it goes on.
+    Run again after an interruption, it goes on where it stopped.
     """
     config = dataset_config(options_among(arguments, KEYS), arguments.out)
     from synfeal.collection.collect import CollectJob, configuration_text, with_backend
@@ -127,7 +125,7 @@ def coverage_text(coverage: Mapping[str, Any]) -> str:
     *MESH_OPTIONS,
 )
 def inspect(arguments: argparse.Namespace) -> None:
-    """Says what a mesh is and where cameras can be in it, before anything is collected.
+    """Shows what a mesh is and where cameras can be in it, before anything is collected.
 
     In numbers, a picture and an offline 3D page.
     """

@@ -119,7 +119,7 @@ def _machines(arguments: argparse.Namespace) -> list[Machine]:
 def run(arguments: argparse.Namespace) -> None:
     """Runs the workflow with a profile of config/ or a configuration of your own.
 
-    In a clone of Synfeal; shows where it is.
+    In a clone of Synfeal; shows its progress.
     """
     from synfeal.config.load import read_yaml
     from synfeal.report.cost.profiles import is_default, profile_path
@@ -191,7 +191,7 @@ def keep(arguments: argparse.Namespace) -> None:
     option("results", "where to: results/<profile>", type=Path, metavar="RESULTS"),
 )
 def restore(arguments: argparse.Namespace) -> None:
-    """Puts the runs of such a file back, so that the workflow goes on from them."""
+    """Puts the runs of a predictions.zip back, so that the workflow goes on from them."""
     from synfeal.report.predictions.restore import restore as unpack
 
     written, there = unpack(arguments.package, arguments.results)

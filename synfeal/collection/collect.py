@@ -74,7 +74,7 @@ def collect(job: CollectJob, workers: int = 1) -> None:
             attempt with other settings stands in the way, or a file cannot be written.
     """
     if workers < 1:
-        raise InputError(f"--workers: {workers} processes cannot render; at least 1 is needed")
+        raise InputError(f"--workers: must be at least 1, found {workers}")
     side_px = min(job.config.network_camera.width, job.config.network_camera.height)
     if job.packed_px is not None and not 0 < job.packed_px < side_px:
         raise InputError(

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
@@ -26,13 +28,11 @@ PROFILES = ("smoke", "mini", "night", "gpu", "paper")
 DEFAULT_PROFILE = "mini"
 COMPARED = (
     "scale",
-    "experiments",
     "collection.frame_spacing_m",
     "groundtruth_camera.width",
     "groundtruth.batch_frames",
     "network.input_px",
     "network.width",
-    "network.view",
     "training.samples_seen.6k",
     "training.repetitions.table2_ground_truth",
     "pretraining.source",
@@ -57,6 +57,11 @@ words are in `.snakemake/log`. `snakemake --configfile FILE` does the same witho
 Give every variant a `profile` of its own: results go to `<results>/<profile>`. Unknown keys, wrong
 types and values out of range stop the run before it starts, in one line that names file and key.
 Editors that read JSON Schema can check a complete profile against `schema.json`.
+"""
+KEYS = """\
+## Keys
+
+A value is the default with its bounds, of a choice the one in bold; without a default the type.
 """
 EXPERIMENTS = """\
 ## The table of experiments
@@ -95,10 +100,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def documents(folder: Path) -> dict[str, str]:
     """Contents of the generated files by name; ``folder`` holds the shipped profiles."""
     schema = json.dumps(Config.model_json_schema(), indent=2) + "\n"
-    keys = table(("key", "type", "default", "meaning"), key_rows(Config))
+    keys = table(("key", "value", "meaning"), joined(key_rows(Config)))
     parts = [
         INTRO,
-        "## Keys\n",
+        KEYS,
         keys,
         SETTINGS,
         table(("key", *PROFILES), setting_rows(folder)),
@@ -111,7 +116,7 @@ def documents(folder: Path) -> dict[str, str]:
 def key_rows(
     model: type[BaseModel], prefix: str = "", told: dict[type[BaseModel], str] | None = None
 ) -> Iterator[tuple[str, ...]]:
-    """Dotted key, type, default and meaning of every key below a model, depth first.
+    """Dotted key, value and meaning of every key below a model, depth first.
 
     Keys of a model that is told already are told by where; ``told`` collects these places.
     """
@@ -119,16 +124,21 @@ def key_rows(
     for name, field in model.model_fields.items():
         inner, key = _model_below(field.annotation, f"{prefix}{name}")
         if inner is None:
-            yield f"`{key}`", type_name(field), _default(field), _text(field)
-            continue
-        default = "required" if field.is_required() else ""
-        if inner in told:
+            yield f"`{key}`", value_of(field), _text(field)
+        elif inner in told:
             kind = "list, " if get_origin(field.annotation) is tuple else ""
-            yield f"`{key}`", f"{kind}as `{told[inner]}`", default, _text(field)
+            yield f"`{key}`", f"{kind}as `{told[inner]}`", _text(field)
         else:
             told[inner] = key
-            yield f"`{key}`", "", default, _text(field)
+            yield f"`{key}`", "required" if field.is_required() else "", _text(field)
             yield from key_rows(inner, f"{key}.", told)
+
+
+def joined(rows: Iterator[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
+    """Neighbouring rows that say the same of their keys are one."""
+    for said, alike in groupby(rows, key=lambda row: row[1:]):
+        first, *more = [row[0] for row in alike]
+        yield ", ".join([first, *(f"`{key.strip('`').rpartition('.')[2]}`" for key in more)]), *said
 
 
 def experiment_rows() -> Iterator[tuple[str, ...]]:
@@ -160,8 +170,22 @@ def flattened(values: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
 
 def table(heading: Sequence[str], rows: Iterator[tuple[str, ...]]) -> str:
     """A Markdown table with a final newline."""
-    lines = [heading, ["---"] * len(heading), *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    lines = [f"| {' | '.join(line)} |\n" for line in (heading, *rows)]
+    return "".join([lines[0], "|" + "---|" * len(heading) + "\n", *lines[1:]])
+
+
+def value_of(field: FieldInfo) -> str:
+    """Default and bounds, e.g. ``500, ≥ 1``; where there is no default, the type."""
+    kind = type_name(field)
+    if field.is_required():
+        return f"required: {kind}"
+    default = _default(field)
+    if default in ("`null`", "`[]`", ""):
+        return kind
+    if default in kind.split(", "):
+        return kind.replace(default, f"**{default}**")
+    bounds = re.search("[≥>].*", kind)
+    return f"{default}, {bounds[0]}" if bounds else default
 
 
 def type_name(field: FieldInfo) -> str:

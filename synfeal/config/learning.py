@@ -117,7 +117,7 @@ class TrainingConfig(Strict):
         if self.patience is not None and self.protocol == "corrected":
             raise ValueError(
                 "patience: must be left out with `protocol: corrected`, whose learning rate follows"
-                " a course of a length known beforehand; lower samples_seen instead"
+                " a schedule of known length; lower samples_seen instead"
             )
         return self
 

@@ -117,8 +117,8 @@ class EffectsConfig(Strict):
     def _check(self) -> Self:
         if self.clutter and self.light and self.light.states:
             raise ValueError(
-                "clutter: of objects it is not known how much of their light comes from where;"
-                " leave light.states out"
+                "clutter: it is not known where the light of objects comes from; leave"
+                " light.states out"
             )
         return self
 

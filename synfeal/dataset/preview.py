@@ -31,7 +31,7 @@ def write_preview(
             encoder.
     """
     if n_frames < 1:
-        raise InputError(f"--frames: {n_frames} frames are no picture; at least 1 is needed")
+        raise InputError(f"--frames: must be at least 1, found {n_frames}")
     if not 0 < fps <= 50:
         raise InputError(f"--fps: must be above 0 and at most 50, which a GIF can show, not {fps}")
     write = WRITERS.get(out.suffix.lower())

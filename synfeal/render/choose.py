@@ -77,7 +77,7 @@ def fastest_working() -> str:
             return name
         log.warning("render.backend: %s does not work here: %s", name, failure)
         failures.append(f"{name}: {failure}")
-    raise InputError(f"render.backend: nothing here can draw: {'; '.join(failures)}")
+    raise InputError(f"render.backend: no renderer works here: {'; '.join(failures)}")
 
 
 @functools.cache

@@ -42,7 +42,7 @@ def profile_path(name: str) -> Path:
     found = {str(read_yaml(p).get("profile")): p for p in sorted(FOLDER.glob("*.yaml"))}
     if name not in found:
         known = ", ".join(sorted(found)) or "none"
-        raise InputError(f"profile '{name}': no file of {FOLDER}/ is called so; known: {known}")
+        raise InputError(f"profile '{name}': no such profile in {FOLDER}/; known: {known}")
     return found[name]
 
 
