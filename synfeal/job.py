@@ -7,7 +7,7 @@ import logging
 import os
 import sys
 import traceback
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePath
 from pkgutil import resolve_name
@@ -47,33 +47,35 @@ def job(log: str | Path) -> Iterator[None]:
 def call(snakemake: Any) -> None:
     """Call the function that a rule names, ``params.function``, with what it is asked for by name.
 
-    An argument is the rule's parameter, wildcard or input of that name, ``out_<name>`` its output
-    ``<name>``, and ``root`` the results directory where this job has it, which with a storage
-    plugin is a copy. Texts become paths, numbers and models as annotated.
+    An argument is the rule's parameter, input or wildcard of that name, ``out_<name>`` its output
+    ``<name>``, ``files`` its inputs and ``wildcards`` its wildcards, both by name, and ``root`` the
+    results directory where this job has it, which with a storage plugin is a copy. Texts become
+    paths, numbers and models as annotated. What a rule does not have keeps its default.
+
+    Raises:
+        InputError: the output was restored (``synfeal restore``), not made here: the rule has no
+            inputs to make it again.
     """
     function = resolve_name(snakemake.params.function)
-    given = {**dict(snakemake.wildcards.items()), **dict(snakemake.input.items())}
-    given |= dict(snakemake.params.items())
+    wildcards = dict(snakemake.wildcards.items())
+    inputs = {name: files for name, files in snakemake.input.items() if files}
+    given = {**wildcards, **dict(snakemake.input.items()), **dict(snakemake.params.items())}
+    given |= {"files": inputs, "wildcards": wildcards}
     given |= {f"out_{name}": path for name, path in snakemake.output.items()}
     asked = inspect.signature(function).parameters
     if "root" in asked:
         root = PurePath(snakemake.config["results"], snakemake.config["profile"]).as_posix()
         output = str(snakemake.output[0])
         given["root"] = output[: output.rindex(root) + len(root)]
-    validate_call(function)(**{name: given[name] for name in asked})
-
-
-def refuse_restored(inputs: Collection[object], output: str | Path) -> None:
-    """Refuse to make again what was restored (``synfeal restore``): its rule has no inputs.
-
-    Raises:
-        InputError: there are none.
-    """
-    if not len(inputs):
+    bare = {name for name, _ in snakemake.input.items() if name in asked} - {*inputs}
+    needed = {name for name, argument in asked.items() if argument.default is argument.empty}
+    if not inputs and bare & needed:
         raise InputError(
-            f"{output}: was restored, not made here; restore it once more, or delete restored.json"
-            " to make everything anew"
+            f"{snakemake.output[0]}: was restored, not made here; restore it once more, or delete"
+            " restored.json to make everything anew"
         )
+    left = {name for name in {*asked} - needed if name in bare or name not in given}
+    validate_call(function)(**{name: given[name] for name in asked if name not in left})
 
 
 def _print_to(log: str | Path) -> None:

@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from baselines.groundtruth.batches import batches_of
-from baselines.groundtruth.chain import chain_batches, chain_unassisted
+from baselines.groundtruth.chain import chain_batches, chain_unassisted, summary_of
 from baselines.groundtruth.trajectory import BatchTrajectory, failed_trajectory, read_trajectory
 from synfeal.config.models import GroundTruthConfig
 from synfeal.errors import InputError
@@ -53,12 +53,12 @@ def test_an_error_as_large_as_the_threshold_is_none():
     truth = straight_truth(6)
     batches = batches_of(6, 5)
     off = turned_last(moved_last(perfect(truth, batches)[0], [0, 0.125, 0]), 7.0)
-    error_deg = chain_batches(batches, [off], truth, CFG)[1].records[0].error_before_deg
+    error_deg = chain_batches(batches, [off], truth, CFG)[1][0].error_before_deg
 
     def assisted(limit_m, limit_deg):
         limits = {"assist_position_m": limit_m, "assist_orientation_deg": limit_deg}
         cfg = GroundTruthConfig(batch_frames=5, **limits)
-        return chain_batches(batches, [off], truth, cfg)[1].records[0].assisted
+        return chain_batches(batches, [off], truth, cfg)[1][0].assisted
 
     assert error_deg == pytest.approx(7.0)
     assert not assisted(0.125, error_deg)
@@ -73,7 +73,7 @@ def test_only_the_last_pose_is_replaced():
     poses[1:, 1, 3] = 0.5
     trajectory = BatchTrajectory(poses, np.ones(6, dtype=bool))
     labels, assistance = chain_batches(batches, [trajectory], truth, CFG)
-    assert assistance.records[0].assisted
+    assert assistance[0].assisted
     np.testing.assert_allclose(labels.position_m[:, 1], [0, 0.5, 0.5, 0.5, 0.5, 0], atol=1e-14)
 
 
@@ -84,9 +84,9 @@ def test_failed_batch_is_assisted_counted_and_interpolated():
     batches = batches_of(11, 5)
     trajectories = [failed_trajectory(6), perfect(truth, batches)[1]]
     labels, assistance = chain_batches(batches, trajectories, truth, CFG)
-    summary = assistance.to_json()
+    summary = summary_of(assistance)
     assert (summary["assisted"], summary["lost"], summary["filled_frames"]) == (1, 1, 5)
-    first = assistance.records[0]
+    first = assistance[0]
     assert (first.registered, first.lost, first.assisted) == (0, True, True)
     assert first.error_before_m == pytest.approx(25.0)
     assert first.error_before_deg == pytest.approx(15.0)

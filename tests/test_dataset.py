@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from PIL import Image
 
-from synfeal.config.models import CameraConfig, SceneConfig
+from synfeal.config.models import CameraConfig, RenderConfig, SceneConfig
 from synfeal.dataset.directories import atomic_directory
 from synfeal.dataset.manifest import write_manifest
 from synfeal.dataset.png import encode_png
-from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.dataset.preview import write_contact_sheet
 from synfeal.dataset.render_sequence import MOST_WAITING, render_sequence, write_sequence
 from synfeal.dataset.sevenscenes import (
@@ -122,8 +122,10 @@ def test_pose_file_is_four_rows_and_exact(tmp_path):
 def test_rendered_sequence_holds_what_the_poses_see(tmp_path):
     save_glb(tmp_path / "mesh.glb", room_mesh())
     poses = poses_of(3)
-    render_sequence(tmp_path / "mesh.glb", CAMERA, poses, tmp_path / "out" / "seq-01", True)
+    write_pose_table(tmp_path / "plan.csv", poses)
     directory = tmp_path / "out" / "seq-01"
+    rows, files = (tmp_path / "plan.csv", 0, 3), (tmp_path / "mesh.glb", CAMERA)
+    render_sequence(*files, *rows, True, RenderConfig(), directory)
     assert len(list(directory.iterdir())) == 9
     assert sorted(p.name for p in directory.glob("*000001*")) == [
         "frame-000001.color.png",
@@ -246,7 +248,7 @@ def test_a_mesh_scene_is_prepared(tmp_path):
     scene = SceneConfig.model_validate(
         {"source": "mesh", "path": tmp_path / "room.glb", "sha256": sha256, "unit_m": 2.0}
     )
-    prepare_scene("room", scene, 0.995, 0, tmp_path / "out")
+    prepare_scene("room", scene, 0.995, 0, tmp_path / "out" / "mesh.glb")
     properties = json.loads((tmp_path / "out" / "properties.json").read_text())
     assert (properties["vertices"], properties["faces"]) == (8, 12)
     assert properties["volume_m3"] == pytest.approx(512.0)  # 4 units of 2 m, cubed
@@ -267,5 +269,5 @@ def test_a_scene_that_contradicts_its_config_is_refused(tmp_path, values, messag
     save_glb(tmp_path / "room.glb", room_mesh())
     scene = SceneConfig.model_validate({"source": "mesh", "path": tmp_path / "room.glb", **values})
     with pytest.raises(InputError, match=message):
-        prepare_scene("room", scene, 0.995, 0, tmp_path / "out")
+        prepare_scene("room", scene, 0.995, 0, tmp_path / "out" / "mesh.glb")
     assert not (tmp_path / "out").exists()

@@ -56,7 +56,7 @@ def test_a_known_drift_gives_the_known_errors_before_and_after(drift_m, ends_aft
     batches = batches_of(len(truth), BATCH)
     trajectories = drifting(batches, drift_m)
     labels, record = chain_batches(batches, trajectories, truth, CFG)
-    assert [batch.assisted for batch in record.records] == assisted
+    assert [batch.assisted for batch in record] == assisted
     ends = [batch.stop - 1 for batch in batches]
     np.testing.assert_allclose(absolute_errors(labels, truth)[0][ends], ends_after_m, atol=1e-12)
     before_m, before_deg = absolute_errors(chain_unassisted(batches, trajectories, truth), truth)
@@ -78,7 +78,7 @@ def test_a_lost_batch_stands_still_before_and_is_assisted_after():
     expected = [0.0] * BATCH + [STEP_M * k for k in range(BATCH + 1)]
     np.testing.assert_allclose(before.position_m[:, 0], expected, atol=1e-12)
     after, record = chain_batches(batches, trajectories, truth, CFG)
-    assert [(b.lost, b.assisted) for b in record.records] == [(True, True), (False, False)]
+    assert [(b.lost, b.assisted) for b in record] == [(True, True), (False, False)]
     np.testing.assert_allclose(after.position_m, truth.position_m, atol=1e-12)
 
 

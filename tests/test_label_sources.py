@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.groundtruth.batches import batches_of
-from baselines.groundtruth.chain import chain_batches
+from baselines.groundtruth.chain import chain_batches, summary_of
 from baselines.groundtruth.label_error import absolute_errors
 from baselines.groundtruth.methods import (
     METHODS,
@@ -38,13 +38,13 @@ def graphs(paths):
     ]
 
 
-def estimated(source, batch, paths, folder):
+def estimated(source, batch, paths):
     """A batch by a method that works on images."""
     color, depth = (files[batch.start : batch.stop] for files in paths)
     if source in frame_methods():
         return estimate_batch(source, color, depth, CAMERA, CFG, 0)[0]
     truth = TRUTH.world_from_cam[batch.start : batch.stop]
-    return sfm_batch(color, CAMERA, truth, CFG.sfm, 0, folder).trajectory
+    return sfm_batch(color, CAMERA, truth, CFG.sfm, 0)[0]
 
 
 @pytest.fixture(scope="module", params=["synfeal", "noise", *METHODS])
@@ -58,14 +58,14 @@ def labels(request, paths, graphs, tmp_path_factory):
     if source in graph_methods():
         estimates = [solve_graph(source, graph, CFG.posegraph)[0] for graph in graphs]
     else:
-        estimates = [estimated(source, batch, paths, folder) for batch in BATCHES]
+        estimates = [estimated(source, batch, paths) for batch in BATCHES]
     for batch, estimate in zip(BATCHES, estimates, strict=True):
         write_trajectory(folder / f"batch-{batch.index:03d}.csv", estimate)
     read = [read_trajectory(path) for path in sorted(folder.glob("*.csv"))]
     table, assistance = chain_batches(BATCHES, read, TRUTH, CFG)
     # Planes leave a motion free that KinectFusion, without colour, cannot find.
-    assert assistance.to_json()["lost"] == (len(BATCHES) if source == "kinect-fusion" else 0)
-    assert assistance.to_json()["assisted"] == assistance.to_json()["lost"]
+    assert summary_of(assistance)["lost"] == (len(BATCHES) if source == "kinect-fusion" else 0)
+    assert summary_of(assistance)["assisted"] == summary_of(assistance)["lost"]
     return table
 
 

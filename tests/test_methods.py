@@ -48,7 +48,7 @@ def test_the_example_of_the_page_labels_a_split(constant):
         estimates.append(trajectory)
     labels, record = chain_batches(batches, estimates, truth, CFG)
     # The camera moves 30 cm in a batch: each is assisted, and all other labels stand still.
-    assert [(b.assisted, b.lost) for b in record.records] == [(True, False)] * 2
+    assert [(b.assisted, b.lost) for b in record] == [(True, False)] * 2
     np.testing.assert_allclose(labels.position_m[:10], np.tile(truth.position_m[0], (10, 1)))
     np.testing.assert_allclose(labels.position_m[10:20], np.tile(truth.position_m[10], (10, 1)))
     np.testing.assert_allclose(labels.position_m[20], truth.position_m[20])
@@ -64,7 +64,7 @@ def test_every_method_has_a_title_a_style_and_someone_who_runs_it():
     own_rules = set(METHODS) - {*methods.frame_methods(), *methods.graph_methods()}
     assert own_rules == {"sfm"}
     rules = (PAGE.parent.parent / "workflow/rules/groundtruth.smk").read_text()
-    assert all(f"rule {name}:" in rules for name in own_rules)
+    assert all(f"as {name} with:" in rules for name in own_rules)
 
 
 def test_odometry_alone_keeps_the_chain_that_an_optimiser_moves():

@@ -54,14 +54,14 @@ def test_frames_rendered_into_an_array_are_those_of_the_files(tmp_path):
     save_glb(tmp_path / "mesh.glb", room_mesh())
     plan, bounds = poses_of(5), ((0, 3), (3, 5))
     shards = [tmp_path / f"seq-{number:02d}.npy" for number in (1, 2)]
-    for (start, stop), shard in zip(bounds, shards, strict=True):
-        poses = plan.between(start, stop)
-        render_packed(tmp_path / "mesh.glb", CAMERA, poses, 24, shard)
-        render_sequence(tmp_path / "mesh.glb", CAMERA, poses, shard.with_suffix(""), False)
+    write_pose_table(tmp_path / "plan.csv", plan)
+    for rows, shard in zip(bounds, shards, strict=True):
+        given = tmp_path / "mesh.glb", CAMERA, tmp_path / "plan.csv", *rows
+        render_packed(*given, 24, "square", RenderConfig(), shard)
+        render_sequence(*given, False, RenderConfig(), shard.with_suffix(""))
     join_packed(shards, tmp_path / "train.npy")
     pack_frames([shard.with_suffix("") for shard in shards], 24, tmp_path / "files.npy")
     assert (tmp_path / "train.npy").read_bytes() == (tmp_path / "files.npy").read_bytes()
-    write_pose_table(tmp_path / "plan.csv", plan)
     records = [shard.with_suffix(".json") for shard in shards]
     write_packed_record(
         tmp_path / "train.npy", records, tmp_path / "plan.csv", CAMERA, RenderConfig()

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from baselines.groundtruth.batches import batches_of
-from baselines.groundtruth.chain import chain_batches, chain_unassisted, fill_gaps
+from baselines.groundtruth.chain import chain_batches, chain_unassisted, fill_gaps, summary_of
 from baselines.groundtruth.label_set import chain_split, write_assistance
 from baselines.groundtruth.trajectory import (
     BatchTrajectory,
@@ -89,7 +89,7 @@ def test_perfect_batches_chain_to_the_truth_wherever_it_lies(seed, n_frames, bat
         np.testing.assert_allclose(table.world_from_cam, walk, atol=1e-9)
         np.testing.assert_array_equal(table.frame, truth.frame)
         np.testing.assert_array_equal(table.path, truth.path)
-    assert not any(record.assisted or record.filled or record.lost for record in assistance.records)
+    assert not any(record.assisted or record.filled or record.lost for record in assistance)
 
 
 @few
@@ -105,7 +105,7 @@ def test_no_batch_starts_farther_off_than_the_thresholds_allow(seed, n_frames, s
     )
     off_deg = np.degrees(turns.magnitude())
     assert off_m[0] < 1e-12
-    for batch, estimate, record in zip(batches, estimates, assistance.records, strict=True):
+    for batch, estimate, record in zip(batches, estimates, assistance, strict=True):
         last = batch.stop - 1
         assert off_m[last] <= CFG.assist_position_m + 1e-9
         assert off_deg[last] <= CFG.assist_orientation_deg + 1e-6
@@ -122,7 +122,7 @@ def test_no_batch_starts_farther_off_than_the_thresholds_allow(seed, n_frames, s
         assert record.filled == len(batch) - 1 - estimate.registered[1:].sum()
         assert record.registered == estimate.registered.sum()
         assert (record.index, record.start, record.stop) == (batch.index, batch.start, batch.stop)
-    summary = assistance.to_json()
+    summary = summary_of(assistance)
     assert json.loads(json.dumps(summary, allow_nan=False)) == summary
     assert summary["batches"] == len(batches) == len(summary["records"])
     for total, part in (("assisted", "assisted"), ("lost", "lost"), ("filled_frames", "filled")):
@@ -165,8 +165,8 @@ def test_a_split_chained_from_files_is_that_chained_in_memory(tmp_path_factory, 
     unassisted = chain_unassisted(batches, estimates, truth)
     for path, table in zip(paths[1:], (labels, unassisted), strict=True):
         np.testing.assert_allclose(read_pose_table(path).position_m, table.position_m, atol=1e-12)
-    assert [r.assisted for r in assistance.records] == [r.assisted for r in expected.records]
+    assert [r.assisted for r in assistance] == [r.assisted for r in expected]
     write_assistance(folder / "a.json", "sfm", {"train": assistance, "test": assistance})
     written = json.loads((folder / "a.json").read_text())
-    same = assistance.to_json()
+    same = summary_of(assistance)
     assert written == {"method": "sfm", "splits": {"train": same, "test": same}}

@@ -11,7 +11,7 @@ import torch
 from baselines.references.correspondences import match_test_frames, mutual_matches
 from baselines.references.descriptors import Vlad, dense_sift, residuals, thumbnails
 from baselines.references.evidence import Evidence
-from baselines.references.features import Features, find_features, read_features, write_features
+from baselines.references.features import Features, find_features
 from baselines.references.oracle import METRES_PER_RADIAN, nearest_rows
 from baselines.references.registry import in_group
 from baselines.references.run import answer_and_score
@@ -116,6 +116,12 @@ TRAIN = [pose_at([-2 + 0.3 * i, -0.2 + 0.05 * i, 1.3], yaw_deg=3 * i - 9) for i 
 TEST = [pose_at([-1.85, -0.2, 1.25], yaw_deg=-6), pose_at([-0.95, 0.1, 1.4], yaw_deg=5)]
 
 
+def evidence_of(labels, truth):
+    files = {split: labels / f"{split}.csv" for split in ("train", "test")}
+    files |= {f"{split}_truth": truth / f"{split}.csv" for split in ("train", "test")}
+    return Evidence(files, CAMERA, 0)
+
+
 @pytest.fixture(scope="module")
 def room(tmp_path_factory):
     """Features of a furnished room's frames, matched; labels are the true poses."""
@@ -124,10 +130,10 @@ def room(tmp_path_factory):
     for split, poses in (("train", TRAIN), ("test", TEST)):
         color, depth = write_room(folder / split, poses)
         found = find_features(color, depth if split == "train" else None, CAMERA, CFG)
-        write_features(folder / f"{split}.npz", found)
-        splits[split] = read_features(folder / f"{split}.npz")
+        found.write(folder / f"{split}.npz")
+        splits[split] = Features.read(folder / f"{split}.npz")
         write_pose_table(folder / "labels" / f"{split}.csv", table_of(poses))
-    evidence = Evidence(folder / "labels", folder / "labels", {}, CAMERA, 0)
+    evidence = evidence_of(folder / "labels", folder / "labels")
     near = np.tile(np.arange(len(TRAIN)), (len(TEST), 1))
     evidence.__dict__["correspondences"] = match_test_frames(*splits.values(), near)
     return evidence
@@ -212,7 +218,7 @@ def test_retrieval_and_oracle_answer_with_labels(room, tmp_path):
     write_pose_table(labels / "test.csv", noisy.first(4))
     write_pose_table(tmp_path / "truth" / "train.csv", room.train)
     write_pose_table(tmp_path / "truth" / "test.csv", room.train.first(4))
-    evidence = Evidence(labels, tmp_path / "truth", {}, CAMERA, 0)
+    evidence = evidence_of(labels, tmp_path / "truth")
     vectors = thumbnails(frames(len(noisy)))
     evidence.__dict__["descriptors"] = dict.fromkeys(("thumbnail", "vlad"), (vectors, vectors[:4]))
     answer_and_score(evidence, in_group("images"), tmp_path / "out", {})

@@ -83,7 +83,7 @@ def test_a_frame_that_sees_nothing_keeps_its_label():
 def test_answers_are_closer_than_on_the_labels_as_they_are_and_no_match_is_no_answer():
     point_m = points()
     count, matched = len(point_m), len(TEST) - 1
-    evidence = Evidence(None, None, {}, CAMERA, 0)
+    evidence = Evidence({}, CAMERA, 0)
     evidence.__dict__["train"] = noisy(0.05, 2.0)
     tracks = seen(POSES, point_m)
     evidence.__dict__["tracks"] = replace(tracks, of_feature=np.arange(count))

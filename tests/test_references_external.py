@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from baselines.references.external import read_answers, run_external, score_external
+from baselines.references.external import answer_externally, read_answers, run_external
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.errors import InputError
 from tests.test_references import frames, random_poses
@@ -41,8 +41,8 @@ def test_the_example_of_the_documentation_answers_and_is_scored(tmp_path):
     command = config["nearest_grey"]["command"].replace("python ", f"{sys.executable} ", 1)
     command = command.replace("examples/", f"{ROOT}/examples/")
     folder = tmp_path / "out"
-    answers = run_external(command, files, {}, folder)
-    score_external(answers, files, folder, {})
+    method = {"command": command, "poses": None}
+    answer_externally(files, method, {}, {}, [folder / "metrics.json"])
     found, labels = read_pose_table(folder / "predictions.csv"), read_pose_table(files["train"])
     nearest = np.argsort(-grey_likeness(files), axis=1)[:, :3]
     assert nearest[:, 0].tolist() == [7, 2, 5]

@@ -5,7 +5,7 @@ import importlib.util
 import numpy as np
 import pytest
 
-from synfeal.config.models import RenderConfig
+from synfeal.config.models import RenderConfig, RenderSpeedConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.frames import frame_of, read_frame, rows_of, write_frame
@@ -156,9 +156,9 @@ def test_a_scene_is_measured_from_its_files(tmp_path):
     plan = PoseTable(index, index, poses[:, :3, 3], quat_wxyz_from_matrix(poses[:, :3, :3]))
     write_pose_table(tmp_path / "test.csv", plan)
     out = tmp_path / "render_speed.csv"
-    speed.write_render_speed(
-        tmp_path / "mesh.glb", tmp_path / "test.csv", [SMALL], 2, RenderConfig(), out
-    )
+    measured = RenderSpeedConfig(poses=2, sizes=1)
+    files = tmp_path / "mesh.glb", tmp_path / "test.csv"
+    speed.write_render_speed(*files, SMALL, SMALL, measured, RenderConfig(), out)
     found = read_frame(out, SCHEMA)
     assert found.backend[0] == choose.fastest_working()
     assert list(found.chosen) == [1] + [0] * (len(found) - 1)

@@ -16,8 +16,8 @@ from tests.room_scene import CAMERA, FURNISHED, Room, pose_at, write_room
 def rgbd(paths, camera=CAMERA):
     """Poses, which of them follow measured motions, and the graph."""
     graph, facts = rgbd_graph(*paths, camera, RgbdConfig(keyframe_every=3))
-    guessed = np.array([edge.information[0, 0] < 1e3 for edge in graph.edges[: facts.pairs]])
-    assert facts.pairs_accepted == facts.pairs - guessed.sum()
+    guessed = np.array([edge.information[0, 0] < 1e3 for edge in graph.edges[: facts["pairs"]]])
+    assert facts["pairs_accepted"] == facts["pairs"] - guessed.sum()
     return optimise_lm(graph, 20), np.concatenate([[True], ~guessed]), graph
 
 

@@ -6,7 +6,7 @@ import pytest
 from baselines.references.descriptors import write_descriptors
 from baselines.references.robustness import SCHEMA, robustness_table
 from synfeal.config.robustness import CLEAN, MIXED
-from synfeal.dataset.packed import new_packed, read_packed
+from synfeal.dataset.packed import new_packed
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.frames import read_frame
 from synfeal.report.robustness import printed, robustness_sheet, write_robustness
@@ -39,8 +39,7 @@ def test_errors_are_those_of_known_answers(tmp_path):
     constant = save(tmp_path / "m.pt", answering([0, 0, 0], [np.sqrt(0.5), 0, 0, np.sqrt(0.5)]))
     models = {CLEAN: {"posenet": constant}, MIXED: {"posenet": constant}}
     described = tmp_path / "described.npz"
-    shown_frames = {name: read_packed(path) for name, path in {"train": known, **tests}.items()}
-    write_descriptors(shown_frames, 4, 0, described)
+    write_descriptors({"train": known, **tests}, 4, 0, described)
     # Structure answers for the second test frame alone: 0.5 m off, then not at all.
     answers = {CLEAN: tmp_path / "near.csv", "dark_2": tmp_path / "lost.csv"}
     off = test.position_m[1:] + np.array([0, 0.3, 0.4])

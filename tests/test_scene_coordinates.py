@@ -7,7 +7,7 @@ import torch
 from baselines.references.coordinate_network import CoordinateNetwork, distance_m
 from baselines.references.evidence import Evidence
 from baselines.references.scene_coordinates import by_coordinates, poses_of, world_points
-from baselines.references.views import Views, cell_pixels, read_frames, read_views, write_views
+from baselines.references.views import Views, cell_pixels, read_frames
 from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
@@ -53,7 +53,7 @@ TRAIN, TEST = wall_poses(48, 0), wall_poses(6, 1)
 
 
 def evidence_of(labels, samples_seen):
-    evidence = Evidence(None, None, {}, SMALL, 3, samples_seen)
+    evidence = Evidence({}, SMALL, 3, samples_seen)
     evidence.__dict__["train"] = table_of(list(labels))
     evidence.__dict__["views"] = (wall_views(TRAIN), wall_views(TEST))
     return evidence
@@ -78,8 +78,8 @@ def test_frames_are_reduced_and_cells_have_the_depth_behind_their_middle(tmp_pat
         np.testing.assert_allclose(views.images[frame], blocks.mean((1, 3)), atol=1)
     with pytest.raises(InputError, match="no such image"):
         read_frames([tmp_path / "none.png"], None, CAMERA, 32, 24)
-    write_views(tmp_path / "views.npz", views)
-    np.testing.assert_array_equal(read_views(tmp_path / "views.npz").point_m, views.point_m)
+    views.write(tmp_path / "views.npz")
+    np.testing.assert_array_equal(Views.read(tmp_path / "views.npz").point_m, views.point_m)
 
 
 def test_exact_coordinates_give_the_pose_and_useless_ones_none():

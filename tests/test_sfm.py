@@ -18,7 +18,7 @@ def frames(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def estimate(frames, tmp_path_factory):
-    return sfm_batch(*_arguments(frames), CFG, 0, tmp_path_factory.mktemp("work")).trajectory
+    return sfm_batch(*_arguments(frames), CFG, 0)[0]
 
 
 def _arguments(frames):
@@ -36,7 +36,7 @@ def test_every_frame_is_found_in_metres(frames, estimate):
 def test_missing_image_is_named(frames, tmp_path):
     missing = tmp_path / "frame-000000.color.png"
     with pytest.raises(InputError, match=r"frame-000000\.color\.png: no such image"):
-        sfm_batch([missing], CAMERA, frames[1][:1], CFG, 0, tmp_path)
+        sfm_batch([missing], CAMERA, frames[1][:1], CFG, 0)
 
 
 def test_scale_bears_wrong_poses_and_leaves_out_near_and_late_frames():

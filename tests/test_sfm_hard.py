@@ -50,22 +50,22 @@ def write(folder, poses, room=ROOM, camera=CAMERA):
 def estimate(folder, poses, room=ROOM, camera=CAMERA, told=None, cfg=CFG):
     """What structure from motion makes of a room; ``told`` is the camera it is told."""
     paths = write(folder, poses, room, camera)
-    return sfm_batch(paths, told or camera, poses, cfg, 0, folder)
+    return sfm_batch(paths, told or camera, poses, cfg, 0)
 
 
-def errors(result, poses):
+def errors(trajectory, poses):
     """Position (m) and orientation (degrees) errors of all frames, gaps filled."""
-    found = fill_gaps(result.trajectory)
+    found = fill_gaps(trajectory)
     position_m, orientation_rad = pose_error(found, relative(poses[0], poses))
     return position_m, np.degrees(orientation_rad)
 
 
 def test_texture_rich_room_is_exact_to_5_mm_and_a_tenth_of_a_degree(tmp_path):
     poses = sideways(7, turn_deg=2.0)
-    result = estimate(tmp_path, poses)
-    position_m, orientation_deg = errors(result, poses)
-    assert result.trajectory.registered.all()
-    assert (result.facts.models, result.facts.starts) == (1, 1)
+    trajectory, facts = estimate(tmp_path, poses)
+    position_m, orientation_deg = errors(trajectory, poses)
+    assert trajectory.registered.all()
+    assert (facts["models"], facts["starts"]) == (1, 1)
     assert np.median(position_m) < 0.005
     assert np.median(orientation_deg) < 0.1
 
@@ -74,9 +74,9 @@ def test_texture_rich_room_is_exact_to_5_mm_and_a_tenth_of_a_degree(tmp_path):
 def test_frames_without_texture_are_lost(tmp_path, grey):
     poses = sideways(40)
     Image.new("RGB", (CAMERA.width, CAMERA.height), (grey,) * 3).save(tmp_path / "wall.png")
-    result = sfm_batch([tmp_path / "wall.png"] * 40, CAMERA, poses, CFG, 0, tmp_path)
-    assert not result.trajectory.registered.any()
-    assert (result.facts.models, result.facts.starts, result.facts.points) == (0, 0, 0)
+    trajectory, facts = sfm_batch([tmp_path / "wall.png"] * 40, CAMERA, poses, CFG, 0)
+    assert not trajectory.registered.any()
+    assert (facts["models"], facts["starts"], facts["points"]) == (0, 0, 0)
 
 
 def test_a_white_wall_in_between_loses_its_frames_and_the_smaller_part(tmp_path):
@@ -85,14 +85,14 @@ def test_a_white_wall_in_between_loses_its_frames_and_the_smaller_part(tmp_path)
     for path in paths[7:10]:
         Image.new("RGB", (CAMERA.width, CAMERA.height), (255,) * 3).save(path)
     linear = CFG.model_copy(update={"quadratic_overlap": False})
-    result = sfm_batch(paths, CAMERA, poses, linear, 0, tmp_path)
-    np.testing.assert_array_equal(np.flatnonzero(result.trajectory.registered), np.arange(7))
-    assert errors(result, poses)[0][:7].max() < 0.02
+    trajectory, _ = sfm_batch(paths, CAMERA, poses, linear, 0)
+    np.testing.assert_array_equal(np.flatnonzero(trajectory.registered), np.arange(7))
+    assert errors(trajectory, poses)[0][:7].max() < 0.02
 
 
 def test_no_motion_has_no_scale_and_is_lost(tmp_path):
     poses = np.repeat(sideways(1), 3, axis=0)
-    assert not estimate(tmp_path, poses).trajectory.registered.any()
+    assert not estimate(tmp_path, poses)[0].registered.any()
 
 
 def before_a_corner(n_frames):
@@ -103,9 +103,9 @@ def before_a_corner(n_frames):
 
 def test_three_frames_are_found(tmp_path):
     poses = before_a_corner(3)
-    result = estimate(tmp_path, poses)
-    position_m, orientation_deg = errors(result, poses)
-    assert result.trajectory.registered.all()
+    trajectory, _ = estimate(tmp_path, poses)
+    position_m, orientation_deg = errors(trajectory, poses)
+    assert trajectory.registered.all()
     assert position_m.max() < 0.03
     assert orientation_deg.max() < 0.5
 
@@ -113,31 +113,31 @@ def test_three_frames_are_found(tmp_path):
 def test_a_turn_of_90_degrees_in_5_frames_loses_one_side_and_the_other_is_right(tmp_path):
     turn_deg = np.concatenate([np.zeros(3), np.linspace(0, 90, 6), np.full(3, 90.0)])
     poses = poses_at([1.2, 2.0, 1.5] + np.arange(12)[:, None] * [0.08, 0.05, 0.0], turn_deg)
-    result = estimate(tmp_path, poses)
-    found = np.flatnonzero(result.trajectory.registered)
+    trajectory, _ = estimate(tmp_path, poses)
+    found = np.flatnonzero(trajectory.registered)
     assert len(found) >= 5
     np.testing.assert_array_equal(found, np.arange(found[0], found[-1] + 1))
     true = relative(poses[0], poses)[found]
-    position_m, _ = pose_error(result.trajectory.first_from_cam[found], true)
+    position_m, _ = pose_error(trajectory.first_from_cam[found], true)
     assert position_m.max() < 0.05
 
 
 def test_walls_that_look_alike_are_not_confused_because_only_neighbours_are_matched(tmp_path):
     room = PaintedRoom((random_texture(np.random.default_rng(1)),) * 6)
     poses = poses_at([2.2, 2.6, 1.5] + np.arange(8)[:, None] * [0.0, 0.1, 0.01], 5.0 * np.arange(8))
-    result = estimate(tmp_path, poses, room)
-    assert result.trajectory.registered.all()
-    assert errors(result, poses)[0].max() < 0.03
+    trajectory, _ = estimate(tmp_path, poses, room)
+    assert trajectory.registered.all()
+    assert errors(trajectory, poses)[0].max() < 0.03
 
 
 def test_a_pattern_that_repeats_within_a_view_misleads_and_the_mapper_starts_again(tmp_path):
     tile = random_texture(np.random.default_rng(1))[:100, :100]
     room = PaintedRoom((np.tile(tile, (7, 7)),) * 6)
     poses = sideways(7, turn_deg=2.0)
-    result = estimate(tmp_path, poses, room)
-    assert np.isfinite(result.trajectory.first_from_cam).all()
-    assert result.facts.explained < CFG.min_explained
-    assert result.facts.starts == 4
+    trajectory, facts = estimate(tmp_path, poses, room)
+    assert np.isfinite(trajectory.first_from_cam).all()
+    assert facts["explained"] < CFG.min_explained
+    assert facts["starts"] == 4
 
 
 def shifted(px):
@@ -151,27 +151,27 @@ def test_image_of_another_size_is_named(tmp_path):
     paths = write(tmp_path, poses)
     told = CAMERA.model_copy(update={"width": 320, "height": 240})
     with pytest.raises(InputError, match=r"000000\.color\.png: is 160x120, the camera has 320x240"):
-        sfm_batch(paths, told, poses, CFG, 0, tmp_path)
+        sfm_batch(paths, told, poses, CFG, 0)
 
 
 def test_a_model_that_explains_enough_is_taken_at_once_else_four_starts_are_compared(tmp_path):
     poses = sideways(4)
     paths = write(tmp_path, poses)
     by_share = {
-        share: sfm_batch(
-            paths, CAMERA, poses, CFG.model_copy(update={"min_explained": share}), 0, tmp_path
-        ).facts
+        share: sfm_batch(paths, CAMERA, poses, CFG.model_copy(update={"min_explained": share}), 0)[
+            1
+        ]
         for share in (0.0, 1.0)
     }
-    assert (by_share[0.0].starts, by_share[1.0].starts) == (1, 4)
-    assert by_share[1.0].explained >= by_share[0.0].explained > 0.5
+    assert (by_share[0.0]["starts"], by_share[1.0]["starts"]) == (1, 4)
+    assert by_share[1.0]["explained"] >= by_share[0.0]["explained"] > 0.5
 
 
 def test_mapping_ends_when_its_time_is_over(tmp_path, monkeypatch, caplog):
     clock = itertools.count(0, 3600)
     monkeypatch.setattr(mapping.time, "monotonic", lambda: float(next(clock)))
-    result = estimate(tmp_path, sideways(3))
-    assert not result.trajectory.registered.any()
+    trajectory, _ = estimate(tmp_path, sideways(3))
+    assert not trajectory.registered.any()
     assert "mapping stopped after max_mapping_s" in caplog.text
 
 
@@ -202,6 +202,6 @@ camera = CameraConfig(width=160, height=120, horizontal_fov_deg=70.0)
 paths, poses = sorted(folder.glob("*.png")), np.load(folder / "poses.npy")
 for mapper in ("incremental", "global"):
     told = cfg.model_copy(update={"mapper": mapper})
-    result = sfm_batch(paths, camera, poses, told, 7, folder)
-    write_trajectory(folder / f"{mapper}.csv", result.trajectory)
+    trajectory, _ = sfm_batch(paths, camera, poses, told, 7)
+    write_trajectory(folder / f"{mapper}.csv", trajectory)
 """

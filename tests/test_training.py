@@ -61,7 +61,7 @@ def test_pretrained_weights_are_where_training_starts(split, tmp_path):
 def test_the_pretext_trains_the_backbone_and_saves_it(name, split, tmp_path):
     pretraining = PretrainingConfig(source="rooms", samples_seen=64)
     out = tmp_path / f"{name}.pt"
-    pretrain_backbone(name, [split, split], NETWORK, pretraining, 3, out)
+    pretrain_backbone(name, NETWORK, pretraining, 3, out, *zip(split, split, strict=True))
     state = torch.load(out, weights_only=True)
     torch.manual_seed(3)
     untrained = build_backbone(name, NETWORK.width)
@@ -76,7 +76,7 @@ def test_imagenet_weights_are_passed_on(tmp_path, monkeypatch):
     torch.save(official, tmp_path / "resnet34-b627a593.pth")
     pretraining = PretrainingConfig(source="imagenet", weights_dir=tmp_path)
     out = tmp_path / "out.pt"
-    pretrain_backbone("resnet34", [], NETWORK, pretraining, 0, out)
+    pretrain_backbone("resnet34", NETWORK, pretraining, 0, out)
     passed_on = torch.load(out, weights_only=True)
     assert set(passed_on) == set(backbone.state_dict())
     assert all(torch.equal(passed_on[k], v) for k, v in backbone.state_dict().items())

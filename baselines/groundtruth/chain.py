@@ -41,7 +41,7 @@ class BatchRecord:
     """What happened to one batch; errors are those of its last pose against the true one.
 
     Attributes:
-        index: position of the batch in its split.
+    index: position of the batch in its split.
         start: first frame.
         stop: one past the last frame.
         registered: frames whose pose the method found.
@@ -67,21 +67,15 @@ class BatchRecord:
     error_after_deg: float
 
 
-@dataclass(frozen=True)
-class Assistance:
-    """The record of one split."""
-
-    records: tuple[BatchRecord, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        """Totals and one record per batch, as plain values."""
-        return {
-            "batches": len(self.records),
-            "assisted": sum(record.assisted for record in self.records),
-            "lost": sum(record.lost for record in self.records),
-            "filled_frames": sum(record.filled for record in self.records),
-            "records": [asdict(record) for record in self.records],
-        }
+def summary_of(records: Sequence[BatchRecord]) -> dict[str, Any]:
+    """Totals of a split and one record per batch, as plain values."""
+    return {
+        "batches": len(records),
+        "assisted": sum(record.assisted for record in records),
+        "lost": sum(record.lost for record in records),
+        "filled_frames": sum(record.filled for record in records),
+        "records": [asdict(record) for record in records],
+    }
 
 
 def chain_batches(
@@ -89,7 +83,7 @@ def chain_batches(
     trajectories: Sequence[BatchTrajectory],
     truth: PoseTable,
     cfg: GroundTruthConfig,
-) -> tuple[PoseTable, Assistance]:
+) -> tuple[PoseTable, list[BatchRecord]]:
     """Labels of a whole split from its batches, and what assistance they needed.
 
     Args:
@@ -99,7 +93,7 @@ def chain_batches(
         cfg: the two thresholds.
 
     Returns:
-        The labels (frames and paths of ``truth``, other poses) and the record of the split.
+        The labels (frames and paths of ``truth``, other poses) and a record per batch.
 
     Raises:
         ValueError: batches, trajectories and truth do not fit together.
@@ -115,7 +109,7 @@ def chain_batches(
         )
         labels[span] = poses
         records.append(record)
-    return truth.with_poses(labels), Assistance(tuple(records))
+    return truth.with_poses(labels), records
 
 
 def chain_unassisted(
@@ -171,19 +165,9 @@ def _place(
     after_m, after_deg = _error(poses[-1], true_world_from_last)
     registered = int(trajectory.registered.sum())
     filled = int((~trajectory.registered[1:]).sum())
-    return poses, BatchRecord(
-        batch.index,
-        batch.start,
-        batch.stop,
-        registered,
-        filled,
-        bool(lost),
-        bool(assisted),
-        before_m,
-        before_deg,
-        after_m,
-        after_deg,
-    )
+    frames = batch.index, batch.start, batch.stop, registered, filled
+    errors = before_m, before_deg, after_m, after_deg
+    return poses, BatchRecord(*frames, bool(lost), bool(assisted), *errors)
 
 
 def _error(pose: Array, true_pose: Array) -> tuple[float, float]:

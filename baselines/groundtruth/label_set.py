@@ -4,14 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from baselines.groundtruth.batches import batches_of
-from baselines.groundtruth.chain import Assistance, chain_batches, chain_unassisted
+from baselines.groundtruth.chain import BatchRecord, chain_batches, chain_unassisted, summary_of
 from baselines.groundtruth.trajectory import read_trajectory
 from synfeal.config.models import GroundTruthConfig
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.errors import InputError
 from synfeal.files import write_json
+
+
+def write_label_set(
+    reconstructed: str,
+    train_batches: Sequence[Path],
+    test_batches: Sequence[Path],
+    train_truth: Path,
+    test_truth: Path,
+    groundtruth: GroundTruthConfig,
+    estimation: dict[str, Any],
+    out_train: Path,
+    out_test: Path,
+    out_train_unassisted: Path,
+    out_test_unassisted: Path,
+    out_assistance: Path,
+    out_record: Path,
+) -> None:
+    """Chain both splits; ``estimation`` is what the record says that the labels depend on."""
+    train = train_truth, out_train, out_train_unassisted
+    test = test_truth, out_test, out_test_unassisted
+    records = {
+        "train": chain_split(train_batches, *train, groundtruth),
+        "test": chain_split(test_batches, *test, groundtruth),
+    }
+    write_assistance(out_assistance, reconstructed, records)
+    write_json(out_record, {"parameters": estimation})
 
 
 def chain_split(
@@ -20,8 +47,8 @@ def chain_split(
     labels: Path,
     unassisted: Path,
     cfg: GroundTruthConfig,
-) -> Assistance:
-    """Chain the batches of one split, and return its record of assistance.
+) -> list[BatchRecord]:
+    """Chain the batches of one split, and return a record per batch.
 
     Args:
         trajectories: files of its batches, in order.
@@ -47,7 +74,6 @@ def chain_split(
     return assistance
 
 
-def write_assistance(path: Path, method: str, splits: Mapping[str, Assistance]) -> None:
+def write_assistance(path: Path, method: str, splits: Mapping[str, list[BatchRecord]]) -> None:
     """Write the records of all splits of one method as JSON."""
-    records = {split: assistance.to_json() for split, assistance in splits.items()}
-    write_json(path, {"method": method, "splits": records})
+    write_json(path, {"method": method, "splits": {s: summary_of(r) for s, r in splits.items()}})

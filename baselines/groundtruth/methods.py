@@ -12,9 +12,7 @@ Functions are named by their place, so that a table of titles loads no estimator
 
 from __future__ import annotations
 
-import resource
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from pkgutil import resolve_name
@@ -22,15 +20,17 @@ from typing import Any
 
 import numpy as np
 
-from baselines.groundtruth.posegraph.graph import Edge, PoseGraph
-from baselines.groundtruth.trajectory import BatchTrajectory
+from baselines.costs import Facts, timed
+from baselines.groundtruth.posegraph.graph import Edge, PoseGraph, read_g2o
+from baselines.groundtruth.trajectory import BatchTrajectory, write_trajectory
 from synfeal.config import Config, Experiment
 from synfeal.config.experiments import INJECTED
 from synfeal.config.models import CameraConfig, GroundTruthConfig, PoseGraphConfig
 from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.sevenscenes import frame_paths
 from synfeal.errors import InputError
+from synfeal.files import write_json
 
-Facts = dict[str, float]
 ODOMETRY = "odometry"
 
 
@@ -111,6 +111,26 @@ def estimation_parameters(config: Config, name: str) -> dict[str, Any]:
     }
 
 
+def write_estimate(
+    frame_method: str,
+    sequences: Sequence[Path],
+    start: int,
+    stop: int,
+    camera: CameraConfig,
+    groundtruth: GroundTruthConfig,
+    seed: int,
+    out_trajectory: Path,
+    out_facts: Path,
+) -> None:
+    """Write :func:`estimate_batch` of the frames ``start`` to ``stop`` of a split."""
+    color, depth = (
+        frame_paths(sequences, f"{kind}.png")[start:stop] for kind in ("color", "depth")
+    )
+    trajectory, facts = estimate_batch(frame_method, color, depth, camera, groundtruth, seed)
+    write_json(out_facts, facts)
+    write_trajectory(out_trajectory, trajectory)
+
+
 def estimate_batch(
     name: str,
     color_paths: Sequence[FrameFile],
@@ -132,7 +152,23 @@ def estimate_batch(
     method = METHODS[name]
     function = resolve_name(method.estimate)
     settings = getattr(groundtruth, method.settings) if method.settings else None
-    return _timed(lambda: function(color_paths, depth_paths, camera, settings, seed))
+    facts: Facts = {}
+    with timed(facts, "estimation_s"):
+        trajectory = function(color_paths, depth_paths, camera, settings, seed)
+    return trajectory, facts
+
+
+def write_solved(
+    graph_method: str,
+    graph: Path,
+    posegraph: PoseGraphConfig,
+    out_trajectory: Path,
+    out_facts: Path,
+) -> None:
+    """Write :func:`solve_graph` of a ``.g2o`` file."""
+    trajectory, facts = solve_graph(graph_method, read_g2o(graph), posegraph)
+    write_json(out_facts, facts)
+    write_trajectory(out_trajectory, trajectory)
 
 
 def solve_graph(name: str, graph: PoseGraph, cfg: PoseGraphConfig) -> tuple[BatchTrajectory, Facts]:
@@ -142,19 +178,14 @@ def solve_graph(name: str, graph: PoseGraph, cfg: PoseGraphConfig) -> tuple[Batc
         ValueError: the edges do not connect all nodes.
     """
     optimiser = METHODS[name].optimiser
+    facts: Facts = {}
     if optimiser == ODOMETRY:
-        registered = np.ones(len(graph.first_from_cam), dtype=bool)
-        return _timed(lambda: BatchTrajectory(graph.first_from_cam, registered))
+        with timed(facts, "estimation_s"):
+            registered = np.ones(len(graph.first_from_cam), dtype=bool)
+        return BatchTrajectory(graph.first_from_cam, registered), facts
     from baselines.groundtruth.posegraph.optimise import optimise  # gtsam takes a second to load
 
     optimise(optimiser, _SMALLEST, cfg)  # loads and compiles what it needs: not timed
-    return _timed(lambda: optimise(optimiser, graph, cfg))
-
-
-def _timed(work: Callable[[], BatchTrajectory]) -> tuple[BatchTrajectory, Facts]:
-    """A result, the processor time it took, and the most memory this process has held."""
-    begin = time.process_time()
-    trajectory = work()
-    estimation_s = time.process_time() - begin
-    peak_memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return trajectory, {"estimation_s": estimation_s, "peak_memory_mb": peak_memory_mb}
+    with timed(facts, "estimation_s"):
+        trajectory = optimise(optimiser, graph, cfg)
+    return trajectory, facts

@@ -1,11 +1,12 @@
-"""Named arrays in one file."""
+"""Named arrays in one file, and classes that consist of them."""
 
 from __future__ import annotations
 
 import zipfile
 from collections.abc import Iterable, Mapping
+from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,3 +37,20 @@ def read_arrays(path: Path, names: Iterable[str]) -> Arrays:
         raise InputError(
             f"{path}: cannot be read as arrays ({why(error)}); make it again"
         ) from None
+
+
+class Stored:
+    """A dataclass whose fields are arrays, kept as a file of them."""
+
+    def write(self, path: Path) -> None:
+        """Write the fields by their names."""
+        write_arrays(path, {field.name: getattr(self, field.name) for field in fields(self)})  # type: ignore[arg-type]
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """What :meth:`write` wrote.
+
+        Raises:
+            InputError: the file cannot be read.
+        """
+        return cls(**read_arrays(path, [field.name for field in fields(cls)]))  # type: ignore[arg-type]

@@ -9,17 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from baselines.references.arrays import read_arrays, write_arrays
-from baselines.references.features import Features, read_features
+from baselines.references.arrays import Stored
+from baselines.references.features import Features
 from baselines.references.vectors import VLAD, most_alike, read_described
 
-ARRAYS = ("start", "slope", "feature", "train", "point_m")
 # A match's distance over that of the second best (Lowe, IJCV 2004).
 RATIO = 0.8
 
 
 @dataclass(frozen=True)
-class Correspondences:
+class Correspondences(Stored):
     """Matches of the test frames, one frame after the other.
 
     Attributes:
@@ -88,17 +87,7 @@ def write_matches(
     Raises:
         InputError: descriptors or features cannot be read.
     """
-    of_train, of_test = read_features(train), read_features(test)
+    of_train, of_test = Features.read(train), Features.read(test)
     described = read_described(descriptors, len(of_train), len(of_test))
     rows = most_alike(*described[VLAD], retrieved)
-    found = match_test_frames(of_train, of_test, rows)
-    write_arrays(out_matches, {name: getattr(found, name) for name in ARRAYS})
-
-
-def read_correspondences(path: Path) -> Correspondences:
-    """Matches that :func:`write_matches` wrote.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
-    return Correspondences(**read_arrays(path, ARRAYS))
+    match_test_frames(of_train, of_test, rows).write(out_matches)

@@ -25,6 +25,7 @@ from torch import Tensor
 
 from baselines.references.arrays import write_arrays
 from baselines.references.vectors import THUMBNAIL, VLAD, Vectors
+from synfeal.dataset.packed import read_packed
 
 Frames = NDArray[np.uint8]
 T = TypeVar("T", bound=np.generic)
@@ -148,21 +149,31 @@ def parts_of(values: NDArray[T]) -> Iterator[NDArray[T]]:
 
 
 def write_descriptors(
-    frames: Mapping[str, Frames], learned_from: int, seed: int, out: Path
+    files: Mapping[str, Path],
+    learned_from: int,
+    seed: int,
+    out_descriptors: Path,
+    counts: Mapping[str, int] | None = None,
 ) -> None:
     """Describe packed frames as wholes.
 
     Args:
-        frames: by name; those of ``train`` are what the vocabulary and the axes come from.
+        files: packed frames by name; the vocabulary and the axes come from those of ``train``.
         learned_from: how many of them: those of the smallest size, so that no size sees frames
             that are not its own.
         seed: of the samples and of k-means.
-        out: arrays to write, ``<descriptor>_<name>`` (N, D).
+        out_descriptors: arrays to write, ``<descriptor>_<name>`` (N, D).
+        counts: how many frames of each, if not all.
+
+    Raises:
+        InputError: packed frames cannot be read.
     """
     torch.set_num_threads(1)
+    counts = counts or {}
+    frames = {name: read_packed(path)[: counts.get(name)] for name, path in files.items()}
     vlad = Vlad.learn(frames["train"][:learned_from], seed)
     methods = {THUMBNAIL: thumbnails, VLAD: vlad.describe}
     write_arrays(
-        out,
+        out_descriptors,
         {f"{name}_{n}": work(part) for name, work in methods.items() for n, part in frames.items()},
     )

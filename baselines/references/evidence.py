@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from baselines.references.correspondences import Correspondences, read_correspondences
-from baselines.references.tracks import Tracks, read_tracks
+from baselines.references.correspondences import Correspondences
+from baselines.references.tracks import Tracks
 from baselines.references.vectors import Described, read_described
-from baselines.references.views import Views, read_views
+from baselines.references.views import Views
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 
@@ -22,17 +23,14 @@ class Evidence:
     for the oracle, whose use of it is the point.
 
     Attributes:
-        labels: folder of the label set: ``train.csv``, ``test.csv``.
-        truth: folder of the true poses, likewise.
-        files: what the methods of a group need, by name.
+        files: by name: labels (``train``, ``test``), true poses (``train_truth``, ``test_truth``),
+            and what the methods of a group need.
         camera: of the frames that features were found in.
         seed: of whatever is random.
         samples_seen: images that a method that learns is shown.
     """
 
-    labels: Path
-    truth: Path
-    files: dict[str, Path]
+    files: Mapping[str, Path]
     camera: CameraConfig
     seed: int
     samples_seen: int = 0
@@ -40,22 +38,22 @@ class Evidence:
     @cached_property
     def train(self) -> PoseTable:
         """Labels of the training frames."""
-        return read_pose_table(self.labels / "train.csv")
+        return read_pose_table(self.files["train"])
 
     @cached_property
     def test_frames(self) -> PoseTable:
         """Which test frames there are; its poses are what methods are asked for."""
-        return read_pose_table(self.labels / "test.csv")
+        return read_pose_table(self.files["test"])
 
-    @cached_property
+    @property
     def train_truth(self) -> PoseTable:
         """True poses of the training frames."""
-        return read_pose_table(self.truth / "train.csv")
+        return read_pose_table(self.files["train_truth"])
 
-    @cached_property
+    @property
     def test_truth(self) -> PoseTable:
         """True poses of the test frames."""
-        return read_pose_table(self.truth / "test.csv")
+        return read_pose_table(self.files["test_truth"])
 
     @cached_property
     def descriptors(self) -> Described:
@@ -66,14 +64,14 @@ class Evidence:
     @cached_property
     def correspondences(self) -> Correspondences:
         """Features of the test images matched with those of the training images."""
-        return read_correspondences(self.files["correspondences"])
+        return Correspondences.read(self.files["correspondences"])
 
     @cached_property
     def tracks(self) -> Tracks:
         """Features of the training images that show the same point."""
-        return read_tracks(self.files["tracks"])
+        return Tracks.read(self.files["tracks"])
 
     @cached_property
     def views(self) -> tuple[Views, Views]:
         """Small training images with depth, and small test images."""
-        return read_views(self.files["train_views"]), read_views(self.files["test_views"])
+        return Views.read(self.files["train_views"]), Views.read(self.files["test_views"])

@@ -9,13 +9,14 @@ from __future__ import annotations
 import shlex
 import subprocess
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from baselines.costs import Facts, timed
 from baselines.references.run import score_answers
 from synfeal.dataset.pose_table import COLUMNS, PoseTable, read_pose_table
 from synfeal.errors import InputError, why
@@ -23,17 +24,39 @@ from synfeal.errors import InputError, why
 NEEDED = ("frame", *COLUMNS[2:])
 
 
-class Answers(NamedTuple):
-    """Where the answers lie, and the seconds it took to make them."""
+def answer_externally(
+    files: Mapping[str, Path],
+    method: Mapping[str, Any],
+    named: Mapping[str, str],
+    wildcards: Mapping[str, str],
+    out_references: Sequence[Path],
+) -> None:
+    """Run the command of a method, or take its file ``poses``, and score the answers.
 
-    path: Path
-    seconds: float
+    Args:
+        files: labels, true poses and packed frames by name, and ``poses``.
+        method: settings: ``command`` or ``poses``.
+        named: see :func:`run_external`.
+        wildcards: further keys of the metrics.
+        out_references: files to write, all in one folder.
+
+    Raises:
+        InputError: the command fails, or the answers cannot be read.
+    """
+    folder, facts = out_references[0].parent, Facts()
+    with timed(facts, "answer_s"):
+        begin = time.perf_counter()
+        found = files["poses"] if method["poses"] else None
+        path = found or run_external(method["command"], files, named, folder)
+    facts["answer_s"] = 0.0 if found else time.perf_counter() - begin  # another process worked
+    poses = read_answers(path, read_pose_table(files["test"]))
+    score_answers(poses, files, folder, wildcards, facts)
 
 
 def run_external(
     command: str, files: Mapping[str, Path], named: Mapping[str, str], folder: Path
-) -> Answers:
-    """Run a command that writes a table of poses.
+) -> Path:
+    """Run a command that writes a table of poses; where that lies.
 
     Args:
         command: words as a shell splits them, with placeholders.
@@ -55,7 +78,6 @@ def run_external(
         "n_test": len(read_pose_table(files["test"])),
         "out": out,
     }
-    begin = time.perf_counter()
     try:
         words = [word.format(**values) for word in shlex.split(command)]
         subprocess.run(words, check=True)
@@ -71,20 +93,7 @@ def run_external(
         ) from None
     if not out.is_file():
         raise InputError(f"references.external: command '{command}' wrote no {out}")
-    return Answers(out, time.perf_counter() - begin)
-
-
-def score_external(
-    answers: Answers, files: Mapping[str, Path], folder: Path, info: Mapping[str, Any]
-) -> None:
-    """Score answers against the labels ``files["test"]`` and the truth ``files["test_truth"]``.
-
-    Raises:
-        InputError: the answers cannot be read.
-    """
-    poses = read_answers(answers.path, read_pose_table(files["test"]))
-    labels, truth = files["test"].parent, files["test_truth"].parent
-    score_answers(poses, labels, truth, folder, info, answers.seconds)
+    return out
 
 
 def read_answers(path: Path, frames: PoseTable) -> PoseTable:

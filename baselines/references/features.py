@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from baselines.groundtruth.images import read_image
-from baselines.references.arrays import read_arrays, write_arrays
+from baselines.references.arrays import Stored
+from baselines.references.split import files_of_split
 from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig, ReferencesConfig
 from synfeal.dataset.archive import FrameFile
@@ -26,11 +27,10 @@ from synfeal.render.base import Depth
 
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
-ARRAYS = ("start", "slope", "depth_m", "descriptor")
 
 
 @dataclass(frozen=True)
-class Features:
+class Features(Stored):
     """Features of the frames of a split, one frame after the other.
 
     Attributes:
@@ -67,6 +67,23 @@ class Features:
         descriptor = self.descriptor[self.of(frame)].astype(np.float32)
         roots = np.sqrt(descriptor / np.maximum(descriptor.sum(axis=1, keepdims=True), 1))
         return np.asarray(roots, dtype=np.float32)
+
+
+def write_features(
+    sequences: Sequence[Path],
+    split: str,
+    n_frames: int,
+    camera: CameraConfig,
+    references: ReferencesConfig,
+    out_features: Path,
+) -> None:
+    """Find features in the first frames of a split, and write them.
+
+    Raises:
+        InputError: a sequence or an image cannot be read.
+    """
+    files = files_of_split(sequences, split, n_frames)
+    find_features(*files, camera, references).write(out_features)
 
 
 def find_features(
@@ -117,17 +134,3 @@ def _frame_features(sift: Any, grey: NDArray[np.uint8]) -> tuple[Array, NDArray[
     inside = ((pixel >= 0) & (pixel < [width, height])).all(axis=1)
     descriptor = np.zeros((0, 128)) if descriptor is None else descriptor
     return pixel[inside], descriptor[inside].astype(np.uint8)
-
-
-def write_features(path: Path, features: Features) -> None:
-    """Write features as arrays."""
-    write_arrays(path, {name: getattr(features, name) for name in ARRAYS})
-
-
-def read_features(path: Path) -> Features:
-    """Features that :func:`write_features` wrote.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
-    return Features(**read_arrays(path, ARRAYS))

@@ -47,7 +47,7 @@ def robustness_table(
     Args:
         models: checkpoints of localizers, by training set and name.
         descriptors: of the training frames and of all test frames, by training set.
-        structure: tables of what :func:`baselines.references.varied.answer_varied` finds on ideal
+        structure: tables of what :func:`baselines.references.varied.write_varied` finds on ideal
             training frames, by effects; empty where there are none.
         test_frames: packed test frames by the name of their effects.
         labels: folder of the true poses, ``train.csv`` and ``test.csv``: the same for all.

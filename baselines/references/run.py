@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import resource
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from pkgutil import resolve_name
@@ -12,18 +10,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines.costs import Facts, timed
 from baselines.references.evidence import Evidence
-from baselines.references.registry import REFERENCES
+from baselines.references.registry import REFERENCES, Group, in_group
 from baselines.training.score import score_run
+from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.files import write_json
 from synfeal.geometry.poses import quat_wxyz_of
 
 
+def answer_group(
+    group: Group,
+    files: Mapping[str, Path],
+    camera: CameraConfig,
+    seed: int,
+    wildcards: Mapping[str, str],
+    out_references: Sequence[Path],
+    samples_seen: int = 0,
+) -> None:
+    """Answer by all methods of a group; see :class:`Evidence` and :func:`answer_and_score`."""
+    evidence = Evidence(files, camera, seed, samples_seen)
+    answer_and_score(evidence, in_group(group), out_references[0].parents[1], wildcards)
+
+
 def answer_and_score(
     evidence: Evidence, names: Sequence[str], out_dir: Path, info: Mapping[str, Any]
 ) -> None:
-    """Write ``predictions.csv``, ``errors.csv``, ``metrics.json``, ``facts.json`` of some methods.
+    """Answer for a data set by some methods, and score them.
 
     Args:
         evidence: the data set.
@@ -35,40 +49,36 @@ def answer_and_score(
         InputError: something the methods need cannot be read.
     """
     for name in names:
-        begin = time.process_time()
-        poses = pose_table(evidence.test_frames, resolve_name(REFERENCES[name].answer)(evidence))
-        seconds = time.process_time() - begin
+        facts: Facts = {}
+        with timed(facts, "answer_s"):
+            answer = resolve_name(REFERENCES[name].answer)
+            poses = pose_table(evidence.test_frames, answer(evidence))
         known = {**info, "reference": name}
-        score_answers(poses, evidence.labels, evidence.truth, out_dir / name, known, seconds)
+        score_answers(poses, evidence.files, out_dir / name, known, facts)
 
 
 def score_answers(
     answers: PoseTable,
-    labels: Path,
-    truth: Path,
+    files: Mapping[str, Path],
     folder: Path,
     info: Mapping[str, Any],
-    seconds: float,
+    facts: Facts,
 ) -> None:
-    """Write the answers of one method, their errors, their scores, and what they took.
+    """Write ``predictions.csv``, ``errors.csv``, ``metrics.json`` and ``facts.json`` of a method.
 
     Args:
         answers: poses of the test frames; NaN where there is none.
-        labels: folder of the label set: ``train.csv``, ``test.csv``.
-        truth: folder of the true poses, likewise.
+        files: labels and true poses, as in :class:`Evidence`.
         folder: where to write.
         info: further keys of the metrics.
-        seconds: spent on the answers.
+        facts: what the answers took.
     """
     write_pose_table(folder / "predictions.csv", answers)
     score_run(
-        *(folder / "predictions.csv", labels / "test.csv", truth / "test.csv"),
-        *(labels / "train.csv", folder / "errors.csv", folder / "metrics.json"),
-        info,
+        *(folder / "predictions.csv", files["test"], files["test_truth"], files["train"]),
+        *(folder / "errors.csv", folder / "metrics.json", info),
     )
-    peak_memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    facts = {"answer_s": seconds, "frames": len(answers), "peak_memory_mb": peak_memory_mb}
-    write_json(folder / "facts.json", facts)
+    write_json(folder / "facts.json", facts | {"frames": len(answers)})
 
 
 def pose_table(frames: PoseTable, world_from_cam: NDArray[np.float64]) -> PoseTable:

@@ -12,13 +12,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from tqdm import tqdm
 
-from baselines.references.arrays import read_arrays, write_arrays
+from baselines.references.arrays import Stored
 from baselines.references.correspondences import mutual_matches
-from baselines.references.features import Features, read_features
+from baselines.references.features import Features
 from baselines.references.vectors import VLAD, most_alike, read_described
 
 Rows = NDArray[np.int64]
-ARRAYS = ("frame", "slope", "track", "of_feature")
 # Frames that each frame is matched with: those that look most alike, and the next of its path.
 ALIKE, NEXT = 10, 2
 # Two views must agree on an essential matrix, to this many focal lengths off epipolar lines.
@@ -27,7 +26,7 @@ CONFIDENCE, MAX_TRIALS = 0.999, 500
 
 
 @dataclass(frozen=True)
-class Tracks:
+class Tracks(Stored):
     """Observations of points by the training frames.
 
     Attributes:
@@ -55,20 +54,10 @@ def write_tracks(descriptors: Path, train: Path, out_tracks: Path) -> None:
     Raises:
         InputError: descriptors or features cannot be read.
     """
-    features = read_features(train)
+    features = Features.read(train)
     vectors, _ = read_described(descriptors, len(features), 0)[VLAD]
     alike = most_alike(vectors, vectors, ALIKE + 1)
-    tracks = find_tracks(features, frame_pairs(alike))
-    write_arrays(out_tracks, {name: getattr(tracks, name) for name in ARRAYS})
-
-
-def read_tracks(path: Path) -> Tracks:
-    """Tracks that :func:`write_tracks` wrote.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
-    return Tracks(**read_arrays(path, ARRAYS))
+    find_tracks(features, frame_pairs(alike)).write(out_tracks)
 
 
 def frame_pairs(alike: Rows) -> Rows:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +11,53 @@ from PIL import Image
 from tqdm import tqdm
 
 from baselines.references.correspondences import match_test_frames
-from baselines.references.evidence import Evidence
-from baselines.references.features import Features, features_of, read_features
+from baselines.references.features import Features, features_of
+from baselines.references.run import pose_table
 from baselines.references.structure import lifted, localize
 from baselines.references.vectors import VLAD, most_alike, read_described
 from synfeal.config.models import CameraConfig, ReferencesConfig, RenderConfig
-from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.render_sequence import drawn, effects_of
 from synfeal.effects.relight import open_scene
+
+
+def write_varied(
+    effects: str,
+    files: Mapping[str, Path],
+    n_test: int,
+    sample: int,
+    camera: CameraConfig,
+    render: RenderConfig,
+    references: ReferencesConfig,
+    seed: int,
+    out_predictions: Path,
+) -> None:
+    """Draw some test frames with effects, and write what ``structure-depth`` answers for them.
+
+    Args:
+        effects: what the descriptors call all test frames that are drawn like these.
+        files: ``mesh``, ``plan`` of the test frames, ``labels``, ``features`` with depth and
+            ``descriptors`` of the training frames.
+        n_test: test frames there are.
+        sample: how many of them are drawn at most, spread evenly.
+        camera: of the frames.
+        render: with effects.
+        references: features and retrieval.
+        seed: of RANSAC.
+        out_predictions: poses of the frames drawn, NaN where none is found.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
+    plan, rows = read_pose_table(files["plan"]), sampled(n_test, sample)
+    test = varied_features(files["mesh"], plan, rows, camera, render, references)
+    train = read_pose_table(files["labels"])
+    known = read_described(files["descriptors"], len(train), int(rows[-1]) + 1, effects)
+    of_train, of_all = known[VLAD]
+    nearest = most_alike(of_train, of_all[rows], references.retrieved)
+    matches = match_test_frames(Features.read(files["features"]), test, nearest)
+    poses = localize(matches, lifted(matches, train), camera, seed)
+    write_pose_table(out_predictions, pose_table(plan.at(rows), poses))
 
 
 def sampled(count: int, most: int) -> NDArray[np.int64]:
@@ -45,26 +85,3 @@ def varied_features(
         views = (next(drawn(renderer, pose, False, effects))[0] for pose in poses)
         greys = (np.asarray(Image.fromarray(rgb).convert("L")) for rgb in views)
         return features_of(greys, None, camera, cfg)
-
-
-def answer_varied(
-    evidence: Evidence, test: Features, rows: NDArray[np.int64], effects: str, retrieved: int
-) -> NDArray[np.float64]:
-    """Poses (N, 4, 4), NaN where none is found, as by ``structure-depth`` of the registry.
-
-    Args:
-        evidence: of the training frames: labels, ``features`` with depth, ``descriptors``.
-        test: features of N test frames.
-        rows: (N,) which of the test frames these are.
-        effects: what the descriptors call all test frames that are drawn like these.
-        retrieved: training frames that a test frame is matched with.
-
-    Raises:
-        InputError: a file cannot be read.
-    """
-    train = evidence.train
-    stored = evidence.files["descriptors"]
-    of_train, of_all = read_described(stored, len(train), int(rows[-1]) + 1, effects)[VLAD]
-    nearest = most_alike(of_train, of_all[rows], retrieved)
-    matches = match_test_frames(read_features(evidence.files["features"]), test, nearest)
-    return localize(matches, lifted(matches, train), evidence.camera, evidence.seed)

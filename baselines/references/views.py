@@ -15,19 +15,19 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from baselines.groundtruth.images import read_image
-from baselines.references.arrays import read_arrays, write_arrays
+from baselines.references.arrays import Stored
+from baselines.references.split import files_of_split
 from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.sevenscenes import read_depth_m
 
 Array = NDArray[np.float64]
-ARRAYS = ("images", "slope", "depth_m")
 STRIDE = 4  # pixels between the cells of the network's output
 
 
 @dataclass(frozen=True)
-class Views:
+class Views(Stored):
     """Frames of a split as a scene-coordinate network sees them.
 
     Attributes:
@@ -49,6 +49,23 @@ class Views:
         """Points (N, R, C, 3) in camera coordinates; not finite where there is no depth."""
         ray = np.concatenate([self.slope, np.ones((*self.slope.shape[:2], 1))], axis=-1)
         return np.asarray(ray * self.depth_m[..., None], dtype=np.float32)
+
+
+def write_views(
+    sequences: Sequence[Path],
+    split: str,
+    n_frames: int,
+    camera: CameraConfig,
+    side: tuple[int, int],
+    out_views: Path,
+) -> None:
+    """Reduce the first frames of a split to ``side`` (width, height), and write them.
+
+    Raises:
+        InputError: a sequence or an image cannot be read.
+    """
+    files = files_of_split(sequences, split, n_frames)
+    read_frames(*files, camera, *side).write(out_views)
 
 
 def read_frames(
@@ -82,17 +99,3 @@ def cell_pixels(camera: CameraConfig, width: int, height: int) -> Array:
     """
     column, row = np.meshgrid(np.arange(0, width, STRIDE) + 0.5, np.arange(0, height, STRIDE) + 0.5)
     return np.stack([column * camera.width / width, row * camera.height / height], axis=-1)
-
-
-def write_views(path: Path, views: Views) -> None:
-    """Write views as arrays."""
-    write_arrays(path, {name: getattr(views, name) for name in ARRAYS})
-
-
-def read_views(path: Path) -> Views:
-    """Views that :func:`write_views` wrote.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
-    return Views(**read_arrays(path, ARRAYS))

@@ -79,28 +79,31 @@ class RoomsNetwork(nn.Module):
 @memory_errors()
 def pretrain_backbone(
     backbone: BackboneName,
-    rooms: Sequence[tuple[Path, Path]],
     network: NetworkConfig,
     pretraining: PretrainingConfig,
     seed: int,
-    out: Path,
+    out_weights: Path,
+    frames: Sequence[Path] = (),
+    labels: Sequence[Path] = (),
 ) -> None:
     """Write the state dict that ``init: pretrained`` starts from.
 
     Args:
         backbone: which one.
-        rooms: packed frames and true poses of each room; none unless ``source`` is ``rooms``.
         network: input side and width.
         pretraining: where the weights come from, and how long they are trained if they are new.
         seed: of the initial weights, the order of frames and their rotations.
-        out: state dict to write.
+        out_weights: state dict to write.
+        frames: packed frames of each room; none unless ``source`` is ``rooms``.
+        labels: their true poses, likewise.
 
     Raises:
         InputError: a file cannot be used, or the ImageNet weights cannot be had.
         MemoryError: there is too little memory.
     """
     if pretraining.source == "rooms":
-        trained = _train_on_rooms(backbone, rooms, network, pretraining, seed, out)
+        rooms = list(zip(frames, labels, strict=True))
+        trained = _train_on_rooms(backbone, rooms, network, pretraining, seed, out_weights)
     else:
         trained = build_backbone(backbone, network.width)
         path = (
@@ -109,7 +112,9 @@ def pretrain_backbone(
             else imagenet_weights_path(backbone, pretraining.weights_dir)
         )
         load_backbone_weights(trained, path)
-    save_atomically(out, {name: value.cpu() for name, value in trained.state_dict().items()})
+    save_atomically(
+        out_weights, {name: value.cpu() for name, value in trained.state_dict().items()}
+    )
 
 
 def _train_on_rooms(

@@ -30,6 +30,26 @@ from synfeal.labels.constant import constant_pose
 Array = NDArray[np.float64]
 
 
+def write_scores(
+    predictions: Path,
+    labels: Path,
+    truth: Path,
+    train_labels: Path,
+    depth: Path,
+    camera: CameraConfig,
+    common: Path,
+    common_truth: Path,
+    wildcards: dict[str, str],
+    out_errors: Path,
+    out_metrics: Path,
+    out_common: Path,
+) -> None:
+    """Score a training run: :func:`score_run` and :func:`score_common`."""
+    files = predictions, labels, truth, train_labels, out_errors, out_metrics
+    score_run(*files, wildcards, (depth, camera))
+    score_common(common, common_truth, out_common)
+
+
 def score_run(
     predictions: Path,
     labels: Path,

@@ -26,9 +26,9 @@ def run(case: BatchCase, seed: int) -> dict[str, float]:
     optimised = optimise("g2o", graph, cfg.posegraph).first_from_cam
     optimise_s = time.process_time() - begin_s
     return {
-        "pairs_accepted": facts.pairs_accepted,
-        "loops": facts.loops,
+        "pairs_accepted": facts["pairs_accepted"],
+        "loops": facts["loops"],
         **errors("odometry", graph.first_from_cam, batch.world_from_cam),
         **errors("g2o", optimised, batch.world_from_cam),
-        "cpu_s": facts.odometry_s + facts.loops_s + optimise_s,
+        "cpu_s": facts["odometry_s"] + facts["loops_s"] + optimise_s,
     }

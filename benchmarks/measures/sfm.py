@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
-
 from baselines.groundtruth.chain import fill_gaps
 from baselines.groundtruth.sfm.batch import sfm_batch
 from benchmarks.measures.batches import BatchCase, errors, open_batch
@@ -20,18 +17,10 @@ def run(case: BatchCase, seed: int) -> dict[str, float]:
         InputError: the frames cannot be used.
     """
     batch = open_batch(case)
-    with tempfile.TemporaryDirectory(prefix="sfm-") as work:
-        estimate = sfm_batch(
-            batch.color,
-            case.groundtruth_camera,
-            batch.world_from_cam,
-            case.groundtruth.sfm,
-            seed_of(seed, "sfm"),
-            Path(work),
-        )
-    facts = estimate.facts
+    files = batch.color, case.groundtruth_camera, batch.world_from_cam
+    trajectory, facts = sfm_batch(*files, case.groundtruth.sfm, seed_of(seed, "sfm"))
     return {
-        **facts.to_json(),
-        **errors("sfm", fill_gaps(estimate.trajectory), batch.world_from_cam),
-        "cpu_s": facts.features_s + facts.matching_s + facts.mapping_s,
+        **facts,
+        **errors("sfm", fill_gaps(trajectory), batch.world_from_cam),
+        "cpu_s": facts["features_s"] + facts["matching_s"] + facts["mapping_s"],
     }

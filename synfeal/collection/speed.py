@@ -31,7 +31,7 @@ def write_collection_speed(
     render: RenderConfig,  # how frames are drawn
     seed: int,  # of the plan
     # ``width``, ``height``, ``frames_per_s`` of each part, ``processor``, ``cores``
-    out_json: Path,
+    out_speed: Path,
 ) -> None:
     """Collect 100 frames of 640 x 480 in four parts and write how fast each was.
 
@@ -45,7 +45,7 @@ def write_collection_speed(
     planning_s = (time.perf_counter() - began) / PARTS
     seconds = []
     with (
-        tempfile.TemporaryDirectory(dir=out_json.parent) as folder,
+        tempfile.TemporaryDirectory(dir=out_speed.parent) as folder,
         open_renderer(load_mesh(mesh), CAMERA, render) as renderer,
     ):
         for part, rows in enumerate(np.array_split(np.arange(FRAMES), PARTS)):
@@ -56,7 +56,7 @@ def write_collection_speed(
             write_sequence(renderer, poses, Path(folder) / f"seq-{part + 1:02d}", with_depth=False)
             seconds.append(time.perf_counter() - began + planning_s)
     write_json(
-        out_json,
+        out_speed,
         {
             "width": CAMERA.width,
             "height": CAMERA.height,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,39 @@ from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
 from synfeal.dataset.archive import sequence_at
 from synfeal.dataset.manifest import write_manifest
 from synfeal.dataset.packed import pack_frames
-from synfeal.dataset.pose_table import read_pose_table, write_pose_table
+from synfeal.dataset.pose_table import read_frames, read_pose_table, write_pose_table
 from synfeal.dataset.preview import write_contact_sheet
 from synfeal.dataset.sevenscenes import Split, frame_paths, sequences_of, write_splits
 from synfeal.effects.crowd import crowd_of
-from synfeal.files import file_sha256, read_json
+from synfeal.files import file_sha256, read_json, write_json
 from synfeal.frames import write_frame
 
 CLUTTER = "clutter.json"  # beside the mesh: which objects stand about in it, and where
+
+
+def finish_dataset(
+    mesh: Path,
+    plans: Sequence[Path],
+    camera: CameraConfig,
+    counts: Mapping[Split, int],
+    shard_frames: int,
+    origin: Mapping[str, Any],
+    out_manifest: Path,
+    coverage: Sequence[Path] = (),
+) -> None:
+    """:func:`finish` sequences, after what is known of their plans was put beside them.
+
+    ``plans`` are those of the splits that have frames, in the order of ``counts``; ``coverage`` is
+    what each of them covers, if that is known; ``out_manifest`` lies beside the sequences.
+    """
+    directory = out_manifest.parent
+    splits: list[Split] = [split for split, count in counts.items() if count]
+    for split, plan in zip(splits, plans, strict=True):
+        write_pose_table(directory / f"{split}.csv", read_frames(plan, 0, counts[split]))
+    if coverage:
+        covered = {s: read_json(path) for s, path in zip(splits, coverage, strict=True)}
+        write_json(directory / "coverage.json", covered)
+    finish(directory, counts, shard_frames, camera, mesh, origin)
 
 
 def finish(
@@ -47,8 +72,9 @@ def finish(
             pack_frames(chosen, packed_px, directory / f"{split}.npy")
     write_contact_sheet(frame_paths(list(paths.values()), "color.png"), directory / "preview.png")
     about = {"mesh_sha256": file_sha256(mesh), **origin, **_write_effects(directory, origin, mesh)}
-    if mesh.with_name(CLUTTER).is_file():
-        about["clutter"] = read_json(mesh.with_name(CLUTTER))
+    clutter = mesh.with_name(CLUTTER)
+    if places := read_json(clutter) if clutter.is_file() else []:
+        about["clutter"] = places
     write_manifest(directory, sequences, camera, about)
 
 

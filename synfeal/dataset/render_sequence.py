@@ -19,7 +19,7 @@ from synfeal.dataset.archive import is_archive, write_archive
 from synfeal.dataset.directories import atomic_directory, refuse_existing, writing_to
 from synfeal.dataset.packed import View, fit_frame, new_packed
 from synfeal.dataset.png import encode_png
-from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.pose_table import PoseTable, read_frames
 from synfeal.dataset.progress import Progress
 from synfeal.dataset.sevenscenes import depth_mm_of, pose_text
 from synfeal.effects.apply import Frame, varied_frames
@@ -33,32 +33,32 @@ REMEDY = "nothing was kept; fix that and render again"
 
 
 def render_sequence(
-    mesh_path: Path,
+    mesh: Path,  # in the world frame, as :func:`synfeal.mesh.save.save_glb` writes it
     camera: CameraConfig,
-    poses: PoseTable,
-    out: Path,
+    plan: Path,  # pose table
+    start: int,  # row of the first frame
+    stop: int,  # one past that of the last
     with_depth: bool,
-    render: RenderConfig | None = None,
+    render: RenderConfig,  # backend and effects
+    out_frames: Path,  # a directory, or an archive if its name ends in ``.zip``
 ) -> None:
-    """Render every pose of the table into a new sequence, which appears when it is complete.
+    """Render poses of a table into a new sequence, which appears when it is complete.
 
-    Frames are numbered from 0 inside the sequence. ``mesh_path`` is a mesh in the world frame, as
-    :func:`synfeal.mesh.save.save_glb` writes it. ``out`` is a directory, or an archive if its name
-    ends in ``.zip``.
+    Frames are numbered from 0 inside the sequence.
 
     Raises:
-        InputError: the mesh cannot be read, or ``out`` is not empty.
+        InputError: the mesh or the table cannot be read, or ``out_frames`` is not empty.
     """
-    began = time.perf_counter()
+    began, poses = time.perf_counter(), read_frames(plan, start, stop)
     with (
-        writing_to(out, lambda: REMEDY),
-        open_scene(mesh_path, camera, render) as renderer,
-        Progress(len(poses), out.name) as progress,
+        writing_to(out_frames, lambda: REMEDY),
+        open_scene(mesh, camera, render) as renderer,
+        Progress(len(poses), out_frames.name) as progress,
     ):
         write_sequence(
-            renderer, poses, out, with_depth, progress.update, effects_of(camera, render)
+            renderer, poses, out_frames, with_depth, progress.update, effects_of(camera, render)
         )
-    progress.part_done(out.name, len(poses), time.perf_counter() - began)
+    progress.part_done(out_frames.name, len(poses), time.perf_counter() - began)
 
 
 THREADS = 4
@@ -152,32 +152,36 @@ def resolved(render: RenderConfig) -> RenderConfig:
 
 
 def render_packed(
-    mesh_path: Path,
+    mesh: Path,
     camera: CameraConfig,
-    poses: PoseTable,
+    plan: Path,
+    start: int,
+    stop: int,
     input_px: int,
-    out: Path,
-    render: RenderConfig | None = None,
-    view: View = "square",
+    view: View,
+    render: RenderConfig,
+    out_frames: Path,
 ) -> None:
-    """Render every pose of the table into one array, as :func:`pack_frames` makes it of files.
+    """Render rows ``start`` to ``stop`` of a plan into one array, as :func:`pack_frames` packs.
 
-    ``<out>.json``, in place of ``.npy``, says how many frames it holds and which backend drew them.
+    ``.json`` beside it, in place of ``.npy``, says how many frames it holds and which backend drew
+    them.
 
     Raises:
-        InputError: the mesh cannot be read, or the file cannot be written.
+        InputError: the mesh or the plan cannot be read, or the file cannot be written.
     """
-    chosen = resolved(render or RenderConfig())
+    chosen, poses = resolved(render), read_frames(plan, start, stop)
     with (
-        writing_to(out, lambda: REMEDY),
-        open_scene(mesh_path, camera, chosen) as renderer,
-        new_packed(out, len(poses), input_px) as packed,
-        Progress(len(poses), out.stem) as progress,
+        writing_to(out_frames, lambda: REMEDY),
+        open_scene(mesh, camera, chosen) as renderer,
+        new_packed(out_frames, len(poses), input_px) as packed,
+        Progress(len(poses), out_frames.stem) as progress,
     ):
         began = time.perf_counter()
         frames = drawn(renderer, poses, False, effects_of(camera, chosen))
         for index, (rgb, _) in enumerate(frames):
             packed[index] = fit_frame(Image.fromarray(rgb), input_px, view)
             progress.update()
-        write_json(out.with_suffix(".json"), {"frames": len(poses), "backend": chosen.backend})
-    progress.part_done(out.stem, len(poses), time.perf_counter() - began)
+        record = {"frames": len(poses), "backend": chosen.backend}
+        write_json(out_frames.with_suffix(".json"), record)
+    progress.part_done(out_frames.stem, len(poses), time.perf_counter() - began)

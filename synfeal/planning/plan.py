@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.models import Box, CollectionConfig, SceneConfig
-from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.mesh.checks import check_sampling_box
@@ -22,6 +22,20 @@ from synfeal.planning.space import PoseSpace
 from synfeal.planning.start import sample_start
 
 Array = NDArray[np.float64]
+
+
+def write_plan(
+    collision: Path,
+    scene: SceneConfig,
+    collection: CollectionConfig,
+    n_frames: int,
+    seed: int,
+    split: str,
+    out_plan: Path,
+) -> None:
+    """Plan one split of a scene; see :func:`plan_split`."""
+    rng = np.random.default_rng(seed)
+    write_pose_table(out_plan, plan_scene(collision, scene, collection, n_frames, rng, split))
 
 
 def plan_scene(

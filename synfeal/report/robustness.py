@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import Literal
 
 import pandas as pd
 
 from baselines.references.registry import REFERENCES
-from baselines.references.robustness import SCHEMA, STRUCTURE
+from baselines.references.robustness import SCHEMA, STRUCTURE, robustness_table
+from synfeal.config.models import MODELS
 from synfeal.config.robustness import CLEAN, MIXED
 from synfeal.frames import read_frame, write_frame
 from synfeal.report.layouts import TITLES
@@ -22,6 +25,45 @@ CAPTION = (
     "The same test paths rendered with effects of a camera and of changing light (config, "
     "robustness): median errors against the true poses."
 )
+
+
+def write_robustness_table(
+    clean: Sequence[Path],
+    mixed: Sequence[Path],
+    descriptors: Sequence[Path],
+    structure: Sequence[Path],
+    test: Path,
+    varied: Sequence[Path],
+    labels: Sequence[Path],
+    effects: Sequence[str],
+    device: Literal["auto", "cpu", "cuda"],
+    out_csv: Path,
+    out_tex: Path,
+) -> None:
+    """Measure and write the table.
+
+    Args:
+        clean: checkpoints of all localizers, trained on ideal frames.
+        mixed: the same, trained on frames with effects mixed in.
+        descriptors: of the frames of both training sets.
+        structure: answers of structure-based poses for the ideal frames and each of ``effects``;
+            none where there are no frames with depth.
+        test: packed test frames.
+        varied: the same with each of ``effects``.
+        labels: true poses of both splits, in one folder.
+        effects: names of what the test frames are varied by.
+        device: where to predict.
+        out_csv: the table.
+        out_tex: its LaTeX.
+    """
+    models = {
+        name: dict(zip(MODELS, m, strict=True)) for name, m in ((CLEAN, clean), (MIXED, mixed))
+    }
+    tests = dict(zip((CLEAN, *effects), (test, *varied), strict=True))
+    answers = dict(zip(tests, structure, strict=bool(structure)))
+    vectors = dict(zip(models, descriptors, strict=True))
+    table = robustness_table(models, vectors, answers, tests, labels[0].parent, device)
+    write_robustness(table, out_csv, out_tex)
 
 
 def write_robustness(table: pd.DataFrame, out_csv: Path, out_tex: Path) -> None:

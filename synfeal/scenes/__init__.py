@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from synfeal.errors import InputError
@@ -20,7 +21,7 @@ BUILDERS = {
 SWITCHED = ("large_room", "sanctuary")
 
 
-def save_light_shares(builder: str, seed: int, directory: Path) -> None:
+def save_light_shares(builder: str, seed: int, out_shares: Sequence[Path]) -> None:
     """Write ``light_<group>.glb`` of a stand-in for :func:`synfeal.effects.relight.open_scene`.
 
     Raises:
@@ -29,7 +30,7 @@ def save_light_shares(builder: str, seed: int, directory: Path) -> None:
     if builder not in SWITCHED:
         raise InputError(f"builder: the lights of {builder} cannot be switched; leave states out")
     for group, mesh in light_shares(*BUILDERS[builder](seed)).items():
-        save_glb(directory / f"light_{group}.glb", mesh)
+        save_glb(out_shares[0].with_name(f"light_{group}.glb"), mesh)
 
 
 def build_scene(builder: str, seed: int) -> TexturedMesh:

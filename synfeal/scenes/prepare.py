@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.config.collection import ClutterConfig
 from synfeal.config.load import check_mesh_file
 from synfeal.config.models import SceneConfig
 from synfeal.dataset.finish import CLUTTER
@@ -23,17 +25,18 @@ from synfeal.seeds import generator_of
 
 
 def prepare_scene(
-    name: str, scene: SceneConfig, collision_agreement: float | None, seed: int, out_dir: Path
+    name: str, scene: SceneConfig, collision_agreement: float | None, seed: int, out_mesh: Path
 ) -> None:
-    """Write what later stages read of a scene into ``out_dir``.
+    """Write what later stages read of a scene: ``out_mesh`` (``mesh.glb``, world frame).
 
-    These are ``mesh.glb`` (world frame), ``collision.ply``, how that was chosen
-    (``collision_curve.csv``, whose times differ between runs), and ``properties.json``.
+    Beside it ``collision.ply``, how that was chosen (``collision_curve.csv``, whose times differ
+    between runs), ``clutter.json`` (what was placed in it, if anything) and ``properties.json``.
 
     Raises:
         InputError: the mesh cannot be used, is not the expected file, or contradicts the
             sampling box; or no pose in that box has a free view.
     """
+    out_dir = out_mesh.parent
     mesh, n_faces = prepare_mesh(name, scene, collision_agreement, seed, out_dir)
     origin = scene.builder if scene.source == "procedural" else str(scene.path)
     details = {"source": scene.source, "origin": origin, "collision_faces": n_faces}
@@ -45,7 +48,7 @@ def prepare_scene(
 def prepare_mesh(
     name: str, scene: SceneConfig, collision_agreement: float | None, seed: int, out_dir: Path
 ) -> tuple[TexturedMesh, int]:
-    """Write ``collision.ply``, ``collision_curve.csv`` and, last, ``mesh.glb`` into ``out_dir``.
+    """Write ``collision.ply``, ``collision_curve.csv``, ``clutter.json``, and ``mesh.glb`` last.
 
     Without ``collision_agreement`` the collision mesh is the mesh itself, and the curve is empty.
 
@@ -63,8 +66,10 @@ def prepare_mesh(
     else:
         rng = generator_of(seed, "collision", name)
         collision, curve = collision_mesh(mesh, scene, box, collision_agreement, rng)
+    places: list[dict[str, Any]] = []
     if scene.clutter is not None:
-        mesh, collision = _with_clutter(name, scene, mesh, collision, box, out_dir)
+        mesh, collision, places = _with_clutter(name, scene.clutter, mesh, collision, box)
+    write_json(out_dir / CLUTTER, places)
     save_collision_mesh(out_dir / "collision.ply", collision)
     write_curve(out_dir / "collision_curve.csv", curve)
     save_glb(out_dir / "mesh.glb", mesh)
@@ -73,25 +78,22 @@ def prepare_mesh(
 
 def _with_clutter(
     name: str,
-    scene: SceneConfig,
+    clutter: ClutterConfig,
     mesh: TexturedMesh,
     collision: Triangles,
     box: NDArray[np.float64],
-    out_dir: Path,
-) -> tuple[TexturedMesh, Triangles]:
-    """Scene and collision mesh with objects, of which none is simplified: paths avoid them all."""
+) -> tuple[TexturedMesh, Triangles, list[dict[str, Any]]]:
+    """Scene and collision mesh with objects, none simplified: paths avoid them; where they are."""
     from synfeal.scenes.objects import cluttered  # paints, so takes time to load
 
-    assert scene.clutter is not None
-    rng = generator_of("clutter", scene.clutter.seed)
-    objects, places = cluttered(mesh, box, scene.clutter, rng, f"scenes.{name}.clutter")
-    write_json(out_dir / CLUTTER, places)
+    rng = generator_of("clutter", clutter.seed)
+    objects, places = cluttered(mesh, box, clutter, rng, f"scenes.{name}.clutter")
     vertices, faces = objects.merged()
     joined = Triangles(
         np.concatenate([collision.vertices_m, vertices]),
         np.concatenate([collision.faces, faces + len(collision.vertices_m)]),
     )
-    return TexturedMesh((*mesh.parts, *objects.parts), mesh.findings), joined
+    return TexturedMesh((*mesh.parts, *objects.parts), mesh.findings), joined, places
 
 
 def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:

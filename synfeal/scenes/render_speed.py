@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from synfeal.config.camera import CameraConfig
-from synfeal.config.rendering import RenderConfig
+from synfeal.config.rendering import RenderConfig, RenderSpeedConfig
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.render_sequence import resolved
 from synfeal.frames import COUNT, NUMBER, TEXT, frame_of, write_frame
@@ -70,22 +70,25 @@ class Truth:
 
 
 def write_render_speed(
-    mesh_path: Path,  # a mesh in the world frame
-    plan_path: Path,  # table of poses
-    cameras: Sequence[CameraConfig],  # as :func:`measured_cameras` gives them, smallest first
-    n_poses: int,  # views through the smallest; half as many through the others
+    mesh: Path,  # in the world frame
+    plan: Path,  # table of poses
+    network_camera: CameraConfig,  # of the profile; see :func:`measured_cameras`
+    groundtruth_camera: CameraConfig,  # likewise
+    render_speed: RenderSpeedConfig,  # how many sizes, and views through the smallest
     render: RenderConfig,  # what the profile renders with
-    out_csv: Path,  # one row per camera and variant, columns :data:`SCHEMA`
+    out_speed: Path,  # one row per camera and variant, columns :data:`SCHEMA`
 ) -> None:
     """Measure on poses spread evenly over a plan, and write the rows; times differ between runs.
 
     Raises:
         InputError: the mesh or the plan cannot be read, or no backend works here.
     """
-    plan = read_pose_table(plan_path).world_from_cam
-    poses = plan[np.linspace(0, len(plan) - 1, min(n_poses, len(plan))).astype(int)]
-    rows = measure_speed(load_mesh(mesh_path), cameras, poses, resolved(render))
-    write_frame(out_csv, rows, float_format=None)
+    every = read_pose_table(plan).world_from_cam
+    count = min(render_speed.poses, len(every))
+    poses = every[np.linspace(0, len(every) - 1, count).astype(int)]
+    cameras = measured_cameras(network_camera, groundtruth_camera, render_speed.sizes)
+    rows = measure_speed(load_mesh(mesh), cameras, poses, resolved(render))
+    write_frame(out_speed, rows, float_format=None)
 
 
 def measured_cameras(

@@ -14,31 +14,31 @@ rule call:
         "../scripts/call.py"
 
 
-rule scene:
+use rule call as scene with:
     input:
         mesh=lambda w: CONFIG.scenes[w.scene].path or [],
     output:
         mesh=f"{ROOT}/scenes/{{scene}}/mesh.glb",
         collision=f"{ROOT}/scenes/{{scene}}/collision.ply",
         curve=f"{ROOT}/scenes/{{scene}}/collision_curve.csv",
+        clutter=f"{ROOT}/scenes/{{scene}}/clutter.json",
         properties=f"{ROOT}/scenes/{{scene}}/properties.json",
     log:
         f"{ROOT}/logs/scene/{{scene}}.log",
     benchmark:
         f"{ROOT}/benchmarks/scene/{{scene}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(4000),
     params:
-        scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
+        function="synfeal.scenes.prepare:prepare_scene",
+        name=lambda w: w.scene,
+        scene=lambda w, input: dump(CONFIG.scenes[w.scene], exclude={"sizes"})
+        | {"path": file_of(input.mesh)},
         collision_agreement=CONFIG.collection.collision_agreement,
         seed=CONFIG.seed,
-    script:
-        "../scripts/scene.py"
 
 
-rule plan:
+use rule call as plan with:
     input:
         collision=rules.scene.output.collision,
         repeat=CONFIG.collection.repeat or [],
@@ -48,17 +48,15 @@ rule plan:
         f"{ROOT}/logs/plan/{{scene}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/plan/{{scene}}/{{split}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(2000),
     params:
+        function="synfeal.planning.plan:write_plan",
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
-        collection=dump(CONFIG.collection),
+        collection=lambda w, input: dump(CONFIG.collection)
+        | {"repeat": file_of(input.repeat)},
         n_frames=lambda w: CONFIG.n_largest(w.scene, w.split),
         seed=lambda w: seed_of(CONFIG.seed, "plan", w.scene, w.split),
-    script:
-        "../scripts/plan.py"
 
 
 use rule call as coverage with:
@@ -93,7 +91,7 @@ use rule call as cell_depth with:
         camera=dump(CONFIG.network_camera),
 
 
-rule render:
+use rule call as render with:
     input:
         mesh=rules.scene.output.mesh,
         plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w).split}.csv",
@@ -104,22 +102,19 @@ rule render:
         f"{ROOT}/logs/render/{{scene}}/{{camera}}/{{sequence}}.log",
     benchmark:
         f"{ROOT}/benchmarks/render/{{scene}}/{{camera}}/{{sequence}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
     params:
+        function="synfeal.dataset.render_sequence:render_sequence",
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
         start=lambda w: sequence_named(w).start,
         stop=lambda w: sequence_named(w).stop,
         with_depth=lambda w: w.camera == "groundtruth" or CONFIG.network_depth,
         render=dump(CONFIG.render),
-    script:
-        "../scripts/render.py"
 
 
 # Built-in objects, where effects place some along every path.
-rule cartons:
+use rule call as cartons with:
     input:
         mesh=rules.scene.output.mesh,
     output:
@@ -128,16 +123,11 @@ rule cartons:
         f"{ROOT}/logs/cartons/{{scene}}.log",
     benchmark:
         f"{ROOT}/benchmarks/cartons/{{scene}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
-    script:
-        "../scripts/cartons.py"
+    params:
+        function="synfeal.scenes.objects:save_cartons",
 
 
-rule render_speed:
+use rule call as render_speed with:
     input:
         mesh=rules.scene.output.mesh,
         plan=f"{ROOT}/plans/{{scene}}/test.csv",
@@ -147,20 +137,17 @@ rule render_speed:
         f"{ROOT}/logs/render_speed/{{scene}}.log",
     benchmark:
         f"{ROOT}/benchmarks/render_speed/{{scene}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
     params:
+        function="synfeal.scenes.render_speed:write_render_speed",
         network_camera=dump(CONFIG.network_camera),
         groundtruth_camera=dump(CONFIG.groundtruth_camera),
         render_speed=dump(CONFIG.render_speed),
         render=dump(CONFIG.render),
-    script:
-        "../scripts/render_speed.py"
 
 
-rule collection_speed:
+use rule call as collection_speed with:
     input:
         mesh=rules.scene.output.mesh,
         collision=rules.scene.output.collision,
@@ -171,21 +158,19 @@ rule collection_speed:
         f"{ROOT}/logs/collection_speed/{{scene}}.log",
     benchmark:
         f"{ROOT}/benchmarks/collection_speed/{{scene}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
     params:
+        function="synfeal.collection.speed:write_collection_speed",
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
-        collection=dump(CONFIG.collection),
+        collection=lambda w, input: dump(CONFIG.collection)
+        | {"repeat": file_of(input.repeat)},
         render=dump(CONFIG.render),
         seed=lambda w: seed_of(CONFIG.seed, "collection speed", w.scene),
-    script:
-        "../scripts/collection_speed.py"
 
 
 # What the localizers see goes from the renderer straight into an array, not through image files.
-rule render_packed:
+use rule call as render_packed with:
     input:
         mesh=rules.scene.output.mesh,
         plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w, 'network').split}.csv",
@@ -197,19 +182,16 @@ rule render_packed:
         f"{ROOT}/logs/render_packed/{{scene}}/{{sequence}}.log",
     benchmark:
         f"{ROOT}/benchmarks/render_packed/{{scene}}/{{sequence}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
     params:
+        function="synfeal.dataset.render_sequence:render_packed",
         camera=dump(CONFIG.network_camera),
         start=lambda w: sequence_named(w, "network").start,
         stop=lambda w: sequence_named(w, "network").stop,
         input_px=CONFIG.network.input_px,
         view=CONFIG.network.view,
         render=dump(CONFIG.render),
-    script:
-        "../scripts/render_packed.py"
 
 
 use rule call as pack with:
@@ -233,13 +215,14 @@ use rule call as pack with:
         view=CONFIG.network.view,
 
 
-rule dataset:
+use rule call as dataset with:
     input:
         mesh=rules.scene.output.mesh,
         sequences=lambda w: sequence_dirs(w.scene, w.camera),
         plans=lambda w: plans_with_frames(w.scene, w.camera, "csv"),
         coverage=lambda w: plans_with_frames(w.scene, w.camera, "coverage.json"),
         extras=lambda w: beside_mesh(w.scene, CONFIG.render.effects),
+        clutter=lambda w: clutter_of(w.scene),
     output:
         manifest=f"{ROOT}/datasets/{{scene}}/{{camera}}/manifest.json",
         train=f"{ROOT}/datasets/{{scene}}/{{camera}}/TrainSplit.txt",
@@ -248,17 +231,12 @@ rule dataset:
         f"{ROOT}/logs/dataset/{{scene}}/{{camera}}.log",
     benchmark:
         f"{ROOT}/benchmarks/dataset/{{scene}}/{{camera}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="synfeal.dataset.finish:finish_dataset",
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
         counts=lambda w: {s: n_frames(w.scene, w.camera, s) for s in SPLITS},
         shard_frames=CONFIG.shard_frames,
         origin=lambda w: origin_of(CONFIG, w.scene),
-    script:
-        "../scripts/dataset.py"
 
 
 use rule call as true_labels with:

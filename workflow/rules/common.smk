@@ -97,6 +97,11 @@ def dump(model, **kwargs):
     return model.model_dump(mode="json", **kwargs)
 
 
+def file_of(files):
+    """A file that a rule may do without, where it lies here."""
+    return str(files) if files else None
+
+
 def n_frames(scene, camera, split):
     """Frames of a split that have to be rendered with a camera: no more than a consumer asks for."""
     if camera == "network":
@@ -367,6 +372,12 @@ def beside_mesh(scene, effects):
         *(map(str, clutter.files) if clutter else []),
         *(cartons_of(scene) if clutter and not clutter.files else []),
     ]
+
+
+def clutter_of(scene):
+    """What was placed in a scene, where its configuration asks for that."""
+    cluttered = CONFIG.scenes[scene].clutter is not None
+    return [f"{ROOT}/scenes/{scene}/clutter.json"] if cluttered else []
 
 
 def cartons_of(scene):

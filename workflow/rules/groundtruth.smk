@@ -26,7 +26,7 @@ use rule call as erroneous_labels with:
         ),
 
 
-rule sfm:
+use rule call as sfm with:
     input:
         sequences=unless_restored(f"{STEM}/sfm/{BATCH}.json", batch_sequences),
         truth=unless_restored(f"{STEM}/sfm/{BATCH}.json", f"{TRUE}/{{split}}.csv"),
@@ -37,21 +37,18 @@ rule sfm:
         f"{ROOT}/logs/sfm/{BATCH_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/sfm/{BATCH_LOG}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(4000),
     params:
+        function="baselines.groundtruth.sfm.batch:write_sfm",
         start=lambda w: batch_of(w).start,
         stop=lambda w: batch_of(w).stop,
         camera=dump(CONFIG.groundtruth_camera),
         sfm=dump(CONFIG.groundtruth.sfm),
         seed=lambda w: seed_of(CONFIG.seed, "sfm", w.scene, w.size, w.split, w.batch),
-    script:
-        "../scripts/sfm.py"
 
 
-rule rgbd:
+use rule call as rgbd with:
     input:
         sequences=unless_restored(f"{STEM}/rgbd/{BATCH}.json", batch_sequences),
     output:
@@ -61,21 +58,18 @@ rule rgbd:
         f"{ROOT}/logs/rgbd/{BATCH_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/rgbd/{BATCH_LOG}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(4000),
     params:
+        function="baselines.groundtruth.rgbd.graph:write_rgbd",
         start=lambda w: batch_of(w).start,
         stop=lambda w: batch_of(w).stop,
         camera=dump(CONFIG.groundtruth_camera),
         rgbd=dump(CONFIG.groundtruth.rgbd),
         seed=lambda w: seed_of(CONFIG.seed, "depth-sensor", w.scene),
-    script:
-        "../scripts/rgbd.py"
 
 
-rule estimate:
+use rule call as estimate with:
     input:
         sequences=unless_restored(
             f"{STEM}/{{frame_method}}/{BATCH}.json", batch_sequences
@@ -87,11 +81,10 @@ rule estimate:
         f"{ROOT}/logs/{{frame_method}}/{BATCH_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/{{frame_method}}/{BATCH_LOG}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(4000),
     params:
+        function="baselines.groundtruth.methods:write_estimate",
         start=lambda w: batch_of(w).start,
         stop=lambda w: batch_of(w).stop,
         camera=dump(CONFIG.groundtruth_camera),
@@ -99,11 +92,9 @@ rule estimate:
             CONFIG.groundtruth, include={METHODS[w.frame_method].settings}
         ),
         seed=lambda w: seed_of(CONFIG.seed, "depth-sensor", w.scene),
-    script:
-        "../scripts/estimate.py"
 
 
-rule posegraph:
+use rule call as posegraph with:
     input:
         graph=unless_restored(
             f"{STEM}/{{graph_method}}/{BATCH}.json", f"{STEM}/rgbd/{BATCH}.g2o"
@@ -115,17 +106,14 @@ rule posegraph:
         f"{ROOT}/logs/{{graph_method}}/{BATCH_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/{{graph_method}}/{BATCH_LOG}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(2000),
     params:
+        function="baselines.groundtruth.methods:write_solved",
         posegraph=dump(CONFIG.groundtruth.posegraph),
-    script:
-        "../scripts/posegraph.py"
 
 
-rule chain:
+use rule call as chain with:
     input:
         train_batches=unless_restored(CHAINED, lambda w: batch_files(w, "train")),
         test_batches=unless_restored(CHAINED, lambda w: batch_files(w, "test")),
@@ -142,15 +130,10 @@ rule chain:
         f"{ROOT}/logs/chain/{{scene}}/{{size}}/{{reconstructed}}.log",
     benchmark:
         f"{ROOT}/benchmarks/chain/{{scene}}/{{size}}/{{reconstructed}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="baselines.groundtruth.label_set:write_label_set",
         groundtruth=dump(
             CONFIG.groundtruth,
             include={"batch_frames", "assist_position_m", "assist_orientation_deg"},
         ),
         estimation=lambda w: estimation_parameters(CONFIG, w.reconstructed),
-    script:
-        "../scripts/chain.py"

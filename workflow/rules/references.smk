@@ -11,7 +11,7 @@ POSES = {
 }
 
 
-rule descriptors:
+use rule call as descriptors with:
     input:
         train=f"{ROOT}/frames/{{scene}}/train.npy",
         test=f"{ROOT}/frames/{{scene}}/test.npy",
@@ -21,18 +21,15 @@ rule descriptors:
         f"{ROOT}/logs/descriptors/{{scene}}.log",
     benchmark:
         f"{ROOT}/benchmarks/descriptors/{{scene}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
     params:
+        function="baselines.references.descriptors:write_descriptors",
         learned_from=lambda w: smallest_train(w.scene),
         seed=lambda w: seed_of(CONFIG.seed, "descriptors", w.scene),
-    script:
-        "../scripts/descriptors.py"
 
 
-rule features:
+use rule call as features with:
     input:
         sequences=lambda w: sequence_dirs(
             w.scene,
@@ -46,16 +43,13 @@ rule features:
         f"{ROOT}/logs/features/{{scene}}/{{size}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/features/{{scene}}/{{size}}/{{split}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
     params:
+        function="baselines.references.features:write_features",
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
         camera=dump(CONFIG.groundtruth_camera),
         references=dump(CONFIG.references, exclude={"coordinate_samples"}),
-    script:
-        "../scripts/features.py"
 
 
 use rule call as correspondences with:
@@ -92,66 +86,61 @@ use rule call as tracks with:
         function="baselines.references.tracks:write_tracks",
 
 
-rule image_references:
+use rule call as image_references with:
     input:
         **POSES,
         descriptors=rules.descriptors.output.descriptors,
     output:
-        reference_files(REFERENCE, in_group("images")),
+        references=reference_files(REFERENCE, in_group("images")),
     log:
         f"{ROOT}/logs/image_references/{REFERENCE_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/image_references/{REFERENCE_LOG}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(2000),
     params:
+        function="baselines.references.run:answer_group",
         group="images",
         camera=dump(CONFIG.network_camera),
         seed=lambda w: seed_of(CONFIG.seed, "references", w.scene, w.size, w.labels),
-    script:
-        "../scripts/references.py"
 
 
-rule structure_references:
+use rule call as structure_references with:
     input:
         **POSES,
         correspondences=rules.correspondences.output.matches,
         tracks=rules.tracks.output.tracks,
     output:
-        reference_files(REFERENCE, in_group("structure")),
+        references=reference_files(REFERENCE, in_group("structure")),
     log:
         f"{ROOT}/logs/structure_references/{REFERENCE_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/structure_references/{REFERENCE_LOG}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
     params:
+        function="baselines.references.run:answer_group",
         group="structure",
         camera=dump(CONFIG.groundtruth_camera),
         seed=lambda w: seed_of(CONFIG.seed, "references", w.scene, w.size, w.labels),
-    script:
-        "../scripts/references.py"
 
 
 # In jobs of their own, as these take longer and are asked of fewer label sets.
 use rule structure_references as adjusted_references with:
     output:
-        reference_files(REFERENCE, in_group("adjusted")),
+        references=reference_files(REFERENCE, in_group("adjusted")),
     log:
         f"{ROOT}/logs/adjusted_references/{REFERENCE_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/adjusted_references/{REFERENCE_LOG}.tsv"
     params:
+        function="baselines.references.run:answer_group",
         group="adjusted",
         camera=dump(CONFIG.groundtruth_camera),
         seed=lambda w: seed_of(CONFIG.seed, "references", w.scene, w.size, w.labels),
 
 
-rule views:
+use rule call as views with:
     input:
         sequences=rules.features.input.sequences,
     output:
@@ -160,64 +149,55 @@ rule views:
         f"{ROOT}/logs/views/{{scene}}/{{size}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/views/{{scene}}/{{size}}/{{split}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(2000),
     params:
+        function="baselines.references.views:write_views",
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
         camera=dump(CONFIG.groundtruth_camera),
         side=(CONFIG.network_camera.width, CONFIG.network_camera.height),
-    script:
-        "../scripts/views.py"
 
 
-rule coordinate_references:
+use rule call as coordinate_references with:
     input:
         **POSES,
         train_views=f"{ROOT}/references/{{scene}}/{{size}}/views-train.npz",
         test_views=f"{ROOT}/references/{{scene}}/{{size}}/views-test.npz",
     output:
-        reference_files(REFERENCE, in_group("coordinates")),
+        references=reference_files(REFERENCE, in_group("coordinates")),
     log:
         f"{ROOT}/logs/coordinate_references/{REFERENCE_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/coordinate_references/{REFERENCE_LOG}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
     params:
+        function="baselines.references.run:answer_group",
         group="coordinates",
         camera=dump(CONFIG.groundtruth_camera),
         samples_seen=CONFIG.references.coordinate_samples,
         # One seed for all label sets: what is drawn does not depend on them.
         seed=lambda w: seed_of(CONFIG.seed, "scene coordinates", w.scene, w.size),
-    script:
-        "../scripts/references.py"
 
 
-rule external_reference:
+use rule call as external_reference with:
     input:
         **POSES,
         poses=external_poses,
         train_frames=f"{ROOT}/frames/{{scene}}/train.npy",
         test_frames=f"{ROOT}/frames/{{scene}}/test.npy",
     output:
-        reference_files(REFERENCE, ["{external}"]),
+        references=reference_files(REFERENCE, ["{external}"]),
     log:
         f"{ROOT}/logs/external_reference/{REFERENCE_LOG}/{{external}}.log",
     benchmark:
         f"{ROOT}/benchmarks/external_reference/{REFERENCE_LOG}/{{external}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(4000),
     params:
+        function="baselines.references.external:answer_externally",
         method=lambda w: dump(EXTERNAL[w.external], exclude={"title", "labels"}),
         named=placeholders,
-    script:
-        "../scripts/external_reference.py"
 
 
 use rule call as references_table with:

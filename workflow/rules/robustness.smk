@@ -4,7 +4,7 @@ VARIED = f"{ROOT}/robustness"
 
 
 # How much of its light comes from where: for light states, of stand-ins alone.
-rule light_shares:
+use rule call as light_shares with:
     output:
         shares=expand(
             f"{ROOT}/scenes/{{{{scene}}}}/light_{{group}}.glb", group=LIGHT_GROUPS
@@ -13,18 +13,15 @@ rule light_shares:
         f"{ROOT}/logs/light_shares/{{scene}}.log",
     benchmark:
         f"{ROOT}/benchmarks/light_shares/{{scene}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(4000),
     params:
+        function="synfeal.scenes:save_light_shares",
         builder=lambda w: CONFIG.scenes[w.scene].builder,
         seed=lambda w: scene_seed(w.scene),
-    script:
-        "../scripts/light_shares.py"
 
 
-rule render_varied:
+use rule call as render_varied with:
     input:
         extras=lambda w: varied_extras([w.effects]),
         mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
@@ -36,19 +33,16 @@ rule render_varied:
         f"{ROOT}/logs/render_varied/{{effects}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/render_varied/{{effects}}/{{split}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
     params:
+        function="synfeal.dataset.render_sequence:render_packed",
         camera=dump(CONFIG.network_camera),
         start=0,
         stop=lambda w: robust_frames(w.split),
         input_px=CONFIG.network.input_px,
         view=CONFIG.network.view,
         render=varied_render,
-    script:
-        "../scripts/render_packed.py"
 
 
 use rule call as pack_varied with:
@@ -72,7 +66,7 @@ use rule call as pack_varied with:
         view=CONFIG.network.view,
 
 
-rule train_varied:
+use rule call as train_varied with:
     input:
         frames=f"{VARIED}/frames/mixed/train.npy",
         labels=f"{ROOT}/labels/{ROBUST_SET}/train.csv",
@@ -89,8 +83,6 @@ rule train_varied:
         f"{ROOT}/logs/train_varied/{{model}}.log",
     benchmark:
         f"{ROOT}/benchmarks/train_varied/{{model}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=lambda w, attempt: attempt
         * training_mb(
@@ -99,13 +91,12 @@ rule train_varied:
             CONFIG.training.batch_size,
         ),
     params:
+        function="baselines.training.run:train_and_predict",
         run=lambda w: training_parameters(CONFIG, robust_run(w.model)),
-    script:
-        "../scripts/train.py"
 
 
 # Vectors of the ideal and of the varied frames: what the map of each training set is searched by.
-rule varied_descriptors:
+use rule call as varied_descriptors with:
     input:
         **varied_tests(
             f"{ROOT}/frames/{ROBUSTNESS.scene}/test.npy",
@@ -120,23 +111,20 @@ rule varied_descriptors:
         f"{ROOT}/benchmarks/varied_descriptors/{{trained_on}}.tsv"
     wildcard_constraints:
         trained_on=f"{CLEAN}|{MIXED}",
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
     params:
-        frames={
+        function="baselines.references.descriptors:write_descriptors",
+        counts={
             **dict.fromkeys([CLEAN, *ROBUST_EFFECTS], robust_frames("test")),
             "train": robust_frames("train"),
         },
         learned_from=smallest_train(ROBUSTNESS.scene),
         seed=seed_of(CONFIG.seed, "descriptors", ROBUSTNESS.scene),
-    script:
-        "../scripts/descriptors.py"
 
 
 # A sample of the test frames, large enough for features, against the map of the ideal frames.
-rule varied_structure:
+use rule call as varied_structure with:
     input:
         extras=lambda w: varied_extras([w.effects]),
         mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
@@ -150,19 +138,16 @@ rule varied_structure:
         f"{ROOT}/logs/varied_structure/{{effects}}.log",
     benchmark:
         f"{ROOT}/benchmarks/varied_structure/{{effects}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
     params:
+        function="baselines.references.varied:write_varied",
         n_test=robust_frames("test"),
         sample=ROBUSTNESS.structure_frames,
         camera=dump(CONFIG.groundtruth_camera),
         render=varied_render,
         references=dump(CONFIG.references, exclude={"coordinate_samples"}),
         seed=seed_of(CONFIG.seed, "references", *ROBUST_SET.split("/")),
-    script:
-        "../scripts/varied_structure.py"
 
 
 use rule call as effects_speed with:
@@ -185,7 +170,7 @@ use rule call as effects_speed with:
         effects={name: dump(VARIATIONS[name]) for name in ROBUST_EFFECTS},
 
 
-rule robustness:
+use rule call as robustness with:
     input:
         clean=[f"{ROOT}/runs/{robust_run(m).directory}/model.pt" for m in MODELS],
         mixed=expand(f"{VARIED}/runs/{{model}}/model.pt", model=MODELS),
@@ -207,12 +192,9 @@ rule robustness:
         f"{ROOT}/logs/tables/robustness.log",
     benchmark:
         f"{ROOT}/benchmarks/tables/robustness.tsv"
-    conda:
-        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(2000),
     params:
+        function="synfeal.report.robustness:write_robustness_table",
         effects=ROBUST_EFFECTS,
         device=CONFIG.training.device,
-    script:
-        "../scripts/robustness.py"

@@ -3,7 +3,7 @@ RUN = f"{ROOT}/runs/{{scene}}/{{size}}/{{labels}}/{{init}}/{{model}}/seed{{repet
 RUN_LOG = "{scene}/{size}/{labels}/{init}/{model}/seed{repetition}"
 
 
-rule pretrain:
+use rule call as pretrain with:
     input:
         frames=[f"{ROOT}/frames/{room}/train.npy" for room in CONFIG.rooms],
         labels=[f"{ROOT}/plans/{room}/train.csv" for room in CONFIG.rooms],
@@ -15,9 +15,6 @@ rule pretrain:
         f"{ROOT}/logs/pretrain/{{backbone}}.log",
     benchmark:
         f"{ROOT}/benchmarks/pretrain/{{backbone}}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=grown(
             training_mb(
@@ -27,14 +24,13 @@ rule pretrain:
             )
         ),
     params:
+        function="baselines.training.pretrain:pretrain_backbone",
         pretraining=dump(CONFIG.pretraining),
         network=dump(CONFIG.network),
         seed=lambda w: seed_of(CONFIG.seed, "pretrain", w.backbone),
-    script:
-        "../scripts/pretrain.py"
 
 
-rule train:
+use rule call as train with:
     input:
         frames=unless_restored(
             f"{RUN}/predictions.csv", f"{ROOT}/frames/{{scene}}/train.npy"
@@ -69,19 +65,15 @@ rule train:
         f"{ROOT}/logs/train/{RUN_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/train/{RUN_LOG}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
     resources:
         mem_mb=train_mem_mb,
     params:
+        function="baselines.training.run:train_and_predict",
         run=lambda w: training_parameters(CONFIG, Run(**w)),
         every=lambda w: common_test_set(w.scene)[1],
-    script:
-        "../scripts/train.py"
 
 
-rule score:
+use rule call as score with:
     input:
         predictions=f"{RUN}/predictions.csv",
         history=f"{RUN}/history.csv",
@@ -100,12 +92,6 @@ rule score:
         f"{ROOT}/logs/score/{RUN_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/score/{RUN_LOG}.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    threads: 1
-    resources:
-        mem_mb=grown(1000),
     params:
+        function="baselines.training.score:write_scores",
         camera=dump(CONFIG.network_camera),
-    script:
-        "../scripts/score.py"

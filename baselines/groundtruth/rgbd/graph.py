@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import resource
-import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
+from baselines.costs import Facts, timed
 from baselines.groundtruth.features import FeatureOdometry
-from baselines.groundtruth.posegraph.graph import Edge, PoseGraph
+from baselines.groundtruth.posegraph.graph import Edge, PoseGraph, write_g2o
 from baselines.groundtruth.rgbd.dense import DenseOdometry
 from baselines.groundtruth.rgbd.frames import read_frame
 from baselines.groundtruth.rgbd.tracks import (
@@ -24,6 +24,8 @@ from baselines.groundtruth.rgbd.tracks import (
 )
 from synfeal.config.models import CameraConfig, RgbdConfig
 from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.sevenscenes import frame_paths
+from synfeal.files import write_json
 from synfeal.geometry.poses import relative
 
 Array = NDArray[np.float64]
@@ -36,23 +38,6 @@ _LOOP_OVERLAP = 0.5
 
 
 @dataclass(frozen=True)
-class RgbdFacts:
-    """How a graph was made; seconds are of processor time."""
-
-    odometry_s: float
-    loops_s: float
-    pairs: int
-    pairs_accepted: int
-    loops_tried: int
-    loops: int
-    peak_memory_mb: float
-
-    def as_dict(self) -> dict[str, float | int]:
-        """For a JSON file."""
-        return asdict(self)
-
-
-@dataclass(frozen=True)
 class _Track:
     """Chained odometry: poses (n, 4, 4), edges, guesses up to each frame, and the keyframes."""
 
@@ -62,13 +47,32 @@ class _Track:
     keyframes: dict[int, View]
 
 
+def write_rgbd(
+    sequences: Sequence[Path],
+    start: int,
+    stop: int,
+    camera: CameraConfig,
+    rgbd: RgbdConfig,
+    seed: int,
+    out_graph: Path,
+    out_facts: Path,
+) -> None:
+    """Write the pose graph of the frames ``start`` to ``stop`` of a split, and what it took."""
+    color, depth = (
+        frame_paths(sequences, f"{kind}.png")[start:stop] for kind in ("color", "depth")
+    )
+    graph, facts = rgbd_graph(color, depth, camera, rgbd, seed)
+    write_g2o(out_graph, graph)
+    write_json(out_facts, facts)
+
+
 def rgbd_graph(
     color_paths: Sequence[FrameFile],
     depth_paths: Sequence[FrameFile],
     camera: CameraConfig,
     cfg: RgbdConfig,
     seed: int = 0,
-) -> tuple[PoseGraph, RgbdFacts]:
+) -> tuple[PoseGraph, Facts]:
     """Pose graph of one batch: an edge per neighbouring pair and the accepted loop closures.
 
     Args:
@@ -87,20 +91,17 @@ def rgbd_graph(
     """
     o3d.utility.set_max_threads(1)
     o3d.utility.set_verbosity_level(o3d.utility.VerbosityLevel.Error)
-    start_s = time.process_time()
-    track = _odometry(color_paths, depth_paths, camera, cfg, seed)
-    odometry_s = time.process_time() - start_s
-    tried, loops = _loops(track, cfg)
-    accepted = len(track.edges) - int(track.guesses[-1])
-    facts = RgbdFacts(
-        odometry_s=odometry_s,
-        loops_s=time.process_time() - start_s - odometry_s,
-        pairs=len(track.edges),
-        pairs_accepted=accepted,
-        loops_tried=tried,
-        loops=len(loops),
-        peak_memory_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-    )
+    facts: Facts = {}
+    with timed(facts, "odometry_s"):
+        track = _odometry(color_paths, depth_paths, camera, cfg, seed)
+    with timed(facts, "loops_s"):
+        tried, loops = _loops(track, cfg)
+    facts |= {
+        "pairs": len(track.edges),
+        "pairs_accepted": len(track.edges) - int(track.guesses[-1]),
+        "loops_tried": tried,
+        "loops": len(loops),
+    }
     return PoseGraph(track.first_from_cam, tuple(track.edges + loops)), facts
 
 

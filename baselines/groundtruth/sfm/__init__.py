@@ -5,6 +5,6 @@ fixed: features.py finds and matches them, mapping.py builds models and takes on
 what bends it, batch.py does it all for one batch and puts the model into metres.
 """
 
-from baselines.groundtruth.sfm.batch import SfmEstimate, SfmFacts, metric_scale, sfm_batch
+from baselines.groundtruth.sfm.batch import metric_scale, sfm_batch
 
-__all__ = ["SfmEstimate", "SfmFacts", "metric_scale", "sfm_batch"]
+__all__ = ["metric_scale", "sfm_batch"]
