@@ -48,9 +48,9 @@ def call(snakemake: Any) -> None:
     """Call the function that a rule names, ``params.function``, with what it is asked for by name.
 
     An argument is the rule's parameter, input or wildcard of that name, ``out_<name>`` its output
-    ``<name>``, ``files`` its inputs and ``wildcards`` its wildcards, both by name, and ``root`` the
-    results directory where this job has it, which with a storage plugin is a copy. Texts become
-    paths, numbers and models as annotated. What a rule does not have keeps its default.
+    ``<name>``, ``files`` its inputs that are one file, by name, ``wildcards`` its wildcards, and
+    ``root`` the results directory where this job has it, which with a storage plugin is a copy.
+    Texts become paths, numbers and models as annotated; what a rule lacks keeps its default.
 
     Raises:
         InputError: the output was restored (``synfeal restore``), not made here: the rule has no
@@ -60,7 +60,8 @@ def call(snakemake: Any) -> None:
     wildcards = dict(snakemake.wildcards.items())
     inputs = {name: files for name, files in snakemake.input.items() if files}
     given = {**wildcards, **dict(snakemake.input.items()), **dict(snakemake.params.items())}
-    given |= {"files": inputs, "wildcards": wildcards}
+    files = {name: path for name, path in inputs.items() if isinstance(path, str)}
+    given |= {"files": files, "wildcards": wildcards}
     given |= {f"out_{name}": path for name, path in snakemake.output.items()}
     asked = inspect.signature(function).parameters
     if "root" in asked:

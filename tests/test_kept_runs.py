@@ -25,13 +25,14 @@ from synfeal.report.predictions.package import POSES
 REPO = Path(__file__).parent.parent
 DESIGN = """table,block,scene,size,labels,noise_m,noise_deg,init
 table2_ground_truth,,large_room,6k,sfm,0,0,pretrained
+table3_inconsistencies,position,large_room,6k,noise,0.1,0,pretrained
 table4_size,,large_room,6k,synfeal,0,0,pretrained
 table4_size,,large_room,20k,synfeal,0,0,pretrained
 """
 
 
 def smoke_config(folder):
-    """The smoke profile with fifteen runs, in a folder."""
+    """The smoke profile with twenty runs, in a folder."""
     (folder / "design.csv").write_text(DESIGN, encoding="utf-8")
     raw = load_config(REPO / "config/config.yaml", REPO / "config/smoke.yaml")
     return raw.model_copy(update={"results": folder, "experiments": folder / "design.csv"})
@@ -75,6 +76,7 @@ def write_results(config):
     for name in ("train", "test", "train-unassisted", "test-unassisted"):
         write_pose_table(estimated / f"{name}.csv", table(25))
     write_json(estimated / "assistance.json", {"method": "sfm"})
+    write_pose_table(root / "labels/large_room/6k/noise-p0.1-r0/test.csv", table(25))
     write_json(estimated / "estimation.json", {"parameters": estimation_parameters(config, "sfm")})
     for split, batches in (("train", 3), ("test", 2)):
         for batch in range(batches):
@@ -244,6 +246,9 @@ def test_the_workflow_goes_on_from_restored_runs(package, tmp_path):
     tables = jobs_of(planned(config, "rescored"))
     assert {"score", "table", "recall", "claims", "summary"} <= tables
     assert not {"scene", "plan", "render_packed", "pack", "train", "sfm", "features"} & tables
+    # Labels with errors are made anew, which is no reason to answer anew what was restored.
+    assert "erroneous_labels" in tables
+    assert not {"image_references", "structure_references", "descriptors"} & tables
     everything = jobs_of(planned(config, "all"))
     assert {"scene", "render", "pack", "score"} <= everything  # all of it is made again ...
     assert not {"train", "sfm", "chain"} & everything  # ... but for what was restored
@@ -255,4 +260,4 @@ def test_the_workflow_goes_on_from_restored_runs(package, tmp_path):
     assert "train" in jobs_of(planned(config, "all"))
     missing = planned(config, "rescored")
     assert missing.returncode == 1
-    assert "5 of 15 runs have no predictions" in missing.stderr
+    assert "5 of 20 runs have no predictions" in missing.stderr

@@ -124,3 +124,45 @@ def test_wrong_configuration_ends_in_one_line(tmp_path, override, words):
     assert len(errors) == 1
     assert all(word in errors[0] for word in words), errors[0]
     assert "Traceback" not in run.stderr
+
+
+# Hands every planned job to its function's twin that checks its arguments and does nothing.
+CALLED = """
+import sys
+from functools import wraps
+from pathlib import Path
+from pkgutil import resolve_name
+from types import SimpleNamespace
+from snakemake.api import SnakemakeApi
+from snakemake.settings.types import (
+    ConfigSettings, DAGSettings, OutputSettings, ResourceSettings, StorageSettings
+)
+from synfeal import job
+job.resolve_name = lambda place: wraps(resolve_name(place))(lambda **_: None)
+config = {"results": sys.argv[1], "profile": "smoke"}
+with SnakemakeApi(OutputSettings(dryrun=True)) as api:
+    workflow = api.workflow(
+        resource_settings=ResourceSettings(cores=1), storage_settings=StorageSettings(),
+        config_settings=ConfigSettings(config=config, configfiles=[Path("config/smoke.yaml")]),
+        snakefile=Path("Snakefile"),
+    )
+    dag = workflow.dag(DAGSettings(targets={"all"}, forceall=True))
+    dag.execute_workflow(executor="dryrun")
+    for each in workflow._workflow.dag.jobs:
+        if each.rule.name != "all":
+            given = {name: getattr(each, name) for name in ("input", "output", "params")}
+            job.call(SimpleNamespace(config=config, wildcards=each.wildcards, **given))
+            print("called", each.rule.name)
+"""
+
+
+def test_every_rule_gives_its_function_what_it_asks_for(tmp_path):
+    """Else a rule and a signature that no longer fit are found hours into a run."""
+    command = [sys.executable, "-c", CALLED, str(tmp_path)]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    called = set(re.findall(r"^called (\w+)$", run.stdout, re.MULTILINE))
+    assert called == set(planned_jobs(tmp_path, "--configfile", "config/smoke.yaml")) - {
+        "all",
+        "total",
+    }

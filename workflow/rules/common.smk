@@ -170,14 +170,15 @@ def batch_sequences(wildcards):
     return sequence_dirs(wildcards.scene, "groundtruth", wildcards.split, stop)
 
 
-def unless_restored(output, source):
-    """Input of a rule: ``source`` (a path or a function), or none where ``output`` was restored.
+def unless_restored(outputs, source):
+    """Input of a rule: ``source`` (a path or a function), or none where ``outputs`` were restored.
 
     What was restored (``synfeal restore``) is done, whatever is made again of what it came from.
     """
+    outputs = [outputs] if isinstance(outputs, str) else outputs
 
     def needed(wildcards):
-        if output.format(**wildcards) in RESTORED:
+        if all(output.format(**wildcards) in RESTORED for output in outputs):
             return []
         return source(wildcards) if callable(source) else source.format(**wildcards)
 

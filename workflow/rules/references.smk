@@ -1,14 +1,19 @@
 # What localizers are compared with. Descriptors, features and matches depend on images alone: they
 # are found once per scene or data set and serve all of its label sets.
-REFERENCE = f"{ROOT}/references/{{scene}}/{{size}}/{{labels}}"
+FOUND = f"{ROOT}/references/{{scene}}/{{size}}"
+REFERENCE = f"{FOUND}/{{labels}}"
 REFERENCE_LOG = "{scene}/{size}/{labels}"
-POSES = {
-    **{s: f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/{s}.csv" for s in SPLITS},
-    **{
-        f"{s}_truth": f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/{s}.csv"
-        for s in SPLITS
-    },
-}
+STRUCTURE = {n: f"{FOUND}/{n}.npz" for n in ("correspondences", "tracks")}
+
+
+def evidence_for(names, **files):
+    """Inputs of a job that answers by these methods; none where all their scores were restored."""
+    labels = f"{ROOT}/labels/{{scene}}/{{size}}"
+    for split in SPLITS:
+        files[split] = f"{labels}/{{labels}}/{split}.csv"
+        files[f"{split}_truth"] = f"{labels}/synfeal/{split}.csv"
+    scores = [f"{REFERENCE}/{name}/metrics.json" for name in names]
+    return {name: unless_restored(scores, file) for name, file in files.items()}
 
 
 use rule call as descriptors with:
@@ -38,7 +43,7 @@ use rule call as features with:
             CONFIG.n_frames(w.scene, w.size, w.split),
         ),
     output:
-        features=temp(f"{ROOT}/references/{{scene}}/{{size}}/features-{{split}}.npz"),
+        features=temp(f"{FOUND}/features-{{split}}.npz"),
     log:
         f"{ROOT}/logs/features/{{scene}}/{{size}}/{{split}}.log",
     benchmark:
@@ -55,10 +60,10 @@ use rule call as features with:
 use rule call as correspondences with:
     input:
         descriptors=rules.descriptors.output.descriptors,
-        train=f"{ROOT}/references/{{scene}}/{{size}}/features-train.npz",
-        test=f"{ROOT}/references/{{scene}}/{{size}}/features-test.npz",
+        train=f"{FOUND}/features-train.npz",
+        test=f"{FOUND}/features-test.npz",
     output:
-        matches=f"{ROOT}/references/{{scene}}/{{size}}/correspondences.npz",
+        matches=f"{FOUND}/correspondences.npz",
     log:
         f"{ROOT}/logs/correspondences/{{scene}}/{{size}}.log",
     benchmark:
@@ -73,9 +78,9 @@ use rule call as correspondences with:
 use rule call as tracks with:
     input:
         descriptors=rules.descriptors.output.descriptors,
-        train=f"{ROOT}/references/{{scene}}/{{size}}/features-train.npz",
+        train=f"{FOUND}/features-train.npz",
     output:
-        tracks=f"{ROOT}/references/{{scene}}/{{size}}/tracks.npz",
+        tracks=f"{FOUND}/tracks.npz",
     log:
         f"{ROOT}/logs/tracks/{{scene}}/{{size}}.log",
     benchmark:
@@ -88,8 +93,10 @@ use rule call as tracks with:
 
 use rule call as image_references with:
     input:
-        **POSES,
-        descriptors=rules.descriptors.output.descriptors,
+        **evidence_for(
+            in_group("images"),
+            descriptors=f"{ROOT}/references/{{scene}}/descriptors.npz",
+        ),
     output:
         references=reference_files(REFERENCE, in_group("images")),
     log:
@@ -107,9 +114,7 @@ use rule call as image_references with:
 
 use rule call as structure_references with:
     input:
-        **POSES,
-        correspondences=rules.correspondences.output.matches,
-        tracks=rules.tracks.output.tracks,
+        **evidence_for(in_group("structure"), **STRUCTURE),
     output:
         references=reference_files(REFERENCE, in_group("structure")),
     log:
@@ -127,6 +132,8 @@ use rule call as structure_references with:
 
 # In jobs of their own, as these take longer and are asked of fewer label sets.
 use rule structure_references as adjusted_references with:
+    input:
+        **evidence_for(in_group("adjusted"), **STRUCTURE),
     output:
         references=reference_files(REFERENCE, in_group("adjusted")),
     log:
@@ -144,7 +151,7 @@ use rule call as views with:
     input:
         sequences=rules.features.input.sequences,
     output:
-        views=temp(f"{ROOT}/references/{{scene}}/{{size}}/views-{{split}}.npz"),
+        views=temp(f"{FOUND}/views-{{split}}.npz"),
     log:
         f"{ROOT}/logs/views/{{scene}}/{{size}}/{{split}}.log",
     benchmark:
@@ -160,9 +167,11 @@ use rule call as views with:
 
 use rule call as coordinate_references with:
     input:
-        **POSES,
-        train_views=f"{ROOT}/references/{{scene}}/{{size}}/views-train.npz",
-        test_views=f"{ROOT}/references/{{scene}}/{{size}}/views-test.npz",
+        **evidence_for(
+            in_group("coordinates"),
+            train_views=f"{FOUND}/views-train.npz",
+            test_views=f"{FOUND}/views-test.npz",
+        ),
     output:
         references=reference_files(REFERENCE, in_group("coordinates")),
     log:
@@ -182,10 +191,12 @@ use rule call as coordinate_references with:
 
 use rule call as external_reference with:
     input:
-        **POSES,
-        poses=external_poses,
-        train_frames=f"{ROOT}/frames/{{scene}}/train.npy",
-        test_frames=f"{ROOT}/frames/{{scene}}/test.npy",
+        **evidence_for(
+            ["{external}"],
+            poses=external_poses,
+            train_frames=f"{ROOT}/frames/{{scene}}/train.npy",
+            test_frames=f"{ROOT}/frames/{{scene}}/test.npy",
+        ),
     output:
         references=reference_files(REFERENCE, ["{external}"]),
     log:
