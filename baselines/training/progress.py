@@ -55,7 +55,7 @@ class Progress:
 
     @property
     def ended(self) -> bool:
-        """Whether all steps are done, or further ones are in vain."""
+        """Whether all steps are done, or further ones are pointless."""
         return self.done == self._steps or self.diverged
 
     def add(self, loss: Tensor) -> None:

@@ -108,7 +108,7 @@ class TrainingConfig(Strict):
     samples_seen: dict[str, Count] = Field(description="images shown in all, by size")
     repetitions: Repetitions = Field(
         default_factory=once,
-        description="seeds per run, by table; of several that show a run the most counts",
+        description="seeds per run, by table; a run that several tables show gets the most",
     )
     device: Literal["auto", "cpu", "cuda"] = Field("auto", description="where to train")
 

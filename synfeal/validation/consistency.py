@@ -58,7 +58,7 @@ MEASURES = (
         *("depth", "depth", 1.0, " times what rounding and slant explain"),
         "median difference in depth",
     ),
-    Measure("surfaces", "in_front", 0.05, "", "share of points before what is seen"),
+    Measure("surfaces", "in_front", 0.05, "", "share of points in front of what is seen"),
     Measure(
         "colours",
         "grey",
