@@ -60,9 +60,6 @@ def dataset_config(options: Mapping[str, Any], out: Path | None = None) -> Datas
         options: values by the names of ``KEYS``; None stands for the default. ``box`` is a list of
             boxes, each x0, x1, y0, y1, z0, z1, metres.
         out: the data set, which gives the profile its name.
-
-    Raises:
-        InputError: naming the option that is wrong.
     """
     check_mesh_file(Path(options["mesh"]), "--mesh")
     values = _nested(options)
@@ -72,7 +69,8 @@ def dataset_config(options: Mapping[str, Any], out: Path | None = None) -> Datas
     if values.get("collection", {}).get("repeat") is not None:
         values["collection"]["repeat"] = Path(values["collection"]["repeat"]).absolute()
     values.setdefault("collection", {})["collision_agreement"] = None
-    values |= {"profile": _slug(out.absolute().name if out else ""), "scale": 1.0}
+    profile = re.sub(r"[^a-z0-9]+", "_", out.absolute().name.lower()) if out else ""
+    values |= {"profile": profile.strip("_")[:64] or "mine", "scale": 1.0}
     with _options_named():
         return DatasetConfig.model_validate(values)
 
@@ -166,9 +164,3 @@ def _nested(options: Mapping[str, Any]) -> dict[str, Any]:
             inner = inner.setdefault(parent, {})
         inner[last] = value
     return values
-
-
-def _slug(name: str) -> str:
-    """A name for a profile, made of that of a directory."""
-    slug = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:64]
-    return slug or "mine"

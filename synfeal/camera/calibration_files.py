@@ -20,13 +20,8 @@ from synfeal.errors import InputError, why
 # Names under which the same thing is found; the first is the one that messages give.
 MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "mtx")
 COEFFICIENTS = (
-    "distortion_coefficients",
-    "Distortion_Coefficients",
-    "distCoeffs",
-    "dist_coeffs",
-    "dist_coeff",
-    "D",
-    "dist",
+    *("distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs"),
+    *("dist_coeff", "D", "dist"),
 )
 SIZE = ("image_size", "imageSize")
 # What the models of ROS are called whose first five coefficients are OpenCV's.
@@ -41,6 +36,10 @@ COLMAP_MODELS = {
     "OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"),
     "FULL_OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
 }
+
+
+# What parsers raise on files that are none of theirs.
+UNREADABLE = (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError, json.JSONDecodeError)
 
 
 class PlainLoader(yaml.SafeLoader):
@@ -85,18 +84,13 @@ def read_calibration(path: Path) -> Calibration:
         InputError: the file is missing, is of another format, or holds no camera that can be used;
             the message names file and field.
     """
-    readers = {".yaml": _from_yaml, ".yml": _from_yaml, ".json": _from_json, ".txt": _from_colmap}
+    readers = {".yaml": _from_yaml, ".yml": _from_yaml, ".txt": _from_colmap}
+    readers[".json"] = lambda text: _from_mapping(json.loads(text))
     try:
         if path.suffix.lower() not in readers:
             raise ValueError(_unknown(path))
         return readers[path.suffix.lower()](path.read_text(encoding="utf-8"))
-    except (
-        OSError,
-        UnicodeDecodeError,
-        yaml.YAMLError,
-        RecursionError,
-        json.JSONDecodeError,
-    ) as error:
+    except UNREADABLE as error:
         raise InputError(f"{path}: cannot be read as a calibration ({why(error)})") from None
     except ValueError as error:
         raise InputError(f"{path}: {why(error)}") from None
@@ -119,10 +113,6 @@ def _from_yaml(text: str) -> Calibration:
     if text.startswith("%YAML:"):  # OpenCV's header, which YAML has no name for
         text = text.partition("\n")[2]
     return _from_mapping(yaml.load(text, _Loader))  # noqa: S506 (a SafeLoader)
-
-
-def _from_json(text: str) -> Calibration:
-    return _from_mapping(json.loads(text))
 
 
 def _from_mapping(values: Any) -> Calibration:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -134,7 +133,9 @@ def run(arguments: argparse.Namespace) -> None:
         read_yaml(path)  # Snakemake would end in a traceback; what it holds the Snakefile checks
     paths = [path for path in paths if not is_default(path)]
     command = snakemake_command(paths, cores, arguments.snakemake)
-    os.execve(sys.executable, [sys.executable, "-m", *command], _with_plugins(os.environ))
+    found = (str(PLUGINS.resolve()), os.environ.get("PYTHONPATH"))
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, found))
+    os.execv(sys.executable, [sys.executable, "-m", *command])
 
 
 def snakemake_command(profiles: list[Path], cores: int, further: list[str]) -> list[str]:
@@ -142,12 +143,6 @@ def snakemake_command(profiles: list[Path], cores: int, further: list[str]) -> l
     display = ["--logger", "synfeal", "--quiet", "host"]
     files = ["--configfile", *map(str, profiles)] if profiles else []
     return ["snakemake", *display, *files, "--cores", str(cores), *further]
-
-
-def _with_plugins(environment: Mapping[str, str]) -> dict[str, str]:
-    before = environment.get("PYTHONPATH")
-    paths = [str(PLUGINS.resolve()), *([before] if before else [])]
-    return {**environment, "PYTHONPATH": os.pathsep.join(paths)}
 
 
 @command(

@@ -23,11 +23,7 @@ log = logging.getLogger("synfeal")
 
 
 def refuse_invisible(mesh: TexturedMesh, camera: CameraConfig, name: str) -> None:
-    """Check that the mesh has colours and reaches beyond the near plane of a camera in it.
-
-    Raises:
-        InputError: images would be of one colour; names ``name``.
-    """
+    """Check that the mesh has colours and reaches beyond the near plane of a camera in it."""
     if shows_one_colour(mesh):
         raise InputError(
             f"{name}: is of one colour, and so would be every image; put its texture files (of an"
@@ -44,11 +40,7 @@ def refuse_invisible(mesh: TexturedMesh, camera: CameraConfig, name: str) -> Non
 def refuse_blank(
     caster: RayCaster, plans: Mapping[Split, PoseTable], camera: CameraConfig, name: str
 ) -> None:
-    """Warn of plans whose images would show little; refuse those that would show nothing.
-
-    Raises:
-        InputError: nearly all pixels of a split would be empty; names ``name``.
-    """
+    """Warn of plans whose images would show little; refuse those that would show nothing."""
     for split, plan in plans.items():
         share = empty_pixels(caster, plan, camera).share
         if share > REFUSE_ABOVE:

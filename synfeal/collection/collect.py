@@ -6,7 +6,6 @@ seeds, and is skipped where what it makes lies there under its final name.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from synfeal.dataset.archive import SUFFIX
 from synfeal.dataset.finish import finish, origin_of
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.progress import Progress
-from synfeal.dataset.render_pool import Studio, Task, render_sequences
+from synfeal.dataset.render_pool import Studio, render_sequences
 from synfeal.dataset.render_sequence import resolved
 from synfeal.dataset.sevenscenes import Split, sequences_of
 from synfeal.dataset.unfinished import WORK, clean_up, growing, place_of
@@ -94,11 +93,7 @@ def collect(job: CollectJob, workers: int = 1) -> None:
 
 
 def _prepare(job: CollectJob, scene: Path) -> None:
-    """The scene, unless it is there.
-
-    Raises:
-        InputError: it cannot be used, or images of it would be blank.
-    """
+    """The scene, unless it is there."""
     if not (scene / "mesh.glb").is_file():
         config, settings = job.config, job.config.scenes[job.scene]
         agreement = config.collection.collision_agreement
@@ -146,19 +141,16 @@ def _render(
 ) -> None:
     """Render the sequences that are not there."""
     config = job.config
-    tasks = list(_tasks(job, plans, part))
+    suffix = SUFFIX if config.archive_sequences else ""
+    tasks = [
+        (part / f"{s.name}{suffix}", plans[s.split].between(s.start, s.stop))
+        for s in sequences_of(job.counts["train"], job.counts["test"], config.shard_frames)
+    ]
     missing = [(out, poses) for out, poses in tasks if not out.exists()]
     n_frames, n_missing = (sum(len(poses) for _, poses in some) for some in (tasks, missing))
     studio = Studio(mesh, config.network_camera, config.render, config.network_depth)
     with Progress(n_frames, "collect", n_frames - n_missing) as progress:
         render_sequences(studio, missing, workers, progress)
-
-
-def _tasks(job: CollectJob, plans: dict[Split, PoseTable], part: Path) -> Iterator[Task]:
-    suffix = SUFFIX if job.config.archive_sequences else ""
-    for sequence in sequences_of(job.counts["train"], job.counts["test"], job.config.shard_frames):
-        poses = plans[sequence.split].between(sequence.start, sequence.stop)
-        yield part / f"{sequence.name}{suffix}", poses
 
 
 LEAST_INPUT_PX = 32
@@ -170,11 +162,7 @@ HEADER = """\
 
 
 def with_backend(config: DatasetConfig) -> DatasetConfig:
-    """The settings with the backend that ``auto`` stands for here: images depend on it.
-
-    Raises:
-        InputError: no backend works on this machine.
-    """
+    """The settings with the backend that ``auto`` stands for here: images depend on it."""
     return config.model_copy(update={"render": resolved(config.render)})
 
 

@@ -36,9 +36,6 @@ def write_collection_speed(
     """Collect 100 frames of 640 x 480 in four parts and write how fast each was.
 
     A frame is a PNG file and its pose. The mesh is loaded once before, as in a job of any length.
-
-    Raises:
-        InputError: a mesh cannot be read, or nothing can be collected there.
     """
     began = time.perf_counter()
     plan = plan_scene(collision, scene, collection, FRAMES, np.random.default_rng(seed))

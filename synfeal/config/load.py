@@ -116,22 +116,14 @@ DOCUMENTATION = "config/scenes/README.md"
 
 
 def check_mesh_files(scenes: Mapping[str, SceneConfig]) -> None:
-    """Check that the file of every scene with ``source: mesh`` is there.
-
-    Raises:
-        InputError: naming the first that is not, its configuration key and the documentation.
-    """
+    """Check that the file of every scene with ``source: mesh`` is there."""
     for name, scene in scenes.items():
         if scene.source == "mesh" and scene.path is not None:
             check_mesh_file(scene.path, f"scenes.{name}.path")
 
 
 def check_mesh_file(path: Path, field: str) -> None:
-    """Check that the mesh file named by a configuration key, ``field``, is there.
-
-    Raises:
-        InputError: it is not.
-    """
+    """Check that the mesh file named by a configuration key, ``field``, is there."""
     try:
         mode = path.stat().st_mode
     except OSError as error:
@@ -146,11 +138,7 @@ def check_mesh_file(path: Path, field: str) -> None:
 
 
 def check_results(root: Path) -> None:
-    """Check that results can lie in the directory ``root``, which need not exist.
-
-    Raises:
-        InputError: it or a directory above it is a file.
-    """
+    """Check that results can lie in the directory ``root``, which need not exist."""
     try:
         place = next(path for path in (root, *root.parents) if os.path.lexists(path))
     except OSError as error:

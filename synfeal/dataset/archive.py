@@ -106,11 +106,7 @@ def frame_file(sequence: Path, name: str) -> FrameFile:
 
 
 def sequence_names(sequence: Path) -> list[str]:
-    """Names of the files of a sequence, in order.
-
-    Raises:
-        OSError: it cannot be read.
-    """
+    """Names of the files of a sequence, in order."""
     if not is_archive(sequence):
         return sorted(path.name for path in sequence.iterdir() if path.is_file())
     prefix = f"{sequence.stem}/"
@@ -123,11 +119,7 @@ def sequence_names(sequence: Path) -> list[str]:
 
 
 def foreign_members(archive: Path) -> list[str]:
-    """Members that unpack to anything but one file each in the directory of the sequence.
-
-    Raises:
-        OSError: the archive cannot be read.
-    """
+    """Members that unpack to anything but one file each in the directory of the sequence."""
     prefix = f"{archive.stem}/"
     with reading(archive) as opened:
         counts = Counter(opened.namelist())

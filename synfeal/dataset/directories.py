@@ -13,11 +13,7 @@ from synfeal.errors import InputError
 
 
 def refuse_existing(path: Path) -> None:
-    """Refuse to write where there is something already.
-
-    Raises:
-        InputError: ``path`` is a file, a directory that is not empty, or a link to nothing.
-    """
+    """Refuse to write where there is something already."""
     if path.is_symlink() and not path.exists():
         raise InputError(f"{path}: is a link that leads nowhere; choose another directory")
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
@@ -29,9 +25,6 @@ def refuse_foreign(out: Path, own: Collection[str], origin: str) -> None:
 
     ``own`` names the files that may be replaced; ``origin`` says what writes them, as in "is not
     from a comparison".
-
-    Raises:
-        InputError: ``out`` is a file or holds other files.
     """
     if os.path.lexists(out) and not out.is_dir():
         raise InputError(f"{out}: is a file; choose another directory with --out")
@@ -61,11 +54,7 @@ def writing_to(path: Path, remedy: Callable[[], str]) -> Iterator[None]:
 
 @contextmanager
 def atomic_directory(path: Path) -> Iterator[Path]:
-    """A temporary directory beside ``path`` that is renamed to it if the block succeeds.
-
-    Raises:
-        InputError: ``path`` holds something already.
-    """
+    """A temporary directory beside ``path`` that is renamed to it if the block succeeds."""
     path = Path(path)
     refuse_existing(path)
     path.parent.mkdir(parents=True, exist_ok=True)

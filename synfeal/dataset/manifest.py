@@ -65,11 +65,7 @@ def versions() -> dict[str, str]:
 
 
 def sequence_sha256(sequence: Path) -> str:
-    """SHA-256 over the names and contents of the frames, in order of name; archived or not.
-
-    Raises:
-        OSError: the sequence (``seq-01`` or ``seq-01.zip``) or a file cannot be read.
-    """
+    """SHA-256 over the names and contents of the frames, in order of name; archived or not."""
     digest = hashlib.sha256()
     for name in sequence_names(sequence):
         if name.startswith("frame-"):

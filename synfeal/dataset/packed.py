@@ -42,9 +42,6 @@ def pack_frames(sequences: list[Path], input_px: int, out: Path, view: View = "s
     """Write the colour frames of the sequences, in order, as one ``.npy``.
 
     uint8 (N, input_px, input_px, 3); see :func:`fit_frame`.
-
-    Raises:
-        InputError: a sequence has no frames, or a frame cannot be read.
     """
     paths = frame_paths(sequences, "color.png")
     with new_packed(out, len(paths), input_px) as packed:
@@ -137,11 +134,7 @@ def write_packed_record(
     render: RenderConfig,  # how they were rendered
     view: View = "square",  # what of a frame was packed
 ) -> None:
-    """Write ``<frames>.json`` in place of ``.npy``.
-
-    Raises:
-        InputError: frames or the record of a shard cannot be read.
-    """
+    """Write ``<frames>.json`` in place of ``.npy``."""
     packed = read_packed(frames)
     record = {
         "format": FORMATS[view],

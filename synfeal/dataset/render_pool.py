@@ -49,12 +49,7 @@ class Studio:
 
 
 def render_sequences(studio: Studio, tasks: list[Task], workers: int, progress: Progress) -> None:
-    """Render all sequences; each appears when it is whole.
-
-    Raises:
-        InputError: this machine cannot render, a worker process was killed, or a file could not be
-            written.
-    """
+    """Render all sequences; each appears when it is whole."""
     workers = min(workers, len(tasks))
     if workers > 1:
         _render_parallel(studio, tasks, workers, progress)

@@ -141,11 +141,7 @@ def _new_sequence(out: Path) -> Iterator[Path]:
 
 
 def resolved(render: RenderConfig) -> RenderConfig:
-    """With ``auto`` replaced by the backend it stands for on this machine.
-
-    Raises:
-        InputError: no backend works here.
-    """
+    """With ``auto`` replaced by the backend it stands for on this machine."""
     if render.backend != "auto":
         return render
     return render.model_copy(update={"backend": fastest_working()})

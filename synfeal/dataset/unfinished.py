@@ -94,11 +94,7 @@ def _kept(part: Path) -> str:
 
 
 def check_settings(part: Path, settings: Mapping[str, Any]) -> None:
-    """Whether ``part`` was begun with the same settings; they are written where there are none.
-
-    Raises:
-        InputError: names what differs.
-    """
+    """Whether ``part`` was begun with the same settings; they are written where there are none."""
     path = part / WORK / SETTINGS
     if not os.path.lexists(path):
         write_json(path, settings)

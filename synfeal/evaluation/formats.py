@@ -68,7 +68,8 @@ def _text(path: Path) -> str:
 
 
 def _from_directory(path: Path) -> Estimates:
-    models = [p for p in (path, path / "sparse" / "0", path / "0") if _has_model(p)]
+    places = (path, path / "sparse" / "0", path / "0")
+    models = [p for p in places if any((p / name).is_file() for name in MODELS)]
     sequences = any(p.is_dir() or p.suffix == ".zip" for p in path.glob("seq-*"))
     lists = sorted(path.glob("seq-*.txt"))
     found = [*models, *([path / "seq-*"] if sequences else []), *lists[:1]]
@@ -84,10 +85,6 @@ def _from_directory(path: Path) -> Estimates:
         f"{path}: holds no seq-01/frame-000000.pose.txt, no seq-01.txt (TUM) and no images.txt or"
         " images.bin (COLMAP); name the file that has the poses"
     )
-
-
-def _has_model(path: Path) -> bool:
-    return any((path / name).is_file() for name in MODELS)
 
 
 def read_sevenscenes(path: Path) -> Estimates:

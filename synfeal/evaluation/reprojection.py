@@ -27,7 +27,7 @@ from synfeal.dataset.sevenscenes import INVALID_MM
 from synfeal.errors import InputError, why
 from synfeal.evaluation.metrics import Metrics, draws, is_pose, means, with_limits
 from synfeal.files import atomic_path
-from synfeal.geometry.poses import pose_from_quat, relative
+from synfeal.geometry.poses import relative
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.validation.images import read_depth_mm
@@ -76,7 +76,7 @@ def dcre(predicted: PoseTable, reference: PoseTable, depth_m: Array, camera: Cam
     errors = np.full(len(predicted), np.inf)
     good = np.flatnonzero(is_pose(predicted))
     for rows in np.array_split(good, -(-len(good) // BLOCK) or 1):
-        estimate, true = (_poses(table, rows) for table in (predicted, reference))
+        estimate, true = (table.at(rows).world_from_cam for table in (predicted, reference))
         errors[rows] = _moved(relative(estimate, true), depth_m[rows], camera)
     return errors
 
@@ -95,10 +95,6 @@ def dcre_summary(errors: Array, path: NDArray[np.int64], end: str = "") -> Metri
         below = (errors < bound).astype(np.float64)
         found[f"dcre_below_{bound:g}{end}"] = means(below, place, counts)
     return with_limits(found)
-
-
-def _poses(table: PoseTable, rows: NDArray[np.intp]) -> Array:
-    return pose_from_quat(table.position_m[rows], table.quat_wxyz[rows])
 
 
 def _moved(estimate_from_reference: Array, depth_m: Array, camera: CameraConfig) -> Array:

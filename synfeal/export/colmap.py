@@ -45,7 +45,9 @@ def write_model(folder: Path, camera: CameraConfig, frames: Iterable[ExportFrame
     )
     lines = ["# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line of points: none"]
     for number, frame in enumerate(frames, start=1):
-        lines += [_image(number, frame), ""]
+        cam_from_world = inverse(frame.world_from_cam)
+        values = [*quat_wxyz_of(cam_from_world).tolist(), *cam_from_world[:3, 3].tolist()]
+        lines += [f"{number} {_numbers(values)} 1 {frame_name(frame)}", ""]
     write_lines(folder / "images.txt", lines)
     write_lines(folder / "points3D.txt", ["# POINT3D_ID X Y Z R G B ERROR TRACK: none"])
 
@@ -63,22 +65,12 @@ def camera_line(camera: CameraConfig) -> str:
     return f"1 {model} {camera.width} {camera.height} {_numbers(parameters)}"
 
 
-def _image(number: int, frame: ExportFrame) -> str:
-    cam_from_world = inverse(frame.world_from_cam)
-    values = [*quat_wxyz_of(cam_from_world).tolist(), *cam_from_world[:3, 3].tolist()]
-    return f"{number} {_numbers(values)} 1 {frame_name(frame)}"
-
-
 def _numbers(values: list[float]) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
 def export_hloc(data: ExportSet, out: Path, place: Place) -> None:
-    """Write ``images/``, ``model/``, ``sfm_reference/`` and the lists.
-
-    Raises:
-        InputError: there are no splits.
-    """
+    """Write ``images/``, ``model/``, ``sfm_reference/`` and the lists."""
     need_splits(data)
     for frame in data.frames:
         place(frame.color, out / "images" / frame_name(frame))

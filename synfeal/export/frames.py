@@ -97,11 +97,7 @@ def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
 
 
 def need_splits(data: ExportSet) -> None:
-    """Refuse a data set that does not say which frames are for training, and which for test.
-
-    Raises:
-        InputError: it does not, or has no frame of one of them.
-    """
+    """Refuse a data set that does not say which frames are for training, and which for test."""
     for split, name in SPLIT_FILES.items():
         if next(data.of_split(split), None) is None:
             raise InputError(
@@ -134,9 +130,6 @@ def rewrite_depth(source: FrameFile, target: Path, units_per_m: int) -> float:
 
     From a 16-bit PNG in millimetres, 0 or 65535 where there is no depth, to one of ``units_per_m``,
     0 where there is none or it is beyond 65535 units.
-
-    Raises:
-        InputError: ``source`` cannot be read.
     """
     depth_mm = read_depth_mm(source)
     known = (depth_mm > 0) & (depth_mm < INVALID_MM)

@@ -65,11 +65,7 @@ COLUMNS = ("scene", "split", "seq", "img_path", "t1", "t2", "t3", "q1", "q2", "q
 
 
 def export_mstransformer(data: ExportSet, out: Path, place: Place) -> None:
-    """Write ``images/``, ``train.csv`` and ``test.csv``.
-
-    Raises:
-        InputError: there are no splits.
-    """
+    """Write ``images/``, ``train.csv`` and ``test.csv``."""
     need_splits(data)
     for split in ("train", "test"):
         rows = []

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from synfeal.config.camera import CameraConfig
-from synfeal.export.frames import ExportFrame, ExportSet, Place, rewrite_depth
+from synfeal.export.frames import ExportFrame, ExportSet, Place, frame_name, rewrite_depth
 from synfeal.files import write_json
 
 # OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
@@ -26,25 +26,22 @@ def export_nerfstudio(data: ExportSet, out: Path, place: Place) -> None:
     """Write ``transforms.json``, ``images/`` and, if there is depth, ``depth/``."""
     frames = []
     for frame in data.frames:
-        frames.append(_frame(frame, data.has_depth))
+        world_from_gl = frame.world_from_cam @ CAM_FROM_GL
+        entry = {"file_path": _image(frame), "transform_matrix": world_from_gl.tolist()}
         place(frame.color, out / _image(frame))
         if data.has_depth:
-            rewrite_depth(frame.depth, out / _depth(frame), UNITS_PER_M)
-    write_json(out / "transforms.json", {**_camera(data.camera), **_splits(data), "frames": frames})
+            entry["depth_file_path"] = f"depth/{frame.sequence}/{frame.depth.name}"
+            rewrite_depth(frame.depth, out / entry["depth_file_path"], UNITS_PER_M)
+        frames.append(entry)
+    splits = {}
+    if data.has_splits:
+        train, test = ([_image(frame) for frame in data.of_split(s)] for s in ("train", "test"))
+        splits = {"train_filenames": train, "val_filenames": test, "test_filenames": test}
+    write_json(out / "transforms.json", {**_camera(data.camera), **splits, "frames": frames})
 
 
 def _image(frame: ExportFrame) -> str:
-    return f"images/{frame.sequence}/{frame.color.name}"
-
-
-def _depth(frame: ExportFrame) -> str:
-    return f"depth/{frame.sequence}/{frame.depth.name}"
-
-
-def _frame(frame: ExportFrame, has_depth: bool) -> dict[str, Any]:
-    world_from_gl = frame.world_from_cam @ CAM_FROM_GL
-    entry = {"file_path": _image(frame), "transform_matrix": world_from_gl.tolist()}
-    return {**entry, "depth_file_path": _depth(frame)} if has_depth else entry
+    return f"images/{frame_name(frame)}"
 
 
 def _camera(camera: CameraConfig) -> dict[str, Any]:
@@ -60,10 +57,3 @@ def _camera(camera: CameraConfig) -> dict[str, Any]:
         "cy": intrinsics.cy,
         **{"k1": k1, "k2": k2, "k3": k3, "p1": p1, "p2": p2},
     }
-
-
-def _splits(data: ExportSet) -> dict[str, list[str]]:
-    if not data.has_splits:
-        return {}
-    train, test = ([_image(frame) for frame in data.of_split(s)] for s in ("train", "test"))
-    return {"train_filenames": train, "val_filenames": test, "test_filenames": test}

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from synfeal.config.camera import CameraConfig
 from synfeal.dataset.sevenscenes import SPLIT_FILES
-from synfeal.export.frames import ExportFrame, ExportSet, Place, rewrite_depth, write_lines
+from synfeal.export.frames import ExportSet, Place, rewrite_depth, write_lines
 from synfeal.geometry.poses import quat_wxyz_of
 
 FRAMES_PER_S = 30.0
@@ -33,7 +33,9 @@ def export_tum(data: ExportSet, out: Path, place: Place) -> None:
         sequence = lists.setdefault(frame.sequence, {"rgb": [], "depth": [], "groundtruth": []})
         directory = out / frame.sequence
         time = f"{frame.frame.number / FRAMES_PER_S:.6f}"
-        sequence["groundtruth"].append(f"{time} {_pose(frame)}")
+        w, x, y, z = quat_wxyz_of(frame.world_from_cam).tolist()
+        values = (*frame.world_from_cam[:3, 3].tolist(), x, y, z, w)
+        sequence["groundtruth"].append(" ".join([time, *(f"{v:.12g}" for v in values)]))
         sequence["rgb"].append(f"{time} rgb/{time}.png")
         place(frame.color, directory / "rgb" / f"{time}.png")
         if data.has_depth:
@@ -49,12 +51,6 @@ def export_tum(data: ExportSet, out: Path, place: Place) -> None:
             "%.2f%% of the depths are beyond %.1f m, more than TUM's images hold: now 0",
             *(100 * lost / len(data.frames), MOST_M),
         )
-
-
-def _pose(frame: ExportFrame) -> str:
-    w, x, y, z = quat_wxyz_of(frame.world_from_cam).tolist()
-    position = frame.world_from_cam[:3, 3].tolist()
-    return " ".join(f"{value:.12g}" for value in (*position, x, y, z, w))
 
 
 def _write_lists(directory: Path, lists: Lists, camera: CameraConfig) -> None:

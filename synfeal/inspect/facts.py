@@ -76,7 +76,12 @@ def facts_of(found: Inspection) -> dict[str, Any]:
     """Numbers, findings and doubts, ready for JSON."""
     scene, mesh, space, suggestion = found.scene, found.mesh, found.space, found.suggestion
     title = title_of(Path(str(scene.path)))
-    detail = detail_of(mesh)
+    detail, collect = detail_of(mesh), None
+    topology = asdict(mesh_topology(*merge_vertices(*mesh.merged())))
+    lengths = list(topology.pop("hole_lengths_m"))
+    if suggestion is not None:  # the command, and what planning it once showed
+        command = suggestion.command(f"{slug_of(title)}-frames")
+        collect = {"command": command, "frames": N_FRAMES, "empty_pixels": asdict(suggestion.empty)}
     return {
         "title": title,
         "mesh": {
@@ -89,7 +94,7 @@ def facts_of(found: Inspection) -> dict[str, Any]:
         "materials": len({_material_key(part) for part in mesh.parts}),
         "parts": [_part(part) for part in mesh.parts],
         "detail": detail,
-        "topology": _topology(mesh),
+        "topology": {**topology, "holes": len(lengths), "longest_holes_m": lengths[:N_HOLES]},
         "findings": list(mesh.findings),
         "free_space": {
             "definition": DEFINITION,
@@ -102,7 +107,7 @@ def facts_of(found: Inspection) -> dict[str, Any]:
         },
         "back_faces_share": back_face_share(mesh, found.caster, space),
         "suggested_sampling_box": None if suggestion is None else as_box(suggestion.box_m),
-        "collect": None if suggestion is None else _collect(suggestion, title),
+        "collect": collect,
         "doubts": _doubts(found, detail["area_m2"]),
         "version": synfeal.__version__,
     }
@@ -120,24 +125,9 @@ def _doubts(found: Inspection, area_m2: dict[str, float]) -> list[str]:
     ]
 
 
-def _collect(suggestion: Suggestion, title: str) -> dict[str, Any]:
-    """The command, and what planning it once showed."""
-    return {
-        "command": suggestion.command(f"{slug_of(title)}-frames"),
-        "frames": N_FRAMES,
-        "empty_pixels": asdict(suggestion.empty),
-    }
-
-
 def as_box(box_m: Array) -> dict[str, list[float]]:
     """A box (2, 3) as the mapping a configuration file holds."""
     return {axis: box_m[:, index].tolist() for index, axis in enumerate("xyz")}
-
-
-def _topology(mesh: TexturedMesh) -> dict[str, Any]:
-    topology = asdict(mesh_topology(*merge_vertices(*mesh.merged())))
-    lengths = topology.pop("hole_lengths_m")
-    return {**topology, "holes": len(lengths), "longest_holes_m": list(lengths[:N_HOLES])}
 
 
 def _part(part: MeshPart) -> dict[str, Any]:

@@ -81,15 +81,12 @@ def suggest(
             box_m = suggest_box(space)
             if box_m is None:
                 continue
-            suggestion = _planned(caster, _with_box(each, box_m), collection)
+            x, y, z = ((low, high) for low, high in box_m.T.tolist())
+            boxed = each.model_copy(update={"sampling_box": Box(x=x, y=y, z=z)})
+            suggestion = _planned(caster, boxed, collection)
             if suggestion is not None:
                 return space, suggestion
     return spaces[0], None
-
-
-def _with_box(scene: SceneConfig, box_m: Array) -> SceneConfig:
-    x, y, z = ((low, high) for low, high in box_m.T.tolist())
-    return scene.model_copy(update={"sampling_box": Box(x=x, y=y, z=z)})
 
 
 def _planned(

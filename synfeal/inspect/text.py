@@ -46,7 +46,8 @@ def plain_text(facts: Facts) -> str:
     for title, rows in sections:
         lines += [title, *(line for row in rows for line in _aligned(*row, width)), ""]
     if facts["doubts"]:
-        lines += ["Look at this first", *_bullets(facts["doubts"]), ""]
+        bullets = [line for text in facts["doubts"] for line in _aligned("-", text, 1)]
+        lines += ["Look at this first", *bullets, ""]
     return "\n".join([*lines, how_to_go_on(facts)])
 
 
@@ -59,10 +60,6 @@ def how_to_go_on(facts: Facts) -> str:
     empty = collect["empty_pixels"]["share"]
     said = f"A first data set, planned once: {collect['frames']} frames, {empty:.1%} empty pixels"
     return "\n".join([*lines, f"{said}:", "", collect["command"]])
-
-
-def _bullets(texts: Sequence[str]) -> list[str]:
-    return [line for text in texts for line in _aligned("-", text, 1)]
 
 
 def _aligned(label: str, value: str, width: int) -> list[str]:

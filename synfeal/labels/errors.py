@@ -50,12 +50,6 @@ def seed_names(kind: str, split: str) -> tuple[str, ...]:
     return (kind,) if kind in OF_SPACE else (kind, split)
 
 
-def _noise(
-    table: PoseTable, train: PoseTable, noise_m: float, noise_deg: float, rng: np.random.Generator
-) -> PoseTable:
-    return add_noise(table, noise_m, noise_deg, rng)
-
-
 def _offset(
     table: PoseTable, train: PoseTable, noise_m: float, noise_deg: float, rng: np.random.Generator
 ) -> PoseTable:
@@ -109,7 +103,10 @@ def _smooth_field(
 
 
 Kind = Callable[[PoseTable, PoseTable, float, float, np.random.Generator], PoseTable]
-_KINDS: Mapping[str, Kind] = {"noise": _noise, "offset": _offset, "bend": _bend, "scale": _scale}
+_KINDS: Mapping[str, Kind] = {
+    "noise": lambda table, train, *given: add_noise(table, *given),
+    **{"offset": _offset, "bend": _bend, "scale": _scale},
+}
 assert set(_KINDS) == set(INJECTED)
 
 

@@ -19,11 +19,7 @@ ROUNDING = 1.0  # grey levels
 
 
 def check_mesh(mesh: TexturedMesh, path: Path) -> None:
-    """Faces, finite coordinates and some colour.
-
-    Raises:
-        InputError: naming ``path`` and what is missing.
-    """
+    """Faces, finite coordinates and some colour."""
     if not mesh.parts:
         raise InputError(f"{path}: holds no faces; export the scene as a triangle mesh")
     for part in mesh.parts:
@@ -41,11 +37,7 @@ def check_mesh(mesh: TexturedMesh, path: Path) -> None:
 
 
 def check_indices(part: MeshPart, path: Path) -> None:
-    """Every face names vertices that are there.
-
-    Raises:
-        InputError: naming ``path`` and the part.
-    """
+    """Every face names vertices that are there."""
     if part.faces.min() < 0 or part.faces.max() >= len(part.vertices_m):
         raise InputError(
             f"{path}: part '{part.name}' has faces that name vertices it lacks; export it again"
@@ -81,9 +73,6 @@ def check_sampling_box(box: NDArray[np.float64], bounds_m: NDArray[np.float64], 
 
     A box that misses the mesh, or a mesh more than a hundred times as large as the box, is almost
     always a file in millimetres or centimetres read as metres, or another up axis.
-
-    Raises:
-        InputError: naming ``name``, both extents, and the settings to look at.
     """
     overlap = np.minimum(box[1], bounds_m[1]) - np.maximum(box[0], bounds_m[0])
     ratio = float(np.max(bounds_m[1] - bounds_m[0]) / np.max(box[1] - box[0]))
@@ -126,11 +115,7 @@ REMEDIES = {
 
 
 def refuse_kind(path: Path) -> None:
-    """Check by its name that the file is of a kind that can hold a scene with colours.
-
-    Raises:
-        InputError: an STL, or an unknown kind.
-    """
+    """Check by its name that the file is of a kind that can hold a scene with colours."""
     suffix = path.suffix.lower()
     if suffix == ".stl":
         raise InputError(
@@ -148,9 +133,6 @@ def refuse_extensions(path: Path, header: Json) -> None:
     """Check that nothing in a glTF is stored in a form that is not read.
 
     Compressed forms pass where the file holds the plain form too.
-
-    Raises:
-        InputError: naming the extension and how to convert the file.
     """
     for name in header.get("extensionsRequired", []):
         if name not in READ and not name.startswith("KHR_materials_"):

@@ -51,7 +51,8 @@ def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> Text
     findings = Findings(path)
     gltf = read_gltf(path) if path.suffix.lower() in GLTF_SUFFIXES else None
     try:
-        parts = _read_parts(path, gltf, unit_m * _world_from_file(path, up_axis), findings)
+        world_from_file = WORLD_FROM_Y_UP if is_y_up(path, up_axis) else np.eye(3)
+        parts = _read_parts(path, gltf, unit_m * world_from_file, findings)
     except InputError:
         raise
     except Exception as error:  # parsers of foreign files fail in every way there is
@@ -75,11 +76,6 @@ def _check_file(path: Path) -> None:
 def is_y_up(path: Path, up_axis: UpAxis) -> bool:
     """Whether y points up in a file; ``auto`` goes by its kind."""
     return path.suffix.lower() in GLTF_SUFFIXES if up_axis == "auto" else up_axis == "y"
-
-
-def _world_from_file(path: Path, up_axis: UpAxis) -> NDArray[np.float64]:
-    """Rotation (3, 3) from the axes of the file to the world."""
-    return WORLD_FROM_Y_UP if is_y_up(path, up_axis) else np.eye(3)
 
 
 def _read_parts(

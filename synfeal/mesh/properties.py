@@ -70,13 +70,17 @@ def mesh_topology(vertices_m: Vertices, faces: Indices) -> Topology:
     boundary = edges[n_faces == 1]
     watertight = len(edges) > 0 and bool((n_faces == 2).all())
     consistent = watertight and bool((_counted(directed, len(vertices_m))[1] == 1).all())
+    volume_m3 = None
+    if consistent:  # the sum over the tetrahedra between each triangle and one point
+        a, b, c = np.moveaxis(vertices_m[faces] - vertices_m.mean(axis=0), 1, 0)
+        volume_m3 = float(np.sum(a * np.cross(b, c)) / 6.0)
     return Topology(
         components=_group(edges)[0],
         boundary_edges=len(boundary),
         non_manifold_edges=int((n_faces > 2).sum()),
         hole_lengths_m=_hole_lengths_m(vertices_m, boundary),
         watertight=watertight,
-        enclosed_volume_m3=_signed_volume_m3(vertices_m, faces) if consistent else None,
+        enclosed_volume_m3=volume_m3,
     )
 
 
@@ -102,9 +106,3 @@ def _hole_lengths_m(vertices_m: Vertices, boundary: Indices) -> tuple[float, ...
     length = np.linalg.norm(vertices_m[boundary[:, 0]] - vertices_m[boundary[:, 1]], axis=1)
     total = np.bincount(_group(boundary)[1], weights=length)
     return tuple(np.sort(total)[::-1].tolist())
-
-
-def _signed_volume_m3(vertices_m: Vertices, faces: Indices) -> float:
-    """Sum over the tetrahedra between each triangle and one point."""
-    a, b, c = (vertices_m[faces[:, corner]] - vertices_m.mean(axis=0) for corner in range(3))
-    return float(np.sum(a * np.cross(b, c)) / 6.0)

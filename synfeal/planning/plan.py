@@ -67,11 +67,7 @@ def plan_mesh(
 
 
 def sampling_boxes_of(scene: SceneConfig, mesh_bounds_m: Array, name: str) -> Array:
-    """The configured sampling boxes (B, 2, 3), or the mesh's bounds (2, 3) as in the paper.
-
-    Raises:
-        InputError: a box contradicts the mesh; the message starts with ``name``.
-    """
+    """The configured sampling boxes (B, 2, 3), or the mesh's bounds (2, 3) as in the paper."""
     if scene.sampling_box is None:
         return mesh_bounds_m[None]
     boxes = np.stack([box_array(box) for box in (scene.sampling_box, *scene.further_boxes)])

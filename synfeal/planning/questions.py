@@ -50,9 +50,6 @@ def draw_questions(
 
     Each walk leaves the planner's first pose and goes to every admissible candidate it draws, so a
     start is always an admissible pose: no question starts in a cupboard or outside the room.
-
-    Raises:
-        InputError: the scene has no pose with a free view.
     """
     space = PoseSpace.of_scene(caster, box_m, scene, rng)
     starts = np.tile(sample_start(space, MAX_TRIES), (count, 1))

@@ -23,9 +23,6 @@ def sample_start(space: PoseSpace, max_tries: int) -> NDArray[np.float64]:
     The paper does not say where the camera starts. Inside a cupboard it would stay there, since
     every path must be free of collisions. Normals cannot tell inside from outside in a scan, but
     visibility can: the start is one of the largest group of poses that see each other.
-
-    Raises:
-        InputError: ``max_tries`` rounds gave no pose with a free view; says what to relax.
     """
     start: NDArray[np.float64] = largest_group(space, max_tries, N_POSES)[0]
     return start
@@ -87,9 +84,5 @@ class ConnectedSpace:
 
 
 def connected_space(space: PoseSpace, max_tries: int) -> ConnectedSpace:
-    """The space in which :func:`synfeal.planning.start.sample_start` starts a path.
-
-    Raises:
-        InputError: no pose with a free view was found; says what to relax.
-    """
+    """The space in which :func:`synfeal.planning.start.sample_start` starts a path."""
     return ConnectedSpace(space.caster, largest_group(space, max_tries, N_CONNECTED)[:, :3])

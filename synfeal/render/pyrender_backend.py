@@ -89,11 +89,7 @@ class PyrenderRenderer(Renderer):
         supersampling: int = DEFAULT_SUPERSAMPLING,
         background_rgb: tuple[int, int, int] = (0, 0, 0),
     ) -> None:
-        """Prepare the mesh, which is uploaded by the first render.
-
-        Raises:
-            InputError: EGL does not work here.
-        """
+        """Prepare the mesh, which is uploaded by the first render."""
         self._supersampling = supersampling
         self._context = _context()
         pyrender = _pyrender()

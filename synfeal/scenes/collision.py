@@ -70,9 +70,6 @@ def collision_mesh(
     """The smallest mesh on which a planner decides as on ``mesh``, and how it was chosen.
 
     Alpha-tested surfaces block as a whole: a camera does not fly through foliage.
-
-    Raises:
-        InputError: the scene has no pose with a free view.
     """
     full = merge_vertices(*mesh.merged())
     questions = draw_questions(RayCaster(*full), scene, box_m, rng)

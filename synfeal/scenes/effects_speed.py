@@ -29,11 +29,7 @@ def write_effects_speed(
     effects: Mapping[str, EffectsConfig],
     out_csv: Path,
 ) -> None:
-    """Write a row for ideal frames and one for each of the effects; times differ between runs.
-
-    Raises:
-        InputError: mesh or plan cannot be used.
-    """
+    """Write a row for ideal frames and one for each of the effects; times differ between runs."""
     poses = read_frames(plan, 0, min(FRAMES, len(read_pose_table(plan))))
     seconds = seconds_of_effects(mesh, poses, camera, render, effects)
     size = {"width": camera.width, "height": camera.height}
@@ -52,9 +48,6 @@ def seconds_of_effects(
 
     All are drawn in turn, so that what else the machine does slows them alike; the first frame
     loads what all use, and does not count.
-
-    Raises:
-        InputError: the mesh cannot be read.
     """
     switched = [e for e in effects.values() if e.light and e.light.states]
     opened = render.model_copy(update={"effects": switched[0] if switched else None})

@@ -54,9 +54,6 @@ def prepare_mesh(
 
     Returns:
         The mesh, and how many faces its collision mesh has.
-
-    Raises:
-        InputError: as :func:`prepare_scene`.
     """
     mesh = build_or_load(scene, seed, name)
     box = sampling_box_of(scene, mesh.bounds_m, f"scenes.{name}")
@@ -109,11 +106,7 @@ def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:
 
 
 def check_sha256(path: Path, expected: str, name: str) -> None:
-    """Check the mesh file itself; textures that lie beside it are not part of the hash.
-
-    Raises:
-        InputError: the file is missing or is not the expected one.
-    """
+    """Check the mesh file itself; textures that lie beside it are not part of the hash."""
     check_mesh_file(path, f"scenes.{name}.path")
     found = file_sha256(path)
     if found != expected:

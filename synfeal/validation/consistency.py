@@ -60,19 +60,11 @@ MEASURES = (
     ),
     Measure("surfaces", "in_front", 0.05, "", "share of points in front of what is seen"),
     Measure(
-        "colours",
-        "grey",
-        15.0,
-        " grey levels",
-        "median difference in grey",
+        *("colours", "grey", 15.0, " grey levels", "median difference in grey"),
         MIN_OVERLAP_OF_COLOURS,
     ),
     Measure(
-        "alignment",
-        "shift_px",
-        0.12,
-        " px",
-        "shift that explains the grey",
+        *("alignment", "shift_px", 0.12, " px", "shift that explains the grey"),
         MIN_OVERLAP_OF_COLOURS,
     ),
 )
@@ -103,7 +95,10 @@ def check_consistency(
     checks = [_overlap_check(compared, poses, camera.config)]
     checks += [measure_check(measure, compared) for measure in MEASURES]
     checks.append(_camera_check(system, camera))
-    return [_unjudged(check) for check in checks] if camera.assumed else checks
+    if not camera.assumed:
+        return checks
+    why = "not judged, the camera is assumed"
+    return [Check(check.name, f"{check.text}; {why}", skipped=True) for check in checks]
 
 
 def _compare_all(
@@ -242,7 +237,3 @@ def _camera_check(system: NDArray[np.float64], camera: KnownCamera) -> Check:
         return Check("camera", text)
     failure = f"{camera.source}: camera: depth fits best with {said}; bounds {bounds}"
     return Check("camera", text, (failure,))
-
-
-def _unjudged(check: Check) -> Check:
-    return Check(check.name, f"{check.text}; not judged, the camera is assumed", skipped=True)

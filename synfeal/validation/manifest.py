@@ -97,11 +97,7 @@ class KnownCamera:
 
 
 def camera_of_dataset(dataset: Path, camera_file: Path | None) -> KnownCamera:
-    """The camera of a data set; a calibration file goes before the manifest.
-
-    Raises:
-        InputError: the file or the manifest is there and cannot be used.
-    """
+    """The camera of a data set; a calibration file goes before the manifest."""
     if camera_file is not None:
         from synfeal.camera.calibration_files import read_calibration
 

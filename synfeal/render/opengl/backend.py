@@ -36,11 +36,7 @@ class OpenglRenderer(Renderer):
         supersampling: int = DEFAULT_SUPERSAMPLING,
         background_rgb: tuple[int, int, int] = (0, 0, 0),
     ) -> None:
-        """Upload the mesh.
-
-        Raises:
-            InputError: OpenGL does not work here, or draws no images as large as this.
-        """
+        """Upload the mesh."""
         self._context = shared_context()
         self._finish = finish()
         self._clip_from_cam = clip_from_cam(camera)

@@ -80,7 +80,7 @@ class TexturedTriangles:
             if not len(pending):
                 break
             points = self.points(view, rays[pending], face[pending], depth_m[pending])
-            alpha = self._alpha(view, points)
+            alpha = self._texel(points, self._uv_per_px(view, points))[:, 3]
             pending = pending[alpha < LEAST_ALPHA]
             start_m = depth_m[pending] + self._step_m
             face[pending], depth_m[pending] = self._first_hits(view, rays[pending], start_m)
@@ -121,9 +121,6 @@ class TexturedTriangles:
             tint = tint * np.clip(points.values[:, 2:], 0.0, 1.0)
         texel = self._texel(points, self._uv_per_px(view, points))
         return texel[:, :3] * tint.astype(np.float32)
-
-    def _alpha(self, view: View, points: Points) -> NDArray[np.float32]:
-        return self._texel(points, self._uv_per_px(view, points))[:, 3]
 
     def _texel(self, points: Points, uv_per_px: Floats) -> NDArray[np.float32]:
         texture = self._texture_of[points.part]
