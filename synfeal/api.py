@@ -21,7 +21,6 @@ from synfeal.config.models import CameraConfig, SceneConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.sevenscenes import frame_paths, read_split
-from synfeal.errors import InputError
 from synfeal.mesh import load
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.triangles import merge_vertices
@@ -30,7 +29,7 @@ from synfeal.planning.repeat import read_poses
 from synfeal.render import open_renderer
 from synfeal.render.base import Depth, Rgb
 from synfeal.seeds import generator_of
-from synfeal.settings import SCENE, dataset_config, in_words_of_options, render_configs
+from synfeal.settings import SCENE, dataset_config, options_named, render_configs
 from synfeal.validation.manifest import camera_of_dataset
 
 if TYPE_CHECKING:
@@ -85,14 +84,10 @@ def plan(mesh: AnyPath, frames: int, **options: Any) -> PoseTable:
     config = _config(mesh, frames, options)
     scene = config.scenes[SCENE]
     loaded = load_mesh(mesh, scene.up_axis, scene.unit_m)
-    triangles, rng = (
-        merge_vertices(*loaded.merged()),
-        generator_of(config.seed, "plan", SCENE, "train"),
-    )
-    try:
+    triangles = merge_vertices(*loaded.merged())
+    rng = generator_of(config.seed, "plan", SCENE, "train")
+    with options_named():
         return plan_mesh(triangles, str(mesh), scene, config.collection, frames, rng, "train")
-    except InputError as error:
-        raise InputError(in_words_of_options(str(error))) from None
 
 
 def collect(
@@ -115,10 +110,8 @@ def collect(
         options: see the top of this module.
     """
     config = _config(mesh, frames, options, Path(out))
-    try:
+    with options_named():
         run_collection(CollectJob(with_backend(config), packed, Path(out)), workers)
-    except InputError as error:
-        raise InputError(in_words_of_options(str(error))) from None
     return open_dataset(out)
 
 

@@ -71,7 +71,7 @@ def dataset_config(options: Mapping[str, Any], out: Path | None = None) -> Datas
     values.setdefault("collection", {})["collision_agreement"] = None
     profile = re.sub(r"[^a-z0-9]+", "_", out.absolute().name.lower()) if out else ""
     values |= {"profile": profile.strip("_")[:64] or "mine", "scale": 1.0}
-    with _options_named():
+    with options_named():
         return DatasetConfig.model_validate(values)
 
 
@@ -83,7 +83,7 @@ def scene_config(options: Mapping[str, Any]) -> SceneConfig:
     """
     check_mesh_file(Path(options["mesh"]), "--mesh")
     scene = _nested(options)["scenes"][SCENE]
-    with _options_named():
+    with options_named():
         try:
             return SceneConfig.model_validate({"source": "mesh", **scene})
         except ValidationError as error:
@@ -99,7 +99,7 @@ def render_configs(options: Mapping[str, Any]) -> tuple[CameraConfig, RenderConf
     if options.get("effects") is not None:
         raise InputError("effects: act on the frames of paths; use collect for them")
     values = _nested(options)
-    with _options_named():
+    with options_named():
         found: list[Any] = []
         for key, model in (("network_camera", CameraConfig), ("render", RenderConfig)):
             try:
@@ -134,7 +134,8 @@ def _flag(option: str) -> str:
 
 
 @contextmanager
-def _options_named() -> Iterator[None]:
+def options_named() -> Iterator[None]:
+    """What is said of keys in the block is said of options."""
     try:
         yield
     except ValidationError as error:

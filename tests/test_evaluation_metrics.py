@@ -88,7 +88,7 @@ def by_opencv(predicted, reference, depth_m, camera):
     matrix = camera.intrinsics.matrix()
     lens = np.array(camera.distortion)
     errors = []
-    for pixel, z_m in zip(cell_pixels(camera), depth_m, strict=True):
+    for pixel, z_m in zip(cell_pixels(camera, *CELLS).reshape(-1, 2), depth_m, strict=True):
         if not np.isfinite(z_m):
             continue
         criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 200, 1e-14)

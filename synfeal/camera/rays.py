@@ -28,6 +28,19 @@ def pixels_of_normalised(camera: Camera, normalised: Array) -> Array:
     return distort(normalised, camera.distortion) * [fx, fy] + [cx, cy]
 
 
+def cell_pixels(camera: Camera, columns: int, rows: int) -> Array:
+    """Middles (rows, columns, 2) of equal cells of an image: column and row, pixels."""
+    x = (np.arange(columns) + 0.5) * camera.width / columns
+    y = (np.arange(rows) + 0.5) * camera.height / rows
+    return np.stack(np.meshgrid(x, y), axis=-1)
+
+
+def cell_directions(camera: Camera, columns: int, rows: int) -> Array:
+    """Camera coordinates (rows, columns, 3), z = 1, of what the middles of equal cells show."""
+    normalised = normalised_of_pixels(camera, cell_pixels(camera, columns, rows))
+    return np.concatenate([normalised, np.ones_like(normalised[..., :1])], axis=-1)
+
+
 def refuse_fold(camera: Camera) -> None:
     """Check that every pixel looks somewhere.
 

@@ -9,9 +9,8 @@ from typing import Any, get_args
 
 from synfeal.cli.options import MESH_OPTIONS, command, option, options_among
 from synfeal.config.models import CollectionConfig, RenderConfig
-from synfeal.errors import InputError
 from synfeal.files import read_json
-from synfeal.settings import KEYS, dataset_config, in_words_of_options, scene_config
+from synfeal.settings import KEYS, dataset_config, options_named, scene_config
 
 BACKENDS = get_args(RenderConfig.model_fields["backend"].annotation)
 MODES = get_args(CollectionConfig.model_fields["mode"].annotation)
@@ -92,10 +91,8 @@ def collect(arguments: argparse.Namespace) -> None:
     if arguments.print_config:
         print(configuration_text(job), end="")
         return
-    try:
+    with options_named():
         run_collection(job, arguments.workers)
-    except InputError as error:
-        raise InputError(in_words_of_options(str(error))) from None
     print(f"{job.out}: {job.counts['train']} training and {job.counts['test']} test frames")
     print(coverage_text(read_json(job.out / "coverage.json")["train"]))
 
@@ -133,9 +130,7 @@ def inspect(arguments: argparse.Namespace) -> None:
 
     out = arguments.out or Path(f"{arguments.mesh.stem}-inspect")
     scene = scene_config(options_among(arguments, KEYS))
-    try:
+    with options_named():
         text = inspect_mesh(scene, out, arguments.unit_m is not None)
-    except InputError as error:
-        raise InputError(in_words_of_options(str(error))) from None
     print(f"{out}: inspect.html, inspect.png and inspect.json\n")
     print(text)

@@ -4,28 +4,22 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 # Flag, and what argparse is told about it.
 Option = tuple[str, dict[str, Any]]
 Action = Callable[[argparse.Namespace], None]
 
 
-@dataclass(frozen=True)
-class Command:
-    """One sub-command of ``synfeal``."""
+class Command(NamedTuple):
+    """One sub-command of ``synfeal``, with what its own help and that of ``synfeal`` say."""
 
-    name: str  # as it is typed
-    summary: str  # a few words for ``synfeal --help``
-    description: str  # a sentence for its own help
-    example: str  # a line a person may type
-    options: tuple[Option, ...]  # its options
-    action: Action  # carries it out; imports what it needs when it is called: ``--help`` is quick
-
-    def __call__(self, arguments: argparse.Namespace) -> None:
-        """Carry it out."""
-        self.action(arguments)
+    name: str
+    summary: str
+    description: str
+    example: str
+    options: tuple[Option, ...]
+    action: Action  # imports what it needs when it is called: ``--help`` is quick
 
 
 def option(flag: str, text: str, **details: Any) -> Option:

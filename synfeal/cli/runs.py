@@ -47,9 +47,7 @@ PLUGINS = Path("workflow/plugins")
         metavar="RESULTS",
     ),
     option(
-        "--time-steps",
-        "time some training steps on this machine: a minute",
-        action="store_true",
+        "--time-steps", "time some training steps on this machine: a minute", action="store_true"
     ),
     option("--csv", "write the plan as a table too", type=Path, metavar="FILE"),
     option(

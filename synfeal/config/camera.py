@@ -39,8 +39,7 @@ class CameraConfig(Strict):
     cx: Finite | None = Field(None, description="principal point, pixels")
     cy: Finite | None = Field(None, description="principal point, pixels")
     distortion: tuple[Finite, Finite, Finite, Finite, Finite] = Field(
-        (0.0, 0.0, 0.0, 0.0, 0.0),
-        description="k1, k2, p1, p2, k3 (Brown-Conrady, as OpenCV)",
+        (0.0, 0.0, 0.0, 0.0, 0.0), description="k1, k2, p1, p2, k3 (Brown-Conrady, as OpenCV)"
     )
     near_m: Positive = Field(0.05, description="near clip plane")
     far_m: Positive = Field(100.0, description="far clip plane")

@@ -138,9 +138,7 @@ class SceneConfig(Strict):
     )
     path: Path | None = Field(None, description="mesh: the file (.glb, .gltf, .obj, .ply)")
     sha256: str | None = Field(
-        None,
-        pattern=r"^[0-9a-f]{64}$",
-        description="mesh: expected hash of the file",
+        None, pattern=r"^[0-9a-f]{64}$", description="mesh: expected hash of the file"
     )
     up_axis: Literal["auto", "y", "z"] = Field(
         "auto", description="mesh: axis that points up; `auto`: y for glTF, else z"
@@ -150,13 +148,11 @@ class SceneConfig(Strict):
     )
     sampling_box: Box | None = Field(None, description="bounds of camera centres; null: the mesh's")
     further_boxes: tuple[Box, ...] = Field(
-        (),
-        description="other rooms or floors, each with paths of its own; frames by volume",
+        (), description="other rooms or floors, each with paths of its own; frames by volume"
     )
     angles: Angles = Field(default_factory=Angles, description="bounds of the camera's angles")
     min_view_distance_m: NonNegative = Field(
-        1.2,
-        description="least free distance ahead of a target pose (the paper's d)",
+        1.2, description="least free distance ahead of a target pose (the paper's d)"
     )
     clutter: ClutterConfig | None = Field(None, description="objects that stand about")
     sizes: dict[SizeName, SizeConfig] = Field(
@@ -200,8 +196,7 @@ class CollectionConfig(Strict):
         2000, description="rounds of candidates before a scene counts as too narrow"
     )
     interpolation: Literal["rpy", "slerp"] = Field(
-        "rpy",
-        description="`rpy`: the paper's, angle by angle, each the short way",
+        "rpy", description="`rpy`: the paper's, angle by angle, each the short way"
     )
     collision_agreement: Annotated[float, Field(gt=0.5, le=1)] | None = Field(
         0.995,

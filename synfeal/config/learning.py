@@ -21,15 +21,13 @@ class NetworkConfig(Strict):
     """Shape shared by all localizers."""
 
     backbone: InceptionName = Field(
-        "googlenet",
-        description="of PoseNet, PoseLSTM and PoseNet2; `inception_v3` needs 75 px",
+        "googlenet", description="of PoseNet, PoseLSTM and PoseNet2; `inception_v3` needs 75 px"
     )
     input_px: Annotated[int, Field(ge=32, le=1024)] = Field(
         224, description="side of the square input"
     )
     view: Literal["square", "whole"] = Field(
-        "square",
-        description="what it sees: a frame's central square, or the whole of it, squeezed",
+        "square", description="what it sees: a frame's central square, or the whole of it, squeezed"
     )
     width: Annotated[float, Field(gt=0, le=1)] = Field(
         1.0, description="factor on all channels; ImageNet weights need 1"
@@ -52,8 +50,7 @@ class LocalizerConfig(Strict):
     weight_decay: NonNegative = Field(1e-4, description="decoupled weight decay")
     dropout: Fraction = Field(0.5, description="dropout before the regressors")
     skip: Literal["sum", "concatenation"] = Field(
-        "sum",
-        description="Hourglass: how its decoder joins the encoder's maps",
+        "sum", description="Hourglass: how its decoder joins the encoder's maps"
     )
     beta: Positive | None = Field(None, description="weight of the orientation (beta losses)")
     s_position: Finite = Field(0.0, description="initial log-variance (learned losses)")
@@ -84,8 +81,7 @@ class TrainingConfig(Strict):
     """How all localizers are trained."""
 
     protocol: Literal["corrected", "published"] = Field(
-        "corrected",
-        description="docs/localizers.md; `published`: as the Synfeal authors' code",
+        "corrected", description="docs/localizers.md; `published`: as the Synfeal authors' code"
     )
     validation_share: Annotated[float, Field(ge=0, lt=1)] = Field(
         0.1,
@@ -93,16 +89,13 @@ class TrainingConfig(Strict):
         " the last weights",
     )
     patience: Count | None = Field(
-        None,
-        description="`published`: stop after so many evaluations (of 20) without a new best",
+        None, description="`published`: stop after so many evaluations (of 20) without a new best"
     )
     augmentation: AugmentationConfig = Field(
-        default_factory=AugmentationConfig,
-        description="`corrected`: rotation augmentation",
+        default_factory=AugmentationConfig, description="`corrected`: rotation augmentation"
     )
     precision: Literal["auto", "float32", "bfloat16"] = Field(
-        "auto",
-        description="`auto`: bfloat16 where the device multiplies in it",
+        "auto", description="`auto`: bfloat16 where the device multiplies in it"
     )
     batch_size: Count = Field(32, description="images per step")
     samples_seen: dict[str, Count] = Field(description="images shown in all, by size")
@@ -148,13 +141,9 @@ class ExternalConfig(Strict):
 
     title: str = Field(description="as tables and figures call it")
     poses: str = Field(
-        "",
-        description="path of its answers, e.g. `mine/{scene}-{size}-{labels}.csv`",
+        "", description="path of its answers, e.g. `mine/{scene}-{size}-{labels}.csv`"
     )
-    command: str = Field(
-        "",
-        description="or what writes them",
-    )
+    command: str = Field("", description="or what writes them")
     labels: list[str] = Field(
         default_factory=list, description="label sets it answers for; none: all"
     )

@@ -54,10 +54,7 @@ class ExposureConfig(Strict):
     """How much light makes a pixel white."""
 
     ev: Stops = Field(0.0, description="compensation, stops: 1 doubles the light")
-    time_constant_s: Positive | None = Field(
-        None,
-        description="lag of auto-exposure; null: none",
-    )
+    time_constant_s: Positive | None = Field(None, description="lag of auto-exposure; null: none")
     target: Annotated[float, Field(gt=0, lt=1)] = Field(
         0.18, description="auto-exposure: mean light aimed at, white is 1"
     )
@@ -103,8 +100,7 @@ class EffectsConfig(Strict):
     exposure: ExposureConfig | None = Field(None, description="fixed or automatic")
     noise: NoiseConfig | None = Field(None, description="shot and read noise")
     white_balance_k: Kelvin | None = Field(
-        None,
-        description="colour temperature taken for white, in light of 6500",
+        None, description="colour temperature taken for white, in light of 6500"
     )
     jpeg_quality: Annotated[int, Field(ge=1, le=95)] | None = Field(
         None, description="libjpeg's scale"

@@ -19,16 +19,13 @@ class RobustnessConfig(Strict):
     scene: Slug = Field("large_room", description="of the data set")
     size: SizeName = Field("6k", description="of the data set")
     effects: dict[Slug, EffectsConfig] = Field(
-        default_factory=dict,
-        description="rows of the table: effects on the test frames",
+        default_factory=dict, description="rows of the table: effects on the test frames"
     )
     mixed: EffectsConfig = Field(
-        default_factory=EffectsConfig,
-        description="effects on the second training set",
+        default_factory=EffectsConfig, description="effects on the second training set"
     )
     structure_frames: Count = Field(
-        250,
-        description="test frames for structure-based poses, spread evenly",
+        250, description="test frames for structure-based poses, spread evenly"
     )
 
     @field_validator("effects")

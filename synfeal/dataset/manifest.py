@@ -20,10 +20,7 @@ LIBRARIES = ("deflate", "numpy", "pillow", "pyrender", "trimesh")
 
 
 def write_manifest(
-    dataset_dir: Path,
-    sequences: Iterable[Sequence],
-    camera: CameraConfig,
-    extra: Mapping[str, Any],
+    dataset_dir: Path, sequences: Iterable[Sequence], camera: CameraConfig, extra: Mapping[str, Any]
 ) -> None:
     """Write ``manifest.json``: camera, frame counts, hash of each sequence, versions, ``extra``."""
     sequences, record = list(sequences), camera_record(camera)

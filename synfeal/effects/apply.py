@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.camera.rays import normalised_of_pixels
+from synfeal.camera.rays import cell_directions
 from synfeal.config.models import CameraConfig, EffectsConfig
 from synfeal.effects.camera import AutoExposure, channel_gains, compressed, with_noise
 from synfeal.effects.crowd import CrowdedRenderer
@@ -203,13 +203,8 @@ class _Path:
     @cached_property
     def _rays_cam(self) -> NDArray[np.float32]:
         """Of all pixels (H, W, 3), 1 m along the optical axis."""
-        column, row = np.meshgrid(
-            np.arange(self.camera.width) + 0.5, np.arange(self.camera.height) + 0.5
-        )
-        normalised = normalised_of_pixels(self.camera, np.stack([column, row], axis=-1))
-        return np.concatenate(
-            [normalised, np.ones_like(normalised[..., :1])], axis=-1, dtype=np.float32
-        )
+        size = self.camera.width, self.camera.height
+        return cell_directions(self.camera, *size).astype(np.float32)
 
     def _taken(self, light: Light, row: int, config: EffectsConfig) -> Rgb:
         """What the camera makes of light (H, W, 3) that reaches its sensor."""

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.bootstrap import medians
-from synfeal.camera.rays import normalised_of_pixels, pixels_of_normalised
+from synfeal.camera.rays import cell_directions, cell_pixels, pixels_of_normalised
 from synfeal.config.camera import CameraConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
@@ -40,18 +40,9 @@ DCRE_BOUNDS = (0.05, 0.15)
 BLOCK = 2000  # frames at once: bounds memory
 
 
-def cell_pixels(camera: CameraConfig) -> Array:
-    """Middles (48, 2) of equal cells of an image: columns and rows, pixels, row by row."""
-    columns, rows = CELLS
-    x = (np.arange(columns) + 0.5) * camera.width / columns
-    y = (np.arange(rows) + 0.5) * camera.height / rows
-    return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-
-
 def _directions(camera: CameraConfig) -> Array:
     """Camera coordinates (48, 3), z = 1, of the points that the cells' middles show."""
-    normalised = normalised_of_pixels(camera, cell_pixels(camera))
-    return np.concatenate([normalised, np.ones((len(normalised), 1))], axis=1)
+    return cell_directions(camera, *CELLS).reshape(-1, 3)
 
 
 def cell_depth_m(caster: RayCaster, camera: CameraConfig, world_from_cam: Array) -> Array:
@@ -105,7 +96,7 @@ def _moved(estimate_from_reference: Array, depth_m: Array, camera: CameraConfig)
     points += estimate_from_reference[:, None, :3, 3]
     ahead = points[..., 2] > 0
     normalised = points[..., :2] / np.where(ahead, points[..., 2], 1.0)[..., None]
-    offset = pixels_of_normalised(camera, normalised) - cell_pixels(camera)
+    offset = pixels_of_normalised(camera, normalised) - cell_pixels(camera, *CELLS).reshape(-1, 2)
     share = np.linalg.norm(offset, axis=-1) / np.hypot(camera.width, camera.height)
     share = np.where(ahead, np.fmin(share, 1.0), 1.0)  # fmin: a lens may fold over far outside
     with np.errstate(invalid="ignore"):
@@ -147,7 +138,7 @@ def depth_of_images(paths: Iterable[FrameFile], camera: CameraConfig) -> Iterato
     Raises:
         InputError: an image cannot be read, or is of another size than the camera's.
     """
-    column, row = cell_pixels(camera).astype(int).T
+    column, row = cell_pixels(camera, *CELLS).reshape(-1, 2).astype(int).T
     for path in paths:
         depth_mm = read_depth_mm(path)
         if depth_mm.shape != (camera.height, camera.width):

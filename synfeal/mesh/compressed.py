@@ -161,9 +161,7 @@ class _Decoder:
         for key in ("byteOffset", "normalized", "sparse", "min", "max"):
             accessor.pop(key, None)
         accessor.update(
-            bufferView=len(self.header["bufferViews"]) - 1,
-            componentType=kind,
-            count=len(values),
+            bufferView=len(self.header["bufferViews"]) - 1, componentType=kind, count=len(values)
         )
 
     def _stored(self, content: bytes) -> Json:

@@ -10,7 +10,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from synfeal.camera.distortion import fold_radius
-from synfeal.camera.rays import normalised_of_pixels, pixels_of_normalised
+from synfeal.camera.rays import cell_directions, pixels_of_normalised
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.mesh.rays import RayCaster
@@ -118,17 +118,7 @@ def empty_pixels(caster: RayCaster, plan: PoseTable, camera: CameraConfig) -> Em
 
 def empty_shares(caster: RayCaster, world_from_cam: Array, camera: CameraConfig) -> Array:
     """Share (N,) of the pixels that show nothing, from each of the poses (N, 4, 4)."""
-    pixel = np.stack(
-        np.meshgrid(
-            (np.arange(COLUMNS) + 0.5) * camera.width / COLUMNS,
-            (np.arange(ROWS) + 0.5) * camera.height / ROWS,
-        ),
-        axis=-1,
-    ).reshape(-1, 2)
-    normalised = normalised_of_pixels(camera, pixel)
-    ray = np.column_stack(
-        [normalised, np.ones(len(normalised))]
-    )  # one metre along the optical axis
+    ray = cell_directions(camera, COLUMNS, ROWS).reshape(-1, 3)  # one metre along the axis
     shares = np.empty(len(world_from_cam))
     for index, pose in enumerate(world_from_cam):
         direction = ray @ pose[:3, :3].T

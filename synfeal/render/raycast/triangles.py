@@ -143,11 +143,7 @@ def _textures(parts: list[MeshPart]) -> tuple[list[NDArray[np.uint8]], NDArray[n
     textures: list[NDArray[np.uint8]] = []
     texture_of = []
     for part in parts:
-        key = part.texture is not None and (
-            id(part.texture),
-            part.alpha_cutoff,
-            part.base_color[3],
-        )
+        key = part.texture is not None and (id(part.texture), part.alpha_cutoff, part.base_color[3])
         if key not in found:
             found[key] = len(textures)
             textures.append(WHITE if part.texture is None else thresholded(part))
