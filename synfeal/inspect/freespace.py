@@ -76,7 +76,9 @@ def survey(caster: RayCaster, surface_m: Array, box_m: Array) -> Survey:
     """
     axes, step_m = _grid(box_m)
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    enclosure = _enclosure(caster, points)
+    directions = (np.broadcast_to(way, points.shape) for way in ray_directions())
+    hits = sum(caster.first_hit_m(points, way) <= REACH_M for way in directions)
+    enclosure = np.asarray(hits / N_RAYS)
     is_clear = enclosure >= MIN_ENCLOSURE
     distance_m, _ = cKDTree(surface_m).query(points[is_clear])
     # A quarter of a step more, by which the suggested box reaches beyond its outermost points.
@@ -163,14 +165,6 @@ def _grid(box_m: Array) -> tuple[tuple[Array, Array, Array], float]:
 def step_m_of(axis: Array) -> float:
     """Distance of neighbouring points along an axis of a grid."""
     return float(axis[1] - axis[0]) if len(axis) > 1 else 0.1
-
-
-def _enclosure(caster: RayCaster, points: Array) -> Array:
-    """Share (N,) of the rays from each point (N, 3) that hit within reach."""
-    hits = np.zeros(len(points))
-    for direction in ray_directions():
-        hits += caster.first_hit_m(points, np.broadcast_to(direction, points.shape)) <= REACH_M
-    return hits / N_RAYS
 
 
 def _floors_m(caster: RayCaster, points: Array) -> Array:

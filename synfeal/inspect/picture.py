@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -26,6 +26,8 @@ SIZE_INCH, DPI = (16.0, 8.8), 100
 ACCENT = "#d55e00"
 LOOKS_ALONG = {0: "+x", 90: "+y", 180: "-x", 270: "-y"}
 OUTLINE = [withStroke(linewidth=3, foreground="white")]
+ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": "black", "path_effects": OUTLINE}
+POINTS: dict[str, Any] = {"textcoords": "offset points", "path_effects": OUTLINE}
 
 
 def picture_png(
@@ -48,15 +50,9 @@ def picture_png(
         axes.imshow(view)
         axes.set_axis_off()
         axes.set_title(f"yaw {yaw}°: along {LOOKS_ALONG[yaw]}", fontsize=11, loc="left", pad=4)
-    figure.text(
-        0.45,
-        0.03,
-        "Views from ({:.2f}, {:.2f}, {:.2f}) m, 75° wide, as a camera will see them.".format(
-            *position_m
-        ),
-        fontsize=10,
-        color="0.35",
-    )
+    place = ", ".join(f"{value:.2f}" for value in position_m)
+    said = f"Views from ({place}) m, 75° wide, as a camera will see them."
+    figure.text(0.45, 0.03, said, fontsize=10, color="0.35")
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})
     return buffer.getvalue()
@@ -84,38 +80,17 @@ def _draw_box(axes: Axes, box_m: Array) -> None:
     frame.set_path_effects([withStroke(linewidth=4, foreground="white")])
     axes.add_patch(frame)
     text = f"suggested sampling box, z {z0:.2f} to {z1:.2f} m"
-    axes.annotate(
-        text,
-        (x0, y1),
-        (0, 4),
-        textcoords="offset points",
-        va="bottom",
-        fontsize=9,
-        color=ACCENT,
-        path_effects=OUTLINE,
-    )
+    axes.annotate(text, (x0, y1), (0, 4), va="bottom", fontsize=9, color=ACCENT, **POINTS)
 
 
 def _draw_position(axes: Axes, position_m: Array, reach: float) -> None:
     """A dot with an arrow for each view."""
     x, y = position_m[:2]
     for yaw in YAWS_DEG:
-        dx, dy = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
-        axes.annotate(
-            "",
-            (x + reach * dx, y + reach * dy),
-            (x, y),
-            arrowprops={"arrowstyle": "-|>", "color": "black", "path_effects": OUTLINE},
-        )
-        axes.text(
-            x + 1.35 * reach * dx,
-            y + 1.35 * reach * dy,
-            f"{yaw}°",
-            ha="center",
-            va="center",
-            fontsize=9,
-            path_effects=OUTLINE,
-        )
+        dx, dy = reach * math.cos(math.radians(yaw)), reach * math.sin(math.radians(yaw))
+        axes.annotate("", (x + dx, y + dy), (x, y), arrowprops=ARROW)
+        label = axes.text(x + 1.35 * dx, y + 1.35 * dy, f"{yaw}°", ha="center", va="center")
+        label.set(fontsize=9, path_effects=OUTLINE)
     axes.plot([x], [y], "o", color="black", markersize=6, markeredgecolor="white")
 
 
@@ -126,15 +101,8 @@ def _draw_scale(axes: Axes, top: TopView) -> None:
     right, height = x1 - 0.03 * (x1 - x0), y0 + 0.025 * (y1 - y0)
     bar = axes.plot([right - length, right], [height] * 2, color="black", linewidth=4)
     bar[0].set_path_effects([withStroke(linewidth=7, foreground="white")])
-    axes.annotate(
-        f"{length:g} m",
-        (right - length / 2, height),
-        (0, 5),
-        textcoords="offset points",
-        ha="center",
-        fontsize=10,
-        path_effects=OUTLINE,
-    )
+    middle = (right - length / 2, height)
+    axes.annotate(f"{length:g} m", middle, (0, 5), ha="center", fontsize=10, **POINTS)
 
 
 def round_length_m(length_m: float) -> float:
@@ -165,12 +133,8 @@ class TopView(NamedTuple):
 def inside_views(mesh: TexturedMesh, position_m: Array) -> list[Rgb]:
     """What a level camera at (3,) sees at each of ``YAWS_DEG``."""
     with open_renderer(mesh, VIEW_CAMERA) as renderer:
-        return [
-            renderer.render(
-                pose_matrix(rotation_from_rpy([0.0, 0.0, math.radians(yaw)]), position_m)
-            )
-            for yaw in YAWS_DEG
-        ]
+        turns = rotation_from_rpy([[0.0, 0.0, math.radians(yaw)] for yaw in YAWS_DEG])
+        return [renderer.render(pose_matrix(turn, position_m)) for turn in turns]
 
 
 def top_view(mesh: TexturedMesh, cut_m: float) -> TopView:

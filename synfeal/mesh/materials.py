@@ -59,10 +59,9 @@ class MaterialReader:
 
     def read(self, material: Any) -> BaseMaterial:
         """What a trimesh material amounts to."""
-        key = id(material)
-        if key not in self._known:
-            self._known[key] = self._reduce(material)
-        return self._known[key]
+        if id(material) not in self._known:
+            self._known[id(material)] = self._reduce(material)
+        return self._known[id(material)]
 
     def _reduce(self, material: Any) -> BaseMaterial:
         if self._header is None:
@@ -76,22 +75,18 @@ class MaterialReader:
         colour = base_color(described)
         texture = self._texture(material.baseColorTexture, owner)
         base = srgb_from_linear(colour.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0]))
-        cutoff = self._gltf_cutoff(described, owner)
+        mode = described.get("alphaMode", "OPAQUE")
+        cutoff = BLEND_CUTOFF if mode == "BLEND" else None
+        if mode == "MASK":
+            cutoff = float(described.get("alphaCutoff", GLTF_DEFAULT_CUTOFF))
         if cutoff is not None and texture is None and "baseColorTexture" in colour:
             self._findings.warn(f"{owner}: its transparency was in its texture; drawn opaque")
         if is_opaque(texture, base):
             cutoff = None
         elif cutoff is not None:
-            self._note_cutoff(owner, described["alphaMode"] == "BLEND", cutoff)
+            self._note_cutoff(owner, mode == "BLEND", cutoff)
         transform = uv_transform(colour.get("baseColorTexture", {}))
         return BaseMaterial(texture, base, cutoff, transform)
-
-    def _gltf_cutoff(self, described: Json, owner: str) -> float | None:
-        """The cutoff that a glTF alpha mode amounts to."""
-        mode = described.get("alphaMode", "OPAQUE")
-        if mode == "MASK":
-            return float(described.get("alphaCutoff", GLTF_DEFAULT_CUTOFF))
-        return BLEND_CUTOFF if mode == "BLEND" else None
 
     def _from_mtl(self, material: Any) -> BaseMaterial:
         """An MTL or PLY material: alpha counts where ``map_d`` or ``d`` say so."""

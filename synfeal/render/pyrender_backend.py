@@ -58,8 +58,13 @@ def _context() -> _Context:
         device = egl.get_device_by_index(int(os.environ.get("EGL_DEVICE_ID", "0")))
         platform = egl.EGLPlatform(16, 16, device)
         platform.init_context()
-        _configure_context()
+        from OpenGL import GL
+
         from synfeal.render.pyrender_passes import ColourPass, DepthPass
+
+        # Texture rows are packed; by default OpenGL expects each to start at a multiple of 4 bytes,
+        # which shears textures of odd width.
+        GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
 
         uploaded: set[Any] = set()
         return _Context(platform, ColourPass(uploaded), DepthPass(uploaded))
@@ -68,15 +73,6 @@ def _context() -> _Context:
             f"rendering needs EGL, which does not work here ({type(error).__name__}: {error});"
             " on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri"
         ) from error
-
-
-def _configure_context() -> None:
-    """Set what pyrender leaves at its default, in the context that was just made current."""
-    from OpenGL import GL
-
-    # Texture rows are packed; by default OpenGL expects each to start at a multiple of 4 bytes,
-    # which shears textures of odd width.
-    GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
 
 
 class PyrenderRenderer(Renderer):
@@ -149,22 +145,17 @@ def mean_of_samples(samples: NDArray[np.uint8], factor: int) -> Rgb:
 
 def _primitive(part: MeshPart, centre_m: NDArray[np.float64]) -> Any:
     """One part as vertex buffers around ``centre_m`` and a material."""
-    pyrender = _pyrender()
-    return pyrender.Primitive(
+    rgba = None
+    if part.vertex_rgb is not None:
+        rgb = part.vertex_rgb.astype(np.float32) / 255.0
+        rgba = np.pad(rgb, ((0, 0), (0, 1)), constant_values=1)
+    return _pyrender().Primitive(
         positions=(part.vertices_m - centre_m).astype(np.float32),
         indices=part.faces.astype(np.uint32),
         texcoord_0=None if part.uv is None else part.uv.astype(np.float32),
-        color_0=_vertex_rgba(part),
+        color_0=rgba,
         material=_material(part),
     )
-
-
-def _vertex_rgba(part: MeshPart) -> NDArray[np.float32] | None:
-    """Vertex colours (V, 4) in 0 to 1."""
-    if part.vertex_rgb is None:
-        return None
-    opaque = np.ones((len(part.vertex_rgb), 1), np.float32)
-    return np.hstack([part.vertex_rgb.astype(np.float32) / 255.0, opaque])
 
 
 def _material(part: MeshPart) -> Any:

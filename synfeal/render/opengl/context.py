@@ -45,31 +45,20 @@ def _attempts() -> Iterator[Callable[[], Any]]:
 
     for device in range(MOST_DEVICES):
         for library in GL_LIBRARIES:
-            settings: dict[str, Any] = {
-                "backend": "egl",
-                "libegl": EGL_LIBRARY,
-                "libgl": library,
-                "device_index": device,
-            }
-            yield functools.partial(
-                moderngl.create_context, require=GL_VERSION, standalone=True, **settings
-            )
+            egl: dict[str, Any] = {"backend": "egl", "libegl": EGL_LIBRARY, "libgl": library}
+            egl |= {"device_index": device, "require": GL_VERSION, "standalone": True}
+            yield functools.partial(moderngl.create_context, **egl)
 
 
 def _first_that_opens(attempts: list[Callable[[], Any]]) -> Any:
-    """What the first attempt that does not raise returns.
-
-    Raises:
-        Exception: what the first attempt raised, where all do.
-    """
-    first_error: Exception | None = None
+    """What the first attempt that does not raise returns; the first error where all raise."""
+    errors = []
     for attempt in attempts:
         try:
             return attempt()
         except Exception as error:
-            first_error = first_error or error
-    assert first_error is not None
-    raise first_error
+            errors.append(error)
+    raise errors[0]
 
 
 @functools.cache
