@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from synfeal.config.models import CameraConfig, CollectionConfig, RenderConfig, SceneConfig
-from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.render_sequence import write_sequence
 from synfeal.files import write_json
 from synfeal.mesh.load import load_mesh
@@ -46,11 +45,10 @@ def write_collection_speed(
         open_renderer(load_mesh(mesh), CAMERA, render) as renderer,
     ):
         for part, rows in enumerate(np.array_split(np.arange(FRAMES), PARTS)):
-            poses = PoseTable(
-                plan.frame[rows], plan.path[rows], plan.position_m[rows], plan.quat_wxyz[rows]
-            )
             began = time.perf_counter()
-            write_sequence(renderer, poses, Path(folder) / f"seq-{part + 1:02d}", with_depth=False)
+            write_sequence(
+                renderer, plan.at(rows), Path(folder) / f"seq-{part + 1:02d}", with_depth=False
+            )
             seconds.append(time.perf_counter() - began + planning_s)
     write_json(
         out_speed,

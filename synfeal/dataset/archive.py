@@ -89,14 +89,9 @@ def is_archive(sequence: Path) -> bool:
     return sequence.suffix == SUFFIX
 
 
-def archive_of(directory: Path) -> Path:
-    """The archive of a sequence that is, or would be, the directory ``seq-01``."""
-    return directory.with_name(directory.name + SUFFIX)
-
-
 def sequence_at(directory: Path) -> Path:
     """The form in which a sequence is there: ``seq-01``, or where that is not, ``seq-01.zip``."""
-    archive = archive_of(directory)
+    archive = directory.with_name(directory.name + SUFFIX)
     return archive if archive.is_file() and not directory.is_dir() else directory
 
 

@@ -55,15 +55,12 @@ class PoseTable:
             raise ValueError(f"asked for frames {start} to {stop} of a table of {len(self)}")
         edges = np.concatenate([[0], np.flatnonzero(np.diff(self.path)) + 1, [len(self)]])
         around = slice(edges[edges <= start].max(), edges[edges >= stop].min())
-        return self._rows(slice(start, stop), None if self.whole else self._rows(around))
+        return self.at(slice(start, stop), None if self.whole else self.at(around))
 
-    def at(self, rows: NDArray[np.int64]) -> PoseTable:
+    def at(self, rows: slice | NDArray[np.int64], whole: PoseTable | None = None) -> PoseTable:
         """Some of the frames, by row."""
-        return self._rows(rows)
-
-    def _rows(self, part: slice | NDArray[np.int64], whole: PoseTable | None = None) -> PoseTable:
-        rows = (self.frame[part], self.path[part], self.position_m[part], self.quat_wxyz[part])
-        return PoseTable(*rows, whole or self.whole)
+        columns = (self.frame[rows], self.path[rows], self.position_m[rows], self.quat_wxyz[rows])
+        return PoseTable(*columns, whole or self.whole)
 
     def first(self, count: int) -> PoseTable:
         """The first ``count`` frames: smaller data sets are prefixes of larger ones."""

@@ -51,15 +51,11 @@ class Estimates:
     quat: Array
     ordered: bool = False  # names are indices of frames within the split (our own tables)
 
-    def is_rotation(self) -> NDArray[np.bool_]:
-        """Which poses (N,) are finite with a quaternion of unit length."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            off = np.abs(np.linalg.norm(self.quat, axis=1) - 1.0)
-        return np.asarray(np.isfinite(self.translation).all(axis=1) & (off <= UNIT_TOLERANCE))
-
     def world_from_cam(self, convention: Convention) -> Array:
         """Poses (N, 4, 4); not a number where there is no rotation."""
-        good = self.is_rotation()
+        with np.errstate(over="ignore", invalid="ignore"):
+            off = np.abs(np.linalg.norm(self.quat, axis=1) - 1.0)
+        good = np.isfinite(self.translation).all(axis=1) & (off <= UNIT_TOLERANCE)
         quat_wxyz = self.quat if convention.order == "wxyz" else np.roll(self.quat, 1, axis=1)
         matrices = np.full((len(good), 4, 4), np.nan)
         matrices[good] = pose_from_quat(self.translation[good], quat_wxyz[good])

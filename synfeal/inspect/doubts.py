@@ -139,7 +139,9 @@ def load_as_meant(
     mesh, notes = _load(scene), []
     extents_m = mesh.bounds_m[1] - mesh.bounds_m[0]
     if not unit_is_given and not EXTENTS_M[0] <= extents_m.max() <= EXTENTS_M[1]:
-        unit_m = likely_unit_m(extents_m)
+        # What makes the smallest extent most like the height of a room.
+        height = max(extents_m.min(), 1e-9) / STOREY_M
+        unit_m = min(UNITS_M, key=lambda unit: abs(np.log(unit * height)))
         scene = scene.model_copy(update={"unit_m": unit_m})
         mesh = _load(scene)
         notes.append(_unit_note(extents_m, unit_m))
@@ -154,11 +156,6 @@ def load_as_meant(
                 f" {floors_m2[2]:.3g} m^2; if that is wrong, give --up-axis"
             )
     return scene, mesh, notes
-
-
-def likely_unit_m(extents: Array) -> float:
-    """The unit, metres, that makes the smallest extent (3,) most like the height of a room."""
-    return min(UNITS_M, key=lambda unit: abs(np.log(unit * max(extents.min(), 1e-9) / STOREY_M)))
 
 
 def _unit_note(extents: Array, unit_m: float) -> str:

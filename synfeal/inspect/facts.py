@@ -76,10 +76,11 @@ def facts_of(found: Inspection) -> dict[str, Any]:
     """Numbers, findings and doubts, ready for JSON."""
     scene, mesh, space, suggestion = found.scene, found.mesh, found.space, found.suggestion
     title = title_of(Path(str(scene.path)))
-    detail, collect = detail_of(mesh), None
+    detail, collect, box = detail_of(mesh), None, None
     topology = asdict(mesh_topology(*merge_vertices(*mesh.merged())))
     lengths = list(topology.pop("hole_lengths_m"))
     if suggestion is not None:  # the command, and what planning it once showed
+        box = dict(zip("xyz", suggestion.box_m.T.tolist(), strict=True))
         command = suggestion.command(f"{slug_of(title)}-frames")
         collect = {"command": command, "frames": N_FRAMES, "empty_pixels": asdict(suggestion.empty)}
     return {
@@ -106,7 +107,7 @@ def facts_of(found: Inspection) -> dict[str, Any]:
             "elsewhere": space.elsewhere,
         },
         "back_faces_share": back_face_share(mesh, found.caster, space),
-        "suggested_sampling_box": None if suggestion is None else as_box(suggestion.box_m),
+        "suggested_sampling_box": box,
         "collect": collect,
         "doubts": _doubts(found, detail["area_m2"]),
         "version": synfeal.__version__,
@@ -123,11 +124,6 @@ def _doubts(found: Inspection, area_m2: dict[str, float]) -> list[str]:
         *doubts_of(bounds_m[1] - bounds_m[0], floors_m2, found.space),
         *([] if found.suggestion is None else suggestion_doubts(found.suggestion)),
     ]
-
-
-def as_box(box_m: Array) -> dict[str, list[float]]:
-    """A box (2, 3) as the mapping a configuration file holds."""
-    return {axis: box_m[:, index].tolist() for index, axis in enumerate("xyz")}
 
 
 def _part(part: MeshPart) -> dict[str, Any]:

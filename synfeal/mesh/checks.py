@@ -29,7 +29,8 @@ def check_mesh(mesh: TexturedMesh, path: Path) -> None:
                 f"{path}: part '{part.name}' has {bad.sum()} vertices that are NaN or infinite;"
                 " repair the mesh"
             )
-    if not has_colour(mesh):
+    painted = any(p.texture is not None or p.vertex_rgb is not None for p in mesh.parts)
+    if not painted and len({part.base_color.tobytes() for part in mesh.parts}) == 1:
         raise InputError(
             f"{path}: has neither a texture nor vertex colours; images would be of one colour."
             " Export it with its texture"
@@ -42,13 +43,6 @@ def check_indices(part: MeshPart, path: Path) -> None:
         raise InputError(
             f"{path}: part '{part.name}' has faces that name vertices it lacks; export it again"
         )
-
-
-def has_colour(mesh: TexturedMesh) -> bool:
-    """Whether anything but one single colour can be seen."""
-    if any(part.texture is not None or part.vertex_rgb is not None for part in mesh.parts):
-        return True
-    return len({part.base_color.tobytes() for part in mesh.parts}) > 1
 
 
 def shows_one_colour(mesh: TexturedMesh) -> bool:

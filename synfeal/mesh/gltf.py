@@ -134,7 +134,8 @@ def base_color(material: Json) -> Json:
 def _use_one_uv_set(attributes: Json, material: Json) -> None:
     """Make the set of texture coordinates that the base colour uses the first one."""
     slot = material.get("pbrMetallicRoughness", {}).get("baseColorTexture", {})
-    chosen = slot_texture_set(slot)
+    transform = slot.get("extensions", {}).get("KHR_texture_transform", {})
+    chosen = int(transform.get("texCoord", slot.get("texCoord", 0)))
     if chosen == 0:
         return
     attributes.pop("TEXCOORD_0", None)
@@ -142,24 +143,13 @@ def _use_one_uv_set(attributes: Json, material: Json) -> None:
         attributes["TEXCOORD_0"] = attributes[f"TEXCOORD_{chosen}"]
 
 
-def slot_texture_set(slot: Json) -> int:
-    """Which set of texture coordinates a texture reference uses."""
-    transform = slot.get("extensions", {}).get("KHR_texture_transform", {})
-    return int(transform.get("texCoord", slot.get("texCoord", 0)))
-
-
 def image_uri(header: Json, texture: int) -> str | None:
-    """The file an image comes from; None if it lies inside the glTF."""
-    source = image_index(header["textures"][texture])
-    uri = None if source is None else header["images"][source].get("uri")
+    """The file an image comes from: WebP where offered, as trimesh chooses; None if inside."""
+    stored = header["textures"][texture]
+    webp = stored.get("extensions", {}).get("EXT_texture_webp", {})
+    source = webp.get("source", stored.get("source"))
+    uri = None if source is None else header["images"][int(source)].get("uri")
     return None if uri is None or uri.startswith("data:") else str(uri)
-
-
-def image_index(texture: Json) -> int | None:
-    """The image of a texture that can be read: WebP where offered, as trimesh chooses."""
-    webp = texture.get("extensions", {}).get("EXT_texture_webp", {})
-    index = webp.get("source", texture.get("source"))
-    return None if index is None else int(index)
 
 
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")

@@ -99,7 +99,7 @@ class OpenglRenderer(Renderer):
     def _draw_colour(self, clip_from_mesh: NDArray[np.float64]) -> Rgb:
         self._begin(self._sample_target, *self._background)
         for part in self._parts:
-            part.draw_colour(clip_from_mesh)
+            part.draw(part.colour, clip_from_mesh)
         self._mean_target.use()
         self._context.enable_only(moderngl.NOTHING)
         self._samples.use(0)
@@ -112,7 +112,7 @@ class OpenglRenderer(Renderer):
     def _draw_depth(self, clip_from_mesh: NDArray[np.float64]) -> Depth:
         self._begin(self._depth_target)
         for part in self._parts:
-            part.draw_depth(clip_from_mesh)
+            part.draw(part.depth, clip_from_mesh)
         depth_m = np.empty(self._size[::-1], np.float32)
         self._finish()
         self._depth_target.read_into(depth_m, components=1, dtype="f4", alignment=1)

@@ -43,12 +43,12 @@ class DevicePart:
         features = ["TEXTURED"] * bool(uv) + ["COLOURED"] * bool(rgb)
         if pixels is not None and pixels.shape[2] == 4:
             features.append("CUT_OUT")
-        self._colour = self._program(shaders.COLOUR, features, [position, *uv, *rgb])
-        self._colour.program["base_rgb"].value = tuple(part.base_color[:3] / 255.0)
+        self.colour = self._program(shaders.COLOUR, features, [position, *uv, *rgb])
+        self.colour.program["base_rgb"].value = tuple(part.base_color[:3] / 255.0)
         if uv:
-            self._colour.program["level_bias"].value = LEVEL_BIAS
+            self.colour.program["level_bias"].value = LEVEL_BIAS
         cut_out = ["TEXTURED", "CUT_OUT"] if "CUT_OUT" in features else []
-        self._depth = self._program(shaders.DEPTH, cut_out, [position, *(uv if cut_out else [])])
+        self.depth = self._program(shaders.DEPTH, cut_out, [position, *(uv if cut_out else [])])
 
     def _attribute(self, values: NDArray[Any], layout: str, name: str) -> tuple[Any, str, str]:
         self._buffers.append(self._context.buffer(np.ascontiguousarray(values)))
@@ -62,15 +62,11 @@ class DevicePart:
         )
         return self._context.vertex_array(program, attributes, self._buffers[0])
 
-    def draw_colour(self, clip_from_mesh: NDArray[np.float64]) -> None:
-        """Draw colours into the framebuffer in use."""
-        self._draw(self._colour, clip_from_mesh)
+    def draw(self, triangles: Any, clip_from_mesh: NDArray[np.float64]) -> None:
+        """Draw ``colour``, or as ``depth`` distances along the optical axis in metres.
 
-    def draw_depth(self, clip_from_mesh: NDArray[np.float64]) -> None:
-        """Draw distances along the optical axis, metres, into the framebuffer in use."""
-        self._draw(self._depth, clip_from_mesh)
-
-    def _draw(self, triangles: Any, clip_from_mesh: NDArray[np.float64]) -> None:
+        Into the framebuffer in use.
+        """
         by_columns = clip_from_mesh.astype(np.float32).tobytes(order="F")
         triangles.program["clip_from_mesh"].write(by_columns)
         if self._texture is not None:
@@ -80,7 +76,7 @@ class DevicePart:
 
     def release(self) -> None:
         """Free what lies on the device."""
-        for triangles in (self._colour, self._depth):
+        for triangles in (self.colour, self.depth):
             triangles.program.release()
             triangles.release()
         for buffer in self._buffers:
