@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Any, Self
 
 from pydantic import Field, model_validator
 
@@ -29,10 +29,10 @@ class CameraConfig(Strict):
         description="file of intrinsics and distortion (docs/cameras.md), scaled to width and"
         " height where given",
     )
-    width: Annotated[int, Field(ge=16, le=8192)] = Field(640, description="pixels")
-    height: Annotated[int, Field(ge=16, le=8192)] = Field(480, description="pixels")
-    horizontal_fov_deg: Annotated[float, Field(gt=1, lt=170)] = Field(
-        60.0, description="field of view; unused with fx"
+    width: int = Field(640, ge=16, le=8192, description="pixels")
+    height: int = Field(480, ge=16, le=8192, description="pixels")
+    horizontal_fov_deg: float = Field(
+        60.0, gt=1, lt=170, description="field of view; unused with fx"
     )
     fx: Positive | None = Field(None, description="focal length, pixels")
     fy: Positive | None = Field(None, description="focal length, pixels")

@@ -98,23 +98,21 @@ class Angles(Strict):
 class SizeConfig(Strict):
     """Frames of a data set at full scale, as the paper prints them."""
 
-    train: Annotated[int, Field(ge=1, le=MOST_FRAMES)] = Field(
-        description="training frames at scale 1"
-    )
-    test: Annotated[int, Field(ge=0, le=MOST_FRAMES)] = Field(description="test frames at scale 1")
+    train: int = Field(ge=1, le=MOST_FRAMES, description="training frames at scale 1")
+    test: int = Field(ge=0, le=MOST_FRAMES, description="test frames at scale 1")
 
 
 class ClutterConfig(Strict):
     """Objects that stand about, on the floor or on tables, wherever cameras can be above them."""
 
-    count: Annotated[int, Field(ge=1, le=1000)] = Field(10, description="how many")
+    count: int = Field(10, ge=1, le=1000, description="how many")
     files: tuple[Path, ...] = Field(
         (), description="meshes in metres, taken in turn; none: cartons"
     )
     size_m: tuple[Positive, Positive] = Field(
         (0.12, 0.4), description="cartons: shortest and longest side, metres"
     )
-    seed: Annotated[int, Field(ge=0, lt=2**63)] = Field(0, description="of the layout")
+    seed: int = Field(0, ge=0, lt=2**63, description="of the layout")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -143,9 +141,7 @@ class SceneConfig(Strict):
     up_axis: Literal["auto", "y", "z"] = Field(
         "auto", description="mesh: axis that points up; `auto`: y for glTF, else z"
     )
-    unit_m: Annotated[float, Field(ge=1e-6, le=1e6)] = Field(
-        1.0, description="mesh: one unit of the file, metres"
-    )
+    unit_m: float = Field(1.0, ge=1e-6, le=1e6, description="mesh: one unit of the file, metres")
     sampling_box: Box | None = Field(None, description="bounds of camera centres; null: the mesh's")
     further_boxes: tuple[Box, ...] = Field(
         (), description="other rooms or floors, each with paths of its own; frames by volume"
@@ -185,15 +181,15 @@ class CollectionConfig(Strict):
         description="mode `repeat`: data set, directory of 7-Scenes frames, pose table (.csv) or"
         " TUM trajectory (.txt)",
     )
-    candidates: Annotated[int, Field(ge=1, le=10**4)] = Field(
-        8, description="target poses tried per path (the paper's k)"
+    candidates: int = Field(
+        8, ge=1, le=10**4, description="target poses tried per path (the paper's k)"
     )
-    frame_spacing_m: Annotated[float, Field(ge=1e-4, le=1e4)] = Field(
-        0.03, description="distance between frames (the paper's other d)"
+    frame_spacing_m: float = Field(
+        0.03, ge=1e-4, le=1e4, description="distance between frames (the paper's other d)"
     )
     min_path_m: NonNegative = Field(1.5, description="shorter paths are drawn again")
-    max_tries: Annotated[int, Field(ge=1, le=10**6)] = Field(
-        2000, description="rounds of candidates before a scene counts as too narrow"
+    max_tries: int = Field(
+        2000, ge=1, le=10**6, description="rounds of candidates before a scene counts as too narrow"
     )
     interpolation: Literal["rpy", "slerp"] = Field(
         "rpy", description="`rpy`: the paper's, angle by angle, each the short way"

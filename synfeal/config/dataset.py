@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
@@ -17,7 +17,7 @@ class DatasetConfig(Strict):
 
     profile: Slug = Field(description="name, and directory under `results`")
     seed: int = Field(0, ge=0, lt=2**63, description="root of all seeds")
-    scale: Annotated[float, Field(gt=0, le=1)] = Field(description="share of the paper's frames")
+    scale: float = Field(gt=0, le=1, description="share of the paper's frames")
     results: Path = Field(Path("results"), description="where runs are written")
     shard_frames: Count = Field(500, description="frames of a render job, and of a sequence")
     archive_sequences: bool = Field(False, description="write a sequence as one `seq-XX.zip`")

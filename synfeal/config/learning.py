@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -23,14 +23,12 @@ class NetworkConfig(Strict):
     backbone: InceptionName = Field(
         "googlenet", description="of PoseNet, PoseLSTM and PoseNet2; `inception_v3` needs 75 px"
     )
-    input_px: Annotated[int, Field(ge=32, le=1024)] = Field(
-        224, description="side of the square input"
-    )
+    input_px: int = Field(224, ge=32, le=1024, description="side of the square input")
     view: Literal["square", "whole"] = Field(
         "square", description="what it sees: a frame's central square, or the whole of it, squeezed"
     )
-    width: Annotated[float, Field(gt=0, le=1)] = Field(
-        1.0, description="factor on all channels; ImageNet weights need 1"
+    width: float = Field(
+        1.0, gt=0, le=1, description="factor on all channels; ImageNet weights need 1"
     )
 
     @model_validator(mode="after")
@@ -64,11 +62,11 @@ class AugmentationConfig(Strict):
     not see is filled with its border.
     """
 
-    tilt_deg: Annotated[float, Field(ge=0, le=45)] = Field(
-        0.0, description="largest rotation about the camera's x and y axes"
+    tilt_deg: float = Field(
+        0.0, ge=0, le=45, description="largest rotation about the camera's x and y axes"
     )
-    roll_deg: Annotated[float, Field(ge=0, le=180)] = Field(
-        0.0, description="largest rotation about its optical axis"
+    roll_deg: float = Field(
+        0.0, ge=0, le=180, description="largest rotation about its optical axis"
     )
 
     @property
@@ -83,8 +81,10 @@ class TrainingConfig(Strict):
     protocol: Literal["corrected", "published"] = Field(
         "corrected", description="docs/localizers.md; `published`: as the Synfeal authors' code"
     )
-    validation_share: Annotated[float, Field(ge=0, lt=1)] = Field(
+    validation_share: float = Field(
         0.1,
+        ge=0,
+        lt=1,
         description="`corrected`: share of the training paths held out to choose weights; 0: keep"
         " the last weights",
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -89,8 +89,10 @@ class SfmConfig(Strict):
     init_min_tri_angle_deg: Positive = Field(
         4.0, description="incremental: least angle of the initial pair"
     )
-    min_explained: Annotated[float, Field(ge=0, le=1)] = Field(
+    min_explained: float = Field(
         0.67,
+        ge=0,
+        le=1,
         description="incremental: a model that explains less of the matched points is tried anew"
         " from another start, up to four",
     )
@@ -118,8 +120,8 @@ class RgbdConfig(DepthConfig):
         "motion", description="first guess: the motion before, feature matches, none"
     )
     keyframe_every: Count = Field(10, description="frames between keyframes")
-    loops_per_keyframe: Annotated[int, Field(ge=0, le=10**9)] = Field(
-        3, description="most loop closures of a keyframe"
+    loops_per_keyframe: int = Field(
+        3, ge=0, le=10**9, description="most loop closures of a keyframe"
     )
     max_rmse_m: Positive = Field(0.05, description="motions with a larger residual are rejected")
     min_fitness: Fraction = Field(0.3, description="motions with less overlap are rejected")
@@ -143,7 +145,7 @@ class PoseGraphConfig(Strict):
 class GroundTruthConfig(Strict):
     """Label replacement as in section 4.1."""
 
-    batch_frames: Annotated[int, Field(ge=2, le=10**9)] = Field(250, description="frames per batch")
+    batch_frames: int = Field(250, ge=2, le=10**9, description="frames per batch")
     more_scenes: tuple[Slug, ...] = Field(
         (), description="further scenes whose labels are estimated, to count assistance in"
     )

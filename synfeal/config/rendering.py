@@ -27,8 +27,8 @@ class LightConfig(Strict):
         description="colour temperature, drawn between these, uniform in mired; 6500 leaves the"
         " mesh as it is",
     )
-    field_ev: Annotated[float, Field(ge=0, le=5)] = Field(
-        0.0, description="smooth change across the scene: standard deviation, stops"
+    field_ev: float = Field(
+        0.0, ge=0, le=5, description="smooth change across the scene: standard deviation, stops"
     )
     field_m: Positive = Field(3.0, description="its shortest wavelength")
 
@@ -45,9 +45,7 @@ class MotionBlurConfig(Strict):
     """The path of the camera during one exposure, centred on the pose of the frame."""
 
     exposure_s: Positive = Field(0.02, description="exposure time")
-    subframes: Annotated[int, Field(ge=2, le=64)] = Field(
-        8, description="frames whose light is averaged"
-    )
+    subframes: int = Field(8, ge=2, le=64, description="frames whose light is averaged")
 
 
 class ExposureConfig(Strict):
@@ -55,27 +53,23 @@ class ExposureConfig(Strict):
 
     ev: Stops = Field(0.0, description="compensation, stops: 1 doubles the light")
     time_constant_s: Positive | None = Field(None, description="lag of auto-exposure; null: none")
-    target: Annotated[float, Field(gt=0, lt=1)] = Field(
-        0.18, description="auto-exposure: mean light aimed at, white is 1"
+    target: float = Field(
+        0.18, gt=0, lt=1, description="auto-exposure: mean light aimed at, white is 1"
     )
-    most_ev: Annotated[float, Field(ge=0, le=10)] = Field(
-        3.0, description="auto-exposure: largest correction, stops"
-    )
+    most_ev: float = Field(3.0, ge=0, le=10, description="auto-exposure: largest correction, stops")
 
 
 class NoiseConfig(Strict):
     """Photon-transfer model: variance in electrons is the signal plus that of reading out."""
 
-    full_well_e: Annotated[float, Field(ge=1, le=1e7)] = Field(
-        10_000.0, description="electrons of a white pixel"
-    )
+    full_well_e: float = Field(10_000.0, ge=1, le=1e7, description="electrons of a white pixel")
     read_e: NonNegative = Field(5.0, description="read noise, electrons RMS")
 
 
 class PathObjectsConfig(Strict):
     """Objects that stand about, differently along every path, none in the way of the camera."""
 
-    count: Annotated[int, Field(ge=1, le=100)] = Field(8, description="how many, where they fit")
+    count: int = Field(8, ge=1, le=100, description="how many, where they fit")
     files: tuple[Path, ...] = Field(
         (), description="meshes in metres, taken in turn; none: cartons"
     )
@@ -86,12 +80,8 @@ class EffectsConfig(Strict):
 
     unless_none = ("clutter",)
 
-    seed: Annotated[int, Field(ge=0, lt=2**63)] = Field(
-        0, description="of noise, lights and the choice of paths"
-    )
-    share: Annotated[float, Field(gt=0, le=1)] = Field(
-        1.0, description="share of the paths that each effect acts on"
-    )
+    seed: int = Field(0, ge=0, lt=2**63, description="of noise, lights and the choice of paths")
+    share: float = Field(1.0, gt=0, le=1, description="share of the paths that each effect acts on")
     speed_m_s: Positive = Field(
         0.5, description="speed of the camera: gives the time between frames"
     )
@@ -127,9 +117,7 @@ class RenderConfig(Strict):
     backend: Literal["auto", "opengl", "pyrender", "raycast"] = Field(
         "auto", description="`auto`: the fastest that works here"
     )
-    supersampling: Annotated[int, Field(ge=1, le=4)] = Field(
-        2, description="samples per pixel along each axis"
-    )
+    supersampling: int = Field(2, ge=1, le=4, description="samples per pixel along each axis")
     background_rgb: tuple[Channel, Channel, Channel] = Field(
         (0, 0, 0), description="where nothing is hit"
     )
@@ -142,7 +130,9 @@ class RenderSpeedConfig(Strict):
     """How speed and error of rendering are measured, for `speed_vs_error.csv`."""
 
     poses: Count = Field(6, description="views of each scene; half as many at the larger sizes")
-    sizes: Annotated[int, Field(ge=1, le=3)] = Field(
+    sizes: int = Field(
         3,
+        ge=1,
+        le=3,
         description="how many of network_camera, groundtruth_camera and 640 × 480, smallest first",
     )
