@@ -120,7 +120,7 @@ def test_colours_alone_draw_no_depth(monkeypatch):
     def fail(*_):
         raise AssertionError("depth was drawn")
 
-    monkeypatch.setattr(opengl_part.DevicePart, "draw_depth", fail)
+    monkeypatch.setattr(OpenglRenderer, "_draw_depth", fail)
     with OpenglRenderer(soup(100), CAMERA) as renderer:
         renderer.render(LOOK_ALONG_X)
         with pytest.raises(AssertionError, match="depth was drawn"):

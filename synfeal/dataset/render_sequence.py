@@ -45,9 +45,6 @@ def render_sequence(
     """Render poses of a table into a new sequence, which appears when it is complete.
 
     Frames are numbered from 0 inside the sequence.
-
-    Raises:
-        InputError: the mesh or the table cannot be read, or ``out_frames`` is not empty.
     """
     began, poses = time.perf_counter(), read_frames(plan, start, stop)
     with (
@@ -162,9 +159,6 @@ def render_packed(
 
     ``.json`` beside it, in place of ``.npy``, says how many frames it holds and which backend drew
     them.
-
-    Raises:
-        InputError: the mesh or the plan cannot be read, or the file cannot be written.
     """
     chosen, poses = resolved(render), read_frames(plan, start, stop)
     with (

@@ -78,11 +78,7 @@ def write_render_speed(
     render: RenderConfig,  # what the profile renders with
     out_speed: Path,  # one row per camera and variant, columns :data:`SCHEMA`
 ) -> None:
-    """Measure on poses spread evenly over a plan, and write the rows; times differ between runs.
-
-    Raises:
-        InputError: the mesh or the plan cannot be read, or no backend works here.
-    """
+    """Measure on poses spread evenly over a plan, and write the rows; times differ between runs."""
     every = read_pose_table(plan).world_from_cam
     count = min(render_speed.poses, len(every))
     poses = every[np.linspace(0, len(every) - 1, count).astype(int)]
