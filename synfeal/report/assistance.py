@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from pydantic import BaseModel, TypeAdapter
+from pydantic import BaseModel
 
 from baselines.groundtruth.chain import BatchRecord
 from baselines.groundtruth.methods import METHODS
 from synfeal.config import Design
 from synfeal.frames import COUNT, MAYBE, MAYBE_COUNT, TEXT, frame_of, write_frame
 from synfeal.report.layouts import SOURCES, scene_title
-from synfeal.report.results import check_result, read_result
+from synfeal.report.results import read_result, shaped
 from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
 
 NAME = "assistance"
@@ -49,9 +49,6 @@ class _Split(BaseModel):
 class _Splits(BaseModel):
     train: _Split
     test: _Split
-
-
-_SHAPE = TypeAdapter(_Splits)
 
 
 def write_assistance_table(design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
@@ -99,7 +96,7 @@ def batch_records(root: Path, scene: str, size: str, method: str, split: str) ->
     path = root / "labels" / scene / size / method / "assistance.json"
     remedy = "chain these labels again"
     splits = read_result(path, ["splits"], remedy)["splits"]
-    check_result(path, splits, _SHAPE, remedy)
+    shaped(path, splits, _Splits, remedy)
     records: Records = splits[split]["records"]
     return records
 

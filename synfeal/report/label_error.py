@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from pydantic import FiniteFloat, TypeAdapter
+from pydantic import FiniteFloat
 
 from baselines.groundtruth.label_error import (
     Pair,
     PoseErrors,
-    RelativeError,
     absolute_errors,
     relative_error,
     share_within,
@@ -22,29 +21,23 @@ from baselines.groundtruth.label_error import (
 from baselines.groundtruth.methods import METHODS, stages_of
 from synfeal.config import Design
 from synfeal.dataset.pose_table import read_pose_table
-from synfeal.errors import InputError, why
-from synfeal.files import read_json
 from synfeal.frames import COUNT, MAYBE, NUMBER, TEXT, frame_of, write_frame
 from synfeal.report.assistance import SPLITS, TOTAL, batch_records
 from synfeal.report.layouts import SOURCES, scene_title
+from synfeal.report.results import read_result
 from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
 
 NAME = "label_error"
-_FACTS = TypeAdapter(dict[str, FiniteFloat])
 # Labels without assistance, and the labels of the data set, by the name of their files.
 STATES = {"before": "{}-unassisted", "after": "{}"}
 RELATIVE_FRAMES = (1, 25)
 WITHIN_M, WITHIN_DEG = 0.05, 5.0
-ABSOLUTE = tuple(
-    f"{measure}_{which}"
-    for measure in ("position_m", "orientation_deg")
-    for which in ("median", "rmse", "max")
-)
-RELATIVE = tuple(
-    f"relative_{n}_{name}"
-    for n in RELATIVE_FRAMES
-    for name in ("m_rmse", "deg_rmse", "m_per_m", "deg_per_m")
-)
+SPREAD = ("median", "rmse", "max")
+# By how names of columns end, what of a relative error they hold.
+DRIFT = {"m_rmse": "rmse_m", "deg_rmse": "rmse_deg"}
+DRIFT |= {"m_per_m": "per_metre_m", "deg_per_m": "per_metre_deg"}
+ABSOLUTE = tuple(f"{m}_{which}" for m in ("position_m", "orientation_deg") for which in SPREAD)
+RELATIVE = tuple(f"relative_{n}_{name}" for n in RELATIVE_FRAMES for name in DRIFT)
 SCHEMA = {
     **dict.fromkeys(("scene", "size", "method", "split", "assistance"), TEXT),
     "frames": COUNT,
@@ -109,11 +102,12 @@ def error_record(pairs: Sequence[Pair]) -> dict[str, Any]:
     record: dict[str, Any] = {}
     for measure, values in zip(("position_m", "orientation_deg"), errors, strict=True):
         found = spread(values)
-        record[f"{measure}_median"] = found.median
-        record[f"{measure}_rmse"] = found.rmse
-        record[f"{measure}_max"] = found.max
+        record |= {f"{measure}_{which}": getattr(found, which) for which in SPREAD}
     for n in RELATIVE_FRAMES:
-        record |= _relative_record(n, relative_error(pairs, n))
+        error = relative_error(pairs, n)
+        for name, attribute in DRIFT.items() if error else ():
+            value = getattr(error, attribute)
+            record[f"relative_{n}_{name}"] = value if np.isfinite(value) else None
     return record | {"share_within_5cm_5deg": share_within(errors, WITHIN_M, WITHIN_DEG)}
 
 
@@ -126,7 +120,8 @@ def cost_record(
         for split in splits:
             folder = root / "groundtruth" / scene / size / stage / split
             for batch, _ in enumerate(batch_records(root, scene, size, method, split)):
-                facts = _read_facts(folder / f"batch-{batch:03d}.json")
+                path, kind = folder / f"batch-{batch:03d}.json", dict[str, FiniteFloat]
+                facts = read_result(path, ["peak_memory_mb"], "estimate that batch again", kind)
                 unused = METHODS[method].unused
                 seconds += sum(v for k, v in facts.items() if k.endswith("_s") and k not in unused)
                 peaks.append(facts["peak_memory_mb"])
@@ -170,26 +165,3 @@ def _pairs(
         f"{a:.3g}{units[0]}, {b:.3g}{units[1]}" for a, b in table[[first, second]].to_numpy(float)
     ]
     return [text.replace("nan", "–") for text in texts]
-
-
-def _relative_record(n: int, error: RelativeError | None) -> dict[str, Any]:
-    if error is None:
-        return {}
-    values = (error.rmse_m, error.rmse_deg, error.per_metre_m, error.per_metre_deg)
-    names = ("m_rmse", "deg_rmse", "m_per_m", "deg_per_m")
-    return {
-        f"relative_{n}_{name}": value if np.isfinite(value) else None
-        for name, value in zip(names, values, strict=True)
-    }
-
-
-def _read_facts(path: Path) -> dict[str, float]:
-    """What a batch took: seconds under keys that end in ``_s``, and ``peak_memory_mb``."""
-    try:
-        facts: dict[str, float] = _FACTS.validate_python(read_json(path), strict=True)
-        facts["peak_memory_mb"]
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(
-            f"{path}: cannot be read ({why(error)}); estimate that batch again"
-        ) from None
-    return facts

@@ -7,16 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from pydantic import TypeAdapter
 
 from synfeal.frames import COUNT, MAYBE, MAYBE_COUNT, NUMBER, TEXT, frame_of, write_frame
 from synfeal.report.layouts import scene_title
 from synfeal.report.published import MeshFacts, published_meshes
-from synfeal.report.results import check_result, read_result
+from synfeal.report.results import read_result
 from synfeal.report.sheet import PAPER, Sheet, sheet_of_texts, write_latex
 
 NAME = "table1_meshes"
-_SHAPE = TypeAdapter(MeshFacts)
 FACTS = {"vertices": "# Vertices", "faces": "# Faces", "volume_m3": "Volume [m³]"}
 SCHEMA = {
     **{"scene": TEXT, "vertices": COUNT, "faces": COUNT, "volume_m3": NUMBER},
@@ -52,11 +50,8 @@ def read_meshes(scenes: Sequence[str], root: Path) -> pd.DataFrame:
 def read_mesh_facts(root: Path, scene: str) -> MeshFacts:
     """Counts and volume from ``<root>/scenes/<scene>/properties.json``."""
     path = root / "scenes" / scene / "properties.json"
-    remedy = "make the scene again"
-    values = read_result(path, FACTS, remedy)
-    facts = {fact: values[fact] for fact in FACTS}
-    check_result(path, facts, _SHAPE, remedy)
-    return MeshFacts(**facts)
+    facts: MeshFacts = read_result(path, FACTS, "make the scene again", MeshFacts)
+    return facts
 
 
 def meshes_sheet(meshes: pd.DataFrame) -> Sheet:

@@ -10,14 +10,14 @@ import math
 from pathlib import Path
 
 import pandas as pd
-from pydantic import FiniteFloat, TypeAdapter
+from pydantic import FiniteFloat
 
 from synfeal.config import MODELS, Design, Run
 from synfeal.evaluation.metrics import BOUNDS, MEANS, POSITION
 from synfeal.evaluation.reprojection import DCRE_BOUNDS
 from synfeal.frames import COUNT, MAYBE, TEXT, frame_of, read_frame, write_frame
 from synfeal.report.layouts import TITLES, scene_title
-from synfeal.report.results import check_result, read_result
+from synfeal.report.results import read_result, shaped
 from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
 from synfeal.report.stats import REMEDY
 
@@ -32,7 +32,6 @@ COLUMNS = [
     for limit in ("", "_low", "_high")
 ]
 SCHEMA = {**dict.fromkeys(KEYS, TEXT), "n_seeds": COUNT, **dict.fromkeys(COLUMNS, MAYBE)}
-_SCORES = TypeAdapter(dict[str, FiniteFloat | None])
 CAPTION = (
     "Share of the test frames with both errors below a bound, and dense correspondence reprojection"
     " error (DCRE, share of the image's diagonal); not in the paper."
@@ -76,8 +75,8 @@ def _read(path: Path) -> dict[str, float | None]:
     """Scores of a run; those of DCRE are absent where its test frames show nothing."""
     needed = [column for column in COLUMNS if not column.startswith("dcre")]
     metrics = read_result(path, needed, REMEDY)
-    scores = {column: metrics[column] for column in COLUMNS if column in metrics}
-    check_result(path, scores, _SCORES, REMEDY)
+    found = {column: metrics[column] for column in COLUMNS if column in metrics}
+    scores: dict[str, float | None] = shaped(path, found, dict[str, FiniteFloat | None], REMEDY)
     return scores
 
 

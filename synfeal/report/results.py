@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,16 +28,18 @@ def read_text(path: Path) -> str:
         raise InputError(f"{path}: cannot be read ({why(error)}); make it again") from None
 
 
-def read_result(path: Path, needed: Iterable[str], remedy: str) -> dict[str, Any]:
+def read_result(path: Path, needed: Iterable[str], remedy: str, shape: Any = None) -> Any:
     """A mapping from a result file.
 
     Args:
         path: the file.
         needed: keys it must have.
         remedy: what to do when it cannot be used, e.g. ``score that run again``.
+        shape: a model, or type, of the mapping; then that is returned.
 
     Raises:
-        InputError: the file is missing, is not JSON, is no mapping, or lacks a key.
+        InputError: the file is missing, is not JSON, is no mapping, or lacks a key; or the first
+            key that is missing or of another type than the shape says.
     """
     try:
         value = read_json(path)
@@ -47,16 +50,17 @@ def read_result(path: Path, needed: Iterable[str], remedy: str) -> dict[str, Any
     absent = [key for key in needed if key not in value]
     if absent:
         raise InputError(f"{path}: {', '.join(absent)} missing; {remedy}")
-    return value
+    return value if shape is None else shaped(path, value, shape, remedy)
 
 
-def check_result(path: Path, value: Any, shape: TypeAdapter[Any], remedy: str) -> None:
-    """Check that what a result file holds, or a part of it, has the shape it is read as.
-
-    Raises:
-        InputError: naming the first key that is missing or of another type.
-    """
+def shaped(path: Path, value: Any, shape: Any, remedy: str) -> Any:
+    """What a result file holds, or a part of it, as the model or type it is read as."""
     try:
-        shape.validate_json(json.dumps(value), strict=True)
+        return _adapter(shape).validate_json(json.dumps(value), strict=True)
     except ValidationError as error:
         raise InputError(f"{path}: {why(error)}; {remedy}") from None
+
+
+@cache
+def _adapter(shape: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(shape)

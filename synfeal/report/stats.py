@@ -8,10 +8,10 @@ from pathlib import Path
 from statistics import fmean, stdev
 from typing import Annotated, Any
 
-from pydantic import Field, FiniteFloat, NonNegativeInt, TypeAdapter
+from pydantic import Field, FiniteFloat, NonNegativeInt
 from scipy.stats import binomtest, kendalltau
 
-from synfeal.report.results import check_result, read_result
+from synfeal.report.results import read_result, shaped
 
 MEASURES = ("position_m", "orientation_deg", "position_m_true", "orientation_deg_true")
 COUNTS = ("n_train", "n_test", "failed")
@@ -21,8 +21,7 @@ Metrics = Mapping[str, Any]
 # Standard errors that 95 % of a normal distribution lie within.
 NORMAL_95 = 1.96
 REMEDY = "score that run again"
-_COUNTS = TypeAdapter(dict[str, NonNegativeInt])
-_SCORES = TypeAdapter(dict[str, Annotated[FiniteFloat, Field(ge=0)] | None])
+Score = Annotated[FiniteFloat, Field(ge=0)]
 
 
 def read_metrics(path: Path) -> Metrics:
@@ -30,9 +29,9 @@ def read_metrics(path: Path) -> Metrics:
     limits = [f"{measure}_{end}" for measure in MEASURES for end in ("low", "high")]
     scores = (*MEASURES, *limits, "position_rms_m", *BASELINES, *FLOORS)
     values = read_result(path, (*COUNTS, *scores), REMEDY)
-    check_result(path, {name: values[name] for name in COUNTS}, _COUNTS, REMEDY)
-    check_result(path, {name: values[name] for name in scores}, _SCORES, REMEDY)
-    return values
+    shaped(path, {name: values[name] for name in COUNTS}, dict[str, NonNegativeInt], REMEDY)
+    shaped(path, {name: values[name] for name in scores}, dict[str, Score | None], REMEDY)
+    return dict(values)
 
 
 def combine(runs: Sequence[Metrics]) -> dict[str, float | None]:

@@ -67,24 +67,17 @@ class TestSet(NamedTuple):
 
 @dataclass(frozen=True)
 class Evidence:
-    """A results directory, read under one of the two scores.
+    """A results directory, read under one of the two scores."""
 
-    Attributes:
-        root: results directory of the profile.
-        runs: by cell of the profile, its runs.
-        estimated: scene, size and labels of its re-estimated label sets.
-        end: ``""`` for errors against the labels, ``"_true"`` against the true poses.
-        common: whether errors are those on the common test set; they are against the true poses.
-        used: files read so far, relative to ``root``.
-        test_paths: by test set, how many paths it has.
-    """
-
-    root: Path
-    runs: Mapping[Cell, Sequence[Run]]
+    root: Path  # results directory of the profile
+    runs: Mapping[Cell, Sequence[Run]]  # by cell of the profile, its runs
+    # Scene, size and labels of its re-estimated label sets.
     estimated: Sequence[tuple[str, str, str]] = ()
-    end: str = ""
+    end: str = ""  # ``""`` for errors against the labels, ``"_true"`` against the true poses
+    # Whether errors are those on the common test set; they are against the true poses.
     common: bool = False
-    used: dict[str, None] = field(default_factory=dict)
+    used: dict[str, None] = field(default_factory=dict)  # files read so far, relative to ``root``
+    # By test set, how many paths it has.
     test_paths: dict[tuple[str, str, bool], int] = field(default_factory=dict)
     _errors: dict[tuple[Cell, str], Array] = field(default_factory=dict)
     _tests: dict[tuple[str, str, bool], TestSet] = field(default_factory=dict)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, Field, TypeAdapter
+from pydantic import BaseModel, Field
 
 from synfeal.report.claims.evidence import Evidence
 from synfeal.report.claims.model import HOLDS, MIXED, OPPOSITE, UNDECIDED, Claim, Outcome, Verdict
 from synfeal.report.layouts import scene_title
 from synfeal.report.meshes import read_mesh_facts
-from synfeal.report.results import check_result, read_result
+from synfeal.report.results import read_result
 
 SCENES = ("large_room", "sanctuary")
 MEAN_7_SCENES_M3 = 6.37
@@ -22,18 +22,13 @@ class _Speed(BaseModel):
     cores: int
 
 
-_SHAPE = TypeAdapter(_Speed)
-
-
 def collection_rate(claim: Claim, evidence: Evidence) -> Outcome:
     """C14: every scene is collected at the published rate: 640 x 480 as PNG, with poses."""
     verdicts, measured, spans, machines = [], [], [], []
     for scene in SCENES:
         evidence.need(scene=scene)
         path = evidence.file(f"scenes/{scene}/collection_speed.json")
-        record = read_result(path, (), "measure it again")
-        check_result(path, record, _SHAPE, "measure it again")
-        speed = _Speed.model_validate(record)
+        speed: _Speed = read_result(path, (), "measure it again", _Speed)
         low, high = min(speed.frames_per_s), max(speed.frames_per_s)
         verdicts.append(_compared(low, high, claim.numbers[0]))
         mean = len(speed.frames_per_s) / sum(1 / rate for rate in speed.frames_per_s)

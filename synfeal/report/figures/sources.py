@@ -25,15 +25,10 @@ SPLITS = ("train", "test")
 
 @dataclass(frozen=True)
 class Results:
-    """A profile's results.
+    """A profile's results."""
 
-    Attributes:
-        root: its directory.
-        design: of the profile; what it leaves out is not drawn, whatever files there are.
-    """
-
-    root: Path
-    design: Design
+    root: Path  # its directory
+    design: Design  # of the profile; what it leaves out is not drawn, whatever files there are
 
     @property
     def rows(self) -> tuple[Experiment, ...]:
@@ -78,17 +73,12 @@ def counted(n_train: int, n_test: int) -> str:
 
 @dataclass(frozen=True)
 class LabelledSplit:
-    """One split with the labels of one method.
+    """One split with the labels of one method."""
 
-    Attributes:
-        labels: the poses the method found, chained and assisted.
-        truth: the true poses of the same frames.
-        batches: records of assistance in the order of their frames ``start`` to ``stop``
-            (exclusive); each begins with the last frame of the one before.
-    """
-
-    labels: PoseTable
-    truth: PoseTable
+    labels: PoseTable  # the poses the method found, chained and assisted
+    truth: PoseTable  # the true poses of the same frames
+    # Records of assistance in the order of their frames ``start`` to ``stop`` (exclusive); each
+    # begins with the last frame of the one before.
     batches: Sequence[Mapping[str, Any]]
 
     @property

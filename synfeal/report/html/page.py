@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -96,7 +96,11 @@ def write_report(design: Design, root: Path, out_html: Path) -> None:
             *(f"{name} is missing." for name in files if not (root / name).exists()),
             *missing_rows(design.rows),
             *untested_claims(claims),
-            *missing_figures(CAPTIONS, figures),
+            *(
+                f"Not drawn, for lack of its data in this profile: figure {name}."
+                for name in CAPTIONS
+                if name not in figures
+            ),
         ],
         viewer_js=Markup(viewer_js()),
     )
@@ -141,12 +145,6 @@ def untested_claims(claims: Claims) -> list[str]:
         for claim in claims
         if NOT_TESTABLE in (claim["verdict_labels"], claim["verdict_true"])
     ]
-
-
-def missing_figures(captions: Mapping[str, str], found: Iterable[str]) -> list[str]:
-    """Figures that have a caption and were not drawn."""
-    names = [name for name in captions if name not in set(found)]
-    return [f"Not drawn, for lack of its data in this profile: figure {name}." for name in names]
 
 
 def _row_name(table: str, key: RowKey) -> str:

@@ -10,14 +10,15 @@ from typing import Any
 
 import pandas as pd
 from markupsafe import Markup
-from pydantic import BaseModel, TypeAdapter
+from pydantic import BaseModel
 
 from synfeal.files import write_json
 from synfeal.frames import records_of
 from synfeal.provenance import CPU_INFO, processor_name, provenance
 from synfeal.report.cost.measured import read_jobs, write_measured
+from synfeal.report.cost.text import duration
 from synfeal.report.html.render import Column, render, sortable
-from synfeal.report.results import check_result, read_result
+from synfeal.report.results import read_result, shaped
 
 
 def write_provenance(
@@ -25,13 +26,9 @@ def write_provenance(
 ) -> None:
     """Write the record, and beside it what every job took, ``benchmarks.csv``.
 
-    Args:
-        seed: root of all seeds.
-        config_hash: :func:`synfeal.provenance.config_hash` of the configuration.
-        measured: what the jobs took, files below ``benchmarks`` beside the record.
-        results: files, and directories of files, whose SHA-256 is recorded.
-        out_json: ``synfeal.provenance.provenance``, ``machine``, ``stages`` (:func:`stages_of`) and
-            ``files``: hashes by path relative to the record.
+    The record is ``synfeal.provenance.provenance``, ``machine``, ``stages`` (:func:`stages_of`) and
+    ``files``: SHA-256 of the ``results`` and of files in directories of them. ``measured`` are
+    files below ``benchmarks`` beside it.
     """
     root = out_json.parent
     jobs = read_jobs(sorted(measured), root / "benchmarks")
@@ -43,8 +40,7 @@ def write_provenance(
 def stages_of(jobs: pd.DataFrame) -> list[dict[str, Any]]:
     """What the jobs of each stage took together, the longest stage first.
 
-    By column: ``stage``; ``jobs``, how many; ``seconds`` of all of them, ``median_seconds`` of one;
-    ``peak_mb``, the largest resident memory of any, None where all were too short to measure.
+    ``seconds`` are of all ``jobs``; ``peak_mb`` is None where all were too short to measure.
     """
     stages = jobs.groupby("stage").agg(
         jobs=("wall_s", "size"),
@@ -105,13 +101,10 @@ class _Origin(BaseModel):
     packages: dict[str, str]
 
 
-_SHAPE = TypeAdapter(_Origin)
-
-
 def read_origin(path: Path) -> Record:
     """``provenance.json``."""
-    record = read_result(path, (*NEEDED, "machine", "stages"), "make it again")
-    check_result(path, record, _SHAPE, "make it again")
+    record: Record = read_result(path, (*NEEDED, "machine", "stages"), "make it again")
+    shaped(path, record, _Origin, "make it again")
     return record
 
 
@@ -142,15 +135,6 @@ def cost_sentence(record: Record) -> str:
         f"{jobs} jobs took {duration(seconds)} of computing together, on {machine['processor']}"
         f" ({machine['usable_cores']} cores)."
     )
-
-
-def duration(seconds: float) -> str:
-    """Seconds as a person reads them."""
-    if seconds < 90:
-        return f"{seconds:.1f} s"
-    if seconds < 5400:
-        return f"{seconds / 60:.1f} min"
-    return f"{seconds / 3600:.1f} h"
 
 
 def _stages(record: Record) -> Markup:

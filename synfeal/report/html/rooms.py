@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from synfeal.config import Design
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.inspect.surface import SurfacePoints
-from synfeal.inspect.viewer_mesh import ViewerMesh, viewer_mesh
+from synfeal.inspect.viewer_mesh import viewer_mesh
 from synfeal.mesh.load import load_mesh
 from synfeal.report.html.render import render
 from synfeal.report.layouts import SOURCES, scene_title
@@ -39,7 +38,9 @@ def room_html(scene: str, root: Path, design: Design) -> Markup:
     """The view of one scene, ready for ``report.js``; the design says what label sets there are."""
     mesh = load_mesh(root / "scenes" / scene / "mesh.glb")
     small = viewer_mesh(mesh, SurfacePoints.of(mesh, generator_of(0, "report", scene)))
-    return _html(scene, small, trajectories(scene, root, design))
+    drawn = trajectories(scene, root, design)
+    data = small.scene([(path, one.rgb) for one in drawn for path in one.paths_m])
+    return render("room.html", scene=scene, title=scene_title(scene), drawn=drawn, data=data)
 
 
 def trajectories(scene: str, root: Path, design: Design) -> list[Trajectory]:
@@ -62,14 +63,3 @@ def paths_of(table: PoseTable) -> tuple[Array, ...]:
     """Camera centres (N, 3) of each path that has more than one frame."""
     starts = np.flatnonzero(np.diff(table.path)) + 1
     return tuple(path for path in np.split(table.position_m, starts) if len(path) > 1)
-
-
-def _html(scene: str, mesh: ViewerMesh, drawn: Sequence[Trajectory]) -> Markup:
-    lines = [(path, trajectory.rgb) for trajectory in drawn for path in trajectory.paths_m]
-    ends = np.cumsum([len(trajectory.paths_m) for trajectory in drawn]).tolist()
-    boxes = [
-        {**vars(trajectory), "start": start, "end": end}
-        for trajectory, start, end in zip(drawn, [0, *ends], ends, strict=False)
-    ]
-    title = scene_title(scene)
-    return render("room.html", scene=scene, title=title, boxes=boxes, data=mesh.scene(lines))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
@@ -83,53 +83,32 @@ def _row(name: str, row: pd.DataFrame, values: Values) -> dict[str, Any]:
         key = f"{1000 * lead.noise_m + lead.noise_deg:g}"
     elif name == "table2_ground_truth":
         key = label
+    numbers = [(TITLES[cell.model], cell, "") for cell in models]
+    numbers += [(title, lead, f"{start}_") for start, title in REFERENCES.items()]
     return {
         "block": lead.block or scene_title(lead.scene),
         "label": label,
         "key": key,
         "note": lead.published_row_note,
         "cells": [
-            *(cell for model in models for cell in _cells(model, TITLES[model.model], values)),
-            *_references(lead, values),
+            _cell(cell, title, start, place, values)
+            for title, cell, start in numbers
+            for place in range(len(UNITS))
         ],
     }
 
 
-def _cells(cell: Any, title: str, values: Values) -> Iterator[dict[str, Any]]:
-    """Two cells of a localizer: both scores, and the paper's value below."""
-    for place, measure in enumerate(UNITS):
-        at = (title, place)
-        scores = []
-        for style, (kind, end) in STYLES.items():
-            score = f"{measure}{end}"
-            scores.append(
-                {
-                    "style": style,
-                    "sort": _key(getattr(cell, score)),
-                    "value": values[cell.row, kind, *at],
-                    "limits": interval(
-                        getattr(cell, f"{score}_low"), getattr(cell, f"{score}_high")
-                    ),
-                    "change": values.get((cell.row, f"{kind} change", *at)),
-                }
-            )
-        paper, change = (values.get((cell.row, kind, *at)) for kind in (PAPER, "paper change"))
-        yield {"scores": scores, "paper": paper, "paper_change": change}
+def _cell(cell: Any, title: str, start: str, place: int, values: Values) -> dict[str, Any]:
+    """Both scores of a localizer, or of an answer without training, and the paper's below."""
 
+    def value(kind: str) -> Any:
+        return values.get((cell.row, kind, title, place))
 
-def _references(cell: Any, values: Values) -> Iterator[dict[str, Any]]:
-    """Two cells for each answer without training: both scores, of which one is shown."""
-    for name, title in REFERENCES.items():
-        for place, measure in enumerate(UNITS):
-            scores = []
-            for style, (kind, end) in STYLES.items():
-                sort = getattr(cell, f"{name}_{measure}{end}", 0.0)  # truth is the truth
-                value = values.get((cell.row, kind, title, place))
-                score = {"style": style, "sort": _key(sort), "value": value}
-                scores.append(score | {"limits": "", "change": None})
-            yield {"scores": scores, "paper": None, "paper_change": None}
-
-
-def _key(value: float) -> object:
-    """What a cell is sorted by; nothing comes last."""
-    return "" if pd.isna(value) else value
+    scores = []
+    for style, (kind, end) in STYLES.items():
+        score = f"{start}{[*UNITS][place]}{end}"
+        sort = getattr(cell, score, 0.0)  # truth is the truth
+        ends = [getattr(cell, f"{score}_{which}", float("nan")) for which in ("low", "high")]
+        shown = {"value": value(kind), "change": value(f"{kind} change"), "limits": interval(*ends)}
+        scores.append({"style": style, "sort": "" if pd.isna(sort) else sort, **shown})
+    return {"scores": scores, "paper": value(PAPER), "paper_change": value("paper change")}
