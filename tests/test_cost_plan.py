@@ -156,7 +156,7 @@ def test_tables_add_up_to_the_run():
     assert alone.set_index("name").jobs.to_dict() == {t: len(keys) for t, keys in needed.items()}
     assert summed(costs, machine)["wall_mid"] == pytest.approx(len(jobs))
     # By itself a table needs the training runs of its own rows, and from the meshes on.
-    rows4 = [e for e in planned("smoke")[0].experiments if e.table == "table4_size"]
+    rows4 = planned("smoke")[0].design.rows_of("table4_size")
     keys = needed["table4_size"]
     trained = {name for stage, name in keys if stage == "train"}
     starts = [f"{e.scene}/{e.size}/{e.label_id}/{e.init}" for e in rows4]

@@ -22,8 +22,9 @@ from synfeal.evaluation.reprojection import (
     read_cell_depth,
     write_cell_depth,
 )
+from synfeal.frames import read_frame
 from synfeal.mesh.rays import RayCaster
-from synfeal.report.recall import COLUMNS, read_recall_table, recall_table, write_recall_table
+from synfeal.report.recall import COLUMNS, SCHEMA, recall_table, write_recall_table
 from tests.property_support import table_of
 
 CAMERA = CameraConfig(width=128, height=96, horizontal_fov_deg=60.0)
@@ -175,7 +176,7 @@ def test_a_run_is_scored_by_the_same_module_and_becomes_a_row(tmp_path):
     expected = np.median(dcre(predicted, table_of(truth), depth_m, CAMERA))
     assert metrics["dcre"] == metrics["dcre_true"] == pytest.approx(expected)
     write_recall_table(design, tmp_path, tmp_path / "recall.csv", tmp_path / "recall.tex")
-    table = read_recall_table(tmp_path / "recall.csv")
+    table = read_frame(tmp_path / "recall.csv", SCHEMA)
     assert len(table) == 5
     for column in COLUMNS:
         assert table[column].iloc[0] == pytest.approx(metrics[column], rel=1e-5)

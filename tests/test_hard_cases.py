@@ -59,7 +59,7 @@ def test_a_broken_function_is_not_ok(monkeypatch):
 )
 def test_an_error_is_that_of_the_doubles(answer, truth, error):
     trial = cases.Trial(lambda: answer, lambda: answer, truth)
-    assert cases.examine(trial).our_error == pytest.approx(error, rel=1e-3)
+    assert cases.examine(trial)["our_error"] == pytest.approx(error, rel=1e-3)
 
 
 def test_exact_rotations_agree_with_scipy_where_it_is_easy():

@@ -30,9 +30,7 @@ def effects(root: Path) -> pd.DataFrame:
     Columns ``COLUMNS``, one row per change (in the order of the tables), localizer, measure
     (``MEASURES``) and source (``HERE`` or ``PAPER``), where both errors are known.
     """
-    size = _table(root, "table4_size")
-    found = [*_of_size(size), *_of_labels(root), *_of_noise(root), *_of_start(root, size)]
-    return pd.concat(found, ignore_index=True)
+    return pd.concat(_changes(root), ignore_index=True)
 
 
 def mean_factor(found: pd.DataFrame, change: str, measure: str, source: str) -> float:
@@ -47,61 +45,35 @@ def sentences(root: Path) -> list[str]:
     return [*(_group_sentence(found) for _, found in groups), _claims_sentence(root)]
 
 
-def _of_size(size: pd.DataFrame) -> Iterator[pd.DataFrame]:
+def _changes(root: Path) -> Iterator[pd.DataFrame]:
+    """Every change, in the order in which it is told."""
+    size = _table(root, "table4_size")
     for scene, rows in size.groupby("scene", sort=False):
         first, last = rows["size"].iloc[[0, -1]]
         title = scene_title(str(scene))
-        yield _factors(
-            ("size", f"{last} frames, not {first}, {title}"),
-            f"From {first} to {last} frames of the {title}",
-            rows[rows["size"] == first],
-            rows[rows["size"] == last],
-        )
-
-
-def _of_labels(root: Path) -> Iterator[pd.DataFrame]:
+        name = ("size", f"{last} frames, not {first}, {title}")
+        spoken = f"From {first} to {last} frames of the {title}"
+        yield _factors(name, spoken, rows[rows["size"] == first], rows[rows["size"] == last])
     rows = _table(root, "table2_ground_truth")
-    exact = rows[rows.labels == "synfeal"]
     for source, title in (("sfm", "SfM"), ("rgbd-toro", "RGB-D SLAM")):
-        yield _factors(
-            ("labels", f"exact labels, not {title}'s"),
-            f"With exact labels in place of those of {title}",
-            rows[rows.labels == source],
-            exact,
-        )
-
-
-def _of_noise(root: Path) -> Iterator[pd.DataFrame]:
-    rows = _table(root, "table3_inconsistencies")
-    both = rows[rows.block == "both"]
-    clean, noisy = both[both.noise_m == 0], both[both.noise_m == both.noise_m.max()]
-    size = f"{both.noise_m.max():g} m and {both.noise_deg.max():g}°"
-    yield _factors(
-        ("noise", f"label noise of {size}, against the labels"),
-        f"With noise of {size} in the labels, measured against those labels as in the paper,",
-        clean,
-        noisy,
-        score="",
-    )
-    yield _factors(
-        ("noise", f"label noise of {size}, against the truth"),
-        "measured against the true poses",
-        clean,
-        noisy,
-    ).query("source == @HERE")
-
-
-def _of_start(root: Path, size: pd.DataFrame) -> Iterator[pd.DataFrame]:
+        name = ("labels", f"exact labels, not {title}'s")
+        spoken = f"With exact labels in place of those of {title}"
+        yield _factors(name, spoken, rows[rows.labels == source], rows[rows.labels == "synfeal"])
+    rows = _table(root, "table3_inconsistencies").query("block == 'both'")
+    clean, noisy = rows[rows.noise_m == 0], rows[rows.noise_m == rows.noise_m.max()]
+    noise = f"{rows.noise_m.max():g} m and {rows.noise_deg.max():g}°"
+    spoken = f"With noise of {noise} in the labels, measured against those labels as in the paper,"
+    name = ("noise", f"label noise of {noise}, against the labels")
+    yield _factors(name, spoken, clean, noisy, score="")
+    name = ("noise", f"label noise of {noise}, against the truth")
+    found = _factors(name, "measured against the true poses", clean, noisy)
+    yield found.query("source == @HERE")
     scratch = _table(root, "table5_from_scratch")
-    for name in scratch["size"].iloc[[0, -1]]:
-        rows = scratch[scratch["size"] == name]
-        pretrained = size[(size["size"] == name) & size.scene.isin(rows.scene)]
-        yield _factors(
-            ("start", f"from scratch, {name} frames"),
-            f"Without pretrained weights and with {name} frames",
-            pretrained,
-            rows,
-        )
+    for last in scratch["size"].iloc[[0, -1]]:
+        rows = scratch[scratch["size"] == last]
+        pretrained = size[(size["size"] == last) & size.scene.isin(rows.scene)]
+        spoken = f"Without pretrained weights and with {last} frames"
+        yield _factors(("start", f"from scratch, {last} frames"), spoken, pretrained, rows)
 
 
 def _factors(

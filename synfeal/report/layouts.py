@@ -135,12 +135,15 @@ def printed_values(name: str, cells: pd.DataFrame) -> pd.DataFrame:
         ``place`` (0 position, 1 orientation), ``text``, ``tone``, ``note`` and ``bold``: whether it
         is the lowest of its kind, column and block, as printed.
     """
-    parts = []
+    parts, first = [], cells.groupby("row", sort=False).head(1)
     for place, (measure, unit) in enumerate(UNITS.items()):
         for kind, end in KIND_OF.items():
             score = f"{measure}{end}"
             parts.append(_scores(cells, kind, place, score, unit))
-            parts += _references(cells, kind, place, score, unit)
+            for start, column in REFERENCES.items():  # the same for every localizer of a row
+                if f"{start}_{score}" in first:
+                    texts = [_plain(value, unit) for value in first[f"{start}_{score}"]]
+                    parts.append(_part(first, kind, place, texts, column=column))
             if name == FROM_SCRATCH:
                 parts.append(_changes(cells, f"{kind} change", place, CHANGES[score]))
         parts.append(_published(cells, place, measure, unit))
@@ -178,18 +181,6 @@ def _scores(cells: pd.DataFrame, kind: str, place: int, score: str, unit: str) -
     return _part(
         cells, kind, place, texts, number=cells[score].map(partial(round, ndigits=2)), note=notes
     )
-
-
-def _references(
-    cells: pd.DataFrame, kind: str, place: int, score: str, unit: str
-) -> list[pd.DataFrame]:
-    """What has not been trained, the same for every localizer of a row."""
-    first = cells.groupby("row", sort=False).head(1)
-    return [
-        _part(first, kind, place, [_plain(v, unit) for v in first[f"{name}_{score}"]], column=title)
-        for name, title in REFERENCES.items()
-        if f"{name}_{score}" in cells
-    ]
 
 
 def _published(cells: pd.DataFrame, place: int, measure: str, unit: str) -> pd.DataFrame:

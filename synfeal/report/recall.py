@@ -15,7 +15,7 @@ from pydantic import FiniteFloat
 from synfeal.config import MODELS, Design, Run
 from synfeal.evaluation.metrics import BOUNDS, MEANS, POSITION
 from synfeal.evaluation.reprojection import DCRE_BOUNDS
-from synfeal.frames import COUNT, MAYBE, TEXT, frame_of, read_frame, write_frame
+from synfeal.frames import COUNT, MAYBE, TEXT, frame_of, write_frame
 from synfeal.report.layouts import TITLES, scene_title
 from synfeal.report.results import read_result, shaped
 from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
@@ -78,11 +78,6 @@ def _read(path: Path) -> dict[str, float | None]:
     found = {column: metrics[column] for column in COLUMNS if column in metrics}
     scores: dict[str, float | None] = shaped(path, found, dict[str, FiniteFloat | None], REMEDY)
     return scores
-
-
-def read_recall_table(path: Path) -> pd.DataFrame:
-    """What :func:`write_recall_table` wrote."""
-    return read_frame(path, SCHEMA)
 
 
 def recall_sheet(design: Design, table: pd.DataFrame) -> Sheet:

@@ -101,7 +101,6 @@ def _seconds(folder: Path) -> dict[str, float]:
 
 
 def _record(folders: Sequence[Path]) -> dict[str, Any]:
-    """Scores of the repetitions of a method, by column."""
     scores = combine([read_metrics(folder / "metrics.json") for folder in folders])
     return scores | dict(zip(WITHIN, _within(folders), strict=True))
 
@@ -169,7 +168,6 @@ def _best(trained: pd.DataFrame, end: str) -> str:
 
 
 def _shown(row: pd.Series, end: str) -> str:
-    """Errors and share of a method."""
     position_m, orientation_deg = row[f"position_m{end}"], row[f"orientation_deg{end}"]
     if pd.isna(position_m):
         return "failed"

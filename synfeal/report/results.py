@@ -15,11 +15,7 @@ from synfeal.files import read_json
 
 
 def read_text(path: Path) -> str:
-    """The text of a result file.
-
-    Raises:
-        InputError: it is missing or cannot be read.
-    """
+    """The text of a result file."""
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -29,17 +25,11 @@ def read_text(path: Path) -> str:
 
 
 def read_result(path: Path, needed: Iterable[str], remedy: str, shape: Any = None) -> Any:
-    """A mapping from a result file.
-
-    Args:
-        path: the file.
-        needed: keys it must have.
-        remedy: what to do when it cannot be used, e.g. ``score that run again``.
-        shape: a model, or type, of the mapping; then that is returned.
+    """A mapping from a result file, or the model or type ``shape`` of it.
 
     Raises:
-        InputError: the file is missing, is not JSON, is no mapping, or lacks a key; or the first
-            key that is missing or of another type than the shape says.
+        InputError: the file is missing, is not JSON, is no mapping, lacks a key of ``needed`` or
+            of the shape, or one is of another type; ``remedy`` says what to do.
     """
     try:
         value = read_json(path)

@@ -22,6 +22,7 @@ LINE = ("block", "row", "kind", "label", "label_note", "against")
 # Columns of values: `line` counts the lines, `column` is a heading, `place` an order in the cell.
 VALUE = ("line", "column", "place", "text", "bold", "tone", "note")
 PAPER = "paper"
+PLAIN, MARKDOWN = "plain", "pipe"  # tables of text for a terminal, for a page
 
 
 @dataclass(frozen=True)
@@ -140,6 +141,14 @@ def markdown_table(table: pd.DataFrame) -> str:
     """A frame of texts as Markdown, its cells as wide as what they hold."""
     padded = table.to_markdown(index=False, disable_numparse=True)
     return re.sub(r":?-{3,}:?", "---", re.sub(r" {2,}(?=\|)", " ", padded))
+
+
+def text_table(rows: Sequence[Sequence[str]], n_left: int = 1, form: str = PLAIN) -> str:
+    """Rows, the first of them the headings; columns are right-aligned but the first ``n_left``."""
+    sides = ["left" if i < n_left else "right" for i in range(len(rows[0]))]
+    frame = pd.DataFrame(rows[1:], columns=list(rows[0]))
+    text = frame.to_markdown(index=False, tablefmt=form, disable_numparse=True, colalign=sides)
+    return "".join(f"{line.rstrip()}\n" for line in text.splitlines())
 
 
 def _table(sheet: Sheet, form: _Format, marks: Mapping[str, str]) -> pd.DataFrame:

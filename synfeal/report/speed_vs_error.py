@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -53,29 +52,24 @@ def training_rows(root: Path, scene: str) -> pd.DataFrame:
     cells = read_frame(path, CELL) if path.exists() else frame_of((), CELL)
     cells = cells[cells.scene == scene]
     cells = cells[cells.n_train == cells.n_train.max()].dropna(subset="position_m_true")
-    runs = [_runs(cell) for cell in rows_of(cells)]
+    runs = [
+        [f"{c.scene}/{c.size}/{KIND}/{c.model}/seed{k}" for k in range(c.n_seeds)]
+        for c in rows_of(cells)
+    ]
     seconds = _processor_seconds(root, [name for names in runs for name in names])
     return pd.DataFrame(
         {
             "variant": cells.model.map(TITLES),
-            "seconds_per_item": [_seconds_per_image(root, names, seconds) for names in runs],
+            "seconds_per_item": [
+                sum(seconds[name] for name in names)
+                / sum(_images_shown(root / "runs" / name / "history.csv") for name in names)
+                for names in runs
+            ],
             "error": cells.position_m_true,
             "error_unit": "m",
             "chosen": 0,
         }
     )
-
-
-def _seconds_per_image(root: Path, runs: Sequence[str], seconds: dict[str, float]) -> float:
-    """Processor seconds over images shown, of all repetitions of a cell."""
-    images = sum(_images_shown(root / "runs" / name / "history.csv") for name in runs)
-    return sum(seconds[name] for name in runs) / images
-
-
-def _runs(cell: Any) -> list[str]:
-    """Directories of a cell's training runs, below ``runs``."""
-    stem = f"{cell.scene}/{cell.size}/{KIND}/{cell.model}"
-    return [f"{stem}/seed{repetition}" for repetition in range(cell.n_seeds)]
 
 
 def _processor_seconds(root: Path, runs: Sequence[str]) -> dict[str, float]:
@@ -120,8 +114,10 @@ def speeds_of(stage: str, scenes: Sequence[str], root: Path) -> pd.DataFrame:
     """The rows of a stage, columns ``SCHEMA``; an item is what the stage makes one of."""
     parts = [READERS[stage](root, scene).assign(scene=scene) for scene in scenes]
     rows = [row for part in parts for row in records_of(part)]
-    speeds = [{"stage": stage, "items_per_s": 1.0 / row["seconds_per_item"]} for row in rows]
-    return frame_of([speed | row for speed, row in zip(speeds, rows, strict=True)], SCHEMA)
+    same = {"stage": stage}
+    return frame_of(
+        [same | row | {"items_per_s": 1.0 / row["seconds_per_item"]} for row in rows], SCHEMA
+    )
 
 
 def collision_rows(root: Path, scene: str) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""From the scores of single runs to the numbers of one table cell."""
+"""Scores and errors of single runs, and from scores to the numbers of one table cell."""
 
 from __future__ import annotations
 
@@ -8,12 +8,17 @@ from pathlib import Path
 from statistics import fmean, stdev
 from typing import Annotated, Any
 
+import pandas as pd
 from pydantic import Field, FiniteFloat, NonNegativeInt
 from scipy.stats import binomtest, kendalltau
 
+from synfeal.dataset.number_table import read_numbers
 from synfeal.report.results import read_result, shaped
 
 MEASURES = ("position_m", "orientation_deg", "position_m_true", "orientation_deg_true")
+# Columns of ``errors.csv`` and ``common_errors.csv``.
+COLUMNS = ("frame", *MEASURES)
+COMMON_COLUMNS = COLUMNS[:3]
 COUNTS = ("n_train", "n_test", "failed")
 BASELINES = tuple(f"baseline_{measure}" for measure in MEASURES)
 FLOORS = tuple(f"floor_{measure}" for measure in MEASURES[:2])
@@ -32,6 +37,12 @@ def read_metrics(path: Path) -> Metrics:
     shaped(path, {name: values[name] for name in COUNTS}, dict[str, NonNegativeInt], REMEDY)
     shaped(path, {name: values[name] for name in scores}, dict[str, Score | None], REMEDY)
     return dict(values)
+
+
+def read_errors(path: Path, columns: Sequence[str] = COLUMNS) -> pd.DataFrame:
+    """Errors of one run, a row per test frame; not finite where a prediction failed."""
+    values = read_numbers(path, ",".join(columns), "table of errors", finite=False)
+    return pd.DataFrame(values, columns=list(columns))
 
 
 def combine(runs: Sequence[Metrics]) -> dict[str, float | None]:

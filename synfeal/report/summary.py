@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from synfeal.config import Design
-from synfeal.frames import rows_of
+from synfeal.frames import read_frame, rows_of
+from synfeal.report import recall, references, robustness
 from synfeal.report.cells import read_cells
 from synfeal.report.crossing import crossing_findings
 from synfeal.report.latex import write_text
 from synfeal.report.layouts import TITLES, scene_title, sheet_of
 from synfeal.report.meshes import meshes_sheet, read_meshes
-from synfeal.report.recall import NAME as RECALL
-from synfeal.report.recall import read_recall_table, recall_sheet
-from synfeal.report.references import NAME as REFERENCES
-from synfeal.report.references import read_references, references_sheet
-from synfeal.report.robustness import NAME as ROBUSTNESS
-from synfeal.report.robustness import read_robustness, robustness_sheet
-from synfeal.report.sheet import sheet_markdown
+from synfeal.report.sheet import Sheet, sheet_markdown
 
+# Tables that a run may lack, and how they are printed.
+SHEETS: dict[Any, Callable[[Design, pd.DataFrame], Sheet]] = {
+    references: lambda _, table: references.references_sheet(table),
+    recall: recall.recall_sheet,
+    robustness: lambda _, table: robustness.robustness_sheet(table),
+}
 ALIVE = "table4_size"
 INTRO = """\
 # Results of profile `{profile}`
@@ -38,18 +40,13 @@ def write_summary(design: Design, root: Path, out_md: Path, out_txt: Path) -> No
     cells = {name: read_cells(name, design, root) for name in design.tables}
     findings = run_sentences(cells)
     meshes = read_meshes([*dict.fromkeys(row.scene for row in design.rows)], root)
-    references = root / "tables" / f"{REFERENCES}.csv"
     sheets = [meshes_sheet(meshes), *(sheet_of(name, found) for name, found in cells.items())]
-    if references.exists():
-        table = read_references(references)
-        findings += crossing_findings(table)
-        sheets.append(references_sheet(table))
-    recalls = root / "tables" / f"{RECALL}.csv"
-    if recalls.exists():
-        sheets.append(recall_sheet(design, read_recall_table(recalls)))
-    robust = root / "tables" / f"{ROBUSTNESS}.csv"
-    if robust.exists():
-        sheets.append(robustness_sheet(read_robustness(robust)))
+    for module, sheet in SHEETS.items():
+        path = root / "tables" / f"{module.NAME}.csv"
+        if path.exists():
+            table = read_frame(path, module.SCHEMA)
+            findings += crossing_findings(table) if module is references else []
+            sheets.append(sheet(design, table))
     parts = [
         INTRO.format(profile=root.name),
         "## Do the localizers localize?\n",

@@ -35,15 +35,20 @@ from synfeal.evaluation.metrics import pose_errors
 from synfeal.labels.constant import constant_pose
 from synfeal.report.claims.model import Missing
 from synfeal.report.layouts import TITLES
-from synfeal.report.run_errors import COLUMNS, COMMON_COLUMNS, read_errors
-from synfeal.report.stats import MEASURES
+from synfeal.report.stats import COLUMNS, COMMON_COLUMNS, MEASURES, read_errors
 from synfeal.seeds import generator_of
 
 # A localizer has learnt where its whole interval lies below this share of the mean pose's error.
 LEARNT = 0.75
 # Errors of a cell are two samples (2, 1 + RESAMPLES) of medians: metres and degrees.
 QUANTITIES = ("position", "orientation")
-OWN_ERRORS, COMMON_ERRORS = "errors.csv", "common_errors.csv"
+# File, its columns and the two errors of each score; on the common test set both are against truth.
+COMMON = "common"
+SCORES = {
+    "labels": ("errors.csv", COLUMNS, MEASURES[:2]),
+    "true": ("errors.csv", COLUMNS, MEASURES[2:]),
+    COMMON: ("common_errors.csv", COMMON_COLUMNS, MEASURES[:2]),
+}
 
 
 class Cell(NamedTuple):
@@ -67,31 +72,25 @@ class TestSet(NamedTuple):
 
 @dataclass(frozen=True)
 class Evidence:
-    """A results directory, read under one of the two scores."""
+    """A results directory, read under one score."""
 
     root: Path  # results directory of the profile
     runs: Mapping[Cell, Sequence[Run]]  # by cell of the profile, its runs
     # Scene, size and labels of its re-estimated label sets.
     estimated: Sequence[tuple[str, str, str]] = ()
-    end: str = ""  # ``""`` for errors against the labels, ``"_true"`` against the true poses
-    # Whether errors are those on the common test set; they are against the true poses.
-    common: bool = False
+    score: str = "labels"  # of ``SCORES``
     used: dict[str, None] = field(default_factory=dict)  # files read so far, relative to ``root``
     # By test set, how many paths it has.
     test_paths: dict[tuple[str, str, bool], int] = field(default_factory=dict)
     _errors: dict[tuple[Cell, str], Array] = field(default_factory=dict)
     _tests: dict[tuple[str, str, bool], TestSet] = field(default_factory=dict)
 
-    def under(self, end: str, common: bool = False) -> Evidence:
-        """The same results under a score and on a test set, with nothing read yet."""
-        return replace(self, end=end, common=common, used={}, test_paths={})
+    def under(self, score: str) -> Evidence:
+        """The same results under a score, with nothing read yet."""
+        return replace(self, score=score, used={}, test_paths={})
 
     def file(self, relative: str) -> Path:
-        """A result file that the design makes, noted as used.
-
-        Raises:
-            InputError: there is no such file.
-        """
+        """A result file that the design makes, noted as used."""
         path = self.root / relative
         if not path.is_file():
             raise InputError(f"{path}: missing; make the results again")
@@ -99,20 +98,12 @@ class Evidence:
         return path
 
     def need(self, **keys: str) -> None:
-        """Make sure that the profile has cells with some values.
-
-        Raises:
-            Missing: it has none.
-        """
+        """Make sure that the profile has cells with some values."""
         if not any(all(getattr(c, k) == v for k, v in keys.items()) for c in self.runs):
             raise Missing(f"this profile has no row {' '.join(keys.values())}")
 
     def runs_of(self, cell: Cell) -> Sequence[Run]:
-        """The repetitions of a cell.
-
-        Raises:
-            Missing: the profile does not run it.
-        """
+        """The repetitions of a cell."""
         if cell not in self.runs:
             raise Missing(f"this profile has no row {_name(cell)}")
         return self.runs[cell]
@@ -122,19 +113,15 @@ class Evidence:
 
         Draws of the seeds are shared by the cells that differ in their labels alone: with one
         number their runs drew the same random numbers.
-
-        Raises:
-            Missing: the profile does not run a cell.
-            InputError: a file is missing, cannot be read, or is about other frames.
         """
         return np.array([self._errors_of(cell) for cell in cells])
 
     def _errors_of(self, cell: Cell) -> Array:
         runs = self.runs_of(cell)
         test = self.test_set(cell.scene, cell.size)
-        name = COMMON_ERRORS if self.common else OWN_ERRORS
+        name = SCORES[self.score][0]
         files = [self.file(f"runs/{run.directory}/{name}") for run in runs]
-        key = cell, COMMON_ERRORS if self.common else self.end
+        key = cell, self.score
         if key not in self._errors:
             draw = generator_of("claims", "seeds", cell._replace(labels=""), len(runs))
             weights = seed_weights(len(runs), draw)
@@ -145,25 +132,25 @@ class Evidence:
 
     def _medians(self, path: Path, test: TestSet) -> list[Array]:
         """Samples of both medians of one run's errors on the frames of a test set."""
-        end = "" if self.common else self.end
-        table = read_errors(path, COMMON_COLUMNS if self.common else COLUMNS)
+        _, columns, measures = SCORES[self.score]
+        table = read_errors(path, columns)
         if not np.array_equal(table["frame"], test.poses.frame):
             raise InputError(
                 f"{path}: its frames are not those of the test set; score that run again"
             )
-        errors = [table[f"{measure}{end}"].to_numpy() for measure in MEASURES[:2]]
-        return [medians(values, test.path, test.counts) for values in errors]
+        return [medians(table[m].to_numpy(), test.path, test.counts) for m in measures]
 
     def test_set(self, scene: str, size: str) -> TestSet:
         """A test set, and the errors on it of always answering the mean true training pose."""
         train = self.file(f"labels/{scene}/{size}/synfeal/train.csv")
-        sizes = {cell.size for cell in self.runs if cell.scene == scene} if self.common else {size}
+        common = self.score == COMMON
+        sizes = {cell.size for cell in self.runs if cell.scene == scene} if common else {size}
         paths = [self.file(f"labels/{scene}/{one}/synfeal/test.csv") for one in sorted(sizes)]
-        key = scene, size, self.common
+        key = scene, size, common
         if key not in self._tests:
             poses = _thinned([read_pose_table(path) for path in paths])
             straight, place = np.unique(poses.path, return_inverse=True)
-            draw = ("common", scene) if self.common else (scene, size)
+            draw = (COMMON, scene) if common else (scene, size)
             counts = path_counts(len(straight), generator_of("claims", *draw))
             errors = pose_errors(constant_pose(read_pose_table(train), poses), poses)
             constant = np.array([medians(errors[m], place, counts) for m in MEASURES[:2]])
@@ -172,12 +159,7 @@ class Evidence:
         return self._tests[key]
 
     def not_learnt(self, cells: Iterable[Cell]) -> list[str]:
-        """Which cells, trained on true labels, are not clearly better than the mean pose, and how.
-
-        Raises:
-            Missing: the profile does not run a cell.
-            InputError: a file is missing or cannot be read.
-        """
+        """Which cells, trained on true labels, are not clearly better than the mean pose."""
         found = []
         for cell in cells:
             constant = self.test_set(cell.scene, cell.size).constant
@@ -193,12 +175,7 @@ class Evidence:
 
 
 def evidence_of(design: Design, root: Path) -> Evidence:
-    """The results of a profile.
-
-    Args:
-        design: of the profile.
-        root: its results directory.
-    """
+    """The results of a profile."""
     runs: dict[Cell, list[Run]] = {}
     for run in design.runs:
         cell = Cell(run.model, run.scene, run.size, run.labels, run.init)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from synfeal.bootstrap import FEWEST_PATHS
 from synfeal.config import MODELS
 from synfeal.report.claims import labels, simulator, training
-from synfeal.report.claims.evidence import Cell, Evidence
+from synfeal.report.claims.evidence import COMMON, Cell, Evidence
 from synfeal.report.claims.model import (
     DECIDED,
     NOT_LEARNT,
@@ -68,8 +68,8 @@ ON_OWN_TEST_SET = {"labels": ("C1", "C2", "C3", "C5", "C6", "C15"), "true": ("C1
 def views(claim: Claim, evidence: Evidence) -> dict[str, Evidence]:
     """The results that a claim is judged on, by score: on the common test set where it can be."""
     return {
-        score: evidence.under(end, common=claim.id not in ON_OWN_TEST_SET[score])
-        for score, end in (("labels", ""), ("true", "_true"))
+        score: evidence.under(score if claim.id in own else COMMON)
+        for score, own in ON_OWN_TEST_SET.items()
     }
 
 

@@ -26,13 +26,7 @@ Row = Mapping[str, str]
 
 
 def write_claims(design: Design, root: Path, out_csv: Path) -> None:
-    """Write one row per claim of the paper.
-
-    Args:
-        design: of the profile.
-        root: results directory of the profile.
-        out_csv: the table, columns :data:`COLUMNS`.
-    """
+    """Write one row per claim of the paper, columns :data:`COLUMNS`."""
     write_frame(out_csv, pd.DataFrame(claim_rows(evidence_of(design, root)), columns=list(COLUMNS)))
 
 

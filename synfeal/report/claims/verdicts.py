@@ -38,21 +38,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from synfeal.bootstrap import Array, limits
-from synfeal.report.claims.model import (
-    HOLDS,
-    LESS,
-    MIXED,
-    NO_EFFECT,
-    OPPOSITE,
-    SMALLER,
-    UNDECIDED,
-    Verdict,
-)
+from synfeal.report.claims import model
+from synfeal.report.claims.model import Verdict
 
 # Percent. The paper prints 0.01 m, which is 5 % of its median cell, 0.20 m: it resolves no less.
 SMALLEST = 5.0
 ENOUGH = 2 / 3
-REFUTED = (SMALLER, NO_EFFECT, LESS, OPPOSITE)
+REFUTED = (model.SMALLER, model.NO_EFFECT, model.LESS, model.OPPOSITE)
 
 
 class Condition(NamedTuple):
@@ -70,14 +62,14 @@ def verdict_of(condition: Condition, comparisons: int = 1) -> Verdict:
     smallest = condition.smallest
     enough = max(ENOUGH * abs(condition.published), smallest)
     if low >= enough and low > 0:
-        return HOLDS
+        return model.HOLDS
     if high <= -smallest and high < 0:
-        return OPPOSITE
+        return model.OPPOSITE
     if -smallest <= low and high <= smallest:
-        return NO_EFFECT
+        return model.NO_EFFECT
     if smallest <= low and high <= enough:
-        return SMALLER
-    return LESS if condition.published and high <= enough else UNDECIDED
+        return model.SMALLER
+    return model.LESS if condition.published and high <= enough else model.UNDECIDED
 
 
 def all_of(conditions: Sequence[Condition], each: Sequence[Condition] = ()) -> tuple[Verdict, str]:
@@ -92,9 +84,9 @@ def all_of(conditions: Sequence[Condition], each: Sequence[Condition] = ()) -> t
     single = [verdict_of(condition, len(each)) for condition in each]
     refuted = {part for part in (*corrected, *single) if part in REFUTED}
     if refuted:
-        verdict = MIXED if HOLDS in (*parts, *single) else _together(refuted)
+        verdict = model.MIXED if model.HOLDS in (*parts, *single) else _together(refuted)
     else:
-        verdict = HOLDS if all(part == HOLDS for part in parts) else UNDECIDED
+        verdict = model.HOLDS if all(part == model.HOLDS for part in parts) else model.UNDECIDED
     return verdict, _parts_text(conditions, parts) + _singles_text(each, single)
 
 
@@ -102,13 +94,13 @@ def _together(refuted: set[Verdict]) -> Verdict:
     """One verdict for conditions that are refuted, each in its way."""
     if len(refuted) == 1:
         return next(iter(refuted))
-    return LESS if LESS in refuted and OPPOSITE not in refuted else MIXED
+    return model.LESS if model.LESS in refuted and model.OPPOSITE not in refuted else model.MIXED
 
 
 def at_least(sample: Array, number: float) -> Verdict:
     """Holds: interval starts at ``number`` or above. Opposite: it ends below it."""
     low, high = limits(sample)
-    return HOLDS if low >= number else OPPOSITE if high < number else UNDECIDED
+    return model.HOLDS if low >= number else model.OPPOSITE if high < number else model.UNDECIDED
 
 
 def _parts_text(conditions: Sequence[Condition], parts: Sequence[Verdict]) -> str:

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from synfeal.dataset.number_table import read_numbers
 from synfeal.dataset.pose_table import HEADER, whole_numbers
 from synfeal.errors import InputError
-from synfeal.report.run_errors import read_errors
-from synfeal.report.stats import MEASURES, REMEDY, read_metrics
+from synfeal.report.stats import MEASURES, REMEDY, read_errors, read_metrics
 
 # What a run is, apart from its seed: the directories below ``runs``, in order.
 KEY = ("scene", "size", "labels", "init", "model")

@@ -7,15 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
-from synfeal.report.compare.runs import KEY, RunErrors, find_runs, read_run
+from synfeal.report.compare.runs import KEY, find_runs, read_run
 from synfeal.report.compare.stats import compare_errors
 from synfeal.report.results import read_result
 from synfeal.report.stats import MEASURES
@@ -95,7 +94,8 @@ def _compare_run(
     a, b = read_run(seeds_a), read_run(seeds_b)
     scene, size, labels, *_ = key
     plans, carried = f"plans/{scene}/test.csv", f"labels/{scene}/{size}/{labels}/test.csv"
-    frames: Sameness = sameness(plans, len(a.frame)) if _same_views(a, b) else "differ"
+    views = np.array_equal(a.frame, b.frame) and np.array_equal(a.path, b.path)
+    frames: Sameness = sameness(plans, len(a.frame)) if views else "differ"
     alike = len(a.frame) == len(b.frame)
     counts = {f"{name}_a": count for name, count in a.counts().items()}
     counts |= {f"{name}_b": count for name, count in b.counts().items()}
@@ -107,45 +107,26 @@ def _compare_run(
     )
 
 
-def _same_views(a: RunErrors, b: RunErrors) -> bool:
-    return np.array_equal(a.frame, b.frame) and np.array_equal(a.path, b.path)
-
-
 def _sameness(a: PoseTable | None, b: PoseTable | None, count: int) -> Sameness:
     """Whether the first ``count`` poses of two tables are the same."""
     if a is None or b is None:
         return "unknown"
     if min(len(a), len(b)) < count:
         return "differ"
-    a_rows, b_rows = (_rows(table.first(count)) for table in (a, b))
+    a_rows, b_rows = (
+        np.column_stack([t.frame, t.path, t.position_m, t.quat_wxyz])[:count] for t in (a, b)
+    )
     return "same" if np.allclose(a_rows, b_rows, rtol=0, atol=TOLERANCE) else "differ"
-
-
-def _rows(table: PoseTable) -> NDArray[np.float64]:
-    """A table as it stands in its file (N, 9)."""
-    return np.column_stack([table.frame, table.path, table.position_m, table.quat_wxyz])
 
 
 def _changes(path_a: Path, path_b: Path) -> pd.DataFrame | None:
     if not (path_a.exists() and path_b.exists()):
         return None
-    causes = {tree: _causes(path) for tree, path in (("a", path_a), ("b", path_b))}
+    causes = {}
+    for tree, path in (("a", path_a), ("b", path_b)):
+        record = read_result(path, (), "delete it or run again")
+        cause = {key: value for key, value in record.items() if key not in OUTCOMES}
+        leaves = pd.json_normalize(cause).to_dict("records")[0]
+        causes[tree] = {key: json.dumps(value) for key, value in leaves.items()}
     table = pd.DataFrame(causes, dtype=object).sort_index()
     return table[table["a"].ne(table["b"])].rename_axis("key").reset_index()
-
-
-def _causes(path: Path) -> dict[str, str]:
-    """What a run was made from, without what came out of it: JSON by dotted key."""
-    record = read_result(path, (), "delete it or run again")
-    return _flat({key: value for key, value in record.items() if key not in OUTCOMES})
-
-
-def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, str]:
-    """Leaves of nested mappings as JSON, by their dotted keys."""
-    flat: dict[str, str] = {}
-    for key, value in values.items():
-        if isinstance(value, dict):
-            flat |= _flat(value, f"{prefix}{key}.")
-        else:
-            flat[f"{prefix}{key}"] = json.dumps(value)
-    return flat

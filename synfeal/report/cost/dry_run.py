@@ -54,21 +54,24 @@ def key_of(benchmark: str | None) -> Key | None:
 
 
 def _needed(records: list[dict[str, Any]]) -> dict[str, frozenset[Key]]:
-    makers = {path: record for record in records for path in record["output"]}
-    tables = [r for r in records if r["rule"] in ("table1_meshes", "table")]
-    needed = {}
-    for table in sorted(tables, key=lambda record: str(record["benchmark"])):
-        seen: dict[str, dict[str, Any]] = {}
-        waiting = [table]
-        while waiting:
-            record = waiting.pop()
-            if record["output"][0] not in seen:
-                seen[record["output"][0]] = record
-                waiting += [makers[path] for path in record["input"] if path in makers]
-        keys = (key_of(record["benchmark"]) for record in seen.values())
-        name = key_of(table["benchmark"])
-        needed[name[1] if name else ""] = frozenset(filter(None, keys))
-    return needed
+    """By table, the jobs that it comes from and its own."""
+    makers = {path: place for place, record in enumerate(records) for path in record["output"]}
+    keys = [key_of(record["benchmark"]) for record in records]
+
+    def with_makers(place: int, found: set[int]) -> set[int]:
+        if place not in found:
+            found.add(place)
+            for path in records[place]["input"]:
+                if path in makers:
+                    with_makers(makers[path], found)
+        return found
+
+    needed = {
+        key[1]: frozenset(filter(None, (keys[job] for job in with_makers(place, set()))))
+        for place, key in enumerate(keys)
+        if key and records[place]["rule"] in ("table1_meshes", "table")
+    }
+    return dict(sorted(needed.items()))
 
 
 def _dry_run(profile: Path, results: Path, out: Path) -> None:

@@ -132,10 +132,12 @@ def _of_frames(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
     config, frames = profile.config, _frames(profile, part, kind)
     with_depth = kind.unit == "Mpx" or part.get("camera") == "groundtruth"
     camera = config.groundtruth_camera if with_depth else config.network_camera
-    pixels = frames * camera.width * camera.height
+    pixels, read = frames * camera.width * camera.height, frames
+    if part.get("labels") == "synfeal" and "split" in part:  # the first of the whole plan
+        read = config.n_largest(part["scene"], part["split"])
     sizes = {
         "frames": float(frames),
-        "rows": float(frames + _read_rows(config, part, frames)),
+        "rows": float(frames + read),
         "Mpx": pixels / 1e6,
         "Msamples": pixels * config.render.supersampling**2 / 1e6,
         "MB": 3 * frames * config.network.input_px**2 / 1e6,
@@ -175,13 +177,6 @@ def _frames(profile: Profile, part: Part, kind: Stage) -> int:
     return sum(counts)
 
 
-def _read_rows(config: Config, part: Part, frames: int) -> int:
-    """Rows read for a set of labels: true ones are the first of the whole plan."""
-    if part.get("labels") != "synfeal" or "split" not in part:
-        return frames
-    return config.n_largest(part["scene"], part["split"])
-
-
 def _scene(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
     """A prepared scene takes as much as the user's mesh, or as a procedural one."""
     path = profile.config.scenes[part["scene"]].path
@@ -198,7 +193,9 @@ def _pretrain(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
 
 
 def _train(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
-    config, size = profile.config, part["size"]
+    config = profile.config
+    part = {"scene": config.robustness.scene, "size": config.robustness.size, **part}
+    size = part["size"]
     train, test = (config.n_frames(part["scene"], size, split) for split in ("train", "test"))
     hyper = config.localizers[part["model"]]  # type: ignore[index]
     work = training_work(part["model"], config.network, hyper)
@@ -247,25 +244,16 @@ def _varied_tests(profile: Profile, part: Part, kind: Stage) -> dict[str, float]
     return {"size": frames, "disk_bytes": kind.disk * frames}
 
 
-def _train_varied(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
-    robust = profile.config.robustness
-    return _train(profile, {**part, "scene": robust.scene, "size": robust.size}, kind)
-
-
-def _claims(profile: Profile, _: Part, __: Stage) -> dict[str, float]:
-    frames = [profile.config.n_frames(r.scene, r.size, "test") for r in profile.design.runs]
-    return {"size": sum(frames)}
-
-
 OWN_SIZES: dict[str, Callable[[Profile, Part, Stage], dict[str, float]]] = {
     "scene": _scene,
     "pretrain": _pretrain,
-    "train": _train,
+    **dict.fromkeys(("train", "train_varied"), _train),
     "features": _features,
     "coordinate_references": _coordinates,
     **dict.fromkeys(("render_varied", "pack_varied"), _varied),
-    "train_varied": _train_varied,
     **dict.fromkeys(("varied_descriptors", "varied_structure"), _varied_tests),
     "render_speed": lambda profile, *_: {"size": profile.config.render_speed.sizes},
-    "claims": _claims,
+    "claims": lambda profile, *_: {
+        "size": sum(profile.config.n_frames(r.scene, r.size, "test") for r in profile.design.runs)
+    },
 }

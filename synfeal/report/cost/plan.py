@@ -59,11 +59,8 @@ def plan_of(
 ) -> list[Plan]:
     """What a run of a profile costs on each machine, stage by stage and table by table.
 
-    Args:
-        profile_name: a profile of ``config/``, or the path of its file.
-        measured: results of runs that the prediction is made from.
-        machines: what it is planned for.
-        time_steps: time some training steps here, on the GPU if there is one, and use these.
+    It is predicted from the results of ``measured`` runs, and with ``time_steps`` from some
+    training steps that are timed here, on the GPU if there is one.
     """
     profile = read_profile(profile_name)
     pairs, unknown = read_runs(measured)

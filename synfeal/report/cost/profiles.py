@@ -31,8 +31,8 @@ def read_profile(name: str) -> Profile:
 
 
 def is_default(path: Path) -> bool:
-    """Whether it is the file that all others go over."""
-    return os.path.realpath(path) == os.path.realpath(DEFAULT)  # of links in a circle, too
+    """Whether it is the file that all others go over; links may form a circle."""
+    return os.path.realpath(path) == os.path.realpath(DEFAULT)
 
 
 def profile_path(name: str) -> Path:

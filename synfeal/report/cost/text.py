@@ -7,9 +7,9 @@ from typing import Any
 
 import pandas as pd
 
-from synfeal.report.aligned import text_table
 from synfeal.report.cost.estimate import ALONE, LAUNCH_S, OWN, RUN, STAGE
 from synfeal.report.cost.plan import Comparisons, Plan
+from synfeal.report.sheet import text_table
 
 # The largest unit of which there are at least so many.
 DURATIONS = ((48 * 3600.0, 86400.0, "d"), (5400.0, 3600.0, "h"), (90.0, 60.0, "min"), (0, 1.0, "s"))

@@ -15,7 +15,7 @@ from synfeal.evaluation.metrics import cumulative, joint_error
 from synfeal.report.figures.sources import Array, Results, counted
 from synfeal.report.figures.style import MODEL_STYLES, add_legend, set_log
 from synfeal.report.layouts import TITLES, scene_title
-from synfeal.report.run_errors import read_errors
+from synfeal.report.stats import read_errors
 
 MEASURES = {
     "position_m_true": "position error against the true poses (m)",

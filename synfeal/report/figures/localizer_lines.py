@@ -27,13 +27,9 @@ ASIDE = dict(zip(MODELS, np.linspace(-0.16, 0.16, len(MODELS)), strict=True))
 
 
 def draw_localizers(axes: Axes, rows: pd.DataFrame, measure: str, published: bool) -> None:
-    """One line per localizer over the places 0, 1, ... of its rows.
+    """One line per localizer over the places 0, 1, ... of its rows of a table, with 95 % limits.
 
-    Args:
-        axes: where to draw.
-        rows: rows of a table, for each localizer in the order of the places.
-        measure: column of the error; its limits are the columns ``_low`` and ``_high``.
-        published: also draw the paper's values of that error.
+    ``measure`` is the column of the error; with ``published`` the paper's values are drawn, too.
     """
     for model in MODELS:
         chosen = rows[rows["model"] == model]
@@ -77,10 +73,8 @@ SHOWN = ("constant", "nearest-vlad", STRUCTURE)
 def draw_references(axes: Axes, data_sets: Sequence[pd.DataFrame], measure: str) -> None:
     """Grey lines over the places 0, 1, ... on axes whose limits stand; they do not change them.
 
-    Args:
-        axes: where to draw; a line that lies above them is said in words.
-        data_sets: rows of ``references.csv``, of the data set at each place.
-        measure: column of the error.
+    ``data_sets`` are rows of ``references.csv``, of the data set at each place. A line that lies
+    above the axes is said in words.
     """
     titles = titles_in(pd.concat(data_sets))
     styles = reference_styles(name for name in titles if name not in MODELS)

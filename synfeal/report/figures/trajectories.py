@@ -50,7 +50,6 @@ def figure_of(data: LabelledSet, plan: Plan) -> Figure:
 def _draw_split(
     part: SubFigure, data: LabelledSet, plan: Plan, split: str, shape: tuple[int, int]
 ) -> None:
-    """The methods beside each other."""
     panels = part.subplots(*shape, squeeze=False).ravel()
     for axes, (method, parts) in zip(panels, data.methods.items(), strict=False):
         draw_plan(axes, plan)

@@ -154,6 +154,5 @@ def rows_of(families: Iterable[Family]) -> list[dict[str, object]]:
 def row_of(family: Family, name: str) -> dict[str, object]:
     """The row of one case."""
     outcome = examine(family.cases[name]())
-    columns = dict(zip(family._fields[:-1], family[:-1], strict=True))
-    ok = int(outcome.our_error <= family.bound)
-    return {"family": columns.pop("name"), "case": name, "ok": ok, **columns, **outcome._asdict()}
+    ok = int(outcome["our_error"] <= family.bound)
+    return {"family": family.name, "case": name, "ok": ok, **family._asdict(), **outcome}

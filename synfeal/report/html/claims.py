@@ -11,31 +11,21 @@ from markupsafe import Markup
 
 from synfeal.errors import InputError
 from synfeal.frames import TEXT, read_frame, records_of
-from synfeal.report.claims.model import (
-    HOLDS,
-    LESS,
-    MIXED,
-    NO_EFFECT,
-    NOT_LEARNT,
-    NOT_TESTABLE,
-    OPPOSITE,
-    SMALLER,
-    UNDECIDED,
-)
+from synfeal.report.claims import model
 from synfeal.report.claims.table import COLUMNS
 from synfeal.report.html.render import SCORES, Column, render
 
 # A sign, a border and the words themselves tell verdicts apart without colour.
 BADGES: Mapping[str, tuple[str, str]] = {
-    HOLDS: ("✓", "holds"),
-    SMALLER: ("↘", "partly"),
-    MIXED: ("±", "partly"),
-    LESS: ("<", "fails"),
-    NO_EFFECT: ("=", "fails"),
-    OPPOSITE: ("✗", "fails"),
-    UNDECIDED: ("?", "undecided"),
-    NOT_LEARNT: ("–", "untestable"),
-    NOT_TESTABLE: ("–", "untestable"),
+    model.HOLDS: ("✓", "holds"),
+    model.SMALLER: ("↘", "partly"),
+    model.MIXED: ("±", "partly"),
+    model.LESS: ("<", "fails"),
+    model.NO_EFFECT: ("=", "fails"),
+    model.OPPOSITE: ("✗", "fails"),
+    model.UNDECIDED: ("?", "undecided"),
+    model.NOT_LEARNT: ("–", "untestable"),
+    model.NOT_TESTABLE: ("–", "untestable"),
 }
 HEADINGS = ("Claim", "The paper says", "Published", "Measured here", "Verdict")
 Claims = Sequence[Mapping[str, str]]

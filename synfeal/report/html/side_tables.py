@@ -32,7 +32,7 @@ DATA_SET, LABELS = Column("Data set", "data_set"), Column("Labels", "labels")
 
 def meshes_table(path: Path) -> Markup:
     """Table 1: the meshes beside the paper's."""
-    counts = {"vertices": "{:,.0f}", "faces": "{:,.0f}", "volume_m3": "{:,.2f}"}
+    counts = dict.fromkeys(meshes.FACTS, "{:,.0f}") | {"volume_m3": "{:,.2f}"}
     columns = [
         Column("Scene", "scene"),
         *(
@@ -71,7 +71,7 @@ def references_table(path: Path) -> Markup:
         " frames within 5 cm and 5°. Seconds of one processor core, without what is done once for"
         " all label sets."
     )
-    table = _with_data_set(references.read_references(path))
+    table = _with_data_set(read_frame(path, references.SCHEMA))
     table = table.assign(
         labels=table.labels.map(references.label_title),
         style=table.kind.where(table.kind == references.LOCALIZER, ""),
@@ -90,7 +90,7 @@ def recall_table(path: Path) -> Markup:
         *(Column(title, name, "{:.1f} %", 100, scored=True) for name, title in shares.items()),
     ]
     caption = f"<b>Recall.</b> {escape(recall.CAPTION)} {escape(recall.REMARK)} Small: 95 % limits."
-    table = _with_data_set(recall.read_recall_table(path))
+    table = _with_data_set(read_frame(path, recall.SCHEMA))
     table = table.assign(
         labels=table.labels.map(references.label_title), model=table.model.map(TITLES)
     )
@@ -186,10 +186,8 @@ def speed_table(path: Path) -> Markup:
         " used. Speeds are measured and differ between runs."
     )
     table = read_frame(path, speed_vs_error.SCHEMA)
-    used = table.chosen == 1
-    table = table.assign(scene=table.scene.map(scene_title))
-    table = table.assign(used=used.map({True: "✓", False: ""}))
-    table = table.assign(style=used.map({True: "used", False: ""}))
+    used, style = (table.chosen.map({1: text, 0: ""}) for text in ("✓", "used"))
+    table = table.assign(scene=table.scene.map(scene_title), used=used, style=style)
     return sortable(speed_vs_error.NAME, caption, columns, table)
 
 

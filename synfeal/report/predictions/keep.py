@@ -30,10 +30,6 @@ def keep(root: Path, out: Path) -> int:
 
     A workflow may be at work there: a run counts as finished when its predictions are there.
 
-    Args:
-        root: ``results/<profile>``.
-        out: ZIP file, described by the ``datapackage.json`` in it.
-
     Raises:
         InputError: no run is finished, or labels of one are missing.
     """

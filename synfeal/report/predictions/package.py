@@ -56,13 +56,9 @@ class Resource:
 
 
 def write_package(root: Path, paths: Mapping[str, str], out: Path) -> None:
-    """Pack files.
+    """Pack files below ``root`` in a ZIP file.
 
-    Args:
-        root: directory they lie in.
-        paths: of each file, below ``root``, the file that holds it: itself, or a longer one that
-            begins with the same bytes.
-        out: ZIP file to write.
+    ``paths`` says which file holds each: itself, or a longer one that begins with the same bytes.
     """
     resources = []
     with atomic_path(out) as temporary, zipfile.ZipFile(temporary, "w") as package:

@@ -26,10 +26,6 @@ def restore(package: Path, root: Path) -> tuple[int, int]:
 
     Files that are there already with the same content are left as they are.
 
-    Args:
-        package: the ZIP file.
-        root: ``results/<profile>``, which need not exist.
-
     Returns:
         How many runs were written, and how many were there.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,16 +60,11 @@ TRUSTED_S = 60.0
 
 
 class TimeLeft:
-    """Time left of a run, from what its jobs were expected to take and what they have taken.
+    """Time left of a run on ``cores``, from what its jobs (``stage/name``) were expected to take.
 
     The ratio of measured to expected seconds is known for the whole run and for each stage; both
     start at what is expected (the stages at the ratio of the run), with a weight of ``TRUSTED_S``.
-
     One thread may ask while another tells: what changes is copied before it is gone through.
-
-    Args:
-        expected_s: seconds by job, ``stage/name``.
-        cores: jobs at a time.
     """
 
     def __init__(self, expected_s: Mapping[str, float], cores: int) -> None:
@@ -108,27 +104,19 @@ class TimeLeft:
         return done_s / sum(expected_s.values()) if expected_s else 1.0
 
     def _left_s(self, now_s: float) -> dict[str, float]:
-        ratio, ratios = self._ratios()
-        left = {}
-        for job, expected_s in tuple(self.expected_s.items()):
-            if job not in self._taken_s:
-                likely_s = expected_s * ratios.get(_stage(job), ratio)
-                left[job] = max(likely_s - (now_s - self._began.get(job, now_s)), 0.0)
-        return left
-
-    def _ratios(self) -> tuple[float, dict[str, float]]:
-        """Measured over expected seconds: of the run, and of each stage that has finished jobs."""
-        expected_s: dict[str, float] = {}
-        taken_s: dict[str, float] = {}
+        expected_s: dict[str, float] = defaultdict(float)  # of finished jobs, by stage
+        taken_s: dict[str, float] = defaultdict(float)
         for job, seconds in tuple(self._taken_s.items()):
-            stage = _stage(job)
-            expected_s[stage] = expected_s.get(stage, 0.0) + self.expected_s[job]
-            taken_s[stage] = taken_s.get(stage, 0.0) + seconds
+            expected_s[_stage(job)] += self.expected_s[job]
+            taken_s[_stage(job)] += seconds
         ratio = (sum(taken_s.values()) + TRUSTED_S) / (sum(expected_s.values()) + TRUSTED_S)
-        return ratio, {
-            stage: (taken_s[stage] + ratio * TRUSTED_S) / (expected_s[stage] + TRUSTED_S)
-            for stage in expected_s
-        }
+        left = {}
+        for job, seconds in tuple(self.expected_s.items()):
+            if job not in self._taken_s:
+                stage = _stage(job)
+                factor = (taken_s[stage] + ratio * TRUSTED_S) / (expected_s[stage] + TRUSTED_S)
+                left[job] = max(seconds * factor - (now_s - self._began.get(job, now_s)), 0.0)
+        return left
 
 
 def _stage(job: str) -> str:
