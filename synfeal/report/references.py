@@ -34,7 +34,7 @@ from synfeal.report.cells import LIMITS
 from synfeal.report.layouts import SOURCES, TITLES, scene_title
 from synfeal.report.results import read_result
 from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
-from synfeal.report.stats import MEASURES, REMEDY, Metrics, combine, read_metrics
+from synfeal.report.stats import MEASURES, REMEDY, combine, read_metrics
 
 NAME, LOCALIZER = "references", "localizer"
 CONSTANT = {"method": "constant", "title": "Mean training pose", "kind": "reference"}
@@ -71,8 +71,10 @@ def references_table(design: Design, external: Externals, root: Path) -> pd.Data
         row = rows[key]
         keys = dict(zip(KEYS, (*key, row.noise_m, row.noise_deg), strict=False))
         methods = answered_by(design.rows, key, external)
-        constant = _constant_record(read_metrics(folder / methods[0] / "metrics.json"))
-        records.append({**keys, **CONSTANT, **constant})
+        any_run = read_metrics(folder / methods[0] / "metrics.json")  # holds the mean pose's scores
+        constant = {measure: any_run[f"baseline_{measure}"] for measure in MEASURES}
+        counts = {"n_train": any_run["n_train"], "n_test": any_run["n_test"], "n_seeds": 1}
+        records.append({**keys, **CONSTANT, **constant, **counts})
         for method in methods:
             kind = "reference" if method in REFERENCES else "external"
             names = {**keys, "method": method, "title": titles[method], "kind": kind}
@@ -89,12 +91,6 @@ def read_references(path: Path) -> pd.DataFrame:
     return read_frame(path, SCHEMA)
 
 
-def _constant_record(metrics: Metrics) -> dict[str, Any]:
-    """Scores of always answering the mean training pose, which every run's scores hold."""
-    scores = {measure: metrics[f"baseline_{measure}"] for measure in MEASURES}
-    return scores | {name: metrics[name] for name in ("n_train", "n_test")} | {"n_seeds": 1}
-
-
 def _seconds(folder: Path) -> dict[str, float]:
     facts = read_result(folder / "facts.json", ("answer_s", "frames"), "answer again")
     return {"seconds_per_frame": facts["answer_s"] / facts["frames"]}
@@ -102,14 +98,9 @@ def _seconds(folder: Path) -> dict[str, float]:
 
 def _record(folders: Sequence[Path]) -> dict[str, Any]:
     scores = combine([read_metrics(folder / "metrics.json") for folder in folders])
-    return scores | dict(zip(WITHIN, _within(folders), strict=True))
-
-
-def _within(folders: Sequence[Path]) -> list[float]:
-    """Share of the frames within 5 cm and 5 degrees of their labels, and of their true poses."""
-    names = [f"{BOUNDS[0].name}{end}" for end in ("", "_true")]
+    names = {f"{BOUNDS[0].name}{end}": f"within_5cm_5deg{end}" for end in ("", "_true")}
     every = [read_result(folder / "metrics.json", names, REMEDY) for folder in folders]
-    return [fmean(metrics[name] for metrics in every) for name in names]
+    return scores | {column: fmean(m[name] for m in every) for name, column in names.items()}
 
 
 def references_sheet(table: pd.DataFrame) -> Sheet:
@@ -173,9 +164,6 @@ def _shown(row: pd.Series, end: str) -> str:
         return "failed"
     share = row[f"within_5cm_5deg{end}"]
     within = "" if pd.isna(share) else f", {100 * share:.0f} %"
-    return f"{position_m:.2g} m, {_degrees(orientation_deg)}°{within}"
-
-
-def _degrees(value: float) -> str:
-    """Two digits, and all before the point."""
-    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
+    # Two digits, and all before the point.
+    degrees = f"{orientation_deg:.0f}" if orientation_deg >= 10 else f"{orientation_deg:.2g}"
+    return f"{position_m:.2g} m, {degrees}°{within}"

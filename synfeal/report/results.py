@@ -13,6 +13,8 @@ from pydantic import TypeAdapter, ValidationError
 from synfeal.errors import InputError, why
 from synfeal.files import read_json
 
+ADAPTER_OF = cache(TypeAdapter)  # of a model or type
+
 
 def read_text(path: Path) -> str:
     """The text of a result file."""
@@ -46,11 +48,6 @@ def read_result(path: Path, needed: Iterable[str], remedy: str, shape: Any = Non
 def shaped(path: Path, value: Any, shape: Any, remedy: str) -> Any:
     """What a result file holds, or a part of it, as the model or type it is read as."""
     try:
-        return _adapter(shape).validate_json(json.dumps(value), strict=True)
+        return ADAPTER_OF(shape).validate_json(json.dumps(value), strict=True)
     except ValidationError as error:
         raise InputError(f"{path}: {why(error)}; {remedy}") from None
-
-
-@cache
-def _adapter(shape: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(shape)

@@ -100,9 +100,13 @@ def _sentences(title: str, cells: pd.DataFrame) -> list[str]:
     first, last = (cells[cells["size"] == size].set_index("model") for size in sizes)
     half_m = last[f"baseline_{POSITION}"].iloc[0] / 2
     below = int((last[POSITION] < half_m).sum())
+    errors = [
+        f"{TITLES[str(model)]} " + ("failed" if pd.isna(error_m) else f"{error_m:.2f} m")
+        for model, error_m in last[POSITION].items()
+    ]
     lines = [
         f"{title}, {sizes[1]}: {below} of {len(last)} localizers have a median position error below"
-        f" half of the mean-pose baseline ({half_m:.2f} m): {_errors(last[POSITION])}."
+        f" half of the mean-pose baseline ({half_m:.2f} m): {', '.join(errors)}."
     ]
     if pd.isna(half_m):
         lines = [f"{title}, {sizes[1]}: the mean-pose baseline could not be computed."]
@@ -113,11 +117,6 @@ def _sentences(title: str, cells: pd.DataFrame) -> list[str]:
             f" orientation error for {falls[1]}."
         )
     return lines
-
-
-def _errors(errors_m: pd.Series) -> str:
-    texts = {m: "failed" if pd.isna(e) else f"{e:.2f} m" for m, e in errors_m.items()}
-    return ", ".join(f"{TITLES[str(model)]} {text}" for model, text in texts.items())
 
 
 def _falls(falls: pd.Series) -> str:

@@ -11,7 +11,6 @@ import numpy as np
 
 from synfeal.bootstrap import Array, difference, limits, mean_of, relative_change
 from synfeal.config import MODELS
-from synfeal.dataset.pose_table import PoseTable
 from synfeal.report.assistance import PUBLISHED_ASSISTED, assistance_record
 from synfeal.report.claims.evidence import QUANTITIES, Cell, Evidence
 from synfeal.report.claims.model import HOLDS, OPPOSITE, UNDECIDED, Claim, Missing, Outcome, Verdict
@@ -158,7 +157,9 @@ def kinectfusion_fails(claim: Claim, evidence: Evidence) -> Outcome:
     at the pose before and reaches a few centimetres (docs/groundtruth.md).
     """
     by_scene = _assisted(evidence, KINECT_FUSION)
-    spacing_m = _spacing_m(evidence.test_set("large_room", "6k").poses)
+    poses = evidence.test_set("large_room", "6k").poses
+    steps_m = np.linalg.norm(np.diff(poses.position_m, axis=0), axis=1)
+    spacing_m = float(np.median(steps_m[np.diff(poses.path) == 0]))
     if spacing_m > FARTHEST_M:
         raise Missing(
             f"frames are {100 * spacing_m:.0f} cm apart, and tracking is asked of frames"
@@ -172,12 +173,6 @@ def kinectfusion_fails(claim: Claim, evidence: Evidence) -> Outcome:
         f"{100 * low:.0f} to {100 * high:.0f} %",
         "does not cope: more than half of the batches are assisted",
     )
-
-
-def _spacing_m(poses: PoseTable) -> float:
-    """Median distance of consecutive frames of one path."""
-    steps_m = np.linalg.norm(np.diff(poses.position_m, axis=0), axis=1)
-    return float(np.median(steps_m[np.diff(poses.path) == 0]))
 
 
 def _assisted(evidence: Evidence, method: str) -> dict[str, tuple[int, int]]:

@@ -62,9 +62,7 @@ class Missing(Exception):  # noqa: N818 - not an error: it ends in the verdict `
 @cache
 def published_claims() -> tuple[Claim, ...]:
     """The claims of the paper, in its order."""
-    return tuple(_claim(row) for _, row in read_records(FOLDER / "claims.csv"))
-
-
-def _claim(row: dict[str, str]) -> Claim:
-    numbers = tuple(map(float, row.pop("numbers").split()))
-    return Claim(numbers=numbers, **row)
+    rows = [row for _, row in read_records(FOLDER / "claims.csv")]
+    return tuple(
+        Claim(numbers=tuple(map(float, row.pop("numbers").split())), **row) for row in rows
+    )

@@ -53,7 +53,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
 def _placed(table: pd.DataFrame) -> pd.DataFrame:
     """The rows that say something of their own, with the name, place and height of each run."""
     runs = [run for _, run in table.groupby(list(KEY), sort=False)]
-    runs.sort(key=_true_change)
+    runs.sort(key=lambda r: float(r.difference[r.measure == "position_m_true"].iloc[0]))
     parts = []
     for place, run in enumerate(runs):
         truth = run["measure"].str.endswith("_true")
@@ -63,10 +63,6 @@ def _placed(table: pd.DataFrame) -> pd.DataFrame:
         name = "/".join(run[list(KEY)].iloc[0])
         parts.append(run.assign(name=name, place=place, height=place + height))
     return pd.concat(parts)
-
-
-def _true_change(run: pd.DataFrame) -> Any:
-    return run.set_index("measure").at["position_m_true", "difference"]
 
 
 def _panel(axis: Axes, rows: pd.DataFrame, title: str) -> None:

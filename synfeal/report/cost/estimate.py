@@ -61,7 +61,11 @@ def job_costs(jobs: pd.DataFrame, laws: pd.DataFrame, machine: Machine) -> pd.Da
 
 def summed(costs: pd.DataFrame, machine: Machine) -> dict[str, Any]:
     """What some jobs take together, stage after stage, with all of them off the same way."""
-    walls = [_stage_wall(stage, machine) for _, stage in costs.groupby("stage", sort=False)]
+    walls = []  # from the start of each stage to its end
+    for _, stage in costs.groupby("stage", sort=False):
+        on_gpu = stage["gpu_mid"].gt(0).any()
+        slots = min(machine.cores, machine.gpus) if on_gpu else machine.cores
+        walls.append([wall_seconds(stage[column].dropna(), slots) for column in CPU])
     return {
         "jobs": len(costs),
         **costs[[*CPU, *GPU]].sum(),
@@ -69,13 +73,6 @@ def summed(costs: pd.DataFrame, machine: Machine) -> dict[str, Any]:
         "disk_bytes": costs["disk_bytes"].sum(),
         "peak_mb": costs["peak_mb"].max(),
     }
-
-
-def _stage_wall(costs: pd.DataFrame, machine: Machine) -> list[float]:
-    """Low, expected and high seconds from the start of a stage to its end."""
-    on_gpu = costs["gpu_mid"].gt(0).any()
-    slots = min(machine.cores, machine.gpus) if on_gpu else machine.cores
-    return [wall_seconds(costs[column].dropna(), slots) for column in CPU]
 
 
 def wall_seconds(seconds: Iterable[float], slots: int) -> float:

@@ -65,9 +65,9 @@ def _count(build: Callable[[], nn.Module], input_px: int) -> Work:
     with torch.device("meta"):
         network = build().eval()
         image = torch.empty(1, 3, input_px, input_px)
-    layers = [m for m in network.modules() if not _inner(m)]
-    for layer in layers:
-        layer.register_forward_hook(lambda _, __, out: outputs.append(_elements(out)))
+    for layer in network.modules():
+        if list(layer.parameters(recurse=False)) and not list(layer.children()):
+            layer.register_forward_hook(lambda _, __, out: outputs.append(_elements(out)))
     with FlopCounterMode(display=False) as counter, torch.no_grad():
         network(image)
     parameters = sum(p.numel() for p in network.parameters())
@@ -77,11 +77,6 @@ def _count(build: Callable[[], nn.Module], input_px: int) -> Work:
         float(FLOAT_BYTES * parameters),
         float(FLOAT_BYTES * sum(outputs)),
     )
-
-
-def _inner(module: nn.Module) -> bool:
-    """Whether a module is made of others, or has no weights of its own."""
-    return not list(module.parameters(recurse=False)) or any(True for _ in module.children())
 
 
 def _elements(out: Any) -> int:

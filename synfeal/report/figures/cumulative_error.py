@@ -41,9 +41,9 @@ def draw(results: Results) -> Figure | None:
     rows = results.rows_of("table4_size")
     if not rows:
         return None
-    scenes = list(dict.fromkeys(row.scene for row in rows))
-    largest = [_largest(results, [row for row in rows if row.scene == scene]) for scene in scenes]
-    return figure_of([scene_errors(results, row) for row in largest])
+    largest = {scene: results.sizes(scene)[-1] for scene in dict.fromkeys(r.scene for r in rows)}
+    rows = [row for row in rows if row.size == largest[row.scene]]
+    return figure_of([scene_errors(results, row) for row in rows])
 
 
 def scene_errors(results: Results, row: Experiment) -> SceneErrors:
@@ -96,8 +96,3 @@ def draw_curves(axes: Axes, errors: Mapping[str, Array]) -> None:
     set_log(axes, "x")
     axes.set_ylim(0, 100)
     axes.grid(axis="x", color="0.93")
-
-
-def _largest(results: Results, rows: list[Experiment]) -> Experiment:
-    sizes = results.sizes(rows[0].scene)
-    return max(rows, key=lambda row: sizes.index(row.size))

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.report.figures.plan_view import Plan, draw_plan, draw_scale_bar, read_plan
 from synfeal.report.figures.sources import SPLITS, Array, Results
-from synfeal.report.figures.style import SPLIT_STYLES
+from synfeal.report.figures.style import SPLIT_STYLES, Style
 from synfeal.report.layouts import scene_title
 
 TICK_M = 0.22
@@ -37,7 +37,9 @@ def draw(results: Results) -> Figure | None:
         for axes, name in zip(line, sizes, strict=False):
             tables = {split: results.labels(scene, name, "synfeal", split) for split in SPLITS}
             _draw_set(axes, plans[scene], tables, f"{scene_title(scene)}, {name}")
-    _add_legend(figure)
+    look: Style = {"linestyle": "-", "linewidth": 0.8, "markersize": 5}
+    handles = [Line2D([], [], **look, **SPLIT_STYLES[split]) for split in SPLITS]
+    figure.legend(handles, ["training pose", "test pose"], loc="outside lower center", ncols=2)
     return figure
 
 
@@ -74,12 +76,3 @@ def _draw_set(axes: Axes, plan: Plan, tables: dict[str, PoseTable], title: str) 
         )
     counts = [f"{len(tables[split]):,} {split}" for split in SPLITS]
     axes.set_title(f"{title}\n{' + '.join(counts)} frames", fontsize=9)
-
-
-def _add_legend(figure: Figure) -> None:
-    handles = [
-        Line2D([], [], linestyle="-", linewidth=0.8, markersize=5, **SPLIT_STYLES[split])
-        for split in SPLITS
-    ]
-    labels = ["training pose", "test pose"]
-    figure.legend(handles, labels, loc="outside lower center", ncols=2)

@@ -104,7 +104,15 @@ def read_resources(package: Path) -> list[Resource]:
     try:
         with zipfile.ZipFile(package) as opened:
             entries = json.loads(opened.read(DESCRIPTOR))["resources"]
-        resources = [_parsed(entry) for entry in entries]
+        resources = [
+            Resource(
+                path=str(entry["path"]),
+                sha256=str(entry["hash"]).removeprefix("sha256:"),
+                member=str(entry.get("member", entry["path"])),
+                n_bytes=int(entry["bytes"]),
+            )
+            for entry in entries
+        ]
     except DAMAGE as error:
         raise InputError(
             f"{package}: cannot be read as what synfeal keep writes ({why(error)})"
@@ -114,11 +122,6 @@ def read_resources(package: Path) -> list[Resource]:
         if path.is_absolute() or ".." in path.parts or "\\" in resource.path:
             raise InputError(f"{package}: '{resource.path}' does not lie in a results directory")
     return resources
-
-
-def _parsed(entry: Mapping[str, Any]) -> Resource:
-    path, digest = str(entry["path"]), str(entry["hash"]).removeprefix("sha256:")
-    return Resource(path, digest, str(entry.get("member", path)), int(entry["bytes"]))
 
 
 def read_contents(package: Path, resources: list[Resource]) -> Iterator[tuple[Resource, bytes]]:
