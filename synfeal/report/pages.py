@@ -97,10 +97,9 @@ def size_table(root: Path) -> str:
 
 
 def labels_table(root: Path) -> str:
-    """Table 2: errors against the true poses, published errors in brackets."""
+    """Table 2, the same way."""
     cells = _table(root, "table2_ground_truth", {"labels": TEXT, **CELL})
-    labels = cells.labels.map(lambda name: SOURCES.get(name, name))
-    return _localizer_table(cells, "labels from", labels)
+    return _localizer_table(cells, "labels from", cells.labels.map(lambda n: SOURCES.get(n, n)))
 
 
 def assistance(root: Path) -> str:

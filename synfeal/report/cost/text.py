@@ -47,19 +47,13 @@ def _plan_lines(plan: Plan) -> Iterator[str]:
     parts.append(f"memory of the largest job {_memory(whole['peak_mb'])}")
     yield "; ".join(parts)
     yield ""
-    yield _stage_table(plan)
-    yield _table_table(plan)
-    yield from _notes(plan)
-
-
-def _stage_table(plan: Plan) -> str:
-    """One line per stage, and the sum."""
-    on_gpu = bool(plan.machine.gpus)
+    on_gpu = bool(machine.gpus)
     gpu = ["GPU time", "range"] if on_gpu else []
     head = ["stage", "jobs", "work", "CPU time", "range", *gpu, "wall time"]
-    rows = [[*head, "disk", "memory", "x measured"]]
-    shown = plan.costs[plan.costs["part"].isin([STAGE, RUN])]
-    return text_table(rows + [_row(r, on_gpu) for r in shown.to_dict("records")])
+    shown = plan.costs[plan.costs["part"].isin([STAGE, RUN])].to_dict("records")
+    yield text_table([[*head, "disk", "memory", "x measured"], *(_row(r, on_gpu) for r in shown)])
+    yield _table_table(plan)
+    yield from _notes(plan)
 
 
 def _row(r: dict[Any, Any], on_gpu: bool) -> list[str]:

@@ -38,7 +38,7 @@ class SceneErrors:
 
 def draw(results: Results) -> Figure | None:
     """Scenes across, measures down; nothing when the design has no rows of Table 4."""
-    rows = results.rows_of("table4_size")
+    rows = results.design.rows_of("table4_size")
     if not rows:
         return None
     largest = {scene: results.sizes(scene)[-1] for scene in dict.fromkeys(r.scene for r in rows)}

@@ -37,7 +37,7 @@ PROTOCOLS = {
 
 def draw_by_noise(results: Results) -> Figure | None:
     """Both scores, one below the other; nothing when the design has no rows of Table 3."""
-    design = results.rows_of(NOISE)
+    design = results.design.rows_of(NOISE)
     if not design:
         return None
     rows = results.table(NOISE)
@@ -75,7 +75,7 @@ def _levels(rows: pd.DataFrame) -> list[str]:
 
 def draw_by_size(results: Results) -> Figure | None:
     """Measures down, scenes across; nothing when the design has no rows of Table 4."""
-    if not results.rows_of(SIZE):
+    if not results.design.rows_of(SIZE):
         return None
     references = read_references(results.root / "tables" / f"{NAME}.csv")
     return by_size(results.table(SIZE), references[references["labels"] == SIMULATOR])
@@ -99,7 +99,7 @@ def _sizes(rows: pd.DataFrame) -> list[str]:
 
 def draw_by_images(results: Results) -> Figure | None:
     """Measures down, starts across; nothing when the design has no rows of Table 7."""
-    return by_images(results.table(IMAGES)) if results.rows_of(IMAGES) else None
+    return by_images(results.table(IMAGES)) if results.design.rows_of(IMAGES) else None
 
 
 def by_images(rows: pd.DataFrame) -> Figure:

@@ -27,14 +27,14 @@ UNITS = {"position_m_true": "position error (m)", "orientation_deg_true": "orien
 
 def draw(results: Results) -> Figure | None:
     """Nothing without rows of Table 3, or without structure-based poses on them."""
-    rows = results.rows_of(TABLE3)
+    rows = results.design.rows_of(TABLE3)
     if not rows:
         return None
     table = read_references(results.root / "tables" / f"{NAME}.csv")
     first = rows[0]
     table = table[(table.scene == first.scene) & (table["size"] == first.size)]
-    sources = [r for r in results.rows_of(TABLE2) if (r.scene, r.size) == (first.scene, first.size)]
-    return figure_of(table, [*rows, *sources])
+    rows += results.design.rows_of(TABLE2)
+    return figure_of(table, [r for r in rows if (r.scene, r.size) == (first.scene, first.size)])
 
 
 def figure_of(table: pd.DataFrame, rows: Sequence[Experiment]) -> Figure:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from synfeal.config import Design, Experiment
+from synfeal.config import Design
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.frames import MAYBE, read_frame
 from synfeal.geometry.poses import pose_error
@@ -31,18 +31,9 @@ class Results:
     design: Design  # of the profile; what it leaves out is not drawn, whatever files there are
 
     @property
-    def rows(self) -> tuple[Experiment, ...]:
-        """The whole design."""
-        return self.design.rows
-
-    @property
     def scenes(self) -> list[str]:
         """The scenes of the design, in the order of their names."""
-        return sorted({row.scene for row in self.rows})
-
-    def rows_of(self, table: str) -> list[Experiment]:
-        """The rows of one table of the design."""
-        return self.design.rows_of(table)
+        return sorted({row.scene for row in self.design.rows})
 
     def table(self, name: str) -> pd.DataFrame:
         """``tables/<name>.csv``."""
@@ -62,7 +53,7 @@ class Results:
 
     def sizes(self, scene: str) -> list[str]:
         """Data set sizes of a scene in the design, the smallest first."""
-        names = dict.fromkeys(row.size for row in self.rows if row.scene == scene)
+        names = dict.fromkeys(row.size for row in self.design.rows if row.scene == scene)
         return sorted(names, key=lambda size: len(self.labels(scene, size, "synfeal", "train")))
 
 
