@@ -139,7 +139,7 @@ def cost_sentence(record: Record) -> str:
 
 def _stages(record: Record) -> Markup:
     columns = [
-        *(Column("Stage", "stage"), Column("Jobs", "jobs", "{:,}")),
+        *(Column("Stage", "stage"), Column("Jobs", "jobs", "{:,.0f}")),
         Column("All jobs", "seconds", text="all"),
         Column("Median job", "median_seconds", text="median"),
         Column("Peak memory (MB)", "peak_mb", "{:,.0f}"),
