@@ -91,12 +91,6 @@ def scene_title(scene: str) -> str:
     return scene.replace("_", " ").title()
 
 
-def init_title(init: str) -> str:
-    """How a run is trained, e.g. ``from scratch, half of the images``."""
-    start, part = split_init(init)
-    return STARTS[start] + PARTS[part]
-
-
 def sheet_of(name: str, cells: pd.DataFrame) -> Sheet:
     """Lay out one of tables 2 to 7, from what :func:`synfeal.report.cells.read_cells` read."""
     one_truth = bool((cells.labels == "synfeal").all())
@@ -229,7 +223,8 @@ def row_label(name: str, cell: Any) -> str:
         size = f"{_level(cell.noise_m)} m, {cell.noise_deg:g}°"
         return f"{ERRORS[cell.labels]}, {size}" if cell.labels in ERRORS else "none"
     if name == "table7_images_shown":
-        return init_title(cell.init)
+        start, part = split_init(cell.init)
+        return STARTS[start] + PARTS[part]
     return f"{cell.size}: ({cell.n_train}, {cell.n_test})"
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -15,7 +14,12 @@ from synfeal.report.results import read_result
 from synfeal.report.sheet import PAPER, Sheet, sheet_of_texts, write_latex
 
 NAME = "table1_meshes"
-FACTS = {"vertices": "# Vertices", "faces": "# Faces", "volume_m3": "Volume [m³]"}
+# Title, and how numbers are written.
+FACTS = {
+    "vertices": ("# Vertices", "{:,.0f}"),
+    "faces": ("# Faces", "{:,.0f}"),
+    "volume_m3": ("Volume [m³]", "{:,.2f}"),
+}
 SCHEMA = {
     **{"scene": TEXT, "vertices": COUNT, "faces": COUNT, "volume_m3": NUMBER},
     **{"published_vertices": MAYBE_COUNT, "published_faces": MAYBE_COUNT},
@@ -59,8 +63,11 @@ def meshes_sheet(meshes: pd.DataFrame) -> Sheet:
     scenes = meshes.set_index(meshes.scene.map(scene_title))
     lines = [
         {"row": fact, "kind": kind, " ": title, "  ": against}
-        | {scene: _printed(value, fact) for scene, value in scenes[f"{start}{fact}"].items()}
-        for fact, label in FACTS.items()
+        | {
+            scene: "–" if pd.isna(value) else form.format(value)
+            for scene, value in scenes[f"{start}{fact}"].items()
+        }
+        for fact, (label, form) in FACTS.items()
         for start, kind, title, against in (
             ("", "", label, "regenerated"),
             ("published_", PAPER, "", "paper"),
@@ -69,9 +76,3 @@ def meshes_sheet(meshes: pd.DataFrame) -> Sheet:
     return sheet_of_texts(
         NAME, "Properties of the 3D textured meshes used.", pd.DataFrame(lines), (REMARK,)
     )
-
-
-def _printed(value: Any, fact: str) -> str:
-    if pd.isna(value):
-        return "–"
-    return f"{value:,.2f}" if fact == "volume_m3" else f"{value:,.0f}"

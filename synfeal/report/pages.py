@@ -75,17 +75,13 @@ def origin(root: Path) -> str:
     first, seeds = cells.iloc[0], sorted(set(cells.n_seeds))
     share = PAPER_FRAMES[first["size"]] / first.n_train
     frames = "the paper's frames" if share == 1 else f"1/{share:.3g} of the paper's frames"
+    span = " to ".join(map(str, dict.fromkeys((seeds[0], seeds[-1]))))
+    runs = f"{span} training run{'' if span == '1' else 's'} per cell"
     return (
-        f"Profile `{root.name}`: {frames}, {counted_seeds(seeds)}, at commit"
+        f"Profile `{root.name}`: {frames}, {runs}, at commit"
         f" `{record['commit'][:9]}` on {record['machine']['usable_cores']} cores"
         f" ({record['machine']['processor']})."
     )
-
-
-def counted_seeds(n_seeds: Sequence[int]) -> str:
-    """As in ``1 to 3 training runs per cell``, from the numbers there are, in order."""
-    span = " to ".join(map(str, dict.fromkeys((n_seeds[0], n_seeds[-1]))))
-    return f"{span} training run{'' if span == '1' else 's'} per cell"
 
 
 def size_table(root: Path) -> str:

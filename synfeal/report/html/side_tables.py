@@ -32,12 +32,11 @@ DATA_SET, LABELS = Column("Data set", "data_set"), Column("Labels", "labels")
 
 def meshes_table(path: Path) -> Markup:
     """Table 1: the meshes beside the paper's."""
-    counts = dict.fromkeys(meshes.FACTS, "{:,.0f}") | {"volume_m3": "{:,.2f}"}
     columns = [
         Column("Scene", "scene"),
         *(
-            Column(meshes.FACTS[fact], fact, form, paper=f"published_{fact}")
-            for fact, form in counts.items()
+            Column(title, fact, form, paper=f"published_{fact}")
+            for fact, (title, form) in meshes.FACTS.items()
         ),
     ]
     caption = (

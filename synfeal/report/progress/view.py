@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from statistics import fmean
@@ -35,10 +36,9 @@ class FirstScores:
 
     def __init__(self, root: Path, runs: Sequence[Run]) -> None:
         self._run_of = {root / "runs" / run.directory / "metrics.json": run for run in runs}
-        self._rows: dict[Row, list[Run]] = {}
-        for run in runs:
-            self._rows.setdefault(_row(run), []).append(run)
-        self._scores: dict[Run, tuple[float, float] | None] = {}
+        # By row and run; None of a run without scores, nothing of one that is still to come.
+        self._scores: dict[Row, dict[Run, tuple[float, float] | None]] = {}
+        self._expected = Counter(map(_row, {*runs}))
 
     def add(self, metrics: Path) -> Row | None:
         """Read the scores of a run; its row, or None where the file is of no run of the design."""
@@ -47,25 +47,25 @@ class FirstScores:
             return None
         scores = read_metrics(metrics)
         position_m, deg = scores["position_m_true"], scores["orientation_deg_true"]
-        self._scores[run] = None if position_m is None or deg is None else (position_m, deg)
+        found = None if position_m is None or deg is None else (position_m, deg)
+        self._scores.setdefault(_row(run), {})[run] = found
         return _row(run)
 
     def complete(self, row: Row) -> bool:
         """Whether every run of a row has its scores."""
-        return all(run in self._scores for run in self._rows[row])
+        return len(self._scores.get(row, {})) == self._expected[row]
 
     def cells(self, row: Row) -> list[str]:
         """Label and cells of a row; of repetitions the mean of those there are."""
-        return [label(row), *(self._cell(row, model) for model in MODELS)]
-
-    def _cell(self, row: Row, model: str) -> str:
-        runs = [run for run in self._rows[row] if run.model == model]
-        known = [self._scores[run] for run in runs if run in self._scores]
-        finished = [score for score in known if score is not None]
-        if not finished:
-            return "failed" if known else MISSING
-        position_m, orientation_deg = map(fmean, zip(*finished, strict=True))
-        return f"{position_m:.2f} {orientation_deg:.3g}°"
+        texts = [label(row)]
+        for model in MODELS:
+            known = [s for run, s in self._scores.get(row, {}).items() if run.model == model]
+            finished = [score for score in known if score is not None]
+            text = "failed" if known else MISSING
+            if finished:
+                text = "{:.2f} {:.3g}°".format(*map(fmean, zip(*finished, strict=True)))
+            texts.append(text)
+        return texts
 
 
 def label(row: Row) -> str:
