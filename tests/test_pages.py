@@ -77,7 +77,7 @@ def changed_in(path, column, value):
             "published/mini/tables/table4_size.csv",
             "published_position_m",
             "6.54",
-            "*(6.54 m",
+            "*(6.54, ",
         ),
         (
             "labels",

@@ -193,7 +193,7 @@ def _cell(cell: Any) -> str:
         own = f"{position_rms_m:.2f} m, {cell.orientation_deg_true:.1f}°"
     if pd.isna(cell.published_position_m):  # a row the paper has not
         return own
-    return f"{own} *({cell.published_position_m:.2f} m, {cell.published_orientation_deg:.2f}°)*"
+    return f"{own} *({cell.published_position_m:.2f}, {cell.published_orientation_deg:.2f})*"
 
 
 def _difficulty(folder: Path, name: str) -> dict[str, str]:
