@@ -110,20 +110,7 @@ def read_origin(path: Path) -> Record:
 
 def origin_html(record: Record) -> Markup:
     """Facts, and the stages as a table."""
-    machine = record["machine"]
-    facts = {
-        "Commit": record["commit"],
-        "Configuration (SHA-256)": record["config_sha256"],
-        "Seed": record["seed"],
-        "Written (UTC)": record["time_utc"],
-        "Processor": f"{machine['processor']}, {machine['usable_cores']} cores used",
-        "Memory": f"{machine['memory_gib']} GiB",
-        "GPU": machine["gpu"] or "none",
-        "System": record["platform"],
-        "Python": record["python"],
-        "Packages": ", ".join(f"{name} {v}" for name, v in record["packages"].items()),
-    }
-    return render("origin.html", facts=facts, stages=_stages(record))
+    return render("origin.html", record=record, stages=_stages(record))
 
 
 def cost_sentence(record: Record) -> str:
