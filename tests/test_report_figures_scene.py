@@ -122,7 +122,7 @@ def test_trajectories_draw_both_paths_and_ring_what_was_assisted(results):
 
 
 def test_a_design_without_such_labels_has_no_label_set(results):
-    rows = tuple(row for row in results.rows if row.table == TABLE4)
+    rows = tuple(row for row in results.design.rows if row.table == TABLE4)
     assert read_labelled_set(Results(results.root, design_of(rows))) is None
 
 
