@@ -126,11 +126,9 @@ class Maker:
         from nearby.
         """
         scale = DETAIL * px_per_m
-        height_px, width_px = (
-            max(4, round(float(step.sum(axis=axis).mean()) * scale))
-            for axis in (0, 1)
-            for step in [np.linalg.norm(np.diff(points_m, axis=axis), axis=-1)]
-        )
+        down_m = np.linalg.norm(np.diff(points_m, axis=0), axis=-1).sum(axis=0).mean()
+        across_m = np.linalg.norm(np.diff(points_m, axis=1), axis=-1).sum(axis=1).mean()
+        height_px, width_px = (max(4, round(float(m) * scale)) for m in (down_m, across_m))
         canvas = Canvas(self.rng, height_px, width_px, scale)
         picture = painter(canvas)
         if not glow:
