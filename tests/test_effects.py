@@ -231,7 +231,7 @@ def test_without_effects_nothing_is_recorded_or_drawn_anew():
         ({"white_balance_k": 500}, "white_balance_k"),
         ({"light": {"ev": [1, -1]}}, "light.ev: the first number"),
         ({"light": {"states": ["disco"]}}, "light.states.0.*'night'"),
-        ({"clutter": {}, "light": {"states": ["night"]}}, "effects.clutter: of objects"),
+        ({"clutter": {}, "light": {"states": ["night"]}}, "effects.clutter: it is not known"),
         ({"vignette": 1}, "vignette: unknown key; allowed here: clutter"),
     ],
 )
