@@ -5,7 +5,7 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from baselines.training.data import image_statistics, read_labelled_frames
-from baselines.training.loop import train_localizer
+from baselines.training.loop import Job, train_localizer
 from synfeal.config.models import LocalizerConfig, NetworkConfig, TrainingConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 
@@ -49,13 +49,12 @@ def statistics_of(frames):
 
 def train(
     split, folder, *, samples=96, seed=1, weights=None, name="posenet2", hyper=HYPER,
-    training=TRAINING, **further,
+    training=TRAINING, protocol=None, **further,
 ):  # fmt: skip
     """A short training; returns the paths of checkpoint and history."""
     model, history = folder / "model.pt", folder / "history.csv"
-    train_localizer(
-        name, *split, NETWORK, hyper, training, samples, weights, seed, model, history, **further
-    )
+    job = Job(name, NETWORK, hyper, training, samples, seed, protocol)
+    train_localizer(job, *split, model, history, weights=weights, **further)
     return model, history
 
 

@@ -38,15 +38,20 @@ FramesAndLabels = tuple[Path, Path] | None
 
 
 class Job(NamedTuple):
-    """What is trained, and how; parameters of :func:`train_localizer`."""
+    """What is trained, and how."""
 
     name: ModelName
     network: NetworkConfig
-    hyper: LocalizerConfig
+    hyper: LocalizerConfig  # of this localizer
     training: TrainingConfig
-    protocol: Protocol
-    samples_seen: int
-    seed: int
+    samples_seen: int  # images shown in all
+    seed: int  # of first weights, paths held out, order of frames, rotations and dropout
+    exchanged: Protocol | None = None  # in place of the protocol that ``training`` names
+
+    @property
+    def protocol(self) -> Protocol:
+        """Its parts."""
+        return self.exchanged or PROTOCOLS[self.training.protocol]
 
     @property
     def schedule(self) -> Schedule:
@@ -84,70 +89,45 @@ class Material(NamedTuple):
 
 @memory_errors()
 def train_localizer(
-    name: ModelName,
-    frames: Path,
-    labels: Path,
-    network: NetworkConfig,
-    hyper: LocalizerConfig,
-    training: TrainingConfig,
-    samples_seen: int,
-    backbone_weights: Path | None,
-    seed: int,
+    job: Job,
+    frames: Path,  # packed frames (N, px, px, 3); the first ones are those of ``labels``
+    labels: Path,  # pose table of the training set
     out_model: Path,
     out_history: Path,
     *,
-    test: FramesAndLabels = None,
-    protocol: Protocol | None = None,
-    augment: Augmentation | None = None,
+    weights: Path | None = None,  # state dict the backbone starts from; without, from scratch
+    test: FramesAndLabels = None,  # read only where weights are chosen by the test set
+    augment: Augmentation | None = None,  # in place of the rotations that ``training`` asks for
 ) -> None:
-    """Train ``name`` and write its checkpoint and its history (columns of ``HistoryRow``).
+    """Train a localizer and write its checkpoint and its history (columns of ``HistoryRow``).
 
     Beside the checkpoint lies ``resume.pt`` until the run is finished.
-
-    Args:
-        name: a key of ``LOCALIZERS``.
-        frames: packed frames (N, px, px, 3); the first ones are those of ``labels``.
-        labels: pose table of the training set.
-        network: input side and width.
-        hyper: of this localizer.
-        training: protocol, batch size, precision and device.
-        samples_seen: images shown in all.
-        backbone_weights: state dict the backbone starts from; None trains from scratch.
-        seed: of the initial weights, the paths held out, the order of frames, their rotations and
-            dropout.
-        out_model: checkpoint to write.
-        out_history: CSV to write.
-        test: packed frames and labels of the test set; read only where weights are chosen by it.
-        protocol: in place of the one that ``training`` names.
-        augment: in place of the rotations that ``training`` asks for.
 
     Raises:
         InputError: one of the files cannot be used.
         MemoryError: there is too little memory; no checkpoint is written.
     """
-    chosen = protocol or PROTOCOLS[training.protocol]
-    job = Job(name, network, hyper, training, chosen, samples_seen, seed)
-    material = _material(job, frames, labels, backbone_weights, test)
-    if augment is None and chosen.images == "rotated":
-        augment = random_rotation(frames, network, training.augmentation, seed)
+    material = _material(job, frames, labels, weights, test)
+    if augment is None and job.protocol.images == "rotated":
+        augment = random_rotation(frames, job.network, job.training.augmentation, job.seed)
     identity = digest(*job, augment and augment.state_dict(), *material.fingerprints())
     resume = ResumeFile(out_model.with_name("resume.pt"), identity)
     rows = _fit(job, material, augment, resume)
-    camera = frame_camera(frames)
-    description = ModelDescription(localizer=name, network=network, hyper=hyper, camera=camera)
+    known = {"localizer": job.name, "network": job.network, "hyper": job.hyper}
+    description = ModelDescription(**known, camera=frame_camera(frames))
     save_checkpoint(out_model, material.localizer, material.statistics, description)
     write_history(out_history, rows)
     resume.remove()
 
 
 def _material(
-    job: Job, frames: Path, labels: Path, backbone_weights: Path | None, test: FramesAndLabels
+    job: Job, frames: Path, labels: Path, weights: Path | None, test: FramesAndLabels
 ) -> Material:
     """What the run begins with, on its device."""
     device = open_device(job.training.device)
     data = read_labelled_frames(frames, labels, job.network.input_px, device)
     learned, held_out = _split(job, data, test)
-    localizer = _initial(job, backbone_weights, learned)
+    localizer = _initial(job, weights, learned)
     log.info("%s: %d frames, %d samples, on %s", job.name, len(learned), job.samples_seen, device)
     return Material(localizer, image_statistics(data.images), learned, held_out)
 
@@ -172,15 +152,15 @@ def _fit(
     )
 
 
-def _initial(job: Job, backbone_weights: Path | None, learned: LabelledFrames) -> Localizer:
+def _initial(job: Job, weights: Path | None, learned: LabelledFrames) -> Localizer:
     """The localizer that training starts from, on the device of the frames it learns from.
 
     Seeds the generator that dropout draws from too.
     """
     torch.manual_seed(job.seed)
     localizer = build_localizer(job.name, job.network, job.hyper)
-    if backbone_weights is not None:
-        load_backbone_weights(localizer.backbone, backbone_weights)
+    if weights is not None:
+        load_backbone_weights(localizer.backbone, weights)
     localizer.place_on(learned.images.device)
     localizer.set_pose_prior(learned.position_m.mean(0))
     return localizer

@@ -22,20 +22,16 @@ from baselines.localizers.backbones.weights import (
     imagenet_weights_path,
     load_backbone_weights,
 )
+from baselines.localizers.base import Localizer
 from baselines.localizers.heads import OutputLayer, PooledFeature
 from baselines.localizers.losses import LearnedWeightLoss, PosePrediction
 from baselines.localizers.names import BackboneName
 from baselines.training.checkpoint import save_atomically
-from baselines.training.data import (
-    BatchOrder,
-    LabelledFrames,
-    image_statistics,
-    read_labelled_frames,
-)
-from baselines.training.device import autocast, memory_errors, open_device, precision_on
-from baselines.training.optimizer import Schedule, optimisation_of
-from baselines.training.progress import Progress
-from baselines.training.resume import Restorable, ResumeFile, digest, stop_signals
+from baselines.training.data import LabelledFrames, image_statistics, read_labelled_frames
+from baselines.training.device import memory_errors, open_device, precision_on
+from baselines.training.fit import LAST_WEIGHTS, fit
+from baselines.training.optimizer import Schedule
+from baselines.training.resume import ResumeFile, digest
 from baselines.training.rotation import random_rotation
 from synfeal.config.models import NetworkConfig, PretrainingConfig
 
@@ -58,7 +54,7 @@ class RoomHeads(OutputLayer):
         return PosePrediction(own[:, :3], own[:, 3:])
 
 
-class RoomsNetwork(nn.Module):
+class RoomsNetwork(Localizer):
     """A backbone, one feature, a regressor for each room, learned weights of the two errors."""
 
     backbone: Backbone
@@ -70,10 +66,18 @@ class RoomsNetwork(nn.Module):
         self.heads = RoomHeads(self.feature.n_out, n_rooms)
         self.criterion = LearnedWeightLoss(s_position=0.0, s_orientation=-1.0)
 
-    def forward(self, images: Tensor) -> Tensor:
+    def forward(self, images: Tensor) -> Tensor:  # type: ignore[override]
         """Features (B, n) of normalised images (B, 3, H, W)."""
         features: Tensor = self.feature(self.backbone(images)[-1])
         return features
+
+    def loss(  # type: ignore[override]
+        self, features: Tensor, place: Tensor, quat_wxyz: Tensor
+    ) -> Tensor:
+        """Loss of features (B, n) at places (B, 4): a position in metres, and in which room."""
+        prediction = self.heads(features.float(), place[:, 3].long())
+        loss: Tensor = self.criterion(prediction, place[:, :3], quat_wxyz)
+        return loss
 
 
 @memory_errors()
@@ -126,68 +130,43 @@ def _train_on_rooms(
     out: Path,
 ) -> Backbone:
     device = open_device("auto")
-    data, room = _read_rooms(rooms, network.input_px, device)
+    data = _read_rooms(rooms, network.input_px, device)
     statistics = image_statistics(data.images)
     torch.manual_seed(seed)
     student = RoomsNetwork(backbone, network.width, len(rooms))
-    student.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+    student.place_on(device)
     log.info("%s: %d frames of %d rooms on %s", backbone, len(data), len(rooms), device)
-    schedule = Schedule(
-        pretraining.samples_seen, pretraining.batch_size, pretraining.learning_rate, WEIGHT_DECAY
-    )
+    rate = pretraining.learning_rate
+    identity = digest(network, pretraining, seed, student.state_dict(), statistics.mean)
+    resume = ResumeFile(out.with_name(f"resume-{backbone}.pt"), identity)
     # Not Muon: ten thousand of its steps leave kernels fifteen times as long, and channels that one
     # image in a batch excites; what starts from there learns no faster than from scratch.
-    optimisation = optimisation_of("adamw", student, schedule)
-    order = BatchOrder(len(data), schedule.batch_size, seed)
-    progress = Progress(schedule.steps, schedule.batch_size, device)
-    augment = random_rotation(rooms[0][0], network, pretraining.augmentation, seed)
-    parts: dict[str, Restorable] = {
-        "student": student,
-        "optimisation": optimisation,
-        "order": order,
-        "progress": progress,
-    }
-    if augment is not None:
-        parts["augment"] = augment
-    resume = ResumeFile(
-        out.with_name(f"resume-{backbone}.pt"),
-        digest(network, pretraining, seed, student.state_dict(), statistics.mean),
+    fit(
+        *(student, data, statistics),
+        Schedule(pretraining.samples_seen, pretraining.batch_size, rate, WEIGHT_DECAY),
+        seed,
+        protocol=LAST_WEIGHTS._replace(optimiser="adamw"),
+        precision=precision_on(device, "auto"),
+        augment=random_rotation(rooms[0][0], network, pretraining.augmentation, seed),
+        resume=resume,
     )
-    resume.load(parts)
-    precision = precision_on(device, "auto")
-    with stop_signals() as stopped:
-        while not (stopped() or progress.ended):
-            chosen = order.next_batch().to(device)
-            images, position_m, quat_wxyz = data.batch(chosen)
-            normalised = statistics.normalise(images)
-            if augment is not None:
-                normalised, quat_wxyz = augment(normalised, quat_wxyz)
-            with autocast(device, precision):
-                features = student(normalised)
-            prediction = student.heads(features.float(), room[chosen])
-            loss = student.criterion(prediction, position_m, quat_wxyz)
-            rate = optimisation.learning_rate
-            optimisation.step(loss)
-            progress.add(loss)
-            progress.end_step(rate, None)
-            resume.save_if_due(parts, now=stopped())
     resume.remove()
     return student.backbone
 
 
 def _read_rooms(
     rooms: Sequence[tuple[Path, Path]], input_px: int, device: torch.device
-) -> tuple[LabelledFrames, Tensor]:
-    """Frames of all rooms, positions relative to each room's mean, and whose frame each is."""
+) -> LabelledFrames:
+    """Frames of all rooms, positions relative to each room's mean, a fourth number says whose."""
     sets = [read_labelled_frames(frames, labels, input_px, device) for frames, labels in rooms]
-    lengths = torch.tensor([len(some) for some in sets], device=device)
-    return (
-        LabelledFrames(
-            torch.cat([some.images for some in sets]),
-            torch.cat([some.position_m - some.position_m.mean(0) for some in sets]),
-            torch.cat([some.quat_wxyz for some in sets]),
-            sets[0].path,
-            torch.arange(int(lengths.sum()), device=device),
-        ),
-        torch.repeat_interleave(torch.arange(len(sets), device=device), lengths),
+    places = [
+        nn.functional.pad(some.position_m - some.position_m.mean(0), (0, 1), value=room)
+        for room, some in enumerate(sets)
+    ]
+    return LabelledFrames(
+        torch.cat([some.images for some in sets]),
+        torch.cat(places),
+        torch.cat([some.quat_wxyz for some in sets]),
+        sets[0].path,
+        torch.arange(sum(map(len, sets)), device=device),
     )

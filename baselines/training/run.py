@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from baselines.training.loop import train_localizer
+from baselines.training.loop import Job, train_localizer
 from baselines.training.predict import predict_poses
 from baselines.training.record import write_training_record
 from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig, TrainingConfig
@@ -48,13 +48,11 @@ def train_and_predict(
     inputs = {"frames": frames, "labels": labels, "test_frames": test_frames}
     inputs |= {"test_labels": test_labels} | ({"weights": weights} if weights else {})
     training = TrainingConfig(**run["training"], samples_seen={})
-    train_localizer(
-        *(model, frames, labels, NetworkConfig(**run["network"])),
-        *(LocalizerConfig(**run["localizer"]), training, run["samples_seen"], weights),
-        *(run["seed"], out_model, out_history),
-        test=(test_frames, test_labels),
-    )
+    network, hyper = NetworkConfig(**run["network"]), LocalizerConfig(**run["localizer"])
+    job = Job(model, network, hyper, training, run["samples_seen"], run["seed"])
+    test = test_frames, test_labels
+    train_localizer(job, frames, labels, out_model, out_history, weights=weights, test=test)
     write_training_record(out_record, run, inputs)
-    predict_poses(out_model, test_frames, test_labels, out_predictions, training.device)
+    predict_poses(out_model, *test, out_predictions, training.device)
     if common and out_common:
         predict_poses(out_model, test_frames, common, out_common, training.device, every)

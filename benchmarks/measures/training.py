@@ -14,7 +14,7 @@ from pydantic import Field, TypeAdapter, model_validator
 from baselines.localizers.names import backbone_of
 from baselines.training.checkpoint import read_checkpoint
 from baselines.training.data import read_images
-from baselines.training.loop import train_localizer
+from baselines.training.loop import Job, train_localizer
 from baselines.training.predict import BATCH, predict, predict_poses
 from baselines.training.protocol import PROTOCOLS, Protocol
 from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig, Strict, TrainingConfig
@@ -84,20 +84,14 @@ def run(case: Case, seed: int) -> dict[str, float]:
         model, predictions = Path(folder) / "model.pt", Path(folder) / "predictions.csv"
         test_frames, test_labels = _test_set(case, Path(folder))
         wall_s, cpu_s = time.perf_counter(), time.process_time()
+        job = Job(
+            *(case.model, case.network, case.localizers[case.model], case.training),
+            *(case.samples_seen, seed_of(seed, "train"), case.exchanged),
+        )
         train_localizer(
-            case.model,
-            case.train_frames,
-            case.train_labels,
-            case.network,
-            case.localizers[case.model],
-            case.training,
-            case.samples_seen,
-            case.start,
-            seed_of(seed, "train"),
-            model,
-            Path(folder) / "history.csv",
+            *(job, case.train_frames, case.train_labels, model, Path(folder) / "history.csv"),
+            weights=case.start,
             test=(test_frames, test_labels),
-            protocol=case.exchanged,
         )
         wall_s, cpu_s = time.perf_counter() - wall_s, time.process_time() - cpu_s
         predict_poses(model, test_frames, test_labels, predictions)

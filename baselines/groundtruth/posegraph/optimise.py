@@ -21,16 +21,10 @@ from synfeal.geometry.poses import relative
 Optimiser = Callable[[PoseGraph, PoseGraphConfig], np.ndarray]
 
 
-def _open3d(graph: PoseGraph, cfg: PoseGraphConfig) -> np.ndarray:
-    from baselines.groundtruth.posegraph.optimise import optimise_open3d  # takes a second to load
-
-    return optimise_open3d(graph, cfg.lm_iterations)
-
-
 OPTIMISERS: dict[str, Optimiser] = {
     "toro": lambda graph, cfg: optimise_toro(graph, cfg.toro_iterations, cfg.toro_epsilon),
     "g2o": lambda graph, cfg: optimise_lm(graph, cfg.lm_iterations),
-    "open3d": _open3d,
+    "open3d": lambda graph, cfg: optimise_open3d(graph, cfg.lm_iterations),
 }
 
 
