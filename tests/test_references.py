@@ -12,8 +12,8 @@ from baselines.references.correspondences import match_test_frames, mutual_match
 from baselines.references.descriptors import Vlad, dense_sift, residuals, thumbnails
 from baselines.references.evidence import Evidence
 from baselines.references.features import Features, find_features
-from baselines.references.oracle import METRES_PER_RADIAN, nearest_rows
 from baselines.references.registry import in_group
+from baselines.references.retrieval import METRES_PER_RADIAN, nearest_rows
 from baselines.references.run import answer_and_score
 from baselines.references.structure import on_depth
 from baselines.references.tracks import Tracks, join_matches

@@ -18,11 +18,10 @@ from tqdm import tqdm
 
 from baselines.groundtruth.images import read_image
 from baselines.references.arrays import Stored
-from baselines.references.split import files_of_split
 from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig, ReferencesConfig
 from synfeal.dataset.archive import FrameFile
-from synfeal.dataset.sevenscenes import read_depth_m
+from synfeal.dataset.sevenscenes import frame_paths, read_depth_m
 from synfeal.render.base import Depth
 
 log = logging.getLogger(__name__)
@@ -67,6 +66,19 @@ class Features(Stored):
         descriptor = self.descriptor[self.of(frame)].astype(np.float32)
         roots = np.sqrt(descriptor / np.maximum(descriptor.sum(axis=1, keepdims=True), 1))
         return np.asarray(roots, dtype=np.float32)
+
+
+def files_of_split(
+    sequences: Sequence[Path], split: str, n_frames: int
+) -> tuple[list[FrameFile], list[FrameFile] | None]:
+    """Colour and depth images of the first frames; of a test set no depth: none may be used.
+
+    Raises:
+        InputError: a sequence cannot be read or has no such file.
+    """
+    color = frame_paths(sequences, "color.png")[:n_frames]
+    depth = frame_paths(sequences, "depth.png")[:n_frames] if split == "train" else None
+    return color, depth
 
 
 def write_features(

@@ -44,7 +44,7 @@ REFERENCES: dict[str, Reference] = {
         "Nearest image, DenseVLAD", "images", f"{_PACKAGE}.retrieval:by_vlad"
     ),
     "nearest-pose": Reference(
-        "Nearest training pose (oracle)", "images", f"{_PACKAGE}.oracle:nearest_pose"
+        "Nearest training pose (oracle)", "images", f"{_PACKAGE}.retrieval:nearest_pose"
     ),
     "structure-depth": Reference(
         "Structure, points from depth", "structure", f"{_PACKAGE}.structure:on_depth"

@@ -1,4 +1,4 @@
-"""The pose of the training image that looks most alike: what any localizer has to beat."""
+"""The pose of the training image that looks most alike, which any localizer has to beat, or is."""
 
 from __future__ import annotations
 
@@ -7,6 +7,11 @@ from numpy.typing import NDArray
 
 from baselines.references.evidence import Evidence
 from baselines.references.vectors import THUMBNAIL, VLAD, most_alike
+from synfeal.dataset.pose_table import PoseTable
+
+CHUNK = 500
+# How many metres a radian counts: about the depth at which a room moves as far in the image.
+METRES_PER_RADIAN = 1.0
 
 
 def by_thumbnail(evidence: Evidence) -> NDArray[np.float64]:
@@ -23,3 +28,26 @@ def nearest_label(evidence: Evidence, descriptor: str) -> NDArray[np.float64]:
     """Labels (N, 4, 4) of the training images nearest to the test images."""
     train, test = evidence.descriptors[descriptor]
     return evidence.train.world_from_cam[most_alike(train, test, 1)[:, 0]]
+
+
+def nearest_pose(evidence: Evidence) -> NDArray[np.float64]:
+    """The label of the training frame whose true pose is nearest to the test frame's true pose.
+
+    An oracle: the best that copying a training pose can do.
+    """
+    rows = nearest_rows(evidence.train_truth, evidence.test_truth)
+    return evidence.train.world_from_cam[rows]
+
+
+def nearest_rows(train: PoseTable, test: PoseTable) -> NDArray[np.int64]:
+    """For every test pose (N,) the training pose at the least metres plus radians."""
+    squares = np.square(train.position_m).sum(axis=1)
+    found = []
+    for start in range(0, len(test), CHUNK):
+        position_m = test.position_m[start : start + CHUNK]
+        square = np.square(position_m).sum(axis=1)[:, None] + squares
+        distance_m = np.sqrt(np.maximum(square - 2 * position_m @ train.position_m.T, 0))
+        cosine = np.abs(test.quat_wxyz[start : start + CHUNK] @ train.quat_wxyz.T)
+        angle_rad = 2 * np.arccos(np.minimum(cosine, 1))
+        found.append(np.argmin(distance_m + METRES_PER_RADIAN * angle_rad, axis=1))
+    return np.concatenate(found)

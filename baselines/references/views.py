@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from baselines.groundtruth.images import read_image
 from baselines.references.arrays import Stored
-from baselines.references.split import files_of_split
+from baselines.references.features import files_of_split
 from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.archive import FrameFile

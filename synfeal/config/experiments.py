@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Literal, cast
 
@@ -252,6 +252,14 @@ class Design(Strict):
 
     def _asked(self, table: TableName) -> int:
         return self.repetitions.get(table, self.repetitions.get("default", 1))
+
+
+def common_every(counts: Collection[int]) -> int:
+    """One in how many frames of a scene's largest test set is in its common one.
+
+    That has about as many frames as the smallest of the test sets, of ``counts`` frames.
+    """
+    return max(counts) // min(counts)
 
 
 def read_design(config: Config) -> Design:

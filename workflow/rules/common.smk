@@ -26,7 +26,7 @@ from baselines.training.record import training_parameters
 from synfeal.config import Run, check_mesh_files, parse_config, read_design
 from synfeal.config.load import read_yaml
 from synfeal.config.load import check_results
-from synfeal.config.experiments import INJECTED, Init, split_init
+from synfeal.config.experiments import INJECTED, Init, common_every, split_init
 from synfeal.config.models import MODELS
 from synfeal.config.robustness import CLEAN, MIXED
 from synfeal.dataset.archive import SUFFIX
@@ -307,13 +307,11 @@ def asked_datasets():
 
 def common_test_set(scene):
     """What localizers of all sizes are tested on, beside their own test sets: the true poses of the
-    largest, and of how many of its frames one is taken, so that there are as many as in the smallest.
-    """
+    largest, and of how many of its frames one is taken."""
     sizes = {e.size for e in EXPERIMENTS if e.scene == scene}
     counts = {CONFIG.n_frames(scene, size, "test"): size for size in sizes}
-    largest, smallest = max(counts), min(counts)
-    poses = f"{ROOT}/labels/{scene}/{counts[largest]}/synfeal/test.csv"
-    return poses, largest // smallest
+    poses = f"{ROOT}/labels/{scene}/{counts[max(counts)]}/synfeal/test.csv"
+    return poses, common_every(counts)
 
 
 def smallest_train(scene):

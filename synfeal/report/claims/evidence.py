@@ -29,6 +29,7 @@ from synfeal.bootstrap import (
     seed_weights,
 )
 from synfeal.config import Design, Run
+from synfeal.config.experiments import common_every
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import pose_errors
@@ -188,6 +189,6 @@ def _name(cell: Cell) -> str:
 
 
 def _thinned(tables: Sequence[PoseTable]) -> PoseTable:
-    """Frames of the longest table, as many as the shortest has (``common_test_set``)."""
-    shortest, longest = min(tables, key=len), max(tables, key=len)
-    return longest.at(np.arange(0, len(longest), len(longest) // len(shortest)))
+    """The common test set of a scene with these test sets."""
+    largest = max(tables, key=len)
+    return largest.at(np.arange(0, len(largest), common_every([*map(len, tables)])))
