@@ -38,25 +38,15 @@ Array = NDArray[np.float64]
 
 
 class Localized(NamedTuple):
-    """What became of some pictures.
+    """What became of some pictures."""
 
-    Attributes:
-        description: of the localizer.
-        device: where it ran, ``cpu`` or ``cuda``.
-        n_images: pictures.
-        n_failed: those whose pose is not finite.
-        read_ms: median time to read and shrink a picture.
-        network_ms: median time of the network on one picture alone.
-        images_per_s: pictures per second in batches, reading included.
-    """
-
-    description: ModelDescription
-    device: str
-    n_images: int
-    n_failed: int
-    read_ms: float
-    network_ms: float
-    images_per_s: float
+    description: ModelDescription  # of the localizer
+    device: str  # where it ran, ``cpu`` or ``cuda``
+    n_images: int  # pictures
+    n_failed: int  # those whose pose is not finite
+    read_ms: float  # median time to read and shrink a picture
+    network_ms: float  # median time of the network on one picture alone
+    images_per_s: float  # pictures per second in batches, reading included
 
 
 def localize(

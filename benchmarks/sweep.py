@@ -75,17 +75,11 @@ class Sweep(Strict):
 
 
 class Run(NamedTuple):
-    """One row of the table that is to be measured.
+    """One row of the table that is to be measured."""
 
-    Attributes:
-        key: value of every axis, and the seed, as the table writes them.
-        case: what the measure takes.
-        settings: digest of the case: a row is taken for this run's only where it is the same.
-    """
-
-    key: dict[str, str]
-    case: Strict
-    settings: str
+    key: dict[str, str]  # value of every axis, and the seed, as the table writes them
+    case: Strict  # what the measure takes
+    settings: str  # digest of the case: a row is taken for this run's only where it is the same
 
 
 def read_sweep(path: Path) -> Sweep:

@@ -7,17 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Batch:
-    """A run of consecutive frames that is estimated on its own.
+    """A run of consecutive frames that is estimated on its own."""
 
-    Attributes:
-        index: position of the batch in its split.
-        start: first frame, which is also the last frame of the batch before.
-        stop: one past the last frame.
-    """
-
-    index: int
-    start: int
-    stop: int
+    index: int  # position of the batch in its split
+    start: int  # first frame, which is also the last frame of the batch before
+    stop: int  # one past the last frame
 
     def __len__(self) -> int:
         return self.stop - self.start

@@ -79,18 +79,13 @@ def summary_of(records: Sequence[BatchRecord]) -> dict[str, Any]:
 
 
 def chain_batches(
+    # all batches of the split in order, from ``batches_of(len(truth), ...)``
     batches: Sequence[Batch],
-    trajectories: Sequence[BatchTrajectory],
-    truth: PoseTable,
-    cfg: GroundTruthConfig,
+    trajectories: Sequence[BatchTrajectory],  # one estimate per batch
+    truth: PoseTable,  # true poses of the split; the first one anchors the chain
+    cfg: GroundTruthConfig,  # the two thresholds
 ) -> tuple[PoseTable, list[BatchRecord]]:
     """Labels of a whole split from its batches, and what assistance they needed.
-
-    Args:
-        batches: all batches of the split in order, from ``batches_of(len(truth), ...)``.
-        trajectories: one estimate per batch.
-        truth: true poses of the split; the first one anchors the chain.
-        cfg: the two thresholds.
 
     Returns:
         The labels (frames and paths of ``truth``, other poses) and a record per batch.

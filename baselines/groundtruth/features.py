@@ -24,19 +24,12 @@ _MIN_MATCHES = 6
 
 @dataclass(frozen=True)
 class FrameFeatures:
-    """Features of one frame.
+    """Features of one frame."""
 
-    Attributes:
-        keypoints: as pycolmap's matcher takes them.
-        descriptors: likewise.
-        pixel: (k, 2) positions in the image.
-        point_m: (k, 3) in camera coordinates; not finite where there is no depth.
-    """
-
-    keypoints: pycolmap.FeatureKeypoints
-    descriptors: pycolmap.FeatureDescriptors
-    pixel: Array
-    point_m: Array
+    keypoints: pycolmap.FeatureKeypoints  # as pycolmap's matcher takes them
+    descriptors: pycolmap.FeatureDescriptors  # likewise
+    pixel: Array  # (k, 2) positions in the image
+    point_m: Array  # (k, 3) in camera coordinates; not finite where there is no depth
 
 
 class FeatureOdometry:

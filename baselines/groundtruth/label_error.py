@@ -31,20 +31,14 @@ class Spread:
 
 @dataclass(frozen=True)
 class RelativeError:
-    """Error of the motion over a fixed number of frames.
+    """Error of the motion over a fixed number of frames."""
 
-    Attributes:
-        rmse_m: root mean square of the translation's error, metres.
-        rmse_deg: the same of the rotation's, degrees.
-        per_metre_m: all errors of translation over all true metres travelled; not a number where
-            the camera stands still.
-        per_metre_deg: the same of rotation, degrees per metre.
-    """
-
-    rmse_m: float
-    rmse_deg: float
+    rmse_m: float  # root mean square of the translation's error, metres
+    rmse_deg: float  # the same of the rotation's, degrees
+    # all errors of translation over all true metres travelled; not a number where the camera stands
+    # still
     per_metre_m: float
-    per_metre_deg: float
+    per_metre_deg: float  # the same of rotation, degrees per metre
 
 
 def absolute_errors(labels: PoseTable, truth: PoseTable) -> PoseErrors:

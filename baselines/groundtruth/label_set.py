@@ -42,20 +42,13 @@ def write_label_set(
 
 
 def chain_split(
-    trajectories: Sequence[Path],
-    truth: Path,
-    labels: Path,
-    unassisted: Path,
-    cfg: GroundTruthConfig,
+    trajectories: Sequence[Path],  # files of its batches, in order
+    truth: Path,  # its true poses
+    labels: Path,  # where its labels are written
+    unassisted: Path,  # where the labels are written that it would have without assistance
+    cfg: GroundTruthConfig,  # frames per batch, and the two thresholds
 ) -> list[BatchRecord]:
     """Chain the batches of one split, and return a record per batch.
-
-    Args:
-        trajectories: files of its batches, in order.
-        truth: its true poses.
-        labels: where its labels are written.
-        unassisted: where the labels are written that it would have without assistance.
-        cfg: frames per batch, and the two thresholds.
 
     Raises:
         InputError: a file cannot be read, or a trajectory is not of its batch.

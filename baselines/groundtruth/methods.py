@@ -36,24 +36,15 @@ ODOMETRY = "odometry"
 
 @dataclass(frozen=True)
 class Method:
-    """A source of labels.
+    """A source of labels."""
 
-    Attributes:
-        title: as tables and figures call it.
-        estimate: place of its function, ``module:name``.
-        settings: key below ``groundtruth`` whose settings the function is given.
-        optimiser: a key of ``posegraph.optimise.OPTIMISERS``, or ``odometry``, which leaves the
-            graph as it is.
-        unused: times in the facts of its stages that it would not have spent.
-        published_assisted: batches that section 4.1 says it needed assistance in.
-    """
-
-    title: str
-    estimate: str = ""
-    settings: str = ""
+    title: str  # as tables and figures call it
+    estimate: str = ""  # place of its function, ``module:name``
+    settings: str = ""  # key below ``groundtruth`` whose settings the function is given
+    # a key of ``posegraph.optimise.OPTIMISERS``, or ``odometry``, which leaves the graph as it is
     optimiser: str = ""
-    unused: tuple[str, ...] = ()
-    published_assisted: int | None = None
+    unused: tuple[str, ...] = ()  # times in the facts of its stages that it would not have spent
+    published_assisted: int | None = None  # batches that section 4.1 says it needed assistance in
 
 
 METHODS: dict[str, Method] = {
@@ -132,23 +123,15 @@ def write_estimate(
 
 
 def estimate_batch(
-    name: str,
-    color_paths: Sequence[FrameFile],
+    name: str,  # a key of ``METHODS``
+    color_paths: Sequence[FrameFile],  # colour images in order
+    # 16-bit depth images in millimetres, 65535 where nothing was hit
     depth_paths: Sequence[FrameFile],
-    camera: CameraConfig,
-    groundtruth: GroundTruthConfig,
-    seed: int,
+    camera: CameraConfig,  # camera of both
+    groundtruth: GroundTruthConfig,  # of which the function is given what ``Method.settings`` names
+    seed: int,  # of whatever is random
 ) -> tuple[BatchTrajectory, Facts]:
-    """Trajectory of a batch by a method with a function, and what it took.
-
-    Args:
-        name: a key of ``METHODS``.
-        color_paths: colour images in order.
-        depth_paths: 16-bit depth images in millimetres, 65535 where nothing was hit.
-        camera: camera of both.
-        groundtruth: of which the function is given what ``Method.settings`` names.
-        seed: of whatever is random.
-    """
+    """Trajectory of a batch by a method with a function, and what it took."""
     method = METHODS[name]
     function = resolve_name(method.estimate)
     settings = getattr(groundtruth, method.settings) if method.settings else None

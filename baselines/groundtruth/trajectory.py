@@ -23,16 +23,12 @@ HEADER = ",".join(COLUMNS)
 
 @dataclass(frozen=True)
 class BatchTrajectory:
-    """Estimated motion inside one batch.
+    """Estimated motion inside one batch."""
 
-    Attributes:
-        first_from_cam: (n, 4, 4) poses relative to the first frame; where a frame is not registered
-            the entry is the identity and means nothing.
-        registered: (n,) whether the method found the frame's pose.
-    """
-
+    # (n, 4, 4) poses relative to the first frame; where a frame is not registered the entry is the
+    # identity and means nothing
     first_from_cam: NDArray[np.float64]
-    registered: NDArray[np.bool_]
+    registered: NDArray[np.bool_]  # (n,) whether the method found the frame's pose
 
     def __post_init__(self) -> None:
         n = len(self.registered)

@@ -15,14 +15,10 @@ AUXILIARY_WEIGHT = 0.3
 
 
 class Localizer(nn.Module):
-    """A network from images to poses with its own loss.
+    """A network from images to poses with its own loss."""
 
-    Attributes:
-        backbone: the part that may start from pretrained weights.
-        criterion: loss of one prediction; its parameters, if any, are trained with the network.
-    """
-
-    backbone: nn.Module
+    backbone: nn.Module  # the part that may start from pretrained weights
+    # loss of one prediction; its parameters, if any, are trained with the network
     criterion: PoseLoss
 
     def forward(self, images: Tensor) -> list[PosePrediction]:

@@ -67,13 +67,9 @@ DISTANCES: dict[Literal["norm", "mse"], Distances] = {
 
 
 class PoseLoss(nn.Module):
-    """A weighted sum of a distance of positions and one of quaternions.
+    """A weighted sum of a distance of positions and one of quaternions."""
 
-    Attributes:
-        distance: a key of ``DISTANCES``.
-    """
-
-    distance: Literal["norm", "mse"] = "norm"
+    distance: Literal["norm", "mse"] = "norm"  # a key of ``DISTANCES``
 
     def distances(
         self, prediction: PosePrediction, position_m: Tensor, quat_wxyz: Tensor

@@ -19,21 +19,16 @@ RATIO = 0.8
 
 @dataclass(frozen=True)
 class Correspondences(Stored):
-    """Matches of the test frames, one frame after the other.
+    """Matches of the test frames, one frame after the other."""
 
-    Attributes:
-        start: (N + 1,) where the matches of each test frame begin; the last is their number C.
-        slope: (C, 2) of the test feature's ray.
-        feature: (C,) index of the training feature among those of all training frames.
-        train: (C,) the training frame it belongs to.
-        point_m: (C, 3) where that frame's depth says it lies, in its camera's coordinates; not
-            finite where there is no depth.
-    """
-
+    # (N + 1,) where the matches of each test frame begin; the last is their number C
     start: NDArray[np.int64]
-    slope: NDArray[np.float64]
+    slope: NDArray[np.float64]  # (C, 2) of the test feature's ray
+    # (C,) index of the training feature among those of all training frames
     feature: NDArray[np.int64]
-    train: NDArray[np.int64]
+    train: NDArray[np.int64]  # (C,) the training frame it belongs to
+    # (C, 3) where that frame's depth says it lies, in its camera's coordinates; not finite where
+    # there is no depth
     point_m: NDArray[np.float64]
 
     def __len__(self) -> int:

@@ -91,16 +91,11 @@ def _windowed(maps: Tensor, cell_px: int) -> Tensor:
 
 @dataclass(frozen=True)
 class Vlad:
-    """A learned DenseVLAD.
+    """A learned DenseVLAD."""
 
-    Attributes:
-        words: (64, 128) visual words.
-        mean: (64 * 128,) of the training frames.
-        axes: (64 * 128, D) principal axes, each over the root of its singular value; D <= 256.
-    """
-
-    words: Tensor
-    mean: Vectors
+    words: Tensor  # (64, 128) visual words
+    mean: Vectors  # (64 * 128,) of the training frames
+    # (64 * 128, D) principal axes, each over the root of its singular value; D <= 256
     axes: Vectors
 
     @classmethod
@@ -149,21 +144,15 @@ def parts_of(values: NDArray[T]) -> Iterator[NDArray[T]]:
 
 
 def write_descriptors(
+    # packed frames by name; the vocabulary and the axes come from those of ``train``
     files: Mapping[str, Path],
+    # how many of them: those of the smallest size, so that no size sees frames that are not its own
     learned_from: int,
-    seed: int,
-    out_descriptors: Path,
-    counts: Mapping[str, int] | None = None,
+    seed: int,  # of the samples and of k-means
+    out_descriptors: Path,  # arrays to write, ``<descriptor>_<name>`` (N, D)
+    counts: Mapping[str, int] | None = None,  # how many frames of each, if not all
 ) -> None:
     """Describe packed frames as wholes.
-
-    Args:
-        files: packed frames by name; the vocabulary and the axes come from those of ``train``.
-        learned_from: how many of them: those of the smallest size, so that no size sees frames
-            that are not its own.
-        seed: of the samples and of k-means.
-        out_descriptors: arrays to write, ``<descriptor>_<name>`` (N, D).
-        counts: how many frames of each, if not all.
 
     Raises:
         InputError: packed frames cannot be read.

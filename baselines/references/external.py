@@ -25,20 +25,13 @@ NEEDED = ("frame", *COLUMNS[2:])
 
 
 def answer_externally(
-    files: Mapping[str, Path],
-    method: Mapping[str, Any],
-    named: Mapping[str, str],
-    wildcards: Mapping[str, str],
-    out_references: Sequence[Path],
+    files: Mapping[str, Path],  # labels, true poses and packed frames by name, and ``poses``
+    method: Mapping[str, Any],  # settings: ``command`` or ``poses``
+    named: Mapping[str, str],  # see :func:`run_external`
+    wildcards: Mapping[str, str],  # further keys of the metrics
+    out_references: Sequence[Path],  # files to write, all in one folder
 ) -> None:
     """Run the command of a method, or take its file ``poses``, and score the answers.
-
-    Args:
-        files: labels, true poses and packed frames by name, and ``poses``.
-        method: settings: ``command`` or ``poses``.
-        named: see :func:`run_external`.
-        wildcards: further keys of the metrics.
-        out_references: files to write, all in one folder.
 
     Raises:
         InputError: the command fails, or the answers cannot be read.

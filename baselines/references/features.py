@@ -30,19 +30,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Features(Stored):
-    """Features of the frames of a split, one frame after the other.
+    """Features of the frames of a split, one frame after the other."""
 
-    Attributes:
-        start: (N + 1,) where the features of each frame begin; the last is their number K.
-        slope: (K, 2) x / z and y / z of the rays they lie on, lens distortion removed.
-        depth_m: (K,) along the optical axis, inf where there is none; of no use for test frames.
-        descriptor: (K, 128) uint8.
-    """
-
+    # (N + 1,) where the features of each frame begin; the last is their number K
     start: NDArray[np.int64]
-    slope: Array
+    slope: Array  # (K, 2) x / z and y / z of the rays they lie on, lens distortion removed
+    # (K,) along the optical axis, inf where there is none; of no use for test frames
     depth_m: Array
-    descriptor: NDArray[np.uint8]
+    descriptor: NDArray[np.uint8]  # (K, 128) uint8
 
     def __len__(self) -> int:
         return len(self.start) - 1

@@ -17,21 +17,17 @@ Externals = Mapping[str, ExternalConfig]
 
 @dataclass(frozen=True)
 class Reference:
-    """A reference method.
+    """A reference method."""
 
-    Attributes:
-        title: as tables and figures call it.
-        group: which methods are answered by one job: ``images`` looks at the frames that localizers
-            see, of every data set; ``structure`` at frames with depth, where some label set of the
-            data set is estimated from them. ``adjusted`` and ``coordinates`` do, too, for
-            label sets of the paper alone, the latter for those of :func:`worst`: they take longer.
-        answer: place of its function, ``module:name``, from
-            :class:`~baselines.references.evidence.Evidence` to poses (N, 4, 4) of the test frames,
-            NaN where it finds none. By place, so that a table of titles loads no estimator.
-    """
-
-    title: str
+    title: str  # as tables and figures call it
+    # which methods are answered by one job: ``images`` looks at the frames that localizers see, of
+    # every data set; ``structure`` at frames with depth, where some label set of the data set is
+    # estimated from them. ``adjusted`` and ``coordinates`` do, too, for label sets of the paper
+    # alone, the latter for those of :func:`worst`: they take longer.
     group: Group
+    # place of its function, ``module:name``, from :class:`~baselines.references.evidence.Evidence`
+    # to poses (N, 4, 4) of the test frames, NaN where it finds none. By place, so that a table of
+    # titles loads no estimator.
     answer: str
 
 

@@ -35,23 +35,16 @@ Files = Mapping[str, Path]
 
 @memory_errors()
 def robustness_table(
-    models: Mapping[str, Files],
-    descriptors: Files,
+    models: Mapping[str, Files],  # checkpoints of localizers, by training set and name
+    descriptors: Files,  # of the training frames and of all test frames, by training set
+    # tables of what :func:`baselines.references.varied.write_varied` finds on ideal training
+    # frames, by effects; empty where there are none
     structure: Files,
-    test_frames: Files,
-    labels: Path,
-    device: Literal["auto", "cpu", "cuda"] = "auto",
+    test_frames: Files,  # packed test frames by the name of their effects
+    labels: Path,  # folder of the true poses, ``train.csv`` and ``test.csv``: the same for all
+    device: Literal["auto", "cpu", "cuda"] = "auto",  # where to predict
 ) -> pd.DataFrame:
     """Median errors by training set, method and effects, with 95 % limits over whole paths.
-
-    Args:
-        models: checkpoints of localizers, by training set and name.
-        descriptors: of the training frames and of all test frames, by training set.
-        structure: tables of what :func:`baselines.references.varied.write_varied` finds on ideal
-            training frames, by effects; empty where there are none.
-        test_frames: packed test frames by the name of their effects.
-        labels: folder of the true poses, ``train.csv`` and ``test.csv``: the same for all.
-        device: where to predict.
 
     Raises:
         InputError: a file cannot be used.

@@ -51,23 +51,14 @@ def world_points(views: Views, world_from_cam: Array) -> NDArray[np.float32]:
 
 
 def learn(
-    images: Tensor,
-    points: Tensor,
-    statistics: ImageStatistics,
-    samples_seen: int,
-    seed: int,
-    device: torch.device,
+    images: Tensor,  # (N, 3, h, w) uint8
+    points: Tensor,  # (N, 3, R, C) in metres; not finite where they are not known
+    statistics: ImageStatistics,  # of the images
+    samples_seen: int,  # images shown in all
+    seed: int,  # of the initial weights and the order of the images
+    device: torch.device,  # where to learn
 ) -> CoordinateNetwork:
-    """A network trained by the mean distance of points, with the localizers' optimiser.
-
-    Args:
-        images: (N, 3, h, w) uint8.
-        points: (N, 3, R, C) in metres; not finite where they are not known.
-        statistics: of the images.
-        samples_seen: images shown in all.
-        seed: of the initial weights and the order of the images.
-        device: where to learn.
-    """
+    """A network trained by the mean distance of points, with the localizers' optimiser."""
     torch.manual_seed(seed)
     known = points.movedim(1, -1)[points.isfinite().all(dim=1)]
     network = CoordinateNetwork(known.mean(dim=0))

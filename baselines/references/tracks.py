@@ -27,20 +27,14 @@ CONFIDENCE, MAX_TRIALS = 0.999, 500
 
 @dataclass(frozen=True)
 class Tracks(Stored):
-    """Observations of points by the training frames.
+    """Observations of points by the training frames."""
 
-    Attributes:
-        frame: (M,) training frame of each observation.
-        slope: (M, 2) of its ray.
-        track: (M,) index of the point, 0 to T - 1; every point is seen in two frames or more, and
-            by none twice.
-        of_feature: (K,) the point that a training feature shows, or -1.
-    """
-
-    frame: Rows
-    slope: NDArray[np.float64]
+    frame: Rows  # (M,) training frame of each observation
+    slope: NDArray[np.float64]  # (M, 2) of its ray
+    # (M,) index of the point, 0 to T - 1; every point is seen in two frames or more, and by none
+    # twice
     track: Rows
-    of_feature: Rows
+    of_feature: Rows  # (K,) the point that a training feature shows, or -1
 
     @property
     def count(self) -> int:

@@ -22,29 +22,19 @@ from synfeal.effects.relight import open_scene
 
 
 def write_varied(
-    effects: str,
+    effects: str,  # what the descriptors call all test frames that are drawn like these
+    # ``mesh``, ``plan`` of the test frames, ``labels``, ``features`` with depth and ``descriptors``
+    # of the training frames
     files: Mapping[str, Path],
-    n_test: int,
-    sample: int,
-    camera: CameraConfig,
-    render: RenderConfig,
-    references: ReferencesConfig,
-    seed: int,
-    out_predictions: Path,
+    n_test: int,  # test frames there are
+    sample: int,  # how many of them are drawn at most, spread evenly
+    camera: CameraConfig,  # of the frames
+    render: RenderConfig,  # with effects
+    references: ReferencesConfig,  # features and retrieval
+    seed: int,  # of RANSAC
+    out_predictions: Path,  # poses of the frames drawn, NaN where none is found
 ) -> None:
     """Draw some test frames with effects, and write what ``structure-depth`` answers for them.
-
-    Args:
-        effects: what the descriptors call all test frames that are drawn like these.
-        files: ``mesh``, ``plan`` of the test frames, ``labels``, ``features`` with depth and
-            ``descriptors`` of the training frames.
-        n_test: test frames there are.
-        sample: how many of them are drawn at most, spread evenly.
-        camera: of the frames.
-        render: with effects.
-        references: features and retrieval.
-        seed: of RANSAC.
-        out_predictions: poses of the frames drawn, NaN where none is found.
 
     Raises:
         InputError: a file cannot be read.

@@ -28,18 +28,13 @@ STRIDE = 4  # pixels between the cells of the network's output
 
 @dataclass(frozen=True)
 class Views(Stored):
-    """Frames of a split as a scene-coordinate network sees them.
+    """Frames of a split as a scene-coordinate network sees them."""
 
-    Attributes:
-        images: (N, h, w, 3) uint8.
-        slope: (R, C, 2) x / z and y / z of the ray through the middle of each cell, distortion
-            removed; cell (r, c) is centred on pixel (4 r, 4 c).
-        depth_m: (N, R, C) along the optical axis there, inf where there is none.
-    """
-
-    images: NDArray[np.uint8]
+    images: NDArray[np.uint8]  # (N, h, w, 3) uint8
+    # (R, C, 2) x / z and y / z of the ray through the middle of each cell, distortion removed; cell
+    # (r, c) is centred on pixel (4 r, 4 c)
     slope: Array
-    depth_m: NDArray[np.float32]
+    depth_m: NDArray[np.float32]  # (N, R, C) along the optical axis there, inf where there is none
 
     def __len__(self) -> int:
         return len(self.images)

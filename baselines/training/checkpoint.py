@@ -19,17 +19,11 @@ from synfeal.files import atomic_path
 
 @dataclass(frozen=True)
 class TrainedLocalizer:
-    """A localizer that was read from a checkpoint, ready for prediction.
+    """A localizer that was read from a checkpoint, ready for prediction."""
 
-    Attributes:
-        description: what it is.
-        network: the network on its device, in evaluation mode.
-        statistics: of the images it was trained on.
-    """
-
-    description: ModelDescription
-    network: Localizer
-    statistics: ImageStatistics
+    description: ModelDescription  # what it is
+    network: Localizer  # the network on its device, in evaluation mode
+    statistics: ImageStatistics  # of the images it was trained on
 
     @property
     def device(self) -> torch.device:

@@ -30,31 +30,18 @@ class Augmentation(Restorable, Interface):
 
 @dataclass
 class Fitting:
-    """A training run between two steps: what it is made of, and how a step is taken.
+    """A training run between two steps: what it is made of, and how a step is taken."""
 
-    Attributes:
-        localizer: on the device of the frames.
-        frames: to learn from.
-        statistics: of the images.
-        optimisation: updates the weights.
-        order: of the frames.
-        progress: losses and history so far.
-        selection: which weights are kept.
-        evaluations: steps after which these are chosen among.
-        precision: of the network; losses and weights are float32.
-        augment: applied to each batch of normalised images.
-    """
-
-    localizer: Localizer
-    frames: LabelledFrames
-    statistics: ImageStatistics
-    optimisation: Optimisation
-    order: BatchOrder
-    progress: Progress
-    selection: Selection
-    evaluations: frozenset[int]
-    precision: Precision
-    augment: Augmentation | None
+    localizer: Localizer  # on the device of the frames
+    frames: LabelledFrames  # to learn from
+    statistics: ImageStatistics  # of the images
+    optimisation: Optimisation  # updates the weights
+    order: BatchOrder  # of the frames
+    progress: Progress  # losses and history so far
+    selection: Selection  # which weights are kept
+    evaluations: frozenset[int]  # steps after which these are chosen among
+    precision: Precision  # of the network; losses and weights are float32
+    augment: Augmentation | None  # applied to each batch of normalised images
 
     @property
     def parts(self) -> dict[str, Restorable]:
@@ -87,37 +74,26 @@ class Fitting:
 
 
 def fit(
+    # see :class:`Fitting`, as for ``frames``, ``statistics``, ``precision`` and ``augment``
     localizer: Localizer,
-    frames: LabelledFrames,
-    statistics: ImageStatistics,
-    schedule: Schedule,
-    seed: int,
+    frames: LabelledFrames,  # to learn from
+    statistics: ImageStatistics,  # of the images
+    schedule: Schedule,  # how long and how fast
+    seed: int,  # of the order of the frames; dropout draws from torch's global generator
     *,
-    protocol: Protocol = LAST_WEIGHTS,
+    protocol: Protocol = LAST_WEIGHTS,  # how
+    # frames that decide which weights are kept; without any it is the last ones
     held_out: LabelledFrames | None = None,
-    patience: int | None = None,
-    precision: Precision = "float32",
-    augment: Augmentation | None = None,
+    patience: int | None = None,  # evaluations without a new best after which training stops
+    precision: Precision = "float32",  # of the network
+    augment: Augmentation | None = None,  # of the images
+    # where the state is kept; a run that finds its own there goes on with it
     resume: ResumeFile = NOT_KEPT,
 ) -> list[HistoryRow]:
     """Train in place and return the history.
 
     Stops when the loss is no longer finite. Such a run has failed: all its weights become NaN, also
     where weights from before would do, because a good one is not one that was stopped in time.
-
-    Args:
-        localizer: see :class:`Fitting`, as for ``frames``, ``statistics``, ``precision`` and
-            ``augment``.
-        frames: to learn from.
-        statistics: of the images.
-        schedule: how long and how fast.
-        seed: of the order of the frames; dropout draws from torch's global generator.
-        protocol: how.
-        held_out: frames that decide which weights are kept; without any it is the last ones.
-        patience: evaluations without a new best after which training stops.
-        precision: of the network.
-        augment: of the images.
-        resume: where the state is kept; a run that finds its own there goes on with it.
     """
     selection = Selection(protocol.selection, localizer, statistics, held_out, precision)
     run = Fitting(

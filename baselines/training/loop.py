@@ -61,19 +61,12 @@ class Job(NamedTuple):
 
 
 class Material(NamedTuple):
-    """What a training run begins with: a network, and frames that it learns from.
+    """What a training run begins with: a network, and frames that it learns from."""
 
-    Attributes:
-        localizer: with its first weights, on the device of the frames.
-        statistics: of all images.
-        learned: frames to learn from.
-        held_out: frames that decide which weights are kept, if any.
-    """
-
-    localizer: Localizer
-    statistics: ImageStatistics
-    learned: LabelledFrames
-    held_out: LabelledFrames | None
+    localizer: Localizer  # with its first weights, on the device of the frames
+    statistics: ImageStatistics  # of all images
+    learned: LabelledFrames  # frames to learn from
+    held_out: LabelledFrames | None  # frames that decide which weights are kept, if any
 
     def fingerprints(self) -> list[object]:
         """All that a run depends on beside its settings; of its images, samples."""

@@ -19,20 +19,13 @@ WARM_UP = 0.05
 
 
 class Schedule(NamedTuple):
-    """How long and how fast to learn.
+    """How long and how fast to learn."""
 
-    Attributes:
-        samples_seen: images shown in all, rounded up to whole batches.
-        batch_size: images per step.
-        learning_rate: the highest one; Muon's is ``MUON_RATE`` times it.
-        weight_decay: decoupled, but with ``halving`` of the loss.
-        halve_every: share of the training run after which the rate is halved (``halving``).
-    """
-
-    samples_seen: int
-    batch_size: int
-    learning_rate: float
-    weight_decay: float
+    samples_seen: int  # images shown in all, rounded up to whole batches
+    batch_size: int  # images per step
+    learning_rate: float  # the highest one; Muon's is ``MUON_RATE`` times it
+    weight_decay: float  # decoupled, but with ``halving`` of the loss
+    # share of the training run after which the rate is halved (``halving``)
     halve_every: float = 1.0
 
     @property

@@ -23,22 +23,14 @@ BATCH = 100
 
 @memory_errors()
 def predict_poses(
-    model: Path,
-    frames: Path,
-    labels_like: Path,
-    out: Path,
-    device: Literal["auto", "cpu", "cuda"] = "auto",
-    every: int = 1,
+    model: Path,  # checkpoint
+    frames: Path,  # packed frames of the split
+    labels_like: Path,  # a pose table that says which frames there are; its poses are not used
+    out: Path,  # pose table to write; a value the network gives no finite number for is ``nan``
+    device: Literal["auto", "cpu", "cuda"] = "auto",  # where to predict
+    every: int = 1,  # predict the first of each so many frames
 ) -> None:
     """Write predictions as a pose table with unit quaternions, w >= 0.
-
-    Args:
-        model: checkpoint.
-        frames: packed frames of the split.
-        labels_like: a pose table that says which frames there are; its poses are not used.
-        out: pose table to write; a value the network gives no finite number for is ``nan``.
-        device: where to predict.
-        every: predict the first of each so many frames.
 
     Raises:
         InputError: one of the files cannot be used.

@@ -82,24 +82,16 @@ class RoomsNetwork(Localizer):
 
 @memory_errors()
 def pretrain_backbone(
-    backbone: BackboneName,
-    network: NetworkConfig,
+    backbone: BackboneName,  # which one
+    network: NetworkConfig,  # input side and width
+    # where the weights come from, and how long they are trained if they are new
     pretraining: PretrainingConfig,
-    seed: int,
-    out_weights: Path,
-    frames: Sequence[Path] = (),
-    labels: Sequence[Path] = (),
+    seed: int,  # of the initial weights, the order of frames and their rotations
+    out_weights: Path,  # state dict to write
+    frames: Sequence[Path] = (),  # packed frames of each room; none unless ``source`` is ``rooms``
+    labels: Sequence[Path] = (),  # their true poses, likewise
 ) -> None:
     """Write the state dict that ``init: pretrained`` starts from.
-
-    Args:
-        backbone: which one.
-        network: input side and width.
-        pretraining: where the weights come from, and how long they are trained if they are new.
-        seed: of the initial weights, the order of frames and their rotations.
-        out_weights: state dict to write.
-        frames: packed frames of each room; none unless ``source`` is ``rooms``.
-        labels: their true poses, likewise.
 
     Raises:
         InputError: a file cannot be used, or the ImageNet weights cannot be had.

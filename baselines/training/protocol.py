@@ -9,25 +9,22 @@ from synfeal.config.models import ModelName
 
 
 class Protocol(NamedTuple):
-    """The parts of a training run that decide what its score means.
+    """The parts of a training run that decide what its score means."""
 
-    Attributes:
-        order: ``shuffled`` draws a new order for every epoch, ``collected`` shows the frames of one
-            path after the other, as they were collected.
-        selection: whose errors decide which weights are kept: those on ``validation`` paths held
-            out of the training set, those on the ``test`` set; ``last`` keeps the last weights.
-        distance: ``norm``: Euclidean distances, ``q`` and ``-q`` are one rotation. ``mse``: mean
-            squared differences of coordinates, predicted quaternions normalised first.
-        optimiser: ``muon`` for kernels and AdamW for the rest, or ``adamw`` for all: the rate
-            rises, then falls to nothing. ``halving``: Adam with L2 regularisation of all
-            parameters, the rate is halved at regular intervals.
-        images: ``rotated``: by ``training.augmentation``; ``plain``: as they were collected.
-    """
-
+    # ``shuffled`` draws a new order for every epoch, ``collected`` shows the frames of one path
+    # after the other, as they were collected
     order: Literal["shuffled", "collected"]
+    # whose errors decide which weights are kept: those on ``validation`` paths held out of the
+    # training set, those on the ``test`` set; ``last`` keeps the last weights
     selection: Literal["validation", "test", "last"]
+    # ``norm``: Euclidean distances, ``q`` and ``-q`` are one rotation. ``mse``: mean squared
+    # differences of coordinates, predicted quaternions normalised first.
     distance: Literal["norm", "mse"]
+    # ``muon`` for kernels and AdamW for the rest, or ``adamw`` for all: the rate rises, then falls
+    # to nothing. ``halving``: Adam with L2 regularisation of all parameters, the rate is halved at
+    # regular intervals.
     optimiser: OptimiserName
+    # ``rotated``: by ``training.augmentation``; ``plain``: as they were collected
     images: Literal["rotated", "plain"]
 
 

@@ -12,39 +12,24 @@ from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig, Tra
 
 
 def train_and_predict(
-    model: ModelName,
-    frames: Path,
-    labels: Path,
-    test_frames: Path,
+    model: ModelName,  # which localizer
+    frames: Path,  # packed frames to learn from, the first of which are those of ``labels``
+    labels: Path,  # their poses
+    test_frames: Path,  # packed frames of the test set
+    # their poses, of which only the frames are read, but by a published protocol
     test_labels: Path,
-    run: dict[str, Any],
-    out_model: Path,
-    out_history: Path,
-    out_record: Path,
-    out_predictions: Path,
-    weights: Path | None = None,
+    run: dict[str, Any],  # see :func:`baselines.training.record.training_parameters`
+    out_model: Path,  # checkpoint
+    out_history: Path,  # losses
+    out_record: Path,  # what the run was trained from
+    out_predictions: Path,  # poses of the test frames
+    weights: Path | None = None,  # of the backbone; none from scratch
+    # pose table of the common test set, of whose frames one in ``every`` is predicted
     common: Path | None = None,
-    every: int = 1,
-    out_common: Path | None = None,
+    every: int = 1,  # see there
+    out_common: Path | None = None,  # poses of the common test set
 ) -> None:
-    """Train a localizer, and predict the test frames it is scored on.
-
-    Args:
-        model: which localizer.
-        frames: packed frames to learn from, the first of which are those of ``labels``.
-        labels: their poses.
-        test_frames: packed frames of the test set.
-        test_labels: their poses, of which only the frames are read, but by a published protocol.
-        run: see :func:`baselines.training.record.training_parameters`.
-        out_model: checkpoint.
-        out_history: losses.
-        out_record: what the run was trained from.
-        out_predictions: poses of the test frames.
-        weights: of the backbone; none from scratch.
-        common: pose table of the common test set, of whose frames one in ``every`` is predicted.
-        every: see there.
-        out_common: poses of the common test set.
-    """
+    """Train a localizer, and predict the test frames it is scored on."""
     inputs = {"frames": frames, "labels": labels, "test_frames": test_frames}
     inputs |= {"test_labels": test_labels} | ({"weights": weights} if weights else {})
     training = TrainingConfig(**run["training"], samples_seen={})

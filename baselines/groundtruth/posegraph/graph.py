@@ -33,32 +33,20 @@ _CELLS = {_VERTEX: 8, _EDGE: 2 + 7 + len(_UPPER[0])}
 
 @dataclass(frozen=True)
 class Edge:
-    """A measured motion.
+    """A measured motion."""
 
-    Attributes:
-        i: node the motion starts from.
-        j: node it leads to.
-        i_from_j: (4, 4) measured pose of node j in the frame of node i.
-        information: (6, 6) inverse covariance, translation first.
-    """
-
-    i: int
-    j: int
-    i_from_j: Array
-    information: Array
+    i: int  # node the motion starts from
+    j: int  # node it leads to
+    i_from_j: Array  # (4, 4) measured pose of node j in the frame of node i
+    information: Array  # (6, 6) inverse covariance, translation first
 
 
 @dataclass(frozen=True)
 class PoseGraph:
-    """A batch as a graph.
+    """A batch as a graph."""
 
-    Attributes:
-        first_from_cam: (n, 4, 4) initial poses relative to node 0.
-        edges: measured motions.
-    """
-
-    first_from_cam: Array
-    edges: tuple[Edge, ...]
+    first_from_cam: Array  # (n, 4, 4) initial poses relative to node 0
+    edges: tuple[Edge, ...]  # measured motions
 
     def __len__(self) -> int:
         return len(self.first_from_cam)

@@ -36,15 +36,10 @@ MIN_CONSTRAINT = 1e-3
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion that was found.
+    """A motion that was found."""
 
-    Attributes:
-        i_from_j: (4, 4).
-        agreement: share of the points of j whose depth agrees closely with image i.
-    """
-
-    i_from_j: Array
-    agreement: float
+    i_from_j: Array  # (4, 4)
+    agreement: float  # share of the points of j whose depth agrees closely with image i
 
 
 def near(a: Array, b: Array, max_m: float = MAX_CHANGE_M, max_deg: float = MAX_CHANGE_DEG) -> bool:

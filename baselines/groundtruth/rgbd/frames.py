@@ -23,17 +23,11 @@ _INVALID_MM = (0, 65535)
 
 @dataclass(frozen=True)
 class RgbdFrame:
-    """One frame.
+    """One frame."""
 
-    Attributes:
-        color: (H, W, 3) uint8.
-        depth_m: (H, W) along the optical axis, inf where nothing was measured.
-        camera: of both.
-    """
-
-    color: NDArray[np.uint8]
-    depth_m: NDArray[np.float32]
-    camera: CameraConfig
+    color: NDArray[np.uint8]  # (H, W, 3) uint8
+    depth_m: NDArray[np.float32]  # (H, W) along the optical axis, inf where nothing was measured
+    camera: CameraConfig  # of both
 
     @cached_property
     def rgbd(self) -> o3d.t.geometry.RGBDImage:

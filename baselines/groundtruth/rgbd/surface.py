@@ -21,20 +21,13 @@ Array = NDArray[np.float64]
 
 
 class Stage(NamedTuple):
-    """How images are compared, and for how long.
+    """How images are compared, and for how long."""
 
-    Attributes:
-        stride: every how many pixels are compared.
-        max_steps: steps at the most.
-        huber_m: depth difference beyond which a point counts by its distance, not its square.
-        rest_m, rest_deg: a step that moves the camera by no more is the last.
-    """
-
-    stride: int
-    max_steps: int
-    huber_m: float
-    rest_m: float
-    rest_deg: float
+    stride: int  # every how many pixels are compared
+    max_steps: int  # steps at the most
+    huber_m: float  # depth difference beyond which a point counts by its distance, not its square
+    rest_m: float  # a step that moves the camera by no more is the last
+    rest_deg: float  # a step that moves the camera by no more is the last
 
 
 # The first stages find a motion, but pull those that depth hardly tells by 0.1 degrees; the last

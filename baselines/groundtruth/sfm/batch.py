@@ -102,22 +102,16 @@ def write_sfm(
 
 
 def sfm_batch(
-    color_paths: Sequence[FrameFile],
-    camera: CameraConfig,
+    color_paths: Sequence[FrameFile],  # images of the batch in order
+    camera: CameraConfig,  # their camera
+    # (n, 4, 4) true poses, used for scale and placement only
     true_world_from_cam: NDArray[np.float64],
-    cfg: SfmConfig,
-    seed: int,
+    cfg: SfmConfig,  # features, matching and mapping
+    seed: int,  # of RANSAC and of the mapper
 ) -> tuple[BatchTrajectory, Facts]:
     """Estimate the poses of one batch from its colour images.
 
     One thread and a fixed seed make the poses repeatable to the bit on one machine.
-
-    Args:
-        color_paths: images of the batch in order.
-        camera: their camera.
-        true_world_from_cam: (n, 4, 4) true poses, used for scale and placement only.
-        cfg: features, matching and mapping.
-        seed: of RANSAC and of the mapper.
 
     Returns:
         Poses relative to the true pose of the first frame, none registered where the mapper finds

@@ -32,36 +32,22 @@ _STARTS = (None, 0.5, 0.25, 0.75)
 
 @dataclass(frozen=True)
 class Matches:
-    """What the mappers start from.
+    """What the mappers start from."""
 
-    Attributes:
-        images: directory of the images.
-        database: their features and verified matches.
-        image_ids: in the order of the frames.
-        matched_points: image points with at least one verified match.
-    """
-
-    images: Path
-    database: Path
-    image_ids: tuple[int, ...]
-    matched_points: int
+    images: Path  # directory of the images
+    database: Path  # their features and verified matches
+    image_ids: tuple[int, ...]  # in the order of the frames
+    matched_points: int  # image points with at least one verified match
 
 
 @dataclass(frozen=True)
 class Mapping:
-    """What the mapper made of a batch.
+    """What the mapper made of a batch."""
 
-    Attributes:
-        model: the one that explains the most; None when there is none.
-        models: how many models there are: the parts that the batch fell into.
-        starts: how often the mapper started.
-        explained: share of the matched image points that ``model`` explains.
-    """
-
-    model: pycolmap.Reconstruction | None
-    models: int
-    starts: int
-    explained: float
+    model: pycolmap.Reconstruction | None  # the one that explains the most; None when there is none
+    models: int  # how many models there are: the parts that the batch fell into
+    starts: int  # how often the mapper started
+    explained: float  # share of the matched image points that ``model`` explains
 
 
 def read_matches(images: Path, database: Path) -> Matches:

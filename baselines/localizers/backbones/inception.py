@@ -45,15 +45,10 @@ class InceptionMaps(NamedTuple):
 
 
 class InceptionBackbone(nn.Module):
-    """GoogLeNet or Inception v3 without its classifiers.
+    """GoogLeNet or Inception v3 without its classifiers."""
 
-    Attributes:
-        n_aux: channels of the maps ``auxiliary1`` and ``auxiliary2``.
-        n_out: channels of the last map.
-    """
-
-    n_aux: tuple[int, int]
-    n_out: int
+    n_aux: tuple[int, int]  # channels of the maps ``auxiliary1`` and ``auxiliary2``
+    n_out: int  # channels of the last map
     input_scale: Tensor
     input_shift: Tensor
 
