@@ -41,7 +41,7 @@ rule all:
 
 rule scenes:
     input:
-        expand(f"{ROOT}/scenes/{{scene}}/properties.json", scene=CONFIG.scenes),
+        under("scenes/{scene}/properties.json", scene=CONFIG.scenes),
 
 
 rule datasets:
@@ -64,28 +64,33 @@ rule runs:
 
 rule start:
     input:
-        expand(f"{ROOT}/pretrained/{{backbone}}.pt", backbone=["googlenet", "resnet34"]),
+        under("pretrained/{backbone}.pt", backbone=["googlenet", "resnet34"]),
 
 
 rule tables:
     input:
         files_of_runs(),
-        expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
+        under("tables/{table}.csv", table=TABLE_NAMES),
 
 
 # Every table from what was restored (synfeal restore), training nothing.
 rule rescored:
     input:
         predictions_there,
-        expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
-        f"{ROOT}/tables/all_tables.tex",
-        f"{ROOT}/tables/recall.csv",
-        f"{ROOT}/tables/assistance.csv",
-        f"{ROOT}/tables/label_error.csv",
-        f"{ROOT}/tables/speed_vs_error.csv",
-        f"{ROOT}/tables/hard_cases.csv",
-        f"{ROOT}/claims.csv",
-        f"{ROOT}/summary.md",
+        under(
+            "tables/{table}.csv",
+            table=[
+                *TABLE_NAMES,
+                *(
+                    "recall",
+                    "assistance",
+                    "label_error",
+                    "speed_vs_error",
+                    "hard_cases",
+                ),
+            ],
+        ),
+        under("{file}", file=["tables/all_tables.tex", "claims.csv", "summary.md"]),
 
 
 onstart:

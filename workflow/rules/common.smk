@@ -1,6 +1,6 @@
 # What the rules share: the checked configuration, and which files a target needs. No rules here.
 import sys
-from functools import cache
+from functools import cache, partial
 from typing import get_args
 
 from snakemake.logging import logger
@@ -64,7 +64,10 @@ ARCHIVE = SUFFIX if CONFIG.archive_sequences else ""
 SPLITS = ("train", "test")
 SCENES = sorted({e.scene for e in EXPERIMENTS})
 SIZES = sorted({(e.scene, e.size) for e in EXPERIMENTS})
-RUNS = DESIGN.runs
+RUNS = [run.directory for run in DESIGN.runs]
+TRUE_SETS = [f"{scene}/{size}/synfeal" for scene, size in SIZES]
+ESTIMATED_SETS = ["/".join(names) for names in DESIGN.estimated]
+POSE_SETS = sorted({*TRUE_SETS, *ESTIMATED_SETS})
 TABLE_NAMES = ["table1_meshes", *DESIGN.tables]
 DRAWN_TABLES = ("table3_inconsistencies", "table4_size", "table7_images_shown")
 RECONSTRUCTED = tuple(METHODS)
@@ -90,6 +93,11 @@ wildcard_constraints:
     effects="|".join([CLEAN, *CONFIG.robustness.effects, MIXED]),
     frame_method="|".join(frame_methods()),
     graph_method="|".join(graph_methods()),
+
+
+def under(pattern, **names):
+    """Files of the profile's results: the pattern with every combination of these names."""
+    return expand(f"{ROOT}/{pattern}", **names)
 
 
 def dump(model, **kwargs):
@@ -124,9 +132,10 @@ def sequence_named(wildcards, camera=None):
 
 def packed_shards(scene, split, kind):
     """Parts of a split's packed frames, in order (``npy``), or what they are (``json``)."""
-    stem = f"{ROOT}/frames/{scene}/shards"
-    every = sequences(scene, "network")
-    return [f"{stem}/{s.name}.{kind}" for s in every if s.split == split]
+    names = [s.name for s in sequences(scene, "network") if s.split == split]
+    return under(
+        "frames/{scene}/shards/{name}.{kind}", scene=scene, name=names, kind=kind
+    )
 
 
 def sequence_output(stem):
@@ -149,7 +158,7 @@ def plans_with_frames(scene, camera, kind):
     if kind != "csv" and camera != "network":
         return []
     splits = [split for split in SPLITS if n_frames(scene, camera, split)]
-    return [f"{ROOT}/plans/{scene}/{split}.{kind}" for split in splits]
+    return under("plans/{scene}/{split}.{kind}", scene=scene, split=splits, kind=kind)
 
 
 def batch_of(wildcards):
@@ -170,19 +179,18 @@ def batch_sequences(wildcards):
     return sequence_dirs(wildcards.scene, "groundtruth", wildcards.split, stop)
 
 
-def unless_restored(outputs, source):
-    """Input of a rule: ``source`` (a path or a function), or none where ``outputs`` were restored.
+def unless_restored(outputs, **sources):
+    """Inputs of a rule, paths or functions by name; none where ``outputs`` were restored.
 
     What was restored (``synfeal restore``) is done, whatever is made again of what it came from.
     """
-    outputs = [outputs] if isinstance(outputs, str) else outputs
 
-    def needed(wildcards):
+    def needed(source, wildcards):
         if all(output.format(**wildcards) in RESTORED for output in outputs):
             return []
         return source(wildcards) if callable(source) else source.format(**wildcards)
 
-    return needed
+    return {name: partial(needed, source) for name, source in sources.items()}
 
 
 def backbone_weights(wildcards):
@@ -203,17 +211,9 @@ def train_mem_mb(wildcards, attempt):
     return attempt * training_mb(frames, CONFIG.network, CONFIG.training.batch_size)
 
 
-def metrics_of(runs):
-    return [f"{ROOT}/runs/{run.directory}/metrics.json" for run in runs]
-
-
-def all_metrics():
-    return metrics_of(RUNS)
-
-
 def predictions_there(wildcards):
     """Predictions of every run, none of which is to be made for this."""
-    paths = [m.replace("metrics.json", "predictions.csv") for m in all_metrics()]
+    paths = under("runs/{run}/predictions.csv", run=RUNS)
     missing = [path for path in paths if not Path(path).exists()]
     if missing:
         sys.exit(
@@ -223,36 +223,13 @@ def predictions_there(wildcards):
     return paths
 
 
-def label_files(sets, end=""):
-    """Both splits of label sets, by scene, size and name."""
-    return [
-        f"{ROOT}/labels/{s}/{z}/{l}/{split}{end}.csv"
-        for s, z, l in sorted(sets)
-        for split in SPLITS
-    ]
-
-
-def all_labels():
-    return label_files({(e.scene, e.size, e.label_id) for e in EXPERIMENTS})
-
-
-def true_labels():
-    """The true poses of every data set."""
-    return label_files((s, z, "synfeal") for s, z in SIZES)
-
-
-def pose_labels():
-    """The true poses of every data set, and those that ground-truth methods estimated."""
-    return label_files({(s, z, "synfeal") for s, z in SIZES} | {*DESIGN.estimated})
-
-
-def errors_of(runs, file="errors.csv"):
-    return [f"{ROOT}/runs/{run.directory}/{file}" for run in runs]
+def runs_of(table):
+    return [run.directory for run in DESIGN.table_runs(table)]
 
 
 def files_of_trainings(pattern):
     """A file of each training run (``{run}``) of Table 4; of restored runs those that were kept."""
-    runs = [run.directory for run in DESIGN.table_runs("table4_size")]
+    runs = runs_of("table4_size")
     made = [run for run in runs if f"{ROOT}/runs/{run}/predictions.csv" not in RESTORED]
     files = {run: f"{ROOT}/{pattern.format(run=run)}" for run in runs}
     return [file for run, file in files.items() if run in made or file in RESTORED]
@@ -270,23 +247,14 @@ def measurements(outputs):
     return [f for f, made in found.items() if made not in RESTORED or f in RESTORED]
 
 
-def packed_frames(splits=SPLITS):
-    """Frames as the localizers see them."""
-    return [f"{ROOT}/frames/{s}/{split}.npy" for s in SCENES for split in splits]
-
-
 def passing_files():
     """Outputs that go once they are used: parts of packed frames, features, views."""
     scenes = sorted({*SCENES, *(CONFIG.rooms if backbones() else ())})
+    mapped = [f"{s}/{z}" for s, z in SIZES if has_structure(EXPERIMENTS, s, z)]
+    kinds = ("features", "views")
     return [
         *(f for s in scenes for p in SPLITS for f in packed_shards(s, p, "npy")),
-        *(
-            f"{ROOT}/references/{s}/{z}/{kind}-{split}.npz"
-            for s, z in SIZES
-            for kind in ("features", "views")
-            for split in SPLITS
-            if has_structure(EXPERIMENTS, s, z)
-        ),
+        *under("references/{set}/{k}-{p}.npz", set=mapped, k=kinds, p=SPLITS),
         *(f"{ROOT}/robustness/shards/{e}/{split}.npy" for e, split in varied_sets()),
     ]
 
@@ -295,14 +263,14 @@ def manifests(camera):
     """Data sets of image files; those of the network camera are made on demand only."""
     labelled = sorted({scene for scene, _, _ in DESIGN.estimated})
     scenes = SCENES if camera == "network" else labelled
-    return [f"{ROOT}/datasets/{s}/{camera}/manifest.json" for s in scenes]
+    return under("datasets/{scene}/{camera}/manifest.json", scene=scenes, camera=camera)
 
 
 def asked_datasets():
     """Data sets of image files that the configuration names, or all of the design."""
     if CONFIG.datasets is None:
         return manifests("network") + manifests("groundtruth")
-    return [f"{ROOT}/datasets/{s}/network/manifest.json" for s in CONFIG.datasets]
+    return under("datasets/{scene}/network/manifest.json", scene=CONFIG.datasets)
 
 
 def common_test_set(scene):
@@ -349,14 +317,11 @@ def reference_sets(file):
 
 def files_of_references():
     """An output of every job that reference methods are answered by."""
+    mapped = [f"{s}/{z}" for s, z in SIZES if has_structure(EXPERIMENTS, s, z)]
+    kinds = ("correspondences", "tracks")
     return [
-        *(f"{ROOT}/references/{scene}/descriptors.npz" for scene in SCENES),
-        *(
-            f"{ROOT}/references/{s}/{z}/{file}.npz"
-            for s, z in SIZES
-            for file in ("correspondences", "tracks")
-            if has_structure(EXPERIMENTS, s, z)
-        ),
+        *under("references/{scene}/descriptors.npz", scene=SCENES),
+        *under("references/{set}/{kind}.npz", set=mapped, kind=kinds),
         *reference_sets("metrics.json"),
     ]
 
@@ -444,7 +409,7 @@ def varied_sets():
     """Effects and split of the frames of the robustness table, where it has rows and its data set
     is trained on here."""
     wanted = (ROBUSTNESS.scene, ROBUSTNESS.size, "synfeal", "pretrained")
-    made = any((r.scene, r.size, r.labels, r.init) == wanted for r in RUNS)
+    made = any((r.scene, r.size, r.labels, r.init) == wanted for r in DESIGN.runs)
     if not (ROBUST_EFFECTS and made) or RESTORED:
         return []
     return [(MIXED, "train"), *((name, "test") for name in VARIATIONS)]
@@ -458,8 +423,8 @@ def robustness_files():
     return [
         *varied_extras(VARIATIONS),
         *(f"{ROOT}/robustness/frames/{name}/{split}.npy" for name, split in sets),
-        *(f"{ROOT}/robustness/runs/{model}/model.pt" for model in MODELS),
-        *(f"{ROOT}/robustness/descriptors/{t}.npz" for t in (CLEAN, MIXED)),
+        *under("robustness/runs/{model}/model.pt", model=MODELS),
+        *under("robustness/descriptors/{name}.npz", name=[CLEAN, MIXED]),
         *varied_structure(),
         f"{ROOT}/scenes/{ROBUSTNESS.scene}/effects_speed.csv",
         f"{ROOT}/tables/robustness.csv",
@@ -469,7 +434,7 @@ def robustness_files():
 def varied_structure():
     """Structure-based poses of the varied test frames, where there are frames with depth."""
     names = [CLEAN, *ROBUST_EFFECTS] if ROBUST_STRUCTURE else []
-    return [f"{ROOT}/robustness/structure/{name}.csv" for name in names]
+    return under("robustness/structure/{name}.csv", name=names)
 
 
 def robustness_tables(kind="csv"):
@@ -488,21 +453,6 @@ def drawn_robustness():
 def label_figures():
     """The figures of a design that draws nothing of training runs."""
     return [] if set(TABLE_NAMES) & set(DRAWN_TABLES) else [f"{ROOT}/figures"]
-
-
-def coverages():
-    """How much of its scene every plan covers: kept on record, read by people alone."""
-    return [f"{ROOT}/plans/{s}/{p}.coverage.json" for s in SCENES for p in SPLITS]
-
-
-def assistance_files():
-    return [
-        f"{ROOT}/labels/{s}/{z}/{l}/assistance.json" for s, z, l in DESIGN.estimated
-    ]
-
-
-def unassisted_labels():
-    return label_files(DESIGN.estimated, "-unassisted")
 
 
 def batch_facts():
@@ -538,20 +488,22 @@ def run_plan(workflow):
 def backbones():
     """Backbones that runs start from."""
     return {
-        backbone_of(r.model, CONFIG.network) for r in RUNS if r.start == "pretrained"
+        backbone_of(r.model, CONFIG.network)
+        for r in DESIGN.runs
+        if r.start == "pretrained"
     }
 
 
 def files_of_labels():
     """An output of every job that labels are made by."""
+    every = sorted({f"{e.scene}/{e.size}/{e.label_id}" for e in EXPERIMENTS})
     return [
-        *(f"{ROOT}/scenes/{scene}/properties.json" for scene in SCENES),
-        *(f"{ROOT}/plans/{scene}/{split}.csv" for scene in SCENES for split in SPLITS),
+        *under("scenes/{scene}/properties.json", scene=SCENES),
+        *under("plans/{scene}/{split}.csv", scene=SCENES, split=SPLITS),
         *(d for scene in SCENES for d in sequence_dirs(scene, "groundtruth")),
-        *pose_labels(),
-        *all_labels(),
+        *under("labels/{set}/{split}.csv", set=[*POSE_SETS, *every], split=SPLITS),
         *batch_facts(),
-        *assistance_files(),
+        *under("labels/{set}/assistance.json", set=ESTIMATED_SETS),
     ]
 
 
@@ -560,31 +512,31 @@ def files_of_runs():
     rooms = CONFIG.rooms if backbones() else []
     return [
         *files_of_labels(),
-        *(f"{ROOT}/scenes/{scene}/properties.json" for scene in rooms),
-        *(f"{ROOT}/plans/{scene}/train.csv" for scene in rooms),
-        *(f"{ROOT}/frames/{scene}/train.npy" for scene in rooms),
-        *packed_frames(),
-        *(f"{ROOT}/scenes/{scene}/test_depth.npy" for scene in SCENES),
-        *(f"{ROOT}/pretrained/{backbone}.pt" for backbone in sorted(backbones())),
-        *(m.replace("metrics.json", "predictions.csv") for m in all_metrics()),
-        *all_metrics(),
+        *under("scenes/{room}/properties.json", room=rooms),
+        *under("plans/{room}/train.csv", room=rooms),
+        *under("frames/{room}/train.npy", room=rooms),
+        *under("frames/{scene}/{split}.npy", scene=SCENES, split=SPLITS),
+        *under("scenes/{scene}/test_depth.npy", scene=SCENES),
+        *under("pretrained/{backbone}.pt", backbone=sorted(backbones())),
+        *under("runs/{run}/{file}", run=RUNS, file=["predictions.csv", "metrics.json"]),
     ]
 
 
 def files_of_evidence():
-    """An output of every job of a run but those that record and report the run."""
+    """An output of every job of a run but those that record and report the run.
+
+    How much of its scene a plan covers is kept on record, read by people alone.
+    """
     tables = ["assistance", "hard_cases", "label_error", "recall", "references"]
+    measured = ["render_speed.csv", "collection_speed.json"]
     return [
         *files_of_runs(),
         *files_of_references(),
         *robustness_files(),
-        *coverages(),
+        *under("plans/{scene}/{split}.coverage.json", scene=SCENES, split=SPLITS),
         *manifests("groundtruth"),
-        *(f"{ROOT}/scenes/{scene}/render_speed.csv" for scene in SCENES),
-        *(f"{ROOT}/scenes/{scene}/collection_speed.json" for scene in SCENES),
-        *(f"{ROOT}/tables/{t}.csv" for t in [*tables, "speed_vs_error", *TABLE_NAMES]),
-        f"{ROOT}/tables/all_tables.tex",
-        f"{ROOT}/figures",
-        f"{ROOT}/claims.csv",
+        *under("scenes/{scene}/{file}", scene=SCENES, file=measured),
+        *under("tables/{t}.csv", t=[*tables, "speed_vs_error", *TABLE_NAMES]),
+        *under("{file}", file=["tables/all_tables.tex", "figures", "claims.csv"]),
         f"{ROOT}/summary.md",
     ]

@@ -3,7 +3,7 @@
 
 use rule call as table1_meshes with:
     input:
-        properties=expand(f"{ROOT}/scenes/{{scene}}/properties.json", scene=SCENES),
+        properties=under("scenes/{scene}/properties.json", scene=SCENES),
     output:
         csv=report(
             f"{ROOT}/tables/table1_meshes.csv",
@@ -22,7 +22,7 @@ use rule call as table1_meshes with:
 
 use rule call as table with:
     input:
-        metrics=lambda w: metrics_of(DESIGN.table_runs(w.table)),
+        metrics=lambda w: under("runs/{run}/metrics.json", run=runs_of(w.table)),
     output:
         csv=report(
             f"{ROOT}/tables/{{table}}.csv",
@@ -43,7 +43,7 @@ use rule call as table with:
 
 use rule call as recall with:
     input:
-        metrics=all_metrics(),
+        metrics=under("runs/{run}/metrics.json", run=RUNS),
     output:
         csv=report(
             f"{ROOT}/tables/recall.csv",
@@ -62,7 +62,7 @@ use rule call as recall with:
 
 use rule call as assistance with:
     input:
-        records=assistance_files(),
+        records=under("labels/{set}/assistance.json", set=ESTIMATED_SETS),
     output:
         csv=f"{ROOT}/tables/assistance.csv",
         tex=f"{ROOT}/tables/assistance.tex",
@@ -77,9 +77,11 @@ use rule call as assistance with:
 
 use rule call as label_error with:
     input:
-        labels=pose_labels(),
-        unassisted=unassisted_labels(),
-        records=assistance_files(),
+        labels=under("labels/{set}/{split}.csv", set=POSE_SETS, split=SPLITS),
+        unassisted=under(
+            "labels/{set}/{split}-unassisted.csv", set=ESTIMATED_SETS, split=SPLITS
+        ),
+        records=under("labels/{set}/assistance.json", set=ESTIMATED_SETS),
         facts=batch_facts(),
     output:
         csv=f"{ROOT}/tables/label_error.csv",
@@ -95,11 +97,11 @@ use rule call as label_error with:
 
 use rule call as speed_vs_error with:
     input:
-        curves=expand(f"{ROOT}/scenes/{{scene}}/collision_curve.csv", scene=SCENES),
-        rendering=expand(f"{ROOT}/scenes/{{scene}}/render_speed.csv", scene=SCENES),
+        curves=under("scenes/{scene}/collision_curve.csv", scene=SCENES),
+        rendering=under("scenes/{scene}/render_speed.csv", scene=SCENES),
         labels=rules.label_error.output.csv,
-        trainings=expand(
-            f"{ROOT}/tables/{{table}}.csv",
+        trainings=under(
+            "tables/{table}.csv",
             table=[t for t in TABLE_NAMES if t == "table4_size"],
         ),
         histories=files_of_trainings("runs/{run}/history.csv"),
@@ -132,8 +134,8 @@ use rule call as hard_cases with:
 use rule call as document with:
     input:
         tables=[
-            *expand(
-                f"{ROOT}/tables/{{table}}.tex",
+            *under(
+                "tables/{table}.tex",
                 table=[*TABLE_NAMES, "references", "recall"],
             ),
             *robustness_tables("tex"),
@@ -150,8 +152,8 @@ use rule call as document with:
 
 use rule call as figures with:
     input:
-        tables=expand(
-            f"{ROOT}/tables/{{table}}.csv",
+        tables=under(
+            "tables/{table}.csv",
             table=[t for t in TABLE_NAMES if t in DRAWN_TABLES],
         ),
         references=(
@@ -161,11 +163,11 @@ use rule call as figures with:
         ),
         robustness=drawn_robustness(),
         speed=rules.speed_vs_error.output.csv,
-        labels=pose_labels(),
-        assistance=assistance_files(),
-        errors=errors_of(DESIGN.table_runs("table4_size")),
-        collision=expand(f"{ROOT}/scenes/{{scene}}/collision.ply", scene=SCENES),
-        frames=packed_frames(["test"]),
+        labels=under("labels/{set}/{split}.csv", set=POSE_SETS, split=SPLITS),
+        assistance=under("labels/{set}/assistance.json", set=ESTIMATED_SETS),
+        errors=under("runs/{run}/errors.csv", run=runs_of("table4_size")),
+        collision=under("scenes/{scene}/collision.ply", scene=SCENES),
+        frames=under("frames/{scene}/test.npy", scene=SCENES),
     output:
         dir=report(
             directory(f"{ROOT}/figures"),
@@ -187,7 +189,7 @@ use rule call as figures with:
 
 use rule call as summary with:
     input:
-        metrics=all_metrics(),
+        metrics=under("runs/{run}/metrics.json", run=RUNS),
         references=rules.references_table.output.csv,
         recall=rules.recall.output.csv,
         robustness=robustness_tables(),
@@ -206,12 +208,12 @@ use rule call as summary with:
 
 use rule call as claims with:
     input:
-        errors=errors_of(RUNS),
-        common_errors=errors_of(RUNS, "common_errors.csv"),
-        labels=true_labels(),
-        assistance=assistance_files(),
+        errors=under("runs/{run}/errors.csv", run=RUNS),
+        common_errors=under("runs/{run}/common_errors.csv", run=RUNS),
+        labels=under("labels/{set}/{split}.csv", set=TRUE_SETS, split=SPLITS),
+        assistance=under("labels/{set}/assistance.json", set=ESTIMATED_SETS),
         properties=rules.table1_meshes.input.properties,
-        speed=expand(f"{ROOT}/scenes/{{scene}}/collection_speed.json", scene=SCENES),
+        speed=under("scenes/{scene}/collection_speed.json", scene=SCENES),
     output:
         csv=report(
             f"{ROOT}/claims.csv",
@@ -228,7 +230,7 @@ use rule call as claims with:
 
 
 RESULTS = [
-    *expand(f"{ROOT}/tables/{{table}}.csv", table=TABLE_NAMES),
+    *under("tables/{table}.csv", table=TABLE_NAMES),
     rules.speed_vs_error.output.csv,
     rules.hard_cases.output.csv,
     rules.assistance.output.csv,
@@ -263,14 +265,14 @@ use rule call as report with:
     input:
         provenance=rules.provenance.output.json,
         results=RESULTS,
-        metrics=all_metrics(),
-        meshes=expand(f"{ROOT}/scenes/{{scene}}/mesh.glb", scene=SCENES),
-        plans=expand(
-            f"{ROOT}/plans/{{scene}}/{{split}}.csv",
+        metrics=under("runs/{run}/metrics.json", run=RUNS),
+        meshes=under("scenes/{scene}/mesh.glb", scene=SCENES),
+        plans=under(
+            "plans/{scene}/{split}.csv",
             scene=SCENES,
             split=SPLITS,
         ),
-        labels=pose_labels(),
+        labels=under("labels/{set}/{split}.csv", set=POSE_SETS, split=SPLITS),
     output:
         html=f"{ROOT}/report.html",
     log:

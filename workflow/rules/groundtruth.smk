@@ -28,8 +28,11 @@ use rule call as erroneous_labels with:
 
 use rule call as sfm with:
     input:
-        sequences=unless_restored(f"{STEM}/sfm/{BATCH}.json", batch_sequences),
-        truth=unless_restored(f"{STEM}/sfm/{BATCH}.json", f"{TRUE}/{{split}}.csv"),
+        **unless_restored(
+            [f"{STEM}/sfm/{BATCH}.json"],
+            sequences=batch_sequences,
+            truth=f"{TRUE}/{{split}}.csv",
+        ),
     output:
         trajectory=f"{STEM}/sfm/{BATCH}.csv",
         facts=f"{STEM}/sfm/{BATCH}.json",
@@ -50,7 +53,7 @@ use rule call as sfm with:
 
 use rule call as rgbd with:
     input:
-        sequences=unless_restored(f"{STEM}/rgbd/{BATCH}.json", batch_sequences),
+        **unless_restored([f"{STEM}/rgbd/{BATCH}.json"], sequences=batch_sequences),
     output:
         graph=f"{STEM}/rgbd/{BATCH}.g2o",
         facts=f"{STEM}/rgbd/{BATCH}.json",
@@ -71,8 +74,8 @@ use rule call as rgbd with:
 
 use rule call as estimate with:
     input:
-        sequences=unless_restored(
-            f"{STEM}/{{frame_method}}/{BATCH}.json", batch_sequences
+        **unless_restored(
+            [f"{STEM}/{{frame_method}}/{BATCH}.json"], sequences=batch_sequences
         ),
     output:
         trajectory=f"{STEM}/{{frame_method}}/{BATCH}.csv",
@@ -96,8 +99,8 @@ use rule call as estimate with:
 
 use rule call as posegraph with:
     input:
-        graph=unless_restored(
-            f"{STEM}/{{graph_method}}/{BATCH}.json", f"{STEM}/rgbd/{BATCH}.g2o"
+        **unless_restored(
+            [f"{STEM}/{{graph_method}}/{BATCH}.json"], graph=f"{STEM}/rgbd/{BATCH}.g2o"
         ),
     output:
         trajectory=f"{STEM}/{{graph_method}}/{BATCH}.csv",
@@ -115,10 +118,13 @@ use rule call as posegraph with:
 
 use rule call as chain with:
     input:
-        train_batches=unless_restored(CHAINED, lambda w: batch_files(w, "train")),
-        test_batches=unless_restored(CHAINED, lambda w: batch_files(w, "test")),
-        train_truth=unless_restored(CHAINED, f"{TRUE}/train.csv"),
-        test_truth=unless_restored(CHAINED, f"{TRUE}/test.csv"),
+        **unless_restored(
+            [CHAINED],
+            train_batches=lambda w: batch_files(w, "train"),
+            test_batches=lambda w: batch_files(w, "test"),
+            train_truth=f"{TRUE}/train.csv",
+            test_truth=f"{TRUE}/test.csv",
+        ),
     output:
         train=f"{ESTIMATED}/train.csv",
         test=f"{ESTIMATED}/test.csv",

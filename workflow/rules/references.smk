@@ -13,7 +13,7 @@ def evidence_for(names, **files):
         files[split] = f"{labels}/{{labels}}/{split}.csv"
         files[f"{split}_truth"] = f"{labels}/synfeal/{split}.csv"
     scores = [f"{REFERENCE}/{name}/metrics.json" for name in names]
-    return {name: unless_restored(scores, file) for name, file in files.items()}
+    return unless_restored(scores, **files)
 
 
 use rule call as descriptors with:
@@ -215,7 +215,7 @@ use rule call as references_table with:
     input:
         metrics=reference_sets("metrics.json"),
         facts=reference_sets("facts.json"),
-        localizers=all_metrics(),
+        localizers=under("runs/{run}/metrics.json", run=RUNS),
     output:
         csv=report(
             f"{ROOT}/tables/references.csv",

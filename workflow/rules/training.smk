@@ -32,28 +32,18 @@ use rule call as pretrain with:
 
 use rule call as train with:
     input:
-        frames=unless_restored(
-            f"{RUN}/predictions.csv", f"{ROOT}/frames/{{scene}}/train.npy"
-        ),
-        labels=unless_restored(
-            f"{RUN}/predictions.csv",
-            f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
-        ),
-        test_frames=unless_restored(
-            f"{RUN}/predictions.csv", f"{ROOT}/frames/{{scene}}/test.npy"
-        ),
-        test_labels=unless_restored(
-            f"{RUN}/predictions.csv",
-            f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
-        ),
-        weights=unless_restored(f"{RUN}/predictions.csv", backbone_weights),
-        common=unless_restored(
-            f"{RUN}/predictions.csv", lambda w: common_test_set(w.scene)[0]
-        ),
-        # The camera of packed frames, and their hash, are in the records beside them.
-        records=unless_restored(
-            f"{RUN}/predictions.csv",
-            lambda w: [f"{ROOT}/frames/{w.scene}/{split}.json" for split in SPLITS],
+        **unless_restored(
+            [f"{RUN}/predictions.csv"],
+            frames=f"{ROOT}/frames/{{scene}}/train.npy",
+            labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
+            test_frames=f"{ROOT}/frames/{{scene}}/test.npy",
+            test_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
+            weights=backbone_weights,
+            common=lambda w: common_test_set(w.scene)[0],
+            # The camera of packed frames, and their hash, are in the records beside them.
+            records=lambda w: under(
+                "frames/{scene}/{split}.json", scene=w.scene, split=SPLITS
+            ),
         ),
     output:
         model=f"{RUN}/model.pt",
