@@ -20,7 +20,7 @@ from torch import Tensor
 from baselines.training.checkpoint import TrainedLocalizer, read_checkpoint
 from baselines.training.description import ModelDescription
 from baselines.training.device import open_device
-from baselines.training.predict import BATCH, predict
+from baselines.training.predict import BATCH, predict, predict_ms
 from synfeal.dataset.directories import writing_to
 from synfeal.dataset.packed import View, fit_frame
 from synfeal.dataset.pose_table import COLUMNS
@@ -31,8 +31,6 @@ from synfeal.frames import write_frame
 log = logging.getLogger(__name__)
 
 HEADER = ("image", *COLUMNS[2:])
-# How often the network is timed on one picture, after one pass that is not.
-TIMED_PASSES = 10
 
 Array = NDArray[np.float64]
 
@@ -69,7 +67,7 @@ def localize(
     trained = read_checkpoint(model, open_device(device))
     pictures = find_pictures(named)
     _check_out(out, [model, *pictures])
-    network_ms = _alone_ms(trained, _batch(trained, pictures[:1], []))
+    network_ms = predict_ms(trained, _batch(trained, pictures[:1], []))
     read_s: list[float] = []
     began = time.perf_counter()
     position_m, quat_wxyz = _predict_all(trained, pictures, read_s)
@@ -115,17 +113,6 @@ def _batch(trained: TrainedLocalizer, pictures: Sequence[Path], read_s: list[flo
         frame[:] = read_picture(path, px, network.view)
         read_s.append(time.perf_counter() - began)
     return torch.from_numpy(frames).to(trained.device).permute(0, 3, 1, 2)
-
-
-def _alone_ms(trained: TrainedLocalizer, image: Tensor) -> float:
-    """Median milliseconds of the network on one image, its pose on the processor included."""
-    predict(trained, image)
-    times = []
-    for _ in range(TIMED_PASSES):
-        begin = time.perf_counter()
-        predict(trained, image)
-        times.append(time.perf_counter() - begin)
-    return 1000 * median(times)
 
 
 def _check_out(out: Path, inputs: Sequence[Path]) -> None:

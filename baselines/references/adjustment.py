@@ -6,6 +6,7 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
+from baselines.groundtruth.sfm.refine import adjustment_of
 from baselines.references.evidence import Evidence
 from baselines.references.structure import pinhole
 from baselines.references.tracks import Tracks
@@ -133,19 +134,9 @@ def _add_points(model: pycolmap.Reconstruction, point_m: Array, frame: Rows, poi
 
 def _solve(model: pycolmap.Reconstruction, labels: Array, loss_px: float) -> None:
     """Some iterations on one thread, with the positions of ``labels`` as weak priors."""
-    config = pycolmap.BundleAdjustmentConfig()
-    for image_id in model.reg_image_ids():
-        config.add_image(image_id)
-    options = pycolmap.BundleAdjustmentOptions(
-        refine_focal_length=False,
-        refine_principal_point=False,
-        refine_extra_params=False,
-        print_summary=False,
-    )
+    config, options = adjustment_of(model, ITERATIONS)
     options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
     options.ceres.loss_function_scale = loss_px
-    options.ceres.solver_options.num_threads = 1
-    options.ceres.solver_options.max_num_iterations = ITERATIONS
     priors = pycolmap.PosePriorBundleAdjustmentOptions()
     priors.alignment_ransac.random_seed = 1
     ids = model.reg_image_ids()

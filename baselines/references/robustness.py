@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
 from baselines.references.vectors import THUMBNAIL, VLAD, most_alike, read_described
 from baselines.training.checkpoint import read_checkpoint
 from baselines.training.data import read_images
 from baselines.training.device import memory_errors, open_device
 from baselines.training.predict import predict
+from baselines.training.score import read_predictions
 from synfeal.config.robustness import CLEAN
-from synfeal.dataset.number_table import read_numbers
-from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table
+from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.evaluation.metrics import pose_errors, summary
 from synfeal.frames import COUNT, MAYBE, TEXT, frame_of
 
@@ -61,7 +59,7 @@ def robustness_table(
                 answers = PoseTable(truth.frame, truth.path, *found)
                 records.append(_record(trained_on, method, effects, answers, truth))
         for effects, file in structure.items() if trained_on == CLEAN else ():
-            answers = _read_answers(file)
+            answers = read_predictions(file)
             records.append(_record(trained_on, STRUCTURE, effects, answers, truth))
         for name, checkpoint in checkpoints.items():
             trained = read_checkpoint(checkpoint, open_device(device))
@@ -80,10 +78,3 @@ def _record(
     scores = summary(pose_errors(answers, asked), asked.path)
     keys = {"trained_on": trained_on, "method": method, "effects": effects}
     return {**scores, **keys, "n_test": len(asked)}
-
-
-def _read_answers(path: Path) -> PoseTable:
-    """Poses of some of the test frames, NaN where there is none."""
-    values = read_numbers(path, HEADER, "table of answers", finite=False)
-    frame, straight_path = values[:, :2].astype(np.int64).T
-    return PoseTable(frame, straight_path, values[:, 2:5], values[:, 5:9])

@@ -77,7 +77,7 @@ def score_run(
             are not those that the run was trained for.
     """
     check_same_labels(predictions.parent, labels)
-    predicted = _read_predictions(predictions)
+    predicted = read_predictions(predictions)
     label_table, true_table = _read_like(labels, predicted), _read_like(truth, predicted)
     train = read_pose_table(train_labels)
     errors = _both_scores(predicted, label_table, true_table)
@@ -114,7 +114,7 @@ def score_common(predictions: Path, truth: Path, out: Path) -> None:
     Raises:
         InputError: a file cannot be read, or the truth lacks frames of the predictions.
     """
-    predicted, whole = _read_predictions(predictions), read_pose_table(truth)
+    predicted, whole = read_predictions(predictions), read_pose_table(truth)
     poses = whole.at(np.flatnonzero(np.isin(whole.frame, predicted.frame)))
     if not np.array_equal(poses.frame, predicted.frame):
         raise InputError(f"{predictions}: has frames that {truth} does not have; predict again")
@@ -128,7 +128,7 @@ def _both_scores(poses: PoseTable, labels: PoseTable, truth: PoseTable) -> dict[
     return pose_errors(poses, labels) | true
 
 
-def _read_predictions(path: Path) -> PoseTable:
+def read_predictions(path: Path) -> PoseTable:
     """A pose table whose poses may be ``nan``, unlike labels."""
     values = read_numbers(path, HEADER, "table of predictions", finite=False)
     if not len(values):

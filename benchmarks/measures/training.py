@@ -15,7 +15,7 @@ from baselines.localizers.names import backbone_of
 from baselines.training.checkpoint import read_checkpoint
 from baselines.training.data import read_images
 from baselines.training.loop import Job, train_localizer
-from baselines.training.predict import BATCH, predict, predict_poses
+from baselines.training.predict import BATCH, predict_ms, predict_poses
 from baselines.training.protocol import PROTOCOLS, Protocol
 from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig, Strict, TrainingConfig
 from synfeal.dataset.packed import read_packed
@@ -23,8 +23,6 @@ from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_ta
 from synfeal.evaluation.metrics import pose_errors
 from synfeal.seeds import seed_of
 
-# Calls of a prediction that is timed; the first, which builds what is built on demand, is left out.
-PREDICTIONS = 11
 PROTOCOL = TypeAdapter(Protocol)
 
 
@@ -96,7 +94,7 @@ def run(case: Case, seed: int) -> dict[str, float]:
         wall_s, cpu_s = time.perf_counter() - wall_s, time.process_time() - cpu_s
         predict_poses(model, test_frames, test_labels, predictions)
         errors = pose_errors(read_pose_table(predictions), read_pose_table(test_labels))
-        one, many = (predict_ms(model, test_frames, count) for count in (1, BATCH))
+        one, many = (_ms_per_image(model, test_frames, count) for count in (1, BATCH))
     return {
         "train_cpu_s": cpu_s,
         "train_wall_s": wall_s,
@@ -121,13 +119,8 @@ def _test_set(case: Case, folder: Path) -> tuple[Path, Path]:
     return frames, labels
 
 
-def predict_ms(model: Path, frames: Path, count: int) -> float:
+def _ms_per_image(model: Path, frames: Path, count: int) -> float:
     """Median milliseconds per image of predicting ``count`` images at once."""
     trained = read_checkpoint(model, torch.device("cpu"))
     images = read_images(frames, count, trained.description.network.input_px, trained.device)
-    taken_s = []
-    for _ in range(PREDICTIONS):
-        begin = time.perf_counter()
-        predict(trained, images)
-        taken_s.append(time.perf_counter() - begin)
-    return 1e3 * float(np.median(taken_s[1:])) / count
+    return predict_ms(trained, images) / count

@@ -30,12 +30,13 @@ def refine_model(model: pycolmap.Reconstruction) -> None:
         _adjust(model)
 
 
-def _adjust(model: pycolmap.Reconstruction) -> None:
-    """Adjust poses and points; intrinsics are known, and one thread makes it repeatable."""
+def adjustment_of(
+    model: pycolmap.Reconstruction, steps: int
+) -> tuple[pycolmap.BundleAdjustmentConfig, pycolmap.BundleAdjustmentOptions]:
+    """Adjustment of all poses and points; intrinsics are known, one thread makes it repeatable."""
     config = pycolmap.BundleAdjustmentConfig()
     for image_id in model.reg_image_ids():
         config.add_image(image_id)
-    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
     options = pycolmap.BundleAdjustmentOptions(
         refine_focal_length=False,
         refine_principal_point=False,
@@ -44,6 +45,12 @@ def _adjust(model: pycolmap.Reconstruction) -> None:
     )
     options.ceres.use_gpu = False
     options.ceres.solver_options.num_threads = 1
-    options.ceres.solver_options.max_num_iterations = _STEPS
+    options.ceres.solver_options.max_num_iterations = steps
+    return config, options
+
+
+def _adjust(model: pycolmap.Reconstruction) -> None:
+    config, options = adjustment_of(model, _STEPS)
+    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
     options.ceres.solver_options.function_tolerance = _TOLERANCE
     pycolmap.create_default_bundle_adjuster(options, config, model).solve()
