@@ -1,9 +1,12 @@
 """Results trees whose claims are known: errors of every cell, path by path."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from scipy.spatial.transform import Rotation
+from scipy.stats import norm
 
 from synfeal.config import MODELS
 from synfeal.config.experiments import SHARES
@@ -14,8 +17,8 @@ from synfeal.geometry.rotations import canonical_quat_wxyz
 from synfeal.report.claims.evidence import evidence_of
 from synfeal.report.claims.table import claim_rows
 from synfeal.report.published import key_of, published_cells
-from synfeal.report.stats import COLUMNS, COMMON_COLUMNS
-from tests.report_results import design_of, fill_assistance, shipped_design
+from synfeal.report.run_errors import COLUMNS, COMMON_COLUMNS
+from tests.report_results import MEASURES, design_of, fill_assistance, shipped_design
 
 N_PATHS, FRAMES_OF_PATH = 12, 3
 # The paper prints root mean squares over the axes.
@@ -78,15 +81,6 @@ def write_part(results, row, model):
     results.write(row, model, errors)
 
 
-def write_lengths(results, ratio, exponent=0.8):
-    """Errors that fall as a power of the images shown, from scratch ``ratio`` times as many."""
-    for row in rows_where(results, table="table7_images_shown"):
-        start, _, part = row.init.partition("-")
-        images = SHARES[part] / (ratio if start == "scratch" else 1.0)
-        for model in MODELS:
-            results.write(row, model, np.array([0.2, 10.0]) * images**-exponent)
-
-
 def papers_results(root, **changes):
     """Every frame of a cell has the error the paper printed as the median of that cell."""
     results = Results(root, **changes)
@@ -118,16 +112,85 @@ def write_scenes(root):
         write_speed(root, scene, [5.0, 5.2])
 
 
-def write_speed(root, scene, frames_per_s):
-    """How fast a scene was collected, part by part."""
-    speed = {"width": 640, "height": 480, "frames_per_s": frames_per_s}
-    write_json(
-        root / "scenes" / scene / "collection_speed.json",
-        speed | {"processor": "Abacus 9", "cores": 2},
-    )
-
-
 def rows_where(results, **keys):
     """Rows of the design with some values, each data set once."""
     rows = [r for r in results.design if all(getattr(r, k) == v for k, v in keys.items())]
     return list({(r.scene, r.size, r.label_id, r.init): r for r in rows}.values())
+
+
+def write_speed(root, scene, frames_per_s):
+    """How fast a scene was collected, part by part."""
+    speed = {"width": 640, "height": 480, "processor": "Abacus 9", "cores": 2}
+    path = root / "scenes" / scene / "collection_speed.json"
+    write_json(path, speed | {"frames_per_s": frames_per_s})
+
+
+def put(keys, models, position_m, orientation_deg, true=None):
+    """A change: errors of some models on the first data set with these keys.
+
+    Positions are the paper's, root mean squares over the axes; ``true`` is in metres.
+    """
+
+    def change(results):
+        errors = np.array([AXES * np.asarray(position_m), orientation_deg]).T
+        for model in models:
+            results.write(rows_where(results, **keys)[0], model, errors, true)
+
+    return change
+
+
+def first_paths(count, inside, outside):
+    """One value on the frames of the first of twelve paths, another on the rest."""
+    return np.where(np.arange(N_PATHS).repeat(FRAMES_OF_PATH) < count, inside, outside)
+
+
+def assisted(g2o, kinect):
+    """A change: of 17 batches so many assisted."""
+    counts = {"sfm": 0, "rgbd-toro": 0, "rgbd-g2o": g2o, "kinect-fusion": kinect}
+    return lambda results: fill_assistance(results.root, counts, batches=(17, 0))
+
+
+def collected_at(*rates):
+    """A change: frames per second in the Sanctuary; the Large Room's are 5.0 to 5.2."""
+    return lambda results: write_speed(results.root, "sanctuary", list(rates))
+
+
+def curves(ratio, falls=0.8):
+    """A change: errors fall as a power of the images, from scratch of ``ratio`` times as many."""
+
+    def change(results):
+        for row in rows_where(results, table="table7_images_shown"):
+            start, _, part = row.init.partition("-")
+            images = SHARES[part] / (ratio if start == "scratch" else 1.0)
+            for model in MODELS:
+                results.write(row, model, np.array([0.2, 10.0]) * images**-falls)
+
+    return change
+
+
+def chance_results(root):
+    """Tables 2 and 3 as 300 frames gave them: localizers about as good as the mean pose."""
+    tables = ("table2_ground_truth", "table3_inconsistencies")
+    design = tuple(row for row in shipped_design() if row.table in tables)
+    results = Results(root, design=design, n_paths=30, spread=(1.37, 85.0))
+    rng = np.random.default_rng(0)
+    for cell in pd.read_csv(Path(__file__).with_name("chance_level.csv")).itertuples():
+        keys = {"labels": cell.labels, "noise_m": cell.noise_m, "noise_deg": cell.noise_deg}
+        scores = [
+            np.stack([_paths_with(rng, cell, f"{m}{end}") for m in MEASURES[:2]], axis=1)
+            for end in ("", "_true")
+        ]
+        errors = (np.repeat(score, FRAMES_OF_PATH, axis=0) for score in scores)
+        results.write(rows_where(results, **keys)[0], cell.model, *errors)
+    fill_assistance(root)
+    write_scenes(root)
+    return results
+
+
+def _paths_with(rng, cell, measure):
+    """Errors of 30 paths whose median has about the published value and limits."""
+    value, low, high = (getattr(cell, f"{measure}{end}") for end in ("", "_low", "_high"))
+    quantiles = norm.ppf((np.arange(30) + 0.5) / 30)
+    # The standard error of a normal median is 1.25 sd / sqrt(n).
+    spread = np.log(high / low) / (2 * 1.96) * np.sqrt(30) / 1.25
+    return value * np.exp(spread * rng.permutation(quantiles))

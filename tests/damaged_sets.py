@@ -16,12 +16,15 @@ from tests.planar_scene import straight_path, write_frames
 CAMERA = CameraConfig(width=96, height=72, horizontal_fov_deg=60.0)
 
 
-def write_planar_set(folder, camera=CAMERA):
-    """24 training and 8 test frames of two planes, as ``synfeal collect`` lays them out."""
-    sequences = [Sequence("seq-01", "train", 0, 24), Sequence("seq-02", "test", 0, 8)]
+def write_planar_set(folder, camera=CAMERA, counts=(24, 8)):
+    """Training and test frames of two planes, as ``synfeal collect`` lays them out."""
+    sequences = [
+        Sequence(f"seq-{number:02d}", split, 0, count)
+        for number, split, count in zip((1, 2), ("train", "test"), counts, strict=True)
+    ]
     for sequence, step_m, turn_deg in zip(sequences, (0.04, 0.05), (1.5, 2.0), strict=True):
         directory = folder / sequence.name
-        directory.mkdir(parents=True)
+        directory.mkdir(parents=True, exist_ok=True)
         truth = straight_path(len(sequence), step_m, turn_deg)
         write_frames(directory, truth, camera)
         for number, pose in enumerate(truth.world_from_cam):

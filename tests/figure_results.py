@@ -7,9 +7,10 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from synfeal.config import MODELS
-from synfeal.dataset.pose_table import PoseTable, write_pose_table
+from synfeal.dataset.pose_table import write_pose_table
 from synfeal.geometry.poses import pose_matrix
 from synfeal.mesh.triangles import Triangles, save_collision_mesh
+from tests.property_support import table_of
 from tests.report_results import TABLE4, batch_record, experiment
 
 METHODS = ("sfm", "rgbd-toro")
@@ -24,14 +25,6 @@ def design():
     sizes = [experiment(TABLE4, size=size) for size in ("20k", "6k")]
     labelled = [experiment("table2_ground_truth", labels=method) for method in METHODS]
     return (*sizes, *labelled)
-
-
-def table_of(world_from_cam):
-    count = len(world_from_cam)
-    index = np.arange(count)
-    return PoseTable(index, index, np.zeros((count, 3)), np.zeros((count, 4))).with_poses(
-        world_from_cam
-    )
 
 
 def true_poses(count, y=1.0):

@@ -9,20 +9,12 @@ from scipy.spatial.transform import Rotation
 
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.dataset.sevenscenes import Sequence, pose_text, write_splits
+from tests.property_support import random_table
 
 Array = NDArray[np.float64]
 
 PER_SEQUENCE, RATE_HZ = 12, 30.0
 TEST = ("seq-02", "seq-03")
-
-
-def random_poses(count, seed):
-    """``world_from_cam`` (N, 4, 4): positions of a metre's spread, any rotation."""
-    rng = np.random.default_rng(seed)
-    poses = np.tile(np.eye(4), (count, 1, 1))
-    poses[:, :3, :3] = Rotation.random(count, rng=rng).as_matrix()
-    poses[:, :3, 3] = rng.normal(size=(count, 3))
-    return poses
 
 
 def disturbed(poses, position_m, angle_deg, seed=1):
@@ -37,7 +29,7 @@ def disturbed(poses, position_m, angle_deg, seed=1):
 
 def write_dataset(folder):
     """Three sequences without images, two of them for test; returns the test poses."""
-    poses = random_poses(3 * PER_SEQUENCE, 0)
+    poses = random_table(3 * PER_SEQUENCE, 0).world_from_cam
     names = ("seq-01", *TEST)
     splits = ("train", "test", "test")
     for index, name in enumerate(names):

@@ -5,11 +5,12 @@ Depth is exact, and no renderer has to share the process with Open3D.
 
 import numpy as np
 from PIL import Image
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import map_coordinates
 
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.rotations import quat_wxyz_from_matrix, rotation_from_rpy
+from tests.painted_room import random_texture
 
 CAMERA = CameraConfig(width=160, height=120, horizontal_fov_deg=60.0)
 TEXELS_PER_M = 100
@@ -51,15 +52,6 @@ def depth_map(world_from_cam, camera, factor=1):
     return depth, seen, world_from_cam[:3, 3] + depth[..., None] * direction
 
 
-def texture(rng):
-    """Random grey values (700, 700) with detail at several scales."""
-    image = np.zeros((700, 700))
-    for sigma, weight in ((1.5, 25), (4, 30), (12, 30)):
-        noise = gaussian_filter(rng.standard_normal(image.shape), sigma, mode="wrap")
-        image += weight * noise / noise.std()
-    return np.clip(128 + image, 0, 255)
-
-
 def render(world_from_cam, camera, textures):
     """Colour image (H, W, 3) uint8, antialiased."""
     _, seen, point = depth_map(world_from_cam, camera, SUPERSAMPLING)
@@ -75,7 +67,7 @@ def render(world_from_cam, camera, textures):
 
 def write_frames(folder, truth, camera=CAMERA):
     """Write colour and depth images; returns their paths."""
-    textures = [texture(np.random.default_rng(seed)) for seed in range(len(PLANES))]
+    textures = [random_texture(np.random.default_rng(seed)) for seed in range(len(PLANES))]
     color_paths, depth_paths = [], []
     for frame, pose in enumerate(truth.world_from_cam):
         color_paths.append(folder / f"frame-{frame:06d}.color.png")

@@ -59,3 +59,12 @@ poses = st.builds(pose_of, positions, quats)
 poses_near = st.builds(pose_of, vectors(3.0), quats)
 fractions = st.floats(0.0, 1.0)
 seeds = st.integers(0, 2**32 - 1)
+
+
+def random_table(count, seed, per_path=10):
+    """Poses turned anyhow within some metres."""
+    rng = np.random.default_rng(seed)
+    quat = Rotation.random(count, rng=rng).as_quat(canonical=True, scalar_first=True)
+    return PoseTable(
+        np.arange(count), np.arange(count) // per_path, rng.normal(size=(count, 3)), quat
+    )

@@ -183,3 +183,10 @@ def lines_of(tex, against):
 def write_rows(path, columns, rows):
     """A table of some columns; what a row lacks is an empty cell."""
     write_frame(path, pd.DataFrame(rows, columns=list(columns)))
+
+
+def change_cell(path, column, value, row=0):
+    """Set a cell of a table."""
+    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    table.loc[row, column] = value
+    table.to_csv(path, index=False)

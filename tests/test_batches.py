@@ -4,9 +4,8 @@ from scipy.spatial.transform import Rotation
 
 from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.chain import chain_batches, chain_unassisted, summary_of
-from baselines.groundtruth.trajectory import BatchTrajectory, failed_trajectory, read_trajectory
+from baselines.groundtruth.trajectory import BatchTrajectory, failed_trajectory
 from synfeal.config.models import GroundTruthConfig
-from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_matrix, relative
 from tests.property_support import table_of
 
@@ -113,24 +112,3 @@ def test_what_does_not_fit_together_is_refused():
             chain_unassisted(parts, estimates, truth)
     with pytest.raises(ValueError, match=r"^2 flags for poses of shape \(1, 4, 4\)$"):
         BatchTrajectory(np.eye(4)[None], np.ones(2, dtype=bool))
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "header must be .*, found ''"),
-        ("frame,tx\n0,1\n", "header must be"),
-        ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n0,1,2\n", "needs 9 numbers"),
-        ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n0,1,nan,0,0,1,0,0,0\n", "row 2"),
-        ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n1,1,0,0,0,1,0,0,0\n", "frames must count from 0"),
-        ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n0,2,0,0,0,1,0,0,0\n", "registered be 0 or 1; est"),
-        ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n0,1.5,0,0,0,1,0,0,0\n", "row 2 must begin with"),
-        ("frame,registered,tx,ty,tz,qw,qx,qy,qz\n0,1,0,0,0,2,0,0,0\n", "line 2 holds a quat"),
-    ],
-)
-def test_broken_trajectory_files_are_named(tmp_path, text, message):
-    path = tmp_path / "batch-000.csv"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match=message) as caught:
-        read_trajectory(path)
-    assert str(path) in str(caught.value)

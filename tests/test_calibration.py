@@ -222,16 +222,13 @@ def test_depth_methods_refuse_a_distorted_camera(monkeypatch, tmp_path):
     assert read_experiments(distorted.model_copy(update={"experiments": only_sfm}))
 
 
-def test_json_and_yaml_of_python_scripts_are_read(tmp_path):
+def test_files_of_scripts_and_of_the_documentation_are_read(tmp_path):
     values = {"image_size": [640, 480], "mtx": [[500, 0, 319.5], [0, 501, 239.5], [0, 0, 1]]}
     values["dist"] = [[-0.2, 0.05, 0.001, -0.002]]
     as_json = read_calibration(stored(tmp_path, "a.json", json.dumps(values)))
     as_yaml = read_calibration(stored(tmp_path, "a.yaml", yaml.safe_dump(values)))
     ros = read_calibration(stored(tmp_path, "ros.yaml", ROS))
     assert as_json == as_yaml == ros
-
-
-def test_the_documented_files_are_one_pinhole(tmp_path):
     page = (CONFIG.parent / "docs" / "cameras.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```(?:yaml)?\n(.*?)```", page, re.DOTALL)
     opencv = next(block for block in blocks if block.startswith("%YAML"))

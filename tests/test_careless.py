@@ -6,8 +6,8 @@ import pytest
 
 from synfeal.cli import main
 from tests.careless import TABLE, arguments_of, make_folder
-from tests.fuzz_files import write_checkpoint
 from tests.fuzzing import JARGON, TooSlow, at_most
+from tests.trained_localizers import save, untrained
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 SECONDS = 20.0
@@ -16,7 +16,7 @@ SECONDS = 20.0
 @pytest.fixture(scope="module")
 def folder(mesh, calm, tmp_path_factory):
     model = tmp_path_factory.mktemp("made") / "model.pt"
-    write_checkpoint(model)
+    save(model, untrained())
     folder = tmp_path_factory.mktemp("folder")
     make_folder(folder, mesh, calm, model)
     return folder

@@ -41,14 +41,11 @@ def test_sign_test_by_counting_splits(changes, negative, counted, chance):
     assert sign_test(changes) == (negative, counted, pytest.approx(float(chance)))
 
 
-def test_kendall_tau_by_counting_pairs():
+def test_kendall_tau_counts_pairs_as_scipys_does_and_ranks_a_failure_last():
     assert kendall_tau([0, 1, 2, 3], [9, 5, 4, 1]) == pytest.approx(-1)
     assert kendall_tau([0, 1, 2, 3], [1, 3, 2, 4]) == pytest.approx(4 / 6)  # 5 pairs for, 1 against
     # One tie in the errors: (5 - 0) / sqrt(6 * 5).
     assert kendall_tau([0, 1, 2, 3], [1, 2, 2, 4]) == pytest.approx(5 / math.sqrt(30))
-
-
-def test_kendall_tau_is_scipys_and_ranks_a_failure_last():
     errors = np.random.default_rng(3).normal(size=9).round(1)
     assert kendall_tau(range(9), errors) == pytest.approx(kendalltau(range(9), errors).statistic)
     assert kendall_tau([0, 1, 2, 3], [INF, 3, 2, 1]) == pytest.approx(-1)
@@ -82,7 +79,7 @@ def test_medians_by_hand(errors, counts, expected):
     assert medians(values, np.arange(len(values)), np.array([counts])).tolist() == [expected]
 
 
-def test_medians_of_resamples_are_numpys_of_the_repeated_frames(monkeypatch):
+def test_medians_of_resamples_are_numpys_and_made_block_by_block(monkeypatch):
     rng = np.random.default_rng(5)
     path = np.repeat(np.arange(9), rng.integers(1, 6, size=9))
     errors = rng.lognormal(size=len(path))
@@ -93,9 +90,6 @@ def test_medians_of_resamples_are_numpys_of_the_repeated_frames(monkeypatch):
     assert repeated[0] == np.median(errors)
     monkeypatch.setattr(bootstrap, "BLOCK", 100)  # as for more frames than are held at once
     assert medians(errors, path, counts).tolist() == repeated
-
-
-def test_no_more_counts_are_held_at_once_than_the_block_allows(monkeypatch):
     held, plain = [], bootstrap._medians
     monkeypatch.setattr(bootstrap, "BLOCK", 60)
     monkeypatch.setattr(bootstrap, "_medians", lambda r, c: held.append(c.shape) or plain(r, c))
@@ -129,23 +123,17 @@ def test_changes_of_failures():
     assert np.isnan(mean_of([np.array([INF]), np.array([-INF])])[0])
 
 
-def test_limits_leave_two_and_a_half_percent_on_either_side():
+def test_limits_leave_two_and_a_half_percent_on_either_side_of_what_is_known(monkeypatch):
     sample = np.concatenate([[50.0], np.random.default_rng(1).permutation(np.arange(1, 1001))])
     assert limits(sample) == (26, 975)
     assert limits(sample, 5) == (6, 995)
-
-
-def test_a_tail_that_is_whole_but_for_rounding_is_whole(monkeypatch):
-    monkeypatch.setattr(bootstrap, "CONFIDENCE", 0.9)  # 1 - 0.9 is a little less than 0.1
-    assert limits(np.concatenate([[0.0], np.arange(1.0, 1001.0)])) == (51, 950)
-
-
-def test_what_cannot_be_known_widens_limits_at_both_ends():
     drawn = np.arange(1000.0)
     drawn[500:550] = NAN
     assert limits(np.concatenate([[0], drawn])) == (-INF, INF)
     few = np.concatenate([[0], np.arange(995.0), [NAN] * 5])
     assert limits(few) == (20, 974)  # without the five: 24 and 970
+    monkeypatch.setattr(bootstrap, "CONFIDENCE", 0.9)  # 1 - 0.9 is a little less than 0.1
+    assert limits(np.concatenate([[0.0], np.arange(1.0, 1001.0)])) == (51, 950)
 
 
 SHIFT = -20.0  # percent, the true change of the median
@@ -174,7 +162,7 @@ def test_limits_hold_the_truth_in_93_to_97_percent_of_1000_trials(n_paths):
     assert 0.93 <= _covered(n_paths, 6, 1000, seed=n_paths) <= 0.97
 
 
-def test_one_seed_fewer_is_drawn_than_there_are():
+def test_one_seed_fewer_is_drawn_than_there_are_and_a_failed_one_fails():
     weights = seed_weights(3, np.random.default_rng(0), 20_000)
     assert weights[0].tolist() == pytest.approx([1 / 3] * 3)
     np.testing.assert_allclose(weights.sum(axis=1), 1)
@@ -183,9 +171,6 @@ def test_one_seed_fewer_is_drawn_than_there_are():
     assert means.mean() == pytest.approx(3, abs=0.05)
     assert means.var() == pytest.approx(7 / 3, rel=0.05)  # that of a mean of three
     assert seed_weights(1, np.random.default_rng(0), 5).tolist() == [[1.0]] * 6
-
-
-def test_a_failed_seed_fails_where_it_is_drawn():
     weights = np.array([[0.5, 0.5], [1.0, 0.0], [0.0, 1.0]])
     assert over_seeds([np.full(3, INF), np.full(3, 2.0)], weights).tolist() == [INF, INF, 2]
 

@@ -23,9 +23,16 @@ def effect(low, high, published=0.0, **keys):
     return Condition("effect", between(low, high), published, **keys)
 
 
-def test_the_samples_are_what_they_are_said_to_be():
+def test_samples_counts_and_what_is_unknown():
     assert limits(between(-3.0, 5.0)) == (-3, 5)
     assert limits(between(-3.0, 5.0), 10) == (-11, 13)
+    assert at_least(between(3, 5), 3) == HOLDS
+    assert at_least(between(2, 5), 3) == UNDECIDED
+    assert at_least(between(0, 2), 3) == OPPOSITE
+    assert at_least(between(0, 3), 3) == UNDECIDED
+    unknown = np.full(1001, np.nan)
+    assert verdict_of(Condition("", unknown, 55)) == UNDECIDED
+    assert verdict_of(Condition("", np.full(1001, np.inf), 55)) == HOLDS
 
 
 @pytest.mark.parametrize(
@@ -70,12 +77,6 @@ def test_an_order_asks_for_no_size(low, high, verdict):
     assert verdict_of(effect(low, high, smallest=0.0)) == verdict
 
 
-def test_what_is_unknown_is_undecided():
-    unknown = np.full(1001, np.nan)
-    assert verdict_of(Condition("", unknown, 55)) == UNDECIDED
-    assert verdict_of(Condition("", np.full(1001, np.inf), 55)) == HOLDS
-
-
 GOOD, SMALL, NONE = effect(50, 60, 55), effect(10, 30, 55), effect(-1, 1, 55)
 LITTLE = effect(2, 14, 55)  # and at the level of two conditions from -10 to 26
 AGAINST, OPEN = effect(-30, -20, 55), effect(-60, 60, 55)
@@ -103,27 +104,17 @@ def test_conditions_together(conditions, verdict):
     assert all_of(conditions)[0] == verdict
 
 
-def test_reasons_name_conditions_and_count_those_without_a_name():
+def test_reasons_name_conditions_and_single_ones_refute_a_mean():
     assert all_of([GOOD, OPEN])[1] == "effect: holds, effect: undecided"
     assert all_of([GOOD, OPEN, GOOD])[1] == "holds: effect, effect; undecided: effect"
     unnamed = [condition._replace(name="") for condition in (GOOD, OPEN, GOOD)]
     assert all_of(unnamed)[1] == "of 3 conditions 2 holds, 1 undecided"
-
-
-def test_a_mean_that_holds_is_refuted_by_a_single_one_that_is_decided_otherwise_and_only_by_that():
     against = effect(-60, -50, 55)._replace(name="PoseNet")
     assert all_of([GOOD], each=[GOOD, OPEN])[0] == HOLDS
     verdict, reason = all_of([GOOD], each=[GOOD, against])
     assert verdict == MIXED
     assert reason.endswith("; single ones opposite: PoseNet")
     assert all_of([OPEN], each=[GOOD, GOOD])[0] == UNDECIDED
-
-
-def test_counts():
-    assert at_least(between(3, 5), 3) == HOLDS
-    assert at_least(between(2, 5), 3) == UNDECIDED
-    assert at_least(between(0, 2), 3) == OPPOSITE
-    assert at_least(between(0, 3), 3) == UNDECIDED
 
 
 PUBLISHED = 55.0

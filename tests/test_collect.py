@@ -124,28 +124,15 @@ REFUSED = {
     "colour": (["--background", "0", "256", "0"], "--background: "),
     "no poses": (["--mode", "repeat"], "--poses: "),
     "long paths": (["--min-path", "1e6"], "--min-path"),
-    "the root": (["--out", "/"], "--out: / is a whole file system"),
-    "a file": (["--out", "notes.txt"], "notes.txt: exists"),
-    "below a file": (["--out", "notes.txt/set"], "notes.txt"),
-    "a circle": (["--out", "loop/set"], "loop"),
-    "a long name": (["--out", "x" * 300], "--out: "),
-    "no mesh": (["--mesh", "none.glb"], "--mesh: none.glb does not exist"),
-    "a directory": (["--mesh", "."], "--mesh: . is a directory"),
 }
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_a_person_can_mend_is_one_line_and_nothing_is_written(
-    case, mesh, tmp_path, monkeypatch, capfd
-):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "notes.txt").write_text("mine")
-    (tmp_path / "loop").symlink_to("loop")
+def test_what_a_person_can_fix_is_one_line_and_nothing_is_written(case, mesh, tmp_path, capfd):
     options, words = REFUSED[case]
     assert collect(mesh, tmp_path / "set", *options) == 1
     assert words in only_error(capfd)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["loop", "notes.txt"]
-    assert (tmp_path / "notes.txt").read_text() == "mine"
+    assert not any(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("options", [["collect"], ["collect", "--frames", "many"], ["paint"], []])

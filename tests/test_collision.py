@@ -8,7 +8,6 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synfeal.config.models import SceneConfig
 from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
 from synfeal.frames import write_frame
@@ -33,10 +32,9 @@ from synfeal.scenes.collision import (
     search,
     write_curve,
 )
+from tests.empty_room import ROOM, SCENE
 from tests.report_results import design_of, read
 
-SCENE = SceneConfig.model_validate({"source": "mesh", "path": "scene.glb"})
-ROOM = np.array([[-3.0, -2.0, 0.0], [3.0, 2.0, 2.5]])
 N_QUESTIONS = 4000
 BOX = np.array([[-2.8, -1.8, 0.8], [2.8, 1.8, 1.8]])
 RUNG = Rung(100, 1.0, 0.99, 1.0, 0, 0, 1, 1, 0.0)
@@ -141,44 +139,33 @@ def test_ladder(n_faces, expected):
     assert ladder(n_faces) == expected
 
 
-def test_small_meshes_are_not_decimated():
+def test_the_choice_does_not_depend_on_the_clock_and_full_agreement_can_be_asked(
+    furnished, questions, trials
+):
+    for a, b in zip(trials, search(furnished, questions, 0.995), strict=True):
+        np.testing.assert_array_equal(a.mesh.vertices_m, b.mesh.vertices_m)
+        assert a.rung.chosen == b.rung.chosen
+    (chosen,) = (trial.rung for trial in search(furnished, questions, 1.0) if trial.rung.chosen)
+    assert chosen.agreement == 1.0
+
+
+def test_small_meshes_are_not_decimated_and_one_without_a_free_view_is_refused():
     box = trimesh.creation.box(bounds=ROOM)
     mesh = TexturedMesh((MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces)),))
     collision, curve = collision_mesh(mesh, SCENE, BOX, 0.995, np.random.default_rng(0))
     assert len(collision.faces) == 12
     assert [(rung.faces, rung.chosen) for rung in curve] == [(12, 1)]
-
-
-def test_full_agreement_keeps_whatever_a_question_noticed(furnished, questions):
-    (chosen,) = (trial.rung for trial in search(furnished, questions, 1.0) if trial.rung.chosen)
-    assert chosen.agreement == 1.0
-
-
-def test_the_choice_does_not_depend_on_the_clock(furnished, questions, trials):
-    again = search(furnished, questions, 0.995)
-    for a, b in zip(trials, again, strict=True):
-        np.testing.assert_array_equal(a.mesh.vertices_m, b.mesh.vertices_m)
-        assert a.rung.chosen == b.rung.chosen
-
-
-def test_a_scene_without_a_free_view_is_refused():
-    box = trimesh.creation.box(bounds=ROOM)
-    mesh = TexturedMesh((MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces)),))
     scene = SCENE.model_copy(update={"min_view_distance_m": 20.0})
     with pytest.raises(InputError, match="min_view_distance_m"):
         collision_mesh(mesh, scene, BOX, 0.995, np.random.default_rng(0))
 
 
-def test_seam_copies_are_merged():
+def test_seam_copies_are_merged_and_files_keep_map_coordinates(tmp_path):
     box = trimesh.creation.box()
     soup, faces = box.vertices[box.faces].reshape(-1, 3), np.arange(36).reshape(-1, 3)
     vertices, merged = merge_vertices(soup, faces)
     assert len(vertices) == 8
     np.testing.assert_allclose(vertices[merged], soup[faces], atol=1e-5)
-
-
-def test_collision_mesh_file_keeps_map_coordinates(tmp_path):
-    box = trimesh.creation.box()
     offset = np.array([5e5, 4e6, 100.123456789])
     mesh = Triangles(np.asarray(box.vertices) + offset, np.asarray(box.faces))
     save_collision_mesh(tmp_path / "collision.ply", mesh)
@@ -212,10 +199,8 @@ def test_the_table_rids_speeds_of_what_else_the_machine_did(tmp_path):
     assert [row["chosen"] for row in rows] == ["0", "1", "0"]
     assert {(row["stage"], row["scene"]) for row in rows} == {("collision", "large_room")}
     write_figures(design_of(()), tmp_path, tmp_path / "figures")
-    assert {path.name for path in (tmp_path / "figures").iterdir()} == {
-        "speed_vs_error_collision.png",
-        "speed_vs_error_collision.svg",
-    }
+    drawn = {path.name for path in (tmp_path / "figures").iterdir()}
+    assert drawn == {f"speed_vs_error_collision.{end}" for end in ("png", "svg")}
 
 
 def test_a_curve_reads_back_and_a_missing_one_is_named(tmp_path):

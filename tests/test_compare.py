@@ -64,7 +64,7 @@ def refusal(capsys, *arguments):
     return message
 
 
-def test_known_changes_are_found_against_both_yardsticks(trees, error_m):
+def test_known_changes_are_found_against_both_yardsticks_counted_and_averaged(trees, error_m):
     comparison = compare_trees(*trees)
     assert (comparison.table[["test_frames", "test_labels"]] == "same").all(axis=None)
     runs = [run for _, run in comparison.table.groupby(["labels", "model"], sort=False)]
@@ -78,18 +78,12 @@ def test_known_changes_are_found_against_both_yardsticks(trees, error_m):
             verdicts = [found.loc[labels, model, measure].verdict for model in MODELS]
             assert verdicts == ["better", "no difference seen", "worse"]
         assert found.loc[labels, SAME, "position_m"].difference == 0
-
-
-def test_summary_counts_runs_and_signs(trees):
     summary = summarise(compare_trees(*trees).table).set_index("measure")
     position, orientation = summary.loc["position_m"], summary.loc["orientation_deg"]
     assert (position.better, position.worse, position.unseen) == (2, 2, 2)
     assert (position.lower, position.higher, position.p_sign) == (2, 2, 1.0)
     assert (orientation.lower, orientation.higher) == (0, 2)
     assert orientation.p_sign == pytest.approx(0.5)  # two of two heads or two of two tails
-
-
-def test_group_means_are_of_relative_changes(trees, error_m):
     groups = groups_of(compare_trees(*trees).table).set_index(["grouping", "name"])
     assert {g: n for g, n in groups.n_runs.items() if g[0] != "model"} == {
         ("scene", "room"): 6,
@@ -105,7 +99,7 @@ def test_group_means_are_of_relative_changes(trees, error_m):
     assert (groups.loc["model", SAME][list(MEASURES)] == 0).all()
 
 
-def test_other_test_paths_are_not_paired(pair):
+def test_other_test_paths_and_a_missing_plan_are_said_and_not_paired(pair):
     plan = pair[1] / "plans/room/test.csv"
     write_pose_table(plan, poses(0.5))
     comparison = compare_trees(*pair)
@@ -113,11 +107,7 @@ def test_other_test_paths_are_not_paired(pair):
     assert (comparison.runs.low < 0).all()
     assert (comparison.runs.high > 0).all()
     assert "in 2 the test frames differ" in remarks_of(comparison)[1]
-
-
-def test_a_missing_plan_is_said_and_not_paired(pair):
     (pair[0] / "plans/room/test.csv").unlink()
-    comparison = compare_trees(*pair)
     assert not (comparison.runs.test_frames == "same").any()
     assert "paired in 0 of 2 runs" in remarks_of(comparison)[1]
 
@@ -164,7 +154,7 @@ def test_provenance_that_differs_is_printed(pair, capsys):
     assert "Keys of provenance.json that differ: 3." in printed
 
 
-def test_files_agree_with_each_other_and_are_written_again_alike(trees, tmp_path, capsys):
+def test_files_and_columns_agree_and_are_written_again_alike(trees, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["compare", *map(str, trees), "--out", str(out)]) == 0
     assert sorted(path.name for path in out.iterdir()) == sorted(OUTPUTS)
@@ -181,9 +171,6 @@ def test_files_agree_with_each_other_and_are_written_again_alike(trees, tmp_path
     assert main(["compare", *map(str, trees), "--out", str(out)]) == 0
     assert first == {name: (out / name).read_bytes() for name in OUTPUTS}
     assert "failed" in capsys.readouterr().out
-
-
-def test_terminal_columns_are_aligned(trees, capsys):
     assert main(["compare", *map(str, trees)]) == 0
     lines = capsys.readouterr().out.splitlines()
     start = next(i for i, line in enumerate(lines) if line.startswith("data set"))
@@ -193,16 +180,13 @@ def test_terminal_columns_are_aligned(trees, capsys):
     assert all(line[ends - 1] != " " and line[ends] == " " for line in rows)
 
 
-def test_foreign_files_are_left_alone(pair, tmp_path, capsys):
+def test_foreign_files_are_left_alone_and_what_is_no_tree_is_refused(pair, tmp_path, capsys):
     out = tmp_path / "out"
     out.mkdir()
     (out / "notes.txt").write_text("mine")
     assert "notes.txt" in refusal(capsys, *pair, "--out", out)
     assert [path.name for path in out.iterdir()] == ["notes.txt"]
     assert "is a file" in refusal(capsys, *pair, "--out", out / "notes.txt")
-
-
-def test_what_is_no_results_tree_is_refused(pair, tmp_path, capsys):
     assert "not a results tree" in refusal(capsys, pair[0], tmp_path / "nowhere")
     assert "not a results tree" in refusal(capsys, pair[0] / "runs", pair[1])
     other = write_tree(tmp_path / "other", {SAME: np.ones(N)})
@@ -229,14 +213,13 @@ def test_broken_files_are_named(pair, tmp_path, capsys, name, content, message):
     assert not (tmp_path / "out").exists()
 
 
-def test_scores_of_other_errors_are_refused(pair, capsys):
+def test_scores_of_other_errors_and_seeds_of_other_frames_are_refused(
+    pair, capsys, tmp_path, error_m
+):
     path = pair[1] / RUN / "metrics.json"
     metrics = json.loads(path.read_text())
     write_json(path, metrics | {"orientation_deg_true": 1.5})
     assert "orientation_deg_true is 1.5" in refusal(capsys, *pair)
-
-
-def test_seeds_of_one_run_must_share_their_frames(tmp_path, error_m, capsys):
     a = write_tree(tmp_path / "a", {BETTER: error_m}, seeds=2)
     path = a / RUN / "predictions.csv"
     write_pose_table(path, read_pose_table(path).first(N - 1))

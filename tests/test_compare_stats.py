@@ -60,7 +60,7 @@ def test_limits_are_those_of_scipy(paired):
     assert [found.low, found.high] == pytest.approx(list(scipy_limits), abs=0.12 * width)
 
 
-def test_failures_make_a_run_worst(errors):
+def test_failures_make_a_run_worst_and_few_move_the_median_as_large_errors_would(errors):
     failed = np.full(N, np.inf)
     worse = difference(run(errors), run(failed))
     assert (worse.verdict, worse.difference, worse.change_percent) == ("worse", math.inf, math.inf)
@@ -68,16 +68,13 @@ def test_failures_make_a_run_worst(errors):
     assert (better.verdict, better.difference, better.change_percent) == ("better", -math.inf, -100)
     both = difference(run(failed), run(failed))
     assert (both.verdict, both.difference, both.change_percent) == ("no difference seen", 0, 0)
-
-
-def test_few_failures_move_the_median_as_large_errors_would(errors):
     some, large = errors.copy(), errors.copy()
     some[::3], large[::3] = np.inf, 1e9
     pd.testing.assert_series_equal(*(difference(run(errors), run(b)) for b in (some, large)))
     assert difference(run(errors), run(some)).difference > 0
 
 
-def test_seeds_give_means_and_the_standard_error_of_welch(errors):
+def test_seeds_give_means_and_the_standard_error_of_welch_and_one_has_no_deviation(errors):
     a, b = [errors + s for s in (0.0, 0.3, 0.1)], [errors + s for s in (0.5, 0.9)]
     found = difference(run(*a), run(*b))
     medians = [[float(np.median(values)) for values in seeds] for seeds in (a, b)]
@@ -85,6 +82,16 @@ def test_seeds_give_means_and_the_standard_error_of_welch(errors):
     assert [found.sd_a, found.sd_b] == pytest.approx([np.std(m, ddof=1) for m in medians])
     welch = stats.ttest_ind(medians[1], medians[0], equal_var=False)
     assert found.difference / found.se_seeds == pytest.approx(welch.statistic)
+    failed = np.full(N, np.inf)
+    found = difference(run(errors, errors + 1, failed), run(errors, errors + 3))
+    assert found.sd_a == pytest.approx(math.sqrt(0.5))  # of the two that are finite
+    assert found.sd_b == pytest.approx(math.sqrt(4.5))
+    assert found.se_seeds == pytest.approx(math.sqrt(0.5 / 2 + 4.5 / 2))
+    found = difference(run(errors, errors + 1), run(errors))
+    assert np.isnan([found.sd_b, found.se_seeds]).all()
+    found = difference(run(errors), run(errors, errors + 1))
+    assert np.isnan([found.sd_a, found.se_seeds]).all()
+    assert np.isnan(difference(run(errors, failed), run(errors, errors + 1)).sd_a)
 
 
 def test_each_measure_is_compared_with_itself(errors):
@@ -105,29 +112,13 @@ def test_draws_are_a_thousand_and_others_for_the_other_tree():
     assert not np.array_equal(a, b)
 
 
-def test_one_finite_seed_has_no_deviation(errors):
-    failed = np.full(N, np.inf)
-    found = difference(run(errors, errors + 1, failed), run(errors, errors + 3))
-    assert found.sd_a == pytest.approx(math.sqrt(0.5))  # of the two that are finite
-    assert found.sd_b == pytest.approx(math.sqrt(4.5))
-    assert found.se_seeds == pytest.approx(math.sqrt(0.5 / 2 + 4.5 / 2))
-    found = difference(run(errors, errors + 1), run(errors))
-    assert np.isnan([found.sd_b, found.se_seeds]).all()
-    found = difference(run(errors), run(errors, errors + 1))
-    assert np.isnan([found.sd_a, found.se_seeds]).all()
-    assert np.isnan(difference(run(errors, failed), run(errors, errors + 1)).sd_a)
-
-
-def test_limits_leave_out_two_and_a_half_percent_of_the_resamples_on_either_side():
+def test_limits_are_differences_that_occur_between_the_outer_two_and_a_half_percent():
     a, b = np.random.default_rng(8).lognormal(size=(2, 30))
     found = difference(run(a), run(b))
     _, counts = draws_of(np.arange(30), "a")
     drawn = np.array([np.median(np.repeat(b, k)) - np.median(np.repeat(a, k)) for k in counts])
     assert (drawn < found.low).mean() <= 0.026 <= (drawn <= found.low).mean()
     assert (drawn > found.high).mean() <= 0.026 <= (drawn >= found.high).mean()
-
-
-def test_limits_are_differences_that_occur():
     whole = np.arange(N, dtype=float)  # medians of whole numbers, and so their differences
     found = difference(run(whole), run(whole[::-1] ** 2), paired=False)
     assert (2 * found.low) % 1 == 0

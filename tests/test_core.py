@@ -13,47 +13,19 @@ import yaml
 from PIL import Image
 from snakemake.iocontainers import Namedlist
 
-from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table
 from synfeal.errors import InputError, why
 from synfeal.files import atomic_path, write_json
 from synfeal.job import call
 from synfeal.seeds import generator_of, seed_of
 from tests.fuzzing import JARGON
-
-
-def random_table(n):
-    rng = np.random.default_rng(3)
-    quat = rng.normal(size=(n, 4))
-    quat /= np.linalg.norm(quat, axis=1, keepdims=True) * np.sign(quat[:, :1])
-    return PoseTable(np.arange(n), np.arange(n) // 3, rng.normal(size=(n, 3)) * 1e3, quat)
+from tests.property_support import random_table
 
 
 def test_first_frames_are_a_prefix_and_too_many_are_refused():
-    table = random_table(10)
+    table = random_table(10, 3)
     np.testing.assert_array_equal(table.first(4).position_m, table.position_m[:4])
     with pytest.raises(ValueError, match="11"):
         table.first(11)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "header must be"),
-        ("a,b\n1,2\n", "header"),
-        (f"{HEADER}\n0,0,1,2,3,1,0,0\n", "9 numbers"),
-        (f"{HEADER}\n0,0,1,2,x,1,0,0,0\n", "x"),
-        (f"{HEADER}\n0,0,1,2,nan,1,0,0,0\n", "row 2"),
-    ],
-)
-def test_broken_pose_table_is_named_in_one_line(tmp_path, text, words):
-    path = tmp_path / "poses.csv"
-    path.write_text(text)
-    with pytest.raises(InputError) as caught:
-        read_pose_table(path)
-    message = str(caught.value)
-    assert str(path) in message
-    assert words in message
-    assert "\n" not in message
 
 
 def raised(action):
@@ -130,7 +102,7 @@ def run_job(tmp_path, body):
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def test_job_tells_a_person_one_line_and_logs_the_rest(tmp_path):
+def test_job_tells_a_person_one_line_and_logs_the_rest_and_a_defects_traceback(tmp_path):
     run = run_job(tmp_path, "raise InputError('mesh.glb: holds no faces;\\n export it again')")
     assert run.returncode == 1
     assert run.stderr == "error: mesh.glb: holds no faces; export it again\n"
@@ -138,9 +110,12 @@ def test_job_tells_a_person_one_line_and_logs_the_rest(tmp_path):
     log = (tmp_path / "job.log").read_text()
     assert "spoken" in log
     assert "native" in log
+    run = run_job(tmp_path, "1 / 0")
+    assert run.returncode == 1
+    assert "ZeroDivisionError" in (tmp_path / "job.log").read_text()
 
 
-def test_a_rule_calls_its_function_with_its_files_by_name(tmp_path):
+def test_a_rule_calls_its_function_with_files_and_the_results_of_its_job(tmp_path):
     table, document = tmp_path / "table.tex", tmp_path / "tables/all.tex"
     table.write_text("% one table")
     document.parent.mkdir()
@@ -152,10 +127,7 @@ def test_a_rule_calls_its_function_with_its_files_by_name(tmp_path):
     )
     call(job)
     assert "% one table" in document.read_text()
-
-
-def test_a_called_function_gets_the_results_directory_of_its_job(tmp_path):
-    """With a storage plugin the configured path is the end of a longer one."""
+    # With a storage plugin the configured path is the end of a longer one.
     root = tmp_path / "results/smoke/stored/results/smoke"
     function = "synfeal.report.meshes:write_meshes_table"
     job = SimpleNamespace(
@@ -167,9 +139,3 @@ def test_a_called_function_gets_the_results_directory_of_its_job(tmp_path):
     )
     with pytest.raises(InputError, match=f"^{root}/scenes/hall/properties.json: "):
         call(job)
-
-
-def test_job_keeps_the_traceback_of_a_defect(tmp_path):
-    run = run_job(tmp_path, "1 / 0")
-    assert run.returncode == 1
-    assert "ZeroDivisionError" in (tmp_path / "job.log").read_text()

@@ -44,13 +44,7 @@ def test_multiply_adds_are_the_published_ones():
     assert work["posenet2resnet"].parameter_bytes >= 4 * 21.28e6
 
 
-def test_looks_follow_snakemakes_schedule():
-    assert [last_look_s(s) for s in (0.4, 0.6, 14.9, 15.2, 44.9, 45.1, 100)] == [
-        *(0, 0.5, 14.5, 15, 15, 45, 75)
-    ]
-
-
-def test_a_law_is_found_and_outliers_are_not_followed():
+def test_a_law_is_found_and_neither_outliers_nor_chance_are_followed():
     rng = np.random.default_rng(0)
     sizes = rng.uniform(1, 10, (40, 2))
     seconds = 2 + sizes @ [0.5, 3]
@@ -61,15 +55,13 @@ def test_a_law_is_found_and_outliers_are_not_followed():
     seconds[:3] *= 4
     fixed_s, rates = fit_seconds(sizes, seconds, 0.3)
     assert fixed_s + np.dot(rates, (5, 5)) == pytest.approx(19.5, rel=0.05)
-
-
-def test_jobs_of_one_size_tell_only_the_rate():
     sizes, seconds = np.full((10, 1), 4.0), np.full(10, 9.0)
     assert fit_seconds(sizes, seconds, 1.0) == (1.0, (2.0,))
     assert fit_seconds(np.empty((3, 0)), np.array([1.0, 2.0, 6.0]), 1.0) == (3.0, ())
-
-
-def test_chance_is_no_rate():
+    sizes = np.linspace(1, 10, 20)[:, None]
+    fixed_s, rates = fit_seconds(sizes, 5 * sizes[:, 0] ** 1.5, 0.1)
+    assert fixed_s >= 0
+    assert rates[0] > 0
     # Short jobs that take 1 s whatever their size, off by up to 30 %: a thousand times the size
     # must not become a thousand times the time, whichever job happened to be slow.
     rng = np.random.default_rng(0)
@@ -78,13 +70,6 @@ def test_chance_is_no_rate():
         fixed_s, rates = fit_seconds(sizes, rng.uniform(0.9, 1.3, 8), 0.9)
         assert fixed_s >= 0.85
         assert fixed_s + rates[0] * 2000 < 12
-
-
-def test_no_part_is_negative():
-    sizes = np.linspace(1, 10, 20)[:, None]
-    fixed_s, rates = fit_seconds(sizes, 5 * sizes[:, 0] ** 1.5, 0.1)
-    assert fixed_s >= 0
-    assert rates[0] > 0
 
 
 def test_rendering_scales_with_samples():
@@ -111,7 +96,7 @@ def test_rendering_scales_with_samples():
     assert stage["peak_mb"] == pytest.approx(705)
 
 
-def test_training_on_a_gpu_takes_the_assumed_throughput():
+def test_training_on_a_gpu_takes_the_assumed_throughput_or_the_timed_one():
     law = a_law("training", fixed_s=3.0, rate_other=1e-4, rate=8.0, low=0.9, high=1.1)
     jobs = alike(4, "train", "training", other=1e5, size=7200.0)
     machine = Machine(8, 2, 10.0)
@@ -127,9 +112,13 @@ def test_training_on_a_gpu_takes_the_assumed_throughput():
     [on_cpu] = stage_costs(job_costs(jobs, law, on_cores), on_cores)
     assert on_cpu["gpu_mid"] == 0
     assert on_cpu["cpu_mid"] == pytest.approx(4 * (3 + 10 + 57_600))
+    law = a_law("training", fixed_s=3.0, rate_other=1e-4, rate=8.0)
+    machine = Machine(8, 2, 10.0, gpu_rates=(1e-5, 0.05))
+    cost = job_costs(alike(1, "train", "training", other=1e6, size=7200.0), law, machine)
+    assert cost.gpu_mid.tolist() == pytest.approx([1e6 * 1e-5 + 7200 * 0.05])
 
 
-def test_unmeasured_stages_are_said_to_be():
+def test_unmeasured_stages_are_said_to_be_and_longest_jobs_start_first():
     machine, laws = Machine(1, 0, 1.0), a_law("other", fixed_s=1.0)
     costs = job_costs(alike(1, "sfm", "sfm", size=1.0, disk_bytes=10.0), laws, machine)
     [stage] = stage_costs(costs, machine)
@@ -137,16 +126,9 @@ def test_unmeasured_stages_are_said_to_be():
     assert np.isnan(stage["cpu_mid"])
     whole = summed(costs, machine)
     assert (whole["cpu_mid"], whole["wall_mid"], whole["disk_bytes"]) == (0, 0, 10)
-
-
-def test_longest_jobs_start_first():
     assert wall_seconds([1, 1, 1, 3], 2) == 3
     assert wall_seconds([2, 2, 2], 2) == 4
     assert wall_seconds([5, 1], 8) == 5
-
-
-def test_timed_steps_of_a_gpu_replace_the_assumption():
-    law = a_law("training", fixed_s=3.0, rate_other=1e-4, rate=8.0)
-    machine = Machine(8, 2, 10.0, gpu_rates=(1e-5, 0.05))
-    cost = job_costs(alike(1, "train", "training", other=1e6, size=7200.0), law, machine)
-    assert cost.gpu_mid.tolist() == pytest.approx([1e6 * 1e-5 + 7200 * 0.05])
+    assert [last_look_s(s) for s in (0.4, 0.6, 14.9, 15.2, 44.9, 45.1, 100)] == [
+        *(0, 0.5, 14.5, 15, 15, 45, 75)
+    ]

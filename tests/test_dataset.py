@@ -101,7 +101,7 @@ def test_split_files_are_those_of_7_scenes(tmp_path):
         read_split(tmp_path, "test")
 
 
-def test_depth_is_16_bit_millimetres(tmp_path):
+def test_depth_is_16_bit_millimetres_and_a_pose_four_exact_rows(tmp_path):
     depth = np.array([[0.5, 1.2344, np.inf], [65.534, 65.536, 100.0]], np.float32)
     (tmp_path / "depth.png").write_bytes(encode_png(depth_mm_of(depth)))
     stored = np.asarray(Image.open(tmp_path / "depth.png"))
@@ -109,9 +109,6 @@ def test_depth_is_16_bit_millimetres(tmp_path):
     back = read_depth_m(tmp_path / "depth.png")
     np.testing.assert_allclose(back[0, :2], [0.5, 1.234], atol=1e-6)
     assert np.isinf(back[[0, 1, 1], [2, 1, 2]]).all()
-
-
-def test_pose_file_is_four_rows_and_exact(tmp_path):
     pose = poses_of(1).world_from_cam[0]
     (tmp_path / "pose.txt").write_text(pose_text(pose))
     rows = (tmp_path / "pose.txt").read_text().splitlines()
@@ -165,21 +162,15 @@ def test_only_some_frames_wait_to_be_written(tmp_path):
             assert frame.getpixel((160, 120)) == (index % 256,) * 3
 
 
-def test_an_interrupted_sequence_leaves_nothing(tmp_path):
+def test_nothing_is_left_half_written_overwritten_or_taken_for_frames(tmp_path):
     with pytest.raises(RuntimeError, match="on fire"):
         write_sequence(FakeRenderer(2), poses_of(5), tmp_path / "seq-01", True)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_directories_that_hold_something_are_not_touched(tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.txt").write_text("years of work")
     with pytest.raises(InputError, match="not empty"), atomic_directory(tmp_path / "mine"):
         pass
     assert (tmp_path / "mine" / "thesis.txt").read_text() == "years of work"
-
-
-def test_empty_sequences_are_named(tmp_path):
     (tmp_path / "seq-04").mkdir()
     with pytest.raises(InputError, match="seq-04"):
         frame_paths([tmp_path / "seq-04"], "color.png")

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 import trimesh
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import map_coordinates
 
 from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig
@@ -14,6 +14,7 @@ from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render import open_renderer
 from synfeal.render.distorted import DistortedRenderer, covering_camera
+from tests.painted_room import random_texture
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 
@@ -74,15 +75,7 @@ def noise_colour(normalised):
     )
 
 
-def _noise():
-    rng, image = np.random.default_rng(0), np.zeros((700, 700))
-    for sigma, weight in ((1.5, 25), (4, 30), (12, 30)):
-        octave = gaussian_filter(rng.standard_normal(image.shape), sigma, mode="wrap")
-        image += weight * octave / octave.std()
-    return np.clip(128 + image, 0, 255)
-
-
-NOISE = _noise()
+NOISE = random_texture(np.random.default_rng(0))
 
 
 def disc(centre_cam, radius):
@@ -169,14 +162,11 @@ def test_a_closed_room_fills_the_image(lens):
     np.testing.assert_allclose(depth[ahead], 2.0, atol=1e-3)  # the wall that faces the camera
 
 
-def test_the_pinhole_keeps_the_resolution_and_the_clip_planes():
+def test_the_pinhole_keeps_resolution_and_clip_planes_and_a_lens_may_be_too_wide():
     camera = camera_of(LENSES["barrel"]).model_copy(update={"near_m": 0.2, "far_m": 30.0})
     pinhole = covering_camera(camera)
     assert (pinhole.fx, pinhole.fy) == (2 * camera.fx, 2 * camera.fy)
     assert (pinhole.near_m, pinhole.far_m) == (0.2, 30.0)
     assert not any(pinhole.distortion)
-
-
-def test_a_lens_too_wide_for_any_pinhole_image_is_refused():
     with pytest.raises(InputError, match="give a smaller width"):
         covering_camera(camera_of((-0.2, 0.0, 0.0, 0.0, 0.0), 8192, 4096))

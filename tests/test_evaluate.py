@@ -115,7 +115,9 @@ def test_what_is_missing_or_no_rotation_counts_as_an_error_and_is_told(
     assert (out / "errors.png").stat().st_size > 10_000
 
 
-def test_labels_are_a_second_yardstick(dataset, truth, estimated, tmp_path):
+def test_labels_are_a_second_yardstick_and_a_swapped_convention_is_noticed(
+    dataset, truth, estimated, tmp_path, capsys
+):
     labels = disturbed(truth, 0.3, 20.0, seed=5)
     settings = Settings(labels=write_tree(tmp_path / "labels", labels))
     found = evaluate(dataset, write_ace(tmp_path / "ace.txt", estimated), settings)
@@ -124,9 +126,6 @@ def test_labels_are_a_second_yardstick(dataset, truth, estimated, tmp_path):
         np.testing.assert_allclose(
             found.errors[f"position_m{end}"], expected["position_m"], rtol=0, atol=2e-9
         )
-
-
-def test_a_swapped_convention_is_noticed_and_can_be_given(dataset, estimated, tmp_path, capsys):
     swapped = write_ace(tmp_path / "ace.txt", np.linalg.inv(estimated))
     assert main(["evaluate", str(dataset), str(swapped)]) == 1
     error = capsys.readouterr().err

@@ -47,7 +47,7 @@ FRAMES = (
 )
 
 
-def test_recalls_of_known_frames():
+def test_recalls_of_known_frames_and_their_limits():
     errors = {
         "position_m": np.array([frame[0] for frame in FRAMES]),
         "orientation_deg": np.array([frame[1] for frame in FRAMES]),
@@ -61,10 +61,7 @@ def test_recalls_of_known_frames():
     assert found["position_m"] == pytest.approx((0.2499 + 0.4) / 2)
     assert found["position_m_mean"] is None  # one frame has no pose
     np.testing.assert_allclose(joint_error(errors)[[0, 1, 7]], [0.0, 4.9, 490.0])
-
-
-def test_limits_of_a_recall_are_those_of_a_share_when_paths_are_frames():
-    """Of 400 independent frames: the normal approximation to the binomial."""
+    # Of 400 independent frames: the normal approximation to the binomial.
     inside = np.arange(400) < 120
     errors = {"position_m": np.where(inside, 0.0, 9.0), "orientation_deg": np.zeros(400)}
     found = summary(errors, np.arange(400))

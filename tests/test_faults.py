@@ -34,6 +34,7 @@ from synfeal.report.figures.registry import save
 from synfeal.report.latex import write_text
 from synfeal.run_lock import begin_run
 from tests.small_disk import mounted, remount
+from tests.test_workflow import snakemake
 
 N = 2000  # rows, vertices or values: more than the disk holds
 ROOM_FOR_NOTHING = "12k"
@@ -156,11 +157,9 @@ def other_run(root):
     return process
 
 
-def snakemake(results, target, *more):
-    command = [sys.executable, "-m", "snakemake", "--cores", "1", *more]
-    command += ["--configfile", "config/smoke.yaml", "--config", f"results={results}"]
-    command += ["--", target]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+def smoke(results, target, *more):
+    given = ("--configfile", "config/smoke.yaml", "--config", f"results={results}")
+    return snakemake(*more, *given, "--", target)
 
 
 @pytest.mark.slow
@@ -169,7 +168,7 @@ def test_a_second_run_is_refused_until_the_first_is_dead(tmp_path):
     with other_run(root) as process:
         with pytest.raises(InputError, match=rf"another run .* \(process {process.pid} on "):
             begin_run(root)
-        second = snakemake(root.parent, f"{root}/tables/hard_cases.csv")
+        second = smoke(root.parent, f"{root}/tables/hard_cases.csv")
         assert second.returncode == 1
         errors = [line for line in second.stderr.splitlines() if line.startswith("error:")]
         assert errors == [line for line in errors if "another run is at work there" in line] != []
@@ -200,7 +199,9 @@ def test_what_killed_runs_left_half_written_is_removed_and_nothing_else(name, tm
     assert sorted(path.name for path in place.iterdir()) == sorted(finished)
 
 
-def test_a_clock_that_jumped_back_leaves_no_date_in_the_future(tmp_path):
+def test_jumped_clocks_leave_no_date_in_the_future_and_missing_locks_are_said(
+    tmp_path, monkeypatch, capsys
+):
     jump_s = 3600
     ages_s = {"plan.csv": 60, "mesh.glb": -jump_s, "frames.npy": -jump_s, "model.pt": -jump_s - 1}
     now = time.time()
@@ -212,8 +213,6 @@ def test_a_clock_that_jumped_back_leaves_no_date_in_the_future(tmp_path):
     assert dates["plan.csv"] == pytest.approx(now - 60, abs=1e-3)
     assert now <= dates["mesh.glb"] == dates["frames.npy"] < dates["model.pt"] <= time.time()
 
-
-def test_a_file_system_without_locks_is_said(tmp_path, monkeypatch, capsys):
     def no_locks(descriptor, operation):
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
@@ -223,7 +222,7 @@ def test_a_file_system_without_locks_is_said(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err == message
 
 
-def test_torch_out_of_memory_is_a_memory_error():
+def test_too_little_memory_is_a_memory_error_and_one_line(tmp_path):
     with (
         pytest.raises(MemoryError, match=r"can't allocate memory: you tried to allocate \d+ bytes"),
         memory_errors(),
@@ -232,9 +231,6 @@ def test_torch_out_of_memory_is_a_memory_error():
     with pytest.raises(RuntimeError, match="shape") as caught, memory_errors():
         torch.zeros(3).reshape(2)
     assert not isinstance(caught.value, MemoryError)
-
-
-def test_a_job_tells_of_too_little_memory_in_one_line(tmp_path):
     log = tmp_path / "job.log"
     script = f"from synfeal.job import job\nwith job({str(log)!r}):\n    bytes(2**60)\n"
     run = subprocess.run(
@@ -251,15 +247,11 @@ def test_a_job_tells_of_too_little_memory_in_one_line(tmp_path):
 @pytest.mark.parametrize("target", ["all", "runs", "labels"])
 def test_every_job_has_an_output_that_the_target_asks_for(target, tmp_path):
     """Else Snakemake takes old results for those of a changed configuration after a failed job."""
-    plan = snakemake(tmp_path, target, "--dry-run", "--quiet", "host").stdout
+    plan = smoke(tmp_path, target, "--dry-run", "--quiet", "host").stdout
     jobs = JOB.findall(plan)
     (asked,) = (set(inputs.split(", ")) for rule, inputs, _ in jobs if rule == target)
     made = [(rule, set(outputs.split(", "))) for rule, _, outputs in jobs if outputs]
     assert {"scene", "plan", "sfm", "rgbd", "posegraph", "chain"} <= {rule for rule, _ in made}
-    temporary = {
-        "render_packed",
-        "render_varied",
-        "features",
-        "views",
-    }  # what is made of their output is asked for
+    # What is made of the output of these is asked for.
+    temporary = {"render_packed", "render_varied", "features", "views"}
     assert [rule for rule, outputs in made if rule not in temporary and not outputs & asked] == []

@@ -30,12 +30,9 @@ def closed_space(enclosure=1.0):
     return FreeSpace((axis, axis, axis), mask, mask, enclosure, 0.0)
 
 
-def test_texels_per_metre_of_one_square():
+def test_texels_and_colours_of_squares():
     assert texels_per_m([square(2.0, texture_of(64, 64))]) == pytest.approx([32.0] * 3)
     assert texels_per_m([square(2.0, texture_of(64, 16))]) == pytest.approx([16.0] * 3)
-
-
-def test_surface_by_what_colours_it():
     rgb = np.zeros((4, 3), np.uint8)
     detail = detail_of(
         TexturedMesh((square(1.0, texture_of(8, 8)), square(2.0, vertex_rgb=rgb), square(3.0)))
@@ -47,9 +44,6 @@ def test_surface_by_what_colours_it():
     bare = detail_of(TexturedMesh((square(1.0),)))
     assert bare["texels_per_m"] is None
     assert bare["coloured_vertices_per_m"] is None
-
-
-def test_texels_are_looked_up_from_the_bottom_left_and_repeat():
     texture = np.arange(4, dtype=np.uint8).reshape(2, 2, 1)  # 0 1 above 2 3
     uv = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [1.75, -0.25], [0.0, 0.0], [1.0, 1.0]])
     assert nearest_texels(texture, uv)[:, 0].tolist() == [2, 3, 0, 1, 2, 2]
@@ -91,13 +85,16 @@ def test_sizes_that_are_not_metres_are_doubted(extents, words):
     assert all(word in found for word in words)
 
 
-def test_plain_and_open_meshes_are_doubted():
+def test_plain_and_open_meshes_are_doubted_and_a_flat_floor_is_a_floor():
     plain = {"textured": 1.0, "coloured_by_vertex": 0.0, "plain": 3.0}
     two = (square(1.0, vertex_rgb=np.eye(4, 3, dtype=np.uint8) * 255), square(2.0))
     assert "75%" in colour_doubts(TexturedMesh(two), plain)[0]
     assert "of one colour" in colour_doubts(TexturedMesh(two[1:]), plain)[0]
     assert not colour_doubts(TexturedMesh(two), {**plain, "plain": 0.5})
     assert "25%" in doubts((5.0, 5.0, 3.0), space=closed_space(0.75))
+    points = np.column_stack([np.random.default_rng(0).random((100, 2)), np.zeros(100)])
+    normals = np.tile([0.0, 0.0, -1.0], (100, 1))
+    assert floor_areas_m2(normals, points, 7.0).tolist() == [0.0, 0.0, pytest.approx(7.0)]
 
 
 @pytest.mark.parametrize(
@@ -113,9 +110,3 @@ def test_the_largest_floor_tells_the_up_axis(turn, words):
     assert found.isascii()
     assert words in found
     assert bool(found) == bool(words)
-
-
-def test_a_flat_floor_is_a_floor():
-    points = np.column_stack([np.random.default_rng(0).random((100, 2)), np.zeros(100)])
-    normals = np.tile([0.0, 0.0, -1.0], (100, 1))
-    assert floor_areas_m2(normals, points, 7.0).tolist() == [0.0, 0.0, pytest.approx(7.0)]

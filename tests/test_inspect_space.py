@@ -43,14 +43,11 @@ def test_a_closed_room_is_free_and_its_box_keeps_off_the_walls():
     np.testing.assert_allclose(box, [low, high], atol=0.2)
 
 
-def test_a_room_without_a_ceiling_is_a_room():
+def test_a_room_without_a_ceiling_is_a_room_and_an_open_plain_is_none():
     mesh = room()
     mesh.update_faces(mesh.face_normals[:, 2] < 0.5)
     space = space_of([mesh], np.array([[-3.0, -2, 0], [3, 2, 2]]))
     assert space.share > 0.95
-
-
-def test_above_an_open_plain_nothing_is_free():
     plain = box_at((400.0, 400.0, 0.01), (0.0, 0.0, 0.0))
     space = space_of([plain], np.array([[-3.0, -3, 0.5], [3, 3, 2.5]]))
     assert space.share == 0.0
@@ -58,7 +55,7 @@ def test_above_an_open_plain_nothing_is_free():
     assert viewpoint(space, None) is None
 
 
-def test_the_inside_of_a_cupboard_is_not_where_cameras_go():
+def test_cameras_go_neither_into_a_cupboard_nor_around_low_furniture():
     space = space_of([room(), box_at((1.5, 1.5, 2.9), (-2.0, 0.0, 1.45))])
     x, y, z = space.axes_m
     inside = np.ix_(np.abs(x + 2.0) < 0.7, np.abs(y) < 0.7, z < 2.8)
@@ -70,9 +67,6 @@ def test_the_inside_of_a_cupboard_is_not_where_cameras_go():
     position = viewpoint(space, box)
     assert position is not None
     assert ((position >= box[0]) & (position <= box[1])).all()
-
-
-def test_furniture_below_the_cameras_is_no_obstacle():
     space = space_of([room(), box_at((4.0, 1.0, 0.4), (0.0, 0.0, 0.2))])
     assert space.floor_m == pytest.approx(0.0, abs=1e-4)
     box = suggest_box(space)

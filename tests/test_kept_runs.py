@@ -4,12 +4,10 @@ import hashlib
 import json
 import re
 import shutil
-import subprocess
-import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from baselines.groundtruth.methods import estimation_parameters
@@ -18,9 +16,11 @@ from baselines.training.record import training_parameters, write_training_record
 from baselines.training.score import score_run
 from synfeal.cli import main
 from synfeal.config import Run, load_config, read_design
-from synfeal.dataset.pose_table import COLUMNS, PoseTable, write_pose_table
+from synfeal.dataset.pose_table import COLUMNS, write_pose_table
 from synfeal.files import write_json
 from synfeal.report.predictions.package import POSES
+from tests.property_support import random_table
+from tests.test_workflow import snakemake
 
 REPO = Path(__file__).parent.parent
 DESIGN = """table,block,scene,size,labels,noise_m,noise_deg,init
@@ -58,11 +58,7 @@ def write_records(config):
 
 def table(count):
     """The first poses of one plan, four frames to a path."""
-    rng = np.random.default_rng(7)
-    position_m, quat = rng.normal(size=(500, 3)), rng.normal(size=(500, 4))
-    quat /= np.linalg.norm(quat, axis=1, keepdims=True) * np.sign(quat[:, :1])
-    frame = np.arange(count)
-    return PoseTable(frame, frame // 4, position_m[:count], quat[:count])
+    return random_table(500, 7, 4).first(count)
 
 
 def write_results(config):
@@ -200,16 +196,15 @@ def test_a_damaged_package_is_refused_in_one_line_and_writes_nothing(
     assert not (tmp_path / "out").exists()
 
 
-def test_results_that_differ_are_not_overwritten(made, package, tmp_path, capsys):
+def test_neither_other_results_are_overwritten_nor_other_labels_scored(
+    made, package, tmp_path, capsys
+):
     other = tmp_path / "out" / PREDICTED
     other.parent.mkdir(parents=True)
     other.write_text("mine\n")
     assert main(["restore", str(package), str(tmp_path / "out")]) == 1
     assert f"{other}: exists and differs" in capsys.readouterr().err
     assert [p for p in (tmp_path / "out").rglob("*") if p.is_file()] == [other]
-
-
-def test_predictions_are_not_scored_by_other_labels(made, tmp_path):
     run = Run("large_room", "6k", "synfeal", "pretrained", "posenet", 0)
     folder = Path(shutil.copytree(made.root / "runs" / run.directory, tmp_path / "run"))
     labels = made.root / "labels/large_room/6k/synfeal"
@@ -217,12 +212,7 @@ def test_predictions_are_not_scored_by_other_labels(made, tmp_path):
     given = (folder / "predictions.csv", labels / "test.csv", labels / "test.csv")
     score_run(*given, labels / "train.csv", *outputs, {})
     write_pose_table(
-        tmp_path / "other.csv",
-        PoseTable(
-            *(getattr(table(25), n) for n in ("frame", "path")),
-            table(25).position_m + 1,
-            table(25).quat_wxyz,
-        ),
+        tmp_path / "other.csv", replace(table(25), position_m=table(25).position_m + 1)
     )
     with pytest.raises(Exception, match="not the labels that"):
         score_run(given[0], tmp_path / "other.csv", given[2], labels / "train.csv", *outputs, {})
@@ -230,9 +220,8 @@ def test_predictions_are_not_scored_by_other_labels(made, tmp_path):
 
 def planned(config, target, *changes):
     given = [f"results={config.results}", f"experiments={config.experiments}", *changes]
-    command = [sys.executable, "-m", "snakemake", "--cores", "1", "--dry-run", "--configfile"]
-    command += ["config/smoke.yaml", "--config", *given, "--", target]
-    return subprocess.run(command, cwd=REPO, capture_output=True, text=True, check=False)
+    smoke = ("--dry-run", "--configfile", "config/smoke.yaml")
+    return snakemake(*smoke, "--config", *given, "--", target)
 
 
 def jobs_of(run):

@@ -93,14 +93,11 @@ def test_relative_error_of_a_known_drift(frames):
     assert error.per_metre_deg == pytest.approx(0.2 / STEP_M)
 
 
-def test_relative_error_needs_enough_frames_and_some_way():
+def test_relative_error_needs_enough_frames_and_some_way_in_each_sequence():
     truth = table_of(straight(25))
     assert relative_error([(truth, truth)], 25) is None
     standing = table_of(straight(26, step_m=0.0))
     assert np.isnan(relative_error([(standing, standing)], 25).per_metre_m)
-
-
-def test_sequences_that_are_too_short_do_not_count():
     truth, short = table_of(straight(60)), table_of(straight(25))
     labels = table_of(straight(60, step_m=1.02 * STEP_M, turn_deg=0.2))
     lost = table_of(straight(25, step_m=0.0))
@@ -187,7 +184,7 @@ def test_the_table_holds_what_was_put_into_the_labels(results):
     assert "Drift" in (root / "t.tex").read_text()
 
 
-def test_a_frame_costs_what_its_stages_took_without_what_the_method_does_not_need(results):
+def test_a_frame_costs_what_its_stages_took_and_each_method_has_a_row(results):
     root, _ = results
     by_method = {m: label_records(root, "large_room", "6k", m, "total")[0] for m in ("sfm",)}
     assert by_method["sfm"]["seconds_per_frame"] == pytest.approx(3 * 7.0 / 27)
@@ -195,9 +192,6 @@ def test_a_frame_costs_what_its_stages_took_without_what_the_method_does_not_nee
     # Two batches, the times of odometry and of the method itself, no loop closures.
     assert alone["seconds_per_frame"] == pytest.approx(2 * 2 * 2.0 / 21)
     assert alone["peak_memory_mb"] == 7.0
-
-
-def test_speed_vs_error_has_a_row_per_method(results):
     root, rows = results
     write_label_error_table(design_of(rows), root, root / "tables/label_error.csv", root / "t.tex")
     found = speeds_of("labels", ["large_room", "sanctuary"], root)

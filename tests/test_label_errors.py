@@ -7,15 +7,9 @@ from scipy.spatial.transform import Rotation
 from synfeal.config.experiments import INJECTED
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import pose_error, position_error_m
-from synfeal.geometry.rotations import canonical_quat_wxyz
 from synfeal.labels.errors import OF_SPACE, seed_names, with_error
 from synfeal.labels.noise import add_noise
-
-
-def table_of(count, seed=0):
-    rng = np.random.default_rng(seed)
-    quat = canonical_quat_wxyz(Rotation.random(count, rng=rng).as_quat(scalar_first=True))
-    return PoseTable(np.arange(count), np.arange(count) // 7, rng.normal(size=(count, 3)), quat)
+from tests.property_support import random_table
 
 
 def noise_of(clean, noisy):
@@ -24,19 +18,28 @@ def noise_of(clean, noisy):
     return noisy.position_m - clean.position_m, (after * before.inv()).as_rotvec()
 
 
-def test_no_noise_is_bit_identical_part_by_part():
-    clean = table_of(50)
+def test_no_noise_changes_no_bit_and_the_seed_decides_part_by_part():
+    clean = random_table(50, 0, 7)
     for noise_m, noise_deg in ((0.0, 0.0), (0.2, 0.0), (0.0, 10.0)):
         noisy = add_noise(clean, noise_m, noise_deg, np.random.default_rng(2))
         assert np.array_equal(noisy.position_m, clean.position_m) == (noise_m == 0)
         assert np.array_equal(noisy.quat_wxyz, clean.quat_wxyz) == (noise_deg == 0)
         np.testing.assert_array_equal(noisy.frame, clean.frame)
         np.testing.assert_array_equal(noisy.path, clean.path)
+    clean = random_table(30, 0, 7)
+    one, same, other = (
+        add_noise(clean, 0.1, 5.0, np.random.default_rng(seed)) for seed in (4, 4, 5)
+    )
+    np.testing.assert_array_equal(one.position_m, same.position_m)
+    np.testing.assert_array_equal(one.quat_wxyz, same.quat_wxyz)
+    assert not np.array_equal(one.position_m, other.position_m)
+    alone = add_noise(clean, 0.1, 0.0, np.random.default_rng(4))
+    np.testing.assert_array_equal(alone.position_m, one.position_m)
 
 
 def test_directions_are_uniform_on_the_sphere():
     count = 40_000
-    clean = table_of(count)
+    clean = random_table(count, 0, 7)
     shift, turn = noise_of(clean, add_noise(clean, 1.0, 20.0, np.random.default_rng(3)))
     for vectors in (shift, turn / np.radians(20.0)):
         # A coordinate of a uniform unit vector is uniform on [-1, 1]: mean 0, variance 1/3.
@@ -48,22 +51,10 @@ def test_directions_are_uniform_on_the_sphere():
     assert abs((shift * turn).sum(axis=1).mean()) < 5 / np.sqrt(count)
 
 
-def test_seed_decides_and_both_parts_keep_their_directions():
-    clean = table_of(30)
-    one, same, other = (
-        add_noise(clean, 0.1, 5.0, np.random.default_rng(seed)) for seed in (4, 4, 5)
-    )
-    np.testing.assert_array_equal(one.position_m, same.position_m)
-    np.testing.assert_array_equal(one.quat_wxyz, same.quat_wxyz)
-    assert not np.array_equal(one.position_m, other.position_m)
-    alone = add_noise(clean, 0.1, 0.0, np.random.default_rng(4))
-    np.testing.assert_array_equal(alone.position_m, one.position_m)
-
-
 @pytest.mark.parametrize(("noise_m", "noise_deg"), [(-0.1, 0.0), (0.0, -0.5), (-0.1, -5.0)])
 def test_negative_noise_is_refused(noise_m, noise_deg):
     with pytest.raises(ValueError, match=f"must not be negative: {noise_m} m, {noise_deg} deg$"):
-        add_noise(table_of(2), noise_m, noise_deg, np.random.default_rng(0))
+        add_noise(random_table(2, 0, 7), noise_m, noise_deg, np.random.default_rng(0))
 
 
 SIZES = [(0.1, 5.0), (0.3, 20.0)]
@@ -77,7 +68,7 @@ def erroneous(kind, table, train, noise_m=0.3, noise_deg=20.0, seed=1):
 @pytest.mark.parametrize("kind", INJECTED)
 @pytest.mark.parametrize(("noise_m", "noise_deg"), SIZES)
 def test_every_kind_has_the_same_median_error_on_the_training_poses(kind, noise_m, noise_deg):
-    train = table_of(501)
+    train = random_table(501, 0, 7)
     found = erroneous(kind, train, train, noise_m, noise_deg)
     position_m, orientation_rad = pose_error(found.world_from_cam, train.world_from_cam)
     assert np.median(position_m) == pytest.approx(noise_m, rel=1e-9)
@@ -89,7 +80,7 @@ def test_every_kind_has_the_same_median_error_on_the_training_poses(kind, noise_
 
 
 def test_an_offset_is_one_rigid_error_per_path_and_another_for_the_next():
-    clean = table_of(70)  # seven frames to a path
+    clean = random_table(70, 0, 7)  # seven frames to a path
     shift, turn = noise_of(clean, erroneous("offset", clean, clean))
     for vectors, size in ((shift, 0.3), (turn, np.radians(20))):
         by_path = vectors.reshape(10, 7, 3)
@@ -99,7 +90,7 @@ def test_an_offset_is_one_rigid_error_per_path_and_another_for_the_next():
 
 
 def test_a_scale_multiplies_all_distances_from_the_first_camera_on():
-    train, test = table_of(101), table_of(40, seed=2)
+    train, test = random_table(101, 0, 7), random_table(40, 2, 7)
     median_m = np.median(np.linalg.norm(train.position_m - train.position_m[0], axis=1))
     found = [erroneous("scale", table, train).position_m for table in (train, test)]
     np.testing.assert_array_equal(found[0][0], train.position_m[0])
@@ -110,7 +101,7 @@ def test_a_scale_multiplies_all_distances_from_the_first_camera_on():
 
 
 def test_a_bend_belongs_to_space_and_is_smooth():
-    train = table_of(400)
+    train = random_table(400, 0, 7)
     low, high = train.position_m.min(axis=0), train.position_m.max(axis=0)
     steps = np.linspace(0, 1, 2001)[:, None]
     line = low + steps * (high - low)
@@ -131,21 +122,20 @@ def test_a_bend_belongs_to_space_and_is_smooth():
     np.testing.assert_array_equal(one, two)
 
 
-def test_errors_of_space_are_seeded_alike_in_both_splits_and_none_by_its_size():
+def test_errors_of_space_are_seeded_alike_and_what_stands_still_is_not_scaled():
     for kind in INJECTED:
         same = seed_names(kind, "train") == seed_names(kind, "test")
         assert same == (kind in OF_SPACE)
+    table = PoseTable(
+        np.arange(3), np.zeros(3, int), np.ones((3, 3)), random_table(3, 0, 7).quat_wxyz
+    )
+    np.testing.assert_array_equal(erroneous("scale", table, table).position_m, table.position_m)
 
 
 @pytest.mark.parametrize("kind", INJECTED)
 def test_two_sizes_of_a_kind_differ_in_size_alone(kind):
-    train = table_of(201)
+    train = random_table(201, 0, 7)
     small, large = (noise_of(train, erroneous(kind, train, train, *size)) for size in SIZES)
     np.testing.assert_allclose(3 * small[0], large[0], atol=1e-9)
     if kind != "scale":
         np.testing.assert_allclose(4 * small[1], large[1], atol=1e-9)
-
-
-def test_a_set_that_stands_still_is_not_scaled():
-    table = PoseTable(np.arange(3), np.zeros(3, int), np.ones((3, 3)), table_of(3).quat_wxyz)
-    np.testing.assert_array_equal(erroneous("scale", table, table).position_m, table.position_m)

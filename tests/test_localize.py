@@ -20,6 +20,7 @@ from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.files import write_json
 from synfeal.frames import read_records
+from tests.collected import only_error
 from tests.trained_localizers import NETWORK, answering, save, untrained
 
 COUNT = 120  # more than a batch
@@ -69,13 +70,6 @@ def localized(model, out, *images):
     return [[*rows[0]], *([*row.values()] for row in rows)]
 
 
-def only_error(capsys):
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1, lines
-    assert lines[0].startswith("error: ")
-    return lines[0]
-
-
 def test_frames_of_a_run_get_its_predictions_to_the_last_digit(run, tmp_path):
     header, *rows = localized(run / "model.pt", tmp_path / "poses.csv", run / "seq-01")
     assert header == ["image", "tx", "ty", "tz", "qw", "qx", "qy", "qz"]
@@ -85,24 +79,6 @@ def test_frames_of_a_run_get_its_predictions_to_the_last_digit(run, tmp_path):
     predictions = (run / "predictions.csv").read_text().splitlines()[1:]
     assert [row[1:] for row in rows] == [line.split(",")[2:] for line in predictions]
     assert len({tuple(row) for row in rows}) == COUNT
-
-
-def test_what_is_printed(run, tmp_path, capsys):
-    localized(run / "model.pt", tmp_path / "poses.csv", run / "seq-01")
-    printed = capsys.readouterr()
-    model, poses = printed.out.splitlines()
-    fov_deg = 2 * math.degrees(math.atan(math.tan(math.radians(35)) * HEIGHT / WIDTH))
-    assert model.endswith(
-        f": posenet2, pictures shrunk to 32 x 32 pixels; the short side must see {fov_deg:.1f}"
-        " degrees"
-    )
-    assert f"poses.csv: {COUNT} poses; " in poses
-    assert " ms for one picture (median: read " in poses
-    assert poses.endswith(" pictures/s in batches, on cpu")
-    assert [line.split(",")[0] for line in printed.err.splitlines()] == [
-        "picture 100 of 120",
-        "picture 120 of 120",
-    ]
 
 
 def test_pictures_come_in_the_order_named(run, tmp_path):
@@ -199,37 +175,37 @@ def upright():
     return Image.fromarray(picture(np.random.default_rng(3)))
 
 
-def test_a_grey_picture_has_three_equal_channels(tmp_path, upright):
-    grey = shrunk(tmp_path, upright.convert("L"))
-    assert (grey == grey[:, :, :1]).all()
-    coloured = Image.merge("RGB", [upright.convert("L")] * 3)
-    np.testing.assert_array_equal(grey, shrunk(tmp_path, coloured))
+def with_alpha(image, alpha):
+    image = image.copy()
+    image.putalpha(alpha)
+    return image
 
 
-@pytest.mark.parametrize("alpha", [0, 128, 255])
-def test_an_alpha_channel_changes_nothing(tmp_path, upright, alpha):
-    expected = shrunk(tmp_path, upright)
-    upright.putalpha(alpha)
-    np.testing.assert_array_equal(shrunk(tmp_path, upright), expected)
+GREY = {"expected": lambda image: Image.merge("RGB", [image.convert("L")] * 3)}
+PALETTE = {"expected": lambda image: image.quantize(64).convert("RGB")}
+# What is stored, how, and what it means.
+STORED = {
+    "grey": (lambda image: image.convert("L"), {}, GREY),
+    "palette": (lambda image: image.quantize(64), {}, PALETTE),
+    "palette, one clear": (lambda image: image.quantize(64), {"transparency": 0}, PALETTE),
+    "palette, alpha": (lambda i: i.quantize(64), {"transparency": b"\x00\x80\xff"}, PALETTE),
+    **{f"alpha {a}": (lambda i, a=a: with_alpha(i, a), {}, {}) for a in (0, 128, 255)},
+}
 
 
-@pytest.mark.parametrize("transparency", [None, 0, b"\x00\x80\xff"])
-def test_a_palette_means_its_colours(tmp_path, upright, transparency):
-    indexed = upright.quantize(64)
-    options = {} if transparency is None else {"transparency": transparency}
-    expected = shrunk(tmp_path, indexed.convert("RGB"))
-    np.testing.assert_array_equal(shrunk(tmp_path, indexed, **options), expected)
+@pytest.mark.parametrize("kind", STORED)
+def test_a_picture_means_its_colours(kind, tmp_path, upright):
+    stored, options, meaning = STORED[kind]
+    expected = meaning.get("expected", lambda image: image)(upright)
+    found = shrunk(tmp_path, stored(upright), **options)
+    np.testing.assert_array_equal(found, shrunk(tmp_path, expected, "expected.png"))
 
 
-def test_sixteen_bits_of_colour_become_their_upper_eight(tmp_path, upright):
-    pixels = np.asarray(upright)
-    deep = pixels[:, :, ::-1].astype(np.uint16) * 256 + 77
+def test_sixteen_bits_become_their_upper_eight_and_a_picture_is_turned_upright(tmp_path, upright):
+    deep = np.asarray(upright)[:, :, ::-1].astype(np.uint16) * 256 + 77
     assert cv2.imwrite(str(tmp_path / "deep.png"), deep)
     found = read_picture(tmp_path / "deep.png", PX)
     np.testing.assert_array_equal(found, shrunk(tmp_path, upright))
-
-
-def test_a_picture_is_turned_upright(tmp_path, upright):
     exif = Image.Exif()
     exif[0x0112] = 6  # what the camera stored is to be turned to the right
     stored = upright.transpose(Image.Transpose.ROTATE_90)

@@ -37,14 +37,11 @@ def z_up(points):
     return np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1)
 
 
-def test_gltf_node_transform_axes_and_units(tmp_path, paint):
+def test_gltf_transforms_axes_and_units_and_glb_is_the_same(tmp_path, paint):
     path = write_gltf(tmp_path, textured(), paint)
     in_file = 2.0 * TRIANGLE + [10.0, 20.0, 30.0]  # scale, then translation
     np.testing.assert_allclose(load_mesh(path).parts[0].vertices_m, z_up(in_file))
     np.testing.assert_allclose(load_mesh(path, "z", 0.01).parts[0].vertices_m, 0.01 * in_file)
-
-
-def test_gltf_and_glb_of_one_scene_are_the_same(tmp_path, paint):
     header, binary = triangle_gltf(textured(), paint)
     plain = load_mesh(store_gltf(tmp_path, header, binary)).parts[0]
     packed = load_mesh(store_glb(tmp_path, header, binary)).parts[0]
@@ -53,7 +50,7 @@ def test_gltf_and_glb_of_one_scene_are_the_same(tmp_path, paint):
     np.testing.assert_array_equal(packed.texture, plain.texture)
 
 
-def test_nested_nodes_and_instances(tmp_path, paint):
+def test_nodes_nest_make_instances_need_no_scene_and_keep_the_order_of_the_file(tmp_path, paint):
     header, binary = triangle_gltf(textured(), paint)
     quarter_turn = [0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)]  # about y: x becomes -z
     header["nodes"] = [
@@ -66,19 +63,11 @@ def test_nested_nodes_and_instances(tmp_path, paint):
     np.testing.assert_allclose(parts[0].vertices_m, np.stack([z + 5.0, y, -x], axis=1), atol=1e-6)
     np.testing.assert_allclose(parts[1].vertices_m, TRIANGLE * [3.0, 1.0, 1.0] + [5.0, 0.0, 0.0])
     assert parts[0].texture is parts[1].texture  # decoded once
-
-
-def test_without_a_scene_all_nodes_are_meant(tmp_path, paint):
-    header, binary = triangle_gltf(textured(), paint)
     expected = load_mesh(store_gltf(tmp_path, header, binary)).parts[0].vertices_m
     header["nodes"].append({"children": [0]})
     del header["scenes"], header["scene"]
     (part,) = load_mesh(store_gltf(tmp_path, header, binary)).parts
     np.testing.assert_array_equal(part.vertices_m, expected)
-
-
-def test_parts_keep_the_order_of_the_file(tmp_path, paint):
-    header, binary = triangle_gltf(textured(), paint)
     primitive = header["meshes"][0]["primitives"][0]
     header["meshes"] = [
         {"name": "z", "primitives": [primitive, dict(primitive)]},
@@ -126,7 +115,7 @@ def test_gltf_vertex_colours_are_linear(
     np.testing.assert_allclose(part.vertex_rgb, [expected] * 3, atol=1)
 
 
-def test_obj_with_material_and_texture(tmp_path):
+def test_obj_with_one_material_and_with_several(tmp_path):
     pixels = np.arange(2 * 2 * 3, dtype=np.uint8).reshape(2, 2, 3)
     Image.fromarray(pixels).save(tmp_path / "wall.png")
     part = load_mesh(write_obj(tmp_path)).parts[0]
@@ -134,9 +123,6 @@ def test_obj_with_material_and_texture(tmp_path):
     assert part.uv is not None
     np.testing.assert_allclose(part.uv[part.faces[0]], UV)
     np.testing.assert_array_equal(part.texture, pixels)
-
-
-def test_obj_with_several_materials(tmp_path):
     (tmp_path / "two.mtl").write_text("newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n")
     (tmp_path / "two.obj").write_text(
         "mtllib two.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n"
@@ -176,7 +162,7 @@ end_header
 """
 
 
-def test_ply_with_texture(tmp_path, paint):
+def test_ply_with_texture_and_with_face_colours(tmp_path, paint):
     (tmp_path / "scan.ply").write_text(PLY_WITH_TEXTURE)
     mesh = load_mesh(tmp_path / "scan.ply")
     part = mesh.parts[0]
@@ -185,9 +171,6 @@ def test_ply_with_texture(tmp_path, paint):
     assert part.texture is not None
     np.testing.assert_allclose(part.uv[part.faces[0]], UV)
     assert part.texture[0, 0].tolist() == [1, 2, 3]
-
-
-def test_ply_with_face_colours(tmp_path):
     box = trimesh.creation.box()
     box.visual.face_colors = np.arange(48).reshape(12, 4).astype(np.uint8)
     box.export(tmp_path / "box.ply")

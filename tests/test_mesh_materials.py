@@ -25,7 +25,7 @@ from tests.mesh_samples import (
 )
 
 
-def test_gltf_names_a_missing_base_colour_texture_and_what_depends_on_it(tmp_path, caplog):
+def test_gltf_names_missing_and_broken_textures_and_what_depends_on_them(tmp_path, caplog):
     material = textured({"normalTexture": {"index": 1}, "alphaMode": "BLEND"})
     header, binary = triangle_gltf(material, ["wall.png", "bumps.png"])
     binary = add_attribute(header, binary, "COLOR_0", np.array([[1, 2, 3, 4]] * 3, np.uint8))
@@ -37,9 +37,6 @@ def test_gltf_names_a_missing_base_colour_texture_and_what_depends_on_it(tmp_pat
     assert "drawn opaque" in findings[2]
     assert "wall.png" in caplog.text
     assert "bumps.png" not in caplog.text
-
-
-def test_broken_texture_is_a_warning(tmp_path, caplog):
     Image.effect_noise((64, 64), 50).save(tmp_path / "paint.png")
     whole = (tmp_path / "paint.png").read_bytes()
     (tmp_path / "paint.png").write_bytes(whole[: len(whole) // 2])
@@ -87,14 +84,11 @@ def test_alpha_mode_becomes_a_cutoff(tmp_path, mode, cutoff, finding):
     assert finding is None or finding in mesh.findings[0]
 
 
-def test_a_blended_texture_without_holes_is_opaque(tmp_path):
+def test_a_blended_texture_without_holes_is_opaque_and_one_without_colour_dropped(tmp_path):
     Image.new("RGBA", (2, 2), (1, 2, 3, 255)).save(tmp_path / "paint.png")
     mesh = load_mesh(write_gltf(tmp_path, textured({"alphaMode": "BLEND"}), ["paint.png"]))
     assert mesh.parts[0].alpha_cutoff is None
     assert mesh.findings == ()
-
-
-def test_what_is_never_visible_is_dropped(tmp_path):
     Image.new("LA", (2, 2), (255, 255)).save(tmp_path / "paint.png")
     material = textured({"alphaMode": "BLEND"})
     material["pbrMetallicRoughness"]["baseColorFactor"] = [1, 1, 1, 0.03]
@@ -121,7 +115,7 @@ def test_obj_glass_is_not_drawn(tmp_path, opacity):
         load_mesh(write_obj(tmp_path, f"map_Kd wall.png\n{opacity}\n"))
 
 
-def test_specular_glossiness_shows_its_diffuse_colour(tmp_path):
+def test_webp_and_the_diffuse_colour_of_specular_glossiness_are_shown(tmp_path):
     Image.new("RGB", (2, 2), (9, 8, 7)).save(tmp_path / "paint.png")
     Image.new("RGB", (2, 2), (1, 1, 1)).save(tmp_path / "fallback.png")
     material = textured()
@@ -132,9 +126,16 @@ def test_specular_glossiness_shows_its_diffuse_colour(tmp_path):
     assert part.texture is not None
     assert part.texture[0, 0].tolist() == [9, 8, 7]
     assert part.base_color.tolist() == [255, 127, 255, 255]
+    Image.new("RGB", (2, 2), (10, 200, 30)).save(tmp_path / "paint.webp", lossless=True)
+    header, binary = triangle_gltf(textured(), ["paint.webp"])
+    header["textures"] = [{"extensions": {"EXT_texture_webp": {"source": 0}}}]
+    header["extensionsRequired"] = header["extensionsUsed"] = ["EXT_texture_webp"]
+    part = load_mesh(store_gltf(tmp_path, header, binary)).parts[0]
+    assert part.texture is not None
+    assert part.texture[0, 0].tolist() == [10, 200, 30]
 
 
-def test_texture_transform_scales_turns_and_moves(tmp_path):
+def test_texture_coordinates_are_transformed_chosen_and_missed(tmp_path):
     Image.new("RGB", (2, 2)).save(tmp_path / "paint.png")
     transform = {"offset": [0.5, 0.25], "scale": [2.0, 1.0], "rotation": np.pi / 2}
     material = textured(extensions={"KHR_texture_transform": transform})
@@ -143,18 +144,12 @@ def test_texture_transform_scales_turns_and_moves(tmp_path):
     # In glTF v points down: counter-clockwise takes (u, v) to (v, -u).
     u, v = UV[:, 0] * 2.0, UV[:, 1]
     np.testing.assert_allclose(part.uv, np.stack([v + 0.5, 1.0 - (-u + 0.25)], axis=1), atol=1e-12)
-
-
-def test_the_second_set_of_texture_coordinates_is_used_where_asked_for(tmp_path):
     Image.new("RGB", (2, 2)).save(tmp_path / "paint.png")
     header, binary = triangle_gltf(textured(texCoord=1), ["paint.png"])
     second = np.array([[0.5, 0.5], [0.25, 0.5], [1.0, 0.0]], "<f4")
     binary = add_attribute(header, binary, "TEXCOORD_1", second)
     part = load_mesh(store_gltf(tmp_path, header, binary)).parts[0]
     np.testing.assert_allclose(part.uv, second * [1, -1] + [0, 1])
-
-
-def test_a_texture_without_coordinates_is_named(tmp_path):
     Image.new("RGB", (2, 2)).save(tmp_path / "paint.png")
     material = textured()
     header, binary = triangle_gltf(material, ["paint.png"])
@@ -200,17 +195,7 @@ def test_every_image_mode_becomes_8_bit_rgb(image, expected):
     assert (pixels == expected).all()
 
 
-def test_webp(tmp_path):
-    Image.new("RGB", (2, 2), (10, 200, 30)).save(tmp_path / "paint.webp", lossless=True)
-    header, binary = triangle_gltf(textured(), ["paint.webp"])
-    header["textures"] = [{"extensions": {"EXT_texture_webp": {"source": 0}}}]
-    header["extensionsRequired"] = header["extensionsUsed"] = ["EXT_texture_webp"]
-    part = load_mesh(store_gltf(tmp_path, header, binary)).parts[0]
-    assert part.texture is not None
-    assert part.texture[0, 0].tolist() == [10, 200, 30]
-
-
-def test_a_texture_wider_than_renderers_take_is_made_smaller(tmp_path, caplog):
+def test_textures_too_wide_are_made_smaller_and_large_ones_no_bombs(tmp_path, caplog, monkeypatch):
     halves = np.zeros((4, 2 * MAX_SIDE_PX, 3), np.uint8)
     halves[:, MAX_SIDE_PX:] = 200
     Image.fromarray(halves).save(tmp_path / "paint.png")
@@ -221,9 +206,6 @@ def test_a_texture_wider_than_renderers_take_is_made_smaller(tmp_path, caplog):
     assert (pixels == halves[::2, ::2]).all()
     assert "from 32768 x 4 to 16384 x 2 pixels" in mesh.findings[0]
     assert mesh.findings[0] in caplog.text
-
-
-def test_a_large_texture_is_no_decompression_bomb(tmp_path, monkeypatch):
     Image.new("RGB", (64, 64)).save(tmp_path / "paint.png")
     path = write_gltf(tmp_path, textured(), ["paint.png"])
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)  # Pillow refuses twice as many

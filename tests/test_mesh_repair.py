@@ -39,7 +39,7 @@ def test_points_and_lines_are_removed_but_slivers_stay(scale, offset):
     np.testing.assert_array_equal(part.faces, [[0, 1, 2], [0, 1, 3]])
 
 
-def test_duplicates_are_removed_and_faces_with_another_texture_kept():
+def test_surfaces_open_and_non_manifold_are_kept_and_duplicates_removed(tmp_path):
     vertices = np.vstack([TRIANGLE, TRIANGLE, TRIANGLE + 9])
     faces = np.array([[0, 1, 2], [1, 2, 0], [2, 1, 0], [3, 4, 5], [6, 7, 8]])
     part, findings = repair(MeshPart("wall", vertices, faces))
@@ -48,9 +48,6 @@ def test_duplicates_are_removed_and_faces_with_another_texture_kept():
         "part 'wall': 2 duplicate faces removed",
         "part 'wall': 1 coincident face kept: their vertices or texture differ",
     )
-
-
-def test_unused_vertices_take_their_colours_and_coordinates_along():
     vertices = np.vstack([[[99.0, 99, 99]], TRIANGLE, [[np.nan] * 3]])
     rgb = np.arange(15, dtype=np.uint8).reshape(5, 3)
     uv = np.arange(10.0).reshape(5, 2)
@@ -60,9 +57,6 @@ def test_unused_vertices_take_their_colours_and_coordinates_along():
     np.testing.assert_array_equal(part.vertex_rgb, rgb[1:4])
     np.testing.assert_array_equal(part.uv, uv[1:4])
     assert findings == ("part 'wall': 2 unused vertices removed",)
-
-
-def test_open_and_non_manifold_surfaces_are_kept(tmp_path):
     # Three walls that meet in one edge: non-manifold there, open everywhere else.
     colours = np.array([[255, 0, 0, 255]] * 4 + [[0, 255, 0, 255]], np.uint8)
     vertices = np.array([[0.0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, -1, 0]])

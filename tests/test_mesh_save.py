@@ -51,7 +51,7 @@ def test_round_trip_keeps_geometry_texture_and_order():
     assert loaded.parts[0].texture is loaded.parts[4].texture  # one image, decoded once
 
 
-def test_every_colour_survives():
+def test_every_colour_survives_and_other_programs_read_linear_ones(tmp_path):
     grey = np.repeat(np.arange(256, dtype=np.uint8)[:, None], 3, axis=1)
     vertices = np.random.default_rng(0).normal(size=(256, 3))
     faces = np.arange(255).reshape(-1, 3)
@@ -65,9 +65,6 @@ def test_every_colour_survives():
     )
     back = there_and_back(TexturedMesh(plain)).parts
     assert [part.base_color[1] for part in back] == list(range(256))
-
-
-def test_other_programs_read_linear_colours(tmp_path):
     save_glb(tmp_path / "mesh.glb", box_mesh())  # display colour 99
     raw = trimesh.load_scene(tmp_path / "mesh.glb", process=False)
     (geometry,) = raw.geometry.values()

@@ -22,7 +22,7 @@ def test_steps_have_the_gradients_singular_vectors_and_values_near_one(shape):
     assert values.max() < 1.25
 
 
-def test_a_matrix_goes_where_torchs_own_muon_takes_it():
+def test_a_matrix_goes_where_torchs_own_muon_takes_it_and_kernels_step_as_matrices():
     torch.manual_seed(1)
     start, target = torch.randn(24, 40), torch.randn(24, 40)
     ours, theirs = (torch.nn.Parameter(start.clone()) for _ in range(2))
@@ -36,9 +36,6 @@ def test_a_matrix_goes_where_torchs_own_muon_takes_it():
     moved = (ours - start).norm()
     # torch iterates in bfloat16, which has three digits.
     assert (ours - theirs).norm() / moved < 0.02
-
-
-def test_kernels_of_one_shape_step_as_if_each_were_a_matrix_alone():
     torch.manual_seed(2)
     kernels = [torch.nn.Parameter(torch.randn(6, 4, 3, 3)) for _ in range(3)]
     matrices = [torch.nn.Parameter(k.detach().reshape(6, 36).clone()) for k in kernels]

@@ -15,9 +15,11 @@ from synfeal.report.findings import HERE, PAPER, effects, mean_factor, sentences
 from synfeal.report.findings_figure import is_drawn_from, write_findings_figure
 from synfeal.report.pages import PAGES, PARTS, headline, main, part_of, rewritten
 from synfeal.report.publish import PUBLISHED
+from tests.report_results import change_cell
 
 REPOSITORY = Path(__file__).parent.parent
 MINI = REPOSITORY / "results/published/mini"
+DIFFICULTY = "results/benchmarks/scene_difficulty"
 
 
 @pytest.fixture
@@ -29,15 +31,12 @@ def root(tmp_path, monkeypatch):
     return tmp_path / PUBLISHED / "mini"
 
 
-DIFFICULTY = "results/benchmarks/scene_difficulty"
-
-
 def test_the_pages_show_the_published_results(monkeypatch):
     monkeypatch.chdir(REPOSITORY)
     assert main(["--check"]) == 0
 
 
-def test_the_four_ways_through_the_code_are_there():
+def test_what_pages_name_is_there():
     page = (REPOSITORY / "docs/architecture.md").read_text()
     ways = page.split("## Four ways")[1].split("\n## ")[0]
     names = re.findall(r"`((?:synfeal|baselines)\.[\w.]+)`", ways)
@@ -45,72 +44,34 @@ def test_the_four_ways_through_the_code_are_there():
     for name in names:
         module, _, function = name.rpartition(".")
         assert callable(getattr(importlib.import_module(module), function)), name
-
-
-def test_the_index_names_files_that_are_there():
     page = (REPOSITORY / "docs/README.md").read_text()
     paths = re.findall(r"`([\w.]+/[\w./]+)`", page)
     assert len(paths) > 15
     assert [path for path in paths if not (REPOSITORY / path).exists()] == []
 
 
-def changed_in(path, column, value):
-    """Set a column of the first row of a CSV."""
-    head, first, *rest = path.read_text().splitlines()
-    cells = first.split(",")
-    cells[head.split(",").index(column)] = value
-    path.write_text("\n".join([head, ",".join(cells), *rest]) + "\n")
+TABLES, SCENES = "published/mini/tables", "benchmarks/scene_difficulty"
 
 
 @pytest.mark.parametrize(
     ("part", "file", "column", "value", "shown"),
     [
-        (
-            "size",
-            "published/mini/tables/table4_size.csv",
-            "position_m_true",
-            "7.654",
-            "4.42 m",
-        ),  # over sqrt(3)
-        (
-            "size",
-            "published/mini/tables/table4_size.csv",
-            "published_position_m",
-            "6.54",
-            "*(6.54, ",
-        ),
-        (
-            "labels",
-            "published/mini/tables/table2_ground_truth.csv",
-            "orientation_deg_true",
-            "99.87",
-            "99.9°",
-        ),
-        (
-            "difficulty",
-            "benchmarks/scene_difficulty/large_room-sift.csv",
-            "covered_share_mean",
-            "0.99",
-            "| 99 % (",
-        ),
-        (
-            "difficulty",
-            "benchmarks/scene_difficulty/large_room-repetition.csv",
-            "far_share",
-            "0.777",
-            "77.7 %",
-        ),
+        ("size", f"{TABLES}/table4_size", "position_m_true", "7.654", "4.42 m"),  # over sqrt(3)
+        ("size", f"{TABLES}/table4_size", "published_position_m", "6.54", "*(6.54 m"),
+        ("labels", f"{TABLES}/table2_ground_truth", "orientation_deg_true", "99.87", "99.9°"),
+        ("difficulty", f"{SCENES}/large_room-sift", "covered_share_mean", "0.99", "| 99 % ("),
+        ("difficulty", f"{SCENES}/large_room-repetition", "far_share", "0.777", "77.7 %"),
     ],
 )
 def test_changing_a_result_changes_the_text(root, part, file, column, value, shown):
     before = PARTS[part](root)
     assert shown not in before
-    changed_in(root.parent.parent / file, column, value)
+    change_cell(root.parent.parent / f"{file}.csv", column, value)
     assert shown in PARTS[part](root)
 
 
 def test_a_failed_cell_says_so(root):
-    changed_in(root / "tables/table4_size.csv", "position_m_true", "")
+    change_cell(root / "tables/table4_size.csv", "position_m_true", "")
     assert "| failed *(" in PARTS["size"](root)
 
 
@@ -127,22 +88,19 @@ def test_parts_are_replaced_and_nothing_else():
 def test_the_headline_is_of_the_largest_profile_published(root):
     assert headline() == "mini"
     shutil.copytree(root, root.with_name("night"))
-    changed_in(root.with_name("night") / "tables/table4_size.csv", "position_m_true", "7.654")
+    change_cell(root.with_name("night") / "tables/table4_size.csv", "position_m_true", "7.654")
     assert headline() == "night"
     assert "4.42 m" in part_of("size", "headline")
     assert "4.42 m" not in part_of("size", "mini")
 
 
-def test_a_part_nobody_knows_is_an_input_error():
-    with pytest.raises(InputError, match="<!-- sizes mini -->: no such part"):
-        part_of("sizes", "mini")
-
-
-def test_results_that_are_not_published_are_an_input_error(root):
+def test_unknown_parts_and_unpublished_results_are_input_errors(root):
     for name in PARTS:
         if name != "difficulty":
             with pytest.raises(InputError, match="results/published/paper"):
                 part_of(name, "paper")
+    with pytest.raises(InputError, match="<!-- sizes mini -->: no such part"):
+        part_of("sizes", "mini")
 
 
 def test_check_writes_nothing_and_publishing_writes_all(root, capsys):
@@ -156,7 +114,7 @@ def test_check_writes_nothing_and_publishing_writes_all(root, capsys):
     assert main([]) == 0
     assert "Large Room 6k" in PAGES[0].read_text()
     assert main(["--check"]) == 0
-    changed_in(root / "tables/table2_ground_truth.csv", "position_m_true", "9.9")
+    change_cell(root / "tables/table2_ground_truth.csv", "position_m_true", "9.9")
     assert main(["--check"]) == 1  # the figure alone
 
 

@@ -4,32 +4,27 @@ import logging
 
 import numpy as np
 import pytest
-import trimesh
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
-from synfeal.config.models import CollectionConfig, SceneConfig
+from synfeal.config.models import CollectionConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
-from synfeal.mesh.rays import RayCaster
 from synfeal.planning.plan import plan_split
 from synfeal.planning.repeat import read_poses, repeated_poses
+from tests.empty_room import EMPTY, ROOM, caster_of
+from tests.empty_room import SCENE as EMPTY_SCENE
 
-# The room is 6 m long; a wall with a door leaves the last 2 m, and a cupboard shuts off a corner.
-ROOM = np.array([[-3.0, -2.0, 0.0], [3.0, 2.0, 2.5]])
+# A wall with a door leaves the last 2 m of the room, and a cupboard shuts off a corner.
 WALL = [[1.0, -1.5, 0.0], [1.1, 2.0, 2.5]]
 CUPBOARD = np.array([[-3.0, -2.0, 0.0], [-1.5, -0.5, 2.5]])
-SCENE = SceneConfig.model_validate(
-    {"source": "mesh", "path": "scene.glb", "min_view_distance_m": 0.8}
-)
+SCENE = EMPTY_SCENE.model_copy(update={"min_view_distance_m": 0.8})
 
 
 @pytest.fixture(scope="module")
 def flat():
-    meshes = [trimesh.creation.box(bounds=bounds) for bounds in (ROOM, WALL, CUPBOARD)]
-    joined = trimesh.util.concatenate(meshes)
-    return RayCaster(joined.vertices, joined.faces)
+    return caster_of(ROOM, WALL, CUPBOARD)
 
 
 def random_plan(caster, n_frames, seed=0, **values):
@@ -49,17 +44,10 @@ def test_random_poses_have_a_free_view_in_the_connected_space(flat):
 
 
 def test_random_poses_are_uniform_where_all_views_are_free():
-    room = trimesh.creation.box(bounds=ROOM)
     box = np.array([[-1.0, -0.5, 1.0], [1.0, 0.5, 1.5]])  # at least 1 m from every wall
     scene = SCENE.model_copy(update={"min_view_distance_m": 0.5})
-    plan = plan_split(
-        RayCaster(room.vertices, room.faces),
-        box,
-        scene,
-        CollectionConfig(mode="random"),
-        5000,
-        np.random.default_rng(3),
-    )
+    random = CollectionConfig(mode="random")
+    plan = plan_split(EMPTY, box, scene, random, 5000, np.random.default_rng(3))
     share = (plan.position_m - box[0]) / (box[1] - box[0])
     assert min(kstest(share[:, axis], "uniform").pvalue for axis in range(3)) > 0.01
     step = np.linalg.norm(np.diff(plan.position_m, axis=0), axis=1)
@@ -163,24 +151,3 @@ def test_poses_outside_the_mesh_are_a_warning(tmp_path, caplog):
         assert not caplog.records
         repeated_poses(source, "train", 6, ROOM * 0.0)
     assert "6 of 6 poses lie outside" in caplog.text
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("poses.txt", "0 0 0 0 0 0 0 2\n", "line 1 holds a quaternion of length 2"),
-        ("poses.txt", "# t\n0 0 0 0 0 0 1\n", "line 2 must hold eight finite numbers"),
-        ("poses.txt", "0 0 0 nan 0 0 0 1\n", "line 1 must hold eight finite numbers"),
-        ("poses.csv", "frame,path,tx,ty,tz,qw,qx,qy,qz\n0,0,0,0,0,0,0,0,0\n", "line 2 .* length 0"),
-        ("poses.json", "[]", "must be a directory, a .csv pose table or a .txt"),
-        ("frame-000000.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n", "not a rigid pose"),
-        ("frame-000000.pose.txt", "1.01 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n", "not a rigid pose"),
-        ("frame-000000.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1.01\n", "not a rigid pose"),
-        ("frame-000000.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n1 0 0 1\n", "not a rigid pose"),
-    ],
-)
-def test_what_is_no_pose_is_named(name, content, message, tmp_path):
-    (tmp_path / name).write_text(content)
-    source = tmp_path if name.startswith("frame") else tmp_path / name
-    with pytest.raises(InputError, match=message):
-        read_poses(source, "train")

@@ -1,26 +1,28 @@
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from baselines.groundtruth.posegraph.graph import (
     Edge,
     PoseGraph,
+    chi2,
     edge_residuals,
-    read_g2o,
     swapped_blocks,
     write_g2o,
 )
 from baselines.groundtruth.posegraph.lm import optimise_lm
+from baselines.groundtruth.posegraph.optimise import optimise_open3d
 from baselines.groundtruth.posegraph.toro import optimise_toro
-from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error, pose_matrix, relative
 
 INFORMATION = np.diag([1e4] * 3 + [1e5] * 3)
 SIGMA_M, SIGMA_RAD = 1e-2, 1e5**-0.5
 OPTIMISERS = {
-    "lm": lambda graph: optimise_lm(graph, 50),
-    "toro": lambda graph: optimise_toro(graph, 150, 1e-9),
+    "lm": lambda graph: optimise_lm(graph, 100),
+    "toro": lambda graph: optimise_toro(graph, 600, 1e-12),
+    "open3d": lambda graph: optimise_open3d(graph, 100),
 }
 
 
@@ -39,22 +41,51 @@ def circle(count):
     return pose_matrix(rotation, position)
 
 
-def loop_graph(count, noise, rng, loops=((0, -1), (0, 5), (3, 9), (7, 2))):
-    """A loop of neighbours and some closures, measured with ``noise`` times the sigmas.
-
-    The initial poses chain the neighbours, as odometry does.
-    """
-    truth = circle(count)
-    pairs = [(k, k + 1) for k in range(count - 1)]
-    pairs += [(i % count, j % count) for i, j in loops]
+def measured(truth, pairs, noise, rng):
+    """The graph of noisy measurements, in sigmas; its initial poses chain the edges (k, k + 1)."""
     edges = []
     for i, j in pairs:
         error = small_motion(rng, noise * SIGMA_M, noise * SIGMA_RAD)
         edges.append(Edge(i, j, relative(truth[i], truth[j]) @ error, INFORMATION))
     initial = [np.eye(4)]
-    for edge in edges[: count - 1]:
+    for edge in edges[: len(truth) - 1]:
         initial.append(initial[-1] @ edge.i_from_j)
-    return truth, PoseGraph(np.array(initial), tuple(edges))
+    return PoseGraph(np.array(initial), tuple(edges))
+
+
+def loop_graph(count, rng, loops=((0, -1), (0, 5), (3, 9), (7, 2))):
+    """A loop of neighbours and some closures."""
+    pairs = [(k, k + 1) for k in range(count - 1)]
+    pairs += [(i % count, j % count) for i, j in loops]
+    return measured(circle(count), pairs, 1.0, rng)
+
+
+def manhattan(rng, nodes=120, blocks=4, closure_m=1.1):
+    """Poses (nodes, 4, 4) of a walk on a street grid with right-angled turns, and its edges.
+
+    A node is joined to the next one and to at most two earlier ones at the same corner or the next.
+    """
+    position, heading = np.zeros((nodes, 3)), np.zeros(nodes, dtype=int)
+    direction = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], dtype=float)
+    for k in range(1, nodes):
+        turn = rng.choice([0, 0, 1, 3]) if k % 3 == 0 else 0
+        heading[k] = (heading[k - 1] + turn) % 4
+        while np.abs(position[k - 1] + direction[heading[k]]).max() > blocks:
+            heading[k] = (heading[k] + 1) % 4
+        position[k] = position[k - 1] + direction[heading[k]]
+    rotation = Rotation.from_euler("z", heading[:, None] * np.pi / 2).as_matrix()
+    pairs = [(k, k + 1) for k in range(nodes - 1)]
+    near = cKDTree(position).query_ball_point(position, closure_m)
+    for k, around in enumerate(near):
+        pairs += [(i, k) for i in sorted(i for i in around if i < k - 10)[:2]]
+    return pose_matrix(rotation, position), pairs
+
+
+def walk_graph(noise):
+    """True poses of a Manhattan walk from the first, and what was measured."""
+    rng = np.random.default_rng(0)
+    truth, pairs = manhattan(rng)
+    return relative(truth[0], truth), measured(truth, pairs, noise, rng)
 
 
 def scipy_solution(graph):
@@ -83,7 +114,7 @@ def scipy_solution(graph):
 
 
 def test_lm_finds_the_minimum_that_scipy_finds():
-    _, graph = loop_graph(12, 1.0, np.random.default_rng(2))
+    graph = loop_graph(12, np.random.default_rng(2))
     expected = scipy_solution(graph)
     assert pose_error(expected, graph.first_from_cam)[0].max() > 1e-3
     np.testing.assert_allclose(optimise_lm(graph, 50), expected, atol=1e-6)
@@ -115,6 +146,47 @@ def test_toro_shares_a_loop_residual_evenly_along_equal_edges():
     np.testing.assert_allclose(residuals[:, [0, 2]], 0, atol=1e-6)
 
 
+@pytest.mark.parametrize("name", OPTIMISERS)
+def test_a_noise_free_graph_is_recovered_from_a_bad_start(name):
+    truth, graph = walk_graph(0.0)
+    rng = np.random.default_rng(1)
+    start = truth @ np.array([small_motion(rng, 0.1, 0.05) for _ in truth])
+    start[0] = np.eye(4)
+    position_m, orientation_rad = pose_error(OPTIMISERS[name](PoseGraph(start, graph.edges)), truth)
+    assert position_m.max() < 1e-6
+    assert orientation_rad.max() < 1e-6
+
+
+def test_toro_comes_near_least_squares():
+    _, graph = walk_graph(2.0)
+    best = chi2(graph, optimise_lm(graph, 100))
+    assert 0.999 * best <= chi2(graph, optimise_toro(graph, 100, 1e-5)) <= 1.3 * best
+
+
+@pytest.mark.parametrize("name", ["lm", "toro"])  # Open3D's steps are too long: it stays 7 m away
+def test_nodes_that_are_upside_down_find_their_way(name):
+    """A walk whose last third starts turned by 170 degrees about its own axis."""
+    truth, graph = walk_graph(0.0)
+    turned = pose_matrix(Rotation.from_euler("z", 170, True).as_matrix(), [0, 0, 0])
+    start = np.concatenate([truth[:80], truth[80:] @ turned])
+    position_m, _ = pose_error(OPTIMISERS[name](PoseGraph(start, graph.edges)), truth)
+    assert position_m.max() < 1e-4
+
+
+@pytest.mark.parametrize("name", OPTIMISERS)
+def test_information_over_twelve_orders_of_magnitude_stays_finite(name):
+    truth, graph = walk_graph(0.0)
+    rng = np.random.default_rng(2)
+    scale = 10.0 ** rng.uniform(-6, 6, len(graph.edges))
+    edges = tuple(
+        Edge(e.i, e.j, e.i_from_j, s * np.eye(6)) for e, s in zip(graph.edges, scale, strict=True)
+    )
+    start = truth @ np.array([small_motion(rng, 0.01, 0.0) for _ in truth])
+    start[0] = np.eye(4)
+    noisy = PoseGraph(start, edges)
+    assert chi2(noisy, OPTIMISERS[name](noisy)) < 1e-3 * chi2(noisy, start)  # and no NaN
+
+
 def full_information(rng):
     root = rng.normal(size=(6, 6))
     return root @ root.T + np.eye(6)
@@ -125,7 +197,7 @@ def test_g2o_file_reads_the_same_in_gtsam(tmp_path):
     import gtsam
 
     rng = np.random.default_rng(4)
-    _, graph = loop_graph(6, 1.0, rng, loops=((0, -1),))
+    graph = loop_graph(6, rng, loops=((0, -1),))
     edges = tuple(Edge(e.i, e.j, e.i_from_j, full_information(rng)) for e in graph.edges)
     path = tmp_path / "graph.g2o"
     write_g2o(path, PoseGraph(graph.first_from_cam, edges))
@@ -138,50 +210,3 @@ def test_g2o_file_reads_the_same_in_gtsam(tmp_path):
         np.testing.assert_allclose(factor.measured().matrix(), edge.i_from_j, atol=1e-12)
         found = factor.noiseModel().information()
         np.testing.assert_allclose(found, swapped_blocks(edge.information), rtol=1e-9, atol=1e-9)
-
-
-VERTEX = "VERTEX_SE3:QUAT"
-
-
-def edge_line(i, j, w=1):
-    return f"EDGE_SE3:QUAT {i} {j} 0 0 0 0 0 0 {w}" + 21 * " 1"
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "numbered 0 to n-1"),
-        ("FIX 0\n", "line 1 is no"),
-        ("VERTEX_SE3:QUAT 0 0 0 0 0 0 0\n", "line 1: needs 8 finite numbers, found 7"),
-        ("VERTEX_SE3:QUAT 0 0 0 zero 0 0 0 1\n", "line 1: 'zero' is no number"),
-        ("VERTEX_SE3:QUAT 1 0 0 0 0 0 0 1\n", "numbered 0 to n-1"),
-        (
-            "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nEDGE_SE3:QUAT 0 1 0 0 0 0 0 0 1" + 21 * " 1" + "\n",
-            "edge 0 1 must join",
-        ),
-        (f"{VERTEX} 0 0 0 0 0 0 0 1\n{VERTEX} 1 0 0 0 0 0 0 1\n{edge_line(1, 1)}", "edge 1 1 must"),
-        (f"{VERTEX} 0 0 0 0 0 0 0 1\n{edge_line(1, 0)}", "edge 1 0 must join two different"),
-        (
-            f"{VERTEX} 0 0 0 0 0 0 0 1\n{VERTEX} 1 0 0 0 0 0 0 1\n",
-            "node 1 is not connected to node 0 by edges; is the file cut short",
-        ),
-        (
-            f"{VERTEX} 0 0 0 0 0 0 0 1\n\n",
-            "line 2 is not a VERTEX_SE3:QUAT or EDGE_SE3:QUAT record",
-        ),
-        (f"{VERTEX} 0 0 0 inf 0 0 0 1\n", "line 1: needs 8 finite numbers, found 8"),
-        (f"{VERTEX} 0 0 0 0 0 0 0 2\n", "line 1 holds a quaternion of length 2"),
-        (f"{VERTEX} 0 0 0 0 0 0 0 1\n{edge_line(0, 1)[:-2]}", "line 2: needs 30 .* found 29"),
-        (f"{VERTEX} 0 0 0 0 0 0 0 1\n{edge_line(0, 0.5)}", "must begin with whole numbers"),
-        (f"{VERTEX} 0 0 0 0 0 0 0 1\n{edge_line(0, 1, w=3)}", "line 2 holds a quaternion of"),
-        (f"{VERTEX} 0.5 0 0 0 0 0 0 1\n", "must begin with whole numbers"),
-        (f"{VERTEX} 0 0 0 0 0 0 0 1\n{VERTEX} 2 0 0 0 0 0 0 1\n", "numbered 0 to n-1 without"),
-        ("\udcff", "cannot be read as a g2o file"),
-    ],
-)
-def test_broken_g2o_files_are_named(tmp_path, text, message):
-    path = tmp_path / "graph.g2o"
-    path.write_text(text, encoding="utf-8", errors="surrogateescape")
-    with pytest.raises(InputError, match=message) as caught:
-        read_g2o(path)
-    assert str(caught.value).startswith(str(path))

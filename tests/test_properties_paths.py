@@ -94,6 +94,11 @@ def test_frames_of_a_path_are_even_on_the_line_to_the_target(start, target, spac
     np.testing.assert_allclose(found[:, :3, 3], expected_m, atol=1e-11)
     np.testing.assert_allclose(found[-1], poses_of(target[None])[0], atol=1e-9)
     np.testing.assert_allclose(np.linalg.det(found[:, :3, :3]), 1.0, atol=1e-12)
+    if how == "slerp":  # at constant speed
+        turns = Rotation.from_matrix(found[:-1, :3, :3]).inv() * Rotation.from_matrix(
+            found[1:, :3, :3]
+        )
+        assert len(found) == 1 or np.ptp(turns.magnitude()) < 1e-6
 
 
 @few

@@ -67,7 +67,7 @@ def test_predictions_are_published_as_one_file_if_it_is_small(root, monkeypatch,
     assert (root.parent / "published/mini/predictions.zip").exists() == tracked
 
 
-def test_a_run_is_published_without_what_no_page_shows(root):
+def test_a_run_is_published_without_what_no_page_shows_and_so_is_one_of_labels_alone(root):
     target = root.parent / "published/mini"
     (target / "tables").mkdir(parents=True)
     (target / "tables/of_an_older_design.csv").write_text("old")
@@ -75,9 +75,6 @@ def test_a_run_is_published_without_what_no_page_shows(root):
     tables = {"tables/table1_meshes.csv", "tables/table1_meshes.tex"}
     assert files_below(target) == tables | {"figures/shown.png"} | set(FINISHED)
     assert all((target / name).read_bytes() == (root / name).read_bytes() for name in tables)
-
-
-def test_a_run_of_labels_alone_has_tables_and_figures(root):
     for name in FINISHED:
         (root / name).unlink()
     assert main([]) == 0

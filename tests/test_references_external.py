@@ -11,14 +11,15 @@ import yaml
 from baselines.references.external import answer_externally, read_answers, run_external
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.errors import InputError
-from tests.test_references import frames, random_poses
+from tests.property_support import random_table
+from tests.test_references import frames
 
 ROOT = Path(__file__).parent.parent
 
 
 def external_files(tmp_path):
     """Frames and labels of a data set whose test images are training images."""
-    train, truth = random_poses(12, 5), tmp_path / "truth"
+    train, truth = random_table(12, 5, 3), tmp_path / "truth"
     np.save(tmp_path / "train.npy", frames(12))
     np.save(tmp_path / "test.npy", frames(12)[[7, 2, 5]])
     rows = [7, 2, 5]
@@ -58,7 +59,7 @@ def grey_likeness(files):
 
 
 def test_answers_may_be_incomplete_and_in_any_order(tmp_path):
-    frames = random_poses(4, 0)
+    frames = random_table(4, 0, 3)
     path = tmp_path / "mine.csv"
     path.write_text("frame,note,tx,ty,tz,qw,qx,qy,qz\n3,x,1,2,3,1,0,0,0\n1,y,4,5,6,0,1,0,0\n")
     found = read_answers(path, frames)
@@ -66,28 +67,6 @@ def test_answers_may_be_incomplete_and_in_any_order(tmp_path):
     assert np.isnan(found.quat_wxyz[[0, 2]]).all()
     np.testing.assert_array_equal(found.position_m[[1, 3]], [[4, 5, 6], [1, 2, 3]])
     np.testing.assert_array_equal(found.quat_wxyz[[1, 3]], [[0, 1, 0, 0], [1, 0, 0, 0]])
-
-
-HEADER = "frame,tx,ty,tz,qw,qx,qy,qz\n"
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (None, "cannot be read"),
-        ("frame,tx,ty,tz\n0,1,2,3\n", "columns frame,tx,ty,tz,qw"),
-        (HEADER + "0,1,2,3,1,0,0,zero\n", "cannot be read"),
-        (HEADER + "0,1,2,3,1,0,0,0\n0,1,2,3,1,0,0,0\n", "frame 0 appears twice"),
-        (HEADER + "4,1,2,3,1,0,0,0\n", "frame 4 is not in the test set of 4"),
-    ],
-)
-def test_answers_that_cannot_be_used_are_refused_in_one_line(tmp_path, text, words):
-    path = tmp_path / "mine.csv"
-    if text is not None:
-        path.write_text(text)
-    with pytest.raises(InputError, match=words) as refusal:
-        read_answers(path, random_poses(4, 0))
-    assert str(path) in str(refusal.value)
 
 
 @pytest.mark.parametrize(

@@ -61,7 +61,7 @@ def table(root):
     return read_references(out.with_suffix(".csv"))
 
 
-def test_the_table_has_a_row_per_data_set_and_method(table):
+def test_the_table_has_a_row_per_data_set_and_method_and_all_are_shown(table, root):
     # Scene coordinates are learnt from the simulator's labels and the largest noise alone.
     learnt = {"synfeal", "noise-p0.3-r20"}
     assert set(table.labels[table.method == "scene-coordinates"]) == learnt
@@ -73,6 +73,19 @@ def test_the_table_has_a_row_per_data_set_and_method(table):
     assert (row.noise_m, row.noise_deg, row.kind) == (0.1, 5, "reference")
     mine = table[table.method == "mine"].iloc[0]
     assert (mine.title, mine.kind, mine.labels) == ("Mine", "external", "synfeal")
+    sheet = references_sheet(table)
+    titles = [reference.title for reference in REFERENCES.values()]
+    assert list(sheet.headings[2:-1]) == ["Mean training pose", *titles, "Mine"]
+    (clean,) = sheet.lines.index[sheet.lines.label == "Synfeal"]  # its labels are the truth
+    best = sheet.values[(sheet.values.line == clean) & (sheet.values["column"] == "Best localizer")]
+    assert best.text.tolist() == ["PoseNet, 0.2 m, 12°, 0 %"]
+    page = html_table(root / "tables" / "references.csv")
+    assert page.count("<tr") == 1 + len(table)
+    rows = [row for row in design() if row.table == TABLE3]
+    (upper, lower) = figure_of(table, rows).axes
+    drawn = {line.get_label(): line.get_ydata() for line in upper.lines}
+    assert list(drawn[REFERENCES["structure-depth"].title]) == list(STRUCTURE_M)
+    assert len(lower.lines) == len(drawn) == len(REFERENCES) + len(MODELS) + 2
 
 
 def test_the_finding_counts_the_localizers_that_are_closer(table):
@@ -90,28 +103,9 @@ def test_the_finding_counts_the_localizers_that_are_closer(table):
     assert crossing_finding(table[table.noise_m == 0]) == ""
 
 
-def test_print_page_and_figure_show_every_method(root, table):
-    sheet = references_sheet(table)
-    titles = [reference.title for reference in REFERENCES.values()]
-    assert list(sheet.headings[2:-1]) == ["Mean training pose", *titles, "Mine"]
-    (clean,) = sheet.lines.index[sheet.lines.label == "Synfeal"]  # its labels are the truth
-    best = sheet.values[(sheet.values.line == clean) & (sheet.values["column"] == "Best localizer")]
-    assert best.text.tolist() == ["PoseNet, 0.2 m, 12°, 0 %"]
-    page = html_table(root / "tables" / "references.csv")
-    assert page.count("<tr") == 1 + len(table)
-    rows = [row for row in design() if row.table == TABLE3]
-    (upper, lower) = figure_of(table, rows).axes
-    drawn = {line.get_label(): line.get_ydata() for line in upper.lines}
-    assert list(drawn[REFERENCES["structure-depth"].title]) == list(STRUCTURE_M)
-    assert len(lower.lines) == len(drawn) == len(REFERENCES) + len(MODELS) + 2
-
-
-def test_label_sets_are_called_by_their_noise():
+def test_label_sets_are_called_by_their_noise_and_a_bad_table_is_refused(tmp_path):
     assert label_title("bend-p0.075-r0") == "bend 0.075 m, 0°"
     assert label_title("sfm") == "SfM"
-
-
-def test_a_table_without_a_column_is_refused(tmp_path):
     path = tmp_path / "references.csv"
     pd.DataFrame({"scene": ["a"]}).to_csv(path)
     with pytest.raises(InputError, match=r"references.csv: column .* missing"):

@@ -27,7 +27,7 @@ def opened(request):
     return opener_of(request.param)
 
 
-def test_depth_of_a_frontal_plane_is_its_distance_everywhere(opened):
+def test_depth_of_a_frontal_plane_is_its_distance_also_from_behind_and_else_infinite(opened):
     mesh = TexturedMesh((facing_quad(3.0, 10.0, base_color=colored((255, 0, 0))),))
     with opened(mesh, camera_of()) as renderer:
         rgb, depth = renderer.render_rgbd(LOOK_ALONG_X)
@@ -35,9 +35,19 @@ def test_depth_of_a_frontal_plane_is_its_distance_everywhere(opened):
     assert (depth.shape, depth.dtype) == ((48, 64), np.float32)
     np.testing.assert_allclose(depth, 3.0, atol=1e-5)  # z, not the length of the ray
     assert (rgb == [255, 0, 0]).all()
+    mesh = TexturedMesh((facing_quad(2.0, 0.2, base_color=colored((255, 255, 255))),))
+    with opened(mesh, camera_of()) as renderer:
+        rgb, depth = renderer.render_rgbd(LOOK_ALONG_X)
+    assert np.isinf(depth[0, 0])
+    assert (rgb[0, 0] == 0).all()
+    assert depth[24, 32] == pytest.approx(2.0, abs=1e-5)
+    mesh = TexturedMesh((facing_quad(1.0, 5.0, base_color=colored((0, 255, 0))),))
+    behind = pose_matrix(rotation_from_rpy([0.0, 0.0, np.pi]), [2.0, 0.0, 0.0])
+    with opened(mesh, camera_of()) as renderer:
+        assert (renderer.render(behind) == [0, 255, 0]).all()
 
 
-def test_depth_of_a_slanted_floor_in_closed_form(opened):
+def test_depth_of_a_slanted_floor_in_closed_form_and_fine_far_away(opened):
     height, pitch = 1.5, 0.6
     floor = np.array([[-99.0, -99, 0], [99, -99, 0], [99, 99, 0], [-99, 99, 0]])
     mesh = TexturedMesh((MeshPart("floor", floor, TWO, base_color=colored((9, 9, 9))),))
@@ -49,15 +59,14 @@ def test_depth_of_a_slanted_floor_in_closed_form(opened):
     slope = (np.arange(48) + 0.5 - cy) / fy  # y / z through the pixel centres of each row
     expected = height / (np.sin(pitch) + slope * np.cos(pitch))
     np.testing.assert_allclose(depth, np.repeat(expected[:, None], 64, axis=1), rtol=1e-5)
-
-
-def test_where_nothing_is_depth_is_infinite(opened):
-    mesh = TexturedMesh((facing_quad(2.0, 0.2, base_color=colored((255, 255, 255))),))
-    with opened(mesh, camera_of()) as renderer:
-        rgb, depth = renderer.render_rgbd(LOOK_ALONG_X)
-    assert np.isinf(depth[0, 0])
-    assert (rgb[0, 0] == 0).all()
-    assert depth[24, 32] == pytest.approx(2.0, abs=1e-5)
+    # A 24-bit depth buffer that begins at 5 cm has steps of 8 mm at 80 m.
+    distances = np.linspace(79.0, 80.0, 9)
+    camera = camera_of(width=16, height=16)
+    for distance in distances:
+        mesh = TexturedMesh((facing_quad(distance, 99.0),))
+        with opened(mesh, camera) as renderer:
+            depth = renderer.render_rgbd(LOOK_ALONG_X)[1]
+        np.testing.assert_allclose(depth, distance, atol=2e-4)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -95,13 +104,6 @@ def test_up_in_the_world_is_up_in_the_image(opened):
     assert rgb[24:, :, 2].max() == 255
 
 
-def test_surfaces_show_from_behind(opened):
-    mesh = TexturedMesh((facing_quad(1.0, 5.0, base_color=colored((0, 255, 0))),))
-    behind = pose_matrix(rotation_from_rpy([0.0, 0.0, np.pi]), [2.0, 0.0, 0.0])
-    with opened(mesh, camera_of()) as renderer:
-        assert (renderer.render(behind) == [0, 255, 0]).all()
-
-
 def test_several_cameras_and_meshes_share_a_process(opened):
     red = TexturedMesh((facing_quad(1.0, 5.0, np.full((4, 4, 3), (255, 0, 0), np.uint8)),))
     blue = TexturedMesh((facing_quad(1.0, 5.0, np.full((4, 4, 3), (0, 0, 255), np.uint8)),))
@@ -129,18 +131,7 @@ def test_images_do_not_depend_on_where_the_scene_lies(opened):
     np.testing.assert_allclose(far_depth, depth, atol=1e-5)
 
 
-def test_depth_is_fine_far_away(opened):
-    """A 24-bit depth buffer that begins at 5 cm has steps of 8 mm at 80 m."""
-    distances = np.linspace(79.0, 80.0, 9)
-    camera = camera_of(width=16, height=16)
-    for distance in distances:
-        mesh = TexturedMesh((facing_quad(distance, 99.0),))
-        with opened(mesh, camera) as renderer:
-            depth = renderer.render_rgbd(LOOK_ALONG_X)[1]
-        np.testing.assert_allclose(depth, distance, atol=2e-4)
-
-
-def test_what_is_nearer_than_near_or_farther_than_far_is_not_drawn(opened):
+def test_near_and_far_cut_along_the_optical_axis(opened):
     camera = camera_of(near_m=1.0, far_m=5.0)
     quads = {
         x: facing_quad(x, 3.0 * x, base_color=colored((0, 0, int(x * 20)))) for x in (0.9, 1.1)
@@ -155,9 +146,6 @@ def test_what_is_nearer_than_near_or_farther_than_far_is_not_drawn(opened):
             rgb, depth = renderer.render_rgbd(LOOK_ALONG_X)
         assert (rgb == (9 if is_drawn else 0)).all()
         np.testing.assert_allclose(depth, distance if is_drawn else np.inf, atol=1e-4)
-
-
-def test_near_and_far_are_measured_along_the_optical_axis(opened):
     camera = camera_of(far_m=2.01, horizontal_fov_deg=120.0)  # corner rays are 4.6 m long
     with opened(TexturedMesh((facing_quad(2.0, 9.0),)), camera) as renderer:
         assert np.isfinite(renderer.render_rgbd(LOOK_ALONG_X)[1]).all()

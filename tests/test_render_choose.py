@@ -10,10 +10,11 @@ import pytest
 
 from synfeal.config.models import RenderConfig
 from synfeal.errors import InputError
-from synfeal.mesh.model import TexturedMesh
-from synfeal.render import choose, open_renderer
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.render import choose, open_renderer, pyrender_backend
 from synfeal.render.opengl import backend as opengl
 from synfeal.render.opengl import context
+from synfeal.render.pieces import pieces
 from tests.render_backends import (
     BACKENDS,
     LOOK_ALONG_X,
@@ -163,3 +164,26 @@ def test_a_process_without_egl_still_draws(lacking, tmp_path):
         assert f"render.backend: {backend} does not work here" in error
         assert "libegl1" in error
         assert f"WARNING render.backend: {backend} does not work here" in done.stderr
+
+
+def test_without_egl_the_packages_are_named(monkeypatch):
+    def fail():
+        raise ImportError("libEGL.so.1: cannot open shared object file")
+
+    monkeypatch.setattr(pyrender_backend, "_pyrender", fail)
+    with pytest.raises(InputError, match="libegl1 libgl1-mesa-dri"):
+        pyrender_backend._context.__wrapped__()
+
+
+def test_parts_with_too_many_vertices_are_drawn_in_pieces():
+    rng = np.random.default_rng(0)
+    vertices = rng.normal(size=(300, 3))
+    faces = rng.integers(0, 300, (500, 3))
+    uv, rgb = rng.random((300, 2)), rng.integers(0, 255, (300, 3), np.uint8)
+    part = MeshPart("part", vertices, faces, uv, vertex_rgb=rgb)
+    split = list(pieces(part, most_vertices=90))
+    assert max(len(piece.vertices_m) for piece in split) <= 90
+    for name, whole in (("vertices_m", vertices), ("uv", uv), ("vertex_rgb", rgb)):
+        corners = np.concatenate([getattr(piece, name)[piece.faces] for piece in split])
+        np.testing.assert_array_equal(corners, whole[faces])
+    assert list(pieces(part, most_vertices=300)) == [part]

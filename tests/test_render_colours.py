@@ -24,7 +24,7 @@ def opened(request):
     return opener_of(request.param)
 
 
-def test_texture_is_upright_and_not_mirrored(opened):
+def test_textures_are_upright_and_neither_mirrored_nor_sheared(opened):
     quarters = np.zeros((64, 64, 3), np.uint8)  # an image: first row on top
     quarters[:32, :32], quarters[:32, 32:] = (255, 0, 0), (0, 255, 0)
     quarters[32:, :32], quarters[32:, 32:] = (0, 0, 255), (255, 255, 0)
@@ -35,15 +35,29 @@ def test_texture_is_upright_and_not_mirrored(opened):
     assert rgb[5, -5].tolist() == [0, 255, 0]
     assert rgb[-5, 5].tolist() == [0, 0, 255]
     assert rgb[-5, -5].tolist() == [255, 255, 0]
+    texture = np.zeros((9, 7, 3), np.uint8)
+    texture[:, 3] = 255  # a vertical line
+    mesh = TexturedMesh((facing_quad(1.0, 1.0, texture),))
+    with opened(mesh, camera_of(width=75, height=53)) as renderer:
+        columns = renderer.render(LOOK_ALONG_X)[..., 0].argmax(axis=1)
+    assert np.ptp(columns) <= 1
 
 
-def test_vertex_colours_are_interpolated(opened):
+def test_vertex_colours_are_interpolated_and_multiplied(opened):
     colors = np.array([[0, 0, 0], [200, 0, 0], [200, 0, 0], [0, 0, 0]], np.uint8)
     mesh = TexturedMesh((facing_quad(1.0, 1.0, vertex_rgb=colors),))
     with opened(mesh, camera_of(horizontal_fov_deg=90.0)) as renderer:
         row = renderer.render(LOOK_ALONG_X)[24, :, 0]
     expected = 200.0 * (np.arange(64) + 0.5) / 64.0
     np.testing.assert_allclose(row[2:-2], expected[2:-2], atol=2.0)
+    factor = np.array([128, 255, 51, 255], np.uint8)
+    grey = np.full((4, 4, 3), 200, np.uint8)
+    expected = np.array([200 * 128 / 255, 200, 200 * 51 / 255])
+    for values in ({"texture": grey}, {"vertex_rgb": grey[0]}):
+        quad = facing_quad(1.0, 3.0, base_color=factor, **values)
+        with opened(TexturedMesh((quad,)), camera_of()) as renderer:
+            rgb = renderer.render(LOOK_ALONG_X)
+        assert np.abs(rgb - expected).max() <= 1.0
 
 
 def test_alpha_below_the_cutoff_lets_the_wall_behind_through(opened):
@@ -59,7 +73,13 @@ def test_alpha_below_the_cutoff_lets_the_wall_behind_through(opened):
         assert depth[24, 56] == pytest.approx(distance, abs=1e-3)
 
 
-def test_hidden_colour_of_cut_out_texels_does_not_bleed(opened):
+def test_textures_are_averaged_without_aliasing_or_hidden_colour(opened):
+    checker = np.indices((512, 512)).sum(axis=0) % 2 * 255
+    texture = np.repeat(checker[..., None], 3, axis=2).astype(np.uint8)
+    mesh = TexturedMesh((facing_quad(3.0, 3.0, texture),))
+    with opened(mesh, camera_of()) as renderer:
+        rgb = renderer.render(LOOK_ALONG_X)
+    np.testing.assert_allclose(rgb.astype(int), 127, atol=3)
     rng = np.random.default_rng(0)
     leaf = np.full((256, 256, 4), (0, 200, 0, 255), np.uint8)
     leaf[rng.random((256, 256)) < 0.5] = (255, 0, 255, 0)  # magenta that must never show
@@ -70,30 +90,15 @@ def test_hidden_colour_of_cut_out_texels_does_not_bleed(opened):
     assert rgb[..., 0].max() <= 2
 
 
-def test_fine_texture_is_averaged_not_aliased(opened):
-    checker = np.indices((512, 512)).sum(axis=0) % 2 * 255
-    texture = np.repeat(checker[..., None], 3, axis=2).astype(np.uint8)
-    mesh = TexturedMesh((facing_quad(3.0, 3.0, texture),))
-    with opened(mesh, camera_of()) as renderer:
-        rgb = renderer.render(LOOK_ALONG_X)
-    np.testing.assert_allclose(rgb.astype(int), 127, atol=3)
-
-
-def test_odd_sizes_are_not_sheared(opened):
-    texture = np.zeros((9, 7, 3), np.uint8)
-    texture[:, 3] = 255  # a vertical line
-    mesh = TexturedMesh((facing_quad(1.0, 1.0, texture),))
-    with opened(mesh, camera_of(width=75, height=53)) as renderer:
-        columns = renderer.render(LOOK_ALONG_X)[..., 0].argmax(axis=1)
-    assert np.ptp(columns) <= 1
-
-
-def test_alpha_of_the_base_colour_counts(opened):
+def test_alpha_of_the_base_colour_counts_and_parts_that_never_show_are_left_out(opened):
     leaf = np.full((8, 8, 4), (0, 255, 0, 255), np.uint8)
     faint = np.array([255, 255, 255, 100], np.uint8)  # 0.39
     back = facing_quad(2.0, 9.0, base_color=colored((255, 0, 0)))
     front = facing_quad(1.0, 3.0, leaf, alpha_cutoff=0.5, base_color=faint)
     with opened(TexturedMesh((front, back)), camera_of()) as renderer:
+        assert (renderer.render(LOOK_ALONG_X) == [255, 0, 0]).all()
+    shaft = facing_quad(1.0, 3.0, alpha_cutoff=0.5, base_color=np.array([9, 9, 9, 20], np.uint8))
+    with opened(TexturedMesh((shaft, back)), camera_of()) as renderer:
         assert (renderer.render(LOOK_ALONG_X) == [255, 0, 0]).all()
 
 
@@ -123,17 +128,6 @@ def test_depth_of_a_cut_out_ends_where_half_of_it_is_left(opened):
     assert np.isinf(depth[:, 321:629]).all()
 
 
-def test_base_colour_multiplies_texture_and_vertex_colours(opened):
-    factor = np.array([128, 255, 51, 255], np.uint8)
-    grey = np.full((4, 4, 3), 200, np.uint8)
-    expected = np.array([200 * 128 / 255, 200, 200 * 51 / 255])
-    for values in ({"texture": grey}, {"vertex_rgb": grey[0]}):
-        quad = facing_quad(1.0, 3.0, base_color=factor, **values)
-        with opened(TexturedMesh((quad,)), camera_of()) as renderer:
-            rgb = renderer.render(LOOK_ALONG_X)
-        assert np.abs(rgb - expected).max() <= 1.0
-
-
 def test_textures_repeat(opened):
     texture = np.zeros((2, 2, 3), np.uint8)
     texture[:, 1] = 255
@@ -145,10 +139,3 @@ def test_textures_repeat(opened):
     np.testing.assert_allclose(row[16:32], row[32:48], atol=1.0)
     # From the middle of the dark texel to that of the bright one, 8 pixels of a straight line.
     np.testing.assert_allclose(row[20:28], 255.0 * (np.arange(8) + 0.5) / 8.0, atol=2.0)
-
-
-def test_parts_that_never_show_are_left_out(opened):
-    shaft = facing_quad(1.0, 3.0, alpha_cutoff=0.5, base_color=np.array([9, 9, 9, 20], np.uint8))
-    back = facing_quad(2.0, 9.0, base_color=colored((255, 0, 0)))
-    with opened(TexturedMesh((shaft, back)), camera_of()) as renderer:
-        assert (renderer.render(LOOK_ALONG_X) == [255, 0, 0]).all()

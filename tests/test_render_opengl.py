@@ -1,5 +1,6 @@
 """The OpenGL backend: culling, sampling and company in one process never change a pixel."""
 
+import hashlib
 import os
 import subprocess
 import sys
@@ -8,14 +9,48 @@ import numpy as np
 import pytest
 
 from synfeal.errors import InputError
-from synfeal.mesh.model import TexturedMesh
+from synfeal.geometry.poses import pose_matrix
+from synfeal.geometry.rotations import rotation_from_rpy
+from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render.opengl import backend as opengl
 from synfeal.render.opengl import part as opengl_part
 from synfeal.render.opengl.backend import OpenglRenderer, clip_from_cam
 from synfeal.render.opengl.chunks import FACES_PER_CHUNK, chunks_of, visible_runs
 from synfeal.render.opengl.context import shared_context
 from tests.render_backends import LOOK_ALONG_X, PYOPENGL_WARNS, camera_of, facing_quad
-from tests.triangle_soup import CAMERA, digest, poses, soup
+
+CAMERA = camera_of(fx=45.0, fy=55.0, cx=20.5, cy=33.0)
+
+
+def soup(n_faces, seed=0):
+    """Small triangles all over a room of 8 m, coloured and textured, some of them coincident."""
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(-4, 4, (n_faces, 1, 3)) + rng.normal(0, 0.4, (n_faces, 3, 3))
+    corners[1::7] = corners[0::7][: len(corners[1::7])]
+    vertices = corners.reshape(-1, 3)
+    faces = np.arange(len(vertices)).reshape(-1, 3)
+    half = n_faces // 2
+    image = rng.integers(0, 256, (64, 64, 3), np.uint8)
+    rgb = rng.integers(0, 256, (len(vertices), 3), np.uint8)
+    return TexturedMesh(
+        (
+            MeshPart("colours", vertices, faces[:half], vertex_rgb=rgb),
+            MeshPart("texture", vertices, faces[half:], rng.random((len(vertices), 2)), image),
+        )
+    )
+
+
+def poses(count, seed=1):
+    rng = np.random.default_rng(seed)
+    return [
+        pose_matrix(rotation_from_rpy(rng.uniform(-3, 3, 3)), rng.uniform(-3, 3, 3))
+        for _ in range(count)
+    ]
+
+
+def digest(renderer, views):
+    images = [renderer.render_rgbd(view) for view in views]
+    return [hashlib.sha256(rgb.tobytes() + depth.tobytes()).hexdigest() for rgb, depth in images]
 
 
 def has_context():
@@ -33,7 +68,7 @@ pytestmark = [
 ]
 
 
-def test_chunks_hold_every_triangle_once_with_its_corners_in_order():
+def test_chunks_hold_every_triangle_once_and_runs_all_that_are_in_view():
     part = soup(3000).parts[1]
     chunks = chunks_of(part.vertices_m, part.faces)
     found = chunks.vertices[chunks.faces]
@@ -43,9 +78,6 @@ def test_chunks_hold_every_triangle_once_with_its_corners_in_order():
         inside = corners[start : start + FACES_PER_CHUNK]
         assert (inside >= chunks.lower_m[index]).all()
         assert (inside <= chunks.upper_m[index]).all()
-
-
-def test_every_triangle_with_a_corner_in_view_is_in_a_visible_run():
     part = soup(20_000).parts[0]
     chunks = chunks_of(part.vertices_m, part.faces)
     n_drawn = 0
@@ -91,7 +123,7 @@ def test_images_do_not_depend_on_what_was_drawn_before():
 
 DRAW = """
 from synfeal.render.opengl.backend import OpenglRenderer
-from tests.triangle_soup import CAMERA, digest, poses, soup
+from tests.test_render_opengl import CAMERA, digest, poses, soup
 with OpenglRenderer(soup(3000), CAMERA) as renderer:
     print(*digest(renderer, poses(6)))
 """
@@ -170,7 +202,7 @@ def test_fine_checkerboards_are_grey_at_every_distance(distance):
     np.testing.assert_allclose(rgb.astype(int), 127, atol=4)
 
 
-def test_textures_larger_than_the_device_takes_are_reduced(monkeypatch):
+def test_textures_and_images_beyond_the_devices_limit(monkeypatch):
     image = np.zeros((300, 100, 3), np.uint8)
     image[:150] = 200
     with OpenglRenderer(TexturedMesh((facing_quad(2.0, 0.9, image),)), CAMERA) as renderer:
@@ -181,9 +213,6 @@ def test_textures_larger_than_the_device_takes_are_reduced(monkeypatch):
         assert renderer._parts[0]._texture.size == (50, 150)
         reduced = renderer.render(LOOK_ALONG_X).astype(int)
     assert np.abs(reduced - full).mean() < 2.0
-
-
-def test_images_beyond_the_devices_limit_are_refused(monkeypatch):
     monkeypatch.setitem(shared_context().info, "GL_MAX_TEXTURE_SIZE", 128)
     with pytest.raises(InputError, match=r"camera: 64x48 pixels at 3 .* lower render\.supersamp"):
         OpenglRenderer(soup(10), camera_of(), supersampling=3)

@@ -7,16 +7,14 @@ import pytest
 
 from synfeal.config.models import RenderConfig, RenderSpeedConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
-from synfeal.errors import InputError
 from synfeal.frames import frame_of, read_frame, rows_of, write_frame
 from synfeal.geometry.rotations import quat_wxyz_from_matrix
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.render import choose
 from synfeal.report.figures import render_speed
-from synfeal.report.figures.registry import write_figures
 from synfeal.report.figures.sources import Results
-from synfeal.report.speed_vs_error import render_rows, speeds_of
+from synfeal.report.speed_vs_error import speeds_of
 from synfeal.scenes import render_speed as speed
 from synfeal.scenes.render_speed import SCHEMA
 from tests.render_backends import BACKENDS, PYOPENGL_WARNS, camera_of
@@ -50,16 +48,13 @@ def test_the_profiles_sizes_and_the_papers_are_measured_smallest_first_and_once(
     assert sizes(speed.measured_cameras(small, wide, 3)) == [(128, 96), (640, 480)]
 
 
-def test_colour_errors_in_closed_form():
+def test_errors_of_colour_and_of_depth_where_both_hit_in_closed_form():
     expected = np.full((2, 4, 4, 3), 100.0, np.float32)
     rgb = np.full(expected.shape, 100, np.uint8)
     rgb[0, :2], rgb[1, :2] = 104, 96  # half the pixels are 4 levels off
     found = speed.colour_errors(rgb, expected)
     assert found["mean_abs_error"] == pytest.approx(2.0)
     assert found["psnr_db"] == pytest.approx(20 * np.log10(255) - 10 * np.log10(8.0), abs=1e-3)
-
-
-def test_depth_errors_look_where_both_hit():
     expected = np.array([[1.0, 1.0, 1.0, 1.0, np.inf, 2.0]], np.float32)
     depth = np.array([[1.001, 0.998, 1.003, 1.05, 1.0, np.inf]], np.float32)
     found = speed.depth_errors(depth, expected)
@@ -166,38 +161,12 @@ def test_a_scene_is_measured_from_its_files(tmp_path):
     assert (tmp_path / "again.csv").read_bytes() == out.read_bytes()
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        None,
-        "a,b\n1,2\n",
-        ",".join(SCHEMA) + "\nopengl,wide,96,2,1.0,9,1,1,1,0,0,1\n",
-        ",".join(SCHEMA) + "\nopengl,128\n",
-    ],
-)
-def test_a_file_that_is_no_measurement_is_named_in_one_line(tmp_path, text):
-    path = tmp_path / "scenes" / "large_room" / "render_speed.csv"
-    if text is not None:
-        path.parent.mkdir(parents=True)
-        path.write_text(text)
-    with pytest.raises(InputError, match=r"large_room/render_speed\.csv") as refusal:
-        render_rows(tmp_path, "large_room")
-    assert "\n" not in str(refusal.value)
-
-
 MADE_UP = [
     LINE,
     LINE | {"supersampling": 1, "ms_per_frame": 4.0, "mean_abs_error": 5.0, "chosen": 0},
     LINE | {"backend": "raycast", "ms_per_frame": 32.0, "chosen": 0},
     LINE | {"texture_scale": 0.25, "ms_per_frame": 7.0, "mean_abs_error": 3.0, "chosen": 0},
-    LINE
-    | {
-        "faces": 250,
-        "ms_per_frame": 6.0,
-        "mean_abs_error": 2.5,
-        "depth_error_mm": 0.5,
-        "chosen": 0,
-    },
+    LINE | dict(faces=250, ms_per_frame=6.0, mean_abs_error=2.5, depth_error_mm=0.5, chosen=0),
     LINE | {"width": 640, "height": 480, "ms_per_frame": 40.0, "mean_abs_error": 0.5},
 ]
 
@@ -211,7 +180,7 @@ def made_up(tmp_path):
     return tmp_path
 
 
-def test_rows_say_what_each_variant_is(made_up):
+def test_rows_and_figure_say_what_each_variant_is(made_up):
     rows = read(made_up / "tables" / "speed_vs_error.csv")
     assert [row["variant"] for row in rows] == [
         "128x96, opengl 2x2",
@@ -227,9 +196,6 @@ def test_rows_say_what_each_variant_is(made_up):
     assert [float(row["error"]) for row in rows[:2]] == [2.0, 5.0]
     assert rows[4]["depth_error_mm"] == "0.5"
     assert [row["chosen"] for row in rows] == ["1", "0", "0", "0", "0", "1"]
-
-
-def test_the_figure_has_a_panel_per_size_with_the_choice_ringed(made_up):
     figure = render_speed.draw(Results(made_up, design_of(())))
     assert figure is not None
     small, large = figure.axes
@@ -244,11 +210,3 @@ def test_the_figure_has_a_panel_per_size_with_the_choice_ringed(made_up):
     np.testing.assert_allclose(opengl.get_xydata(), [[4.0, 5.0], [8.0, 2.0]])
     np.testing.assert_allclose(textures.get_xydata(), [[8.0, 2.0], [7.0, 3.0]])
     assert {text.get_text() for text in small.texts} == {"1/4", "25%"}
-
-
-def test_the_figure_is_written_under_its_name(made_up):
-    write_figures(design_of(()), made_up, made_up / "figures")
-    assert {path.name for path in (made_up / "figures").iterdir()} == {
-        "speed_vs_error_render.png",
-        "speed_vs_error_render.svg",
-    }

@@ -48,7 +48,7 @@ def test_key_columns_come_first_and_tell_all_rows_apart(results, table, keys):
     assert len({tuple(row[key] for key in keys) for row in rows}) == len(rows)
 
 
-def test_a_cell_carries_both_scores_limits_counts_and_the_published_value(results):
+def test_cells_carry_scores_limits_counts_changes_and_the_published_values(results):
     rows = read(results / "tables" / "table3_inconsistencies.csv")
     found = cell(rows, block="both", noise_m="0.1", noise_deg="5", model="posenet")
     # 1 + 3 * 0.1 from the noise level; true scores are half of it.
@@ -75,9 +75,6 @@ def test_a_cell_carries_both_scores_limits_counts_and_the_published_value(result
         "0.75",
         "misprint",
     )
-
-
-def test_meshes_stand_beside_the_papers(results):
     rows = read(results / "tables" / "table1_meshes.csv")
     assert rows[0] == {
         "scene": "large_room",
@@ -89,9 +86,6 @@ def test_meshes_stand_beside_the_papers(results):
         "published_volume_m3": "89.4",
     }
     assert (rows[1]["published_faces"], rows[1]["published_volume_m3"]) == ("397516", "183.18")
-
-
-def test_table_5_gives_the_change_against_the_same_run_with_transfer_learning(results):
     rows = read(results / "tables" / "table5_from_scratch.csv")
     changes = ("position", "orientation", "position_true", "orientation_true")
     for row in rows:  # scratch scores are twice the others
@@ -105,7 +99,7 @@ def test_table_5_gives_the_change_against_the_same_run_with_transfer_learning(re
     assert r"\textcolor{green!45!black}{$+$0.0\%}" in tex  # the paper: 0.0 % is green
 
 
-def test_a_level_the_paper_does_not_have_has_no_published_value(tmp_path):
+def test_what_the_paper_does_not_have_is_not_compared_with_it(tmp_path):
     noise = {"labels": "noise", "noise_m": 0.05, "noise_deg": 0}
     row = experiment("table3_inconsistencies", block="position", **noise)
     fill(tmp_path, [row])
@@ -114,16 +108,13 @@ def test_a_level_the_paper_does_not_have_has_no_published_value(tmp_path):
     assert {r["published_position_m"] + r["published_flag"] for r in rows} == {""}
     assert "0.05 m, 0$^\\circ$" in tex
     assert "& paper &" not in tex.replace(r"\textcolor{gray}{paper}", "paper")
-
-
-def test_another_scene_or_initialisation_is_not_compared_with_the_papers(tmp_path):
     rows = [experiment(TABLE4, init="scratch"), experiment(TABLE4, scene="sanctuary", size="80k")]
     fill(tmp_path, rows)
     found, _ = make(TABLE4, rows, tmp_path)
     assert [row["published_position_m"] for row in found] == [""] * 10
 
 
-def test_the_best_of_each_column_is_bold_and_nothing_else(tmp_path):
+def test_the_best_of_each_column_is_bold_and_a_failed_run_counted_and_never_bold(tmp_path):
     rows = [experiment(TABLE4, size=size) for size in SIZES]
     scores = [(0.50, 8.0), (0.304, 6.0), (0.296, 7.0), (0.40, 9.0)]
     for row, (position, orientation) in zip(rows, scores, strict=True):
@@ -137,10 +128,6 @@ def test_the_best_of_each_column_is_bold_and_nothing_else(tmp_path):
         r"\textbf{0.30 m}, 7.00$^\circ$",  # a tie as printed
         r"0.40 m, 9.00$^\circ$",
     ]
-
-
-def test_a_failed_run_is_shown_counted_and_never_bold(tmp_path):
-    rows = [experiment(TABLE4, size=size) for size in SIZES]
     fill(tmp_path, rows)
     write_run(tmp_path, rows[0], "poselstm", failed_metrics("6k"))
     found, tex = make(TABLE4, rows, tmp_path)

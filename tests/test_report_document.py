@@ -57,11 +57,8 @@ def small_sheet():
     return Sheet("small", "Errors of 2 & 3.", headings, lines, table, ("A remark.",))
 
 
-def test_latex_of_a_small_table_letter_by_letter():
+def test_a_small_table_letter_by_letter():
     assert sheet_latex(small_sheet()) == GOLDEN
-
-
-def test_markdown_of_a_small_table_letter_by_letter():
     assert sheet_markdown(small_sheet()) == (
         "**Errors of 2 & 3.**\n\n"
         "| Set | Error against | PoseNet | PoseNet2 |\n"
@@ -93,9 +90,6 @@ def test_document_holds_claims_tables_and_the_figures_there_are(root):
     assert text.count(r"\includegraphics") == 2
     assert r"\label{tab:small}" in text
     assert "55 \\%" in text
-
-
-def test_missing_claims_are_an_input_error(root):
     (root / "claims.csv").unlink()
     with pytest.raises(InputError, match=r"claims\.csv"):
         write_report_document(root, [], root / "report.tex")

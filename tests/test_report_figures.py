@@ -7,8 +7,6 @@ import pytest
 from synfeal.config import MODELS
 from synfeal.evaluation.metrics import cumulative
 from synfeal.report.figures import Results, speed_vs_error
-from synfeal.report.figures.cumulative_error import SceneErrors
-from synfeal.report.figures.cumulative_error import figure_of as cumulative_figure
 from synfeal.report.figures.error_by_design import LEVEL, by_images, by_noise, by_size
 from synfeal.report.figures.localizer_lines import ASIDE, SHOWN, published_values
 from synfeal.report.figures.pareto import pareto_front
@@ -138,7 +136,7 @@ def test_error_by_noise_draws_both_scores_and_the_published_only_beside_the_pape
     assert "true poses" in figure.subfigs[1].get_suptitle()
 
 
-def test_a_misprint_and_a_failed_run_leave_a_gap(tables):
+def test_a_misprint_and_a_failed_run_leave_a_gap_and_the_cumulative_share_is_a_count(tables):
     rows = tables["table3_inconsistencies"]
     none = reference_rows([{"scene": "", "size": "", "noise_m": -1.0, "noise_deg": -1.0}])
     figure = by_noise(rows, none, "title")
@@ -151,9 +149,6 @@ def test_a_misprint_and_a_failed_run_leave_a_gap(tables):
     failed.loc[failed.index[0], measures] = np.nan
     _, values, _ = drawn(by_size(failed, none).axes[0])["posenet"]
     assert np.isnan(values).tolist() == [True, False, False, False]
-
-
-def test_the_cumulative_share_is_a_count():
     errors = np.random.default_rng(3).gamma(2.0, size=41)
     errors[[4, 7]] = np.inf
     ordered, percent = cumulative(errors)
@@ -163,23 +158,6 @@ def test_the_cumulative_share_is_a_count():
     assert percent[-1] == pytest.approx(100 * 39 / 41)
     # The median is where the curve passes a half.
     assert ordered[np.searchsorted(percent, 50)] == pytest.approx(np.median(errors))
-
-
-def test_cumulative_error_draws_a_curve_per_localizer_measure_and_scene():
-    rng = np.random.default_rng(4)
-    names = ("position_m_true", "orientation_deg_true", "both")
-    scenes = [
-        SceneErrors(title, {m: {name: rng.gamma(2.0, size=9) for name in names} for m in MODELS})
-        for title in ("first", "second")
-    ]
-    panels = np.reshape(cumulative_figure(scenes).axes, (3, 2))
-    for line, name in enumerate(names):
-        for place, scene in enumerate(scenes):
-            curves = {c.get_label(): c for c in panels[line, place].lines}
-            for model in MODELS:
-                curve = curves[TITLES[model]]
-                np.testing.assert_array_equal(curve.get_xdata(), np.sort(scene.errors[model][name]))
-                np.testing.assert_allclose(curve.get_ydata(), 100 * np.arange(1, 10) / 9)
 
 
 def dominated(one, all_of_them):
@@ -197,7 +175,7 @@ def test_the_pareto_front_is_what_nothing_dominates(seed):
     assert pareto_front(*variants.T).tolist() == expected
 
 
-def test_speed_vs_error_joins_the_front_and_rings_the_choice():
+def test_speed_vs_error_joins_the_front_rings_the_choice_and_fills_the_best():
     measured = ((1e6, 0.0, 0), (1.5e6, 0.004, 0), (1.2e6, 0.005, 1), (3e6, 0.2, 0))
     rows = pd.DataFrame(measured, columns=["items_per_s", "error", "chosen"])
     rows = rows.assign(scene="large_room", faces=[1000, 990, 980, 970])
@@ -207,9 +185,6 @@ def test_speed_vs_error_joins_the_front_and_rings_the_choice():
     np.testing.assert_allclose(front.get_xydata(), [[1.0, 0.0], [1.5, 0.4], [3.0, 20.0]])
     np.testing.assert_allclose(ring.get_xydata(), [[1.2, 0.5]])
     assert ring.get_label() == "Large Room: used, 980 of 1,000 faces"
-
-
-def test_trainings_are_filled_where_no_other_is_faster_and_better():
     measured = (("PoseNet", 500, 0.5), ("Hourglass", 200, 0.6), ("PoseNet2", 400, 0.4))
     rows = pd.DataFrame(measured, columns=["variant", "items_per_s", "error"])
     (axes,) = speed_vs_error.training_figure(rows.assign(scene="sanctuary")).axes

@@ -35,10 +35,10 @@ from tests.figure_results import (
     fill_figures,
     pixels,
     room,
-    table_of,
     true_poses,
     wrong_poses,
 )
+from tests.property_support import table_of
 from tests.report_results import TABLE4, design_of, fill, make, write_rows
 
 SPEED_KEYS = ("stage", "scene", "variant", "faces", "items_per_s", "error", "chosen")
@@ -75,7 +75,7 @@ def style():
         yield
 
 
-def test_label_error_draws_the_errors_that_were_put_into_the_labels(results):
+def test_label_error_draws_known_errors_borders_and_assisted_batches(results):
     panels = np.reshape(label_error.draw(results).axes, (3, 2))
     for place, count in enumerate((9, 5)):
         for line, step in enumerate((0.01, 1.0)):
@@ -86,10 +86,6 @@ def test_label_error_draws_the_errors_that_were_put_into_the_labels(results):
                 curve = curves[SOURCES[method]]
                 np.testing.assert_array_equal(curve.get_xdata(), np.arange(count))
                 np.testing.assert_allclose(curve.get_ydata(), np.abs(offset), atol=1e-6 * step)
-
-
-def test_label_error_marks_borders_and_assisted_batches(results):
-    panels = np.reshape(label_error.draw(results).axes, (3, 2))
     borders = [c.get_xdata()[0] for c in panels[0, 0].lines if len(set(c.get_xdata())) == 1]
     assert borders == [4]
     bars = [
@@ -121,12 +117,7 @@ def test_trajectories_draw_both_paths_and_ring_what_was_assisted(results):
     ]
 
 
-def test_a_design_without_such_labels_has_no_label_set(results):
-    rows = tuple(row for row in results.design.rows if row.table == TABLE4)
-    assert read_labelled_set(Results(results.root, design_of(rows))) is None
-
-
-def test_poses_draw_every_camera_of_every_size(results):
+def test_poses_draw_every_camera_with_a_tick_where_it_looks(results):
     small, large = poses.draw(results).axes
     for axes, size in ((small, "6k"), (large, "20k")):
         dots = {c.get_label(): c for c in axes.collections}
@@ -135,9 +126,6 @@ def test_poses_draw_every_camera_of_every_size(results):
             np.testing.assert_allclose(dots[split].get_offsets(), true_poses(count, y)[:, :2, 3])
         text = f"{N_FRAMES[size, 'train']} train + {N_FRAMES[size, 'test']} test frames"
         assert axes.get_title() == f"Large Room, {size}\n{text}"
-
-
-def test_ticks_point_where_cameras_look_as_seen_from_above():
     cameras = true_poses(3)
     down = np.diag([1.0, -1.0, -1.0])
     left = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # looks along y
@@ -154,7 +142,7 @@ def area(corners):
     return np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2
 
 
-def test_a_plan_shows_walls_and_furniture_but_neither_floor_nor_ceiling():
+def test_a_plan_shows_what_is_between_floor_and_cut():
     plan = plan_of(room(), top_m=2.0)
     # From above only the table has an area: its top and its underside.
     assert area(plan.corners_m) == pytest.approx(2.0)
@@ -163,17 +151,11 @@ def test_a_plan_shows_walls_and_furniture_but_neither_floor_nor_ceiling():
     # The wall at x = 4, its triangles cut at the top.
     assert (walls[:, :, 1].min(), walls[:, :, 1].max()) == (0, 2)
     assert area(plan_of(room(), top_m=3.5).corners_m) == pytest.approx(2.0 + 8.0)  # and ceiling
-
-
-def test_a_slope_is_shown_as_far_as_it_is_between_floor_and_cut():
     slope = np.array([[0, 0, 0], [3.0, 0, 3.0], [3.0, 1, 3.0], [0, 1, 0]])
     floor = np.array([[0, 0, 0], [9.0, 0, 0], [9.0, 9, 0]])
     mesh = Triangles(np.concatenate([slope, floor]), np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6]]))
     x = plan_of(mesh, top_m=2.0).corners_m[:, :, 0]  # on the slope, height is x
     assert (x.min(), x.max()) == pytest.approx((0.15, 2.0))
-
-
-def test_specks_below_the_floor_do_not_move_it():
     corners = room().vertices_m[room().faces]
     speck = np.array([[[0, 0, -5.0], [0.1, 0, -5.0], [0, 0.1, -5.0]]])
     assert floor_m(np.concatenate([speck, corners])) == pytest.approx(0.0)
@@ -223,28 +205,22 @@ def test_what_the_design_makes_is_written_and_equal_results_give_equal_files(res
     assert files == {path.name: path.read_bytes() for path in (tmp_path / "b").iterdir()}
     pictures = {f"{name}.svg" for name in names if name != "frames"}
     assert set(files) == pictures | {f"{name}.png" for name in names}
+    for name in pictures:  # text stays text, and there is no date
+        assert len(re.findall(b"<text ", files[name])) > 5
+        assert b"dc:date" not in files[name]
 
 
-def test_svg_keeps_text_as_text_and_no_date(results, tmp_path):
-    write_figures(results.design, results.root, tmp_path)
-    for path in tmp_path.glob("*.svg"):
-        page = path.read_text()
-        assert len(re.findall(r"<text ", page)) > 5
-        assert "dc:date" not in page
-
-
-def test_captions_are_single_sentences_in_reading_order():
+def test_every_drawing_has_a_caption_and_is_a_figure_or_left_out(results):
     assert list(CAPTIONS) == list(FIGURES)
     for caption in CAPTIONS.values():
         assert re.fullmatch(r"[A-Z][^.]*\.", caption.replace("0.", "0")), caption
-
-
-def test_every_drawing_is_a_figure_or_left_out(results):
     nothing = Results(results.root, design_of(()))
     drawn = {name for name, entry in FIGURES.items() if entry.draw(nothing) is not None}
     stages = ("collision", "labels", "render", "training")
     assert drawn == {f"speed_vs_error_{stage}" for stage in stages}
     assert isinstance(FIGURES["error_by_size"].draw(results), Figure)
+    rows = tuple(row for row in results.rows if row.table == TABLE4)
+    assert read_labelled_set(Results(results.root, design_of(rows))) is None
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """The page in a browser: it switches, sorts and draws; it complains of and asks for nothing."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,7 @@ from synfeal.report.html.page import write_report
 from synfeal.report.html.rooms import SPLITS, paths_of, trajectories
 from tests.report_page import PLANS, large_room_design, page_results, straight
 from tests.report_results import design_of
-from tests.test_inspect_page import CHROMIUM, Reply, browse
+from tests.test_inspect_page import CHROMIUM, answer
 
 # Answers with what PROBE finds, after the views were drawn.
 SCRIPT = """
@@ -50,21 +48,9 @@ def page(tmp_path_factory):
 
 def asked(page, tmp_path, probe):
     """What a script of ours finds on the page, which must leave the console empty."""
-    head, _, tail = page.read_text().rpartition("</script>")
-    with Reply() as reply:
-        address = f"http://127.0.0.1:{reply.server_port}/"
-        head = head.replace("default-src 'none'", f"default-src 'none'; connect-src {address}")
-        script = SCRIPT.replace("PROBE", probe).replace("REPLY", address)
-        path = tmp_path / "report.html"
-        path.write_text(f"{head}{script}</script>{tail}")
-        browser = browse(path)
-        reply.handle_request()
-        browser.terminate()
-        _, said = browser.communicate(timeout=30)
-    assert reply.body is not None, said
-    console = [line for line in said.splitlines() if "CONSOLE" in line]
+    found, console = answer(page.read_text(), tmp_path, SCRIPT.replace("PROBE", probe))
     assert [line for line in console if "ReadPixels" not in line] == []  # we are slow, not the page
-    return json.loads(reply.body)
+    return found
 
 
 def test_one_switch_changes_every_table(page, tmp_path):
@@ -150,15 +136,12 @@ def test_nothing_is_requested_and_nothing_sticks_out(page, tmp_path):
     assert images == [True, True]
 
 
-def test_paths_are_cut_where_their_number_changes():
+def test_paths_are_cut_where_their_number_changes_and_trajectories_those_of_the_files(page):
     table = straight([[0.0, 0, 0], [1, 0, 0], [5, 5, 5], [2, 0, 0], [3, 0, 0], [4, 0, 0]])
     table.path[:] = [0, 0, 1, 2, 2, 2]
     first, last = paths_of(table)
     np.testing.assert_array_equal(first[:, 0], [0, 1])
     np.testing.assert_array_equal(last[:, 0], [2, 3, 4])
-
-
-def test_trajectories_are_those_of_the_files(page):
     found = trajectories("large_room", page.parent, design_of(large_room_design()))
     assert [t.title for t in found] == [
         *(title for title, _ in SPLITS.values()),

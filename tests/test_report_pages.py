@@ -24,7 +24,7 @@ from tests.report_results import (
 )
 
 
-def test_the_papers_lines_are_bold_where_the_paper_has_them_bold(results):
+def test_the_papers_lines_have_its_bold_print_and_its_errata(results):
     def paper(table):
         tex = (results / "tables" / f"{table}.tex").read_text()
         return lines_of(tex, r"\textcolor{gray}{paper}")
@@ -36,19 +36,16 @@ def test_the_papers_lines_are_bold_where_the_paper_has_them_bold(results):
     assert table4[:4] == [[0] * 5, [0] * 5, [0, 0, 0, 1, 0], [2, 2, 2, 1, 2]]
     # Sanctuary: PoseNet's 0.32 m stands twice.
     assert table4[4:] == [[0] * 5, [0] * 5, [1, 0, 0, 0, 0], [2] * 5]
-
-
-def test_latex_escapes_what_is_special():
-    assert escape("50% of a_b & #1 {x} 5° ± 2") == (r"50\% of a\_b \& \#1 \{x\} 5$^\circ$ $\pm$ 2")
-
-
-def test_footnotes_of_the_papers_errata(results):
     table3 = (results / "tables" / "table3_inconsistencies.tex").read_text()
     assert r"\textcolor{gray}{0.10 m, 0$^\circ$$^{a}$}" in table3
     assert r"\textcolor{gray}{0.18 m, 0.75$^\circ$$^{b}$}" in table3
     table4 = (results / "tables" / "table4_size.tex").read_text()
     assert table4.count("38.98$^\\circ$$^{a}$") == 2
     assert table4.count("15.36$^\\circ$$^{b}$") == 2
+
+
+def test_latex_escapes_what_is_special():
+    assert escape("50% of a_b & #1 {x} 5° ± 2") == (r"50\% of a\_b \& \#1 \{x\} 5$^\circ$ $\pm$ 2")
 
 
 @pytest.mark.parametrize("table", ["table1_meshes", *ROWS])

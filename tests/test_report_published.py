@@ -43,12 +43,25 @@ def test_published_totals(table, position_m, orientation_deg):
     assert sum(c.orientation_deg for c in cells) == pytest.approx(orientation_deg, abs=1e-6)
 
 
-def test_published_changes_of_table_5():
+def test_published_changes_the_text_and_the_misprinted_row():
     cells = published_cells("table5_from_scratch").values()
     changes = [(c.position_change_percent, c.orientation_change_percent) for c in cells]
     assert changes[0] == (44.8, 100.1)
     assert changes[-1] == (-25, -1.96)
     assert sum(map(sum, changes)) == pytest.approx(1339.34)
+    cells = published_cells(TABLE4)
+    first = [c for k, c in cells.items() if k[1:3] == ("sanctuary", "6k")]
+    assert round(mean(c.position_m for c in first), 2) == 0.70
+    assert round(mean(c.orientation_deg for c in first), 1) == 34.8
+    assert [round(m.volume_m3 / 6.37) for m in published_meshes().values()] == [14, 29]
+    noise = {"labels": "noise", "noise_m": 0.1, "block": "both"}
+    row = experiment("table3_inconsistencies", noise_deg=5, **noise)
+    found = {m: published_cells(row.table)[key_of(row, m)] for m in MODELS}
+    assert {c.printed_row for c in found.values()} == {"0.10 m, 0°"}
+    assert all("run as 0.10 m, 5°" in c.row_note for c in found.values())
+    assert (found["posenet2"].orientation_deg, found["posenet2"].flag) == (0.75, "misprint")
+    flags = Counter(c.flag for table in ROWS for c in published_cells(table).values())
+    assert flags == {"none": 135, "misprint": 1, "suspect": 4}
 
 
 @pytest.mark.parametrize(
@@ -66,22 +79,3 @@ def test_published_changes_of_table_5():
 def test_published_spot_values(row, model, printed):
     found = published_cells(row.table)[key_of(row, model)]
     assert (found.position_m, found.orientation_deg) == printed
-
-
-def test_what_the_text_of_the_paper_says_about_its_own_tables():
-    cells = published_cells(TABLE4)
-    first = [c for k, c in cells.items() if k[1:3] == ("sanctuary", "6k")]
-    assert round(mean(c.position_m for c in first), 2) == 0.70
-    assert round(mean(c.orientation_deg for c in first), 1) == 34.8
-    assert [round(m.volume_m3 / 6.37) for m in published_meshes().values()] == [14, 29]
-
-
-def test_the_misprinted_row_of_table_3_is_run_with_five_degrees_and_flagged():
-    noise = {"labels": "noise", "noise_m": 0.1, "block": "both"}
-    row = experiment("table3_inconsistencies", noise_deg=5, **noise)
-    found = {m: published_cells(row.table)[key_of(row, m)] for m in MODELS}
-    assert {c.printed_row for c in found.values()} == {"0.10 m, 0°"}
-    assert all("run as 0.10 m, 5°" in c.row_note for c in found.values())
-    assert (found["posenet2"].orientation_deg, found["posenet2"].flag) == (0.75, "misprint")
-    flags = Counter(c.flag for table in ROWS for c in published_cells(table).values())
-    assert flags == {"none": 135, "misprint": 1, "suspect": 4}

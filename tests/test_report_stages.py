@@ -1,11 +1,13 @@
 """What a run cost, from the measurements of its jobs, and what it ran on."""
 
 import json
+import subprocess
 
 import pytest
 
+from synfeal.config import load_config
 from synfeal.errors import InputError
-from synfeal.provenance import processor_name
+from synfeal.provenance import config_hash, git_commit, processor_name, provenance
 from synfeal.report.cost.measured import read_jobs
 from synfeal.report.html.provenance import (
     cost_sentence,
@@ -13,6 +15,7 @@ from synfeal.report.html.provenance import (
     stages_of,
     write_provenance,
 )
+from tests.report_results import CONFIG
 
 HEADER = "s\th:m:s\tmax_rss\tcpu_time\n"
 
@@ -32,13 +35,10 @@ def benchmarks(tmp_path):
     return folder
 
 
-def test_jobs_are_summed_by_stage(benchmarks):
+def test_jobs_are_summed_by_stage_and_a_broken_measurement_is_named(benchmarks):
     train, summary = stages_of(read_jobs(benchmarks.rglob("*.tsv"), benchmarks))
     assert [*train.values()] == ["train", 3, 15.0, 4.0, 300.5]
     assert [*summary.values()] == ["summary", 1, 0.5, 0.5, None]
-
-
-def test_a_broken_measurement_is_named(benchmarks):
     (benchmarks / "summary.tsv").write_text("s\tmax_rss\tcpu_time\nfast\t1\t1\n")
     with pytest.raises(InputError, match=r"summary\.tsv: row 2: s must be a number"):
         read_jobs([benchmarks / "summary.tsv"], benchmarks)
@@ -64,8 +64,35 @@ def test_the_record_says_what_ran_where_and_for_how_long(benchmarks):
     assert record["commit"] in origin_html(record)
 
 
-def test_the_processor_is_the_kernels_word_for_it(tmp_path):
+def test_provenance_names_processor_commit_versions_and_configuration(tmp_path):
     path = tmp_path / "cpuinfo"
     path.write_text("processor : 0\nmodel name\t: Abacus 9 @ 1 GHz\nmodel name\t: other\n")
     assert processor_name(path) == "Abacus 9 @ 1 GHz"
     assert processor_name(tmp_path / "none")
+    config = load_config(CONFIG / "config.yaml")
+    record = provenance(7, config_hash(config))
+    assert record["seed"] == 7
+    assert record["packages"]["numpy"][0].isdigit()
+    assert len(record["config_sha256"]) == 64
+    assert git_commit(tmp_path) == "unknown"
+    assert config_hash(config) == config_hash(config.model_copy())
+    assert config_hash(config) != config_hash(config.model_copy(update={"seed": 1}))
+
+
+def test_a_commit_is_dirty_when_code_changed_but_not_when_results_did(tmp_path):
+    def git(*arguments):
+        identity = ("-c", "user.name=a", "-c", "user.email=a@b.c")
+        subprocess.run(["git", "-C", str(tmp_path), *identity, *arguments], check=True)
+
+    (tmp_path / "results").mkdir()
+    for name in ("code.py", "results/table.csv"):
+        (tmp_path / name).write_text("1")
+    git("init", "--quiet")
+    git("add", ".")
+    git("commit", "--quiet", "--message", "first")
+    clean = git_commit(tmp_path / "results")
+    assert len(clean) == 40
+    (tmp_path / "results" / "table.csv").write_text("2")
+    assert git_commit(tmp_path / "results") == clean
+    (tmp_path / "code.py").write_text("2")
+    assert git_commit(tmp_path) == f"{clean}-dirty"

@@ -77,7 +77,7 @@ def test_steps_of_one_scale_end_where_open3ds_own_loop_ends(tmp_path, monkeypatc
     assert np.abs(ours - np.eye(4)).max() > 1e-2
 
 
-def test_unmeasurable_pair_keeps_a_weak_edge(paths, tmp_path):
+def test_what_is_unmeasurable_or_too_far_away_keeps_a_weak_edge(paths, tmp_path):
     """Two empty frames in the middle: the graph stays connected, by guesses of low weight."""
     color_paths, depth_paths = list(paths[0][:6]), list(paths[1][:6])
     color_paths[3], depth_paths[3] = tmp_path / "color.png", tmp_path / "depth.png"
@@ -88,9 +88,6 @@ def test_unmeasurable_pair_keeps_a_weak_edge(paths, tmp_path):
     weights = [edge.information[0, 0] for edge in graph.edges[:5]]
     assert max(weights[2:4]) < 0.01 * min(weights[0], weights[1], weights[4])
     np.testing.assert_array_equal(graph.edges[2].i_from_j, graph.edges[1].i_from_j)
-
-
-def test_depth_beyond_the_limit_is_not_used(paths):
     with_limit = rgbd_graph(paths[0][:2], paths[1][:2], CAMERA, RgbdConfig(max_depth_m=0.5))[0]
     assert with_limit.edges[0].information[0, 0] < 1e3
 

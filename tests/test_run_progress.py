@@ -13,7 +13,7 @@ from rich.console import Console
 
 from synfeal.config import MODELS, Run, load_config, read_design
 from synfeal.files import write_json
-from synfeal.report.progress.plan import RunPlan, TimeLeft, job_name, plan_run
+from synfeal.report.progress.plan import RunPlan, TimeLeft, plan_run
 from synfeal.report.progress.view import FirstScores, RunView
 from tests.planned_runs import planned
 from tests.report_results import failed_metrics, metrics
@@ -63,10 +63,6 @@ def test_every_job_of_a_profile_has_an_expected_time(monkeypatch):
     assert set(plan.expected_s) == set(keys)
     assert len(set(plan.expected_s.values())) > 10  # laws, not one number for all
     assert plan.expected_s["train/large_room/6k/synfeal/pretrained/posenet/seed0"] > 2
-
-
-def test_a_job_is_named_as_its_measurement():
-    assert job_name("results/mini/benchmarks/render/room/seq-01.tsv") == "render/room/seq-01"
 
 
 @pytest.fixture

@@ -104,7 +104,14 @@ def test_a_network_learns_the_wall_and_answers_in_the_world_of_the_labels():
     assert np.degrees(np.median(angle_rad)) < 3
 
 
-def test_distance_counts_known_points_alone():
+def test_the_networks_size_stride_and_loss_are_those_of_its_source():
+    network = CoordinateNetwork(torch.tensor([1.0, 2.0, 3.0]))
+    size = sum(4 * p.numel() for p in network.parameters())
+    assert 3.5e6 < size < 4.5e6  # DSAC* small: 4 MB
+    found = network(torch.rand(2, 3, 66, 88))
+    assert found.shape == (2, 3, 17, 22)
+    assert (found == network.mean_m).all()  # untrained: the mean
+    assert cell_pixels(CAMERA, 88, 66).shape == (17, 22, 2)
     wanted = torch.zeros(1, 3, 1, 3)
     wanted[..., 2] = torch.inf
     found = torch.tensor([[3.0, 4.0, 0.0], [0.0, 0.0, 0.0], [9.0, 9.0, 9.0]]).T[None, :, None]
@@ -114,13 +121,3 @@ def test_distance_counts_known_points_alone():
     loss.backward()
     assert found.grad.isfinite().all()
     torch.testing.assert_close(found.grad[0, :, 0, 0], torch.tensor([0.3, 0.4, 0.0]))
-
-
-def test_the_network_has_the_size_and_the_stride_of_its_source():
-    network = CoordinateNetwork(torch.tensor([1.0, 2.0, 3.0]))
-    size = sum(4 * p.numel() for p in network.parameters())
-    assert 3.5e6 < size < 4.5e6  # DSAC* small: 4 MB
-    found = network(torch.rand(2, 3, 66, 88))
-    assert found.shape == (2, 3, 17, 22)
-    assert (found == network.mean_m).all()  # untrained: the mean
-    assert cell_pixels(CAMERA, 88, 66).shape == (17, 22, 2)

@@ -124,7 +124,7 @@ def light_on(patches, lighting, albedo=0.0):
     return surface, factor.astype(np.float64) ** 2.2
 
 
-def test_lamp_light_falls_off_as_it_should():
+def test_lamp_light_falls_off_as_it_should_and_a_table_shades_it():
     lamp = Lamp((0.0, 0.0, 2.0), (0, 0, -1), (1, 1, 1))
     floor = [Patch(level((-2, 2), (-2, 2), 0), GREY)]
     surface, light = light_on(floor, Lighting((-2, -2, 0), (2, 2, 3), DARK, [lamp], None))
@@ -133,9 +133,6 @@ def test_lamp_light_falls_off_as_it_should():
     np.testing.assert_allclose(
         light[:, 0] / np.median(light), expected / np.median(expected), rtol=1e-4
     )
-
-
-def test_table_shades_the_floor_from_a_lamp():
     lamp = Lamp((2.0, 2.0, 2.8), (0, 0, -1), (1, 1, 1))
     top = grey_box((1.0, 1.0, 0.05)).placed(2.0, 2.0, 1.4)
     surface, light = light_on([*room(), *top.patches], Lighting(LOWER, UPPER, DARK, [lamp], None))
@@ -175,7 +172,7 @@ def test_a_red_wall_tints_its_neighbours():
     assert redness[floor & near & ~red].mean() > redness[floor & far].mean() + 0.03 > 1.03
 
 
-def test_packing_never_overlaps():
+def test_packing_never_overlaps_and_pictures_keep_a_rim():
     sizes = [(int(h), int(w)) for h, w in rng().integers(5, 900, (150, 2))]
     places, atlases = pack(sizes)
     assert len(atlases) > 1
@@ -186,9 +183,6 @@ def test_packing_never_overlaps():
         used[atlas][row : row + high, column : column + wide] += 1
     assert max(grid.max() for grid in used) == 1
     assert sum(grid.sum() for grid in used) == sum(high * wide for high, wide in sizes)
-
-
-def test_pictures_keep_a_rim_of_their_own_colour():
     pictures = [np.full((20, 30, 3), value, np.uint8) for value in (10, 200)]
     places, (texture,) = laid_out(pictures)
     for (_, row, column), picture in zip(places, pictures, strict=True):

@@ -13,15 +13,9 @@ from baselines.training.score import score_common, score_run
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.frames import read_records
+from tests.property_support import random_table
 
 N = 40
-
-
-def poses(rng, count=N):
-    """Random poses, ten frames to a path."""
-    quat = Rotation.random(count, rng=rng).as_quat(canonical=True, scalar_first=True)
-    frame = np.arange(count)
-    return PoseTable(frame, frame // 10, rng.normal(size=(count, 3)), quat)
 
 
 def moved(table, offset_m, angle_rad):
@@ -53,7 +47,7 @@ def score(tmp_path):
 
 
 def test_known_motions_give_known_errors_against_labels_and_truth(score):
-    truth = poses(np.random.default_rng(1))
+    truth = random_table(N, 1)
     labels = moved(truth, np.array([3.0, 0.0, 4.0]), 0.0)
     predicted = moved(truth, np.array([0.0, 0.0, 0.0]), math.radians(25))
     metrics, errors = score(predicted, labels, truth, truth)
@@ -67,7 +61,7 @@ def test_known_motions_give_known_errors_against_labels_and_truth(score):
 
 
 def test_on_the_common_test_set_each_frame_is_compared_with_its_own_true_pose(tmp_path):
-    truth = poses(np.random.default_rng(1))
+    truth = random_table(N, 1)
     part = moved(truth, np.array([3.0, 0.0, 4.0]), math.radians(25)).at(np.arange(0, N, 8))
     files = [tmp_path / name for name in ("predictions.csv", "truth.csv", "errors.csv")]
     write_pose_table(files[0], part)
@@ -80,11 +74,14 @@ def test_on_the_common_test_set_each_frame_is_compared_with_its_own_true_pose(tm
     write_pose_table(files[1], truth.first(30))
     with pytest.raises(InputError, match=r"predictions\.csv: has frames that"):
         score_common(*files)
+    others = [files[0], *[files[1]] * 3, files[2], tmp_path / "metrics.json"]
+    with pytest.raises(InputError, match=r"truth\.csv: its frames are not those"):
+        score_run(*others, {})
 
 
 def test_the_baseline_predicts_the_mean_training_position(score):
-    test = poses(np.random.default_rng(3))
-    train = poses(np.random.default_rng(4), 60)
+    test = random_table(N, 3)
+    train = random_table(60, 4)
     distances = np.sort(np.sqrt(((test.position_m - train.position_m.mean(0)) ** 2).sum(1)))
     metrics, _ = score(test, test, test, train)
     assert metrics["baseline_position_m_true"] == pytest.approx(distances[19:21].mean())
@@ -106,12 +103,6 @@ def test_the_mean_pose_and_the_true_poses_are_scored_against_the_labels_too(scor
     assert metrics["baseline_position_m"] == metrics["floor_position_m"] == pytest.approx(5)
     assert metrics["baseline_orientation_deg"] == pytest.approx(30)
     assert metrics["floor_orientation_deg"] == pytest.approx(30)
-
-
-def test_tables_of_different_frames_are_refused(score):
-    table = poses(np.random.default_rng(6))
-    with pytest.raises(InputError, match=r"labels\.csv: its frames are not those"):
-        score(table.first(10), table, table, table)
 
 
 def test_scoring_needs_no_torch():

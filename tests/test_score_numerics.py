@@ -13,7 +13,6 @@ from baselines.training.score import score_run
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.evaluation.metrics import cumulative
 from synfeal.frames import read_records
-from synfeal.geometry.rotations import rotation_angle_rad
 from synfeal.report.cells import read_cells
 from synfeal.report.compare.runs import read_run
 from tests.report_results import design_of, experiment
@@ -42,31 +41,8 @@ def turned(base, axis, angle):
     return np.array([float(value) for value in product])
 
 
-def exact_angle(a, b):
-    """The angle between two quaternions of doubles, by Kahan's formula for angles of vectors."""
-    p, q = ([MP.mpf(float(v)) for v in quat] for quat in (a, b))
-    if sum(x * y for x, y in zip(p, q, strict=True)) < 0:
-        q = [-v for v in q]
-    size_p, size_q = (MP.sqrt(sum(v * v for v in quat)) for quat in (p, q))
-    pairs = [(x * size_q, y * size_p) for x, y in zip(p, q, strict=True)]
-    apart = MP.sqrt(sum((x - y) ** 2 for x, y in pairs))
-    together = MP.sqrt(sum((x + y) ** 2 for x, y in pairs))
-    return 4 * MP.atan2(apart, together)
-
-
 BASES = ((1.0, 0.0, 0.0, 0.0), (0.5, -0.5, 0.5, 0.5), (0.1, 0.7, -0.5, 0.5))
 AXES = ((0.0, 0.0, 1.0), (2.0, -3.0, 6.0))
-
-
-@pytest.mark.parametrize("axis", AXES)
-@pytest.mark.parametrize("base", BASES)
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_angles_from_0_to_180_degrees_keep_their_digits(base, axis, sign):
-    quats = np.array([sign * turned(base, axis, angle) for angle in ANGLES])
-    found = rotation_angle_rad(np.tile(base, (len(quats), 1)), quats)
-    for angle, quat, truth in zip(found, quats, ANGLES, strict=True):
-        assert abs(MP.mpf(float(angle)) - exact_angle(np.array(base), quat)) < 1e-15
-        assert abs(MP.mpf(float(angle)) - truth) < 1e-15
 
 
 @pytest.fixture

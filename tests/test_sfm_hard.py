@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from baselines.groundtruth.chain import fill_gaps
-from baselines.groundtruth.sfm import mapping, sfm_batch
+from baselines.groundtruth.sfm import mapping, metric_scale, sfm_batch
 from synfeal.config.models import CameraConfig, SfmConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error, pose_matrix, relative
@@ -140,14 +140,11 @@ def test_a_pattern_that_repeats_within_a_view_misleads_and_the_mapper_starts_aga
     assert facts["starts"] == 4
 
 
-def shifted(px):
-    """The camera with its principal point moved to the right."""
-    fx, fy, cx, cy = CAMERA.intrinsics
-    return CAMERA.model_copy(update={"fx": fx, "fy": fy, "cx": cx + px, "cy": cy})
-
-
-def test_image_of_another_size_is_named(tmp_path):
+def test_a_missing_image_and_one_of_another_size_are_named(tmp_path):
     poses = sideways(3)
+    missing = tmp_path / "frame-000000.color.png"
+    with pytest.raises(InputError, match=r"frame-000000\.color\.png: no such image"):
+        sfm_batch([missing], CAMERA, poses[:1], CFG, 0, tmp_path)
     paths = write(tmp_path, poses)
     told = CAMERA.model_copy(update={"width": 320, "height": 240})
     with pytest.raises(InputError, match=r"000000\.color\.png: is 160x120, the camera has 320x240"):
@@ -205,3 +202,14 @@ for mapper in ("incremental", "global"):
     trajectory, _ = sfm_batch(paths, camera, poses, told, 7)
     write_trajectory(folder / f"{mapper}.csv", trajectory)
 """
+
+
+def test_scale_bears_wrong_poses_and_leaves_out_near_and_late_frames():
+    true = np.column_stack([0.04 * np.arange(60), np.zeros(60), np.zeros(60)])
+    model = true / 3
+    model[1] = [9, 9, 9]  # 4 cm from the first frame
+    model[44:] *= 5  # beyond the first 44 frames
+    model[10:15] *= 7  # wrong, but a minority
+    assert metric_scale(true, model) == pytest.approx(3.0)
+    assert np.isnan(metric_scale(np.zeros((5, 3)), np.ones((5, 3))))  # no motion, no scale
+    assert np.isnan(metric_scale(np.eye(3), np.zeros((3, 3))))

@@ -19,7 +19,7 @@ def run_of(first):
     return values | {"position_rms_m": first + 50.0, "floor_position_m": first + 60.0}
 
 
-def test_a_cell_is_the_mean_of_its_runs_measure_by_measure():
+def test_a_cell_is_the_mean_of_its_runs_and_those_without_a_score_count():
     cell = combine([run_of(0), run_of(2), run_of(10)])  # offsets 0, 2, 10: mean 4, sd sqrt(28)
     for place, measure in enumerate(MEASURES):
         low = len(MEASURES) + 2 * place
@@ -33,9 +33,6 @@ def test_a_cell_is_the_mean_of_its_runs_measure_by_measure():
     assert (cell["position_rms_m"], cell["floor_position_m"]) == (54, 60)
     assert (cell["n_train"], cell["n_test"]) == (300, 125)
     assert (cell["n_seeds"], cell["n_finished"], cell["failed"]) == (3, 3, 0)
-
-
-def test_runs_without_a_score_count_as_runs_and_give_no_score():
     cell = combine([failed_metrics("6k"), run_of(3) | {"failed": 7}])
     assert cell["position_m"] == 3
     assert cell["position_m_sd"] is None
@@ -45,9 +42,6 @@ def test_runs_without_a_score_count_as_runs_and_give_no_score():
     nothing = combine([failed_metrics("6k")])
     assert nothing["orientation_deg"] is None
     assert (nothing["position_rms_m"], nothing["n_finished"], nothing["n_test"]) == (None, 0, 125)
-
-
-def test_one_wide_limit_makes_the_mean_limit_unknown():
     score = score_of([run_of(0), run_of(2) | {"position_m_high": None}], "position_m")
     assert (score["position_m"], score["position_m_high"]) == (1, None)
     assert score["position_m_sd"] == pytest.approx(math.sqrt(2))

@@ -131,16 +131,13 @@ def test_normalised_images_have_zero_mean_and_unit_deviation(split):
     assert normalised.is_contiguous(memory_format=torch.channels_last)
 
 
-def test_too_few_frames_or_another_size_are_refused(split, tmp_path):
+def test_too_few_frames_another_size_and_no_labels_are_refused(split, tmp_path):
     with pytest.raises(InputError, match="holds 140 frames, but 141 are labelled"):
         read_images(split[0], 141, PX, CPU)
     with pytest.raises(InputError, match=r"network\.input_px"):
         read_images(split[0], 5, 64, CPU)
     with pytest.raises(InputError, match="packed frames"):
         read_images(tmp_path / "absent.npy", 5, PX, CPU)
-
-
-def test_an_empty_label_table_is_refused(split, tmp_path):
     _, table = coloured_frames(1, np.random.default_rng(0))
     write_pose_table(tmp_path / "empty.csv", table.first(0))
     with pytest.raises(InputError, match="no rows"):

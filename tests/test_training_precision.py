@@ -50,9 +50,6 @@ def test_training_learns_what_the_images_show(learned):
     assert np.array_equal(predicted.path, table.path)
     assert int(rows[-1]["samples_seen"]) == 2400
     assert float(rows[-1]["loss"]) < float(rows[0]["loss"]) - 0.5
-
-
-def test_errors_on_validation_paths_fall(learned):
     looked_at = [row for row in learned[2] if row["held_out_position_m"]]
     assert len(looked_at) == 20
     for name in ("held_out_position_m", "held_out_orientation_deg"):

@@ -15,13 +15,16 @@ from baselines.training.fit import fit
 from baselines.training.optimizer import Schedule, optimisation_of
 from baselines.training.protocol import HALVE_EVERY, PROTOCOLS
 from baselines.training.selection import HeldOutErrors, Selection, held_out_errors
-from synfeal.config.models import MODELS
+from synfeal.config import MODELS, Run
+from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.errors import InputError
 from synfeal.frames import read_records
+from synfeal.labels.noise import add_noise
 from tests.coloured_frames import (
     HYPER,
     NETWORK,
     TRAINING,
+    Jitter,
     read_split,
     statistics_of,
     train,
@@ -65,11 +68,16 @@ def test_whole_paths_are_held_out(n_paths, share):
         assert len(held) == min(max(round(share * n_paths), 1), n_paths - 1)
 
 
-def test_the_seed_draws_the_paths():
+def test_seeds_draw_paths_and_leave_out_labels():
     path = np.arange(20).repeat(3)
     drawn = {tuple(held_out_paths(path, 0.2, seed)) for seed in range(8)}
     assert len(drawn) > 5
     assert (held_out_paths(path, 0.2, 1) == held_out_paths(path, 0.2, 1)).all()
+    seed = Run(**RUN).seed(0)
+    assert Run(**RUN | {"labels": "sfm"}).seed(0) == seed
+    others = [Run(**RUN | {key: value}).seed(0) for key, value in OTHERS.items()]
+    others += [Run(**RUN | {"repetition": 1}).seed(0), Run(**RUN).seed(1)]
+    assert len({seed, *others}) == len(others) + 1
 
 
 def test_parts_share_images_and_keep_their_labels(splits):
@@ -222,3 +230,35 @@ def test_patience_ends_a_published_training_early(splits, tmp_path, monkeypatch)
     _, history = train(splits[0], tmp_path, samples=640, training=training, test=splits[1])
     rows = [row for _, row in read_records(history)]
     assert int(rows[-1]["samples_seen"]) == 640 // 20 * 4
+
+
+RUN = {"scene": "large_room", "size": "6k", "labels": "synfeal", "init": "scratch"}
+RUN |= {"model": "posenet", "repetition": 0}
+OTHERS = {"scene": "sanctuary", "size": "20k", "init": "pretrained", "model": "posenet2"}
+
+
+class Recorder(Jitter):
+    """Remembers what was shown, image by image."""
+
+    def __init__(self):
+        super().__init__()
+        self.shown: list[torch.Tensor] = []
+
+    def __call__(self, images, quat_wxyz):
+        self.shown.append(images.sum(dim=(1, 2, 3)))
+        return super().__call__(images, quat_wxyz)
+
+
+@pytest.mark.parametrize(("share", "left"), [(0.0, 60), (0.3, 40)])
+def test_labels_change_neither_order_nor_held_out_paths(tmp_path, share, left):
+    frames, labels = write_split(tmp_path, "train", 60, 0)
+    noisy = tmp_path / "noisy.csv"
+    write_pose_table(noisy, add_noise(read_pose_table(labels), 0.3, 20, np.random.default_rng(0)))
+    training = TRAINING.model_copy(update={"validation_share": share})
+    shown = []
+    for path in (labels, noisy):
+        recorder = Recorder()
+        train((frames, path), tmp_path, training=training, augment=recorder)
+        shown.append(torch.cat(recorder.shown))
+    assert torch.equal(*shown)
+    assert len(shown[0].unique()) == left

@@ -62,12 +62,9 @@ def test_a_design_without_table_4_has_no_rows(tmp_path):
     assert training_rows(tmp_path, "large_room").empty
 
 
-def test_a_training_that_was_not_measured_is_named(root):
+def test_a_training_without_measurement_or_images_is_named(root):
     with pytest.raises(InputError, match=r"sanctuary/95k/.*/posenet/seed0\.tsv: missing"):
         training_rows(root, "sanctuary")
-
-
-def test_a_history_without_images_is_named(root):
     path = root / "runs/large_room/80k/synfeal/pretrained/posenet/seed1/history.csv"
     path.write_text("samples_seen,loss\n")
     with pytest.raises(InputError, match=r"seed1/history\.csv: shows no images"):

@@ -10,16 +10,27 @@ kept: the same command goes on there.
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from synfeal.errors import InputError, exit_status
 from synfeal.files import atomic_path
-from tests.slurm_run.page import compare, page
-from tests.slurm_run.run import cluster, run_local, run_on_cluster
+from tests.slurm_run.page import page
 
+ROOT = Path(__file__).parents[2]
+CLUSTER = ROOT / "setup/slurm_cluster.sh"
 OUT = Path("results/benchmarks/slurm.md")
+# The profile as it is, but: there is no accounting to ask, a small cluster answers at once, and
+# jobs of seconds go so many to a group that there are two groups, one for each core.
+SLURM = (
+    *("--profile", "workflow/profiles/slurm", "--slurm-status-command", "squeue"),
+    *("--slurm-init-seconds-before-status-checks", "5", "--latency-wait", "5"),
+    *("--group-components", "fits=20", "plans=3", "chains=2", "shards=5", "batches=5"),
+)
+LOOK_EVERY_S, NODE_GONE_S = 2.0, 300.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -36,19 +47,101 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _compare(work: Path, local: Path | None, out: Path) -> None:
     work.mkdir(parents=True, exist_ok=True)
-    local_s = None if local else run_local(work)
+    begin = time.monotonic()
+    if local is None:
+        _ended_well(_snakemake(work, "local", ("--cores", "2")).wait(), work / "local.log")
+    local_s = None if local else time.monotonic() - begin
     try:
-        cluster("start", work)
-        slurm_s, crash = run_on_cluster(work)
+        cluster("start", work / "cluster")
+        slurm_s, crash = _run_on_cluster(work)
     finally:
-        cluster("stop", work)
-    files = compare(local or work / "local/smoke", work / "slurm/smoke")
-    text = page((local_s, slurm_s), crash, work / "cluster", files)
+        cluster("stop", work / "cluster")
+    trees = local or work / "local/smoke", work / "slurm/smoke"
+    text, differing = page(trees, (local_s, slurm_s), crash, work / "cluster")
     with atomic_path(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     print(text)
-    if files.differing:
-        raise InputError(f"{out}: {len(files.differing)} files differ or lack; both are in {work}")
+    if differing:
+        raise InputError(f"{out}: {len(differing)} files differ or lack; both are in {work}")
+
+
+def _snakemake(work: Path, name: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
+    """The workflow at work, its results below ``<work>/<name>``, what it prints beside them."""
+    command = (sys.executable, "-m", "snakemake", *arguments, "--configfile", "config/smoke.yaml")
+    results = ("--config", f"results={work / name}", "--", "all")
+    with (work / f"{name}.log").open("ab") as log:
+        return subprocess.Popen((*command, *results), cwd=ROOT, stdout=log, stderr=log)
+
+
+def _run_on_cluster(work: Path) -> tuple[float, list[str]]:
+    """Seconds of the run through SLURM, and what became of the crash in it.
+
+    Raises:
+        InputError: the run failed, or no training run was left during which to kill the node.
+    """
+    begin, crash = time.monotonic(), []
+    process = _snakemake(work, "slurm", (*SLURM, "--slurm-logdir", str(work / "slurm_logs")))
+    try:
+        while process.poll() is None:
+            time.sleep(LOOK_EVERY_S)
+            trained = list((work / "slurm").glob("*/runs/**/model.pt"))
+            running = _lines("squeue", "--states=RUNNING", "--format=%i %k") if trained else []
+            if running and not crash:
+                crash = _crash_node(work, begin, len(trained), running)
+    finally:
+        process.kill()
+    _ended_well(process.wait(), work / "slurm.log")
+    if not crash:
+        raise InputError(f"{work / 'slurm'}: all was trained before; remove it and start again")
+    return time.monotonic() - begin, crash
+
+
+def _crash_node(work: Path, begin: float, trained: int, running: Sequence[str]) -> list[str]:
+    """Kill the node with what is ``running`` there, wait until it is missed, start it again.
+
+    Returns:
+        What happened in a sentence, then the jobs that were lost.
+    """
+    at_s = [time.monotonic() - begin]
+    cluster("kill-node", work / "cluster")
+    _wait_for(lambda: any(state.startswith("down") for state in _lines("sinfo", "--format=%T")))
+    at_s.append(time.monotonic() - begin)
+    cluster("start-node", work / "cluster")
+    at_s.append(time.monotonic() - begin)
+    return [
+        f"After {at_s[0]:.0f} s, with {trained} models trained, the node was killed; it was missed"
+        f" after {at_s[1] - at_s[0]:.0f} s and back {at_s[2] - at_s[1]:.0f} s later.",
+        *running,
+    ]
+
+
+def cluster(action: str, folder: Path) -> None:
+    """Start the cluster, stop it, kill its node or bring that back.
+
+    Raises:
+        InputError: that failed; what to do about it is on standard error.
+    """
+    if subprocess.run((CLUSTER, action, folder), check=False).returncode:
+        raise InputError(f"{CLUSTER.name} {action}: did not succeed; see above")
+
+
+def _lines(*command: str) -> list[str]:
+    """What a command of SLURM's lists; nothing when the controller is too busy to answer."""
+    listing = subprocess.run((*command, "--noheader"), stdout=subprocess.PIPE, text=True)
+    return listing.stdout.splitlines()
+
+
+def _wait_for(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + NODE_GONE_S
+    while not condition():
+        if time.monotonic() > end:
+            raise InputError(f"the controller did not miss the node within {NODE_GONE_S:.0f} s")
+        time.sleep(LOOK_EVERY_S)
+
+
+def _ended_well(status: int, log: Path) -> None:
+    if status:
+        raise InputError(f"{log}: the run failed; see its end, then start the same command again")
 
 
 if __name__ == "__main__":
