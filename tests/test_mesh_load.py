@@ -63,11 +63,13 @@ def test_nodes_nest_make_instances_need_no_scene_and_keep_the_order_of_the_file(
     np.testing.assert_allclose(parts[0].vertices_m, np.stack([z + 5.0, y, -x], axis=1), atol=1e-6)
     np.testing.assert_allclose(parts[1].vertices_m, TRIANGLE * [3.0, 1.0, 1.0] + [5.0, 0.0, 0.0])
     assert parts[0].texture is parts[1].texture  # decoded once
+    header, binary = triangle_gltf(textured(), paint)
     expected = load_mesh(store_gltf(tmp_path, header, binary)).parts[0].vertices_m
     header["nodes"].append({"children": [0]})
     del header["scenes"], header["scene"]
     (part,) = load_mesh(store_gltf(tmp_path, header, binary)).parts
     np.testing.assert_array_equal(part.vertices_m, expected)
+    header, binary = triangle_gltf(textured(), paint)
     primitive = header["meshes"][0]["primitives"][0]
     header["meshes"] = [
         {"name": "z", "primitives": [primitive, dict(primitive)]},
