@@ -212,6 +212,7 @@ def test_jumped_clocks_leave_no_date_in_the_future_and_missing_locks_are_said(
     dates = {name: (tmp_path / name).stat().st_mtime for name in ages_s}
     assert dates["plan.csv"] == pytest.approx(now - 60, abs=1e-3)
     assert now <= dates["mesh.glb"] == dates["frames.npy"] < dates["model.pt"] <= time.time()
+    assert "3 files dated in the future" in capsys.readouterr().err
 
     def no_locks(descriptor, operation):
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))

@@ -144,7 +144,7 @@ def test_a_missing_image_and_one_of_another_size_are_named(tmp_path):
     poses = sideways(3)
     missing = tmp_path / "frame-000000.color.png"
     with pytest.raises(InputError, match=r"frame-000000\.color\.png: no such image"):
-        sfm_batch([missing], CAMERA, poses[:1], CFG, 0, tmp_path)
+        sfm_batch([missing], CAMERA, poses[:1], CFG, 0)
     paths = write(tmp_path, poses)
     told = CAMERA.model_copy(update={"width": 320, "height": 240})
     with pytest.raises(InputError, match=r"000000\.color\.png: is 160x120, the camera has 320x240"):
