@@ -17,7 +17,7 @@ from synfeal.geometry.rotations import canonical_quat_wxyz
 from synfeal.report.claims.evidence import evidence_of
 from synfeal.report.claims.table import claim_rows
 from synfeal.report.published import key_of, published_cells
-from synfeal.report.run_errors import COLUMNS, COMMON_COLUMNS
+from synfeal.report.stats import COLUMNS, COMMON_COLUMNS
 from tests.report_results import MEASURES, design_of, fill_assistance, shipped_design
 
 N_PATHS, FRAMES_OF_PATH = 12, 3

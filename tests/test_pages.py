@@ -57,7 +57,7 @@ TABLES, SCENES = "published/mini/tables", "benchmarks/scene_difficulty"
     ("part", "file", "column", "value", "shown"),
     [
         ("size", f"{TABLES}/table4_size", "position_m_true", "7.654", "4.42 m"),  # over sqrt(3)
-        ("size", f"{TABLES}/table4_size", "published_position_m", "6.54", "*(6.54 m"),
+        ("size", f"{TABLES}/table4_size", "published_position_m", "6.54", "*(6.54, "),
         ("labels", f"{TABLES}/table2_ground_truth", "orientation_deg_true", "99.87", "99.9°"),
         ("difficulty", f"{SCENES}/large_room-sift", "covered_share_mean", "0.99", "| 99 % ("),
         ("difficulty", f"{SCENES}/large_room-repetition", "far_share", "0.777", "77.7 %"),

@@ -219,7 +219,7 @@ def test_every_drawing_has_a_caption_and_is_a_figure_or_left_out(results):
     stages = ("collision", "labels", "render", "training")
     assert drawn == {f"speed_vs_error_{stage}" for stage in stages}
     assert isinstance(FIGURES["error_by_size"].draw(results), Figure)
-    rows = tuple(row for row in results.rows if row.table == TABLE4)
+    rows = tuple(row for row in results.design.rows if row.table == TABLE4)
     assert read_labelled_set(Results(results.root, design_of(rows))) is None
 
 

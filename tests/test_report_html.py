@@ -20,7 +20,6 @@ from synfeal.report.html.page import (
     LARGEST_SIDE_PX,
     data_address,
     figure_files,
-    missing_figures,
     missing_rows,
 )
 from synfeal.report.html.tables import score_table
@@ -169,7 +168,7 @@ def test_the_page_names_what_it_lacks(root):
     for path in (root / "figures").iterdir():
         path.unlink()
     assert "figures is missing from this run." in text_of(written(root))
-    assert "error_by_noise" in text_of(written(root))
+    assert "for lack of its data in this profile: figure error_by_noise." in text_of(written(root))
 
 
 def test_untested_claims_and_rows_left_out_are_listed_and_nothing_else_is_needed(root):
@@ -203,6 +202,3 @@ def test_figures_are_shown_in_order_as_vectors_or_made_small(finished, tmp_path)
     with Image.open(io.BytesIO(base64.b64decode(content))) as image:
         assert image.size == (LARGEST_SIDE_PX, 300 * LARGEST_SIDE_PX // 2000)
     assert missing_rows(shipped_design()) == []
-    assert missing_figures({"a": "", "b": ""}, ["b"]) == [
-        "Not drawn, for lack of its data in this profile: figure a."
-    ]
