@@ -20,6 +20,7 @@ from synfeal.report.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, RC,
 
 COLORS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 MARKERS = "os^DvP"
+LEGEND_INCHES = 7.0  # of four columns of settings
 
 
 def write_page(out: Path, name: str, sweep: Sweep, rows: pd.DataFrame) -> None:
@@ -75,6 +76,7 @@ def draw(path: Path, sweep: Sweep, picture: Picture, rows: pd.DataFrame) -> None
     shape = (len(picture.y), len(columns)) if picture.across else (1, len(picture.y))
     size = (2.4 * shape[1], 2.5 * shape[0]) if picture.across else (4.3 * shape[1], 3.9)
     with mpl.rc_context(RC), atomic_path(path) as temporary:
+        size = max(size[0], LEGEND_INCHES if picture.group else 0.0), size[1]
         figure = Figure(figsize=size, layout="constrained")
         panels = figure.subplots(*shape, squeeze=False, sharey="row" if picture.across else False)
         panels = panels if picture.across else panels.T
@@ -148,7 +150,12 @@ def mark_front(panel: Axes, means: pd.DataFrame, x: str, y: str, chosen: Mapping
 
 def _logarithmic(panel: Axes) -> None:
     panel.set(xscale="log", yscale="log")
-    axes = ((panel.xaxis, (1, 2, 3, 5)), (panel.yaxis, (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8)))
+    low, high = panel.get_ylim()
+    within_a_decade = (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8)
+    axes = (
+        (panel.xaxis, (1, 2, 3, 5)),
+        (panel.yaxis, within_a_decade if high < 10 * low else (1, 2, 5)),
+    )
     for axis, marked in axes:
         axis.set_major_locator(LogLocator(subs=marked))
         axis.set_major_formatter("{x:g}")
