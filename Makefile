@@ -33,11 +33,12 @@ publish: $(INSTALLED)  ## track what PROFILE's run made (results/published), and
 	$(BIN)/python -m synfeal.report.publish --profile $(PROFILE)
 	$(BIN)/python -m synfeal.report.pages
 
-archive: $(INSTALLED)  ## PROFILE's tables, figures and report.html in one file, for a release
+archive: $(INSTALLED)  ## PROFILE's tables, figures, report.html and predictions in one file, for a release
 	mkdir -p build
+	$(BIN)/synfeal keep results/$(PROFILE)
 	tar --create --gzip --file build/results-$(PROFILE).tar.gz --directory results \
 	  --owner 0 --group 0 --sort name --exclude '.snakemake*' \
-	  $(addprefix $(PROFILE)/,report.html report.tex summary.md claims.csv provenance.json benchmarks.csv tables figures)
+	  $(addprefix $(PROFILE)/,report.html report.tex summary.md claims.csv provenance.json benchmarks.csv tables figures predictions.zip)
 	@echo build/results-$(PROFILE).tar.gz
 
 plan: smoke  ## what paper and gpu cost, and what such plans are worth (results/benchmarks)

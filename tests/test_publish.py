@@ -3,14 +3,12 @@
 import hashlib
 import json
 import subprocess
-import zipfile
 from pathlib import Path
 
 import pytest
 
-import synfeal.report.publish
 from synfeal.errors import InputError
-from synfeal.report.publish import FINISHED, TRACKED_MB, main, publish
+from synfeal.report.publish import FINISHED, main, publish
 
 REPOSITORY = Path(__file__).parent.parent
 LIMIT_MB = 4.0
@@ -50,21 +48,6 @@ def root(tmp_path, monkeypatch):
 
 def files_below(folder):
     return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
-
-
-@pytest.mark.parametrize("tracked", [True, False])
-def test_predictions_are_published_as_one_file_if_it_is_small(root, monkeypatch, tracked):
-    if not tracked:
-        monkeypatch.setattr(synfeal.report.publish, "TRACKED_MB", 0)
-    run = root / "runs/large_room/6k/synfeal/scratch/posenet/seed0/predictions.csv"
-    labels = root / "labels/large_room/6k/synfeal/test.csv"
-    for path in (run, labels):
-        path.parent.mkdir(parents=True)
-        path.write_text("frame\n")
-    assert main(["--profile", "mini"]) == 0
-    with zipfile.ZipFile(root / "predictions.zip") as package:
-        assert run.relative_to(root).as_posix() in package.namelist()
-    assert (root.parent / "published/mini/predictions.zip").exists() == tracked
 
 
 def test_a_run_is_published_without_what_no_page_shows_and_so_is_one_of_labels_alone(root):
@@ -113,9 +96,7 @@ def test_tracked_results_are_small_and_of_their_provenance():
     )
     paths = [REPOSITORY / name for name in listed.stdout.decode().split("\0") if name]
     assert {p.relative_to(REPOSITORY).parts[1] for p in paths} == {"published", "benchmarks"}
-    packages = [p.stat().st_size for p in paths if p.name == "predictions.zip"]
-    assert sum(p.stat().st_size for p in paths) - sum(packages) <= LIMIT_MB * 1e6
-    assert max(packages, default=0) <= TRACKED_MB * 1e6
+    assert sum(p.stat().st_size for p in paths) <= LIMIT_MB * 1e6
 
 
 @pytest.mark.parametrize("profile", ["mini", "night"])

@@ -1,9 +1,8 @@
 """Copying a finished run to where the pages read it: ``results/published/<profile>``, tracked.
 
-``python -m synfeal.report.publish --profile mini`` takes tables, claims, summary, provenance, job
-times and, where they are small, predictions from ``results/mini``, and of its figures those that a
-page shows. Nothing else of a run is tracked, so making results never changes the repository;
-publishing does.
+``python -m synfeal.report.publish --profile mini`` takes tables, claims, summary, provenance and
+job times from ``results/mini``, and of its figures those that a page shows. Nothing else of a run
+is tracked, so making results never changes the repository; publishing does.
 """
 
 from __future__ import annotations
@@ -18,13 +17,10 @@ from pathlib import Path
 from synfeal.dataset.directories import atomic_directory
 from synfeal.errors import InputError
 from synfeal.report.html.provenance import hashes
-from synfeal.report.predictions.keep import PACKAGE, PREDICTIONS, keep
 from synfeal.report.results import read_result, read_text
 
 RESULTS = Path("results")
 PUBLISHED = RESULTS / "published"
-# Larger ones stay beside the results, for the page of a release.
-TRACKED_MB = 16
 FINISHED = ("claims.csv", "summary.md", "provenance.json", "benchmarks.csv")
 
 
@@ -44,7 +40,6 @@ def publish(root: Path, target: Path, pages: Iterable[Path]) -> None:
     """
     paths = [*_tables(root), *_records(root), *_shown_figures(root, target, pages)]
     _check_provenance(root, paths)
-    paths += _predictions(root)
     shutil.rmtree(target, ignore_errors=True)
     with atomic_directory(target) as directory:
         for path in paths:
@@ -68,14 +63,6 @@ def _records(root: Path) -> list[Path]:
     if missing:
         raise InputError(f"{root / missing[0]}: missing; finish the run, then publish it")
     return [root / name for name in FINISHED]
-
-
-def _predictions(root: Path) -> list[Path]:
-    """The run's predictions in one small file (docs/kept.md); none for a run of labels alone."""
-    if not any(root.glob(f"runs/**/{PREDICTIONS}")):
-        return []
-    keep(root, root / PACKAGE)
-    return [root / PACKAGE] if (root / PACKAGE).stat().st_size <= TRACKED_MB * 1e6 else []
 
 
 def _shown_figures(root: Path, target: Path, pages: Iterable[Path]) -> list[Path]:
