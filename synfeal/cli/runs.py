@@ -132,8 +132,8 @@ def run(arguments: argparse.Namespace) -> None:
     paths = [path for path in paths if not is_default(path)]
     command = snakemake_command(paths, cores, arguments.snakemake)
     found = (str(PLUGINS.resolve()), os.environ.get("PYTHONPATH"))
-    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, found))
-    os.execv(sys.executable, [sys.executable, "-m", *command])
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, found))}
+    os.execve(sys.executable, [sys.executable, "-m", *command], environment)
 
 
 def snakemake_command(profiles: list[Path], cores: int, further: list[str]) -> list[str]:
