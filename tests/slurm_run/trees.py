@@ -16,6 +16,10 @@ TIMED = {
     "provenance.json": "dates, times and hashes of timed files",
     "report.html": "shows what jobs took",
     "report.tex": "shows times of hard cases",
+    "summary.txt": "says where the results lie",
+    "references/*/facts.json": "what answers took",
+    "scenes/*/collection_speed.json": "times of frames",
+    "scenes/*/effects_speed.csv": "times of frames",
     "scenes/*/render_speed.csv": "times of frames",
     "scenes/*/collision_curve.csv": "times of rays",
     "tables/speed_vs_error.csv": "times",
@@ -27,6 +31,7 @@ TIMED = {
 TIMED_PARTS = {
     "claims.csv": re.compile(rb"^C14,.*\n", re.MULTILINE),  # the rate of collection
     "tables/label_error.csv": re.compile(rb",[^,\n]*,[^,\n]*$", re.MULTILINE),  # seconds and MB
+    "tables/references.csv": re.compile(rb",[^,\n]*$", re.MULTILINE),  # seconds
     "tables/label_error.tex": re.compile(rb"&[^&\n]*&[^&\n]*$", re.MULTILINE),
 }
 # Files that go when what needs them is made.

@@ -227,6 +227,12 @@ use rule call as dataset with:
         manifest=f"{ROOT}/datasets/{{scene}}/{{camera}}/manifest.json",
         train=f"{ROOT}/datasets/{{scene}}/{{camera}}/TrainSplit.txt",
         test=f"{ROOT}/datasets/{{scene}}/{{camera}}/TestSplit.txt",
+        preview=f"{ROOT}/datasets/{{scene}}/{{camera}}/preview.png",
+        poses=[
+            f"{ROOT}/datasets/{{scene}}/{{camera}}/{split}.csv"
+            for split in SPLITS
+            if all(CONFIG.n_largest(scene, split) for scene in CONFIG.scenes)
+        ],
     log:
         f"{ROOT}/logs/dataset/{{scene}}/{{camera}}.log",
     benchmark:
