@@ -193,6 +193,16 @@ def unless_restored(outputs, **sources):
     return {name: partial(needed, source) for name, source in sources.items()}
 
 
+def evidence_for(names, **files):
+    """Inputs of a job that answers by these methods; none where all their scores were restored."""
+    labels = f"{ROOT}/labels/{{scene}}/{{size}}"
+    for split in SPLITS:
+        files[split] = f"{labels}/{{labels}}/{split}.csv"
+        files[f"{split}_truth"] = f"{labels}/synfeal/{split}.csv"
+    scores = [f"{REFERENCE}/{name}/metrics.json" for name in names]
+    return unless_restored(scores, **files)
+
+
 def backbone_weights(wildcards):
     """The pretrained backbone a run starts from; nothing when it starts from scratch."""
     if split_init(wildcards.init)[0] == "scratch":

@@ -6,16 +6,6 @@ REFERENCE_LOG = "{scene}/{size}/{labels}"
 STRUCTURE = {n: f"{FOUND}/{n}.npz" for n in ("correspondences", "tracks")}
 
 
-def evidence_for(names, **files):
-    """Inputs of a job that answers by these methods; none where all their scores were restored."""
-    labels = f"{ROOT}/labels/{{scene}}/{{size}}"
-    for split in SPLITS:
-        files[split] = f"{labels}/{{labels}}/{split}.csv"
-        files[f"{split}_truth"] = f"{labels}/synfeal/{split}.csv"
-    scores = [f"{REFERENCE}/{name}/metrics.json" for name in names]
-    return unless_restored(scores, **files)
-
-
 use rule call as descriptors with:
     input:
         train=f"{ROOT}/frames/{{scene}}/train.npy",
