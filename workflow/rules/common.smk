@@ -68,6 +68,7 @@ RUNS = [run.directory for run in DESIGN.runs]
 TRUE_SETS = [f"{scene}/{size}/synfeal" for scene, size in SIZES]
 ESTIMATED_SETS = ["/".join(names) for names in DESIGN.estimated]
 POSE_SETS = sorted({*TRUE_SETS, *ESTIMATED_SETS})
+MAPPED_SETS = [f"{s}/{z}" for s, z in SIZES if has_structure(EXPERIMENTS, s, z)]
 TABLE_NAMES = ["table1_meshes", *DESIGN.tables]
 DRAWN_TABLES = ("table3_inconsistencies", "table4_size", "table7_images_shown")
 RECONSTRUCTED = tuple(METHODS)
@@ -260,11 +261,10 @@ def measurements(outputs):
 def passing_files():
     """Outputs that go once they are used: parts of packed frames, features, views."""
     scenes = sorted({*SCENES, *(CONFIG.rooms if backbones() else ())})
-    mapped = [f"{s}/{z}" for s, z in SIZES if has_structure(EXPERIMENTS, s, z)]
     kinds = ("features", "views")
     return [
         *(f for s in scenes for p in SPLITS for f in packed_shards(s, p, "npy")),
-        *under("references/{set}/{k}-{p}.npz", set=mapped, k=kinds, p=SPLITS),
+        *under("references/{set}/{k}-{p}.npz", set=MAPPED_SETS, k=kinds, p=SPLITS),
         *(f"{ROOT}/robustness/shards/{e}/{split}.npy" for e, split in varied_sets()),
     ]
 
@@ -327,11 +327,10 @@ def reference_sets(file):
 
 def files_of_references():
     """An output of every job that reference methods are answered by."""
-    mapped = [f"{s}/{z}" for s, z in SIZES if has_structure(EXPERIMENTS, s, z)]
     kinds = ("correspondences", "tracks")
     return [
         *under("references/{scene}/descriptors.npz", scene=SCENES),
-        *under("references/{set}/{kind}.npz", set=mapped, kind=kinds),
+        *under("references/{set}/{kind}.npz", set=MAPPED_SETS, kind=kinds),
         *reference_sets("metrics.json"),
     ]
 
