@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps
 from torch import Tensor
 
-from baselines.training.checkpoint import TrainedLocalizer, read_checkpoint
-from baselines.training.description import ModelDescription
+from baselines.training.checkpoint import ModelDescription, TrainedLocalizer, read_checkpoint
 from baselines.training.device import open_device
 from baselines.training.predict import BATCH, predict, predict_ms
 from synfeal.dataset.directories import writing_to
@@ -28,11 +27,11 @@ from synfeal.dataset.progress import Progress
 from synfeal.errors import InputError, why
 from synfeal.frames import write_frame
 
+Array = NDArray[np.float64]
+
 log = logging.getLogger(__name__)
 
 HEADER = ("image", *COLUMNS[2:])
-
-Array = NDArray[np.float64]
 
 
 class Localized(NamedTuple):

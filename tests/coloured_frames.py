@@ -5,7 +5,7 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from baselines.training.data import image_statistics, read_labelled_frames
-from baselines.training.loop import Job, train_localizer
+from baselines.training.run import Job, train_localizer
 from synfeal.config.models import LocalizerConfig, NetworkConfig, TrainingConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 

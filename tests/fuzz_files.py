@@ -17,10 +17,10 @@ import torch
 import trimesh
 from PIL import Image
 
+from baselines.groundtruth.batches import BatchTrajectory, read_trajectory, write_trajectory
 from baselines.groundtruth.images import link_images, read_image
 from baselines.groundtruth.methods import check_sources
 from baselines.groundtruth.posegraph import graph as posegraph
-from baselines.groundtruth.trajectory import BatchTrajectory, read_trajectory, write_trajectory
 from baselines.localizers.backbones.weights import load_backbone_weights
 from baselines.training.checkpoint import read_checkpoint
 from baselines.training.data import read_images

@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from baselines.groundtruth.batches import batches_of
+from baselines.groundtruth.batches import BatchTrajectory, batches_of, failed_trajectory
 from baselines.groundtruth.chain import chain_batches, chain_unassisted, summary_of
-from baselines.groundtruth.trajectory import BatchTrajectory, failed_trajectory
 from synfeal.config.models import GroundTruthConfig
 from synfeal.geometry.poses import pose_matrix, relative
 from tests.property_support import table_of

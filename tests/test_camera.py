@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from baselines.groundtruth.sfm.features import colmap_parameters
+from baselines.groundtruth.sfm.batch import colmap_parameters
 from synfeal.camera.distortion import distort, fold_radius, undistort
 from synfeal.camera.rays import normalised_of_pixels, pixels_of_normalised
 from synfeal.config.models import CameraConfig

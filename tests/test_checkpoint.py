@@ -5,8 +5,7 @@ import math
 import pytest
 import torch
 
-from baselines.training.checkpoint import read_checkpoint
-from baselines.training.description import frame_camera
+from baselines.training.checkpoint import frame_camera, read_checkpoint
 from baselines.training.predict import predict
 from synfeal.config.models import MODELS, CameraConfig, NetworkConfig
 from synfeal.dataset.manifest import camera_record

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from packaging.requirements import Requirement
 
-from baselines.training.memory import training_mb
+from baselines.training.record import training_mb
 from synfeal.report.cost.networks import pretext_work, training_work
 from synfeal.report.cost.profiles import read_profile
 from tests.test_containers import pins

@@ -15,12 +15,12 @@ import torch
 import trimesh
 from matplotlib.figure import Figure
 
+from baselines.groundtruth.batches import failed_trajectory, read_trajectory, write_trajectory
 from baselines.groundtruth.posegraph.graph import PoseGraph, write_g2o
-from baselines.groundtruth.trajectory import failed_trajectory, read_trajectory, write_trajectory
 from baselines.training.checkpoint import save_atomically
 from baselines.training.device import memory_errors
-from baselines.training.progress import HistoryRow, write_history
 from baselines.training.resume import ResumeFile
+from baselines.training.selection import HistoryRow, write_history
 from synfeal.dataset.directories import atomic_directory
 from synfeal.dataset.packed import join_packed, new_packed, read_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table

@@ -9,8 +9,8 @@ import pytest
 import torch
 import yaml
 
-from baselines.groundtruth.label_set import chain_split
-from baselines.groundtruth.trajectory import BatchTrajectory, write_trajectory
+from baselines.groundtruth.batches import BatchTrajectory, write_trajectory
+from baselines.groundtruth.chain import chain_split
 from synfeal.camera.calibration_files import PlainLoader
 from synfeal.config.models import GroundTruthConfig
 from synfeal.dataset.pose_table import read_frames, write_pose_table

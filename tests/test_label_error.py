@@ -4,12 +4,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from baselines.groundtruth.batches import batches_of
-from baselines.groundtruth.chain import chain_batches, chain_unassisted
+from baselines.groundtruth.batches import (
+    BatchTrajectory,
+    batches_of,
+    failed_trajectory,
+    write_trajectory,
+)
+from baselines.groundtruth.chain import (
+    chain_batches,
+    chain_split,
+    chain_unassisted,
+    write_assistance,
+)
 from baselines.groundtruth.label_error import absolute_errors, relative_error, share_within, spread
-from baselines.groundtruth.label_set import chain_split, write_assistance
 from baselines.groundtruth.methods import METHODS, check_sources, stages_of
-from baselines.groundtruth.trajectory import BatchTrajectory, failed_trajectory, write_trajectory
 from synfeal.config.models import GroundTruthConfig
 from synfeal.dataset.pose_table import write_pose_table
 from synfeal.errors import InputError

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from baselines.groundtruth.batches import batches_of
+from baselines.groundtruth.batches import batches_of, read_trajectory, write_trajectory
 from baselines.groundtruth.chain import chain_batches, summary_of
 from baselines.groundtruth.label_error import absolute_errors
 from baselines.groundtruth.methods import (
@@ -15,7 +15,6 @@ from baselines.groundtruth.methods import (
 )
 from baselines.groundtruth.rgbd import rgbd_graph
 from baselines.groundtruth.sfm import sfm_batch
-from baselines.groundtruth.trajectory import read_trajectory, write_trajectory
 from synfeal.config.models import GroundTruthConfig
 from synfeal.labels.noise import add_noise
 from tests.planar_scene import CAMERA, straight_path, write_frames

@@ -10,7 +10,7 @@ import torch
 from PIL import Image
 
 from baselines.localize import HEADER, read_picture
-from baselines.training.description import frame_camera
+from baselines.training.checkpoint import frame_camera
 from baselines.training.predict import predict, predict_poses
 from synfeal.cli import main
 from synfeal.config.models import CameraConfig

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
+from types import ModuleType
 from typing import NamedTuple
 
 import pytest
 import torch
 
 from baselines.localizers.backbones.weights import build_backbone
-from baselines.localizers.heads import PoseRegressor
+from baselines.localizers.base import PoseRegressor
 from baselines.localizers.hourglass import UpBlock
 from baselines.localizers.losses import PosePrediction
-from baselines.localizers.names import RESNET_LOCALIZERS, backbone_of
 from baselines.localizers.poselstm import FourDirectionLstm
-from baselines.localizers.registry import LOCALIZERS, build_localizer
+from baselines.localizers.registry import (
+    LOCALIZERS,
+    RESNET_LOCALIZERS,
+    backbone_of,
+    build_localizer,
+)
 from synfeal.config.models import MODELS, LocalizerConfig, NetworkConfig
 from synfeal.errors import InputError
 
@@ -173,10 +179,11 @@ def test_an_up_block_adds_or_appends_the_encoders_maps():
 def test_the_example_of_the_page_is_a_localizer(monkeypatch):
     """It keeps the contract with either backbone, once it is added as the page says."""
     module, line = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
-    namespace = {"__name__": "direct"}
-    exec(module, namespace)
-    ((name, localizer),) = eval(f"{{{line}}}", namespace).items()
-    monkeypatch.setitem(LOCALIZERS, name, localizer)
+    ((name, place),) = eval(f"{{{line}}}").items()
+    direct = ModuleType(place.partition(":")[0])
+    exec(module, direct.__dict__)
+    monkeypatch.setitem(sys.modules, direct.__name__, direct)
+    monkeypatch.setitem(LOCALIZERS, name, place)
     for network in (NETWORK, INCEPTION_V3):
         case = Case(name, network)
         test_predictions_have_the_contracts_shapes_and_teach_every_parameter(case)

@@ -3,8 +3,7 @@
 import pytest
 import torch
 
-from baselines.training.muon import Muon, orthogonalised
-from baselines.training.optimizer import WARM_UP, Schedule, optimisation_of
+from baselines.training.optimizer import WARM_UP, Muon, Schedule, optimisation_of, orthogonalised
 
 
 @pytest.mark.parametrize("shape", [(7, 5, 30), (3, 40, 8), (1, 16, 16)])

@@ -7,9 +7,8 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from baselines.localizers.registry import build_localizer
-from baselines.training.checkpoint import TrainedLocalizer
+from baselines.training.checkpoint import ModelDescription, TrainedLocalizer
 from baselines.training.data import image_statistics
-from baselines.training.description import ModelDescription
 from baselines.training.predict import predict
 from synfeal.config.models import LocalizerConfig, NetworkConfig
 from synfeal.dataset.pose_table import PoseTable

@@ -12,8 +12,7 @@ from baselines.groundtruth.posegraph.graph import (
     swapped_blocks,
     write_g2o,
 )
-from baselines.groundtruth.posegraph.lm import optimise_lm
-from baselines.groundtruth.posegraph.optimise import optimise_open3d
+from baselines.groundtruth.posegraph.optimise import optimise_lm, optimise_open3d
 from baselines.groundtruth.posegraph.toro import optimise_toro
 from synfeal.geometry.poses import pose_error, pose_matrix, relative
 

@@ -8,14 +8,20 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from baselines.groundtruth.batches import batches_of
-from baselines.groundtruth.chain import chain_batches, chain_unassisted, fill_gaps, summary_of
-from baselines.groundtruth.label_set import chain_split, write_assistance
-from baselines.groundtruth.trajectory import (
+from baselines.groundtruth.batches import (
     BatchTrajectory,
+    batches_of,
     failed_trajectory,
     read_trajectory,
     write_trajectory,
+)
+from baselines.groundtruth.chain import (
+    chain_batches,
+    chain_split,
+    chain_unassisted,
+    fill_gaps,
+    summary_of,
+    write_assistance,
 )
 from synfeal.config.models import GroundTruthConfig
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table

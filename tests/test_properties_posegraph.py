@@ -17,8 +17,7 @@ from baselines.groundtruth.posegraph.graph import (
     swapped_blocks,
     write_g2o,
 )
-from baselines.groundtruth.posegraph.lm import optimise_lm
-from baselines.groundtruth.posegraph.optimise import optimise
+from baselines.groundtruth.posegraph.optimise import optimise, optimise_lm
 from baselines.groundtruth.posegraph.toro import optimise_toro, spanning_tree
 from synfeal.config.models import PoseGraphConfig
 from tests.property_support import directions, few, fewer, pose_of, poses_near, seeds, turn, vectors

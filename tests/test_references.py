@@ -8,17 +8,20 @@ import numpy as np
 import pytest
 import torch
 
-from baselines.references.correspondences import match_test_frames, mutual_matches
+from baselines.references.arrays import most_alike
+from baselines.references.correspondences import (
+    Tracks,
+    join_matches,
+    match_test_frames,
+    mutual_matches,
+)
 from baselines.references.descriptors import Vlad, dense_sift, residuals, thumbnails
 from baselines.references.evidence import Evidence
 from baselines.references.features import Features, find_features
 from baselines.references.registry import in_group
 from baselines.references.retrieval import METRES_PER_RADIAN, nearest_rows
 from baselines.references.run import answer_and_score
-from baselines.references.structure import on_depth
-from baselines.references.tracks import Tracks, join_matches
-from baselines.references.triangulation import triangulate
-from baselines.references.vectors import most_alike
+from baselines.references.structure import on_depth, triangulate
 from synfeal.config.models import ReferencesConfig
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.geometry.poses import (

@@ -8,8 +8,7 @@ import pytest
 from baselines.references.adjustment import adjust, adjusted, errors_px, placed_on
 from baselines.references.correspondences import Correspondences
 from baselines.references.evidence import Evidence
-from baselines.references.structure import pinhole
-from baselines.references.triangulation import triangulate, triangulated
+from baselines.references.structure import pinhole, triangulate, triangulated
 from synfeal.geometry.alignment import umeyama_sim3
 from synfeal.geometry.poses import pose_error, pose_matrix
 from synfeal.labels.noise import add_noise

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from baselines.references.external import answer_externally, read_answers, run_external
+from baselines.references.run import answer_externally, read_answers, run_external
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.errors import InputError
 from tests.property_support import random_table

@@ -2,10 +2,10 @@
 
 import pytest
 
+from baselines.groundtruth.batches import read_trajectory
 from baselines.groundtruth.posegraph.graph import read_g2o
-from baselines.groundtruth.trajectory import read_trajectory
-from baselines.references.external import read_answers
-from baselines.training.description import frame_camera
+from baselines.references.run import read_answers
+from baselines.training.checkpoint import frame_camera
 from synfeal.config import load_config, read_experiments
 from synfeal.dataset.pose_table import HEADER, read_pose_table
 from synfeal.errors import InputError

@@ -2,11 +2,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from baselines.groundtruth.features import FeatureOdometry
-from baselines.groundtruth.rgbd import dense, rgbd_graph, surface
-from baselines.groundtruth.rgbd.agreement import depth_agreement
+from baselines.groundtruth.rgbd import dense, frames, rgbd_graph
+from baselines.groundtruth.rgbd.dense import depth_agreement
 from baselines.groundtruth.rgbd.frames import read_frame
-from baselines.groundtruth.rgbd.tracks import loop_candidates
+from baselines.groundtruth.rgbd.tracks import FeatureOdometry, loop_candidates
 from synfeal.config.models import RgbdConfig
 from synfeal.geometry.poses import inverse, pose_error, pose_matrix, relative
 from synfeal.geometry.rotations import rotation_from_rpy
@@ -68,11 +67,11 @@ def test_steps_of_one_scale_end_where_open3ds_own_loop_ends(tmp_path, monkeypatc
     poses = np.array([pose_at([-1.8, 0.0, 1.4]), pose_at([-1.78, 0.01, 1.4], yaw_deg=0.3)])
     colors, depths = write_room(tmp_path, poses)
     i, j = (read_frame(*pair, ROOM_CAMERA, CFG, 0) for pair in zip(colors, depths, strict=True))
-    stage = surface.Stage(stride=1, max_steps=8, huber_m=0.05, rest_m=0.0, rest_deg=0.0)
-    monkeypatch.setattr(surface, "STAGES", (stage,))
+    stage = frames.Stage(stride=1, max_steps=8, huber_m=0.05, rest_m=0.0, rest_deg=0.0)
+    monkeypatch.setattr(frames, "STAGES", (stage,))
     monkeypatch.setattr(dense, "_PASSES", (((8,), 0.05),))
     theirs = dense.register(i.rgbd, j.rgbd, np.eye(4), ROOM_CAMERA, CFG)
-    ours = surface.align(i.surfaces, j.surfaces, np.eye(4), 2 * CFG.max_rmse_m)
+    ours = frames.align(i.surfaces, j.surfaces, np.eye(4), 2 * CFG.max_rmse_m)
     assert np.abs(ours - theirs).max() < 1e-6
     assert np.abs(ours - np.eye(4)).max() > 1e-2
 

@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 from baselines.groundtruth.kinect_fusion import kinect_fusion_batch
-from baselines.groundtruth.posegraph.lm import optimise_lm
+from baselines.groundtruth.posegraph.optimise import optimise_lm
 from baselines.groundtruth.rgbd import rgbd_graph
 from synfeal.config.models import CameraConfig, KinectFusionConfig, RgbdConfig
 from synfeal.errors import InputError

@@ -10,7 +10,7 @@ import torch
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from baselines.training.description import FrameCamera
+from baselines.training.checkpoint import FrameCamera
 from baselines.training.rotation import (
     RandomRotation,
     packed_intrinsics,

@@ -4,10 +4,15 @@ import numpy as np
 import pytest
 import torch
 
-from baselines.references.coordinate_network import CoordinateNetwork, distance_m
 from baselines.references.evidence import Evidence
-from baselines.references.scene_coordinates import by_coordinates, poses_of, world_points
-from baselines.references.views import Views, cell_pixels, read_frames
+from baselines.references.features import Views, cell_pixels, read_frames
+from baselines.references.scene_coordinates import (
+    CoordinateNetwork,
+    by_coordinates,
+    distance_m,
+    poses_of,
+    world_points,
+)
 from synfeal.camera.rays import normalised_of_pixels
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError

@@ -106,7 +106,7 @@ def test_the_mean_pose_and_the_true_poses_are_scored_against_the_labels_too(scor
 
 
 def test_scoring_needs_no_torch():
-    modules = "baselines.training.score, baselines.localizers.names"
+    modules = "baselines.training.score, baselines.localizers.registry"
     code = f"import sys, {modules}; print(sorted(sys.modules))"
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True

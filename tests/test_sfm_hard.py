@@ -192,7 +192,7 @@ import sys
 from pathlib import Path
 import numpy as np
 from baselines.groundtruth.sfm import sfm_batch
-from baselines.groundtruth.trajectory import write_trajectory
+from baselines.groundtruth.batches import write_trajectory
 from synfeal.config.models import CameraConfig, SfmConfig
 folder, cfg = Path(sys.argv[1]), SfmConfig.model_validate_json(sys.argv[2])
 camera = CameraConfig(width=160, height=120, horizontal_fov_deg=70.0)

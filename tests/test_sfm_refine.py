@@ -8,10 +8,8 @@ import pytest
 
 from baselines.groundtruth.chain import fill_gaps
 from baselines.groundtruth.images import link_images
-from baselines.groundtruth.sfm.batch import metric_trajectory
-from baselines.groundtruth.sfm.features import extract_features, match_features
-from baselines.groundtruth.sfm.mapping import camera_poses, map_matches, read_matches
-from baselines.groundtruth.sfm.refine import refine_model
+from baselines.groundtruth.sfm.batch import extract_features, match_features, metric_trajectory
+from baselines.groundtruth.sfm.mapping import camera_poses, map_matches, read_matches, refine_model
 from synfeal.geometry.poses import pose_error, relative
 from tests.test_sfm_hard import CAMERA, CFG, sideways, write
 

@@ -11,9 +11,8 @@ from baselines.localizers.losses import PosePrediction
 from baselines.localizers.registry import build_localizer
 from baselines.training import selection
 from baselines.training.data import BatchOrder, held_out_paths
-from baselines.training.fit import fit
+from baselines.training.fit import HALVE_EVERY, PROTOCOLS, fit
 from baselines.training.optimizer import Schedule, optimisation_of
-from baselines.training.protocol import HALVE_EVERY, PROTOCOLS
 from baselines.training.selection import HeldOutErrors, Selection, held_out_errors
 from synfeal.config import MODELS, Run
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table

@@ -3,9 +3,8 @@
 import torch
 
 from baselines.localizers.registry import build_localizer
-from baselines.training.checkpoint import TrainedLocalizer, save_checkpoint
+from baselines.training.checkpoint import ModelDescription, TrainedLocalizer, save_checkpoint
 from baselines.training.data import ImageStatistics
-from baselines.training.description import ModelDescription
 from tests.coloured_frames import HYPER, NETWORK
 
 

@@ -19,11 +19,10 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
+from baselines.groundtruth.batches import BatchTrajectory
 from baselines.groundtruth.projective_icp import pyramid_of, register
-from baselines.groundtruth.rgbd.agreement import matched_depths
-from baselines.groundtruth.rgbd.dense import near
+from baselines.groundtruth.rgbd.dense import matched_depths, near
 from baselines.groundtruth.rgbd.frames import RgbdFrame, open3d_depth, read_frame
-from baselines.groundtruth.trajectory import BatchTrajectory
 from synfeal.config.models import CameraConfig, KinectFusionConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.geometry.poses import inverse

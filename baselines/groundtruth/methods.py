@@ -3,7 +3,7 @@
 A method works on one batch. It says so in one of three ways:
 
 - ``estimate``: a function ``(color_paths, depth_paths, camera, settings, seed)`` that returns a
-  :class:`~baselines.groundtruth.trajectory.BatchTrajectory`; the rule ``estimate`` calls it.
+  :class:`~baselines.groundtruth.batches.BatchTrajectory`; the rule ``estimate`` calls it.
 - ``optimiser``: what is done to the pose graph of RGB-D odometry; the rule ``posegraph`` does it.
 - neither: a rule of its own, named like the method (``sfm``, which is given its scale).
 
@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 
 from baselines.costs import Facts, timed
+from baselines.groundtruth.batches import BatchTrajectory, write_trajectory
 from baselines.groundtruth.posegraph.graph import Edge, PoseGraph, read_g2o
-from baselines.groundtruth.trajectory import BatchTrajectory, write_trajectory
 from synfeal.config import Config, Experiment
 from synfeal.config.experiments import INJECTED
 from synfeal.config.models import CameraConfig, GroundTruthConfig, PoseGraphConfig

@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from baselines.groundtruth.rgbd.agreement import points_of
+from baselines.groundtruth.rgbd.dense import points_of
 from synfeal.config.models import CameraConfig
 from synfeal.geometry.poses import pose_error, pose_matrix
 

@@ -1,1 +1,1 @@
-"""The five end-to-end localizers: ``registry`` builds them by name, ``names`` needs no torch."""
+"""The five end-to-end localizers; ``registry`` names them without torch and builds them."""

@@ -19,10 +19,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from baselines.localizers.backbones.channels import scaled_channels
+from baselines.localizers.backbones import scaled_channels
 from baselines.localizers.backbones.resnet import ResNet34
-from baselines.localizers.base import Localizer, beta_loss
-from baselines.localizers.heads import PoseRegressor
+from baselines.localizers.base import Localizer, PoseRegressor, beta_loss
 from baselines.localizers.losses import PosePrediction
 from synfeal.config.models import LocalizerConfig, NetworkConfig
 

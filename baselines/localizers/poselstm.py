@@ -22,10 +22,9 @@ import math
 import torch
 from torch import Tensor, nn
 
-from baselines.localizers.backbones.channels import scaled_channels
+from baselines.localizers.backbones import scaled_channels
 from baselines.localizers.backbones.weights import build_inception
-from baselines.localizers.base import Localizer, beta_loss
-from baselines.localizers.heads import PoseRegressor
+from baselines.localizers.base import Localizer, PoseRegressor, beta_loss
 from baselines.localizers.losses import PosePrediction
 from synfeal.config.models import LocalizerConfig, NetworkConfig
 

@@ -21,8 +21,7 @@ from torch import Tensor
 
 from baselines.localizers.backbones.resnet import ResNet34
 from baselines.localizers.backbones.weights import build_inception
-from baselines.localizers.base import Localizer, learned_loss
-from baselines.localizers.heads import PooledRegressor
+from baselines.localizers.base import Localizer, PooledRegressor, learned_loss
 from baselines.localizers.losses import PosePrediction
 from synfeal.config.models import LocalizerConfig, NetworkConfig
 

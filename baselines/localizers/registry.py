@@ -1,25 +1,35 @@
-"""The localizers by the names that the configuration and the tables use."""
+"""The localizers by name, and their backbones; torch is loaded when one is built."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Literal
 
-from baselines.localizers.base import Localizer
-from baselines.localizers.hourglass import Hourglass
-from baselines.localizers.poselstm import PoseLstm
-from baselines.localizers.posenet import PoseNet
-from baselines.localizers.posenet2 import PoseNet2, PoseNet2ResNet
-from synfeal.config.models import LocalizerConfig, NetworkConfig
+from synfeal.config.learning import NetworkConfig
+from synfeal.config.models import LocalizerConfig
 
-LOCALIZERS: dict[str, Callable[[NetworkConfig, LocalizerConfig], Localizer]] = {
-    "posenet": PoseNet,
-    "poselstm": PoseLstm,
-    "hourglass": Hourglass,
-    "posenet2resnet": PoseNet2ResNet,
-    "posenet2": PoseNet2,
+if TYPE_CHECKING:
+    from baselines.localizers.base import Localizer
+
+BackboneName = Literal["googlenet", "inception_v3", "resnet34"]
+
+# The class of each, ``module:name``.
+LOCALIZERS = {
+    "posenet": "baselines.localizers.posenet:PoseNet",
+    "poselstm": "baselines.localizers.poselstm:PoseLstm",
+    "hourglass": "baselines.localizers.hourglass:Hourglass",
+    "posenet2resnet": "baselines.localizers.posenet2:PoseNet2ResNet",
+    "posenet2": "baselines.localizers.posenet2:PoseNet2",
 }
+RESNET_LOCALIZERS = frozenset({"hourglass", "posenet2resnet"})
+
+
+def backbone_of(model: str, network: NetworkConfig) -> BackboneName:
+    """The backbone of a localizer: ResNet-34, or the Inception network of the configuration."""
+    return "resnet34" if model in RESNET_LOCALIZERS else network.backbone
 
 
 def build_localizer(name: str, network: NetworkConfig, hyper: LocalizerConfig) -> Localizer:
     """A localizer of this shape, randomly initialised from torch's global generator."""
-    return LOCALIZERS[name](network, hyper)
+    localizer: Localizer = resolve_name(LOCALIZERS[name])(network, hyper)
+    return localizer

@@ -1,7 +1,7 @@
 """What a reader compares localizers with: image retrieval, an oracle, and structure-based poses.
 
-descriptors.py describes images as a whole, features.py in parts; correspondences.py and tracks.py
-match parts. None of them reads a label, so each is computed once for all label sets of a data set.
-evidence.py hands it to the methods, one short module each; registry.py lists them; run.py answers
-and scores a data set.
+descriptors.py describes images as a whole, features.py in parts; correspondences.py matches parts.
+None of them reads a label, so each is computed once for all label sets of a data set. evidence.py
+hands it to the methods (retrieval.py, structure.py, adjustment.py, scene_coordinates.py);
+registry.py lists them; run.py answers and scores a data set.
 """

@@ -6,11 +6,10 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
-from baselines.groundtruth.sfm.refine import adjustment_of
+from baselines.groundtruth.sfm.mapping import adjustment_of
+from baselines.references.correspondences import Tracks
 from baselines.references.evidence import Evidence
-from baselines.references.structure import pinhole
-from baselines.references.tracks import Tracks
-from baselines.references.triangulation import on_points, triangulate
+from baselines.references.structure import on_points, pinhole, triangulate
 from synfeal.geometry.alignment import umeyama_sim3
 from synfeal.geometry.poses import inverse, pose_matrix
 

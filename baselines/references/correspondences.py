@@ -1,17 +1,21 @@
-"""Which features of test frames look like which features of training frames."""
+"""Which features look alike: of test and training frames, and, as tracks, of training frames."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from tqdm import tqdm
 
-from baselines.references.arrays import Stored
+from baselines.references.arrays import VLAD, Stored, most_alike, read_described
 from baselines.references.features import Features
-from baselines.references.vectors import VLAD, most_alike, read_described
+
+Rows = NDArray[np.int64]
 
 # A match's distance over that of the second best (Lowe, IJCV 2004).
 RATIO = 0.8
@@ -86,3 +90,89 @@ def write_matches(
     described = read_described(descriptors, len(of_train), len(of_test))
     rows = most_alike(*described[VLAD], retrieved)
     match_test_frames(of_train, of_test, rows).write(out_matches)
+
+
+# Frames that each frame is matched with: those that look most alike, and the next of its path.
+ALIKE, NEXT = 10, 2
+# Two views must agree on an essential matrix, to this many focal lengths off epipolar lines.
+MIN_INLIERS, MAX_SLOPE = 15, 0.01
+CONFIDENCE, MAX_TRIALS = 0.999, 500
+
+
+@dataclass(frozen=True)
+class Tracks(Stored):
+    """Observations of points by the training frames."""
+
+    frame: Rows  # (M,) training frame of each observation
+    slope: NDArray[np.float64]  # (M, 2) of its ray
+    # (M,) index of the point, 0 to T - 1; every point is seen in two frames or more, and by none
+    # twice
+    track: Rows
+    of_feature: Rows  # (K,) the point that a training feature shows, or -1
+
+    @property
+    def count(self) -> int:
+        """Number of points T."""
+        return int(self.track.max(initial=-1)) + 1
+
+
+def write_tracks(descriptors: Path, train: Path, out_tracks: Path) -> None:
+    """Match training frames with each other, and write the tracks.
+
+    Raises:
+        InputError: descriptors or features cannot be read.
+    """
+    features = Features.read(train)
+    vectors, _ = read_described(descriptors, len(features), 0)[VLAD]
+    alike = most_alike(vectors, vectors, ALIKE + 1)
+    find_tracks(features, frame_pairs(alike)).write(out_tracks)
+
+
+def frame_pairs(alike: Rows) -> Rows:
+    """Pairs (P, 2) of frames, i < j, each once: neighbours in looks (N, k), and in time."""
+    count = len(alike)
+    frame = np.arange(count)
+    looks = np.column_stack([np.repeat(frame, alike.shape[1]), alike.ravel()])
+    time = [np.column_stack([frame[:-n], frame[n:]]) for n in range(1, NEXT + 1)]
+    pairs = np.sort(np.concatenate([looks, *time]), axis=1)
+    return np.unique(pairs[pairs[:, 0] < pairs[:, 1]], axis=0)
+
+
+def find_tracks(features: Features, pairs: Rows) -> Tracks:
+    """Tracks of the matches of pairs (P, 2) of frames that a rigid motion explains."""
+    cv2.setNumThreads(1)
+    edges = []
+    for i, j in tqdm(pairs, "matching", unit="pair", mininterval=5):
+        own, other = mutual_matches(features.roots(i), features.roots(j))
+        good = rigid(features.slope[features.of(i)][own], features.slope[features.of(j)][other])
+        edges.append(np.column_stack([features.start[i] + own, features.start[j] + other])[good])
+    return join_matches(features, np.concatenate(edges))
+
+
+def rigid(slope_i: NDArray[np.float64], slope_j: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which matches (m, 2), (m, 2) of two views agree on an essential matrix; none where few do."""
+    nothing = np.zeros(len(slope_i), dtype=bool)
+    if len(slope_i) < MIN_INLIERS:
+        return nothing
+    _, mask = cv2.findEssentialMat(
+        slope_i, slope_j, np.eye(3), cv2.RANSAC, CONFIDENCE, MAX_SLOPE, MAX_TRIALS
+    )
+    good = nothing if mask is None else mask.ravel().astype(bool)
+    return good if good.sum() >= MIN_INLIERS else nothing
+
+
+def join_matches(features: Features, matches: Rows) -> Tracks:
+    """Tracks of matches (E, 2) between features; one that a frame sees twice is dropped."""
+    total = len(features.slope)
+    graph = coo_matrix((np.ones(len(matches), bool), matches.T), shape=(total, total))
+    _, component = connected_components(graph, directed=False)
+    component = component.astype(np.int64)  # times a number of frames it leaves 32 bits
+    frame = features.frame
+    size = np.bincount(component, minlength=1)
+    seen = np.unique(component * len(features) + frame)  # (component, frame), each once
+    frames = np.bincount(seen // len(features), minlength=len(size))
+    good = (size >= 2) & (frames == size)
+    index = np.where(good, np.cumsum(good) - 1, -1)
+    of_feature = index[component]
+    kept = of_feature >= 0
+    return Tracks(frame[kept], features.slope[kept], of_feature[kept], of_feature)

@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 from torch import Tensor
 
-from baselines.references.arrays import write_arrays
-from baselines.references.vectors import THUMBNAIL, VLAD, Vectors
+from baselines.references.arrays import THUMBNAIL, VLAD, Vectors, write_arrays
 from synfeal.dataset.packed import read_packed
 
 Frames = NDArray[np.uint8]

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from baselines.references.correspondences import Correspondences
-from baselines.references.tracks import Tracks
-from baselines.references.vectors import Described, read_described
-from baselines.references.views import Views
+from baselines.references.arrays import Described, read_described
+from baselines.references.correspondences import Correspondences, Tracks
+from baselines.references.features import Views
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 

@@ -46,7 +46,7 @@ REFERENCES: dict[str, Reference] = {
         "Structure, points from depth", "structure", f"{_PACKAGE}.structure:on_depth"
     ),
     "structure-rays": Reference(
-        "Structure, points triangulated", "structure", f"{_PACKAGE}.triangulation:triangulated"
+        "Structure, points triangulated", "structure", f"{_PACKAGE}.structure:triangulated"
     ),
     "structure-adjusted": Reference(
         "Structure, bundle-adjusted", "adjusted", f"{_PACKAGE}.adjustment:adjusted"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines.references.arrays import THUMBNAIL, VLAD, most_alike
 from baselines.references.evidence import Evidence
-from baselines.references.vectors import THUMBNAIL, VLAD, most_alike
 from synfeal.dataset.pose_table import PoseTable
 
 CHUNK = 500

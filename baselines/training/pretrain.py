@@ -22,10 +22,9 @@ from baselines.localizers.backbones.weights import (
     imagenet_weights_path,
     load_backbone_weights,
 )
-from baselines.localizers.base import Localizer
-from baselines.localizers.heads import OutputLayer, PooledFeature
+from baselines.localizers.base import Localizer, OutputLayer, PooledFeature
 from baselines.localizers.losses import LearnedWeightLoss, PosePrediction
-from baselines.localizers.names import BackboneName
+from baselines.localizers.registry import BackboneName
 from baselines.training.checkpoint import save_atomically
 from baselines.training.data import LabelledFrames, image_statistics, read_labelled_frames
 from baselines.training.device import memory_errors, open_device, precision_on

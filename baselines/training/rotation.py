@@ -16,7 +16,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from baselines.training.description import FrameCamera, frame_camera
+from baselines.training.checkpoint import FrameCamera, frame_camera
 from synfeal.camera.intrinsics import Intrinsics
 from synfeal.config.models import AugmentationConfig, NetworkConfig
 from synfeal.dataset.packed import crop_of

@@ -1,14 +1,175 @@
-"""A training run as one job: train, record what from, predict."""
+"""A training run: one localizer learns one labelled set, what from is recorded, poses predicted."""
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from baselines.training.loop import Job, train_localizer
+import torch
+
+from baselines.localizers.backbones.weights import load_backbone_weights
+from baselines.localizers.base import Localizer
+from baselines.localizers.registry import build_localizer
+from baselines.training.checkpoint import ModelDescription, frame_camera, save_checkpoint
+from baselines.training.data import (
+    ImageStatistics,
+    LabelledFrames,
+    held_out_paths,
+    image_statistics,
+    read_labelled_frames,
+)
+from baselines.training.device import memory_errors, open_device, precision_on
+from baselines.training.fit import HALVE_EVERY, PROTOCOLS, Augmentation, Protocol, fit
+from baselines.training.optimizer import Schedule
 from baselines.training.predict import predict_poses
 from baselines.training.record import write_training_record
+from baselines.training.resume import ResumeFile, digest
+from baselines.training.rotation import random_rotation
+from baselines.training.selection import HistoryRow, write_history
 from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig, TrainingConfig
+
+log = logging.getLogger(__name__)
+
+# Images that tell the frames of this run from others, beside the statistics of all of them.
+FINGERPRINT_IMAGES = 64
+
+FramesAndLabels = tuple[Path, Path] | None
+
+
+class Job(NamedTuple):
+    """What is trained, and how."""
+
+    name: ModelName
+    network: NetworkConfig
+    hyper: LocalizerConfig  # of this localizer
+    training: TrainingConfig
+    samples_seen: int  # images shown in all
+    seed: int  # of first weights, paths held out, order of frames, rotations and dropout
+    exchanged: Protocol | None = None  # in place of the protocol that ``training`` names
+
+    @property
+    def protocol(self) -> Protocol:
+        """Its parts."""
+        return self.exchanged or PROTOCOLS[self.training.protocol]
+
+    @property
+    def schedule(self) -> Schedule:
+        """How long and how fast."""
+        rates = self.hyper.learning_rate, self.hyper.weight_decay, HALVE_EVERY[self.name]
+        return Schedule(self.samples_seen, self.training.batch_size, *rates)
+
+
+class Material(NamedTuple):
+    """What a training run begins with: a network, and frames that it learns from."""
+
+    localizer: Localizer  # with its first weights, on the device of the frames
+    statistics: ImageStatistics  # of all images
+    learned: LabelledFrames  # frames to learn from
+    held_out: LabelledFrames | None  # frames that decide which weights are kept, if any
+
+    def fingerprints(self) -> list[object]:
+        """All that a run depends on beside its settings; of its images, samples."""
+        learned = self.learned
+        values: list[object] = [torch.__version__, self.localizer.state_dict()]
+        values += [self.statistics.mean, self.statistics.deviation, learned.images.device.type]
+        for part in (learned, self.held_out):
+            if part is not None:
+                some = torch.arange(0, len(part), max(1, len(part) // FINGERPRINT_IMAGES))
+                values += [*part.batch(some.to(part.rows.device)), part.position_m, part.quat_wxyz]
+        return values
+
+
+@memory_errors()
+def train_localizer(
+    job: Job,
+    frames: Path,  # packed frames (N, px, px, 3); the first ones are those of ``labels``
+    labels: Path,  # pose table of the training set
+    out_model: Path,
+    out_history: Path,
+    *,
+    weights: Path | None = None,  # state dict the backbone starts from; without, from scratch
+    test: FramesAndLabels = None,  # read only where weights are chosen by the test set
+    augment: Augmentation | None = None,  # in place of the rotations that ``training`` asks for
+) -> None:
+    """Train a localizer and write its checkpoint and its history (columns of ``HistoryRow``).
+
+    Beside the checkpoint lies ``resume.pt`` until the run is finished.
+
+    Raises:
+        InputError: one of the files cannot be used.
+        MemoryError: there is too little memory; no checkpoint is written.
+    """
+    material = _material(job, frames, labels, weights, test)
+    if augment is None and job.protocol.images == "rotated":
+        augment = random_rotation(frames, job.network, job.training.augmentation, job.seed)
+    identity = digest(*job, augment and augment.state_dict(), *material.fingerprints())
+    resume = ResumeFile(out_model.with_name("resume.pt"), identity)
+    rows = _fit(job, material, augment, resume)
+    known = {"localizer": job.name, "network": job.network, "hyper": job.hyper}
+    description = ModelDescription(**known, camera=frame_camera(frames))
+    save_checkpoint(out_model, material.localizer, material.statistics, description)
+    write_history(out_history, rows)
+    resume.remove()
+
+
+def _material(
+    job: Job, frames: Path, labels: Path, weights: Path | None, test: FramesAndLabels
+) -> Material:
+    """What the run begins with, on its device."""
+    device = open_device(job.training.device)
+    data = read_labelled_frames(frames, labels, job.network.input_px, device)
+    learned, held_out = _split(job, data, test)
+    localizer = _initial(job, weights, learned)
+    log.info("%s: %d frames, %d samples, on %s", job.name, len(learned), job.samples_seen, device)
+    return Material(localizer, image_statistics(data.images), learned, held_out)
+
+
+def _fit(
+    job: Job, material: Material, augment: Augmentation | None, resume: ResumeFile
+) -> list[HistoryRow]:
+    """Train the network in place; the history."""
+    localizer, statistics, learned, held_out = material
+    if held_out is None:
+        log.info("no frames are held out: the last weights are kept")
+    else:
+        log.info("weights are chosen on %d frames (%s)", len(held_out), job.protocol.selection)
+    return fit(
+        *(localizer, learned, statistics, job.schedule, job.seed),
+        protocol=job.protocol,
+        held_out=held_out,
+        patience=job.training.patience,
+        precision=precision_on(learned.images.device, job.training.precision),
+        augment=augment,
+        resume=resume,
+    )
+
+
+def _initial(job: Job, weights: Path | None, learned: LabelledFrames) -> Localizer:
+    """The localizer that training starts from, on the device of the frames it learns from.
+
+    Seeds the generator that dropout draws from too.
+    """
+    torch.manual_seed(job.seed)
+    localizer = build_localizer(job.name, job.network, job.hyper)
+    if weights is not None:
+        load_backbone_weights(localizer.backbone, weights)
+    localizer.place_on(learned.images.device)
+    localizer.set_pose_prior(learned.position_m.mean(0))
+    return localizer
+
+
+def _split(
+    job: Job, data: LabelledFrames, test: FramesAndLabels
+) -> tuple[LabelledFrames, LabelledFrames | None]:
+    """The frames to learn from, and those that choose the weights."""
+    if job.protocol.selection == "test":
+        if test is None:
+            raise ValueError("this protocol chooses weights by the test set, which is not given")
+        return data, read_labelled_frames(*test, data.images.shape[-1], data.images.device)
+    share = job.training.validation_share if job.protocol.selection == "validation" else 0.0
+    mask = held_out_paths(data.path, share, job.seed)
+    return (data.part(~mask), data.part(mask)) if mask.any() else (data, None)
 
 
 def train_and_predict(

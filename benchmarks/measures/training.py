@@ -11,12 +11,12 @@ import numpy as np
 import torch
 from pydantic import Field, TypeAdapter, model_validator
 
-from baselines.localizers.names import backbone_of
+from baselines.localizers.registry import backbone_of
 from baselines.training.checkpoint import read_checkpoint
 from baselines.training.data import read_images
-from baselines.training.loop import Job, train_localizer
+from baselines.training.fit import PROTOCOLS, Protocol
 from baselines.training.predict import BATCH, predict_ms, predict_poses
-from baselines.training.protocol import PROTOCOLS, Protocol
+from baselines.training.run import Job, train_localizer
 from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig, Strict, TrainingConfig
 from synfeal.dataset.packed import read_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table

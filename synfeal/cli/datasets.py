@@ -13,7 +13,7 @@ from synfeal.errors import InputError
 
 if TYPE_CHECKING:
     from baselines.localize import Localized
-    from baselines.training.description import FrameCamera, ModelDescription
+    from baselines.training.checkpoint import FrameCamera, ModelDescription
     from synfeal.dataset.packed import View
     from synfeal.evaluation.run import Evaluation
 

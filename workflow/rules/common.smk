@@ -5,7 +5,7 @@ from typing import get_args
 
 from snakemake.logging import logger
 
-from baselines.localizers.names import backbone_of
+from baselines.localizers.registry import backbone_of
 from baselines.groundtruth.batches import batches_of
 from baselines.groundtruth.methods import (
     METHODS,
@@ -21,7 +21,7 @@ from baselines.references.registry import (
     has_structure,
     in_group,
 )
-from baselines.training.memory import training_mb
+from baselines.training.record import training_mb
 from baselines.training.record import training_parameters
 from synfeal.config import Run, check_mesh_files, parse_config, read_design
 from synfeal.config.load import read_yaml

@@ -137,7 +137,7 @@ use rule call as chain with:
     benchmark:
         f"{ROOT}/benchmarks/chain/{{scene}}/{{size}}/{{reconstructed}}.tsv"
     params:
-        function="baselines.groundtruth.label_set:write_label_set",
+        function="baselines.groundtruth.chain:write_label_set",
         groundtruth=dump(
             CONFIG.groundtruth,
             include={"batch_frames", "assist_position_m", "assist_orientation_deg"},

@@ -78,7 +78,7 @@ use rule call as tracks with:
     resources:
         mem_mb=grown(3000),
     params:
-        function="baselines.references.tracks:write_tracks",
+        function="baselines.references.correspondences:write_tracks",
 
 
 use rule call as image_references with:
@@ -149,7 +149,7 @@ use rule call as views with:
     resources:
         mem_mb=grown(2000),
     params:
-        function="baselines.references.views:write_views",
+        function="baselines.references.features:write_views",
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
         camera=dump(CONFIG.groundtruth_camera),
         side=(CONFIG.network_camera.width, CONFIG.network_camera.height),
@@ -196,7 +196,7 @@ use rule call as external_reference with:
     resources:
         mem_mb=grown(4000),
     params:
-        function="baselines.references.external:answer_externally",
+        function="baselines.references.run:answer_externally",
         method=lambda w: dump(EXTERNAL[w.external], exclude={"title", "labels"}),
         named=placeholders,
 

@@ -141,7 +141,7 @@ use rule call as varied_structure with:
     resources:
         mem_mb=grown(3000),
     params:
-        function="baselines.references.varied:write_varied",
+        function="baselines.references.robustness:write_varied",
         n_test=robust_frames("test"),
         sample=ROBUSTNESS.structure_frames,
         camera=dump(CONFIG.groundtruth_camera),

@@ -1,4 +1,4 @@
-"""Registration of two frames by Open3D's dense odometry, and when to believe it."""
+"""Dense registration of two frames, and checks of a motion that do not trust what found it."""
 
 from __future__ import annotations
 
@@ -8,13 +8,103 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from baselines.groundtruth.rgbd.agreement import constraint, depth_agreement
-from baselines.groundtruth.rgbd.frames import RgbdFrame
-from baselines.groundtruth.rgbd.surface import align
+from baselines.groundtruth.rgbd.frames import RgbdFrame, align
 from synfeal.config.models import CameraConfig, RgbdConfig
 from synfeal.geometry.poses import pose_error
 
 Array = NDArray[np.float64]
+Depth = NDArray[np.float32]
+
+# Every how many pixels, in both directions, depth images are compared.
+_STRIDE = 4
+# Side of the blocks whose medians give normals, so that noise and rounding hardly tilt them, and
+# the largest relative step of depth between blocks of one surface.
+_BLOCK, _MAX_STEP = 8, 0.1
+
+
+def depth_agreement(
+    depth_i_m: Depth, depth_j_m: Depth, i_from_j: Array, camera: CameraConfig, max_rmse_m: float
+) -> tuple[float, float]:
+    """Overlap and residual of two depth images (H, W) under a motion (4, 4).
+
+    A point of image j agrees when its depth differs by at most twice ``max_rmse_m`` from the one
+    measured there in image i.
+
+    Returns:
+        The share of the points of j that agree, and the RMS of their depth differences in metres.
+    """
+    measured_m, moved_m, n_points = matched_depths(depth_i_m, depth_j_m, i_from_j, camera)
+    difference = np.abs(measured_m - moved_m)
+    agreeing = difference[difference <= 2 * max_rmse_m]
+    if not len(agreeing):
+        return 0.0, np.inf
+    return len(agreeing) / n_points, float(np.sqrt(np.mean(agreeing**2)))
+
+
+def matched_depths(
+    depth_i_m: Depth, depth_j_m: Depth, i_from_j: Array, camera: CameraConfig
+) -> tuple[Array, Array, int]:
+    """Points of image j (H, W) projected into image i (H, W) by a motion (4, 4).
+
+    Returns:
+        For the points inside image i the depth (n,) measured there, inf where there is none, and
+        their own (n,); and the number of all points of j.
+    """
+    fx, fy, cx, cy = camera.intrinsics
+    focal, centre = np.array([fx, fy]), np.array([cx, cy])
+    point = points_of(depth_j_m[::_STRIDE, ::_STRIDE], camera, _STRIDE).reshape(-1, 3)
+    point = point[np.isfinite(point[:, 2])]
+    n_points = len(point)
+    point = point @ i_from_j[:3, :3].T + i_from_j[:3, 3]
+    point = point[point[:, 2] > 0]
+    projected = np.floor(focal * point[:, :2] / point[:, 2:] + centre)
+    inside = ((projected >= 0) & (projected < [camera.width, camera.height])).all(axis=1)
+    column, row = projected[inside].astype(int).T
+    return depth_i_m[row, column], point[inside, 2], n_points
+
+
+def points_of(depth_m: Depth, camera: CameraConfig, stride: int, first: float = 0.5) -> Array:
+    """Points (h, w, 3) in camera coordinates, not finite where there is no depth.
+
+    Args:
+        depth_m: (h, w), every ``stride``-th row and column of an image.
+        camera: camera of the full image.
+        stride: in pixels.
+        first: position in the full image of the first row and column given.
+    """
+    fx, fy, cx, cy = camera.intrinsics
+    row, column = np.indices(depth_m.shape) * stride + first
+    z = depth_m.astype(np.float64)
+    with np.errstate(invalid="ignore"):  # 0 * inf on the optical axis of an empty pixel
+        return np.stack([(column - cx) / fx * z, (row - cy) / fy * z, z], axis=-1)
+
+
+def constraint(depth_m: Depth, camera: CameraConfig) -> float:
+    """How well the surfaces in view constrain a motion: 0 where one motion leaves them in place.
+
+    Distances to the tangent planes change under a small motion by ``normal . (v + w x point)``. The
+    result is the smallest eigenvalue of the mean of the outer products of those rows, points
+    measured in their RMS length. Their trace is 2 at the most, so the result is 1/3 at the most; it
+    is 0 in front of a plane, a cylinder or a sphere (Gelfand et al., 3DIM 2003).
+    """
+    height, width = (side // _BLOCK for side in depth_m.shape)
+    blocks = depth_m[: height * _BLOCK, : width * _BLOCK].reshape(height, _BLOCK, width, _BLOCK)
+    median_m = np.median(blocks.transpose(0, 2, 1, 3).reshape(height, width, -1), axis=-1)
+    point = points_of(median_m.astype(np.float32), camera, _BLOCK, _BLOCK / 2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        down, right = point[2:, 1:-1] - point[:-2, 1:-1], point[1:-1, 2:] - point[1:-1, :-2]
+        step = np.maximum(np.abs(down[..., 2]), np.abs(right[..., 2])) / point[1:-1, 1:-1, 2]
+        normal = np.cross(right, down)
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    smooth = np.isfinite(normal).all(axis=-1) & (step <= _MAX_STEP)
+    smooth &= np.isfinite(point[1:-1, 1:-1, 2])
+    if smooth.sum() < 6:
+        return 0.0
+    normal, point = normal[smooth], point[1:-1, 1:-1][smooth]
+    moment = np.cross(point / np.sqrt(np.mean(np.sum(point**2, axis=-1))), normal)
+    rows = np.hstack([normal, moment])
+    return max(0.0, float(np.linalg.eigvalsh(rows.T @ rows / len(rows))[0]))
+
 
 _METHODS = {
     "point-to-plane": o3d.t.pipelines.odometry.Method.PointToPlane,

@@ -11,11 +11,11 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from baselines.costs import Facts, timed
-from baselines.groundtruth.features import FeatureOdometry
 from baselines.groundtruth.posegraph.graph import Edge, PoseGraph, write_g2o
 from baselines.groundtruth.rgbd.dense import DenseOdometry
 from baselines.groundtruth.rgbd.frames import read_frame
 from baselines.groundtruth.rgbd.tracks import (
+    FeatureOdometry,
     View,
     closure,
     loop_candidates,

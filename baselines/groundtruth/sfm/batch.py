@@ -10,7 +10,7 @@ A wrong scale over the first frames and a first camera that few others share poi
 the distance, so the placed error of a long path is larger than that after a similarity fit
 (``results/benchmarks/sfm_settings.csv``). The rule is kept because it is the assistance that the
 published labels had; what bent models, and their first cameras with them, is removed before
-(``refine.py``).
+(``mapping.py``).
 """
 
 from __future__ import annotations
@@ -26,11 +26,9 @@ import pycolmap
 from numpy.typing import NDArray
 
 from baselines.costs import Facts, timed
+from baselines.groundtruth.batches import BatchTrajectory, failed_trajectory, write_trajectory
 from baselines.groundtruth.images import link_images
-from baselines.groundtruth.sfm.features import extract_features, match_features
-from baselines.groundtruth.sfm.mapping import camera_poses, map_matches, read_matches
-from baselines.groundtruth.sfm.refine import refine_model
-from baselines.groundtruth.trajectory import BatchTrajectory, failed_trajectory, write_trajectory
+from baselines.groundtruth.sfm.mapping import camera_poses, map_matches, read_matches, refine_model
 from synfeal.config.models import CameraConfig, SfmConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.pose_table import read_frames
@@ -39,8 +37,50 @@ from synfeal.files import write_json
 from synfeal.geometry.poses import relative
 
 log = logging.getLogger(__name__)
-
 Array = NDArray[np.float64]
+
+
+def extract_features(images: Path, database: Path, camera: CameraConfig, cfg: SfmConfig) -> None:
+    """SIFT features of all images in a directory; they share one camera of known intrinsics."""
+    extraction = pycolmap.FeatureExtractionOptions(num_threads=1, use_gpu=False)
+    extraction.sift.max_num_features = cfg.max_features
+    extraction.sift.peak_threshold = cfg.peak_threshold
+    pycolmap.extract_features(
+        database,
+        images,
+        camera_mode=pycolmap.CameraMode.SINGLE,
+        reader_options=_reader_options(camera),
+        extraction_options=extraction,
+        device=pycolmap.Device.cpu,
+    )
+
+
+def match_features(database: Path, cfg: SfmConfig, seed: int) -> None:
+    """Verified matches between frames near in time; ``seed`` is that of RANSAC."""
+    matching = pycolmap.FeatureMatchingOptions(
+        num_threads=1, use_gpu=False, guided_matching=cfg.guided_matching
+    )
+    pairing = pycolmap.SequentialPairingOptions(
+        overlap=cfg.overlap, quadratic_overlap=cfg.quadratic_overlap, num_threads=1
+    )
+    verification = pycolmap.TwoViewGeometryOptions(min_num_inliers=cfg.min_num_inliers)
+    verification.ransac.random_seed = seed
+    pycolmap.match_sequential(database, matching, pairing, verification, device=pycolmap.Device.cpu)
+
+
+def colmap_parameters(camera: CameraConfig) -> list[float]:
+    """Parameters of COLMAP's PINHOLE or, where there is distortion, FULL_OPENCV."""
+    pinhole = list(camera.intrinsics)
+    return [*pinhole, *camera.distortion, 0.0, 0.0, 0.0] if any(camera.distortion) else pinhole
+
+
+def _reader_options(camera: CameraConfig) -> pycolmap.ImageReaderOptions:
+    """The camera model and its parameters."""
+    reader = pycolmap.ImageReaderOptions()
+    reader.camera_model = "FULL_OPENCV" if any(camera.distortion) else "PINHOLE"
+    reader.camera_params = ",".join(map(repr, colmap_parameters(camera)))
+    return reader
+
 
 # The published code's rule for the scale: the first 44 frames, none nearer than 5 cm to the first.
 _SCALE_FRAMES = 44

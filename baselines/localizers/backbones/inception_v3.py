@@ -15,8 +15,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from baselines.localizers.backbones.channels import scaled_channels
-from baselines.localizers.backbones.inception import ConvBn, InceptionBackbone, InceptionMaps
+from baselines.localizers.backbones import scaled_channels
+from baselines.localizers.backbones.googlenet import ConvBn, InceptionBackbone, InceptionMaps
 
 
 class Conv(NamedTuple):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from baselines.localizers.backbones.channels import scaled_channels
+from baselines.localizers.backbones import scaled_channels
 
 
 class BasicBlock(nn.Module):

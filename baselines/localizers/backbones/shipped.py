@@ -15,7 +15,7 @@ from pathlib import Path
 import safetensors.torch
 import torch
 
-from baselines.localizers.names import BackboneName
+from baselines.localizers.registry import BackboneName
 from synfeal.errors import InputError, exit_status, why
 from synfeal.files import atomic_path, read_json, write_json
 

@@ -10,11 +10,10 @@ import safetensors.torch
 import torch
 from torch import Tensor, nn
 
-from baselines.localizers.backbones.googlenet import GoogLeNet
-from baselines.localizers.backbones.inception import InceptionBackbone
+from baselines.localizers.backbones.googlenet import GoogLeNet, InceptionBackbone
 from baselines.localizers.backbones.inception_v3 import InceptionV3
 from baselines.localizers.backbones.resnet import ResNet34
-from baselines.localizers.names import BackboneName
+from baselines.localizers.registry import BackboneName
 from synfeal.config.learning import InceptionName
 from synfeal.errors import InputError, why
 from synfeal.files import atomic_path

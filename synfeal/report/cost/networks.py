@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from baselines.localizers.names import BackboneName
+from baselines.localizers.registry import BackboneName
 from synfeal.config.models import LocalizerConfig, NetworkConfig
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import norm
 
-from baselines.groundtruth.posegraph import lm, optimise, toro
+from baselines.groundtruth.posegraph import optimise, toro
 from baselines.groundtruth.posegraph.graph import Edge, PoseGraph
 from synfeal import bootstrap
 from synfeal.config.models import PoseGraphConfig
@@ -25,7 +25,7 @@ from synfeal.report.hard_cases.exact import exact, mpf
 Array = NDArray[np.float64]
 N_NODES, N_TURNS = 60, 3
 OPTIMISERS = {  # positions (n, 3), given more than enough iterations
-    "lm": lambda graph: lm.optimise_lm(graph, 100)[:, :3, 3],
+    "lm": lambda graph: optimise.optimise_lm(graph, 100)[:, :3, 3],
     "toro": lambda graph: toro.optimise_toro(graph, 600, 1e-12)[:, :3, 3],
 }
 
@@ -63,7 +63,7 @@ def turned(name: str) -> Trial:
 
 def gauss_newton(graph: PoseGraph) -> Array:
     """Positions (n, 3) by Gauss-Newton: every step taken as it comes."""
-    optimizer = gtsam.GaussNewtonOptimizer(*lm.factors_of(graph), gtsam.GaussNewtonParams())
+    optimizer = gtsam.GaussNewtonOptimizer(*optimise.factors_of(graph), gtsam.GaussNewtonParams())
     result = optimizer.optimize()
     return np.array([result.atPose3(node).translation() for node in range(len(graph))])
 
