@@ -5,7 +5,7 @@ import pytest
 
 from baselines.references.descriptors import write_descriptors
 from baselines.references.robustness import SCHEMA, robustness_table
-from synfeal.config.robustness import CLEAN, MIXED
+from synfeal.config.effects import CLEAN, MIXED
 from synfeal.dataset.packed import new_packed
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.frames import read_frame

@@ -25,8 +25,8 @@ from baselines.training.data import read_images
 from baselines.training.device import memory_errors, open_device
 from baselines.training.predict import predict
 from baselines.training.score import read_predictions
+from synfeal.config.effects import CLEAN
 from synfeal.config.models import CameraConfig, ReferencesConfig, RenderConfig
-from synfeal.config.robustness import CLEAN
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.render_sequence import drawn, effects_of
 from synfeal.effects.relight import open_scene

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from baselines.training.record import check_same_labels
-from synfeal.config.camera import CameraConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.number_table import read_numbers
 from synfeal.dataset.pose_table import (
     HEADER,

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from pydantic import Field
 
+from synfeal.config.effects import CLEAN
 from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig, Strict
-from synfeal.config.robustness import CLEAN
 from synfeal.dataset.pose_table import read_frames
 from synfeal.scenes.effects_speed import seconds_of_effects
 

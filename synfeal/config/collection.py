@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, get_origin
 
@@ -56,6 +57,11 @@ class Strict(BaseModel):
             if isinstance(part, str | Path) and "\0" in str(part):
                 raise PydanticCustomError("no_text", "Input should not hold the character NUL")
         return value
+
+
+def part(model: Callable[[], Any], description: str) -> Any:
+    """A field that holds another model, all of whose keys have defaults."""
+    return Field(default_factory=model, description=description)
 
 
 def _ordered(name: str, interval: Interval) -> None:
@@ -146,14 +152,12 @@ class SceneConfig(Strict):
     further_boxes: tuple[Box, ...] = Field(
         (), description="other rooms or floors, each with paths of its own; frames by volume"
     )
-    angles: Angles = Field(default_factory=Angles, description="bounds of the camera's angles")
+    angles: Angles = part(Angles, "bounds of the camera's angles")
     min_view_distance_m: NonNegative = Field(
         1.2, description="least free distance ahead of a target pose (the paper's d)"
     )
     clutter: ClutterConfig | None = Field(None, description="objects that stand about")
-    sizes: dict[SizeName, SizeConfig] = Field(
-        default_factory=dict, description="data sets by the paper's names"
-    )
+    sizes: dict[SizeName, SizeConfig] = part(dict, "data sets by the paper's names")
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -8,9 +8,10 @@ from typing import Literal, cast
 
 from pydantic import Field, ValidationError, model_validator
 
+from synfeal.config.collection import NonNegative, Strict
+from synfeal.config.learning import KEYS, Repetitions, TableName
 from synfeal.config.load import describe
-from synfeal.config.models import MODELS, Config, NonNegative, Strict
-from synfeal.config.tables import KEYS, Repetitions, TableName
+from synfeal.config.models import MODELS, Config
 from synfeal.errors import InputError
 from synfeal.frames import read_records
 from synfeal.seeds import seed_of

@@ -2,13 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal, Self
+from typing import Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
-from synfeal.config.collection import Count, Finite, Fraction, NonNegative, Positive, Slug, Strict
-from synfeal.config.tables import Repetitions, once
+from synfeal.config.collection import (
+    Count,
+    Finite,
+    Fraction,
+    NonNegative,
+    Positive,
+    Slug,
+    Strict,
+    part,
+)
+
+TableName = Literal[
+    "table2_ground_truth",
+    "table3_inconsistencies",
+    "table4_size",
+    "table5_from_scratch",
+    "table6_label_errors",
+    "table7_images_shown",
+]
+# A table shows each combination of these columns once.
+KEYS: Mapping[str, tuple[str, ...]] = {
+    "table2_ground_truth": ("scene", "labels"),
+    "table3_inconsistencies": ("block", "noise_m", "noise_deg"),
+    "table4_size": ("scene", "size"),
+    "table5_from_scratch": ("scene", "size"),
+    "table6_label_errors": ("labels", "noise_m", "noise_deg"),
+    "table7_images_shown": ("scene", "size", "init"),
+}
+assert set(KEYS) == set(get_args(TableName))
+
+# Seeds per run of a table; `default` where a table is not named.
+Repetitions = dict[Literal["default", TableName], Count]
+
+
+def once() -> Repetitions:
+    """One seed per run."""
+    return {"default": 1}
+
 
 InceptionName = Literal["googlenet", "inception_v3"]
 # Of the backbones that come with the package.
@@ -91,17 +128,16 @@ class TrainingConfig(Strict):
     patience: Count | None = Field(
         None, description="`published`: stop after so many evaluations (of 20) without a new best"
     )
-    augmentation: AugmentationConfig = Field(
-        default_factory=AugmentationConfig, description="`corrected`: rotation augmentation"
+    augmentation: AugmentationConfig = part(
+        AugmentationConfig, "`corrected`: rotation augmentation"
     )
     precision: Literal["auto", "float32", "bfloat16"] = Field(
         "auto", description="`auto`: bfloat16 where the device multiplies in it"
     )
     batch_size: Count = Field(32, description="images per step")
     samples_seen: dict[str, Count] = Field(description="images shown in all, by size")
-    repetitions: Repetitions = Field(
-        default_factory=once,
-        description="seeds per run, by table; a run that several tables show gets the most",
+    repetitions: Repetitions = part(
+        once, "seeds per run, by table; a run that several tables show gets the most"
     )
     device: Literal["auto", "cpu", "cuda"] = Field("auto", description="where to train")
 
@@ -127,9 +163,7 @@ class PretrainingConfig(Strict):
     samples_seen: Count = Field(64_000, description="rooms: images shown in all")
     batch_size: Count = Field(64, description="rooms: images per step")
     learning_rate: Positive = Field(1e-3, description="rooms: peak learning rate")
-    augmentation: AugmentationConfig = Field(
-        default_factory=AugmentationConfig, description="rooms: rotation augmentation"
-    )
+    augmentation: AugmentationConfig = part(AugmentationConfig, "rooms: rotation augmentation")
     weights_dir: Path = Field(Path("weights"), description="imagenet: where files are kept")
 
 
@@ -144,9 +178,7 @@ class ExternalConfig(Strict):
         "", description="path of its answers, e.g. `mine/{scene}-{size}-{labels}.csv`"
     )
     command: str = Field("", description="or what writes them")
-    labels: list[str] = Field(
-        default_factory=list, description="label sets it answers for; none: all"
-    )
+    labels: list[str] = part(list, "label sets it answers for; none: all")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -168,6 +200,4 @@ class ReferencesConfig(Strict):
     coordinate_samples: Count = Field(
         2000, description="scene coordinates: images shown in training"
     )
-    external: dict[Slug, ExternalConfig] = Field(
-        default_factory=dict, description="localizers of somebody else's"
-    )
+    external: dict[Slug, ExternalConfig] = part(dict, "localizers of somebody else's")

@@ -1,4 +1,7 @@
-"""Typed configuration. A stage takes the model it needs, so a change re-runs its readers only."""
+"""Typed configuration; all models are imported from here.
+
+A stage takes the model it needs, so a change re-runs its readers only.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,6 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from synfeal.config.camera import CameraConfig
 from synfeal.config.collection import (
     Angles,
     Box,
@@ -20,8 +22,10 @@ from synfeal.config.collection import (
     SizeConfig,
     Slug,
     Strict,
+    part,
 )
-from synfeal.config.dataset import DatasetConfig
+from synfeal.config.dataset import CameraConfig, DatasetConfig, RenderConfig
+from synfeal.config.effects import EffectsConfig, RobustnessConfig
 from synfeal.config.learning import (
     SHIPPED_WIDTH,
     AugmentationConfig,
@@ -32,42 +36,21 @@ from synfeal.config.learning import (
     ReferencesConfig,
     TrainingConfig,
 )
-from synfeal.config.rendering import EffectsConfig, RenderConfig, RenderSpeedConfig
-from synfeal.config.robustness import RobustnessConfig
-
-__all__ = [
-    "MODELS",
-    "Angles",
-    "AugmentationConfig",
-    "Box",
-    "CameraConfig",
-    "CollectionConfig",
-    "Config",
-    "DatasetConfig",
-    "DepthConfig",
-    "EffectsConfig",
-    "ExternalConfig",
-    "GroundTruthConfig",
-    "KinectFusionConfig",
-    "LocalizerConfig",
-    "ModelName",
-    "NetworkConfig",
-    "NonNegative",
-    "PoseGraphConfig",
-    "PretrainingConfig",
-    "ReferencesConfig",
-    "RenderConfig",
-    "RenderSpeedConfig",
-    "RgbdConfig",
-    "SceneConfig",
-    "SfmConfig",
-    "SizeConfig",
-    "Strict",
-    "TrainingConfig",
-]
 
 MODELS = ("posenet", "poselstm", "hourglass", "posenet2resnet", "posenet2")
 ModelName = Literal["posenet", "poselstm", "hourglass", "posenet2resnet", "posenet2"]
+
+
+class RenderSpeedConfig(Strict):
+    """How speed and error of rendering are measured, for `speed_vs_error.csv`."""
+
+    poses: Count = Field(6, description="views of each scene; half as many at the larger sizes")
+    sizes: int = Field(
+        3,
+        ge=1,
+        le=3,
+        description="how many of network_camera, groundtruth_camera and 640 × 480, smallest first",
+    )
 
 
 class SfmConfig(Strict):
@@ -153,14 +136,10 @@ class GroundTruthConfig(Strict):
         0.20, description="assist a batch whose last position is off by more"
     )
     assist_orientation_deg: Positive = Field(10.0, description="or whose last orientation is")
-    sfm: SfmConfig = Field(default_factory=SfmConfig, description="structure from motion")
-    rgbd: RgbdConfig = Field(default_factory=RgbdConfig, description="RGB-D odometry")
-    kinect_fusion: KinectFusionConfig = Field(
-        default_factory=KinectFusionConfig, description="frame-to-model tracking"
-    )
-    posegraph: PoseGraphConfig = Field(
-        default_factory=PoseGraphConfig, description="pose-graph optimisers"
-    )
+    sfm: SfmConfig = part(SfmConfig, "structure from motion")
+    rgbd: RgbdConfig = part(RgbdConfig, "RGB-D odometry")
+    kinect_fusion: KinectFusionConfig = part(KinectFusionConfig, "frame-to-model tracking")
+    posegraph: PoseGraphConfig = part(PoseGraphConfig, "pose-graph optimisers")
 
 
 class Config(DatasetConfig):
@@ -170,30 +149,21 @@ class Config(DatasetConfig):
     datasets: tuple[Slug, ...] | None = Field(
         None, description="scenes of the target `datasets`; null: those of the design"
     )
-    groundtruth_camera: CameraConfig = Field(
-        default_factory=CameraConfig,
-        description="camera of the frames that labels are estimated from",
+    groundtruth_camera: CameraConfig = part(
+        CameraConfig, "camera of the frames that labels are estimated from"
     )
-    render_speed: RenderSpeedConfig = Field(
-        default_factory=RenderSpeedConfig, description="what rendering is measured on"
+    render_speed: RenderSpeedConfig = part(RenderSpeedConfig, "what rendering is measured on")
+    groundtruth: GroundTruthConfig = part(
+        GroundTruthConfig, "estimated labels (docs/groundtruth.md)"
     )
-    groundtruth: GroundTruthConfig = Field(
-        default_factory=GroundTruthConfig, description="estimated labels (docs/groundtruth.md)"
+    references: ReferencesConfig = part(
+        ReferencesConfig, "what localizers are compared with (docs/references.md)"
     )
-    references: ReferencesConfig = Field(
-        default_factory=ReferencesConfig,
-        description="what localizers are compared with (docs/references.md)",
-    )
-    robustness: RobustnessConfig = Field(
-        default_factory=RobustnessConfig, description="tests with effects (docs/variation.md)"
-    )
-    network: NetworkConfig = Field(
-        default_factory=NetworkConfig, description="shape of all localizers"
-    )
+    robustness: RobustnessConfig = part(RobustnessConfig, "tests with effects (docs/variation.md)")
+    network: NetworkConfig = part(NetworkConfig, "shape of all localizers")
     training: TrainingConfig = Field(description="docs/localizers.md")
-    pretraining: PretrainingConfig = Field(
-        default_factory=PretrainingConfig,
-        description="what pretrained runs start from (docs/start.md)",
+    pretraining: PretrainingConfig = part(
+        PretrainingConfig, "what pretrained runs start from (docs/start.md)"
     )
     localizers: dict[ModelName, LocalizerConfig] = Field(description="hyper-parameters of each")
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from synfeal.config.rendering import ExposureConfig, NoiseConfig
+from synfeal.config.effects import ExposureConfig, NoiseConfig
 from synfeal.effects.transfer import Light, Rgb
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of linear sRGB

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.rendering import LightConfig
+from synfeal.config.effects import LightConfig
 from synfeal.effects.camera import channel_gains
 from synfeal.effects.transfer import Light
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from synfeal.bootstrap import FEWEST_PATHS
-from synfeal.config.camera import CameraConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.errors import InputError, why
 from synfeal.evaluation.estimates import CONVENTIONS, Convention, Estimates, checked_convention

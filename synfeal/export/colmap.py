@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from synfeal.config.camera import CameraConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.export.frames import (
     ExportFrame,
     ExportSet,

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from synfeal.config.camera import CameraConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.export.frames import ExportFrame, ExportSet, Place, frame_name, rewrite_depth
 from synfeal.files import write_json
 

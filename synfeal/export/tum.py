@@ -12,7 +12,7 @@ import logging
 import shutil
 from pathlib import Path
 
-from synfeal.config.camera import CameraConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.export.frames import ExportSet, Place, rewrite_depth, write_lines
 from synfeal.geometry.poses import quat_wxyz_of

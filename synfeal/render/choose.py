@@ -12,8 +12,7 @@ from pkgutil import resolve_name
 
 import numpy as np
 
-from synfeal.config.camera import CameraConfig
-from synfeal.config.rendering import RenderConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render.base import Renderer

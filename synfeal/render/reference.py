@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.camera import CameraConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.render.base import Renderer
 
 SAMPLES_PER_AXIS = 8

@@ -9,7 +9,7 @@ import pandas as pd
 
 from synfeal.config import MODELS, Design, Experiment
 from synfeal.config.experiments import FROM_SCRATCH
-from synfeal.config.tables import KEYS
+from synfeal.config.learning import KEYS
 from synfeal.frames import COUNT, EXTRA, MAYBE, NUMBER, TEXT, Schema, frame_of
 from synfeal.report.published import KEY, SCHEMA, published_frame
 from synfeal.report.stats import (

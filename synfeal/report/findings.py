@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from synfeal.config.tables import KEYS
+from synfeal.config.learning import KEYS
 from synfeal.frames import TEXT, read_frame
 from synfeal.report.cells import schema_of
 from synfeal.report.layouts import scene_title

@@ -11,8 +11,8 @@ import pandas as pd
 
 from baselines.references.registry import REFERENCES
 from baselines.references.robustness import SCHEMA, STRUCTURE, robustness_table
+from synfeal.config.effects import CLEAN, MIXED
 from synfeal.config.models import MODELS
-from synfeal.config.robustness import CLEAN, MIXED
 from synfeal.frames import read_frame, write_frame
 from synfeal.report.layouts import TITLES
 from synfeal.report.sheet import LINE, VALUE, Sheet, with_bold, write_latex

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from synfeal.config.robustness import CLEAN
+from synfeal.config.effects import CLEAN
 from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
 from synfeal.frames import (

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from synfeal.config.effects import CLEAN
 from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
-from synfeal.config.robustness import CLEAN
 from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable, read_frames, read_pose_table
 from synfeal.dataset.render_sequence import Effects, drawn

@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from synfeal.config.camera import CameraConfig
-from synfeal.config.rendering import RenderConfig, RenderSpeedConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig
+from synfeal.config.models import RenderSpeedConfig
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.render_sequence import resolved
 from synfeal.frames import COUNT, NUMBER, TEXT, frame_of, write_frame

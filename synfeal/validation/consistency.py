@@ -15,7 +15,7 @@ from statistics import median_low
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.camera import CameraConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
 from synfeal.validation.frames import Poses

@@ -8,7 +8,7 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
-from synfeal.config.camera import CameraConfig
+from synfeal.config.dataset import CameraConfig
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from synfeal.config.camera import CameraConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.config.load import describe
 from synfeal.dataset.manifest import MANIFEST, sequence_sha256
 from synfeal.errors import InputError, why

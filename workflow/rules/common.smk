@@ -28,7 +28,7 @@ from synfeal.config.load import read_yaml
 from synfeal.config.load import check_results
 from synfeal.config.experiments import INJECTED, Init, common_every, split_init
 from synfeal.config.models import MODELS
-from synfeal.config.robustness import CLEAN, MIXED
+from synfeal.config.effects import CLEAN, MIXED
 from synfeal.dataset.archive import SUFFIX
 from synfeal.dataset.finish import origin_of
 from synfeal.dataset.sevenscenes import sequences_of

@@ -15,7 +15,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.camera import CameraConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import TexturedMesh

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from baselines.references.robustness import STRUCTURE
-from synfeal.config.robustness import CLEAN, MIXED
+from synfeal.config.effects import CLEAN, MIXED
 from synfeal.report.figures.sources import Results
 from synfeal.report.figures.style import BLUE, ORANGE, Style, add_legend, set_log
 from synfeal.report.robustness import BLOCKS, METHODS, NAME, effects_title, read_robustness

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from PIL import Image
 
 from synfeal.config import Design, Experiment
-from synfeal.config.tables import KEYS
+from synfeal.config.learning import KEYS
 from synfeal.files import atomic_path
 from synfeal.inspect.viewer_mesh import viewer_js
 from synfeal.report import meshes

@@ -1,13 +1,22 @@
-"""Typed configuration of how frames are drawn, and what a camera and its world add to them."""
+"""What a camera and its world add to ideal frames, and what localizers are tested on besides."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from synfeal.config.collection import Channel, Count, NonNegative, Positive, Strict
+from synfeal.config.collection import (
+    CollectionConfig,
+    Count,
+    NonNegative,
+    Positive,
+    SizeName,
+    Slug,
+    Strict,
+    part,
+)
 
 Kelvin = Annotated[float, Field(ge=2000, le=25000)]
 Stops = Annotated[float, Field(ge=-10, le=10)]
@@ -109,30 +118,71 @@ class EffectsConfig(Strict):
         return self
 
 
-class RenderConfig(Strict):
-    """How images are drawn."""
+CLEAN, MIXED = "clean", "mixed"
 
-    unless_none = ("effects",)
 
-    backend: Literal["auto", "opengl", "pyrender", "raycast"] = Field(
-        "auto", description="`auto`: the fastest that works here"
+class RobustnessConfig(Strict):
+    """Test paths rendered anew with effects, for localizers trained without and with them.
+
+    Exposures end where the next frame begins: one setting serves profiles of any frame spacing.
+    """
+
+    scene: Slug = Field("large_room", description="of the data set")
+    size: SizeName = Field("6k", description="of the data set")
+    effects: dict[Slug, EffectsConfig] = part(dict, "rows of the table: effects on the test frames")
+    mixed: EffectsConfig = part(EffectsConfig, "effects on the second training set")
+    structure_frames: Count = Field(
+        250, description="test frames for structure-based poses, spread evenly"
     )
-    supersampling: int = Field(2, ge=1, le=4, description="samples per pixel along each axis")
-    background_rgb: tuple[Channel, Channel, Channel] = Field(
-        (0, 0, 0), description="where nothing is hit"
-    )
-    effects: EffectsConfig | None = Field(
-        None, description="what is added to ideal frames (docs/variation.md)"
-    )
+
+    @field_validator("effects")
+    @classmethod
+    def _check_names(cls, effects: dict[str, EffectsConfig]) -> dict[str, EffectsConfig]:
+        taken = sorted({"train", CLEAN, MIXED} & set(effects))
+        if taken:
+            raise ValueError(f"'{taken[0]}' is a name of the table's own; choose another")
+        return effects
+
+    def rendered(self, collection: CollectionConfig, own_mesh: bool) -> dict[str, EffectsConfig]:
+        """The effects that can be rendered, by name, and ``mixed``.
+
+        Nothing is known of the lamps of a mesh of one's own, and independent frames do not move.
+        """
+        still = collection.mode == "random"
+        possible = {
+            name: effects
+            for name, effects in self.effects.items()
+            if not (own_mesh and effects.light and effects.light.states)
+            and not (still and effects.motion_blur)
+        }
+        mixed = self.mixed.model_copy(update={"motion_blur": None}) if still else self.mixed
+        return {name: _shortened(e, collection) for name, e in {**possible, MIXED: mixed}.items()}
 
 
-class RenderSpeedConfig(Strict):
-    """How speed and error of rendering are measured, for `speed_vs_error.csv`."""
+def _shortened(effects: EffectsConfig, collection: CollectionConfig) -> EffectsConfig:
+    """With no exposure longer than the time between frames."""
+    blur = effects.motion_blur
+    if blur is None or collection.mode == "repeat":
+        return effects
+    exposure_s = min(blur.exposure_s, collection.frame_spacing_m / effects.speed_m_s)
+    shorter = blur.model_copy(update={"exposure_s": exposure_s})
+    return effects.model_copy(update={"motion_blur": shorter})
 
-    poses: Count = Field(6, description="views of each scene; half as many at the larger sizes")
-    sizes: int = Field(
-        3,
-        ge=1,
-        le=3,
-        description="how many of network_camera, groundtruth_camera and 640 × 480, smallest first",
-    )
+
+def refuse_long_exposure(effects: EffectsConfig, collection: CollectionConfig, key: str) -> None:
+    """Refuse to expose for longer than there is between two frames.
+
+    Raises:
+        ValueError: naming what stands under ``key``.
+    """
+    blur = effects.motion_blur
+    if blur is None or collection.mode == "repeat":
+        return
+    if collection.mode == "random":
+        raise ValueError(f"{key}.motion_blur: independent frames have no motion; leave it out")
+    frame_s = collection.frame_spacing_m / effects.speed_m_s
+    if blur.exposure_s > frame_s:
+        raise ValueError(
+            f"{key}.motion_blur.exposure_s: {blur.exposure_s:g} s is longer than the"
+            f" {frame_s:.3g} s between frames (collection.frame_spacing_m by speed_m_s)"
+        )
