@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation, Slerp
 from synfeal.frames import read_records
 from synfeal.report import stats
 from synfeal.report.document import hard_cases_latex
-from synfeal.report.hard_cases import case as cases
 from synfeal.report.hard_cases import estimates, exact, scenes
 from synfeal.report.hard_cases import table as hard_table
 from synfeal.report.hard_cases.table import CASES, SCHEMA, row_of, rows_of, write_hard_cases
@@ -25,7 +24,7 @@ FAMILIES = list(dict.fromkeys(family.name for family in CASES))
 @pytest.fixture(scope="module", autouse=True)
 def all_rows():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cases, "N_TIMINGS", 1)
+        patch.setattr(exact, "N_TIMINGS", 1)
         yield rows_of(CASES)
 
 
@@ -39,7 +38,7 @@ def test_every_case_keeps_its_bound_and_pages_mark_what_exceeds_it(all_rows, tmp
         assert "✗" not in "".join(line[3].itertext())
     text = hard_cases_latex([row for _, row in read_records(tmp_path / "table.csv")])
     refused = r"\textcolor{red!85!black}{\textbf{answered}} & refused &"
-    assert text.count(refused) == sum(row["quantity"] == cases.REFUSAL for row in all_rows)
+    assert text.count(refused) == sum(row["quantity"] == exact.REFUSAL for row in all_rows)
     assert {c for c in text if ord(c) > 127} <= {"µ", "ö"}  # those LaTeX knows
 
 
@@ -59,16 +58,16 @@ def test_a_broken_function_is_not_ok(monkeypatch):
     [
         ([1.0, np.nan], [1, 2], np.inf),
         ([1.0, np.inf], [1, 2], np.inf),
-        (cases.REFUSED, cases.REFUSED, 0),
-        (cases.REFUSED, 1, np.inf),
-        (1.0, cases.REFUSED, np.inf),
+        (exact.REFUSED, exact.REFUSED, 0),
+        (exact.REFUSED, 1, np.inf),
+        (1.0, exact.REFUSED, np.inf),
         ([1.0, 0.5], [1 + Fraction(1, 10**40), Fraction(1, 2)], 1e-40),
         (0.1, Fraction(1, 10), 5.55e-18),  # of the double itself
     ],
 )
 def test_an_error_is_that_of_the_doubles(answer, truth, error):
-    trial = cases.Trial(lambda: answer, lambda: answer, truth)
-    assert cases.examine(trial)["our_error"] == pytest.approx(error, rel=1e-3)
+    trial = exact.Trial(lambda: answer, lambda: answer, truth)
+    assert exact.examine(trial)["our_error"] == pytest.approx(error, rel=1e-3)
 
 
 def test_truths_agree_with_scipy_and_closed_forms():

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from synfeal.frames import read_records
 from synfeal.report.figures import CAPTIONS
-from synfeal.report.hard_cases.case import Row, error_text, judged, short
+from synfeal.report.hard_cases.exact import Row, error_text, judged, short
 from synfeal.report.hard_cases.table import NAME as HARD_CASES
 from synfeal.report.hard_cases.table import SCHEMA
 from synfeal.report.latex import (

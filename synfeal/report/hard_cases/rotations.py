@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 from synfeal.geometry import alignment, poses, rotations
 from synfeal.planning import path
 from synfeal.report.hard_cases import exact
-from synfeal.report.hard_cases.case import REFUSED, Trial
-from synfeal.report.hard_cases.exact import MP
+from synfeal.report.hard_cases.exact import MP, REFUSED, Trial
 
 Array = NDArray[np.float64]
 AXIS = (2.0, -3.0, 6.0)

@@ -13,8 +13,7 @@ from synfeal.config.models import CameraConfig
 from synfeal.mesh import rays
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render import raycast_backend
-from synfeal.report.hard_cases.case import Trial
-from synfeal.report.hard_cases.exact import MP, mpf
+from synfeal.report.hard_cases.exact import MP, Trial, mpf
 
 Array = NDArray[np.float64]
 N_AIMED, N_RAYS, N_SLIVERS = 4000, 100, 101

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from synfeal.frames import COUNT, NUMBER, TEXT, frame_of, write_frame
-from synfeal.report.hard_cases import estimates, noise, rotations, scenes
-from synfeal.report.hard_cases.case import REFUSAL, Family, examine
-from synfeal.report.hard_cases.exact import MPMATH, RATIONAL
+from synfeal.report.hard_cases import estimates, rotations, scenes
+from synfeal.report.hard_cases.exact import MPMATH, RATIONAL, REFUSAL, Family, examine
 
 NAME = "hard_cases"
 SCHEMA = {
@@ -99,12 +98,12 @@ CASES = (
     }),
     Family("injected noise", "median", "of the nominal", "the published code", "add_noise",
            "nominal value", 0.01, {
-        "position": noise.median_displacement,
-        "orientation, 20°": lambda: noise.median_turn(20.0),
+        "position": estimates.median_displacement,
+        "orientation, 20°": lambda: estimates.median_turn(20.0),
     }),
     Family("injected noise", "Kolmogorov distance", "1", "the published code",
-           "add_noise", "uniform on the sphere", noise.LARGEST_DISTANCE, {
-        "axes of turns": noise.directions_of_axes,
+           "add_noise", "uniform on the sphere", estimates.LARGEST_DISTANCE, {
+        "axes of turns": estimates.directions_of_axes,
     }),
     Family("medians", "median", "1", "quantile(0.5)", "medians", RATIONAL, 1e-16, {
         "an even number": lambda: estimates.median_of([0.3, 0.1, 0.7, 0.2]),

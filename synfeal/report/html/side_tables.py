@@ -23,7 +23,7 @@ from synfeal.report import (
     speed_vs_error,
 )
 from synfeal.report.hard_cases import table as hard_cases
-from synfeal.report.hard_cases.case import Row, error_text, judged, short
+from synfeal.report.hard_cases.exact import Row, error_text, judged, short
 from synfeal.report.html.render import Column, sortable
 from synfeal.report.layouts import SOURCES, TITLES, scene_title
 
