@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from synfeal.report.html.page import write_report
-from synfeal.report.html.rooms import SPLITS, paths_of, trajectories
+from synfeal.report.html.page import SPLITS, paths_of, trajectories, write_report
 from tests.report_page import PLANS, large_room_design, page_results, straight
 from tests.report_results import design_of
 from tests.test_inspect_page import CHROMIUM, answer

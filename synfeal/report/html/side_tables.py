@@ -24,7 +24,7 @@ from synfeal.report import (
 )
 from synfeal.report.hard_cases import table as hard_cases
 from synfeal.report.hard_cases.exact import Row, error_text, judged, short
-from synfeal.report.html.render import Column, sortable
+from synfeal.report.html.tables import Column, sortable
 from synfeal.report.layouts import SOURCES, TITLES, scene_title
 
 DATA_SET, LABELS = Column("Data set", "data_set"), Column("Labels", "labels")
