@@ -14,9 +14,9 @@ from synfeal.dataset.number_table import write_numbers
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.files import write_json
 from synfeal.geometry.rotations import canonical_quat_wxyz
+from synfeal.report.cells import key_of, published_cells
 from synfeal.report.claims.evidence import evidence_of
 from synfeal.report.claims.table import claim_rows
-from synfeal.report.published import key_of, published_cells
 from synfeal.report.stats import COLUMNS, COMMON_COLUMNS
 from tests.report_results import MEASURES, design_of, fill_assistance, shipped_design
 

@@ -122,7 +122,7 @@ def test_a_rule_calls_its_function_with_files_and_the_results_of_its_job(tmp_pat
     job = SimpleNamespace(
         wildcards=Namedlist(fromdict={"scene": "large_room"}),
         input=Namedlist(fromdict={"tables": [str(table)]}),
-        params=Namedlist(fromdict={"function": "synfeal.report.latex:write_document"}),
+        params=Namedlist(fromdict={"function": "synfeal.report.document:write_document"}),
         output=Namedlist(fromdict={"tex": str(document)}),
     )
     call(job)

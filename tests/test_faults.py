@@ -25,13 +25,12 @@ from synfeal.dataset.directories import atomic_directory
 from synfeal.dataset.packed import join_packed, new_packed, read_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.errors import InputError
-from synfeal.files import atomic_path, read_json, write_json
+from synfeal.files import atomic_path, read_json, write_json, write_text
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import Triangles, load_collision_mesh, save_collision_mesh
 from synfeal.report.figures.registry import save
-from synfeal.report.latex import write_text
 from synfeal.run_lock import begin_run
 from tests.small_disk import mounted, remount
 from tests.test_workflow import snakemake

@@ -8,10 +8,10 @@ from synfeal.config import MODELS, Design
 from synfeal.config.models import ExternalConfig
 from synfeal.errors import InputError
 from synfeal.files import write_json
-from synfeal.report.crossing import crossing_finding
 from synfeal.report.figures.references_by_noise import figure_of
 from synfeal.report.html.side_tables import references_table as html_table
 from synfeal.report.references import (
+    crossing_finding,
     label_title,
     read_references,
     references_sheet,

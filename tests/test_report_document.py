@@ -9,9 +9,9 @@ from PIL import Image
 
 from synfeal.errors import InputError
 from synfeal.frames import TEXT, read_frame, write_frame
+from synfeal.report.cells import FOLDER
 from synfeal.report.document import CLAIM_COLUMNS, write_report_document
 from synfeal.report.figures import CAPTIONS
-from synfeal.report.published import FOLDER
 from synfeal.report.sheet import LINE, PAPER, VALUE, Sheet, sheet_latex, sheet_markdown, write_latex
 
 GOLDEN = r"""\begin{table*}[tp]

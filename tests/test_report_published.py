@@ -6,7 +6,7 @@ from statistics import mean
 import pytest
 
 from synfeal.config import MODELS
-from synfeal.report.published import key_of, published_cells, published_meshes
+from synfeal.report.cells import key_of, published_cells, published_meshes
 from tests.report_results import ROWS, TABLE4, experiment, shipped_design
 
 OUR_OWN = ("table6_label_errors", "table7_images_shown")

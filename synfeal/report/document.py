@@ -1,23 +1,18 @@
-"""``report.tex``: claims, tables and figures as one document that compiles by itself."""
+"""LaTeX documents that compile by themselves: all tables; claims, tables and figures."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from synfeal.files import write_text
 from synfeal.frames import read_records
 from synfeal.report.figures import CAPTIONS
 from synfeal.report.hard_cases.exact import Row, error_text, judged, short
 from synfeal.report.hard_cases.table import NAME as HARD_CASES
 from synfeal.report.hard_cases.table import SCHEMA
-from synfeal.report.latex import (
-    PACKAGES,
-    TONES,
-    document_latex,
-    escape,
-    table_bodies,
-    write_text,
-)
+from synfeal.report.results import read_text
+from synfeal.report.sheet import HEADER, PACKAGES, TONES, escape
 
 LONG_PACKAGES = (*PACKAGES, "longtable", "array")
 # Headings and widths in millimetres.
@@ -35,6 +30,29 @@ CASES_CAPTION = (
     r"\noindent\textbf{Hard cases.} Errors against exact answers, of the formula somebody would"
     r" write first and of ours; in colour: above the bound that ours promises."
 )
+
+
+def write_document(tables: Sequence[Path], out_tex: Path) -> None:
+    """Write a complete document that holds the given tables, in order, and nothing else."""
+    write_text(out_tex, document_latex(table_bodies(tables)))
+
+
+def table_bodies(tables: Sequence[Path]) -> list[str]:
+    """The table environments of files that :func:`synfeal.report.sheet.write_latex` wrote."""
+    return [read_text(table).removeprefix(HEADER).rstrip() for table in tables]
+
+
+def document_latex(pages: Sequence[str], packages: Sequence[str] = PACKAGES) -> str:
+    """A complete document of bodies that each begin a page."""
+    lines = [
+        r"\documentclass{article}",
+        r"\usepackage[a4paper,margin=18mm]{geometry}",
+        *(f"\\usepackage{{{package}}}" for package in packages),
+        r"\begin{document}",
+        "\n\n\\clearpage\n".join(pages),
+        r"\end{document}",
+    ]
+    return "\n".join(lines) + "\n"
 
 
 def write_report_document(root: Path, tables: Sequence[Path], out_tex: Path) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import pandas as pd
 
 from synfeal.frames import COUNT, MAYBE, MAYBE_COUNT, NUMBER, TEXT, frame_of, write_frame
+from synfeal.report.cells import MeshFacts, published_meshes
 from synfeal.report.layouts import scene_title
-from synfeal.report.published import MeshFacts, published_meshes
 from synfeal.report.results import read_result
 from synfeal.report.sheet import PAPER, Sheet, sheet_of_texts, write_latex
 

@@ -14,13 +14,27 @@ from typing import Any
 
 import pandas as pd
 
+from synfeal.files import write_text
 from synfeal.frames import rows_of
-from synfeal.report.latex import HEADER, TONES, escape, write_text
 
 # Columns of lines: a rule stands between blocks, a thin gap between rows.
 LINE = ("block", "row", "kind", "label", "label_note", "against")
 # Columns of values: `line` counts the lines, `column` is a heading, `place` an order in the cell.
 VALUE = ("line", "column", "place", "text", "bold", "tone", "note")
+PACKAGES = ("booktabs", "graphicx", "xcolor")
+HEADER = f"% Needs \\usepackage{{{','.join(PACKAGES)}}}\n"
+# Plain xcolor mixes, so that no package option is needed; both stay apart from black in grey print.
+TONES = {"better": "green!45!black", "worse": "red!85!black"}
+SPECIAL = str.maketrans(
+    {
+        **{character: f"\\{character}" for character in "&%#_${}"},
+        **{"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"},
+        **{"|": r"\textbar{}", "…": r"\ldots{}", "–": "--", "°": r"$^\circ$", "ᵀ": r"$^\top$"},
+        **{"²": "$^2$", "³": "$^3$", "−": "$-$", "±": r"$\pm$", "×": r"$\times$", "·": r"$\cdot$"},
+        **{"→": r"$\to$", "≥": r"$\ge$", "≤": r"$\le$", "√": r"$\surd$", "Σ": r"$\Sigma$"},
+        **{"τ": r"$\tau$", "β": r"$\beta$", "θ": r"$\theta$", "π": r"$\pi$"},
+    }
+)
 PAPER = "paper"
 PLAIN, MARKDOWN = "plain", "pipe"  # tables of text for a terminal, for a page
 
@@ -123,6 +137,11 @@ def sheet_latex(sheet: Sheet) -> str:
         r"\end{table*}",
     ]
     return "\n".join(lines) + "\n"
+
+
+def escape(text: str) -> str:
+    """Unicode text as LaTeX; a sign before a number becomes a minus sign, not a hyphen."""
+    return text.translate(SPECIAL)
 
 
 def sheet_markdown(sheet: Sheet) -> str:

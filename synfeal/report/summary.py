@@ -9,14 +9,15 @@ from typing import Any
 import pandas as pd
 
 from synfeal.config import Design
+from synfeal.files import write_text
 from synfeal.frames import read_frame, rows_of
 from synfeal.report import recall, references, robustness
 from synfeal.report.cells import read_cells
-from synfeal.report.crossing import crossing_findings
-from synfeal.report.latex import write_text
-from synfeal.report.layouts import TITLES, scene_title, sheet_of
+from synfeal.report.layouts import TITLES, scene_title
 from synfeal.report.meshes import meshes_sheet, read_meshes
+from synfeal.report.references import crossing_findings
 from synfeal.report.sheet import Sheet, sheet_markdown
+from synfeal.report.tables import sheet_of
 
 # Tables that a run may lack, and how they are printed.
 SHEETS: dict[Any, Callable[[Design, pd.DataFrame], Sheet]] = {

@@ -147,7 +147,7 @@ use rule call as document with:
     benchmark:
         f"{ROOT}/benchmarks/tables/document.tsv"
     params:
-        function="synfeal.report.latex:write_document",
+        function="synfeal.report.document:write_document",
 
 
 use rule call as figures with:

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Literal
 
 from synfeal.frames import read_records
-from synfeal.report.published import FOLDER
+from synfeal.report.cells import FOLDER
 
 Verdict = Literal[
     "holds",

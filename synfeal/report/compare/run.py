@@ -11,13 +11,12 @@ import pandas as pd
 
 from synfeal.bootstrap import FEWEST_PATHS
 from synfeal.dataset.directories import refuse_foreign
-from synfeal.files import atomic_path
+from synfeal.files import atomic_path, write_text
 from synfeal.frames import write_frame
 from synfeal.report.compare.figure import comparison_figure
 from synfeal.report.compare.runs import KEY
 from synfeal.report.compare.summary import groups_of, remarks_of, summarise
 from synfeal.report.compare.trees import Comparison, compare_trees, one_yardstick
-from synfeal.report.latex import write_text
 from synfeal.report.sheet import MARKDOWN, PLAIN, text_table
 from synfeal.report.stats import MEASURES
 

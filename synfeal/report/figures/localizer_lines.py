@@ -11,11 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from synfeal.config import MODELS
-from synfeal.report.crossing import STRUCTURE
 from synfeal.report.figures.sources import Array
 from synfeal.report.figures.style import MODEL_STYLES, PUBLISHED, reference_styles
 from synfeal.report.layouts import TITLES
-from synfeal.report.references import titles_in
+from synfeal.report.references import STRUCTURE, titles_in
 
 PAPER = {
     "published (light grey; positions × √3,\nsince print has RMS over the axes)": Line2D(

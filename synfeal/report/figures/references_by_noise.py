@@ -10,10 +10,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from synfeal.config import MODELS, Experiment
-from synfeal.report.crossing import STRUCTURE, crossing_finding
 from synfeal.report.figures.sources import Results
 from synfeal.report.figures.style import MODEL_STYLES, add_legend, reference_styles
-from synfeal.report.references import NAME, label_title, read_references, titles_in
+from synfeal.report.references import (
+    NAME,
+    STRUCTURE,
+    crossing_finding,
+    label_title,
+    read_references,
+    titles_in,
+)
 
 TABLE2, TABLE3 = "table2_ground_truth", "table3_inconsistencies"
 BLOCKS = {

@@ -17,12 +17,12 @@ from PIL import Image
 from synfeal.config import Design, Experiment
 from synfeal.config.learning import KEYS
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
-from synfeal.files import atomic_path
+from synfeal.files import write_text
 from synfeal.inspect.surface import SurfacePoints
 from synfeal.inspect.viewer_mesh import viewer_js, viewer_mesh
 from synfeal.mesh.load import load_mesh
 from synfeal.report import meshes
-from synfeal.report.cells import read_cells
+from synfeal.report.cells import key_of, published_cells, read_cells
 from synfeal.report.claims.model import NOT_TESTABLE
 from synfeal.report.figures import CAPTIONS
 from synfeal.report.html.provenance import cost_sentence, origin_html, read_origin
@@ -37,7 +37,6 @@ from synfeal.report.html.tables import (
     verdict_counts,
 )
 from synfeal.report.layouts import BLOCKS, SOURCES, scene_title
-from synfeal.report.published import key_of, published_cells
 from synfeal.report.summary import run_sentences
 from synfeal.seeds import generator_of
 
@@ -116,8 +115,7 @@ def write_report(design: Design, root: Path, out_html: Path) -> None:
         ],
         viewer_js=Markup(viewer_js()),
     )
-    with atomic_path(out_html) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_text(out_html, page)
 
 
 def _tables(cells: Mapping[str, pd.DataFrame], root: Path) -> Iterator[dict[str, str]]:

@@ -23,13 +23,12 @@ from synfeal.report.layouts import (
     REFERENCES,
     TITLES,
     UNITS,
-    printed_values,
     published_labels,
     row_label,
     scene_title,
-    sheet_of,
 )
 from synfeal.report.sheet import PAPER, footnotes
+from synfeal.report.tables import printed_values, sheet_of
 
 ENVIRONMENT = Environment(
     loader=PackageLoader("synfeal.report.html"),
