@@ -20,11 +20,11 @@ from torch import Tensor
 from baselines.training.checkpoint import ModelDescription, TrainedLocalizer, read_checkpoint
 from baselines.training.device import open_device
 from baselines.training.predict import BATCH, predict, predict_ms
-from synfeal.dataset.directories import writing_to
 from synfeal.dataset.packed import View, fit_frame
 from synfeal.dataset.pose_table import COLUMNS
-from synfeal.dataset.progress import Progress
+from synfeal.dataset.render_sequence import Progress
 from synfeal.errors import InputError, why
+from synfeal.files import writing_to
 from synfeal.frames import write_frame
 
 Array = NDArray[np.float64]

@@ -14,17 +14,13 @@ from typing import Any
 
 from pydantic import BaseModel
 
+import synfeal
+
 PACKAGES = (
-    "gtsam",
-    "numpy",
-    "open3d",
-    "pycolmap",
-    "pyrender",
-    "scipy",
-    "synfeal",
-    "torch",
-    "trimesh",
+    *("gtsam", "numpy", "open3d", "pycolmap", "pyrender"),
+    *("scipy", "synfeal", "torch", "trimesh"),
 )
+DRAWING = ("deflate", "numpy", "pillow", "pyrender", "trimesh")
 UNKNOWN = "unknown"
 CPU_INFO = Path("/proc/cpuinfo")
 
@@ -41,6 +37,12 @@ def provenance(seed: int, config_hash: str) -> dict[str, Any]:
         "cpus": os.cpu_count(),
         "time_utc": datetime.now(UTC).isoformat(timespec="seconds"),
     }
+
+
+def frame_versions() -> dict[str, str]:
+    """The versions that decide what frames look like; not every renderer has to be installed."""
+    found = {name: _version(name) for name in DRAWING if _version(name) != UNKNOWN}
+    return {"synfeal": synfeal.__version__, **found}
 
 
 def config_hash(model: BaseModel) -> str:

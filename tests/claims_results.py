@@ -10,9 +10,9 @@ from scipy.stats import norm
 
 from synfeal.config import MODELS
 from synfeal.config.experiments import SHARES
-from synfeal.dataset.number_table import write_numbers
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.files import write_json
+from synfeal.frames import write_numbers
 from synfeal.geometry.rotations import canonical_quat_wxyz
 from synfeal.report.cells import key_of, published_cells
 from synfeal.report.claims.evidence import evidence_of

@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 from synfeal.config.models import CameraConfig
-from synfeal.dataset.manifest import write_manifest
+from synfeal.dataset.finish import write_manifest
 from synfeal.dataset.pose_table import write_pose_table
 from synfeal.dataset.sevenscenes import Sequence, write_splits
 from tests.planar_scene import straight_path, write_frames

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from synfeal.config.models import Angles, CameraConfig, SceneConfig
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles
-from synfeal.planning.sampling import pose_bounds
+from synfeal.planning.space import pose_bounds
 from tests.property_support import angles_rad, positions
 
 ROOM = np.array([[-3.0, -2.0, 0.0], [3.0, 2.0, 2.5]])

@@ -8,7 +8,6 @@ import torch
 from baselines.training.checkpoint import frame_camera, read_checkpoint
 from baselines.training.predict import predict
 from synfeal.config.models import MODELS, CameraConfig, NetworkConfig
-from synfeal.dataset.manifest import camera_record
 from synfeal.errors import InputError
 from synfeal.files import write_json
 from tests.trained_localizers import HYPER, NETWORK, save, untrained
@@ -87,7 +86,7 @@ HALF = math.tan(math.radians(30))  # of 60 degrees across
 )
 def test_the_field_of_view_is_that_of_the_short_side(tmp_path, camera, short_side_deg):
     assert frame_camera(tmp_path / "train.npy") is None
-    record = camera_record(CameraConfig(**camera))
+    record = CameraConfig(**camera).record
     write_json(tmp_path / "train.json", {"camera": record, "frames": 3})
     found = frame_camera(tmp_path / "train.npy")
     assert found is not None

@@ -8,9 +8,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
-from synfeal.frames import write_frame
+from synfeal.frames import read_numbers, write_frame
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import (
@@ -20,7 +19,7 @@ from synfeal.mesh.triangles import (
     save_collision_mesh,
     simplify,
 )
-from synfeal.planning.questions import draw_questions
+from synfeal.planning.start import draw_questions
 from synfeal.report.figures import write_figures
 from synfeal.report.speed_vs_error import speeds_of, write_speed_vs_error
 from synfeal.scenes.collision import (

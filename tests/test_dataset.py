@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.config.models import CameraConfig, RenderConfig, SceneConfig
-from synfeal.dataset.directories import atomic_directory
-from synfeal.dataset.manifest import write_manifest
+from synfeal.dataset.finish import write_manifest
 from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.dataset.preview import write_contact_sheet
@@ -32,6 +31,7 @@ from synfeal.dataset.sevenscenes import (
     write_splits,
 )
 from synfeal.errors import InputError
+from synfeal.files import atomic_directory
 from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.load import load_mesh

@@ -21,11 +21,10 @@ from baselines.training.checkpoint import save_atomically
 from baselines.training.device import memory_errors
 from baselines.training.resume import ResumeFile
 from baselines.training.selection import HistoryRow, write_history
-from synfeal.dataset.directories import atomic_directory
 from synfeal.dataset.packed import join_packed, new_packed, read_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.errors import InputError
-from synfeal.files import atomic_path, read_json, write_json, write_text
+from synfeal.files import atomic_directory, atomic_path, read_json, write_json, write_text
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb

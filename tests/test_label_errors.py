@@ -7,8 +7,7 @@ from scipy.spatial.transform import Rotation
 from synfeal.config.experiments import INJECTED
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import pose_error, position_error_m
-from synfeal.labels.errors import OF_SPACE, seed_names, with_error
-from synfeal.labels.noise import add_noise
+from synfeal.labels import OF_SPACE, add_noise, seed_names, with_error
 from tests.property_support import random_table
 
 

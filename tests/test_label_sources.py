@@ -16,7 +16,7 @@ from baselines.groundtruth.methods import (
 from baselines.groundtruth.rgbd import rgbd_graph
 from baselines.groundtruth.sfm import sfm_batch
 from synfeal.config.models import GroundTruthConfig
-from synfeal.labels.noise import add_noise
+from synfeal.labels import add_noise
 from tests.planar_scene import CAMERA, straight_path, write_frames
 
 CFG = GroundTruthConfig(batch_frames=6, sfm={"max_features": 400}, rgbd={"keyframe_every": 3})

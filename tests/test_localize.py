@@ -14,7 +14,6 @@ from baselines.training.checkpoint import frame_camera
 from baselines.training.predict import predict, predict_poses
 from synfeal.cli import main
 from synfeal.config.models import CameraConfig
-from synfeal.dataset.manifest import camera_record
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
@@ -52,7 +51,7 @@ def run(tmp_path_factory):
     frames, labels = folder / "frames.npy", folder / "labels.csv"
     pack_frames([sequence], PX, frames)
     camera = CameraConfig(width=WIDTH, height=HEIGHT, horizontal_fov_deg=70.0)
-    write_json(folder / "frames.json", {"camera": camera_record(camera)})
+    write_json(folder / "frames.json", {"camera": camera.record})
     camera = frame_camera(frames)
     assert camera is not None
     save(folder / "model.pt", untrained(camera=camera))

@@ -5,13 +5,10 @@ import pytest
 
 from synfeal.config.models import Angles, CollectionConfig
 from synfeal.errors import InputError
-from synfeal.planning import candidates
-from synfeal.planning.path import path_poses
+from synfeal.planning.path import CandidateStream, path_poses
 from synfeal.planning.plan import plan_split
-from synfeal.planning.sampling import pose_bounds, sample_poses
-from synfeal.planning.space import PoseSpace
+from synfeal.planning.space import PoseSpace, admissible, has_free_view, pose_bounds, sample_poses
 from synfeal.planning.start import sample_start
-from synfeal.planning.target import admissible, has_free_view
 from tests.empty_room import EMPTY, ROOM, SCENE, caster_of
 
 VIEW_M, MIN_PATH_M, SPACING_M = 1.2, 1.5, 0.25
@@ -79,7 +76,7 @@ def round_by_round(caster, k, n_frames, rng):
 @pytest.mark.parametrize("block", [7, 64, 4096])
 @pytest.mark.parametrize("k", [1, 3, 8])
 def test_plan_is_that_of_one_round_at_a_time(furnished, k, block, monkeypatch):
-    monkeypatch.setattr(candidates, "BLOCK", block)
+    monkeypatch.setattr("synfeal.planning.path.BLOCK", block)
     collection = CollectionConfig(candidates=k, frame_spacing_m=SPACING_M, min_path_m=MIN_PATH_M)
     for seed in range(3):
         plan = plan_split(furnished, ROOM, SCENE, collection, 400, np.random.default_rng(seed))
@@ -90,7 +87,7 @@ def test_plan_is_that_of_one_round_at_a_time(furnished, k, block, monkeypatch):
 @pytest.mark.parametrize("tries", [1, 5, 1000])
 def test_no_more_rounds_are_tried_than_allowed(tries):
     bounds, rng = pose_bounds(ROOM, Angles()), np.random.default_rng(0)
-    stream = candidates.CandidateStream(PoseSpace(EMPTY, bounds, VIEW_M, rng), 2)
+    stream = CandidateStream(PoseSpace(EMPTY, bounds, VIEW_M, rng), 2)
     start = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     assert stream.next_target(start, 50.0, tries) is None
     found = stream.next_target(start, 0.0, 1)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from baselines.groundtruth.label_error import absolute_errors, relative_error, share_within, spread
-from synfeal.labels.noise import add_noise
+from synfeal.labels import add_noise
 from tests.property_support import (
     directions,
     few,

@@ -12,7 +12,7 @@ from synfeal.errors import InputError
 from synfeal.planning.path import n_frames_of, path_poses, path_vectors, poses_of, step_of
 from synfeal.planning.plan import box_array
 from synfeal.planning.repeat import read_poses, repeated_poses
-from synfeal.planning.sampling import pose_bounds, sample_poses, view_directions
+from synfeal.planning.space import pose_bounds, sample_poses, view_directions
 from tests.empty_room import BOUNDS, pose_vectors
 from tests.property_support import few, poses, seeds, table_of, vectors
 

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from synfeal.config.models import CollectionConfig, SceneConfig
 from synfeal.errors import InputError
 from synfeal.mesh.triangles import save_collision_mesh
-from synfeal.planning.candidates import CandidateStream, independent_poses
 from synfeal.planning.coverage import plan_coverage, scene_coverage
+from synfeal.planning.path import CandidateStream, independent_poses
 from synfeal.planning.plan import (
     plan_mesh,
     plan_scene,
@@ -18,10 +18,15 @@ from synfeal.planning.plan import (
     sampling_box_of,
     sampling_boxes_of,
 )
-from synfeal.planning.questions import Questions, draw_questions
-from synfeal.planning.space import PoseSpace
-from synfeal.planning.start import connected_space, largest_group, sample_start, seeing_groups
-from synfeal.planning.target import admissible, farthest_admissible, has_free_view
+from synfeal.planning.space import PoseSpace, admissible, farthest_admissible, has_free_view
+from synfeal.planning.start import (
+    Questions,
+    connected_space,
+    draw_questions,
+    largest_group,
+    sample_start,
+    seeing_groups,
+)
 from tests.empty_room import (
     BOUNDS,
     EMPTY,

@@ -11,7 +11,7 @@ from baselines.references.evidence import Evidence
 from baselines.references.structure import pinhole, triangulate, triangulated
 from synfeal.geometry.alignment import umeyama_sim3
 from synfeal.geometry.poses import pose_error, pose_matrix
-from synfeal.labels.noise import add_noise
+from synfeal.labels import add_noise
 from tests.property_support import table_of
 from tests.room_scene import CAMERA, pose_at
 from tests.test_references import BESIDE, seen

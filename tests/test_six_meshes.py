@@ -13,8 +13,8 @@ from synfeal.dataset.pose_table import read_pose_table
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.planning.path import poses_of
-from synfeal.planning.sampling import pose_bounds, sample_poses
 from synfeal.planning.seen_surface import empty_shares
+from synfeal.planning.space import pose_bounds, sample_poses
 from tests.varied_meshes import MESHES
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")

@@ -18,7 +18,7 @@ from synfeal.config import MODELS, Run
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.errors import InputError
 from synfeal.frames import read_records
-from synfeal.labels.noise import add_noise
+from synfeal.labels import add_noise
 from tests.coloured_frames import (
     HYPER,
     NETWORK,

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.dataset.number_table import read_numbers, write_numbers
 from synfeal.dataset.pose_table import check_unit, whole_numbers
 from synfeal.errors import InputError
+from synfeal.frames import read_numbers, write_numbers
 from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
 
 

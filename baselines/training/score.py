@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from baselines.training.record import check_same_labels
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset.number_table import read_numbers
 from synfeal.dataset.pose_table import (
     HEADER,
     PoseTable,
@@ -24,8 +23,8 @@ from synfeal.errors import InputError
 from synfeal.evaluation.metrics import finite, pose_errors, summary
 from synfeal.evaluation.reprojection import dcre, dcre_summary, read_cell_depth
 from synfeal.files import write_json
-from synfeal.frames import write_frame
-from synfeal.labels.constant import constant_pose
+from synfeal.frames import read_numbers, write_frame
+from synfeal.labels import constant_pose
 
 Array = NDArray[np.float64]
 

@@ -126,10 +126,10 @@ def export(arguments: argparse.Namespace) -> None:
 )
 def evaluate(arguments: argparse.Namespace) -> None:
     """Scores poses of any common format against a data set: errors, recalls, reprojection error."""
-    from synfeal.dataset.directories import refuse_foreign
     from synfeal.evaluation.run import Settings
     from synfeal.evaluation.run import evaluate as score
     from synfeal.evaluation.text import report_text
+    from synfeal.files import refuse_foreign
 
     out: Path | None = arguments.out
     if out:
@@ -144,8 +144,7 @@ def evaluate(arguments: argparse.Namespace) -> None:
 
 
 def _write(out: Path, title: str, found: Evaluation) -> None:
-    from synfeal.evaluation.figure import figure_of
-    from synfeal.evaluation.text import errors_table, scores_table
+    from synfeal.evaluation.text import errors_table, figure_of, scores_table
     from synfeal.files import atomic_path
 
     for name, table in zip(FILES, (scores_table(found), errors_table(found)), strict=False):

@@ -81,6 +81,11 @@ class CameraConfig(Strict):
             return Intrinsics.of_view(self.width, self.height, self.horizontal_fov_deg)
         return Intrinsics(*map(float, given))  # type: ignore[arg-type]
 
+    @property
+    def record(self) -> dict[str, Any]:
+        """With its intrinsics, ready for JSON."""
+        return {**self.model_dump(mode="json"), **self.intrinsics._asdict()}
+
 
 def _calibrated(values: dict[str, Any]) -> dict[str, Any]:
     """A camera's values with those of its calibration in place of the path."""

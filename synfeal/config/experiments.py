@@ -28,7 +28,7 @@ Init = Literal[
 # Share of `training.samples_seen` that a run is shown, by how its `init` ends.
 SHARES = {"": 1.0, "half": 0.5, "quarter": 0.25}
 # Errors that are put into true poses, of a size that noise_m and noise_deg name: one by frame,
-# one by path, a bend of space, another scale (`synfeal/labels/errors.py`).
+# one by path, a bend of space, another scale (`synfeal/labels.py`).
 INJECTED = ("noise", "offset", "bend", "scale")
 FROM_SCRATCH: TableName = "table5_from_scratch"
 COLUMNS = ("table", "block", "scene", "size", "labels", "noise_m", "noise_deg", "init")

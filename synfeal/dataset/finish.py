@@ -1,23 +1,26 @@
-"""The last step of a data set: what is made of all its frames together."""
+"""The last step of a data set: what is made of all its frames together, and the manifest."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from synfeal.config.dataset import DatasetConfig
 from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
-from synfeal.dataset.archive import sequence_at
-from synfeal.dataset.manifest import write_manifest
+from synfeal.dataset.archive import frame_file, sequence_at, sequence_names
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.pose_table import read_frames, read_pose_table, write_pose_table
 from synfeal.dataset.preview import write_contact_sheet
+from synfeal.dataset.sevenscenes import Sequence as Shard
 from synfeal.dataset.sevenscenes import Split, frame_paths, sequences_of, write_splits
 from synfeal.effects.crowd import crowd_of
 from synfeal.files import file_sha256, read_json, write_json
 from synfeal.frames import write_frame
+from synfeal.provenance import frame_versions
 
+MANIFEST = "manifest.json"
 CLUTTER = "clutter.json"  # beside the mesh: which objects stand about in it, and where
 
 
@@ -112,3 +115,41 @@ def origin_of(config: DatasetConfig, scene: str) -> dict[str, Any]:
         "render": config.render.model_dump(mode="json"),
         "seed": config.seed,
     }
+
+
+def write_manifest(
+    directory: Path, sequences: Sequence[Shard], camera: CameraConfig, extra: Mapping[str, Any]
+) -> None:
+    """Write ``manifest.json``: camera, frame counts, hash of each sequence, versions, ``extra``."""
+    record = camera.record
+    if camera.fx is not None:  # which replaced the field of view
+        del record["horizontal_fov_deg"]
+    manifest = {
+        "format": "7-Scenes; depth along the optical axis, millimetres, 65535 invalid",
+        "camera": record,
+        "frames": {
+            split: sum(len(s) for s in sequences if s.split == split) for split in ("train", "test")
+        },
+        "sequences": [
+            {
+                "name": s.name,
+                "split": s.split,
+                "frames": len(s),
+                "sha256": sequence_sha256(sequence_at(directory / s.name)),
+            }
+            for s in sequences
+        ],
+        "versions": frame_versions(),
+        **extra,
+    }
+    write_json(directory / MANIFEST, manifest)
+
+
+def sequence_sha256(sequence: Path) -> str:
+    """SHA-256 over the names and contents of the frames, in order of name; archived or not."""
+    digest = hashlib.sha256()
+    for name in sequence_names(sequence):
+        if name.startswith("frame-"):
+            content = hashlib.sha256(frame_file(sequence, name).read_bytes()).hexdigest()
+            digest.update(f"{content}  {name}\n".encode())
+    return digest.hexdigest()

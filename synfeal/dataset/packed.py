@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.config.models import CameraConfig, RenderConfig
-from synfeal.dataset.manifest import camera_record, versions
 from synfeal.dataset.png import read_image
 from synfeal.dataset.sevenscenes import frame_paths
 from synfeal.errors import InputError, why
 from synfeal.files import atomic_path, file_sha256, read_json, write_json
+from synfeal.provenance import frame_versions
 
 COPIED_BYTES = 2**24  # at a time
 
@@ -140,12 +140,12 @@ def write_packed_record(
         "format": FORMATS[view],
         "frames": len(packed),
         "input_px": packed.shape[1],
-        "camera": camera_record(camera),
+        "camera": camera.record,
         "render": render.model_dump(mode="json"),
         "plan_sha256": file_sha256(plan),
         "sha256": file_sha256(frames),
         "shards": [_read_shard(path) for path in shards],
-        "versions": versions(),
+        "versions": frame_versions(),
     }
     write_json(frames.with_suffix(".json"), record)
 

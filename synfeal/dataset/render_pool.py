@@ -17,8 +17,7 @@ from typing import Any
 
 from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable
-from synfeal.dataset.progress import Progress
-from synfeal.dataset.render_sequence import effects_of, write_sequence
+from synfeal.dataset.render_sequence import Progress, effects_of, write_sequence
 from synfeal.effects.relight import open_scene
 from synfeal.errors import InputError
 from synfeal.render.base import Renderer

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import tempfile
 import time
 from collections import deque
@@ -9,24 +10,50 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+from tqdm import tqdm
 
 from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
 from synfeal.dataset.archive import is_archive, write_archive
-from synfeal.dataset.directories import atomic_directory, refuse_existing, writing_to
 from synfeal.dataset.packed import View, fit_frame, new_packed
 from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable, read_frames
-from synfeal.dataset.progress import Progress
 from synfeal.dataset.sevenscenes import depth_mm_of, pose_text
 from synfeal.effects.apply import Frame, varied_frames
 from synfeal.effects.relight import open_scene
-from synfeal.files import write_json
+from synfeal.files import atomic_directory, refuse_existing, write_json, writing_to
 from synfeal.render.base import Depth, Renderer, Rgb
 from synfeal.render.choose import fastest_working
+
+
+class Progress:
+    """Frames done of all that are to be rendered; everything goes to standard error."""
+
+    def __init__(self, n_frames: int, name: str, n_done: int = 0) -> None:
+        self._on_terminal = sys.stderr.isatty()
+        self._bar = tqdm(total=n_frames, initial=n_done, unit="frame", desc=name, disable=None)
+
+    def update(self, n_frames: int = 1) -> None:
+        """Some more frames are done."""
+        self._bar.update(n_frames)
+
+    def part_done(self, name: str, n_frames: int, seconds: float) -> None:
+        """One sequence is done; says so where there is no bar."""
+        if not self._on_terminal:
+            rate = n_frames / seconds if seconds else float("inf")
+            line = f"{name}, {n_frames} frames in {seconds:.1f} s, {rate:.1f}/s"
+            print(line, file=sys.stderr, flush=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()
+
 
 Effects = tuple[CameraConfig, EffectsConfig]
 REMEDY = "nothing was kept; fix that and render again"

@@ -1,26 +1,37 @@
-"""What ``synfeal evaluate`` prints."""
+"""What ``synfeal evaluate`` prints and draws."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
-from synfeal.evaluation.metrics import BOUNDS, MEANS, ORIENTATION, POSITION, Metrics
+from synfeal.evaluation.metrics import (
+    BOUNDS,
+    MEANS,
+    ORIENTATION,
+    POSITION,
+    Metrics,
+    cumulative,
+    joint_error,
+)
 from synfeal.evaluation.reprojection import DCRE_BOUNDS
 from synfeal.evaluation.run import Evaluation, Settings
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 SHOWN = 3  # frames named where some are missing
 TITLES = {"": "against the data set", "_labels": "against --labels"}
-UNITS = {POSITION: ("m", "{:.4g} m"), ORIENTATION: ("deg", "{:.4g}°")}
 
 
 def rows_of(found: Evaluation) -> list[tuple[str, str, str, float]]:
     """Title, key in ``metrics``, format and factor of everything that is printed, in order."""
     rows = []
-    for name, title in ((POSITION, "position"), (ORIENTATION, "orientation")):
-        text = UNITS[name][1]
+    units = ((POSITION, "position", "{:.4g} m"), (ORIENTATION, "orientation", "{:.4g}°"))
+    for name, title, text in units:
         keys = {"median": name, "mean": MEANS[name], "RMSE": f"{name}_rmse", "max": f"{name}_max"}
         rows += [(f"{title}, {which}", key, text, 1.0) for which, key in keys.items()]
     rows += [(f"within {bound.title}", bound.name, "{:.1f} %", 100.0) for bound in BOUNDS]
@@ -105,3 +116,35 @@ def _cell(metrics: Metrics, key: str, text: str, factor: float) -> str:
         return shown
     ends = ("∞" if end is None else f"{factor * end:.4g}" for end in (low, high))
     return f"{shown} ({'–'.join(ends)})"
+
+
+COLOURS, DASHES = ("#0072B2", "#D55E00"), ("-", "--")
+LEAST = 1e-6  # where an error of nothing is drawn on a logarithmic axis
+
+
+def figure_of(title: str, found: Evaluation) -> Figure:
+    """Three panels: position, orientation, and both at once (x cm and x°)."""
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    figure = Figure(figsize=(11, 3.8), layout="constrained")
+    figure.suptitle(title, fontsize=10)
+    panels = figure.subplots(1, 3, sharey=True)
+    labels = ("position error (m)", "orientation error (°)", "both errors: below x cm and x°")
+    for end, colour, dash in zip(found.ends, COLOURS, DASHES, strict=False):
+        shown = found.errors[POSITION + end], found.errors[ORIENTATION + end]
+        for axes, values in zip(panels, (*shown, joint_error(found.errors, end)), strict=True):
+            error, percent = cumulative(np.maximum(values, LEAST))
+            axes.step(error, percent, dash, where="post", color=colour, label=TITLES[end])
+    for axes, label in zip(panels, labels, strict=True):
+        axes.set(xscale="log", ylim=(0, 101), xlabel=label)
+        axes.axhline(50, color="0.85", linewidth=0.8, zorder=0)
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.grid(axis="x", color="0.93")
+        axes.spines[["top", "right"]].set_visible(False)
+    panels[0].set_ylabel("frames with at most this error (%)")
+    if len(found.ends) > 1:
+        panels[0].legend(frameon=False, fontsize=8)
+    return figure

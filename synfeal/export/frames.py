@@ -125,7 +125,7 @@ def write_lines(path: Path, lines: Iterable[str]) -> None:
     path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
 
 
-def rewrite_depth(source: FrameFile, target: Path, units_per_m: int) -> float:
+def rewrite_depth(source: FrameFile, target: Path, units_per_m: int = 1000) -> float:
     """Write a depth image anew; returns the share of known depths that are too large for it.
 
     From a 16-bit PNG in millimetres, 0 or 65535 where there is no depth, to one of ``units_per_m``,

@@ -1,4 +1,4 @@
-"""What learned localizers read: ACE's scenes, and the tables of MS-Transformer.
+"""What is learned from: ACE's scenes, tables of MS-Transformer, Nerfstudio's ``transforms.json``.
 
 ACE: ``{train,test}/{rgb,poses,calibration}``, one file of each for a frame. Source: ``dataset.py``
 and ``datasets/setup_7scenes.py`` of nianticlabs/ace: files of a folder go together by their order;
@@ -10,14 +10,22 @@ MS-Transformer, and pose regressors that read the same format. Source:
 ``datasets/CameraPoseDataset.py`` of yolish/multi-scene-pose-transformer and the tables beside it:
 columns ``scene,split,seq,img_path,t1,t2,t3,q1,q2,q3,q4``, poses ``world_from_cam`` with quaternions
 ``wxyz``, image paths below the data set's directory. There is no camera in it.
+
+Nerfstudio. Source: its documentation, "Data conventions", and its data
+parser: cameras are x right, y up, z backward; the world has z up; the centre of the first pixel is
+at (0.5, 0.5); depth is in millimetres along the optical axis, 0 where there is none; the three
+lists of file names go together and evaluation during training reads ``val_filenames``.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
+from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.sevenscenes import pose_text
 from synfeal.errors import InputError
 from synfeal.export.frames import (
@@ -29,9 +37,8 @@ from synfeal.export.frames import (
     rewrite_depth,
     write_lines,
 )
+from synfeal.files import write_json
 from synfeal.geometry.poses import quat_wxyz_of
-
-UNITS_PER_M = 1000
 
 
 def export_ace(data: ExportSet, out: Path, place: Place) -> None:
@@ -54,7 +61,7 @@ def export_ace(data: ExportSet, out: Path, place: Place) -> None:
         write_lines(folder / "poses" / f"{_stem(frame)}.pose.txt", pose)
         write_lines(folder / "calibration" / f"{_stem(frame)}.calibration.txt", matrix)
         if data.has_depth:
-            rewrite_depth(frame.depth, folder / "depth" / f"{_stem(frame)}.depth.png", UNITS_PER_M)
+            rewrite_depth(frame.depth, folder / "depth" / f"{_stem(frame)}.depth.png")
 
 
 def _stem(frame: ExportFrame) -> str:
@@ -74,5 +81,37 @@ def export_mstransformer(data: ExportSet, out: Path, place: Place) -> None:
             place(frame.color, out / path)
             pose = (*frame.world_from_cam[:3, 3], *quat_wxyz_of(frame.world_from_cam))
             rows.append((data.path.resolve().name, split, frame.sequence, path, *pose))
-            table = pd.DataFrame(rows, columns=list(COLUMNS))
+        table = pd.DataFrame(rows, columns=list(COLUMNS))
         table.to_csv(out / f"{split}.csv", index=False, lineterminator="\n")
+
+
+# OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
+CAM_FROM_GL = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+def export_nerfstudio(data: ExportSet, out: Path, place: Place) -> None:
+    """Write ``transforms.json``, ``images/`` and, if there is depth, ``depth/``."""
+    frames = []
+    for frame in data.frames:
+        world_from_gl = frame.world_from_cam @ CAM_FROM_GL
+        entry = {"file_path": _image(frame), "transform_matrix": world_from_gl.tolist()}
+        place(frame.color, out / _image(frame))
+        if data.has_depth:
+            entry["depth_file_path"] = f"depth/{frame.sequence}/{frame.depth.name}"
+            rewrite_depth(frame.depth, out / entry["depth_file_path"])
+        frames.append(entry)
+    splits = {}
+    if data.has_splits:
+        train, test = ([_image(frame) for frame in data.of_split(s)] for s in ("train", "test"))
+        splits = {"train_filenames": train, "val_filenames": test, "test_filenames": test}
+    write_json(out / "transforms.json", {**_camera(data.camera), **splits, "frames": frames})
+
+
+def _image(frame: ExportFrame) -> str:
+    return f"images/{frame_name(frame)}"
+
+
+def _camera(camera: CameraConfig) -> dict[str, Any]:
+    names = ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+    numbers = dict(zip(names, (*camera.intrinsics, *camera.distortion), strict=True))
+    return {"camera_model": "OPENCV", "w": camera.width, "h": camera.height, **numbers}

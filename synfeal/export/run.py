@@ -9,12 +9,10 @@ from pathlib import Path
 from tqdm import tqdm
 
 from synfeal.dataset.archive import FrameFile, link_or_unpack
-from synfeal.dataset.directories import atomic_directory, refuse_existing
-from synfeal.export.colmap import export_colmap, export_hloc
 from synfeal.export.frames import ExportSet, Place, read_export_set
-from synfeal.export.learned import export_ace, export_mstransformer
-from synfeal.export.nerfstudio import export_nerfstudio
-from synfeal.export.tum import export_tum
+from synfeal.export.learned import export_ace, export_mstransformer, export_nerfstudio
+from synfeal.export.reconstruction import export_colmap, export_hloc, export_tum
+from synfeal.files import atomic_directory, refuse_existing
 
 Exporter = Callable[[ExportSet, Path, Place], None]
 

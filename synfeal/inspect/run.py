@@ -13,8 +13,7 @@ from jinja2 import Environment, PackageLoader
 from numpy.typing import NDArray
 
 from synfeal.config.models import SceneConfig
-from synfeal.dataset.directories import refuse_foreign
-from synfeal.files import atomic_path, write_json
+from synfeal.files import atomic_path, refuse_foreign, write_json
 from synfeal.inspect.facts import Inspection, facts_of
 from synfeal.inspect.picture import inside_views, picture_png, top_view
 from synfeal.inspect.text import Facts, Section, how_to_go_on, plain_text, sections_of

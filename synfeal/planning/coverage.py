@@ -17,7 +17,6 @@ from synfeal.files import write_json
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, load_collision_mesh
 from synfeal.planning.plan import sampling_boxes_of
-from synfeal.planning.sampling import pose_bounds
 from synfeal.planning.seen_surface import (
     FARTHEST_M,
     MOSTLY,
@@ -27,7 +26,7 @@ from synfeal.planning.seen_surface import (
     shown_frames,
 )
 from synfeal.planning.seen_surface import N_POINTS as N_SURFACE_POINTS
-from synfeal.planning.space import PoseSpace
+from synfeal.planning.space import PoseSpace, pose_bounds
 from synfeal.planning.start import ConnectedSpace, connected_space
 
 Array = NDArray[np.float64]

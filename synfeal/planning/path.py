@@ -1,4 +1,11 @@
-"""The frames of one straight path: section 3.3 of the paper."""
+"""The frames of straight paths, section 3.3 of the paper, and the stream their targets come from.
+
+Candidates are independent of the path they are drawn for. So they are drawn and their free views
+tested a block at a time, and paths are served in turn from one stream: a path tests several of the
+next rounds at once and takes the first with an admissible candidate; the next path goes on with the
+round after it. The numbers drawn, their order and what they are used for are those of drawing and
+testing one round at a time; the sizes of blocks and windows change the speed alone.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +14,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.config.models import CollectionConfig
+from synfeal.errors import InputError
 from synfeal.geometry.poses import interpolate, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
-from synfeal.planning.sampling import PoseVectors
+from synfeal.planning.space import PoseSpace, PoseVectors, farthest_admissible
+from synfeal.planning.start import connected_space
 
 Array = NDArray[np.float64]
 
@@ -55,3 +65,84 @@ def path_poses(
 def poses_of(vectors: PoseVectors) -> Array:
     """``world_from_cam`` (N, 4, 4) of pose vectors (N, 6)."""
     return pose_matrix(rotation_from_rpy(vectors[:, 3:]), vectors[:, :3])
+
+
+BLOCK = 4096  # candidates drawn at once; more gain nothing
+FIRST_WINDOW = 8  # candidates tested at once for a path; doubled while none is admissible
+
+
+class CandidateStream:
+    """Rounds of candidates in the order they are drawn."""
+
+    def __init__(self, space: PoseSpace, candidates: int) -> None:
+        """Draw rounds of ``candidates`` poses."""
+        self._space, self._candidates = space, candidates
+        self._poses = np.empty((0, candidates, 6))
+        self._has_view = np.empty((0, candidates), np.bool_)
+        self._at = 0
+
+    def next_target(
+        self, start: NDArray[np.float64], min_path_m: float, max_rounds: int
+    ) -> NDArray[np.float64] | None:
+        """The target (6,) of a path from ``start`` (6,): the first admissible round's farthest.
+
+        None if none of the next ``max_rounds`` rounds has an admissible candidate that is
+        ``min_path_m`` away.
+        """
+        tried, window = 0, max(1, FIRST_WINDOW // self._candidates)
+        while tried < max_rounds:
+            poses, has_view = self._ahead(min(window, max_rounds - tried))
+            found = farthest_admissible(self._space.caster, start, poses, has_view, min_path_m)
+            if found is not None:
+                self._at += found[0] + 1
+                target: NDArray[np.float64] = poses[found]
+                return target
+            self._at += len(poses)
+            tried += len(poses)
+            window *= 2
+        return None
+
+    def _ahead(self, count: int) -> tuple[PoseVectors, NDArray[np.bool_]]:
+        """The next rounds (R, k, 6), 1 to ``count``, and which have a free view (R, k)."""
+        if self._at == len(self._poses):
+            self._draw()
+        part = slice(self._at, self._at + count)
+        return self._poses[part], self._has_view[part]
+
+    def _draw(self) -> None:
+        """Replace the block, which is used up, by the next."""
+        rounds = max(1, BLOCK // self._candidates)
+        poses = self._space.sample(rounds * self._candidates)
+        has_view = self._space.has_free_view(poses)
+        self._poses = poses.reshape(rounds, self._candidates, 6)
+        self._has_view = has_view.reshape(rounds, self._candidates)
+        self._at = 0
+
+
+def independent_poses(space: PoseSpace, collection: CollectionConfig, n_frames: int) -> PoseVectors:
+    """Pose vectors (n_frames, 6), uniform among those with a free view in the connected space.
+
+    Every admissible candidate is kept, so a round of candidates gives as many frames as it has
+    admissible ones, and ``candidates`` does not change what is drawn. A shorter plan is a prefix
+    of a longer one.
+
+    Raises:
+        InputError: ``max_tries`` rounds of ``candidates`` in a row had no admissible pose.
+    """
+    tries = collection.max_tries
+    connected = connected_space(space, tries)
+    most_empty = -(-tries * collection.candidates // BLOCK)
+    kept: list[PoseVectors] = []
+    n_kept = n_empty = 0
+    while n_kept < n_frames:
+        poses = space.sample(BLOCK)
+        poses = poses[space.has_free_view(poses)]
+        kept.append(poses[connected.contains(poses[:, :3])])
+        n_kept += len(kept[-1])
+        n_empty = 0 if len(kept[-1]) else n_empty + 1
+        if n_empty >= most_empty:
+            raise InputError(
+                f"plan: no admissible pose among {n_empty * BLOCK} candidates; lower"
+                f" min_view_distance_m ({space.min_view_distance_m} m), or widen sampling_box"
+            )
+    return np.concatenate(kept)[:n_frames]

@@ -15,8 +15,7 @@ from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.mesh.checks import check_sampling_box
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, load_collision_mesh
-from synfeal.planning.candidates import CandidateStream, independent_poses
-from synfeal.planning.path import path_poses, poses_of
+from synfeal.planning.path import CandidateStream, independent_poses, path_poses, poses_of
 from synfeal.planning.repeat import repeated_poses
 from synfeal.planning.space import PoseSpace
 from synfeal.planning.start import sample_start

@@ -14,8 +14,8 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from synfeal.dataset.directories import atomic_directory
 from synfeal.errors import InputError
+from synfeal.files import atomic_directory
 from synfeal.report.html.provenance import hashes
 from synfeal.report.results import read_result, read_text
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import pandas as pd
 
 from synfeal.config.effects import CLEAN
-from synfeal.dataset.number_table import read_numbers
 from synfeal.errors import InputError
 from synfeal.frames import (
     COUNT,
@@ -18,6 +17,7 @@ from synfeal.frames import (
     TEXT,
     frame_of,
     read_frame,
+    read_numbers,
     records_of,
     rows_of,
     write_frame,

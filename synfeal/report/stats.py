@@ -12,7 +12,7 @@ import pandas as pd
 from pydantic import Field, FiniteFloat, NonNegativeInt
 from scipy.stats import binomtest, kendalltau
 
-from synfeal.dataset.number_table import read_numbers
+from synfeal.frames import read_numbers
 from synfeal.report.results import read_result, shaped
 
 MEASURES = ("position_m", "orientation_deg", "position_m_true", "orientation_deg_true")

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from synfeal.config.models import SceneConfig
-from synfeal.dataset.number_table import write_numbers
+from synfeal.frames import write_numbers
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, merge_vertices, simplify
-from synfeal.planning.questions import Questions, draw_questions
+from synfeal.planning.start import Questions, draw_questions
 
 SMALLEST = 100
 N_BISECTIONS = 4  # between two rungs, a factor of 2: the count is then settled to 4 %
@@ -64,7 +64,7 @@ def collision_mesh(
     # (2, 3) lower and upper corner of the space camera centres are sampled in
     box_m: NDArray[np.float64],
     min_agreement: float,  # least share of decisions that must be those of the full mesh
-    # draws the questions, see :func:`synfeal.planning.questions.draw_questions`
+    # draws the questions, see :func:`synfeal.planning.start.draw_questions`
     rng: np.random.Generator,
 ) -> tuple[Triangles, list[Rung]]:
     """The smallest mesh on which a planner decides as on ``mesh``, and how it was chosen.

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from synfeal.config.dataset import CameraConfig
 from synfeal.config.load import describe
-from synfeal.dataset.manifest import MANIFEST, sequence_sha256
+from synfeal.dataset.finish import MANIFEST, sequence_sha256
 from synfeal.errors import InputError, why
 from synfeal.files import read_json
 from synfeal.validation.listing import Check, SequenceListing

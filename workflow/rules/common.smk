@@ -35,7 +35,7 @@ from synfeal.dataset.sevenscenes import sequences_of
 from synfeal.effects.crowd import carton_files
 from synfeal.effects.light import GROUPS as LIGHT_GROUPS
 from synfeal.errors import InputError
-from synfeal.labels.errors import seed_names
+from synfeal.labels import seed_names
 from synfeal.provenance import config_hash
 from synfeal.report.predictions.restored import restored_files
 from synfeal.run_lock import begin_run

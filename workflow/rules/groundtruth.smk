@@ -20,7 +20,7 @@ use rule call as erroneous_labels with:
     benchmark:
         f"{ROOT}/benchmarks/labels/{ERRONEOUS}.tsv"
     params:
-        function="synfeal.labels.errors:write_erroneous_labels",
+        function="synfeal.labels:write_erroneous_labels",
         seed=lambda w: seed_of(
             CONFIG.seed, *seed_names(w.error_kind, w.split), w.scene, w.size
         ),

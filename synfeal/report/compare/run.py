@@ -10,8 +10,7 @@ from typing import Any
 import pandas as pd
 
 from synfeal.bootstrap import FEWEST_PATHS
-from synfeal.dataset.directories import refuse_foreign
-from synfeal.files import atomic_path, write_text
+from synfeal.files import atomic_path, refuse_foreign, write_text
 from synfeal.frames import write_frame
 from synfeal.report.compare.figure import comparison_figure
 from synfeal.report.compare.runs import KEY

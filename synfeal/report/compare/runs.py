@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.dataset.number_table import read_numbers
 from synfeal.dataset.pose_table import HEADER, whole_numbers
 from synfeal.errors import InputError
+from synfeal.frames import read_numbers
 from synfeal.report.stats import MEASURES, REMEDY, read_errors, read_metrics
 
 # What a run is, apart from its seed: the directories below ``runs``, in order.

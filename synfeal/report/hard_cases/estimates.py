@@ -17,12 +17,11 @@ from scipy.stats import kstest, norm
 
 from baselines.groundtruth.posegraph import optimise, toro
 from baselines.groundtruth.posegraph.graph import Edge, PoseGraph
-from synfeal import bootstrap
+from synfeal import bootstrap, labels
 from synfeal.config.models import PoseGraphConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import pose_matrix, relative
 from synfeal.geometry.rotations import rotation_angle_rad
-from synfeal.labels import noise
 from synfeal.report import stats
 from synfeal.report.hard_cases.exact import REFUSED, Trial, exact, mpf
 
@@ -171,7 +170,7 @@ def clean() -> PoseTable:
 
 
 def _noisy(noise_m: float, noise_deg: float) -> PoseTable:
-    return noise.add_noise(clean(), noise_m, noise_deg, np.random.default_rng(8))
+    return labels.add_noise(clean(), noise_m, noise_deg, np.random.default_rng(8))
 
 
 def _published_turns(noise_deg: float) -> PoseTable:

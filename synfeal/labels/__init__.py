@@ -1,1 +1,0 @@
-"""Label sets that differ from the true poses."""
