@@ -1,7 +1,6 @@
 """The contact sheets of variation.md: python docs/variation_sheets.py results/mini [NAME ...]"""
 
 import sys
-from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
 
@@ -13,10 +12,9 @@ from synfeal.config.collection import ClutterConfig
 from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.dataset.render_sequence import drawn
-from synfeal.effects.relight import LitRenderer, open_scene
+from synfeal.effects.scene import SceneRenderer, open_scene
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
-from synfeal.render import open_renderer
 from synfeal.scenes import large_room
 from synfeal.scenes.bake import light_shares
 from synfeal.scenes.objects import cluttered, save_cartons
@@ -75,14 +73,9 @@ def second_of(plan: PoseTable, path: int) -> list[int]:
 def row_of(mesh: TexturedMesh, poses: list[PoseTable], title: str, effects: EffectsConfig | None):
     """The frames side by side under a title (H, W, 3)."""
     through = (CAMERA, effects) if effects else None
-    with ExitStack() as opened:
-        renderer = opened.enter_context(open_renderer(mesh, CAMERA, RENDER))
-        if effects and effects.light and effects.light.states:
-            shares = {
-                group: opened.enter_context(open_renderer(shared, CAMERA, RENDER))
-                for group, shared in shares_of_the_room().items()
-            }
-            renderer = LitRenderer(renderer, shares)
+    switched = effects and effects.light and effects.light.states
+    shares = shares_of_the_room() if switched else None
+    with SceneRenderer(mesh, CAMERA, RENDER, shares) as renderer:
         frames = [rgb for pose in poses for rgb, _ in drawn(renderer, pose, False, through)]
     row = Image.new("RGB", (CAMERA.width * len(frames), CAMERA.height + TITLE_PX))
     row.paste(Image.fromarray(np.hstack(frames)), (0, TITLE_PX))

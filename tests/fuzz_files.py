@@ -25,7 +25,7 @@ from baselines.localizers.backbones.weights import load_backbone_weights
 from baselines.training.checkpoint import read_checkpoint
 from baselines.training.data import read_images
 from baselines.training.score import score_run
-from synfeal.camera.calibration_files import read_calibration
+from synfeal.camera.calibration import read_calibration
 from synfeal.config import Config, load_config, read_experiments
 from synfeal.config.models import CameraConfig, LocalizerConfig, NetworkConfig, RenderConfig
 from synfeal.dataset.packed import join_packed, pack_frames, read_packed, write_packed_record

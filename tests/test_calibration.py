@@ -11,9 +11,8 @@ import pycolmap
 import pytest
 import yaml
 
-from synfeal.camera.calibration import Calibration
-from synfeal.camera.calibration_files import read_calibration
-from synfeal.camera.rays import pixels_of_normalised
+from synfeal.camera.calibration import Calibration, read_calibration
+from synfeal.camera.projection import pixels_of_normalised
 from synfeal.config import load_config, parse_config, read_experiments
 from synfeal.config.load import merge, read_yaml
 from synfeal.config.models import CameraConfig

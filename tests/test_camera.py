@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from baselines.groundtruth.sfm.batch import colmap_parameters
 from synfeal.camera.distortion import distort, fold_radius, undistort
-from synfeal.camera.rays import normalised_of_pixels, pixels_of_normalised
+from synfeal.camera.projection import normalised_of_pixels, pixels_of_normalised
 from synfeal.config.models import CameraConfig
 
 LENSES = {

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from synfeal.dataset import render_pool
-from synfeal.effects import relight
+from synfeal.effects import scene
 from synfeal.render import open_renderer
 from synfeal.run_lock import only_command
 from tests.collected import collect, command, only_error, save_room, tree_of
@@ -35,17 +35,14 @@ class Interrupting:
         self.count += 1
         return self.real.render_rgbd(world_from_cam)
 
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
+    def close(self):
         self.real.close()
 
 
 def interrupted(mesh, out, limit=13):
     """The unfinished directory of a collection that stopped after some frames."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(relight, "open_renderer", Interrupting(limit).open)
+        patch.setattr(scene, "open_renderer", Interrupting(limit).open)
         assert collect(mesh, out, "--depth") == 130
     return out.with_name(f"{out.name}.part")
 
@@ -59,7 +56,7 @@ def test_ctrl_c_keeps_whole_sequences_and_says_how_to_go_on(mesh, calm, tmp_path
     (part / ".manifest-12345678.json").write_text("half a mani")
     renderer = Interrupting(100)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(relight, "open_renderer", renderer.open)
+        patch.setattr(scene, "open_renderer", renderer.open)
         assert collect(mesh, tmp_path / "set", "--depth") == 0
     assert renderer.count == 32 - 10
     assert tree_of(tmp_path / "set") == tree_of(calm)

@@ -6,7 +6,7 @@ import pytest
 import trimesh
 from scipy.ndimage import map_coordinates
 
-from synfeal.camera.rays import normalised_of_pixels
+from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_matrix

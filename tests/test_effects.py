@@ -17,10 +17,16 @@ from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.dataset.render_sequence import drawn, effects_of
 from synfeal.dataset.sevenscenes import frame_paths, read_split
-from synfeal.effects.camera import AutoExposure, channel_gains, with_noise
-from synfeal.effects.light import GROUPS, drawn_light
-from synfeal.effects.relight import open_scene
-from synfeal.effects.transfer import light_of, rgb_of
+from synfeal.effects.light import (
+    GROUPS,
+    AutoExposure,
+    channel_gains,
+    drawn_light,
+    light_of,
+    rgb_of,
+    with_noise,
+)
+from synfeal.effects.scene import open_scene
 from synfeal.errors import InputError
 from synfeal.files import file_sha256, read_json
 from synfeal.geometry.poses import pose_matrix, quat_wxyz_of

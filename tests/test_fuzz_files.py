@@ -11,10 +11,10 @@ import yaml
 
 from baselines.groundtruth.batches import BatchTrajectory, write_trajectory
 from baselines.groundtruth.chain import chain_split
-from synfeal.camera.calibration_files import PlainLoader
 from synfeal.config.models import GroundTruthConfig
 from synfeal.dataset.pose_table import read_frames, write_pose_table
 from synfeal.errors import InputError
+from synfeal.files import PlainLoader
 from tests.fuzz_files import KINDS
 from tests.fuzzing import damages, json_damages, little_memory, problem_with, put, text_damages
 from tests.planar_scene import straight_path

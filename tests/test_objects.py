@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 from synfeal.config.models import EffectsConfig, RenderConfig
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.sevenscenes import frame_paths, read_split
-from synfeal.effects.crowd import crowd_of
+from synfeal.effects.scene import crowd_of
 from synfeal.files import file_sha256, read_json
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb

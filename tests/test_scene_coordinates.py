@@ -13,7 +13,7 @@ from baselines.references.scene_coordinates import (
     poses_of,
     world_points,
 )
-from synfeal.camera.rays import normalised_of_pixels
+from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error

@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from baselines.groundtruth.images import read_image
 from baselines.references.arrays import Stored
-from synfeal.camera.rays import normalised_of_pixels
+from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.models import CameraConfig, ReferencesConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.sevenscenes import frame_paths, read_depth_m

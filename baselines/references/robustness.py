@@ -29,7 +29,7 @@ from synfeal.config.effects import CLEAN
 from synfeal.config.models import CameraConfig, ReferencesConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.render_sequence import drawn, effects_of
-from synfeal.effects.relight import open_scene
+from synfeal.effects.scene import open_scene
 from synfeal.evaluation.metrics import pose_errors, summary
 from synfeal.frames import COUNT, MAYBE, TEXT, frame_of
 

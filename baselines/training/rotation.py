@@ -17,7 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from baselines.training.checkpoint import FrameCamera, frame_camera
-from synfeal.camera.intrinsics import Intrinsics
+from synfeal.camera.projection import Intrinsics
 from synfeal.config.models import AugmentationConfig, NetworkConfig
 from synfeal.dataset.packed import crop_of
 from synfeal.errors import InputError

@@ -1,9 +1,43 @@
-"""A camera as a calibration tool found it, whatever the file it came in."""
+"""A camera as a calibration tool found it: files of OpenCV (YAML, JSON), ROS and COLMAP (text).
+
+OpenCV and ROS put the centre of the first pixel at (0, 0); :class:`Calibration` and COLMAP at
+(0.5, 0.5).
+"""
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from json import JSONDecodeError
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from synfeal.errors import InputError, why
+from synfeal.files import PlainLoader
+
+# Names under which the same thing is found; the first is the one that messages give.
+MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "mtx")
+COEFFICIENTS = (
+    *("distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs"),
+    *("dist_coeff", "D", "dist"),
+)
+SIZE = ("image_size", "imageSize")
+# What the models of ROS are called whose first five coefficients are OpenCV's.
+MODELS = ("plumb_bob", "rational_polynomial")
+
+# COLMAP's camera models: the names of their parameters in order.
+COLMAP_MODELS = {
+    "SIMPLE_PINHOLE": ("f", "cx", "cy"),
+    "PINHOLE": ("fx", "fy", "cx", "cy"),
+    "SIMPLE_RADIAL": ("f", "cx", "cy", "k1"),
+    "RADIAL": ("f", "cx", "cy", "k1", "k2"),
+    "OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"),
+    "FULL_OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+}
 
 Distortion = tuple[float, float, float, float, float]
 
@@ -60,13 +94,157 @@ class Calibration:
                 f"is of {self.width}x{self.height}, which does not scale to"
                 f" {width}x{height}; {width}x{kept} keeps the aspect ratio"
             )
-        along_x, along_y = width / self.width, height / self.height
-        return replace(
-            self,
-            width=width,
-            height=height,
-            fx=self.fx * along_x,
-            fy=self.fy * along_y,
-            cx=self.cx * along_x,
-            cy=self.cy * along_y,
+        x, y = width / self.width, height / self.height
+        scaled = (x * self.fx, y * self.fy, x * self.cx, y * self.cy)
+        return Calibration(width, height, *scaled, self.distortion)
+
+
+class _Loader(PlainLoader):
+    """The same, and OpenCV's matrices as mappings."""
+
+
+_MATRIX_TAG = "tag:yaml.org,2002:opencv-matrix"
+_Loader.add_constructor(_MATRIX_TAG, _Loader.construct_yaml_map)  # type: ignore[type-var]
+
+
+def read_calibration(path: Path) -> Calibration:
+    """The camera in a file; the format goes by the ending: .yaml, .yml, .json or .txt.
+
+    Raises:
+        InputError: the file is missing, is of another format, or holds no camera that can be used;
+            the message names file and field.
+    """
+    readers = {".yaml": _from_yaml, ".yml": _from_yaml, ".txt": _from_colmap}
+    readers[".json"] = lambda text: _from_mapping(json.loads(text))
+    try:
+        if path.suffix.lower() not in readers:
+            raise ValueError(_unknown(path))
+        return readers[path.suffix.lower()](path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError, JSONDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as a calibration ({why(error)})") from None
+    except ValueError as error:
+        raise InputError(f"{path}: {why(error)}") from None
+
+
+def _unknown(path: Path) -> str:
+    if path.suffix.lower() == ".bin":
+        return (
+            "COLMAP's binary format is not read; convert the folder it is in: colmap"
+            " model_converter --input_path IN --output_path OUT --output_type TXT, and take"
+            " OUT/cameras.txt"
         )
+    return (
+        "is no calibration file: OpenCV's or ROS's end in .yaml, .yml or .json, COLMAP's is"
+        " cameras.txt"
+    )
+
+
+def _from_yaml(text: str) -> Calibration:
+    if text.startswith("%YAML:"):  # OpenCV's header, which YAML has no name for
+        text = text.partition("\n")[2]
+    return _from_mapping(yaml.load(text, _Loader))  # noqa: S506 (a SafeLoader)
+
+
+def _from_mapping(values: Any) -> Calibration:
+    """What OpenCV and ROS write, as plain values."""
+    if not isinstance(values, Mapping):
+        raise ValueError(f"must hold a mapping of keys, found {_shortened(values)}")
+    model = values.get("distortion_model", MODELS[0])
+    if model not in MODELS:
+        raise ValueError(
+            f"distortion_model: {_shortened(model)} is not supported, only {' and '.join(MODELS)}"
+        )
+    fx, skew, cx, zero, fy, cy, *last = matrix = _numbers(values, MATRIX, (9,))
+    if (skew, zero, *last) != (0.0, 0.0, 0.0, 0.0, 1.0):
+        raise ValueError(
+            f"{MATRIX[0]}: must be fx 0 cx, 0 fy cy, 0 0 1 without skew, found {matrix}"
+        )
+    size = _size(values)
+    distortion = _five(COEFFICIENTS[0], _numbers(values, COEFFICIENTS, (4, 5, 8, 12, 14)))
+    return Calibration(*size, fx, fy, cx + 0.5, cy + 0.5, distortion)
+
+
+def _size(values: Mapping[str, Any]) -> tuple[int, int]:
+    if any(name in values for name in SIZE):
+        width, height = _numbers(values, SIZE, (2,))
+        return _side(SIZE[0], width), _side(SIZE[0], height)
+    width, height = (_numbers(values, (name,), (1,))[0] for name in ("image_width", "image_height"))
+    return _side("image_width", width), _side("image_height", height)
+
+
+def _numbers(values: Mapping[str, Any], names: Sequence[str], counts: Sequence[int]) -> list[float]:
+    """The numbers under the first of ``names`` that is there: a list of one of ``counts``."""
+    name = next((name for name in names if name in values), None)
+    if name is None:
+        raise ValueError(f"{names[0]}: missing")
+    held = values[name]
+    if isinstance(held, Mapping):  # OpenCV and ROS: rows, cols, data
+        held = held.get("data")
+    try:
+        numbers = list(_flattened(held))
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name}: must hold numbers, found {_shortened(held)}") from None
+    if len(numbers) not in counts:
+        allowed = " or ".join(map(str, counts))
+        raise ValueError(f"{name}: must hold {allowed} numbers, found {len(numbers)}")
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{name}: must hold finite numbers, found {_shortened(numbers)}")
+    return numbers
+
+
+def _flattened(held: Any) -> Iterator[float]:
+    """Numbers of nested lists in order; YAML reads some numbers, such as 1e5, as text."""
+    if isinstance(held, list):
+        for item in held:
+            yield from _flattened(item)
+    elif isinstance(held, bool):
+        raise TypeError(held)
+    else:
+        yield float(held)
+
+
+def _side(name: str, value: float) -> int:
+    if not (value >= 1 and value == int(value)):
+        raise ValueError(f"{name}: must be a whole number of pixels, found {value:g}")
+    return int(value)
+
+
+def _five(name: str, found: Sequence[float]) -> Distortion:
+    """The first five coefficients, k1, k2, p1, p2 and k3; the others must be 0."""
+    if any(found[5:]):
+        raise ValueError(
+            f"{name}: only k1, k2, p1, p2 and k3 are supported, and {list(found[5:])} are not 0;"
+            " calibrate without the rational, thin prism and tilted models"
+        )
+    k1, k2, p1, p2, k3 = [*found, 0.0][:5]
+    return k1, k2, p1, p2, k3
+
+
+def _from_colmap(text: str) -> Calibration:
+    """COLMAP's table of cameras: CAMERA_ID MODEL WIDTH HEIGHT PARAMS[], which holds one."""
+    rows = [line.split() for line in text.splitlines() if not line.lstrip().startswith("#")]
+    rows = [row for row in rows if row]
+    if len(rows) > 1:
+        raise ValueError(
+            f"holds {len(rows)} cameras; keep the line of the one you want in a file of its own"
+        )
+    if not rows or len(rows[0]) < 4:
+        raise ValueError("must hold one line with CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]")
+    _, model, width, height, *parameters = rows[0]
+    if model not in COLMAP_MODELS:
+        raise ValueError(
+            f"MODEL: {_shortened(model)} is not supported, only {', '.join(COLMAP_MODELS)}"
+        )
+    names = COLMAP_MODELS[model]
+    values = {"WIDTH": width, "HEIGHT": height, "PARAMS": parameters}
+    w, h = (_side(name, *_numbers(values, (name,), (1,))) for name in ("WIDTH", "HEIGHT"))
+    held = dict(zip(names, _numbers(values, ("PARAMS",), (len(names),)), strict=True))
+    order = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+    distortion = _five("PARAMS", [held.get(name, 0.0) for name in order])
+    fx, fy = (held[name if name in held else "f"] for name in ("fx", "fy"))
+    return Calibration(w, h, fx, fy, held["cx"], held["cy"], distortion)
+
+
+def _shortened(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:60]}..."

@@ -24,7 +24,7 @@ from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_ta
 from synfeal.dataset.render_pool import Studio, render_sequences
 from synfeal.dataset.render_sequence import Progress, resolved
 from synfeal.dataset.sevenscenes import Split, sequences_of
-from synfeal.effects.crowd import crowd_of
+from synfeal.effects.scene import crowd_of
 from synfeal.errors import InputError
 from synfeal.files import write_json
 from synfeal.mesh.checks import shows_one_colour

@@ -11,11 +11,10 @@ import numpy as np
 
 from synfeal.config.models import CameraConfig, CollectionConfig, RenderConfig, SceneConfig
 from synfeal.dataset.render_sequence import write_sequence
+from synfeal.effects.scene import open_scene
 from synfeal.files import write_json
-from synfeal.mesh.load import load_mesh
 from synfeal.planning.plan import plan_scene
 from synfeal.provenance import CPU_INFO, processor_name
-from synfeal.render import open_renderer
 
 # What the published code renders.
 CAMERA = CameraConfig(width=640, height=480)
@@ -42,7 +41,7 @@ def write_collection_speed(
     seconds = []
     with (
         tempfile.TemporaryDirectory(dir=out_speed.parent) as folder,
-        open_renderer(load_mesh(mesh), CAMERA, render) as renderer,
+        open_scene(mesh, CAMERA, render) as renderer,
     ):
         for part, rows in enumerate(np.array_split(np.arange(FRAMES), PARTS)):
             began = time.perf_counter()

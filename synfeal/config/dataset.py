@@ -8,9 +8,8 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from synfeal.camera.calibration_files import read_calibration
-from synfeal.camera.intrinsics import Intrinsics
-from synfeal.camera.rays import refuse_fold
+from synfeal.camera.calibration import read_calibration
+from synfeal.camera.projection import Intrinsics, refuse_fold
 from synfeal.config.collection import (
     Channel,
     CollectionConfig,

@@ -12,10 +12,10 @@ from typing import Any, get_args, get_origin
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from synfeal.camera.calibration_files import PlainLoader
 from synfeal.config.collection import SceneConfig
 from synfeal.config.models import Config
 from synfeal.errors import InputError, why
+from synfeal.files import PlainLoader
 
 
 def parse_config(raw: Mapping[str, Any], origin: str = "config") -> Config:

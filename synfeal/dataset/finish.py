@@ -15,7 +15,7 @@ from synfeal.dataset.pose_table import read_frames, read_pose_table, write_pose_
 from synfeal.dataset.preview import write_contact_sheet
 from synfeal.dataset.sevenscenes import Sequence as Shard
 from synfeal.dataset.sevenscenes import Split, frame_paths, sequences_of, write_splits
-from synfeal.effects.crowd import crowd_of
+from synfeal.effects.scene import crowd_of
 from synfeal.files import file_sha256, read_json, write_json
 from synfeal.frames import write_frame
 from synfeal.provenance import frame_versions
@@ -89,7 +89,7 @@ def _write_effects(directory: Path, origin: Mapping[str, Any], mesh: Path) -> di
     settings = origin["render"].get("effects")
     if settings is None:
         return {}
-    from synfeal.effects.table import effects_table, objects_table  # pandas takes time to load
+    from synfeal.effects.apply import effects_table, objects_table  # pandas takes time to load
 
     effects, hashes = EffectsConfig(**settings), {}
     crowd = crowd_of(mesh, RenderConfig(effects=effects))

@@ -18,9 +18,8 @@ from typing import Any
 from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.render_sequence import Progress, effects_of, write_sequence
-from synfeal.effects.relight import open_scene
+from synfeal.effects.scene import SceneRenderer, open_scene
 from synfeal.errors import InputError
-from synfeal.render.base import Renderer
 
 POLL_S = 0.2
 Task = tuple[Path, PoseTable]  # `seq-01` or `seq-01.zip`, and its poses
@@ -35,11 +34,13 @@ class Studio:
     render: RenderConfig
     with_depth: bool
 
-    def open(self) -> Renderer:
+    def open(self) -> SceneRenderer:
         """A renderer."""
         return open_scene(self.mesh, self.camera, self.render)
 
-    def carry_out(self, renderer: Renderer, task: Task, on_frame: Callable[[], object]) -> float:
+    def carry_out(
+        self, renderer: SceneRenderer, task: Task, on_frame: Callable[[], object]
+    ) -> float:
         """Render a sequence; seconds it took."""
         began, (out, poses) = time.perf_counter(), task
         effects = effects_of(self.camera, self.render)

@@ -24,9 +24,9 @@ from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable, read_frames
 from synfeal.dataset.sevenscenes import depth_mm_of, pose_text
 from synfeal.effects.apply import Frame, varied_frames
-from synfeal.effects.relight import open_scene
+from synfeal.effects.scene import SceneRenderer, open_scene
 from synfeal.files import atomic_directory, refuse_existing, write_json, writing_to
-from synfeal.render.base import Depth, Renderer, Rgb
+from synfeal.render.base import Depth, Rgb
 from synfeal.render.choose import fastest_working
 
 
@@ -90,7 +90,7 @@ MOST_WAITING = 2 * THREADS  # frames in memory, whatever the length of the seque
 
 
 def write_sequence(
-    renderer: Renderer,
+    renderer: SceneRenderer,
     poses: PoseTable,
     out: Path,
     with_depth: bool,
@@ -130,7 +130,7 @@ def _write_frame(
 
 
 def drawn(
-    renderer: Renderer, poses: PoseTable, with_depth: bool, effects: Effects | None
+    renderer: SceneRenderer, poses: PoseTable, with_depth: bool, effects: Effects | None
 ) -> Iterator[Frame]:
     """Colours, and depth if it is asked for, of every pose: all frames of data sets come from here.
 

@@ -7,29 +7,42 @@ at the frames before it, and with auto-exposure draws them.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.camera.rays import cell_directions
+from synfeal.camera.projection import cell_directions
+from synfeal.config.effects import MotionBlurConfig
 from synfeal.config.models import CameraConfig, EffectsConfig
-from synfeal.effects.camera import AutoExposure, channel_gains, compressed, with_noise
-from synfeal.effects.crowd import CrowdedRenderer
-from synfeal.effects.light import LightState, drawn_light
-from synfeal.effects.relight import LitRenderer
-from synfeal.effects.transfer import Light, light_of, rgb_of
+from synfeal.effects.light import (
+    AutoExposure,
+    Light,
+    LightState,
+    channel_gains,
+    compressed,
+    drawn_light,
+    light_of,
+    rgb_of,
+    with_noise,
+)
+from synfeal.effects.scene import Crowd, SceneRenderer
 from synfeal.geometry.poses import interpolate
-from synfeal.render.base import Depth, Renderer, Rgb
+from synfeal.render.base import Depth, Rgb
 from synfeal.seeds import generator_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 EFFECTS = (
     *("light", "motion_blur", "exposure", "noise", "white_balance_k", "jpeg_quality"),
     "clutter",  # last: what was drawn before there was it stays the same
 )
+# The middle of an object's bottom in the world, and its size before it is turned, metres.
+PLACE = ("x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m")
 Frame = tuple[Rgb, Depth | None]
 
 
@@ -79,7 +92,7 @@ def _generator(what: str, config: EffectsConfig, poses: Poses, row: int) -> np.r
 
 
 def varied_frames(
-    renderer: Renderer,  # of the scene, through ``camera``
+    renderer: SceneRenderer,  # through ``camera``
     camera: CameraConfig,  # whose frames they are
     config: EffectsConfig,  # what is added
     poses: Poses,  # whole paths
@@ -90,91 +103,68 @@ def varied_frames(
     """Draw the rows ``begin`` to ``end`` (exclusive) of ``poses`` with effects."""
     for first, last in paths_of(poses):
         if first < end and last > begin:
-            with _world_of(renderer, config, poses, first, last) as world:
-                path = _Path(world, camera, config, poses, first, last)
+            own = path_effects(config, poses, first)
+            world: AbstractContextManager[SceneRenderer] = nullcontext(renderer)
+            if own.clutter is not None:
+                rng = _generator("clutter", own, poses, first)
+                world = renderer.along(poses.position_m[first:last], rng)
+            with world as drawer:
+                path = _Path(drawer, camera, own, poses, first, last)
                 yield from path.frames(max(begin, first), min(end, last), with_depth)
-
-
-@contextmanager
-def _world_of(
-    renderer: Renderer, config: EffectsConfig, poses: Poses, first: int, last: int
-) -> Iterator[Renderer]:
-    """What a path is drawn by: with objects that stand about, a renderer of its own."""
-    if path_effects(config, poses, first).clutter is None:
-        yield renderer
-        return
-    if not isinstance(renderer, CrowdedRenderer):
-        raise TypeError("clutter: the renderer must come from open_scene")
-    with renderer.along(poses.position_m[first:last], crowd_generator(config, poses, first)) as own:
-        yield own
-
-
-def crowd_generator(config: EffectsConfig, poses: Poses, first: int) -> np.random.Generator:
-    """What places of objects along the path that begins at row ``first`` are drawn from."""
-    return _generator("clutter", config, poses, first)
 
 
 @dataclass(frozen=True)
 class _Path:
-    """The rows ``first`` to ``last`` (exclusive) of poses, and what draws them."""
+    """The rows ``first`` to ``last`` (exclusive) of poses, what draws them, and what acts."""
 
-    renderer: Renderer
+    renderer: SceneRenderer
     camera: CameraConfig
-    whole: EffectsConfig
+    config: EffectsConfig
     poses: Poses
     first: int
     last: int
 
+    @cached_property
+    def _light(self) -> LightState | None:
+        return path_light(self.config, self.poses, self.first)
+
+    @cached_property
+    def _world_from_cam(self) -> NDArray[np.float64]:
+        return self.poses.world_from_cam
+
     def frames(self, begin: int, end: int, with_depth: bool) -> Iterator[Frame]:
         """The frames of some rows, with those before them for auto-exposure alone."""
-        config = path_effects(self.whole, self.poses, self.first)
-        light = path_light(config, self.poses, self.first)
-        meter = AutoExposure(config.exposure) if config.exposure else None
+        meter = AutoExposure(self.config.exposure) if self.config.exposure else None
         lagging = meter is not None and meter.lags
-        world_from_cam = self.poses.world_from_cam
         for row in range(self.first if lagging else begin, end):
-            seen, depth_m = self._seen(world_from_cam, row, config, light, with_depth)
+            seen, depth_m = self._seen(row, with_depth)
             if meter is not None:
-                seen *= np.float32(2.0 ** meter.next_ev(seen, self._seconds(row, config)))
+                seen *= np.float32(2.0 ** meter.next_ev(seen, self._seconds(row)))
             if row >= begin:
-                yield self._taken(seen, row, config), depth_m
+                yield self._taken(seen, row), depth_m
 
-    def _seen(
-        self,
-        world_from_cam: NDArray[np.float64],
-        row: int,
-        config: EffectsConfig,
-        light: LightState | None,
-        with_depth: bool,
-    ) -> tuple[Light, Depth | None]:
+    def _seen(self, row: int, with_depth: bool) -> tuple[Light, Depth | None]:
         """Light (H, W, 3) that reaches the sensor, and depth where it is needed."""
-        pose, depth_m = world_from_cam[row], None
+        pose, light, depth_m = self._world_from_cam[row], self._light, None
         if with_depth or (light is not None and light.amplitude_ev):
             rgb, depth_m = self.renderer.render_rgbd(pose)
-        seconds = self._seconds(row, config)
-        if config.motion_blur is None or not seconds:
-            seen = light_of(rgb if depth_m is not None else self.renderer.render(pose))
+        if self.config.motion_blur is not None and self._seconds(row):
+            seen = self._blurred(row, self.config.motion_blur)
         else:
-            seen = self._blurred(world_from_cam, row, config)
+            seen = light_of(rgb if depth_m is not None else self.renderer.render(pose))
         if light is not None:
             seen *= light.gains
             if light.weights is not None:
-                if not isinstance(self.renderer, LitRenderer):
-                    raise TypeError("light.states: the renderer must come from open_scene")
                 seen *= self.renderer.left(pose, light.weights)
             if light.amplitude_ev and depth_m is not None:
                 seen *= light.field(self._points_m(pose, depth_m))[..., None]
         return seen, depth_m if with_depth else None
 
-    def _blurred(
-        self, world_from_cam: NDArray[np.float64], row: int, config: EffectsConfig
-    ) -> Light:
+    def _blurred(self, row: int, blur: MotionBlurConfig) -> Light:
         """The mean light of sub-frames, midpoints of equal parts of the exposure."""
-        blur = config.motion_blur
-        assert blur is not None
-        count, before = blur.subframes, self._neighbour(row)
-        share = min(1.0, blur.exposure_s / self._seconds(row, config))
-        ends = world_from_cam[before], world_from_cam[row]
+        count = blur.subframes
+        share = min(1.0, blur.exposure_s / self._seconds(row))
+        ends = self._world_from_cam[self._neighbour(row)], self._world_from_cam[row]
         at = share * ((np.arange(count) + 0.5) / count - 0.5)
         # From the frame before to this one is 0 to 1; on a path's first frame, 0 to -1.
         moved = interpolate(*ends, 1 + at)
@@ -188,11 +178,11 @@ class _Path:
         """The row of the path that movement is measured from."""
         return row - 1 if row > self.first else min(row + 1, self.last - 1)
 
-    def _seconds(self, row: int, config: EffectsConfig) -> float:
+    def _seconds(self, row: int) -> float:
         """Time between a frame and its neighbour; 0 where the camera does not move."""
         position_m = self.poses.position_m
         step_m = np.linalg.norm(position_m[row] - position_m[self._neighbour(row)])
-        return float(step_m) / config.speed_m_s
+        return float(step_m) / self.config.speed_m_s
 
     def _points_m(self, pose: NDArray[np.float64], depth_m: Depth) -> NDArray[np.float32]:
         """Where pixels look (H, W, 3); beyond the far plane nothing is."""
@@ -206,14 +196,45 @@ class _Path:
         size = self.camera.width, self.camera.height
         return cell_directions(self.camera, *size).astype(np.float32)
 
-    def _taken(self, light: Light, row: int, config: EffectsConfig) -> Rgb:
+    def _taken(self, light: Light, row: int) -> Rgb:
         """What the camera makes of light (H, W, 3) that reaches its sensor."""
+        config = self.config
         if config.noise is not None:
             rng = _generator("noise", config, self.poses, row)
             light = with_noise(light, config.noise, rng)
         if config.white_balance_k is not None:
             light /= channel_gains(config.white_balance_k)
         rgb = rgb_of(light)
-        if config.jpeg_quality is not None:
-            rgb = compressed(rgb, config.jpeg_quality)
-        return rgb
+        return rgb if config.jpeg_quality is None else compressed(rgb, config.jpeg_quality)
+
+
+def effects_table(config: EffectsConfig, poses: Poses) -> pd.DataFrame:
+    """What acts on each path and in which light, as columns; one row a path."""
+    import pandas as pd  # takes time to load
+
+    rows = []
+    for first, last in paths_of(poses):
+        own = path_effects(config, poses, first)
+        light = path_light(own, poses, first)
+        acts = {name: int(getattr(own, name) is not None) for name in EFFECTS}
+        state = {}
+        if light is not None:
+            state = {"lights": light.state, "ev": light.ev, "temperature_k": light.temperature_k}
+        rows.append({"path": poses.path[first], "frames": last - first, **acts, **state})
+    return pd.DataFrame(rows)
+
+
+def objects_table(config: EffectsConfig, poses: Poses, crowd: Crowd) -> pd.DataFrame:
+    """What stands along each path and where, as columns; one row an object."""
+    import pandas as pd
+
+    rows = []
+    for first, last in paths_of(poses):
+        if path_effects(config, poses, first).clutter is None:
+            continue
+        rng = _generator("clutter", config, poses, first)
+        for place in crowd.along(poses.position_m[first:last], rng)[1]:
+            corners = dict(zip(PLACE, [*place["position_m"], *place["size_m"]], strict=True))
+            about = {"name": place["name"], **corners, "yaw_deg": place["yaw_deg"]}
+            rows.append({"path": poses.path[first], **about})
+    return pd.DataFrame(rows, columns=["path", "name", *PLACE, "yaw_deg"])

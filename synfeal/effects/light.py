@@ -1,15 +1,34 @@
-"""The light of a path: brightness, colour temperature, and a smooth change across the scene."""
+"""Light of a path, and what a camera makes of it: all in linear light, between sRGB files.
+
+The transfer function of the files is that of IEC 61966-2-1, by tables.
+"""
 
 from __future__ import annotations
 
+import io
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
+from trimesh.visual.color import linear_to_srgb, srgb_to_linear
 
-from synfeal.config.effects import LightConfig
-from synfeal.effects.camera import channel_gains
-from synfeal.effects.transfer import Light
+from synfeal.config.effects import ExposureConfig, LightConfig, NoiseConfig
+
+Light = NDArray[np.float32]
+Rgb = NDArray[np.uint8]
+STEPS = 2**15 - 1  # of light: less than a tenth of a level of the file even where it is darkest
+
+_LIGHT: Light = srgb_to_linear(np.arange(256) / 255).astype(np.float32)
+_LEVEL: Rgb = np.round(255 * linear_to_srgb(np.arange(STEPS + 1) / STEPS)).astype(np.uint8)
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of linear sRGB
+DAYLIGHT_K = 6500.0
+_RGB_FROM_XYZ = np.array(
+    [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
+)
+DARKEST = 1e-4  # mean light that auto-exposure takes black frames for
 
 WAVES = 6
 GROUPS = ("ambient", "lamps", "daylight")
@@ -21,6 +40,42 @@ STATES: dict[str, tuple[float, float, float]] = {
     "dusk": (0.25, 1.0, 0.15),
     "night": (0.05, 0.1, 0.0),
 }
+
+
+def light_of(rgb: Rgb) -> Light:
+    """Light (...), white is 1, of what files hold (...)."""
+    return np.asarray(np.take(_LIGHT, rgb))
+
+
+def rgb_of(light: Light) -> Rgb:
+    """What files hold (...) of light (...); what is beyond white is white."""
+    step = np.clip(light * np.float32(STEPS) + np.float32(0.5), 0, STEPS).astype(np.uint16)
+    return np.asarray(np.take(_LEVEL, step))
+
+
+def channel_gains(temperature_k: float) -> Light:
+    """What light of a colour temperature does to red, green and blue (3,) beside that of 6500 K.
+
+    The Planckian locus by Kim et al.'s cubic splines (US patent 7,024,034), 1667 to 25,000 K.
+    """
+    gains = _planckian(temperature_k) / _planckian(DAYLIGHT_K)
+    return np.asarray(gains / (LUMINANCE @ gains), np.float32)
+
+
+def _planckian(temperature_k: float) -> NDArray[np.float64]:
+    """Linear sRGB (3,) of a black body, luminance 1."""
+    inverse = 1e3 / temperature_k
+    if temperature_k <= 4000:
+        x = np.polyval([-0.2661239, -0.2343589, 0.8776956, 0.179910], inverse)
+    else:
+        x = np.polyval([-3.0258469, 2.1070379, 0.2226347, 0.240390], inverse)
+    if temperature_k <= 2222:
+        y = np.polyval([-1.1063814, -1.34811020, 2.18555832, -0.20219683], x)
+    elif temperature_k <= 4000:
+        y = np.polyval([-0.9549476, -1.37418593, 2.09137015, -0.16748867], x)
+    else:
+        y = np.polyval([3.0817580, -5.87338670, 3.75112997, -0.37001483], x)
+    return np.asarray(_RGB_FROM_XYZ @ [x / y, 1.0, (1 - x - y) / y])
 
 
 @dataclass(frozen=True)
@@ -64,3 +119,55 @@ def drawn_light(config: LightConfig, rng: np.random.Generator) -> LightState:
     vectors = ways * (2 * np.pi / lengths_m[:, None])
     state = config.states[int(rng.integers(len(config.states)))] if config.states else None
     return LightState(ev, 1e6 / mired, vectors, phases, amplitude, state)
+
+
+class AutoExposure:
+    """A first-order lag in stops behind what the frames before were metered at."""
+
+    def __init__(self, config: ExposureConfig) -> None:
+        self._config = config
+        self._goal_ev: float | None = None
+        self._ev = 0.0
+
+    @property
+    def lags(self) -> bool:
+        """Whether a frame depends on those before it."""
+        return self._config.time_constant_s is not None
+
+    def next_ev(self, light: Light, since_s: float) -> float:
+        """Exposure of a frame (H, W, 3), stops, ``since_s`` after the last; the first is settled.
+
+        ``ev = goal + (ev - goal) * exp(-since_s / time_constant_s)``, with the goal of the frame
+        before: what a camera meters it can only use later.
+        """
+        config = self._config
+        if config.time_constant_s is None:
+            return config.ev
+        mean = max(float(light.mean((0, 1), np.float64) @ LUMINANCE), DARKEST)
+        now_ev = float(np.clip(math.log2(config.target / mean), -config.most_ev, config.most_ev))
+        if self._goal_ev is None:
+            self._goal_ev = self._ev = now_ev
+        left = math.exp(-since_s / config.time_constant_s)
+        self._ev = self._goal_ev + (self._ev - self._goal_ev) * left
+        self._goal_ev = now_ev
+        return config.ev + self._ev
+
+
+def with_noise(light: Light, noise: NoiseConfig, rng: np.random.Generator) -> Light:
+    """Shot and read noise: variance ``light / full_well + (read / full_well)^2``, clipped at white.
+
+    The normal approximation of the Poisson-Gaussian model (Foi et al., IEEE TIP 17(10), 2008), in
+    which a well that is full holds no more.
+    """
+    signal = np.clip(light, 0, 1)
+    variance = signal / np.float32(noise.full_well_e)
+    variance += np.float32((noise.read_e / noise.full_well_e) ** 2)
+    signal += np.sqrt(variance) * rng.standard_normal(light.shape, np.float32)
+    return np.asarray(signal)
+
+
+def compressed(rgb: Rgb, quality: int) -> Rgb:
+    """A frame (H, W, 3) after JPEG."""
+    file = io.BytesIO()
+    Image.fromarray(rgb).save(file, "JPEG", quality=quality)
+    return np.asarray(Image.open(file))

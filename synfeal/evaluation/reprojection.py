@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.bootstrap import medians
-from synfeal.camera.rays import cell_directions, cell_pixels, pixels_of_normalised
+from synfeal.camera.projection import cell_directions, cell_pixels, pixels_of_normalised
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.pose_table import PoseTable, read_pose_table

@@ -10,7 +10,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from synfeal.camera.distortion import fold_radius
-from synfeal.camera.rays import cell_directions, pixels_of_normalised
+from synfeal.camera.projection import cell_directions, pixels_of_normalised
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.mesh.rays import RayCaster

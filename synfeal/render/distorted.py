@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from synfeal.camera.rays import normalised_of_pixels
+from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.render.base import Depth, Renderer, Rgb

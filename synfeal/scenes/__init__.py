@@ -22,7 +22,7 @@ SWITCHED = ("large_room", "sanctuary")
 
 
 def save_light_shares(builder: str, seed: int, out_shares: Sequence[Path]) -> None:
-    """Write ``light_<group>.glb`` of a stand-in for :func:`synfeal.effects.relight.open_scene`.
+    """Write ``light_<group>.glb`` of a stand-in for :func:`synfeal.effects.scene.open_scene`.
 
     Raises:
         InputError: its lights cannot be switched.

@@ -14,7 +14,7 @@ from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable, read_frames, read_pose_table
 from synfeal.dataset.render_sequence import Effects, drawn
 from synfeal.effects.apply import Frame
-from synfeal.effects.relight import open_scene
+from synfeal.effects.scene import open_scene
 from synfeal.frames import COUNT, NUMBER, TEXT, frame_of, write_frame
 
 FRAMES = 40

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.collection import ClutterConfig
-from synfeal.effects.crowd import CARTONS, carton_files
+from synfeal.effects.scene import CARTONS, carton_files
 from synfeal.errors import InputError
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh

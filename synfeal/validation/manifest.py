@@ -99,7 +99,7 @@ class KnownCamera:
 def camera_of_dataset(dataset: Path, camera_file: Path | None) -> KnownCamera:
     """The camera of a data set; a calibration file goes before the manifest."""
     if camera_file is not None:
-        from synfeal.camera.calibration_files import read_calibration
+        from synfeal.camera.calibration import read_calibration
 
         return KnownCamera(
             _config(camera_file, asdict(read_calibration(camera_file))), str(camera_file)

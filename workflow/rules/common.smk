@@ -32,7 +32,7 @@ from synfeal.config.effects import CLEAN, MIXED
 from synfeal.dataset.archive import SUFFIX
 from synfeal.dataset.finish import origin_of
 from synfeal.dataset.sevenscenes import sequences_of
-from synfeal.effects.crowd import carton_files
+from synfeal.effects.scene import carton_files
 from synfeal.effects.light import GROUPS as LIGHT_GROUPS
 from synfeal.errors import InputError
 from synfeal.labels import seed_names

@@ -1,12 +1,14 @@
-"""Objects that stand about along one path, and its frames with them.
+"""Scenes that know what effects ask for: lights that are switched, objects along each path.
 
-Where they stand is drawn from the path alone, so all shards of it see the same ones.
+The baking of a stand-in knows how much of its light comes from where. Each pixel of an ideal frame
+is multiplied, in linear light, by the weighted shares of the groups of sources, so that states add
+up as their weights do. Where objects stand is drawn from the path alone, so all shards of it see
+the same ones.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.effects.light import GROUPS, Light
 from synfeal.errors import InputError
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
@@ -98,29 +101,68 @@ def crowd_of(mesh: Path, render: RenderConfig) -> Crowd | None:
     return Crowd(scene, kinds, settings.count)
 
 
-class CrowdedRenderer(Renderer):
-    """A renderer of a scene that can be opened once more with objects in it."""
+class SceneRenderer(Renderer):
+    """A renderer of a scene, of its shares of light, and of the scene with objects in it."""
 
-    def __init__(self, crowd: Crowd, camera: CameraConfig, render: RenderConfig) -> None:
-        self.crowd, self._camera, self._render = crowd, camera, render
-        self._ideal = open_renderer(crowd.mesh, camera, render)
+    def __init__(
+        self,
+        mesh: TexturedMesh,
+        camera: CameraConfig,
+        render: RenderConfig,
+        shares: Mapping[str, TexturedMesh] | None = None,  # of its light, by group of sources
+        crowd: Crowd | None = None,
+    ) -> None:
+        self._camera, self._render, self._crowd = camera, render, crowd
+        self._ideal = open_renderer(mesh, camera, render)
+        even = render.model_copy(update={"background_rgb": (255 // len(GROUPS),) * 3})
+        held = (shares or {}).items()
+        self._shares = {group: open_renderer(share, camera, even) for group, share in held}
 
     def render(self, world_from_cam: Array) -> Rgb:
-        """Colours (H, W, 3) of the scene alone."""
+        """Colours (H, W, 3) of the scene alone, in its own light."""
         return self._ideal.render(world_from_cam)
 
     def render_rgbd(self, world_from_cam: Array) -> tuple[Rgb, Depth]:
-        """Colours (H, W, 3) and depth (H, W) of the scene alone."""
+        """Colours (H, W, 3) of the scene alone, in its own light, and depth (H, W)."""
         return self._ideal.render_rgbd(world_from_cam)
 
-    @contextmanager
-    def along(self, path_m: Array, rng: np.random.Generator) -> Iterator[Renderer]:
+    def left(self, world_from_cam: Array, weights: Mapping[str, float]) -> Light:
+        """Factors (H, W, 3) of the light that is left with these weights of the groups."""
+        total = np.zeros((), np.float32)
+        for group, renderer in self._shares.items():
+            if weights[group]:
+                total = total + np.float32(weights[group] / 255) * renderer.render(world_from_cam)
+        return np.asarray(total, np.float32)
+
+    def along(self, path_m: Array, rng: np.random.Generator) -> SceneRenderer:
         """A renderer of the scene with what stands along a path (P, 3)."""
-        parts, _ = self.crowd.along(path_m, rng)
-        both = TexturedMesh((*self.crowd.mesh.parts, *parts))
-        with open_renderer(both, self._camera, self._render) as renderer:
-            yield renderer
+        assert self._crowd is not None, "opened without `clutter`"
+        parts, _ = self._crowd.along(path_m, rng)
+        both = TexturedMesh((*self._crowd.mesh.parts, *parts))
+        return SceneRenderer(both, self._camera, self._render)
 
     def close(self) -> None:
-        """Give the memory of the mesh back."""
-        self._ideal.close()
+        """Give the memory of all meshes back."""
+        for renderer in (self._ideal, *self._shares.values()):
+            renderer.close()
+
+
+def open_scene(mesh: Path, camera: CameraConfig, render: RenderConfig | None) -> SceneRenderer:
+    """A renderer of a mesh, which knows what else effects ask for: shares of light, objects.
+
+    Raises:
+        InputError: a mesh cannot be read, its shares are not there, or objects cannot be used.
+    """
+    render = render or RenderConfig()
+    light = render.effects and render.effects.light
+    groups = GROUPS if light and light.states else ()
+    files = {group: mesh.with_name(f"light_{group}.glb") for group in groups}
+    missing = [file for file in files.values() if not file.is_file()]
+    if missing:
+        raise InputError(
+            f"{missing[0]}: missing, and light.states needs it; of a mesh of your own use ev,"
+            " temperature_k and field_ev"
+        )
+    crowd = crowd_of(mesh, render)
+    shares = {group: load_mesh(file) for group, file in files.items()}
+    return SceneRenderer(crowd.mesh if crowd else load_mesh(mesh), camera, render, shares, crowd)
