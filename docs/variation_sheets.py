@@ -17,7 +17,7 @@ from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.scenes import large_room
 from synfeal.scenes.bake import light_shares
-from synfeal.scenes.objects import cluttered, save_cartons
+from synfeal.scenes.prepare import cluttered, save_cartons
 
 CAMERA, RENDER = CameraConfig(width=320, height=240), RenderConfig(backend="opengl")
 SHOWN = (3, 10, 30, 47)  # paths of the test set, their second frame

@@ -33,10 +33,9 @@ from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.save import save_glb
 from synfeal.scenes.bake import light_shares, scanned_mesh
-from synfeal.scenes.grids import surface_of
 from synfeal.scenes.lighting import Lamp, Lighting, received
 from synfeal.scenes.patches import Item, Patch, level, upright
-from synfeal.scenes.scan import Scanner
+from synfeal.scenes.scan import Scanner, surface_of
 from tests.collected import collect, save_room
 
 CAMERA = CameraConfig(width=120, height=16, horizontal_fov_deg=60.0)

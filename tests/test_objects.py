@@ -15,7 +15,7 @@ from synfeal.files import file_sha256, read_json
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.mesh.standing import PATH_CLEARANCE_M, meets_box
-from synfeal.scenes.objects import save_cartons
+from synfeal.scenes.prepare import save_cartons
 from tests.collected import collect, save_room
 
 C = "color.png"

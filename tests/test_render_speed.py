@@ -138,8 +138,8 @@ def test_speeds_are_told_in_turns_with_the_chosen(monkeypatch):
             now += self.cost * load
 
     now, load = 0.0, 1.0
-    monkeypatch.setattr(speed.time, "perf_counter", lambda: now)
-    seconds = speed.seconds_of([Drawing(1.0), Drawing(3.0)], np.zeros((5, 4, 4)))
+    monkeypatch.setattr("time.perf_counter", lambda: now)
+    seconds = speed.seconds_in_turns([Drawing(1.0), Drawing(3.0)], np.zeros((5, 4, 4)))
     assert seconds.shape == (5 * speed.ROUNDS, 2)
     np.testing.assert_allclose(seconds[:, 1] / seconds[:, 0], 3.0, rtol=1e-3)
 

@@ -7,10 +7,17 @@ import pytest
 
 from synfeal.mesh.triangles import weld
 from synfeal.scenes.bake import ATLAS_PX, GUTTER_PX, laid_out, pack, scanned_mesh
-from synfeal.scenes.grids import jittered, refined, surface_of
 from synfeal.scenes.lighting import Lamp, Lighting, Sun, baked
 from synfeal.scenes.patches import Item, Maker, Patch, level, upright
-from synfeal.scenes.scan import Scanner, rounded, seen_faces, stations
+from synfeal.scenes.scan import (
+    Scanner,
+    jittered,
+    refined,
+    rounded,
+    seen_faces,
+    stations,
+    surface_of,
+)
 
 GREY = np.full((8, 8, 3), 128, np.uint8)
 DARK = np.zeros((2, 2, 2, 3), np.float32)

@@ -9,7 +9,7 @@ from pydantic import Field
 from synfeal.config.effects import CLEAN
 from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig, Strict
 from synfeal.dataset.pose_table import read_frames
-from synfeal.scenes.effects_speed import seconds_of_effects
+from synfeal.scenes.speed import seconds_of_effects
 
 
 class Case(Strict):

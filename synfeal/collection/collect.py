@@ -35,7 +35,7 @@ from synfeal.planning.coverage import scene_coverage
 from synfeal.planning.plan import plan_scene
 from synfeal.planning.seen_surface import empty_pixels
 from synfeal.run_lock import WORK, clean_up, growing, place_of
-from synfeal.scenes.prepare import prepare_mesh
+from synfeal.scenes.prepare import prepare_mesh, save_cartons
 from synfeal.seeds import generator_of
 
 WARN_ABOVE = 0.1  # of all pixels: more than windows let through
@@ -150,8 +150,6 @@ def _prepare(job: CollectJob, scene: Path) -> None:
     effects = job.config.render.effects
     if effects and effects.clutter:
         if not effects.clutter.files:
-            from synfeal.scenes.objects import save_cartons  # paints, so takes time to load
-
             save_cartons(scene / "mesh.glb")
         crowd_of(scene / "mesh.glb", job.config.render)  # what cannot be used is refused first
 

@@ -28,8 +28,8 @@ from synfeal.report.cost.measured import read_jobs
 from synfeal.report.label_error import SCHEMA as LABEL_ERROR
 from synfeal.report.layouts import SOURCES, TITLES
 from synfeal.scenes.collision import CURVE_HEADER
-from synfeal.scenes.effects_speed import SCHEMA as EFFECTS_SPEED
 from synfeal.scenes.render_speed import SCHEMA as RENDERED
+from synfeal.scenes.speed import EFFECTS_SCHEMA
 
 # The table whose training runs are shown, and the part of their names that all of them share.
 TABLE = "table4_size"
@@ -200,7 +200,7 @@ def effect_rows(root: Path, scene: str) -> pd.DataFrame:
     table = robustness.read_robustness(tested)
     trained = table[(table.trained_on == CLEAN) & table.method.isin(TITLES)]
     errors_m = trained.groupby("effects").position_m.mean()
-    speeds = read_frame(measured, EFFECTS_SPEED, "measure again")
+    speeds = read_frame(measured, EFFECTS_SCHEMA, "measure again")
     return speeds.assign(
         variant=speeds.effects.map(robustness.effects_title),
         seconds_per_item=speeds.cpu_s_per_frame,

@@ -13,10 +13,18 @@ from numpy.typing import NDArray
 
 from synfeal.effects.light import GROUPS
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.scenes.grids import Grid, Surface, albedo_of, jittered, surface_of
 from synfeal.scenes.lighting import Lighting, baked, exposure_of, received
 from synfeal.scenes.patches import Item, Patch, Points, bilinear
-from synfeal.scenes.scan import Scanner, scanned, seen_faces
+from synfeal.scenes.scan import (
+    Grid,
+    Scanner,
+    Surface,
+    albedo_of,
+    jittered,
+    scanned,
+    seen_faces,
+    surface_of,
+)
 
 log = logging.getLogger("synfeal")
 

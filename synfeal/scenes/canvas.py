@@ -6,11 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw
 
 Colour = tuple[float, float, float]
 Pixels = NDArray[np.float32]  # (H, W, 3) display-referred albedo in [0, 1], row 0 on top
+VIVID: tuple[Colour, ...] = (
+    (0.85, 0.15, 0.12), (0.95, 0.55, 0.08), (0.95, 0.85, 0.15), (0.15, 0.55, 0.25),
+    (0.1, 0.35, 0.75), (0.45, 0.15, 0.6), (0.9, 0.35, 0.55), (0.1, 0.65, 0.7), (0.1, 0.1, 0.12),
+)  # fmt: skip
+INK: tuple[Colour, ...] = ((0.1, 0.1, 0.12), (0.1, 0.2, 0.75), (0.8, 0.1, 0.1), (0.05, 0.5, 0.2))
 
 
 @dataclass(frozen=True)
@@ -141,3 +146,34 @@ def shade(colour: Colour, factor: float) -> Colour:
     """A lighter or darker version of a colour."""
     red, green, blue = (min(1.0, channel * factor) for channel in colour)
     return red, green, blue
+
+
+def mix(
+    first: Pixels | NDArray[np.float32],
+    second: Pixels | NDArray[np.float32],
+    share: NDArray[np.float32],
+) -> Pixels:
+    """Per pixel ``first·(1 − share) + second·share``; ``share`` is (H, W)."""
+    return np.asarray(first + (second - first) * share[..., None], np.float32)
+
+
+def tinted(image: ArrayLike, relief: NDArray[np.float32]) -> Pixels:
+    """An image or a colour, lighter where the relief (H, W) is above 0 and darker below."""
+    return np.asarray(np.asarray(image, np.float32) * (1 + relief[..., None]), np.float32)
+
+
+def ramp(canvas: Canvas, first: Colour, second: Colour, angle_rad: float) -> Pixels:
+    """From one colour to another along a direction (0 is right, π/2 is down)."""
+    x, y = canvas.coordinates_m()
+    width, height = canvas.size_m
+    along = np.cos(angle_rad) * (x / width - 0.5) + np.sin(angle_rad) * (y / height - 0.5) + 0.5
+    share = np.clip(along, 0, 1).astype(np.float32)
+    return mix(np.asarray(first, np.float32), np.asarray(second, np.float32), share)
+
+
+def bordered(image: Pixels, share: float, colour: Colour) -> Pixels:
+    """The image with a frame that takes ``share`` of the shorter side."""
+    margin = max(1, round(share * min(image.shape[:2])))
+    for edge in (image[:margin], image[-margin:], image[:, :margin], image[:, -margin:]):
+        edge[:] = np.asarray(colour, np.float32)
+    return image

@@ -11,6 +11,7 @@ import logging
 import time
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, merge_vertices, simplify
 from synfeal.planning.start import Questions, draw_questions
+from synfeal.scenes.speed import seconds_of
 
 SMALLEST = 100
 N_BISECTIONS = 4  # between two rungs, a factor of 2: the count is then settled to 4 %
@@ -149,14 +151,9 @@ def measure(mesh: Triangles, reference: RayCaster, questions: Questions, build_s
 
 def rays_per_s(questions: Questions, *casters: RayCaster) -> list[int]:
     """Speed of several casters at the same questions, asked in turns: what else runs slows all."""
-    seconds = np.array([[_seconds(questions, c) for c in casters] for _ in range(N_TIMINGS)])
+    works = [partial(questions.answers, caster) for caster in casters]
+    seconds = np.array([seconds_of(works) for _ in range(N_TIMINGS)])
     return [round(questions.n_rays / median) for median in np.median(seconds, axis=0)]
-
-
-def _seconds(questions: Questions, caster: RayCaster) -> float:
-    begin = time.perf_counter()
-    questions.answers(caster)
-    return time.perf_counter() - begin
 
 
 def write_curve(path: Path, curve: Sequence[Rung]) -> None:

@@ -12,8 +12,8 @@ from functools import partial
 
 import numpy as np
 
-from synfeal.scenes import clutter, fronts, furniture, materials, pictures
-from synfeal.scenes.canvas import Canvas, Colour, Painter, Pixels
+from synfeal.scenes import furniture, materials, pictures
+from synfeal.scenes.canvas import Canvas, Colour, Painter, Pixels, mix
 from synfeal.scenes.lighting import Lamp, Lighting, Sun, ambient_corners
 from synfeal.scenes.materials import painted
 from synfeal.scenes.patches import Item, Maker, joined, level, upright
@@ -155,7 +155,7 @@ def _ceiling(canvas: Canvas) -> Pixels:
     ragged = 1 + 0.25 * canvas.noise(0.3, 3)
     stain = np.exp(-((np.hypot(x - 1.3, y - 4.9) / 0.5 / np.maximum(ragged, 0.3)) ** 2))
     rust = tiles * np.asarray((0.75, 0.6, 0.4), np.float32)
-    return materials.mix(tiles, rust, stain.astype(np.float32))
+    return mix(tiles, rust, stain.astype(np.float32))
 
 
 def _windows(make: Maker) -> Item:
@@ -170,13 +170,13 @@ def _windows(make: Maker) -> Item:
 
 def _south_wall(make: Maker) -> Item:
     """Door with exit sign, whiteboard, notice and extinguisher."""
-    door = partial(fronts.door, colour=(0.15, 0.3, 0.6), window=True)
-    sign = partial(fronts.label, colour=(0.1, 0.6, 0.25))
+    door = partial(materials.door, colour=(0.15, 0.3, 0.6), window=True)
+    sign = partial(materials.label, colour=(0.1, 0.6, 0.25))
     extinguisher = make.turned(EXTINGUISHER_M, painted((0.8, 0.08, 0.06)), 150, 12)
     return joined(
         make.on_wall((1.3, 0, 1.05), 180, (1.0, 2.1), door, 180, 0.04),
         make.on_wall((3.4, 0, 1.55), 180, (2.2, 1.15), pictures.whiteboard, 280, 0.03),
-        make.on_wall((2.1, 0, 1.25), 180, (0.12, 0.16), fronts.page, 250),
+        make.on_wall((2.1, 0, 1.25), 180, (0.12, 0.16), materials.page, 250),
         make.on_wall((1.3, 0, 2.36), 180, (0.6, 0.22), sign, 300, 0.03, glow=0.6),
         extinguisher.placed(2.12, 0.12, 0.5),
     )
@@ -195,11 +195,11 @@ def _desks(make: Maker) -> Item:
     chair = furniture.chair(make, (0.15, 0.25, 0.55))
     things = []
     for x, y, yaw in DESKS_M:
-        stuff = clutter.on_table(make, 1.2, 0.6).placed(0, 0, 0.74)
+        stuff = furniture.on_table(make, 1.2, 0.6).placed(0, 0, 0.74)
         seat = chair.placed(rng.uniform(-0.3, 0.3), -0.6, 0, 180 + rng.uniform(-50, 50))
         things.append(joined(desk, stuff, seat).placed(x, y, 0, yaw))
     island = furniture.table(make, (0.9, 1.9, 0.74), OAK)
-    stuff = clutter.on_table(make, 0.8, 1.7).placed(0, 0, 0.74)
+    stuff = furniture.on_table(make, 0.8, 1.7).placed(0, 0, 0.74)
     return joined(
         things, joined(island, stuff, screen.placed(0.1, 0.6, 0.74, 25)).placed(2.55, 3.5)
     )
@@ -207,10 +207,10 @@ def _desks(make: Maker) -> Item:
 
 def _storage(make: Maker) -> Item:
     """Cupboards, a bookcase, cartons, plants: large areas of one colour."""
-    cabinet, plant = partial(furniture.cabinet, make), partial(clutter.plant, make)
+    cabinet, plant = partial(furniture.cabinet, make), partial(furniture.plant, make)
     east, brown, light = (
         WIDTH_M - 0.23,
-        *(partial(fronts.label, colour=c) for c in ((0.65, 0.48, 0.3), (0.7, 0.55, 0.36))),
+        *(partial(materials.label, colour=c) for c in ((0.65, 0.48, 0.3), (0.7, 0.55, 0.36))),
     )
     large = make.box((0.5, 0.4, 0.4), brown, 200, "fblrt")
     small = make.box((0.38, 0.35, 0.3), light, 200, "fblrt")
@@ -260,11 +260,13 @@ def _fittings(make: Maker) -> Item:
 
 def _small_things(make: Maker) -> Item:
     """Shelves with bottles, pinned sheets of paper, coats, files on cupboards, more plants."""
-    files, plant, coat = (partial(f, make) for f in (clutter.books, clutter.plant, clutter.coat))
+    files, plant, coat = (
+        partial(f, make) for f in (furniture.books, furniture.plant, furniture.coat)
+    )
     return joined(
-        *(clutter.pinned_page(make).placed(x, y, z, yaw) for x, y, z, yaw in PAGES_M),
-        clutter.wall_shelf(make, 1.2, 11).placed(WIDTH_M, 4.85, 1.42, -90),
-        clutter.wall_shelf(make, 0.9, 8).placed(1.9, LENGTH_M, 1.25),
+        *(furniture.pinned_page(make).placed(x, y, z, yaw) for x, y, z, yaw in PAGES_M),
+        furniture.wall_shelf(make, 1.2, 11).placed(WIDTH_M, 4.85, 1.42, -90),
+        furniture.wall_shelf(make, 0.9, 8).placed(1.9, LENGTH_M, 1.25),
         coat((0.2, 0.22, 0.28)).placed(0.68, 0.0, 1.65, 180),
         coat((0.92, 0.92, 0.9)).placed(2.35, 0.0, 1.6, 180),
         files(0.9, 0.25, 0.3).placed(WIDTH_M - 0.2, 2.05, 1.2, -90),

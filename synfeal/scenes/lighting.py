@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from synfeal.mesh.rays import RayCaster
 from synfeal.scenes.canvas import Colour
-from synfeal.scenes.grids import Surface
+from synfeal.scenes.scan import Surface
 
 Vectors = NDArray[np.float32]
 LIFT_M = 0.015  # rays start this far in front of their surface

@@ -1,31 +1,31 @@
-"""Painters of building materials: plaster, wood, masonry, fabric, marble."""
+"""Painters of materials, and of the fronts of things: doors, shelves, screens, sheets of paper."""
 
 from __future__ import annotations
 
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from synfeal.scenes.canvas import Canvas, Colour, Painter, Pixels
-
-
-def mix(
-    first: Pixels | NDArray[np.float32],
-    second: Pixels | NDArray[np.float32],
-    share: NDArray[np.float32],
-) -> Pixels:
-    """Per pixel ``first·(1 − share) + second·share``; ``share`` is (H, W)."""
-    return np.asarray(first + (second - first) * share[..., None], np.float32)
-
-
-def _tinted(colour: Colour, relief: NDArray[np.float32]) -> Pixels:
-    return np.asarray(np.asarray(colour, np.float32) * (1 + relief[..., None]), np.float32)
+from synfeal.scenes.canvas import (
+    INK,
+    VIVID,
+    Canvas,
+    Colour,
+    Painter,
+    Pixels,
+    Sketch,
+    bordered,
+    mix,
+    pick,
+    ramp,
+    shade,
+    tinted,
+)
 
 
 def flat(canvas: Canvas, colour: Colour, wear: float = 0.03) -> Pixels:
     """Paint or plastic: one colour with a little wear."""
-    return _tinted(colour, np.float32(wear) * canvas.noise(0.08, 3))
+    return tinted(colour, np.float32(wear) * canvas.noise(0.08, 3))
 
 
 def painted(colour: Colour, wear: float = 0.05) -> Painter:
@@ -37,7 +37,7 @@ def plaster(canvas: Canvas, colour: Colour, stains: float = 0.03, grain: float =
     """A painted wall: almost no texture, broad stains."""
     relief = np.float32(stains) * canvas.noise(0.9, 5, 0.65)
     relief += np.float32(grain) * canvas.noise(0.025, 2)
-    return _tinted(colour, relief)
+    return tinted(colour, relief)
 
 
 def wainscot(
@@ -65,7 +65,7 @@ def wood(canvas: Canvas, colour: Colour, contrast: float = 0.12, upright: bool =
     cell = (across, along) if upright else (along, across)
     rings = np.sin(6 * canvas.noise((cell[0] * 3, cell[1] * 3), 2)).astype(np.float32)
     relief = contrast * (0.5 * rings + 0.6 * canvas.noise(cell, 4, 0.75))
-    return _tinted(colour, relief.astype(np.float32))
+    return tinted(colour, relief.astype(np.float32))
 
 
 def masonry(
@@ -102,7 +102,7 @@ def fabric(
     canvas: Canvas, colour: Colour, stripe: Colour | None = None, pitch_m: float = 0.1
 ) -> Pixels:
     """Cloth with a weave and, if given, stripes."""
-    image = _tinted(colour, 0.06 * canvas.noise(0.012, 2) + 0.06 * canvas.noise(0.3, 3))
+    image = tinted(colour, 0.06 * canvas.noise(0.012, 2) + 0.06 * canvas.noise(0.3, 3))
     if stripe is not None:
         x, _ = canvas.coordinates_m()
         inside = (x[0] / pitch_m) % 1 < 0.3
@@ -146,3 +146,100 @@ def damask(canvas: Canvas, colour: Colour, motif: Colour, pitch_m: float = 0.22)
     image = plaster(canvas, colour, 0.05)
     image[petal] = np.asarray(motif, np.float32)
     return image * (1 + 0.03 * canvas.noise(0.02, 2))[..., None]
+
+
+METAL: Colour = (0.75, 0.76, 0.78)
+PAPER: Colour = (0.93, 0.92, 0.88)
+
+
+def screen(canvas: Canvas) -> Pixels:
+    """A computer screen: windows, a plot, lines of code."""
+    rng = canvas.rng
+    sketch = Sketch(ramp(canvas, shade(pick(rng, VIVID), 0.6), (0.1, 0.12, 0.2), rng.uniform(0, 6)))
+    for _ in range(3):
+        x, y = rng.uniform((0.04, 0.05), (0.5, 0.45))
+        x1, y1 = x + rng.uniform(0.3, 0.45), y + rng.uniform(0.35, 0.5)
+        dark = rng.random() < 0.5
+        sketch.rectangle(x, y, x1, y1, (0.12, 0.12, 0.15) if dark else (0.95, 0.95, 0.95))
+        sketch.rectangle(x, y, x1, y + 0.05, shade(pick(rng, VIVID), 0.9))
+        ink: Colour = (0.6, 0.9, 0.7) if dark else (0.15, 0.15, 0.2)
+        sketch.text_lines(rng, (x + 0.02, y + 0.08, x1 - 0.02, y1 - 0.03), 7, ink)
+    return bordered(sketch.pixels(), 0.05, (0.06, 0.06, 0.07))
+
+
+def spine(canvas: Canvas, colour: Colour) -> Pixels:
+    """The back of a book: cloth, two bands and a title."""
+    rng = canvas.rng
+    sketch = Sketch(plaster(canvas, colour, 0.06, 0.03))
+    bands = shade(pick(rng, VIVID), rng.uniform(0.6, 1.6))
+    for y in (rng.uniform(0.06, 0.15), rng.uniform(0.8, 0.92)):
+        sketch.rectangle(0, y, 1, y + 0.04, bands)
+    top = rng.uniform(0.2, 0.4)
+    sketch.text_lines(rng, (0.2, top, 0.85, top + rng.uniform(0.2, 0.35)), 6, shade(bands, 1.4))
+    return sketch.pixels()
+
+
+def door(canvas: Canvas, colour: Colour, window: bool = False) -> Pixels:
+    """A door leaf with frame, panels, handle and, if wanted, a small window."""
+    sketch = Sketch(plaster(canvas, colour, 0.05, 0.03))
+    dark = shade(colour, 0.7)
+    for y0, y1 in ((0.1, 0.45), (0.55, 0.92)):
+        sketch.rectangle(0.18, y0, 0.82, y1, dark)
+        sketch.rectangle(0.2, y0 + 0.01, 0.8, y1 - 0.01, shade(colour, 1.1))
+    if window:
+        sketch.rectangle(0.35, 0.12, 0.65, 0.4, (0.75, 0.85, 0.9))
+    sketch.rectangle(0.85, 0.49, 0.93, 0.53, (0.8, 0.75, 0.5))
+    return bordered(sketch.pixels(), 0.07, shade(colour, 0.55))
+
+
+def cabinet_front(canvas: Canvas, colour: Colour, doors: int = 2, rows: int = 1) -> Pixels:
+    """Doors or drawers side by side, each with a handle and a label."""
+    sketch = Sketch(plaster(canvas, colour, 0.05, 0.03))
+    for column in range(doors):
+        for row in range(rows):
+            x0, x1 = (column + 0.03) / doors, (column + 0.97) / doors
+            y0, y1 = (row + 0.03) / rows, (row + 0.97) / rows
+            tint = shade(colour, canvas.rng.uniform(0.9, 1.12))
+            sketch.rectangle(x0, y0, x1, y1, shade(colour, 0.5))
+            sketch.rectangle(x0 + 0.008, y0 + 0.008, x1 - 0.008, y1 - 0.008, tint)
+            middle, wide = (x0 + x1) / 2, (x1 - x0) / 5
+            sketch.rectangle(middle - wide, y0 + 0.1 / rows, middle + wide, y0 + 0.13 / rows, METAL)
+            sketch.rectangle(middle - wide, y0 + 0.2 / rows, middle + wide, y0 + 0.4 / rows, PAPER)
+            box = (middle - 0.9 * wide, y0 + 0.22 / rows, middle + 0.9 * wide, y0 + 0.38 / rows)
+            sketch.text_lines(canvas.rng, box, 3, pick(canvas.rng, INK))
+    return sketch.pixels() * (1 + 0.03 * canvas.noise(0.05, 3))[..., None]
+
+
+def keyboard(canvas: Canvas) -> Pixels:
+    """Dark keys in five rows."""
+    sketch = Sketch(canvas.plain((0.1, 0.1, 0.11)))
+    for row in range(5):
+        for column in range(16):
+            x, y = (column + 0.12) / 16, (row + 0.12) / 5
+            sketch.rectangle(
+                x, y, x + 0.048, y + 0.15, shade((0.28, 0.28, 0.3), canvas.rng.uniform(0.8, 1.2))
+            )
+    return sketch.pixels()
+
+
+def page(canvas: Canvas) -> Pixels:
+    """A printed sheet of paper, sometimes with a figure."""
+    sketch = Sketch(canvas.plain(PAPER))
+    sketch.text_lines(canvas.rng, (0.1, 0.06, 0.9, 0.14), 1, pick(canvas.rng, INK))
+    sketch.text_lines(canvas.rng, (0.1, 0.5, 0.9, 0.94), 9, (0.2, 0.2, 0.2))
+    sketch.rectangle(0.1, 0.18, 0.9, 0.46, shade(pick(canvas.rng, VIVID), 1.3))
+    return sketch.pixels()
+
+
+def label(canvas: Canvas, colour: Colour) -> Pixels:
+    """A carton with a printed label."""
+    sketch = Sketch(plaster(canvas, colour, 0.06, 0.03))
+    sketch.rectangle(0.15, 0.2, 0.85, 0.8, PAPER)
+    sketch.text_lines(canvas.rng, (0.2, 0.28, 0.8, 0.75), 3, pick(canvas.rng, INK))
+    return sketch.pixels()
+
+
+def gilded(canvas: Canvas) -> Pixels:
+    """Gold leaf over carved wood."""
+    image = marble(canvas, (0.86, 0.66, 0.24), (0.4, 0.24, 0.06), 0.12)
+    return image * (1 + 0.15 * canvas.noise(0.03, 3))[..., None]

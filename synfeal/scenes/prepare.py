@@ -1,7 +1,8 @@
-"""The first stage: a scene from its source, in the form all later stages read."""
+"""The first stage: a scene from its source, and the objects placed in it."""
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +13,20 @@ from synfeal.config.collection import ClutterConfig
 from synfeal.config.load import check_mesh_file
 from synfeal.config.models import SceneConfig
 from synfeal.dataset.finish import CLUTTER
+from synfeal.effects.scene import CARTONS, carton_files
 from synfeal.errors import InputError
 from synfeal.files import file_sha256, write_json
 from synfeal.mesh.load import load_mesh
-from synfeal.mesh.model import TexturedMesh
+from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.properties import mesh_properties
 from synfeal.mesh.save import save_glb
+from synfeal.mesh.standing import Ground, described, moved
 from synfeal.mesh.triangles import Triangles, merge_vertices, save_collision_mesh
 from synfeal.planning.plan import sampling_box_of
+from synfeal.scenes import build_scene, materials
+from synfeal.scenes.canvas import VIVID, pick
 from synfeal.scenes.collision import Rung, collision_mesh, write_curve
+from synfeal.scenes.patches import Maker
 from synfeal.seeds import generator_of
 
 
@@ -81,8 +87,6 @@ def _with_clutter(
     box: NDArray[np.float64],
 ) -> tuple[TexturedMesh, Triangles, list[dict[str, Any]]]:
     """Scene and collision mesh with objects, none simplified: paths avoid them; where they are."""
-    from synfeal.scenes.objects import cluttered  # paints, so takes time to load
-
     rng = generator_of("clutter", clutter.seed)
     objects, places = cluttered(mesh, box, clutter, rng, f"scenes.{name}.clutter")
     vertices, faces = objects.merged()
@@ -94,23 +98,93 @@ def _with_clutter(
 
 
 def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:
-    """The scene's mesh: the stand-in of its ``builder``, or the file at its ``path``."""
-    if scene.source == "procedural":
-        from synfeal.scenes import build_scene  # only a procedural scene needs the builders
+    """The scene's mesh: the stand-in of its ``builder``, or the file at its ``path``.
 
+    Textures that lie beside the file are not part of its hash.
+    """
+    if scene.source == "procedural":
         return build_scene(str(scene.builder), seed if scene.seed is None else scene.seed)
     path = Path(str(scene.path))
     if scene.sha256 is not None:
-        check_sha256(path, scene.sha256, name)
+        check_mesh_file(path, f"scenes.{name}.path")
+        found = file_sha256(path)
+        if found != scene.sha256:
+            raise InputError(
+                f"scenes.{name}.sha256: {path} has {found}, expected {scene.sha256}; download it"
+                " again, or correct the hash if another version is meant"
+            )
     return load_mesh(path, scene.up_axis, scene.unit_m)
 
 
-def check_sha256(path: Path, expected: str, name: str) -> None:
-    """Check the mesh file itself; textures that lie beside it are not part of the hash."""
-    check_mesh_file(path, f"scenes.{name}.path")
-    found = file_sha256(path)
-    if found != expected:
-        raise InputError(
-            f"scenes.{name}.sha256: {path} has {found}, expected {expected}; download it again,"
-            " or correct the hash if another version is meant"
-        )
+Array = NDArray[np.float64]
+TRIES = 2000  # places, before a scene is called too full
+DIM = 0.75  # of the built-in cartons beside their pictures: rooms are dimmer than paper
+
+
+def cluttered(
+    mesh: TexturedMesh, bounds_m: Array, clutter: ClutterConfig, rng: np.random.Generator, key: str
+) -> tuple[TexturedMesh, list[dict[str, Any]]]:
+    """The objects placed in a scene, and where each stands.
+
+    They are let down from the space between the corners ``bounds_m`` (2, 3); ``key`` is that of the
+    scene's settings, for messages.
+
+    Raises:
+        InputError: an object is larger than the scene, cannot be read, or finds no place.
+    """
+    room_m = np.ptp(mesh.bounds_m, axis=0)
+    kinds = [(path.stem, load_mesh(path)) for path in clutter.files]
+    if not kinds:
+        _refuse_larger(np.full(3, clutter.size_m[1]), room_m, f"{key}: size_m: a carton")
+        kinds = [(f"carton-{n}", _carton(clutter, rng)) for n in range(min(clutter.count, CARTONS))]
+    for name, kind in kinds:
+        _refuse_larger(np.ptp(kind.bounds_m, axis=0), room_m, f"{key}: {name}")
+    vertices, faces = mesh.merged()
+    corners = vertices[faces]
+    parts: list[MeshPart] = []
+    places: list[dict[str, Any]] = []
+    for number in range(clutter.count):
+        name, kind = kinds[number % len(kinds)]
+        found = Ground(corners).place(kind, bounds_m, rng, TRIES)
+        if found is None:
+            raise InputError(
+                f"{key}: no place left for {name}, object {number + 1} of {clutter.count}; give"
+                " fewer or smaller ones"
+            )
+        foot_m, yaw_rad = found
+        standing = moved(kind, foot_m, yaw_rad, f"object-{number}")
+        parts += standing
+        corners = np.concatenate([corners, *(p.vertices_m[p.faces] for p in standing)])
+        places.append(described(name, kind, foot_m, yaw_rad))
+    return TexturedMesh(tuple(parts)), places
+
+
+def save_cartons(mesh: Path) -> None:
+    """Write the built-in objects beside the mesh of a scene, where rendering finds them."""
+    rng, usual = generator_of("cartons"), ClutterConfig()
+    for path in carton_files(mesh):
+        save_glb(path, _carton(usual, rng))
+
+
+def _refuse_larger(size_m: Array, room_m: Array, what: str) -> None:
+    if (np.sort(size_m) > np.sort(room_m)).any():
+        shown = " x ".join(f"{side:.3g}" for side in size_m)
+        raise InputError(f"{what} is {shown} m, larger than the scene; check its unit")
+
+
+def _carton(clutter: ClutterConfig, rng: np.random.Generator) -> TexturedMesh:
+    """A carton with labels."""
+    wide, deep, high = rng.uniform(*clutter.size_m, 3)
+    painter = partial(materials.label, colour=pick(rng, VIVID))
+    parts = []
+    for patch in Maker(rng).box((wide, deep, high), painter, 120).patches:
+        rows, columns = patch.points_m.shape[:2]
+        index = np.arange(rows * columns).reshape(rows, columns)
+        a, b, c, d = (i.ravel() for i in (index[:-1, :-1], index[:-1, 1:], index[1:, :-1],
+                                          index[1:, 1:]))  # fmt: skip
+        faces = np.concatenate([np.stack([a, c, d], 1), np.stack([a, d, b], 1)])
+        down, right = np.meshgrid(patch.row_shares, patch.column_shares, indexing="ij")
+        uv = np.stack([right.ravel(), 1 - down.ravel()], axis=1)
+        picture = (patch.picture * DIM).astype(np.uint8)
+        parts.append(MeshPart("side", patch.points_m.reshape(-1, 3), faces, uv, picture))
+    return TexturedMesh(tuple(parts))

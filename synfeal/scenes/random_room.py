@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from synfeal.scenes import clutter, fronts, furniture, materials, murals, pictures
+from synfeal.scenes import furniture, materials, pictures
 from synfeal.scenes.canvas import Colour, Painter
 from synfeal.scenes.lighting import Lamp, Lighting, ambient_corners
 from synfeal.scenes.patches import Item, Maker, joined, level, upright
@@ -131,9 +131,9 @@ def _picture(rng: Generator) -> Painter:
         partial(pictures.noticeboard, ground=_colour(rng)),
         partial(pictures.window_view, panes=(int(rng.integers(1, 4)), int(rng.integers(1, 4)))),
         partial(pictures.stained_glass, palette=_palette(rng, 5), cells=60),
-        partial(murals.mural, ground=_colour(rng), sky=_colour(rng), figures=3),
-        partial(fronts.door, colour=_colour(rng), window=bool(rng.random() < 0.5)),
-        fronts.screen,
+        partial(pictures.mural, ground=_colour(rng), sky=_colour(rng), figures=3),
+        partial(materials.door, colour=_colour(rng), window=bool(rng.random() < 0.5)),
+        materials.screen,
         partial(materials.rug, palette=_palette(rng, 4)),
     ]
     return choices[int(rng.integers(len(choices)))]
@@ -155,7 +155,7 @@ def _standing(make: Maker, wide_m: float) -> tuple[Item, float, float]:
         case 2:
             return furniture.sofa(make, max(wide_m, 1.0), cloth), 0.8, 0.8
         case _:
-            return clutter.plant(make, min(tall, 1.4), _colour(rng), 30), 0.5, 1.4
+            return furniture.plant(make, min(tall, 1.4), _colour(rng), 30), 0.5, 1.4
 
 
 def _free_standing(make: Maker, size: Size) -> Item:
@@ -167,7 +167,7 @@ def _free_standing(make: Maker, size: Size) -> Item:
         wide, deep = rng.uniform(0.7, 1.5), rng.uniform(0.6, 0.9)
         top = partial(materials.wood, colour=_colour(rng), contrast=0.18)
         table = furniture.table(make, (wide, deep, tall), top, _colour(rng))
-        stuff = clutter.on_table(make, wide, deep).placed(0, 0, tall)
+        stuff = furniture.on_table(make, wide, deep).placed(0, 0, tall)
         seats = (
             furniture.chair(make, _colour(rng)).placed(
                 rng.uniform(-0.9, 0.9), rng.uniform(-0.9, 0.9), 0, rng.uniform(0, 360)

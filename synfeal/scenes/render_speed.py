@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import logging
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +24,8 @@ from synfeal.mesh.model import TexturedMesh
 from synfeal.render import choose, open_renderer
 from synfeal.render.base import Depth, Renderer, Rgb
 from synfeal.render.reference import SAMPLES_PER_AXIS, reference_images
+from synfeal.scenes.speed import PAPER_CAMERA, seconds_of
 
-PAPER_CAMERA = CameraConfig(width=640, height=480)
 LARGEST_PX = 8192 // SAMPLES_PER_AXIS  # of a side, so that the reference is an image in OpenGL
 SUPERSAMPLING = {"opengl": (1, 2, 3), "pyrender": (1, 2, 3), "raycast": (1, 2)}
 FACTORS = (2, 4)  # that textures are made smaller by, and triangles fewer
@@ -157,7 +157,7 @@ def measure_camera(
         for variant in others:
             with variant.opened(camera) as renderer:
                 errors.append(errors_of(renderer, poses, truth))
-                beside.append(seconds_of([yardstick, renderer], poses))
+                beside.append(seconds_in_turns([yardstick, renderer], poses))
     chosen_ms = 1e3 * float(np.median([seconds[:, 0] for seconds in beside]))
     ratios = [1.0, *(float(np.median(seconds[:, 1] / seconds[:, 0])) for seconds in beside)]
     return [
@@ -224,14 +224,12 @@ def depth_errors(depth_m: Depth, expected_m: Depth) -> dict[str, float]:
     }
 
 
-def seconds_of(renderers: Sequence[Renderer], poses: Poses) -> Floats:
+def seconds_in_turns(renderers: Sequence[Renderer], poses: Poses) -> Floats:
     """Times (rounds * P, R) of R renderers, which draw each colour image in turns."""
     return np.array(
-        [[_seconds(r, pose) for r in renderers] for _ in range(ROUNDS) for pose in poses]
+        [
+            seconds_of(partial(renderer.render, pose) for renderer in renderers)
+            for _ in range(ROUNDS)
+            for pose in poses
+        ]
     )
-
-
-def _seconds(renderer: Renderer, world_from_cam: Poses) -> float:
-    begin = time.perf_counter()
-    renderer.render(world_from_cam)
-    return time.perf_counter() - begin

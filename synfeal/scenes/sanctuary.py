@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from synfeal.scenes import clutter, fronts, furniture, materials, murals, pictures
+from synfeal.scenes import furniture, materials, pictures
 from synfeal.scenes.canvas import Canvas, Colour, Painter, Pixels
 from synfeal.scenes.lighting import Lamp, Lighting, Sun, ambient_corners
 from synfeal.scenes.materials import painted
@@ -36,19 +36,23 @@ WEST: Painter = partial(
 EAST: Painter = partial(
     materials.wainscot, colour=(0.78, 0.5, 0.32), lower=(0.42, 0.2, 0.16), grain=0.03
 )
-ALTAR: Painter = partial(murals.mural, ground=(0.5, 0.36, 0.2), sky=(0.75, 0.6, 0.3), figures=6)
+ALTAR: Painter = partial(pictures.mural, ground=(0.5, 0.36, 0.2), sky=(0.75, 0.6, 0.3), figures=6)
 ASHLAR: Painter = partial(
     materials.masonry,
     palette=((0.62, 0.56, 0.48), (0.55, 0.5, 0.45), (0.66, 0.62, 0.55)), block_m=(0.5, 0.26),
 )  # fmt: skip
-VAULT: Painter = partial(murals.starry_vault, first=(0.62, 0.3, 0.22), second=(0.14, 0.24, 0.55))
+VAULT: Painter = partial(pictures.starry_vault, first=(0.62, 0.3, 0.22), second=(0.14, 0.24, 0.55))
 STONE: Painter = partial(materials.marble, colour=(0.74, 0.7, 0.62), vein=(0.5, 0.44, 0.38))
 ROSE: Painter = partial(materials.marble, colour=(0.6, 0.33, 0.28), vein=(0.8, 0.65, 0.55))
 GREEN_MARBLE: Painter = partial(materials.marble, colour=(0.3, 0.42, 0.36), vein=(0.75, 0.78, 0.7))
 BLUE_MARBLE: Painter = partial(materials.marble, colour=(0.28, 0.3, 0.4), vein=(0.7, 0.7, 0.75))
 CLOTH: Painter = partial(materials.fabric, colour=(0.9, 0.88, 0.8), stripe=(0.75, 0.6, 0.2))
 FRIEZE: Painter = partial(
-    materials.masonry, palette=murals.ROBES, block_m=(0.25, 0.11), joint=murals.GOLD, joint_m=0.02
+    materials.masonry,
+    palette=pictures.ROBES,
+    block_m=(0.25, 0.11),
+    joint=pictures.GOLD,
+    joint_m=0.02,
 )
 
 # Profiles of what is turned: radius and height, metres.
@@ -174,7 +178,7 @@ def _floor(canvas: Canvas) -> Pixels:
 
 def _mural(make: Maker, mural: Mural) -> Item:
     centre_m, yaw_deg, size_m, px_per_m, rim_m, ground, sky, figures = mural
-    saints = partial(murals.mural, ground=ground, sky=sky, figures=figures)
+    saints = partial(pictures.mural, ground=ground, sky=sky, figures=figures)
     return make.on_wall(centre_m, yaw_deg, size_m, saints, px_per_m, rim_m)
 
 
@@ -209,7 +213,7 @@ def _portal_wall(make: Maker) -> Item:
     """Portal, rose window, confessional and font at the far end."""
     y = -HALF_Y_M
     jamb = partial(make.box, (0.22, 0.14, 2.3), ROSE, 140, "flrt")
-    leaf = partial(fronts.door, colour=(0.38, 0.23, 0.12))
+    leaf = partial(materials.door, colour=(0.38, 0.23, 0.12))
     booth = furniture.cabinet(make, (1.1, 0.6, 2.05), (0.45, 0.24, 0.12), 3)
     return joined(
         *(jamb().placed(x, y + 0.07, 0, 180) for x in (-0.95, 0.95)),
@@ -239,15 +243,15 @@ def _rose_window(make: Maker, y_m: float, z_m: float, radius_m: float) -> Item:
 
 def _altar(make: Maker) -> Item:
     """Steps, table, candles and a gilded altar piece with painted panels."""
-    slender = partial(make.turned, SLENDER, fronts.gilded, 130, 12)
+    slender = partial(make.turned, SLENDER, materials.gilded, 130, 12)
     candle = partial(make.turned, CANDLE, painted((0.95, 0.92, 0.8)), 80, 8)
-    flowers = partial(clutter.plant, make, 0.45, (0.75, 0.6, 0.25), 30)
+    flowers = partial(furniture.plant, make, 0.45, (0.75, 0.6, 0.25), 30)
     return joined(
         make.box((3.4, 1.2, 0.14), ROSE, 140, "flrt").placed(0, 3.65),
         make.box((2.6, 0.9, 0.14), STONE, 140, "flrt").placed(0, 3.8, 0.14),
         make.box((1.5, 0.5, 0.75), CLOTH, 160, "flrt").placed(0, 3.65, 0.28),
-        make.box((3.1, 0.12, 2.75), fronts.gilded, 130, "flrt").placed(0, 4.18, 0.28),
-        make.box((3.3, 0.22, 0.16), fronts.gilded, 140).placed(0, 4.1, 2.85),
+        make.box((3.1, 0.12, 2.75), materials.gilded, 130, "flrt").placed(0, 4.18, 0.28),
+        make.box((3.3, 0.22, 0.16), materials.gilded, 140).placed(0, 4.1, 2.85),
         (slender().placed(x, 4.0) for x in (-1.5, -0.6, 0.6, 1.5)),
         (candle().placed(x, 3.75, 1.03) for x in (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)),
         (flowers().placed(x, 3.3, 0.14) for x in (-1.25, 1.2)),
@@ -281,7 +285,7 @@ def _statues(make: Maker) -> Item:
     """Robed figures on pedestals, two beside the altar and one at the east wall."""
     things = []
     for x, y, colour in STATUES:
-        robe = partial(materials.fabric, colour=colour, stripe=murals.GOLD, pitch_m=0.25)
+        robe = partial(materials.fabric, colour=colour, stripe=pictures.GOLD, pitch_m=0.25)
         things.append(make.turned(FIGURE, robe, 170, 16).placed(x, y, 0.8))
         things.append(make.box((0.42, 0.42, 0.8), STONE, 140, "fblrt").placed(x, y))
     return joined(things)

@@ -124,7 +124,7 @@ use rule call as cartons with:
     benchmark:
         f"{ROOT}/benchmarks/cartons/{{scene}}.tsv"
     params:
-        function="synfeal.scenes.objects:save_cartons",
+        function="synfeal.scenes.prepare:save_cartons",
 
 
 use rule call as render_speed with:
@@ -161,7 +161,7 @@ use rule call as collection_speed with:
     resources:
         mem_mb=grown(3000),
     params:
-        function="synfeal.collection.speed:write_collection_speed",
+        function="synfeal.scenes.speed:write_collection_speed",
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
         collection=lambda w, input: dump(CONFIG.collection)
         | {"repeat": file_of(input.repeat)},

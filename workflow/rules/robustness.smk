@@ -164,7 +164,7 @@ use rule call as effects_speed with:
     resources:
         mem_mb=grown(3000),
     params:
-        function="synfeal.scenes.effects_speed:write_effects_speed",
+        function="synfeal.scenes.speed:write_effects_speed",
         camera=dump(CONFIG.network_camera),
         render=dump(CONFIG.render),
         effects={name: dump(VARIATIONS[name]) for name in ROBUST_EFFECTS},
