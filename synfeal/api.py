@@ -30,7 +30,7 @@ from synfeal.render import open_renderer
 from synfeal.render.base import Depth, Rgb
 from synfeal.seeds import generator_of
 from synfeal.settings import SCENE, dataset_config, options_named, render_configs
-from synfeal.validation.manifest import camera_of_dataset
+from synfeal.validation.camera import camera_of_dataset
 
 if TYPE_CHECKING:
     from synfeal.evaluation.run import Evaluation

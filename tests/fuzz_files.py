@@ -38,8 +38,8 @@ from synfeal.mesh.triangles import Triangles, load_collision_mesh, save_collisio
 from synfeal.planning.repeat import read_poses
 from synfeal.report.assistance import assistance_record
 from synfeal.report.stats import combine, read_metrics
-from synfeal.validation.images import read_color, read_depth_mm
-from synfeal.validation.manifest import camera_of_dataset
+from synfeal.validation.camera import camera_of_dataset
+from synfeal.validation.listing import read_color, read_depth_mm
 from synfeal.validation.run import validate
 from tests import mesh_samples as meshes
 from tests.damaged_sets import write_planar_set

@@ -16,7 +16,8 @@ from synfeal.errors import InputError
 from synfeal.evaluation.estimates import Estimates
 from synfeal.validation.frames import read_poses
 from synfeal.validation.listing import Frame, SequenceListing, list_sequences
-from synfeal.validation.poses import check_rigid, read_splits
+from synfeal.validation.manifest import read_splits
+from synfeal.validation.poses import check_rigid
 
 Array = NDArray[np.float64]
 

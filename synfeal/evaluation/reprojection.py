@@ -30,7 +30,7 @@ from synfeal.files import atomic_path
 from synfeal.geometry.poses import relative
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import load_collision_mesh
-from synfeal.validation.images import read_depth_mm
+from synfeal.validation.listing import read_depth_mm
 
 Array = NDArray[np.float64]
 

@@ -22,8 +22,8 @@ from synfeal.evaluation.metrics import MEANS, ORIENTATION, POSITION, Metrics, po
 from synfeal.evaluation.reprojection import dcre, dcre_summary, depth_of_images
 from synfeal.geometry.alignment import umeyama_sim3
 from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.listing import DEPTH
-from synfeal.validation.manifest import camera_of_dataset
 
 Array = NDArray[np.float64]
 Align = Literal["none", "se3", "sim3"]

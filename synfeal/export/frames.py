@@ -14,11 +14,18 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.sevenscenes import INVALID_MM, SPLIT_FILES
 from synfeal.errors import InputError
+from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.frames import check_names, kinds_of, read_poses
-from synfeal.validation.images import read_color, read_depth_mm
-from synfeal.validation.listing import COLOR, DEPTH, Frame, list_sequences
-from synfeal.validation.manifest import camera_of_dataset
-from synfeal.validation.poses import check_rigid, check_splits, read_splits
+from synfeal.validation.listing import (
+    COLOR,
+    DEPTH,
+    Frame,
+    list_sequences,
+    read_color,
+    read_depth_mm,
+)
+from synfeal.validation.manifest import check_splits, read_splits
+from synfeal.validation.poses import check_rigid
 
 # Links or copies the image of a frame.
 Place = Callable[[FrameFile, Path], None]

@@ -18,12 +18,10 @@ from numpy.typing import NDArray
 from synfeal.config.dataset import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
+from synfeal.validation.camera import KnownCamera, Lens
 from synfeal.validation.frames import Poses
-from synfeal.validation.images import read_color, read_depth_mm
-from synfeal.validation.lens import Lens
-from synfeal.validation.listing import COLOR, DEPTH, Check, Frame
-from synfeal.validation.manifest import KnownCamera
-from synfeal.validation.pairs import GAPS
+from synfeal.validation.listing import COLOR, DEPTH, Check, Frame, read_color, read_depth_mm
+from synfeal.validation.poses import GAPS
 from synfeal.validation.reprojection import Residual, View, camera_normal, compare
 
 GRID_PIXELS = 5000  # of each frame are moved to the other one

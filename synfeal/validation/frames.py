@@ -12,8 +12,17 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.archive import FrameFile, foreign_members, is_archive
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError
-from synfeal.validation.images import Pixels, read_color, read_depth_mm
-from synfeal.validation.listing import COLOR, DEPTH, POSE, Check, Frame, SequenceListing
+from synfeal.validation.listing import (
+    COLOR,
+    DEPTH,
+    POSE,
+    Check,
+    Frame,
+    Pixels,
+    SequenceListing,
+    read_color,
+    read_depth_mm,
+)
 
 Poses = dict[Frame, NDArray[np.float64]]
 

@@ -1,17 +1,13 @@
-"""The manifest: hashes of sequences, their frames and splits; and which camera took the frames."""
+"""What the manifest and the split files say of the sequences is so."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
-from synfeal.config.dataset import CameraConfig
-from synfeal.config.load import describe
 from synfeal.dataset.finish import MANIFEST, sequence_sha256
+from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
 from synfeal.errors import InputError, why
 from synfeal.files import read_json
 from synfeal.validation.listing import Check, SequenceListing
@@ -83,40 +79,6 @@ def _wrong_counts(
             yield f"{path}: frames: {split} must be {count}, the sum over its sequences"
 
 
-# Depth and colour of 7-Scenes come from a Kinect; its authors give this for both.
-SEVEN_SCENES = CameraConfig(width=640, height=480, fx=585.0, fy=585.0, cx=320.0, cy=240.0)
-
-
-@dataclass(frozen=True)
-class KnownCamera:
-    """A camera and where it is known from."""
-
-    config: CameraConfig  # its intrinsics and distortion
-    source: str  # for the report
-    assumed: bool = False  # nothing says that this is the camera
-
-
-def camera_of_dataset(dataset: Path, camera_file: Path | None) -> KnownCamera:
-    """The camera of a data set; a calibration file goes before the manifest."""
-    if camera_file is not None:
-        from synfeal.camera.calibration import read_calibration
-
-        return KnownCamera(
-            _config(camera_file, asdict(read_calibration(camera_file))), str(camera_file)
-        )
-    path = dataset / MANIFEST
-    if not path.exists():
-        return KnownCamera(SEVEN_SCENES, "assumed: that of 7-Scenes", assumed=True)
-    return KnownCamera(_config(path, read_manifest(dataset).get("camera")), MANIFEST)
-
-
-def _config(path: Path, values: object) -> CameraConfig:
-    try:
-        return CameraConfig.model_validate(values)
-    except ValidationError as error:
-        raise InputError(f"{path}: camera: {describe(error, CameraConfig)}") from None
-
-
 def read_manifest(dataset: Path) -> dict[str, Any]:
     """The manifest as it stands.
 
@@ -131,3 +93,54 @@ def read_manifest(dataset: Path) -> dict[str, Any]:
     if not isinstance(manifest, dict):
         raise InputError(f"{path}: cannot be read as a manifest (no JSON object)")
     return manifest
+
+
+Splits = dict[str, list[SequenceListing]]
+
+
+def read_splits(
+    dataset: Path, sequences: Iterable[SequenceListing]
+) -> tuple[Splits, tuple[str, ...]]:
+    """The sequences of each split that can be read, in order, and what is wrong with the files."""
+    by_path = {sequence.path: sequence for sequence in sequences}
+    splits: Splits = {}
+    failures: list[str] = []
+    for split, name in SPLIT_FILES.items():
+        try:
+            directories = read_split(dataset, split)
+        except InputError as error:
+            failures.append(str(error))
+            continue
+        except (OSError, ValueError) as error:
+            failures.append(f"{dataset / name}: cannot be read ({why(error)})")
+            continue
+        failures += [
+            f"{dataset / name}: lists {path.name}, which is not there"
+            for path in directories
+            if path not in by_path
+        ]
+        splits[split] = [by_path[path] for path in directories if path in by_path]
+    return splits, tuple(failures)
+
+
+def check_splits(
+    dataset: Path,
+    sequences: Iterable[SequenceListing],
+    splits: Mapping[str, list[SequenceListing]],
+    unreadable: tuple[str, ...],
+) -> Check:
+    """Each sequence is in one split, once."""
+    uses = {sequence.name: 0 for sequence in sequences}
+    for listed in splits.values():
+        for sequence in listed:
+            uses[sequence.name] += 1
+    names = " and ".join(SPLIT_FILES.values())
+    failures = [
+        f"{dataset / name}: is listed {count} times in {names}, must be listed once"
+        for name, count in uses.items()
+        if count != 1 and (count > 1 or not unreadable)
+    ]
+    parts = [
+        f"{split} {sum(len(s.frames) for s in listed)} frames" for split, listed in splits.items()
+    ]
+    return Check("splits", ", ".join(parts) or names, (*unreadable, *failures))

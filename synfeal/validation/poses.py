@@ -1,4 +1,4 @@
-"""Poses are rigid and those of the tables; splits are disjoint, and no pose is in both."""
+"""Poses are rigid, those of the tables, and of one split; which frames they let be compared."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
-from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError
 from synfeal.validation.frames import Poses
 from synfeal.validation.listing import POSE, Check, Frame, SequenceListing
 
@@ -44,6 +44,15 @@ def rigid_defects(pose: NDArray[np.float64]) -> NDArray[np.float64]:
     last_row = np.abs(pose[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=1)
     defects = np.stack([orthonormal, determinant, last_row], axis=1)
     return np.asarray(np.nan_to_num(defects, nan=np.inf))
+
+
+def rigid_poses(poses: Poses) -> Poses:
+    """The poses that can be used; the check names the others."""
+    return {
+        frame: pose
+        for frame, pose in poses.items()
+        if rigid_defects(pose[None]).max() <= ORTHONORMAL_BOUND
+    }
 
 
 def _worst(defects: NDArray[np.float64]) -> str:
@@ -109,57 +118,6 @@ def _differences(
     }
 
 
-Splits = dict[str, list[SequenceListing]]
-
-
-def read_splits(
-    dataset: Path, sequences: Iterable[SequenceListing]
-) -> tuple[Splits, tuple[str, ...]]:
-    """The sequences of each split that can be read, in order, and what is wrong with the files."""
-    by_path = {sequence.path: sequence for sequence in sequences}
-    splits: Splits = {}
-    failures: list[str] = []
-    for split, name in SPLIT_FILES.items():
-        try:
-            directories = read_split(dataset, split)
-        except InputError as error:
-            failures.append(str(error))
-            continue
-        except (OSError, ValueError) as error:
-            failures.append(f"{dataset / name}: cannot be read ({why(error)})")
-            continue
-        failures += [
-            f"{dataset / name}: lists {path.name}, which is not there"
-            for path in directories
-            if path not in by_path
-        ]
-        splits[split] = [by_path[path] for path in directories if path in by_path]
-    return splits, tuple(failures)
-
-
-def check_splits(
-    dataset: Path,
-    sequences: Iterable[SequenceListing],
-    splits: Mapping[str, list[SequenceListing]],
-    unreadable: tuple[str, ...],
-) -> Check:
-    """Each sequence is in one split, once."""
-    uses = {sequence.name: 0 for sequence in sequences}
-    for listed in splits.values():
-        for sequence in listed:
-            uses[sequence.name] += 1
-    names = " and ".join(SPLIT_FILES.values())
-    failures = [
-        f"{dataset / name}: is listed {count} times in {names}, must be listed once"
-        for name, count in uses.items()
-        if count != 1 and (count > 1 or not unreadable)
-    ]
-    parts = [
-        f"{split} {sum(len(s.frames) for s in listed)} frames" for split, listed in splits.items()
-    ]
-    return Check("splits", ", ".join(parts) or names, (*unreadable, *failures))
-
-
 def check_leaks(poses: Poses, splits: Mapping[str, list[SequenceListing]]) -> Check:
     """No test frame is taken from the pose of a training frame."""
     train = {
@@ -178,3 +136,55 @@ def check_leaks(poses: Poses, splits: Mapping[str, list[SequenceListing]]) -> Ch
     ]
     text = f"{len(test)} test poses, none of them a training pose"
     return Check("overlap", text, tuple(failures))
+
+
+GAPS = (1, 5, 20)  # frames apart: neighbours see the most, distant ones tell angles and lengths
+N_NEAREST = 2  # frames of the most similar pose, which of independent poses see the most
+PAIRS_PER_GAP = 200  # evenly spread over larger sets
+
+
+def choose_pairs(
+    sequences: Iterable[SequenceListing], usable: Poses, every: bool
+) -> list[tuple[Frame, Frame]]:
+    """Pairs ``GAPS`` frames apart, and each frame with those of the most similar poses.
+
+    Of a sequence each; at most ``PAIRS_PER_GAP`` of each kind unless ``every``.
+    """
+    sequences = list(sequences)
+    kinds = [
+        [
+            (frame, Frame(frame.sequence, frame.number + gap))
+            for sequence in sequences
+            for frame in sequence.frames
+            if frame in usable and Frame(frame.sequence, frame.number + gap) in usable
+        ]
+        for gap in GAPS
+    ]
+    kinds.append([pair for sequence in sequences for pair in _nearest(sequence, usable)])
+    chosen: set[tuple[Frame, Frame]] = set()
+    for pairs in kinds:
+        index = np.arange(len(pairs))
+        if not every and len(pairs) > PAIRS_PER_GAP:
+            index = np.linspace(0, len(pairs) - 1, PAIRS_PER_GAP).round().astype(int)
+        chosen.update(pairs[i] for i in index)
+    order = {sequence.path: index for index, sequence in enumerate(sequences)}
+    return sorted(chosen, key=lambda p: (order[p[0].sequence], p[0].number, p[1].number))
+
+
+def _nearest(sequence: SequenceListing, usable: Poses) -> list[tuple[Frame, Frame]]:
+    """Each frame with the ``N_NEAREST`` of the most similar poses, the earlier frame first.
+
+    A turn by a radian counts as much as a step across the space that the cameras are in.
+    """
+    frames = [frame for frame in sequence.frames if frame in usable]
+    if len(frames) <= N_NEAREST:
+        return []
+    poses = np.array([usable[frame] for frame in frames])
+    position, axes = poses[:, :3, 3], poses[:, :3, [0, 2]].reshape(-1, 6)
+    extent_m = max(float(np.linalg.norm(np.ptp(position, axis=0))), 1e-6)
+    features = np.column_stack([position / extent_m, axes])
+    _, found = KDTree(features).query(features, k=N_NEAREST + 1)
+    numbers = {
+        (min(i, j), max(i, j)) for i, row in enumerate(found.tolist()) for j in row if i != j
+    }
+    return [(frames[i], frames[j]) for i, j in sorted(numbers)]

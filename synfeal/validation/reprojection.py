@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.geometry.poses import relative
-from synfeal.validation.lens import Lens
+from synfeal.validation.camera import Lens
 
 Array = NDArray[np.float64]
 

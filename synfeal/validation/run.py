@@ -5,23 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 from tqdm import tqdm
 
 from synfeal.errors import InputError
+from synfeal.validation.camera import KnownCamera, camera_of_dataset
 from synfeal.validation.consistency import check_consistency
 from synfeal.validation.frames import Poses, check_images, check_names, kinds_of, read_poses
 from synfeal.validation.listing import DEPTH, Check, SequenceListing, list_sequences
-from synfeal.validation.manifest import KnownCamera, camera_of_dataset, check_manifest
-from synfeal.validation.pairs import choose_pairs
+from synfeal.validation.manifest import check_manifest, check_splits, read_splits
 from synfeal.validation.poses import (
-    ORTHONORMAL_BOUND,
     check_leaks,
     check_rigid,
-    check_splits,
     check_tables,
-    read_splits,
-    rigid_defects,
+    choose_pairs,
+    rigid_poses,
 )
 
 
@@ -73,24 +70,12 @@ def _geometry(
     """The checks that need depth, the camera and rigid poses."""
     if DEPTH not in kinds_of(sequences):
         return [Check("pairs", "no depth images: frames cannot be compared", skipped=True)]
-    rigid = _rigid(poses)
+    rigid = rigid_poses(poses)
     pairs = choose_pairs(sequences, rigid, every_pair)
     if not pairs:
         return [Check("pairs", "no two frames of a sequence to compare", skipped=True)]
     with tqdm(total=len(pairs), unit="pair", desc="compare", leave=False, disable=None) as progress:
         return check_consistency(pairs, rigid, camera, progress.update)
-
-
-def _rigid(poses: Poses) -> Poses:
-    """The poses that can be used; the check of the poses names the others."""
-    if not poses:
-        return {}
-    defects = rigid_defects(np.array(list(poses.values()))).max(axis=1)
-    return {
-        frame: pose
-        for (frame, pose), defect in zip(poses.items(), defects, strict=True)
-        if defect <= ORTHONORMAL_BOUND
-    }
 
 
 def report(dataset: Path, checks: Sequence[Check]) -> str:

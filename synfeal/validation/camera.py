@@ -1,14 +1,55 @@
-"""Pixels to rays and back by COLMAP's camera models: other code than the renderers'."""
+"""Which camera took the frames, and its pixels as rays by other code than the renderers'."""
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 import pycolmap
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from synfeal.config.dataset import CameraConfig
+from synfeal.config.load import describe
+from synfeal.dataset.finish import MANIFEST
+from synfeal.errors import InputError
+from synfeal.validation.manifest import read_manifest
+
+# Depth and colour of 7-Scenes come from a Kinect; its authors give this for both.
+SEVEN_SCENES = CameraConfig(width=640, height=480, fx=585.0, fy=585.0, cx=320.0, cy=240.0)
+
+
+@dataclass(frozen=True)
+class KnownCamera:
+    """A camera and where it is known from."""
+
+    config: CameraConfig  # its intrinsics and distortion
+    source: str  # for the report
+    assumed: bool = False  # nothing says that this is the camera
+
+
+def camera_of_dataset(dataset: Path, camera_file: Path | None) -> KnownCamera:
+    """The camera of a data set; a calibration file goes before the manifest."""
+    if camera_file is not None:
+        from synfeal.camera.calibration import read_calibration
+
+        return KnownCamera(
+            _config(camera_file, asdict(read_calibration(camera_file))), str(camera_file)
+        )
+    path = dataset / MANIFEST
+    if not path.exists():
+        return KnownCamera(SEVEN_SCENES, "assumed: that of 7-Scenes", assumed=True)
+    return KnownCamera(_config(path, read_manifest(dataset).get("camera")), MANIFEST)
+
+
+def _config(path: Path, values: object) -> CameraConfig:
+    try:
+        return CameraConfig.model_validate(values)
+    except ValidationError as error:
+        raise InputError(f"{path}: camera: {describe(error, CameraConfig)}") from None
+
 
 Array = NDArray[np.float64]
 
