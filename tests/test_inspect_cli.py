@@ -13,7 +13,7 @@ from PIL import Image
 
 from synfeal.cli import main
 from synfeal.config.models import SceneConfig
-from synfeal.inspect.picture import top_view
+from synfeal.inspect.run import top_view
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 

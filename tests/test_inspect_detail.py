@@ -5,8 +5,9 @@ import pytest
 import trimesh
 
 from synfeal.inspect.doubts import colour_doubts, doubts_of, floor_areas_m2
+from synfeal.inspect.facts import detail_of, texels_per_m
 from synfeal.inspect.freespace import FreeSpace
-from synfeal.inspect.surface import SurfacePoints, detail_of, nearest_texels, texels_per_m
+from synfeal.inspect.surface import SurfacePoints, nearest_texels
 from synfeal.mesh.model import MeshPart, TexturedMesh
 
 UNIT_UV = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

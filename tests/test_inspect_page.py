@@ -15,10 +15,8 @@ import pytest
 import trimesh
 
 from synfeal.errors import InputError
-from synfeal.inspect.run import page_html
-from synfeal.inspect.surface import SurfacePoints
-from synfeal.inspect.text import Section
-from synfeal.inspect.viewer_mesh import split_longest_edges, viewer_mesh
+from synfeal.inspect.surface import SurfacePoints, split_longest_edges, viewer_mesh
+from synfeal.inspect.text import Section, page_html
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.triangles import Triangles, simplify
 

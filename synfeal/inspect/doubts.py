@@ -1,20 +1,24 @@
-"""What looks wrong about a mesh, and what its file does not say of itself: unit, up axis."""
+"""A mesh looked at once, in the unit and with the axis up that make sense, and what looks wrong."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
+from typing import Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.models import SceneConfig
-from synfeal.inspect.freespace import FreeSpace
-from synfeal.inspect.suggest import Suggestion
+from synfeal.inspect.freespace import FreeSpace, survey, viewpoint
+from synfeal.inspect.suggest import Suggestion, suggest
 from synfeal.inspect.surface import SurfacePoints, triangle_areas_m2
 from synfeal.mesh.checks import shows_one_colour
 from synfeal.mesh.load import is_y_up, load_mesh
 from synfeal.mesh.model import TexturedMesh
+from synfeal.mesh.rays import RayCaster
+from synfeal.planning.plan import sampling_box_of
+from synfeal.seeds import generator_of
 
 Array = NDArray[np.float64]
 
@@ -177,3 +181,39 @@ def _floors_m2(mesh: TexturedMesh) -> Array:
     points = SurfacePoints.of(mesh, np.random.default_rng(0), N_POINTS)
     area_m2 = sum(float(triangle_areas_m2(part).sum()) for part in mesh.parts)
     return floor_areas_m2(points.normal, points.position_m, area_m2)
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What is known of a mesh."""
+
+    scene: SceneConfig  # path, axis and unit as they were taken
+    mesh: TexturedMesh
+    assumed: tuple[str, ...]  # sentences about what the file did not say
+    surface: SurfacePoints  # points spread over the mesh
+    caster: RayCaster  # rays against it
+    box_m: Array  # (2, 3) the box that was searched
+    space: FreeSpace  # its free space
+    suggestion: Suggestion | None  # a sampling box that works, if one was found
+
+    @classmethod
+    def of(cls, scene: SceneConfig, unit_is_given: bool) -> Self:
+        """Load and look at a mesh; see :func:`synfeal.inspect.run.inspect_mesh`."""
+        scene, mesh, assumed = load_as_meant(scene, unit_is_given)
+        box_m = sampling_box_of(scene, mesh.bounds_m, str(scene.path))
+        surface = SurfacePoints.of(mesh, generator_of(0, "inspect"))
+        caster = RayCaster(*mesh.merged())
+        found = survey(caster, surface.position_m, box_m)
+        space, suggestion = suggest(caster, found, scene)
+        return cls(scene, mesh, tuple(assumed), surface, caster, box_m, space, suggestion)
+
+    @property
+    def suggested_m(self) -> Array | None:
+        """The suggested box (2, 3)."""
+        return None if self.suggestion is None else self.suggestion.box_m
+
+    @property
+    def viewpoint_m(self) -> Array:
+        """Where the pictures are taken from, (3,): in the free space if there is any."""
+        found_m = viewpoint(self.space, self.suggested_m)
+        return self.mesh.bounds_m.mean(axis=0) if found_m is None else found_m

@@ -3,73 +3,35 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from trimesh.triangles import cross
 
 import synfeal
-from synfeal.config.models import SceneConfig
 from synfeal.files import file_sha256
 from synfeal.inspect.doubts import (
+    Inspection,
     colour_doubts,
     doubts_of,
     floor_areas_m2,
-    load_as_meant,
     suggestion_doubts,
 )
-from synfeal.inspect.freespace import DEFINITION, FreeSpace, survey, viewpoint
-from synfeal.inspect.suggest import N_FRAMES, Suggestion, suggest
-from synfeal.inspect.surface import SurfacePoints, back_face_share, detail_of, triangle_areas_m2
+from synfeal.inspect.freespace import DEFINITION, FreeSpace
+from synfeal.inspect.suggest import N_FRAMES
+from synfeal.inspect.surface import triangle_areas_m2
 from synfeal.mesh.gltf import slug_of, title_of
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.properties import mesh_properties, mesh_topology
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import merge_vertices
-from synfeal.planning.plan import sampling_box_of
-from synfeal.seeds import generator_of
 
 Array = NDArray[np.float64]
 
 N_HOLES = 10  # of which the length is told
-
-
-@dataclass(frozen=True)
-class Inspection:
-    """What is known of a mesh."""
-
-    scene: SceneConfig  # path, axis and unit as they were taken
-    mesh: TexturedMesh
-    assumed: tuple[str, ...]  # sentences about what the file did not say
-    surface: SurfacePoints  # points spread over the mesh
-    caster: RayCaster  # rays against it
-    box_m: Array  # (2, 3) the box that was searched
-    space: FreeSpace  # its free space
-    suggestion: Suggestion | None  # a sampling box that works, if one was found
-
-    @classmethod
-    def of(cls, scene: SceneConfig, unit_is_given: bool) -> Self:
-        """Load and look at a mesh; see :func:`synfeal.inspect.run.inspect_mesh`."""
-        scene, mesh, assumed = load_as_meant(scene, unit_is_given)
-        box_m = sampling_box_of(scene, mesh.bounds_m, str(scene.path))
-        surface = SurfacePoints.of(mesh, generator_of(0, "inspect"))
-        caster = RayCaster(*mesh.merged())
-        found = survey(caster, surface.position_m, box_m)
-        space, suggestion = suggest(caster, found, scene)
-        return cls(scene, mesh, tuple(assumed), surface, caster, box_m, space, suggestion)
-
-    @property
-    def suggested_m(self) -> Array | None:
-        """The suggested box (2, 3)."""
-        return None if self.suggestion is None else self.suggestion.box_m
-
-    @property
-    def viewpoint_m(self) -> Array:
-        """Where the pictures are taken from, (3,): in the free space if there is any."""
-        found_m = viewpoint(self.space, self.suggested_m)
-        return self.mesh.bounds_m.mean(axis=0) if found_m is None else found_m
 
 
 def facts_of(found: Inspection) -> dict[str, Any]:
@@ -149,3 +111,87 @@ def _material_key(part: MeshPart) -> tuple[str, bytes, float | None]:
     texture = b"" if part.texture is None else part.texture.tobytes()
     kind = f"{_colour(part)} {hashlib.sha256(texture).hexdigest()}"
     return kind, part.base_color.tobytes(), part.alpha_cutoff
+
+
+QUANTILES = (0.05, 0.5, 0.95)
+
+
+def detail_of(mesh: TexturedMesh) -> dict[str, Any]:
+    """Surface by what colours it, and the density of texels and of coloured vertices.
+
+    ``texels_per_m`` holds the 5 %, 50 % and 95 % quantiles over the textured surface, weighted by
+    area, of the square root of texels per square metre; ``coloured_vertices_per_m`` is the square
+    root of vertices per square metre over all parts coloured by their vertices. None where there
+    are no such parts.
+    """
+    textured = [part for part in mesh.parts if part.texture is not None]
+    by_vertex = [p for p in mesh.parts if p.texture is None and p.vertex_rgb is not None]
+    plain = [p for p in mesh.parts if p.texture is None and p.vertex_rgb is None]
+    return {
+        "area_m2": {
+            "textured": _area_m2(textured),
+            "coloured_by_vertex": _area_m2(by_vertex),
+            "plain": _area_m2(plain),
+        },
+        "texels_per_m": texels_per_m(textured),
+        "coloured_vertices_per_m": _vertices_per_m(by_vertex),
+    }
+
+
+def texels_per_m(parts: list[MeshPart]) -> list[float] | None:
+    """Quantiles of texel density over textured parts; see :func:`detail_of`."""
+    if not parts:
+        return None
+    area = np.concatenate([triangle_areas_m2(part) for part in parts])
+    texels = np.concatenate([_texels(part) for part in parts])
+    usable = area > 0.0
+    if not usable.any():
+        return None
+    density = np.sqrt(texels[usable] / area[usable])
+    found = np.quantile(density, QUANTILES, weights=area[usable], method="inverted_cdf")
+    return [float(value) for value in found]
+
+
+def _texels(part: MeshPart) -> Array:
+    """Texels (F,) that each triangle of a textured part covers."""
+    assert part.texture is not None
+    assert part.uv is not None
+    size = part.texture.shape[1::-1]
+    a, b, c = (part.uv[part.faces[:, corner]] * size for corner in range(3))
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    return np.asarray(np.abs(ux * vy - uy * vx) / 2.0)
+
+
+def _area_m2(parts: list[MeshPart]) -> float:
+    return float(sum(triangle_areas_m2(part).sum() for part in parts))
+
+
+def _vertices_per_m(parts: list[MeshPart]) -> float | None:
+    area_m2 = _area_m2(parts)
+    if area_m2 <= 0.0:
+        return None
+    return float(np.sqrt(sum(len(np.unique(part.faces)) for part in parts) / area_m2))
+
+
+N_RAYS = 5000
+
+
+def back_face_share(mesh: TexturedMesh, caster: RayCaster, space: FreeSpace) -> float | None:
+    """Share of what random rays from the clear points of a space hit that is a back side.
+
+    A face shows its front where its vertices run counter-clockwise. None if nothing is hit.
+    """
+    index = np.argwhere(space.is_clear)
+    if not len(index):
+        return None
+    rng = np.random.default_rng(0)
+    index = index[rng.integers(len(index), size=N_RAYS)]
+    start = np.stack([axis[index[:, i]] for i, axis in enumerate(space.axes_m)], axis=1)
+    direction: NDArray[np.float64] = rng.standard_normal((N_RAYS, 3))
+    _, face = caster.first_hits(start, direction)
+    vertices, faces = mesh.merged()
+    hit = face >= 0
+    if not hit.any():
+        return None
+    normal = cross(vertices[faces[face[hit]]])
+    return float(np.mean(np.einsum("ni,ni->n", normal, direction[hit]) > 0.0))

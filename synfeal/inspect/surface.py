@@ -1,17 +1,20 @@
-"""Coloured points spread evenly over a mesh, how much detail it shows, and from which side."""
+"""Coloured points spread evenly over a mesh, and a small coloured copy for the viewer in a page."""
 
 from __future__ import annotations
 
+import base64
+from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 from trimesh.triangles import cross
 
-from synfeal.inspect.freespace import FreeSpace
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.mesh.rays import RayCaster
+from synfeal.mesh.triangles import merge_vertices, simplify
 
 N_POINTS = 300_000
 
@@ -92,85 +95,119 @@ def nearest_texels(texture: NDArray[np.uint8], uv: Array) -> NDArray[np.uint8]:
     return np.asarray(texture[row, column])
 
 
-QUANTILES = (0.05, 0.5, 0.95)
+MAX_FACES = 60_000
+SIMPLIFY_ABOVE = 30_000  # the rest of the budget goes to splitting what large triangles remain
+NORMAL_M = 0.1  # how far apart two colours seem that face opposite ways, halved
+MIN_EDGE_SHARE = 1 / 400  # of the longest extent: finer than that no triangle is split
+N_NEAREST = 4
+ACROSS_RAD = -2.2  # across the corners of a room
+STEPS = 32_000  # int16 on either side of the middle
 
 
-def detail_of(mesh: TexturedMesh) -> dict[str, Any]:
-    """Surface by what colours it, and the density of texels and of coloured vertices.
+@dataclass(frozen=True)
+class ViewerMesh:
+    """What :file:`viewer.js` draws."""
 
-    ``texels_per_m`` holds the 5 %, 50 % and 95 % quantiles over the textured surface, weighted by
-    area, of the square root of texels per square metre; ``coloured_vertices_per_m`` is the square
-    root of vertices per square metre over all parts coloured by their vertices. None where there
-    are no such parts.
+    # (V, 3) int16; metres are ``offset_m + step_m * positions``, world, z up
+    positions: NDArray[np.int16]
+    rgb: NDArray[np.uint8]  # (V, 3) uint8
+    faces: NDArray[np.uint32]  # (F, 3) uint32
+    offset_m: Array  # (3,) middle of the mesh
+    step_m: float  # metres per unit of ``positions``
+
+    def scene(
+        self, polylines: Sequence[tuple[ArrayLike, Sequence[int]]] = (), yaw_rad: float = ACROSS_RAD
+    ) -> dict[str, Any]:
+        """The argument of ``synfealViewer``, ready for JSON.
+
+        With lines through points (N, 3), metres, of a colour (0 to 255 each), and the heading of
+        the first view, 0 along x.
+        """
+        return {
+            "positions": _base64(self.positions, "<i2"),
+            "colours": _base64(self.rgb, "u1"),
+            "faces": _base64(self.faces, "<u4"),
+            "offset_m": self.offset_m.tolist(),
+            "step_m": self.step_m,
+            "yaw": yaw_rad,
+            "polylines": [
+                {"points": np.round(np.asarray(points, np.float64), 4).tolist(), "colour": [*rgb]}
+                for points, rgb in polylines
+            ],
+        }
+
+
+def viewer_js() -> str:
+    """The script that defines ``synfealViewer(canvas, scene)``."""
+    return files("synfeal.inspect").joinpath("viewer.js").read_text(encoding="utf-8")
+
+
+def viewer_mesh(mesh: TexturedMesh, surface: SurfacePoints) -> ViewerMesh:
+    """At most 60,000 triangles with colours at their corners.
+
+    Large triangles are split until the budget is used, since corners are all that carries colour.
+    Triangles that the alpha test cuts out are left out.
     """
-    textured = [part for part in mesh.parts if part.texture is not None]
-    by_vertex = [p for p in mesh.parts if p.texture is None and p.vertex_rgb is not None]
-    plain = [p for p in mesh.parts if p.texture is None and p.vertex_rgb is None]
-    return {
-        "area_m2": {
-            "textured": _area_m2(textured),
-            "coloured_by_vertex": _area_m2(by_vertex),
-            "plain": _area_m2(plain),
-        },
-        "texels_per_m": texels_per_m(textured),
-        "coloured_vertices_per_m": _vertices_per_m(by_vertex),
-    }
+    merged = merge_vertices(*mesh.merged())
+    if len(merged.faces) > SIMPLIFY_ABOVE:
+        merged = simplify(merged, SIMPLIFY_ABOVE)
+    min_edge_m = MIN_EDGE_SHARE * float(np.ptp(mesh.bounds_m, axis=0).max())
+    corners = split_longest_edges(merged.vertices_m[merged.faces], MAX_FACES, min_edge_m)
+    normals = _normals(corners)
+    tree = cKDTree(_features(surface.position_m, surface.normal))
+    if not surface.is_drawn.all():
+        _, nearest = tree.query(_features(corners.mean(axis=1), normals))
+        corners, normals = corners[surface.is_drawn[nearest]], normals[surface.is_drawn[nearest]]
+    return _indexed(mesh.bounds_m, corners, normals, surface, tree)
 
 
-def texels_per_m(parts: list[MeshPart]) -> list[float] | None:
-    """Quantiles of texel density over textured parts; see :func:`detail_of`."""
-    if not parts:
-        return None
-    area = np.concatenate([triangle_areas_m2(part) for part in parts])
-    texels = np.concatenate([_texels(part) for part in parts])
-    usable = area > 0.0
-    if not usable.any():
-        return None
-    density = np.sqrt(texels[usable] / area[usable])
-    found = np.quantile(density, QUANTILES, weights=area[usable], method="inverted_cdf")
-    return [float(value) for value in found]
+def split_longest_edges(corners: Array, max_faces: int, min_edge_m: float) -> Array:
+    """Split triangles (F, 3, 3) at the middle of their longest edge, the longest edges first.
 
-
-def _texels(part: MeshPart) -> Array:
-    """Texels (F,) that each triangle of a textured part covers."""
-    assert part.texture is not None
-    assert part.uv is not None
-    size = part.texture.shape[1::-1]
-    a, b, c = (part.uv[part.faces[:, corner]] * size for corner in range(3))
-    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
-    return np.asarray(np.abs(ux * vy - uy * vx) / 2.0)
-
-
-def _area_m2(parts: list[MeshPart]) -> float:
-    return float(sum(triangle_areas_m2(part).sum() for part in parts))
-
-
-def _vertices_per_m(parts: list[MeshPart]) -> float | None:
-    area_m2 = _area_m2(parts)
-    if area_m2 <= 0.0:
-        return None
-    return float(np.sqrt(sum(len(np.unique(part.faces)) for part in parts) / area_m2))
-
-
-N_RAYS = 5000
-
-
-def back_face_share(mesh: TexturedMesh, caster: RayCaster, space: FreeSpace) -> float | None:
-    """Share of what random rays from the clear points of a space hit that is a back side.
-
-    A face shows its front where its vertices run counter-clockwise. None if nothing is hit.
+    Stops at ``max_faces`` triangles or when no edge is longer than ``min_edge_m``.
     """
-    index = np.argwhere(space.is_clear)
-    if not len(index):
-        return None
-    rng = np.random.default_rng(0)
-    index = index[rng.integers(len(index), size=N_RAYS)]
-    start = np.stack([axis[index[:, i]] for i, axis in enumerate(space.axes_m)], axis=1)
-    direction: NDArray[np.float64] = rng.standard_normal((N_RAYS, 3))
-    _, face = caster.first_hits(start, direction)
-    vertices, faces = mesh.merged()
-    hit = face >= 0
-    if not hit.any():
-        return None
-    normal = cross(vertices[faces[face[hit]]])
-    return float(np.mean(np.einsum("ni,ni->n", normal, direction[hit]) > 0.0))
+    while len(corners) < max_faces:
+        edges_m = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+        longest_m = edges_m.max(axis=1)
+        chosen = np.flatnonzero(longest_m > max(0.7 * float(longest_m.max()), min_edge_m))
+        if not len(chosen):
+            break
+        chosen = chosen[np.argsort(-longest_m[chosen], kind="stable")][: max_faces - len(corners)]
+        order = (edges_m[chosen].argmax(axis=1)[:, None] + np.arange(3)) % 3
+        a, b, c = np.moveaxis(np.take_along_axis(corners[chosen], order[..., None], axis=1), 1, 0)
+        middle = (a + b) / 2.0
+        halves = [np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)]
+        corners = np.concatenate([np.delete(corners, chosen, axis=0), *halves])
+    return corners
+
+
+def _indexed(
+    bounds_m: Array, corners: Array, normals: Array, surface: SurfacePoints, tree: Any
+) -> ViewerMesh:
+    """Corners that agree in place and normal as one vertex, coloured by the surface nearby."""
+    offset_m = bounds_m.mean(axis=0)
+    step_m = max(float(np.ptp(bounds_m, axis=0).max()) / 2.0 / STEPS, 1e-9)
+    steps = np.round((corners.reshape(-1, 3) - offset_m) / step_m)
+    facing = np.round(np.repeat(normals, 3, axis=0) * 8.0)
+    keys, index = np.unique(
+        np.hstack([steps, facing]).astype(np.int16), axis=0, return_inverse=True
+    )
+    place = offset_m + step_m * keys[:, :3]
+    _, nearest = tree.query(_features(place, keys[:, 3:] / 8.0), k=N_NEAREST)
+    rgb = np.round(surface.rgb[nearest].mean(axis=1)).astype(np.uint8)
+    faces = index.reshape(-1, 3).astype(np.uint32)
+    return ViewerMesh(np.ascontiguousarray(keys[:, :3]), rgb, faces, offset_m, step_m)
+
+
+def _normals(corners: Array) -> Array:
+    normals = cross(corners)
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30))
+
+
+def _features(position_m: Array, normal: Array) -> Array:
+    """Place and facing (N, 6), so that two sides of a thin wall keep their own colours."""
+    return np.hstack([position_m, NORMAL_M * normal])
+
+
+def _base64(values: NDArray[Any], kind: str) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from textwrap import wrap
 from typing import Any, NamedTuple
 
+from jinja2 import Environment, PackageLoader
+
+from synfeal.inspect.surface import viewer_js
 from synfeal.mesh.gltf import slug_of
 
 Facts = Mapping[str, Any]
@@ -177,3 +181,25 @@ def _part_text(part: Facts) -> str:
         colour = "texture {} x {}".format(*part["texture_px"])
     cut = "" if part["alpha_cutoff"] is None else f", alpha cut at {part['alpha_cutoff']:.2f}"
     return f"{part['faces']:>9,} faces  {part['area_m2']:>8.1f} m^2  {colour}{cut}"
+
+
+def page_html(
+    title: str,  # heading
+    doubts: Sequence[str],  # sentences to stand out at the top
+    sections: Sequence[Section],  # tables of numbers
+    snippet: str,  # lines for a configuration file and for a shell
+    picture_png: bytes,  # the picture
+    scene: dict[str, Any],  # what :meth:`synfeal.inspect.surface.ViewerMesh.scene` returns
+) -> str:
+    """The page as HTML, with nothing to load from elsewhere."""
+    loader = PackageLoader("synfeal.inspect", ".")
+    pages = Environment(loader=loader, autoescape=True, keep_trailing_newline=True)
+    return pages.get_template("page.html").render(
+        title=title,
+        doubts=doubts,
+        sections=sections,
+        snippet=snippet,
+        picture=base64.b64encode(picture_png).decode("ascii"),
+        scene=json.dumps(scene, allow_nan=False).replace("<", "\\u003c"),
+        viewer=viewer_js(),
+    )

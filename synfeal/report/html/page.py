@@ -18,8 +18,7 @@ from synfeal.config import Design, Experiment
 from synfeal.config.learning import KEYS
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.files import write_text
-from synfeal.inspect.surface import SurfacePoints
-from synfeal.inspect.viewer_mesh import viewer_js, viewer_mesh
+from synfeal.inspect.surface import SurfacePoints, viewer_js, viewer_mesh
 from synfeal.mesh.load import load_mesh
 from synfeal.report import meshes
 from synfeal.report.cells import key_of, published_cells, read_cells
