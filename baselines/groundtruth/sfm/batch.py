@@ -7,10 +7,9 @@ camera centres, because the centres of a straight path leave the rotation about 
 Where that camera is not the batch's first, the chain counts the batch as assisted.
 
 A wrong scale over the first frames and a first camera that few others share points with grow with
-the distance, so the placed error of a long path is larger than that after a similarity fit
-(``results/benchmarks/sfm_settings.csv``). The rule is kept because it is the assistance that the
-published labels had; what bent models, and their first cameras with them, is removed before
-(``mapping.py``).
+the distance, so the placed error of a long path is larger than that after a similarity fit. The
+rule is kept because it is the assistance that the published labels had; what bent models, and their
+first cameras with them, is removed before (``mapping.py``).
 """
 
 from __future__ import annotations
