@@ -19,6 +19,9 @@ include: "workflow/rules/evidence.smk"
 include: "workflow/rules/robustness.smk"
 
 
+name_logs(workflow.rules)
+
+
 localrules:
     all,
     scenes,

@@ -4,8 +4,6 @@
 # A job that calls one function, `params.function`, with the rule's files, parameters and wildcards
 # (synfeal.job.call); rules that add nothing else are `use rule call as ... with`.
 rule call:
-    log:
-        f"{ROOT}/logs/call.log",
     conda:
         "../envs/synfeal.yaml"
     resources:
@@ -23,10 +21,6 @@ use rule call as scene with:
         curve=f"{ROOT}/scenes/{{scene}}/collision_curve.csv",
         clutter=f"{ROOT}/scenes/{{scene}}/clutter.json",
         properties=f"{ROOT}/scenes/{{scene}}/properties.json",
-    log:
-        f"{ROOT}/logs/scene/{{scene}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/scene/{{scene}}.tsv"
     resources:
         mem_mb=grown(4000),
     params:
@@ -44,10 +38,6 @@ use rule call as plan with:
         repeat=CONFIG.collection.repeat or [],
     output:
         plan=f"{ROOT}/plans/{{scene}}/{{split}}.csv",
-    log:
-        f"{ROOT}/logs/plan/{{scene}}/{{split}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/plan/{{scene}}/{{split}}.tsv"
     resources:
         mem_mb=grown(2000),
     params:
@@ -65,10 +55,6 @@ use rule call as coverage with:
         plan=rules.plan.output.plan,
     output:
         coverage=f"{ROOT}/plans/{{scene}}/{{split}}.coverage.json",
-    log:
-        f"{ROOT}/logs/coverage/{{scene}}/{{split}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/coverage/{{scene}}/{{split}}.tsv"
     params:
         function="synfeal.planning.coverage:write_coverage",
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
@@ -82,10 +68,6 @@ use rule call as cell_depth with:
         plan=f"{ROOT}/plans/{{scene}}/test.csv",
     output:
         depth=f"{ROOT}/scenes/{{scene}}/test_depth.npy",
-    log:
-        f"{ROOT}/logs/cell_depth/{{scene}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/cell_depth/{{scene}}.tsv"
     params:
         function="synfeal.evaluation.reprojection:write_scene_depth",
         camera=dump(CONFIG.network_camera),
@@ -98,10 +80,6 @@ use rule call as render with:
         extras=lambda w: beside_mesh(w.scene, CONFIG.render.effects),
     output:
         frames=sequence_output(f"{ROOT}/datasets/{{scene}}/{{camera}}/{{sequence}}"),
-    log:
-        f"{ROOT}/logs/render/{{scene}}/{{camera}}/{{sequence}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/render/{{scene}}/{{camera}}/{{sequence}}.tsv"
     resources:
         mem_mb=grown(3000),
     params:
@@ -119,10 +97,6 @@ use rule call as cartons with:
         mesh=rules.scene.output.mesh,
     output:
         cartons=cartons_of("{scene}"),
-    log:
-        f"{ROOT}/logs/cartons/{{scene}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/cartons/{{scene}}.tsv"
     params:
         function="synfeal.scenes.prepare:save_cartons",
 
@@ -133,10 +107,6 @@ use rule call as render_speed with:
         plan=f"{ROOT}/plans/{{scene}}/test.csv",
     output:
         speed=f"{ROOT}/scenes/{{scene}}/render_speed.csv",
-    log:
-        f"{ROOT}/logs/render_speed/{{scene}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/render_speed/{{scene}}.tsv"
     resources:
         mem_mb=grown(3000),
     params:
@@ -154,10 +124,6 @@ use rule call as collection_speed with:
         repeat=CONFIG.collection.repeat or [],
     output:
         speed=f"{ROOT}/scenes/{{scene}}/collection_speed.json",
-    log:
-        f"{ROOT}/logs/collection_speed/{{scene}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/collection_speed/{{scene}}.tsv"
     resources:
         mem_mb=grown(3000),
     params:
@@ -178,10 +144,6 @@ use rule call as render_packed with:
     output:
         frames=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.npy"),
         record=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.json"),
-    log:
-        f"{ROOT}/logs/render_packed/{{scene}}/{{sequence}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/render_packed/{{scene}}/{{sequence}}.tsv"
     resources:
         mem_mb=grown(3000),
     params:
@@ -202,10 +164,6 @@ use rule call as pack with:
     output:
         frames=f"{ROOT}/frames/{{scene}}/{{split}}.npy",
         record=f"{ROOT}/frames/{{scene}}/{{split}}.json",
-    log:
-        f"{ROOT}/logs/pack/{{scene}}/{{split}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/pack/{{scene}}/{{split}}.tsv"
     resources:
         mem_mb=grown(2000),
     params:
@@ -233,10 +191,6 @@ use rule call as dataset with:
             for split in SPLITS
             if all(CONFIG.n_largest(scene, split) for scene in CONFIG.scenes)
         ],
-    log:
-        f"{ROOT}/logs/dataset/{{scene}}/{{camera}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/dataset/{{scene}}/{{camera}}.tsv"
     params:
         function="synfeal.dataset.finish:finish_dataset",
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),

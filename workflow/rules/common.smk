@@ -3,6 +3,7 @@ import sys
 from functools import cache, partial
 from typing import get_args
 
+from snakemake.io import strip_wildcard_constraints
 from snakemake.logging import logger
 
 from baselines.localizers.registry import backbone_of
@@ -178,6 +179,22 @@ def batch_sequences(wildcards):
     """Sequences that hold the frames of a batch."""
     stop = batch_of(wildcards).stop
     return sequence_dirs(wildcards.scene, "groundtruth", wildcards.split, stop)
+
+
+def name_logs(rules):
+    """Give jobs a log and a benchmark file, named after their rule and its wildcards.
+
+    Those of tables lie together, under their names. Rules that name their own keep them.
+    """
+    for made in (r for r in rules if r.script and not r.log):
+        path = Path(strip_wildcard_constraints(made.output[0]) if made.output else "")
+        varied = Path(*(part for part in path.parts if "{" in part)).as_posix()
+        name = Path(made.name, varied.partition(".")[0]).as_posix()
+        if path.parent.name == "tables":
+            name = f"tables/{path.stem}"
+        made.log_modifier = made.benchmark_modifier = workflow.modifier.path_modifier
+        made.set_log(f"{ROOT}/logs/{name}.log")
+        made.benchmark = f"{ROOT}/benchmarks/{name}.tsv"
 
 
 def unless_restored(outputs, **sources):

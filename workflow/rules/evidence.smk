@@ -11,10 +11,6 @@ use rule call as table1_meshes with:
             category="Tables",
         ),
         tex=f"{ROOT}/tables/table1_meshes.tex",
-    log:
-        f"{ROOT}/logs/tables/table1_meshes.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/table1_meshes.tsv"
     params:
         function="synfeal.report.meshes:write_meshes_table",
         scenes=SCENES,
@@ -30,10 +26,6 @@ use rule call as table with:
             category="Tables",
         ),
         tex=f"{ROOT}/tables/{{table}}.tex",
-    log:
-        f"{ROOT}/logs/tables/{{table}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/{{table}}.tsv"
     wildcard_constraints:
         table="table[2-9]_[a-z_]+",
     params:
@@ -51,10 +43,6 @@ use rule call as recall with:
             category="Tables",
         ),
         tex=f"{ROOT}/tables/recall.tex",
-    log:
-        f"{ROOT}/logs/tables/recall.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/recall.tsv"
     params:
         function="synfeal.report.recall:write_recall_table",
         design=dump(DESIGN),
@@ -66,10 +54,6 @@ use rule call as assistance with:
     output:
         csv=f"{ROOT}/tables/assistance.csv",
         tex=f"{ROOT}/tables/assistance.tex",
-    log:
-        f"{ROOT}/logs/tables/assistance.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/assistance.tsv"
     params:
         function="synfeal.report.assistance:write_assistance_table",
         design=dump(DESIGN),
@@ -86,10 +70,6 @@ use rule call as label_error with:
     output:
         csv=f"{ROOT}/tables/label_error.csv",
         tex=f"{ROOT}/tables/label_error.tex",
-    log:
-        f"{ROOT}/logs/tables/label_error.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/label_error.tsv"
     params:
         function="synfeal.report.label_error:write_label_error_table",
         design=dump(DESIGN),
@@ -109,10 +89,6 @@ use rule call as speed_vs_error with:
         measured=files_of_trainings("benchmarks/train/{run}.tsv"),
     output:
         csv=f"{ROOT}/tables/speed_vs_error.csv",
-    log:
-        f"{ROOT}/logs/tables/speed_vs_error.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/speed_vs_error.tsv"
     params:
         function="synfeal.report.speed_vs_error:write_speed_vs_error",
         scenes=SCENES,
@@ -121,10 +97,6 @@ use rule call as speed_vs_error with:
 use rule call as hard_cases with:
     output:
         csv=f"{ROOT}/tables/hard_cases.csv",
-    log:
-        f"{ROOT}/logs/tables/hard_cases.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/hard_cases.tsv"
     resources:
         mem_mb=grown(2000),
     params:
@@ -176,10 +148,6 @@ use rule call as figures with:
             category="Figures",
             labels={"figure": "{figure}"},
         ),
-    log:
-        f"{ROOT}/logs/figures.log",
-    benchmark:
-        f"{ROOT}/benchmarks/figures.tsv"
     resources:
         mem_mb=grown(2000),
     params:
@@ -197,10 +165,6 @@ use rule call as summary with:
     output:
         md=f"{ROOT}/summary.md",
         txt=f"{ROOT}/summary.txt",
-    log:
-        f"{ROOT}/logs/summary.log",
-    benchmark:
-        f"{ROOT}/benchmarks/summary.tsv"
     params:
         function="synfeal.report.summary:write_summary",
         design=dump(DESIGN),
@@ -220,10 +184,6 @@ use rule call as claims with:
             caption="../report/claims.rst",
             category="Claims",
         ),
-    log:
-        f"{ROOT}/logs/claims.log",
-    benchmark:
-        f"{ROOT}/benchmarks/claims.tsv"
     params:
         function="synfeal.report.claims.table:write_claims",
         design=dump(DESIGN),
@@ -251,10 +211,6 @@ use rule call as provenance with:
     output:
         json=f"{ROOT}/provenance.json",
         csv=f"{ROOT}/benchmarks.csv",
-    log:
-        f"{ROOT}/logs/provenance.log",
-    benchmark:
-        f"{ROOT}/benchmarks/provenance.tsv"
     params:
         function="synfeal.report.html.provenance:write_provenance",
         seed=CONFIG.seed,
@@ -275,10 +231,6 @@ use rule call as report with:
         labels=under("labels/{set}/{split}.csv", set=POSE_SETS, split=SPLITS),
     output:
         html=f"{ROOT}/report.html",
-    log:
-        f"{ROOT}/logs/report.log",
-    benchmark:
-        f"{ROOT}/benchmarks/report.tsv"
     resources:
         mem_mb=grown(4000),
     params:
@@ -294,9 +246,5 @@ use rule call as report_document with:
         figures=rules.figures.output.dir,
     output:
         tex=f"{ROOT}/report.tex",
-    log:
-        f"{ROOT}/logs/report_document.log",
-    benchmark:
-        f"{ROOT}/benchmarks/report_document.tsv"
     params:
         function="synfeal.report.document:write_report_document",

@@ -36,10 +36,6 @@ use rule call as sfm with:
     output:
         trajectory=f"{STEM}/sfm/{BATCH}.csv",
         facts=f"{STEM}/sfm/{BATCH}.json",
-    log:
-        f"{ROOT}/logs/sfm/{BATCH_LOG}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/sfm/{BATCH_LOG}.tsv"
     resources:
         mem_mb=grown(4000),
     params:
@@ -57,10 +53,6 @@ use rule call as rgbd with:
     output:
         graph=f"{STEM}/rgbd/{BATCH}.g2o",
         facts=f"{STEM}/rgbd/{BATCH}.json",
-    log:
-        f"{ROOT}/logs/rgbd/{BATCH_LOG}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/rgbd/{BATCH_LOG}.tsv"
     resources:
         mem_mb=grown(4000),
     params:
@@ -132,10 +124,6 @@ use rule call as chain with:
         test_unassisted=f"{ESTIMATED}/test-unassisted.csv",
         assistance=CHAINED,
         record=f"{ESTIMATED}/estimation.json",
-    log:
-        f"{ROOT}/logs/chain/{{scene}}/{{size}}/{{reconstructed}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/chain/{{scene}}/{{size}}/{{reconstructed}}.tsv"
     params:
         function="baselines.groundtruth.chain:write_label_set",
         groundtruth=dump(

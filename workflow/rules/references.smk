@@ -12,10 +12,6 @@ use rule call as descriptors with:
         test=f"{ROOT}/frames/{{scene}}/test.npy",
     output:
         descriptors=f"{ROOT}/references/{{scene}}/descriptors.npz",
-    log:
-        f"{ROOT}/logs/descriptors/{{scene}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/descriptors/{{scene}}.tsv"
     resources:
         mem_mb=grown(3000),
     params:
@@ -54,10 +50,6 @@ use rule call as correspondences with:
         test=f"{FOUND}/features-test.npz",
     output:
         matches=f"{FOUND}/correspondences.npz",
-    log:
-        f"{ROOT}/logs/correspondences/{{scene}}/{{size}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/correspondences/{{scene}}/{{size}}.tsv"
     resources:
         mem_mb=grown(3000),
     params:
@@ -71,10 +63,6 @@ use rule call as tracks with:
         train=f"{FOUND}/features-train.npz",
     output:
         tracks=f"{FOUND}/tracks.npz",
-    log:
-        f"{ROOT}/logs/tracks/{{scene}}/{{size}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tracks/{{scene}}/{{size}}.tsv"
     resources:
         mem_mb=grown(3000),
     params:
@@ -89,10 +77,6 @@ use rule call as image_references with:
         ),
     output:
         references=reference_files(REFERENCE, in_group("images")),
-    log:
-        f"{ROOT}/logs/image_references/{REFERENCE_LOG}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/image_references/{REFERENCE_LOG}.tsv"
     resources:
         mem_mb=grown(2000),
     params:
@@ -107,10 +91,6 @@ use rule call as structure_references with:
         **evidence_for(in_group("structure"), **STRUCTURE),
     output:
         references=reference_files(REFERENCE, in_group("structure")),
-    log:
-        f"{ROOT}/logs/structure_references/{REFERENCE_LOG}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/structure_references/{REFERENCE_LOG}.tsv"
     resources:
         mem_mb=grown(3000),
     params:
@@ -126,10 +106,6 @@ use rule structure_references as adjusted_references with:
         **evidence_for(in_group("adjusted"), **STRUCTURE),
     output:
         references=reference_files(REFERENCE, in_group("adjusted")),
-    log:
-        f"{ROOT}/logs/adjusted_references/{REFERENCE_LOG}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/adjusted_references/{REFERENCE_LOG}.tsv"
     params:
         function="baselines.references.run:answer_group",
         group="adjusted",
@@ -164,10 +140,6 @@ use rule call as coordinate_references with:
         ),
     output:
         references=reference_files(REFERENCE, in_group("coordinates")),
-    log:
-        f"{ROOT}/logs/coordinate_references/{REFERENCE_LOG}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/coordinate_references/{REFERENCE_LOG}.tsv"
     resources:
         mem_mb=grown(3000),
     params:
@@ -189,10 +161,6 @@ use rule call as external_reference with:
         ),
     output:
         references=reference_files(REFERENCE, ["{external}"]),
-    log:
-        f"{ROOT}/logs/external_reference/{REFERENCE_LOG}/{{external}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/external_reference/{REFERENCE_LOG}/{{external}}.tsv"
     resources:
         mem_mb=grown(4000),
     params:
@@ -213,10 +181,6 @@ use rule call as references_table with:
             category="Tables",
         ),
         tex=f"{ROOT}/tables/references.tex",
-    log:
-        f"{ROOT}/logs/tables/references.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/references.tsv"
     params:
         function="synfeal.report.references:write_references_table",
         design=dump(DESIGN),

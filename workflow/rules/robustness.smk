@@ -9,10 +9,6 @@ use rule call as light_shares with:
         shares=expand(
             f"{ROOT}/scenes/{{{{scene}}}}/light_{{group}}.glb", group=LIGHT_GROUPS
         ),
-    log:
-        f"{ROOT}/logs/light_shares/{{scene}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/light_shares/{{scene}}.tsv"
     resources:
         mem_mb=grown(4000),
     params:
@@ -29,10 +25,6 @@ use rule call as render_varied with:
     output:
         frames=temp(f"{VARIED}/shards/{{effects}}/{{split}}.npy"),
         record=temp(f"{VARIED}/shards/{{effects}}/{{split}}.json"),
-    log:
-        f"{ROOT}/logs/render_varied/{{effects}}/{{split}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/render_varied/{{effects}}/{{split}}.tsv"
     resources:
         mem_mb=grown(3000),
     params:
@@ -53,10 +45,6 @@ use rule call as pack_varied with:
     output:
         frames=f"{VARIED}/frames/{{effects}}/{{split}}.npy",
         record=f"{VARIED}/frames/{{effects}}/{{split}}.json",
-    log:
-        f"{ROOT}/logs/pack_varied/{{effects}}/{{split}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/pack_varied/{{effects}}/{{split}}.tsv"
     resources:
         mem_mb=grown(2000),
     params:
@@ -79,10 +67,6 @@ use rule call as train_varied with:
         history=f"{VARIED}/runs/{{model}}/history.csv",
         record=f"{VARIED}/runs/{{model}}/training.json",
         predictions=f"{VARIED}/runs/{{model}}/predictions.csv",
-    log:
-        f"{ROOT}/logs/train_varied/{{model}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/train_varied/{{model}}.tsv"
     resources:
         mem_mb=lambda w, attempt: attempt
         * training_mb(
@@ -105,10 +89,6 @@ use rule call as varied_descriptors with:
         train=varied_training_frames,
     output:
         descriptors=f"{VARIED}/descriptors/{{trained_on}}.npz",
-    log:
-        f"{ROOT}/logs/varied_descriptors/{{trained_on}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/varied_descriptors/{{trained_on}}.tsv"
     wildcard_constraints:
         trained_on=f"{CLEAN}|{MIXED}",
     resources:
@@ -134,10 +114,6 @@ use rule call as varied_structure with:
         labels=f"{ROOT}/labels/{ROBUST_SET}/train.csv",
     output:
         predictions=f"{VARIED}/structure/{{effects}}.csv",
-    log:
-        f"{ROOT}/logs/varied_structure/{{effects}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/varied_structure/{{effects}}.tsv"
     resources:
         mem_mb=grown(3000),
     params:
@@ -157,10 +133,6 @@ use rule call as effects_speed with:
         plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/test.csv",
     output:
         csv=f"{ROOT}/scenes/{ROBUSTNESS.scene}/effects_speed.csv",
-    log:
-        f"{ROOT}/logs/effects_speed.log",
-    benchmark:
-        f"{ROOT}/benchmarks/effects_speed.tsv"
     resources:
         mem_mb=grown(3000),
     params:
@@ -188,10 +160,6 @@ use rule call as robustness with:
             category="Tables",
         ),
         tex=f"{ROOT}/tables/robustness.tex",
-    log:
-        f"{ROOT}/logs/tables/robustness.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/robustness.tsv"
     resources:
         mem_mb=grown(2000),
     params:

@@ -11,10 +11,6 @@ use rule call as pretrain with:
         records=[f"{ROOT}/frames/{room}/train.json" for room in CONFIG.rooms],
     output:
         weights=f"{ROOT}/pretrained/{{backbone}}.pt",
-    log:
-        f"{ROOT}/logs/pretrain/{{backbone}}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/pretrain/{{backbone}}.tsv"
     resources:
         mem_mb=grown(
             training_mb(
@@ -51,10 +47,6 @@ use rule call as train with:
         record=f"{RUN}/training.json",
         predictions=f"{RUN}/predictions.csv",
         common=f"{RUN}/common_predictions.csv",
-    log:
-        f"{ROOT}/logs/train/{RUN_LOG}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/train/{RUN_LOG}.tsv"
     resources:
         mem_mb=train_mem_mb,
     params:
@@ -78,10 +70,6 @@ use rule call as score with:
         errors=f"{RUN}/errors.csv",
         common=f"{RUN}/common_errors.csv",
         metrics=f"{RUN}/metrics.json",
-    log:
-        f"{ROOT}/logs/score/{RUN_LOG}.log",
-    benchmark:
-        f"{ROOT}/benchmarks/score/{RUN_LOG}.tsv"
     params:
         function="baselines.training.score:write_scores",
         camera=dump(CONFIG.network_camera),
