@@ -36,7 +36,7 @@ localrules:
 rule all:
     default_target: True
     input:
-        files_of_evidence(),
+        lambda w: and_behind(*EVIDENCE),
         f"{ROOT}/provenance.json",
         f"{ROOT}/report.html",
         f"{ROOT}/report.tex",
@@ -54,15 +54,12 @@ rule datasets:
 
 rule labels:
     input:
-        files_of_labels(),
-        f"{ROOT}/tables/assistance.csv",
-        f"{ROOT}/tables/label_error.csv",
-        label_figures(),
+        lambda w: and_behind(*LABELS),
 
 
 rule runs:
     input:
-        files_of_runs(),
+        lambda w: and_behind(*METRICS, *every_label_set()),
 
 
 rule start:
@@ -72,8 +69,11 @@ rule start:
 
 rule tables:
     input:
-        files_of_runs(),
-        under("tables/{table}.csv", table=TABLE_NAMES),
+        lambda w: and_behind(
+            *METRICS,
+            *every_label_set(),
+            *under("tables/{table}.csv", table=TABLE_NAMES),
+        ),
 
 
 # Every table from what was restored (synfeal restore), training nothing.

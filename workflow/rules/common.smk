@@ -3,7 +3,7 @@ import sys
 from functools import cache, partial
 from typing import get_args
 
-from snakemake.io import strip_wildcard_constraints
+from snakemake.io import is_flagged, strip_wildcard_constraints
 from snakemake.logging import logger
 
 from baselines.localizers.registry import backbone_of
@@ -66,6 +66,7 @@ SPLITS = ("train", "test")
 SCENES = sorted({e.scene for e in EXPERIMENTS})
 SIZES = sorted({(e.scene, e.size) for e in EXPERIMENTS})
 RUNS = [run.directory for run in DESIGN.runs]
+METRICS = [f"{ROOT}/runs/{run}/metrics.json" for run in RUNS]
 TRUE_SETS = [f"{scene}/{size}/synfeal" for scene, size in SIZES]
 ESTIMATED_SETS = ["/".join(names) for names in DESIGN.estimated]
 POSE_SETS = sorted({*TRUE_SETS, *ESTIMATED_SETS})
@@ -255,35 +256,21 @@ def runs_of(table):
     return [run.directory for run in DESIGN.table_runs(table)]
 
 
+def table_files(name, caption=None):
+    """A table, CSV and LaTeX; with a caption of ``workflow/report`` it is in Snakemake's report."""
+    csv, shown = f"{ROOT}/tables/{name}.csv", f"../report/{caption}.rst"
+    return {
+        "csv": report(csv, caption=shown, category="Tables") if caption else csv,
+        "tex": f"{ROOT}/tables/{name}.tex",
+    }
+
+
 def files_of_trainings(pattern):
     """A file of each training run (``{run}``) of Table 4; of restored runs those that were kept."""
     runs = runs_of("table4_size")
     made = [run for run in runs if f"{ROOT}/runs/{run}/predictions.csv" not in RESTORED]
     files = {run: f"{ROOT}/{pattern.format(run=run)}" for run in runs}
     return [file for run, file in files.items() if run in made or file in RESTORED]
-
-
-def measurements(outputs):
-    """What the jobs that make ``outputs`` took, but for what was restored without it."""
-    stored = workflow.modifier.path_modifier.apply_default_storage
-    found = {}
-    for output in dict.fromkeys(outputs):
-        path = stored(output)
-        maker = next(r for r in workflow.rules if r.is_producer(path))
-        benchmark = maker.expand_benchmark(maker.get_wildcards(path))
-        found[f"{ROOT}{benchmark.partition(ROOT)[2]}"] = output
-    return [f for f, made in found.items() if made not in RESTORED or f in RESTORED]
-
-
-def passing_files():
-    """Outputs that go once they are used: parts of packed frames, features, views."""
-    scenes = sorted({*SCENES, *(CONFIG.rooms if backbones() else ())})
-    kinds = ("features", "views")
-    return [
-        *(f for s in scenes for p in SPLITS for f in packed_shards(s, p, "npy")),
-        *under("references/{set}/{k}-{p}.npz", set=MAPPED_SETS, k=kinds, p=SPLITS),
-        *(f"{ROOT}/robustness/shards/{e}/{split}.npy" for e, split in varied_sets()),
-    ]
 
 
 def manifests(camera):
@@ -339,16 +326,6 @@ def reference_sets(file):
         f"{ROOT}/references/{s}/{z}/{l}/{name}/{file}"
         for s, z, l in data_sets(EXPERIMENTS)
         for name in answered_by(EXPERIMENTS, (s, z, l), EXTERNAL)
-    ]
-
-
-def files_of_references():
-    """An output of every job that reference methods are answered by."""
-    kinds = ("correspondences", "tracks")
-    return [
-        *under("references/{scene}/descriptors.npz", scene=SCENES),
-        *under("references/{set}/{kind}.npz", set=MAPPED_SETS, kind=kinds),
-        *reference_sets("metrics.json"),
     ]
 
 
@@ -431,30 +408,11 @@ def varied_tests(clean, varied):
     }
 
 
-def varied_sets():
-    """Effects and split of the frames of the robustness table, where it has rows and its data set
-    is trained on here."""
+def robustness_made():
+    """Whether the robustness table has rows, and its data set is trained on here."""
     wanted = (ROBUSTNESS.scene, ROBUSTNESS.size, "synfeal", "pretrained")
-    made = any((r.scene, r.size, r.labels, r.init) == wanted for r in DESIGN.runs)
-    if not (ROBUST_EFFECTS and made) or RESTORED:
-        return []
-    return [(MIXED, "train"), *((name, "test") for name in VARIATIONS)]
-
-
-def robustness_files():
-    """An output of every job of the robustness table."""
-    sets = varied_sets()
-    if not sets:
-        return []
-    return [
-        *varied_extras(VARIATIONS),
-        *(f"{ROOT}/robustness/frames/{name}/{split}.npy" for name, split in sets),
-        *under("robustness/runs/{model}/model.pt", model=MODELS),
-        *under("robustness/descriptors/{name}.npz", name=[CLEAN, MIXED]),
-        *varied_structure(),
-        f"{ROOT}/scenes/{ROBUSTNESS.scene}/effects_speed.csv",
-        f"{ROOT}/tables/robustness.csv",
-    ]
+    trained = any((r.scene, r.size, r.labels, r.init) == wanted for r in DESIGN.runs)
+    return bool(ROBUST_EFFECTS) and trained and not RESTORED
 
 
 def varied_structure():
@@ -465,12 +423,12 @@ def varied_structure():
 
 def robustness_tables(kind="csv"):
     """The robustness table, where it is made."""
-    return [f"{ROOT}/tables/robustness.{kind}"] if robustness_files() else []
+    return [f"{ROOT}/tables/robustness.{kind}"] if robustness_made() else []
 
 
 def drawn_robustness():
     """What figures and speeds read of it, where anything is drawn of training runs."""
-    if not (robustness_files() and set(TABLE_NAMES) & set(DRAWN_TABLES)):
+    if not (robustness_made() and set(TABLE_NAMES) & set(DRAWN_TABLES)):
         return []
     speed = f"{ROOT}/scenes/{ROBUSTNESS.scene}/effects_speed.csv"
     return [speed, *robustness_tables()]
@@ -508,61 +466,50 @@ def run_plan(workflow):
     return plan
 
 
+def every_label_set():
+    every = sorted({f"{e.scene}/{e.size}/{e.label_id}" for e in EXPERIMENTS})
+    return under("labels/{set}/{split}.csv", set=[*POSE_SETS, *every], split=SPLITS)
+
+
+def plain(path):
+    """A file of the results as rules name it, wherever a storage plugin keeps it."""
+    return f"{ROOT}{str(path).partition(ROOT)[2]}"
+
+
+@cache
+def jobs_behind(*files):
+    """The jobs that files come from, each once: rule, wildcards, and what is asked of it."""
+    stored = workflow.modifier.path_modifier.apply_default_storage
+    jobs, left = {}, list(files)
+    while left:
+        asked = plain(left.pop())
+        path = stored(asked)
+        maker = next((r for r in workflow.rules if r.is_producer(path)), None)
+        wildcards = maker.get_wildcards(path) if maker else {}
+        job = maker and (maker.name, *sorted(wildcards.items()))
+        if maker and job not in jobs:
+            jobs[job] = maker, wildcards, asked
+            left += maker.expand_input(wildcards)[0]
+    return list(jobs.values())
+
+
 # Of a job that fails or is killed no output stays, and Snakemake does not make a file again that
 # only finished files need: after a change of the configuration the tables of the old one would
 # pass for the new. So the targets ask for an output of every job, not of the last ones alone.
-def backbones():
-    """Backbones that runs start from."""
-    return {
-        backbone_of(r.model, CONFIG.network)
-        for r in DESIGN.runs
-        if r.start == "pretrained"
-    }
-
-
-def files_of_labels():
-    """An output of every job that labels are made by."""
-    every = sorted({f"{e.scene}/{e.size}/{e.label_id}" for e in EXPERIMENTS})
+def and_behind(*files):
+    """Files, and an output of every job they come from; for input functions: rules are known then."""
+    made = jobs_behind(*files)
     return [
-        *under("scenes/{scene}/properties.json", scene=SCENES),
-        *under("plans/{scene}/{split}.csv", scene=SCENES, split=SPLITS),
-        *(d for scene in SCENES for d in sequence_dirs(scene, "groundtruth")),
-        *under("labels/{set}/{split}.csv", set=[*POSE_SETS, *every], split=SPLITS),
-        *batch_facts(),
-        *under("labels/{set}/assistance.json", set=ESTIMATED_SETS),
+        asked for maker, _, asked in made if not is_flagged(maker.output[0], "temp")
     ]
 
 
-def files_of_runs():
-    """An output of every job that runs are made by."""
-    rooms = CONFIG.rooms if backbones() else []
+def measurements(*files):
+    """What the jobs behind files took, but for what was restored without it."""
+    found = {}
+    for maker, wildcards, _ in jobs_behind(*files):
+        outputs = map(plain, maker.expand_output(wildcards)[0])
+        found[plain(maker.expand_benchmark(wildcards))] = RESTORED.intersection(outputs)
     return [
-        *files_of_labels(),
-        *under("scenes/{room}/properties.json", room=rooms),
-        *under("plans/{room}/train.csv", room=rooms),
-        *under("frames/{room}/train.npy", room=rooms),
-        *under("frames/{scene}/{split}.npy", scene=SCENES, split=SPLITS),
-        *under("scenes/{scene}/test_depth.npy", scene=SCENES),
-        *under("pretrained/{backbone}.pt", backbone=sorted(backbones())),
-        *under("runs/{run}/{file}", run=RUNS, file=["predictions.csv", "metrics.json"]),
-    ]
-
-
-def files_of_evidence():
-    """An output of every job of a run but those that record and report the run.
-
-    How much of its scene a plan covers is kept on record, read by people alone.
-    """
-    tables = ["assistance", "hard_cases", "label_error", "recall", "references"]
-    measured = ["render_speed.csv", "collection_speed.json"]
-    return [
-        *files_of_runs(),
-        *files_of_references(),
-        *robustness_files(),
-        *under("plans/{scene}/{split}.coverage.json", scene=SCENES, split=SPLITS),
-        *manifests("groundtruth"),
-        *under("scenes/{scene}/{file}", scene=SCENES, file=measured),
-        *under("tables/{t}.csv", t=[*tables, "speed_vs_error", *TABLE_NAMES]),
-        *under("{file}", file=["tables/all_tables.tex", "figures", "claims.csv"]),
-        f"{ROOT}/summary.md",
+        file for file, restored in found.items() if not restored or file in RESTORED
     ]

@@ -5,12 +5,7 @@ use rule call as table1_meshes with:
     input:
         properties=under("scenes/{scene}/properties.json", scene=SCENES),
     output:
-        csv=report(
-            f"{ROOT}/tables/table1_meshes.csv",
-            caption="../report/table1_meshes.rst",
-            category="Tables",
-        ),
-        tex=f"{ROOT}/tables/table1_meshes.tex",
+        **table_files("table1_meshes", "table1_meshes"),
     params:
         function="synfeal.report.meshes:write_meshes_table",
         scenes=SCENES,
@@ -20,12 +15,7 @@ use rule call as table with:
     input:
         metrics=lambda w: under("runs/{run}/metrics.json", run=runs_of(w.table)),
     output:
-        csv=report(
-            f"{ROOT}/tables/{{table}}.csv",
-            caption="../report/table.rst",
-            category="Tables",
-        ),
-        tex=f"{ROOT}/tables/{{table}}.tex",
+        **table_files("{table}", "table"),
     wildcard_constraints:
         table="table[2-9]_[a-z_]+",
     params:
@@ -35,14 +25,9 @@ use rule call as table with:
 
 use rule call as recall with:
     input:
-        metrics=under("runs/{run}/metrics.json", run=RUNS),
+        metrics=METRICS,
     output:
-        csv=report(
-            f"{ROOT}/tables/recall.csv",
-            caption="../report/recall.rst",
-            category="Tables",
-        ),
-        tex=f"{ROOT}/tables/recall.tex",
+        **table_files("recall", "recall"),
     params:
         function="synfeal.report.recall:write_recall_table",
         design=dump(DESIGN),
@@ -52,8 +37,7 @@ use rule call as assistance with:
     input:
         records=under("labels/{set}/assistance.json", set=ESTIMATED_SETS),
     output:
-        csv=f"{ROOT}/tables/assistance.csv",
-        tex=f"{ROOT}/tables/assistance.tex",
+        **table_files("assistance"),
     params:
         function="synfeal.report.assistance:write_assistance_table",
         design=dump(DESIGN),
@@ -68,8 +52,7 @@ use rule call as label_error with:
         records=under("labels/{set}/assistance.json", set=ESTIMATED_SETS),
         facts=batch_facts(),
     output:
-        csv=f"{ROOT}/tables/label_error.csv",
-        tex=f"{ROOT}/tables/label_error.tex",
+        **table_files("label_error"),
     params:
         function="synfeal.report.label_error:write_label_error_table",
         design=dump(DESIGN),
@@ -157,7 +140,7 @@ use rule call as figures with:
 
 use rule call as summary with:
     input:
-        metrics=under("runs/{run}/metrics.json", run=RUNS),
+        metrics=METRICS,
         references=rules.references_table.output.csv,
         recall=rules.recall.output.csv,
         robustness=robustness_tables(),
@@ -204,10 +187,27 @@ RESULTS = [
 ]
 
 
+LABELS = [
+    *every_label_set(),
+    rules.assistance.output.csv,
+    rules.label_error.output.csv,
+    *label_figures(),
+]
+
+# All but what records and reports a run; how much of its scene a plan covers is read by people alone.
+EVIDENCE = [
+    *RESULTS,
+    rules.document.output.tex,
+    *every_label_set(),
+    *under("plans/{scene}/{split}.coverage.json", scene=SCENES, split=SPLITS),
+    *manifests("groundtruth"),
+]
+
+
 use rule call as provenance with:
     input:
         results=RESULTS,
-        measured=lambda w: measurements([*files_of_evidence(), *passing_files()]),
+        measured=lambda w: measurements(*EVIDENCE),
     output:
         json=f"{ROOT}/provenance.json",
         csv=f"{ROOT}/benchmarks.csv",
@@ -221,7 +221,7 @@ use rule call as report with:
     input:
         provenance=rules.provenance.output.json,
         results=RESULTS,
-        metrics=under("runs/{run}/metrics.json", run=RUNS),
+        metrics=METRICS,
         meshes=under("scenes/{scene}/mesh.glb", scene=SCENES),
         plans=under(
             "plans/{scene}/{split}.csv",

@@ -173,14 +173,9 @@ use rule call as references_table with:
     input:
         metrics=reference_sets("metrics.json"),
         facts=reference_sets("facts.json"),
-        localizers=under("runs/{run}/metrics.json", run=RUNS),
+        localizers=METRICS,
     output:
-        csv=report(
-            f"{ROOT}/tables/references.csv",
-            caption="../report/references.rst",
-            category="Tables",
-        ),
-        tex=f"{ROOT}/tables/references.tex",
+        **table_files("references", "references"),
     params:
         function="synfeal.report.references:write_references_table",
         design=dump(DESIGN),

@@ -154,12 +154,7 @@ use rule call as robustness with:
         varied=expand(f"{VARIED}/frames/{{effects}}/test.npy", effects=ROBUST_EFFECTS),
         labels=expand(f"{ROOT}/labels/{ROBUST_SET}/{{split}}.csv", split=SPLITS),
     output:
-        csv=report(
-            f"{ROOT}/tables/robustness.csv",
-            caption="../report/table.rst",
-            category="Tables",
-        ),
-        tex=f"{ROOT}/tables/robustness.tex",
+        **table_files("robustness", "table"),
     resources:
         mem_mb=grown(2000),
     params:
