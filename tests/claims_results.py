@@ -1,4 +1,4 @@
-"""Results trees whose claims are known: errors of every cell, path by path."""
+"""Results whose claims are known: errors of every cell, path by path, and changes of them."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,13 +12,18 @@ from synfeal.config import MODELS
 from synfeal.config.experiments import SHARES
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.files import write_json
-from synfeal.frames import write_numbers
-from synfeal.geometry.rotations import canonical_quat_wxyz
 from synfeal.report.cells import key_of, published_cells
 from synfeal.report.claims.evidence import evidence_of
 from synfeal.report.claims.table import claim_rows
-from synfeal.report.stats import COLUMNS, COMMON_COLUMNS
-from tests.report_results import MEASURES, design_of, fill_assistance, shipped_design
+from tests.report_results import (
+    MEASURES,
+    SCENES,
+    design_of,
+    fill_assistance,
+    fill_scenes,
+    shipped_design,
+    write_errors,
+)
 
 N_PATHS, FRAMES_OF_PATH = 12, 3
 # The paper prints root mean squares over the axes.
@@ -27,9 +32,9 @@ AXES = 3**0.5
 
 @dataclass
 class Results:
-    """A results directory to be; ``errors`` maps a cell's directory to (N, 2) errors."""
+    """A results directory whose runs are written one by one; its claims, by name."""
 
-    root: object
+    root: Path
     design: tuple = field(default_factory=shipped_design)
     n_paths: int = N_PATHS
     spread: tuple = (2.0, 80.0)
@@ -44,16 +49,9 @@ class Results:
 
     def write(self, row, model, errors, errors_true=None, repetition=0):
         """Errors (N, 2), or the two values every frame has, under both scores or each its own."""
-        both = [
-            np.broadcast_to(e, (len(self.table), 2)) for e in (errors, errors_true) if e is not None
-        ]
-        columns = [self.table.frame[:, None], both[0], both[-1]]
-        name = f"{row.scene}/{row.size}/{row.label_id}/{row.init}/{model}/seed{repetition}"
-        rows = np.concatenate(columns, axis=1)
-        folder = self.root / "runs" / name
-        write_numbers(folder / "errors.csv", ",".join(COLUMNS), rows.tolist())
-        common = rows[:, [0, 3, 4]].tolist()  # all sizes have the same test frames here
-        write_numbers(folder / "common_errors.csv", ",".join(COMMON_COLUMNS), common)
+        both = (errors, errors if errors_true is None else errors_true)
+        columns = [np.broadcast_to(values, (len(self.table), 2)) for values in both]
+        write_errors(self.root, row, model, np.hstack(columns), repetition)
 
     def rows(self):
         """``claims.csv`` by claim."""
@@ -64,52 +62,43 @@ class Results:
 def far_apart(n_paths, metres, degrees):
     """Poses that all lie some metres and some degrees from their mean, so a constant is no use."""
     path = np.repeat(np.arange(n_paths), FRAMES_OF_PATH)
-    side = np.where(np.arange(len(path)) % 2 == 0, 1.0, -1.0)
-    position_m = side[:, None] * [metres, 0.0, 0.0]
-    turn = np.radians(degrees) * side[:, None] * [0.0, 0.0, 1.0]
-    quat = canonical_quat_wxyz(Rotation.from_rotvec(turn).as_quat(scalar_first=True))
-    return PoseTable(np.arange(len(path)), path, position_m, quat)
-
-
-def write_part(results, row, model):
-    """Errors of a run that is shown a part of the images, as many times as large as these are few;
-    those of one that is shown all are the paper's."""
-    start, _, part = row.init.partition("-")
-    table = "table4_size" if start == "pretrained" else "table5_from_scratch"
-    cell = published_cells(table)[key_of(row.model_copy(update={"init": start}), model)]
-    errors = np.array([AXES * cell.position_m, cell.orientation_deg]) / SHARES[part]
-    results.write(row, model, errors)
+    side = np.where(np.arange(len(path)) % 2 == 0, 1.0, -1.0)[:, None]
+    turn = Rotation.from_rotvec(np.radians(degrees) * side * [0.0, 0.0, 1.0])
+    quat = turn.as_quat(scalar_first=True, canonical=True)
+    return PoseTable(np.arange(len(path)), path, side * [metres, 0.0, 0.0], quat)
 
 
 def papers_results(root, **changes):
-    """Every frame of a cell has the error the paper printed as the median of that cell."""
+    """Every frame of a cell has the error the paper printed as the median of that cell; of a run
+    that is shown a part of the images, as many times that as the images are fewer."""
     results = Results(root, **changes)
     for row in results.design:
+        start, _, part = row.init.partition("-")
+        table = row.table
+        if table == "table7_images_shown":
+            table = "table4_size" if start == "pretrained" else "table5_from_scratch"
+        elif table == "table6_label_errors" and row.labels in ("synfeal", "noise"):
+            continue  # the runs of other tables
         for model in MODELS:
-            cell = published_cells(row.table).get(key_of(row, model))
-            if row.table == "table7_images_shown":
-                write_part(results, row, model)
-                continue
-            if row.table == "table6_label_errors" and row.labels in ("synfeal", "noise"):
-                continue  # the runs of other tables
+            key = key_of(row.model_copy(update={"init": start}), model)
+            cell = published_cells(table).get(key)
             if cell is None:  # KinectFusion, say: the paper has no such row
-                results.write(row, model, (1.0, 30.0))
-            elif cell.flag != "misprint":
-                results.write(row, model, (AXES * cell.position_m, cell.orientation_deg))
+                errors = np.array([1.0, 30.0])
             else:
-                results.write(row, model, (AXES * cell.position_m, 10.0))
+                degrees = 10.0 if cell.flag == "misprint" else cell.orientation_deg
+                errors = np.array([AXES * cell.position_m, degrees])
+            results.write(row, model, errors / SHARES[part])
     assisted = {"sfm": 3, "rgbd-toro": 6, "rgbd-g2o": 4, "kinect-fusion": 34}
-    fill_assistance(root, assisted, batches=(34, 0))
-    write_scenes(root)
+    return measured(results, assisted, batches=(34, 0))
+
+
+def measured(results, *assisted, **batches):
+    """Volumes of the paper's meshes, a little over its 5 frames per second, and assistance."""
+    fill_assistance(results.root, *assisted, **batches)
+    fill_scenes(results.root, (89.4, 183.18))
+    for scene in SCENES:
+        write_speed(results.root, scene, [5.0, 5.2])
     return results
-
-
-def write_scenes(root):
-    """Volumes of the paper's meshes, and a little over its 5 frames per second."""
-    for scene, volume in (("large_room", 89.4), ("sanctuary", 183.18)):
-        facts = {"vertices": 1, "faces": 1, "volume_m3": volume}
-        write_json(root / "scenes" / scene / "properties.json", facts)
-        write_speed(root, scene, [5.0, 5.2])
 
 
 def rows_where(results, **keys):
@@ -176,15 +165,10 @@ def chance_results(root):
     rng = np.random.default_rng(0)
     for cell in pd.read_csv(Path(__file__).with_name("chance_level.csv")).itertuples():
         keys = {"labels": cell.labels, "noise_m": cell.noise_m, "noise_deg": cell.noise_deg}
-        scores = [
-            np.stack([_paths_with(rng, cell, f"{m}{end}") for m in MEASURES[:2]], axis=1)
-            for end in ("", "_true")
-        ]
-        errors = (np.repeat(score, FRAMES_OF_PATH, axis=0) for score in scores)
-        results.write(rows_where(results, **keys)[0], cell.model, *errors)
-    fill_assistance(root)
-    write_scenes(root)
-    return results
+        errors = np.stack([_paths_with(rng, cell, m).repeat(FRAMES_OF_PATH) for m in MEASURES])
+        row = rows_where(results, **keys)[0]
+        results.write(row, cell.model, errors[:2].T, errors[2:].T)
+    return measured(results)
 
 
 def _paths_with(rng, cell, measure):

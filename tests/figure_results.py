@@ -1,17 +1,16 @@
 """A small results tree whose poses, label errors and frames are known, for tests of the figures."""
 
-import json
-
 import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
 from synfeal.config import MODELS
 from synfeal.dataset.pose_table import write_pose_table
+from synfeal.files import write_json
 from synfeal.geometry.poses import pose_matrix
 from synfeal.mesh.triangles import Triangles, save_collision_mesh
 from tests.property_support import table_of
-from tests.report_results import TABLE4, batch_record, experiment
+from tests.report_results import TABLE4, batch_record, experiment, write_errors
 
 METHODS = ("sfm", "rgbd-toro")
 N_FRAMES = {("6k", "train"): 9, ("6k", "test"): 5, ("20k", "train"): 12, ("20k", "test"): 6}
@@ -62,14 +61,12 @@ def fill_figures(root):
     for k, method in enumerate(METHODS, start=1):
         _fill_method(root / "labels" / "large_room" / "6k" / method, k)
     save_collision_mesh(root / "scenes" / "large_room" / "collision.ply", room())
-    _fill_frames(root / "frames" / "large_room")
+    (root / "frames" / "large_room").mkdir(parents=True)
+    shown = [pixels(number) for number in range(N_TEST_FRAMES)]
+    np.save(root / "frames" / "large_room" / "test.npy", np.stack(shown))
+    errors = [[9, 9, 0.4, 30], [9, 9, 0.1, 10], [9, 9, 0.2, 20], [9, 9, np.inf, np.inf]]
     for model in MODELS:
-        folder = root / f"runs/large_room/20k/synfeal/pretrained/{model}/seed0"
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "errors.csv").write_text(
-            "frame,position_m,orientation_deg,position_m_true,orientation_deg_true\n"
-            "0,9,9,0.4,30\n1,9,9,0.1,10\n2,9,9,0.2,20\n3,9,9,inf,inf\n"
-        )
+        write_errors(root, design()[0], model, errors)
     return root
 
 
@@ -82,9 +79,4 @@ def _fill_method(folder, k):
         splits[split] = {
             "records": [batch_record(0, (a, b) == batches[-1], start=a, stop=b) for a, b in batches]
         }
-    (folder / "assistance.json").write_text(json.dumps({"method": "", "splits": splits}))
-
-
-def _fill_frames(folder):
-    folder.mkdir(parents=True)
-    np.save(folder / "test.npy", np.stack([pixels(number) for number in range(N_TEST_FRAMES)]))
+    write_json(folder / "assistance.json", {"method": "", "splits": splits})

@@ -1,17 +1,18 @@
 """A small results tree with known numbers, for the tests of the report."""
 
-from pathlib import Path
-
+import numpy as np
 import pandas as pd
 
 from synfeal.config import MODELS, Design, Experiment, load_config, read_experiments
 from synfeal.files import write_json
-from synfeal.frames import read_records, write_frame
+from synfeal.frames import read_records, write_frame, write_numbers
 from synfeal.report.meshes import write_meshes_table
+from synfeal.report.stats import COLUMNS, COMMON_COLUMNS
 from synfeal.report.tables import write_table
+from tests import CONFIG
 
-CONFIG = Path(__file__).parent.parent / "config"
 TABLE4 = "table4_size"
+SCENES = ("large_room", "sanctuary")
 SIZES = ("6k", "20k", "40k", "80k")
 ROWS = {
     "table2_ground_truth": 25,
@@ -28,49 +29,32 @@ FRAMES |= {"80k": (4000, 1000), "95k": (4750, 1000)}
 
 
 def experiment(table, **changes):
-    values = {
-        "table": table,
-        "block": "",
-        "scene": "large_room",
-        "size": "6k",
-        "labels": "synfeal",
-        "noise_m": 0,
-        "noise_deg": 0,
-        "init": "pretrained",
-    }
+    values = {"table": table, "block": "", "scene": "large_room", "size": "6k"}
+    values |= {"labels": "synfeal", "noise_m": 0, "noise_deg": 0, "init": "pretrained"}
     return Experiment(**(values | changes))
 
 
 def metrics(size, position_m, orientation_deg, true_share=1.0):
     """Scores of one run; limits are 10 % below and 20 % above each score."""
-    n_train, n_test = FRAMES[size]
     shares = (position_m, orientation_deg, position_m * true_share, orientation_deg * true_share)
     scores = dict(zip(MEASURES, shares, strict=True))
     limits = {f"{m}_low": 0.9 * value for m, value in scores.items()}
     limits |= {f"{m}_high": 1.2 * value for m, value in scores.items()}
-    return {
-        **scores,
-        **limits,
-        "position_rms_m": position_m / 3**0.5,
-        **references(),
-        "n_train": n_train,
-        "n_test": n_test,
-        "failed": 0,
-    }
+    rms = {"position_rms_m": position_m / 3**0.5}
+    return {**scores, **limits, **rms, **references(size), "failed": 0}
 
 
 def failed_metrics(size):
     """Scores of a run that predicted nothing finite."""
-    values = dict.fromkeys(metrics(size, 1.0, 1.0))
-    n_train, n_test = FRAMES[size]
-    counts = {"n_train": n_train, "n_test": n_test, "failed": n_test}
-    return values | counts | references()
+    known = references(size)
+    return dict.fromkeys(metrics(size, 1.0, 1.0)) | known | {"failed": known["n_test"]}
 
 
-def references():
-    """What the mean pose and the true poses score."""
+def references(size):
+    """What the mean pose and the true poses score, and the number of frames."""
     baseline = {f"baseline_{m}": v for m, v in zip(MEASURES, (1.1, 70.0, 1.0, 60.0), strict=True)}
-    return baseline | {"floor_position_m": 0.25, "floor_orientation_deg": 15.0}
+    counts = dict(zip(("n_train", "n_test"), FRAMES[size], strict=True))
+    return {**baseline, "floor_position_m": 0.25, "floor_orientation_deg": 15.0, **counts}
 
 
 def design_of(rows, repetitions=1, more_scenes=()):
@@ -78,9 +62,22 @@ def design_of(rows, repetitions=1, more_scenes=()):
     return Design(rows=tuple(rows), repetitions=repeated, more_scenes=more_scenes)
 
 
-def write_run(root, row, model, values, repetition=0):
+def run_folder(root, row, model, repetition=0):
     place = f"{row.scene}/{row.size}/{row.label_id}/{row.init}/{model}/seed{repetition}"
-    write_json(root / "runs" / place / "metrics.json", values)
+    return root / "runs" / place
+
+
+def write_run(root, row, model, values, repetition=0):
+    write_json(run_folder(root, row, model, repetition) / "metrics.json", values)
+
+
+def write_errors(root, row, model, errors, repetition=0):
+    """Errors (N, 4) of every frame; those of the frames that all sizes share are the same."""
+    rows = np.column_stack([np.arange(len(errors)), errors])
+    folder = run_folder(root, row, model, repetition)
+    write_numbers(folder / "errors.csv", ",".join(COLUMNS), rows.tolist())
+    common = rows[:, [0, 3, 4]].tolist()
+    write_numbers(folder / "common_errors.csv", ",".join(COMMON_COLUMNS), common)
 
 
 def fill(root, rows, repetitions=1):
@@ -96,10 +93,10 @@ def fill(root, rows, repetitions=1):
                     write_run(root, same, model, metrics(row.size, score, 20 * score, share), k)
 
 
-def fill_scenes(root):
-    large_room = {"vertices": 50_000, "faces": 90_000, "volume_m3": 88.25, "extents_m": [1, 2, 3]}
-    sanctuary = {"vertices": 80_000, "faces": 150_000, "volume_m3": 190.0}
-    for scene, values in (("large_room", large_room), ("sanctuary", sanctuary)):
+def fill_scenes(root, volumes_m3=(88.25, 190.0)):
+    for k, (scene, volume_m3) in enumerate(zip(SCENES, volumes_m3, strict=True)):
+        values = {"vertices": (50_000, 80_000)[k], "faces": (90_000, 150_000)[k]}
+        values |= {"volume_m3": volume_m3} | ({} if k else {"extents_m": [1, 2, 3]})
         write_json(root / "scenes" / scene / "properties.json", values)
 
 
@@ -146,19 +143,20 @@ def complete_results(root):
     fill_assistance(root)
     for name in ROWS:
         make(name, design, root)
-    out = root / "tables" / "table1_meshes"
-    scenes = ["large_room", "sanctuary"]
-    write_meshes_table(scenes, root, out.with_suffix(".csv"), out.with_suffix(".tex"))
+    write_meshes_table([*SCENES], root, *table_files(root, "table1_meshes"))
     return root
+
+
+def table_files(root, name):
+    """CSV and LaTeX of a table."""
+    return [root / "tables" / f"{name}.{end}" for end in ("csv", "tex")]
 
 
 def make(name, rows, root, repetitions=1):
     """Write a table and return its CSV rows and its LaTeX."""
-    out = root / "tables" / name
-    write_table(
-        name, design_of(rows, repetitions), root, out.with_suffix(".csv"), out.with_suffix(".tex")
-    )
-    return read(out.with_suffix(".csv")), out.with_suffix(".tex").read_text()
+    csv, tex = table_files(root, name)
+    write_table(name, design_of(rows, repetitions), root, csv, tex)
+    return read(csv), tex.read_text()
 
 
 def read(path):
