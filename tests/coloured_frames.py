@@ -4,7 +4,9 @@ import numpy as np
 import torch
 from scipy.spatial.transform import Rotation
 
-from baselines.training.data import image_statistics, read_labelled_frames
+from baselines.localizers.registry import build_localizer
+from baselines.training.checkpoint import ModelDescription, TrainedLocalizer, save_checkpoint
+from baselines.training.data import ImageStatistics, image_statistics, read_labelled_frames
 from baselines.training.run import Job, train_localizer
 from synfeal.config.models import LocalizerConfig, NetworkConfig, TrainingConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
@@ -77,3 +79,30 @@ class Jitter:
 
     def load_state_dict(self, state):
         self._generator.set_state(state["generator"])
+
+
+def untrained(name="posenet2", network=NETWORK, hyper=HYPER, camera=None):
+    """A localizer of random weights that looks at each image."""
+    torch.manual_seed(0)
+    built = build_localizer(name, network, hyper).eval()
+    built.place_on(torch.device("cpu"))
+    statistics = ImageStatistics(torch.full((1, 3, 1, 1), 128.0), torch.full((1, 3, 1, 1), 60.0))
+    description = ModelDescription(localizer=name, network=network, hyper=hyper, camera=camera)
+    return TrainedLocalizer(description, built, statistics)
+
+
+def answering(position_m, quat_wxyz):
+    """A localizer that gives every image this pose."""
+    trained = untrained()
+    head = trained.network.regressor[-1]
+    with torch.no_grad():
+        for layer, values in ((head.position, position_m), (head.quat, quat_wxyz)):
+            layer.weight.zero_()
+            layer.bias.copy_(torch.tensor(values))
+    return trained
+
+
+def save(path, trained):
+    """Write its checkpoint."""
+    save_checkpoint(path, trained.network, trained.statistics, trained.description)
+    return path

@@ -42,11 +42,11 @@ from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.listing import read_color, read_depth_mm
 from synfeal.validation.run import validate
 from tests import mesh_samples as meshes
+from tests.coloured_frames import save, untrained
 from tests.damaged_sets import write_planar_set
 from tests.planar_scene import straight_path
 from tests.report_results import CONFIG, design_of, fill_assistance
 from tests.test_calibration import OLD_OPENCV
-from tests.trained_localizers import save, untrained
 
 CAMERA = CameraConfig(width=24, height=18)
 TINY = NetworkConfig(input_px=32, width=0.01)
@@ -197,7 +197,7 @@ def load_obj(path):
 
 write_scene = with_wall(meshes.write_obj)
 WALL = meshes.triangle_gltf(meshes.textured(), ["wall.png"])
-write_gltf = with_wall(lambda folder: meshes.store_gltf(folder, *WALL))
+write_gltf = with_wall(WALL.store)
 
 
 def write_ply(path):

@@ -15,6 +15,10 @@ TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 3]])
 FACE = np.array([[0, 1, 2]])
 UV = np.array([[0.0, 0.0], [1.0, 0.0], [0.25, 0.75]])
 
+# Numbers of glTF's specification.
+TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+COMPONENTS = {"u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
+
 Json = dict[str, Any]
 
 
@@ -36,86 +40,84 @@ def textured(material=None, **slot):
     }
 
 
+class Gltf:
+    """A glTF of one primitive in one node, put together attribute by attribute."""
+
+    def __init__(self):
+        self.binary = b""
+        self.header: Json = {
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {}}]}],
+            "buffers": [{"uri": "data.bin", "byteLength": 0}],
+            "bufferViews": [],
+            "accessors": [],
+        }
+
+    @property
+    def primitive(self):
+        return self.header["meshes"][0]["primitives"][0]
+
+    def view(self, content, **more):
+        """The number of a view of bytes that are put at the end."""
+        place = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(content)}
+        self.header["bufferViews"].append({**place, **more})
+        self.binary += content + b"\0" * (-len(content) % 4)
+        self.header["buffers"][0]["byteLength"] = len(self.binary)
+        return len(self.header["bufferViews"]) - 1
+
+    def accessor(self, values, **more):
+        """The number of an accessor to values (N, C) that have no view yet, or are in one."""
+        kind = {"componentType": COMPONENTS[values.dtype.str[1:]], "count": len(values)}
+        shape = {"type": TYPES[values.shape[1]]}
+        self.header["accessors"].append({**kind, **shape, **more})
+        return len(self.header["accessors"]) - 1
+
+    def add(self, name, values, stride=None, **more):
+        """An attribute, or the indices; with a stride, of the first numbers of each row."""
+        strided = {"byteStride": stride} if stride else {}
+        number = self.accessor(values, bufferView=self.view(values.tobytes(), **strided), **more)
+        holder = self.primitive if name == "indices" else self.primitive["attributes"]
+        holder[name] = number
+
+    def store(self, folder):
+        (folder / "data.bin").write_bytes(self.binary)
+        path = folder / "scene.gltf"
+        path.write_text(json.dumps(self.header))
+        return path
+
+    def store_glb(self, folder):
+        header = copy.deepcopy(self.header)
+        header["buffers"][0].pop("uri", None)
+        text = json.dumps(header).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = struct.pack("<I4s", len(text), b"JSON") + text
+        chunks += struct.pack("<I4s", len(self.binary), b"BIN\0") + self.binary
+        path = folder / "scene.glb"
+        path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks)
+        return path
+
+
 def triangle_gltf(material, images):
-    """JSON and buffer of TRIANGLE with UV, moved by a node."""
-    binary = TRIANGLE.astype("<f4").tobytes() + UV.astype("<f4").tobytes()
-    header = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0, "translation": [10.0, 20.0, 30.0], "scale": [2.0, 2.0, 2.0]}],
-        "meshes": [
-            {"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]}
-        ],
+    """TRIANGLE with UV, moved by a node; images are files beside it."""
+    gltf = Gltf()
+    gltf.add("POSITION", TRIANGLE.astype("<f4"), min=[0, 0, 0], max=[1, 2, 3])
+    gltf.add("TEXCOORD_0", UV.astype("<f4"))
+    gltf.primitive["material"] = 0
+    gltf.header["nodes"][0] |= {"translation": [10.0, 20.0, 30.0], "scale": [2.0, 2.0, 2.0]}
+    gltf.header |= {
         "materials": [{"name": "Paint", **material}],
         "textures": [{"source": index} for index in range(len(images))],
         "images": [{"uri": uri} for uri in images],
-        "buffers": [{"uri": "data.bin", "byteLength": 60}],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": 36},
-            {"buffer": 0, "byteOffset": 36, "byteLength": 24},
-        ],
-        "accessors": [
-            {
-                "bufferView": 0,
-                "componentType": 5126,
-                "count": 3,
-                "type": "VEC3",
-                "min": [0, 0, 0],
-                "max": [1, 2, 3],
-            },
-            {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2"},
-        ],
     }
-    return header, binary
-
-
-def add_attribute(header, binary, name, values, **accessor):
-    """Give the first primitive another attribute; returns the longer buffer."""
-    types = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
-    components = {"u1": 5121, "u2": 5123, "u4": 5125, "f4": 5126, "i2": 5122}
-    header["bufferViews"].append(
-        {"buffer": 0, "byteOffset": len(binary), "byteLength": values.nbytes}
-    )
-    header["accessors"].append(
-        {
-            "bufferView": len(header["bufferViews"]) - 1,
-            "componentType": components[values.dtype.str[1:]],
-            "count": len(values),
-            "type": types[values.shape[1]],
-            **accessor,
-        }
-    )
-    attributes = header["meshes"][0]["primitives"][0]["attributes"]
-    attributes[name] = len(header["accessors"]) - 1
-    binary += values.tobytes()
-    binary += b"\0" * (-len(binary) % 4)
-    header["buffers"][0]["byteLength"] = len(binary)
-    return binary
-
-
-def store_gltf(folder, header, binary):
-    (folder / "data.bin").write_bytes(binary)
-    path = folder / "scene.gltf"
-    path.write_text(json.dumps(header))
-    return path
-
-
-def store_glb(folder, header, binary):
-    header = copy.deepcopy(header)
-    header["buffers"][0].pop("uri", None)
-    text = json.dumps(header).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text
-    chunks += struct.pack("<I4s", len(binary), b"BIN\0") + binary
-    path = folder / "scene.glb"
-    path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks)
-    return path
+    return gltf
 
 
 def write_gltf(folder, material, images):
     """A one-triangle glTF."""
-    return store_gltf(folder, *triangle_gltf(material, images))
+    return triangle_gltf(material, images).store(folder)
 
 
 def write_obj(folder, mtl="Kd 0.2 0.4 0.6\nmap_Kd wall.png\n"):

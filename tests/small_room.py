@@ -7,10 +7,11 @@ import numpy as np
 import trimesh
 from scipy.ndimage import gaussian_filter
 
+from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.geometry.poses import pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from tests.render_backends import CORNER_UV, TWO
+from synfeal.render import choose
 
 SIZE_M = np.array([5.0, 4.0, 2.6])
 TEXELS = 512
@@ -96,3 +97,30 @@ def room_poses(count, seed, roll=0.2):
         turn = rotation_from_rpy([*rng.uniform([-roll, -0.3], [roll, 0.4]), angle])
         poses.append(pose_matrix(turn, place))
     return np.stack(poses)
+
+
+BACKENDS = [name for name in choose.BACKENDS if choose.why_not(name) is None]
+CORNER_UV = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+TWO = np.array([[0, 1, 2], [0, 2, 3]])
+LOOK_ALONG_X = pose_matrix(rotation_from_rpy([0.0, 0.0, 0.0]), [0.0, 0.0, 0.0])
+PYOPENGL_WARNS = "ignore::DeprecationWarning:OpenGL.*"
+
+
+def opener_of(name):
+    """How a backend is opened with the default settings."""
+    return lambda mesh, camera: choose.BACKENDS[name](mesh, camera, RenderConfig())
+
+
+def camera_of(**values):
+    return CameraConfig.model_validate({"width": 64, "height": 48, **values})
+
+
+def facing_quad(x, half, texture=None, **values):
+    """A square at distance ``x`` that faces the camera at the origin; texture left to right."""
+    corners = np.array([[x, half, -half], [x, -half, -half], [x, -half, half], [x, half, half]])
+    uv = CORNER_UV if texture is not None else None
+    return MeshPart("quad", corners, TWO, uv, texture, **values)
+
+
+def colored(rgb):
+    return np.array([*rgb, 255], np.uint8)

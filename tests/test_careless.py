@@ -6,8 +6,8 @@ import pytest
 
 from synfeal.cli import main
 from tests.careless import TABLE, arguments_of, make_folder
+from tests.coloured_frames import save, untrained
 from tests.fuzzing import JARGON, TooSlow, at_most
-from tests.trained_localizers import save, untrained
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 SECONDS = 20.0

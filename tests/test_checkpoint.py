@@ -10,7 +10,7 @@ from baselines.training.predict import predict
 from synfeal.config.models import MODELS, CameraConfig, NetworkConfig
 from synfeal.errors import InputError
 from synfeal.files import write_json
-from tests.trained_localizers import HYPER, NETWORK, save, untrained
+from tests.coloured_frames import HYPER, NETWORK, save, untrained
 
 CPU = torch.device("cpu")
 

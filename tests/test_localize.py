@@ -20,7 +20,7 @@ from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.files import write_json
 from synfeal.frames import read_records
 from tests.collected import only_error
-from tests.trained_localizers import NETWORK, answering, save, untrained
+from tests.coloured_frames import NETWORK, answering, save, untrained
 
 COUNT = 120  # more than a batch
 WIDTH, HEIGHT = 52, 39

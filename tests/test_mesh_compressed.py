@@ -1,4 +1,7 @@
-"""Compressed glTF is read as its plain form is: the files are made here with the same libraries."""
+"""Compressed glTF is read as its plain form is, and what is not read is refused by name.
+
+The files are made here, with the libraries that read them.
+"""
 
 from __future__ import annotations
 
@@ -9,145 +12,97 @@ import zlib
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from synfeal.errors import InputError
 from synfeal.mesh.load import load_mesh
-from tests.mesh_samples import Json, store_glb, store_gltf, textured, triangle_gltf
+from tests.mesh_samples import Gltf, textured, triangle_gltf
 
 # 8 x 8 pixels, red on the left, green at the top, encoded by Basis Universal (ktx2-encoder 0.6),
 # deflated and in base 64.
-KTX2 = {
-    "UASTC": (
-        "eNpb7R0SoWBksJuXS4qLAQgYgZgDimGAEYpBIAOIdYB4CpRGBwegtAMaDVPLxKDBsIyRiYGZmYFBAK6rHs76DwTy"
-        "QBrorPKizJLUIganxOLMYoXQvMyy1KLixBwFIz1TAwYGFpAuoDbxmWGv9y/9BNcv3grkG01nhPNnOr22P5KE4Lc6"
-        "vY4XWQhXDwCeLySE"
-    ),
-    "ETC1S": (
-        "eNpb7R0SoWBksJuXS4qLAQgYgZgDimGAEQlnALEOEE8BYhUg3gFVMxlKezNCaCYGVKDDABPXYFjMyMTAzIxshz2c"
-        "9R8I5EHmhESUF2WWpBYxOCUWZxYrhOZllqUWFSfmKBjpmRowMLAwMDMYAdXxIpnNwIBpt/iBIw0gWsBNv8esYQfQ"
-        "ZoYGhZctBZsYZ0Csd2BxYFgEdopDEsP87coMIaGhoaxA7opVq1YxMRx0gZjzKb6XYQbEbw5OnAKKDiCW0DoOBjWI"
-        "vIADgwM3AKmDK+c="
-    ),
-}
+KTX2 = (
+    "eNpb7R0SoWBksJuXS4qLAQgYgZgDimGAEYpBIAOIdYB4CpRGBwegtAMaDVPLxKDBsIyRiYGZmYFBAK6rHs76DwTy"
+    "QBrorPKizJLUIganxOLMYoXQvMyy1KLixBwFIz1TAwYGFpAuoDbxmWGv9y/9BNcv3grkG01nhPNnOr22P5KE4Lc6"
+    "vY4XWQhXDwCeLySE"
+)
+DRACO, BASISU = "KHR_draco_mesh_compression", "KHR_texture_basisu"
+MESHOPT = "EXT_meshopt_compression"
 SPHERE = trimesh.creation.icosphere(subdivisions=2, radius=2.0)
 VERTICES = np.asarray(SPHERE.vertices, np.float32)
 FACES = np.asarray(SPHERE.faces, np.uint32)
-UV = np.asarray((VERTICES[:, :2] + 2.0) / 4.0, np.float32)
 RGB = np.asarray(255 * np.abs(VERTICES) / 2.0, np.uint8)
 
 
-class Maker:
-    """A glTF put together view by view."""
-
-    def __init__(self):
-        self.binary = b""
-        self.header: Json = {
-            "asset": {"version": "2.0"},
-            "scenes": [{"nodes": [0]}],
-            "scene": 0,
-            "nodes": [{"mesh": 0}],
-            "meshes": [{"primitives": [{"attributes": {}}]}],
-            "buffers": [{"byteLength": 0}],
-            "bufferViews": [],
-            "accessors": [],
-        }
-
-    @property
-    def primitive(self):
-        return self.header["meshes"][0]["primitives"][0]
-
-    def view(self, content, **more):
-        place = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(content)}
-        self.header["bufferViews"].append({**place, **more})
-        self.binary += content + b"\0" * (-len(content) % 4)
-        self.header["buffers"][0]["byteLength"] = len(self.binary)
-        return len(self.header["bufferViews"]) - 1
-
-    def accessor(self, kind, count, shape, **more):
-        entry = {"componentType": kind, "count": count, "type": shape, **more}
-        self.header["accessors"].append(entry)
-        return len(self.header["accessors"]) - 1
-
-    def needs(self, *names):
-        self.header["extensionsRequired"] = self.header["extensionsUsed"] = [*names]
-
-    def save(self, folder):
-        return store_glb(folder, self.header, self.binary)
+def padded(values, filling=0):
+    """Rows of three numbers as rows of four, which begin at whole words."""
+    return np.pad(values, ((0, 0), (0, 1)), constant_values=filling)
 
 
-def quantised(maker):
+def write_quantised(gltf):
     """Positions as normalised 16-bit integers in a node that scales, colours as bytes."""
-    position = np.round(VERTICES / 2.0 * 32767).astype("<i2")
-    padded = np.pad(position, ((0, 0), (0, 1)))
-    position_view = maker.view(padded.tobytes(), byteStride=8)
-    colour_view = maker.view(np.pad(RGB, ((0, 0), (0, 1)), constant_values=255).tobytes())
-    index_view = maker.view(FACES.astype("<u2").tobytes())
-    n = len(VERTICES)
-    maker.primitive["attributes"] = {
-        "POSITION": maker.accessor(5122, n, "VEC3", normalized=True, bufferView=position_view),
-        "COLOR_0": maker.accessor(5121, n, "VEC4", normalized=True, bufferView=colour_view),
-    }
-    maker.primitive["indices"] = maker.accessor(5123, FACES.size, "SCALAR", bufferView=index_view)
-    maker.header["nodes"][0]["scale"] = [2.0, 2.0, 2.0]
-    maker.needs("KHR_mesh_quantization")
+    position = padded(np.round(VERTICES / 2.0 * 32767).astype("<i2"))
+    gltf.add("POSITION", position, stride=8, type="VEC3", normalized=True)
+    gltf.add("COLOR_0", padded(RGB, 255), normalized=True)
+    gltf.add("indices", FACES.astype("<u2").reshape(-1, 1))
+    gltf.header["nodes"][0]["scale"] = [2.0, 2.0, 2.0]
+    needs(gltf, "KHR_mesh_quantization")
 
 
-def meshopt(maker):
+def needs(gltf, *names):
+    gltf.header["extensionsRequired"] = gltf.header["extensionsUsed"] = [*names]
+
+
+def write_meshopt(gltf):
     """As gltfpack writes: compressed views that stand for those of a buffer that is not there."""
     from meshoptimizer import encode_index_buffer, encode_vertex_buffer
 
-    quantised(maker)
-    name, plain, count = "EXT_meshopt_compression", maker.binary, len(VERTICES)
-    views, maker.binary = maker.header["bufferViews"], b""
+    write_quantised(gltf)
+    plain, count, views = gltf.binary, len(VERTICES), gltf.header["bufferViews"]
     contents = [plain[v["byteOffset"] : v["byteOffset"] + v["byteLength"]] for v in views]
-    position = np.frombuffer(contents[0], np.uint8).reshape(count, 8)
-    colour = np.frombuffer(contents[1], np.uint8).reshape(count, 4)
+    gltf.binary, gltf.header["bufferViews"] = b"", []
+    position, colour = (np.frombuffer(part, np.uint8).reshape(count, -1) for part in contents[:2])
     encoded = [
         (encode_vertex_buffer(position), count, 8, "ATTRIBUTES"),
         (encode_vertex_buffer(colour), count, 4, "ATTRIBUTES"),
         (encode_index_buffer(FACES.ravel()), FACES.size, 2, "TRIANGLES"),
     ]
-    maker.header["bufferViews"] = []
     for view, (data, n, stride, mode) in zip(views, encoded, strict=True):
-        start = len(maker.binary)
-        maker.view(data)
-        stored = {"buffer": 0, "byteOffset": start, "byteLength": len(data)}
+        stored = {"buffer": 0, "byteOffset": len(gltf.binary), "byteLength": len(data)}
         stored |= {"count": n, "byteStride": stride, "mode": mode}
-        maker.header["bufferViews"][-1] = {**view, "buffer": 1, "extensions": {name: stored}}
-    fallback = {"byteLength": len(plain), "extensions": {name: {"fallback": True}}}
-    maker.header["buffers"].append(fallback)
-    maker.needs("KHR_mesh_quantization", name)
+        gltf.view(data)
+        gltf.header["bufferViews"][-1] = {**view, "buffer": 1, "extensions": {MESHOPT: stored}}
+    fallback = {"byteLength": len(plain), "extensions": {MESHOPT: {"fallback": True}}}
+    gltf.header["buffers"].append(fallback)
+    needs(gltf, "KHR_mesh_quantization", MESHOPT)
 
 
-def draco(maker):
+def write_draco(gltf):
     import DracoPy
 
     data = DracoPy.encode(VERTICES, FACES, quantization_bits=20, colors=RGB, preserve_order=True)
     kinds = DracoPy.AttributeType
     identity = {e["attribute_type"]: e["unique_id"] for e in DracoPy.decode(data).attributes}
-    position, colour = identity[kinds.POSITION], identity[kinds.COLOR]
-    view, n = maker.view(data), len(VERTICES)
-    maker.primitive["attributes"] = {
-        "POSITION": maker.accessor(5126, n, "VEC3"),
-        "COLOR_0": maker.accessor(5121, n, "VEC3", normalized=True),
+    attributes = {"POSITION": identity[kinds.POSITION], "COLOR_0": identity[kinds.COLOR]}
+    gltf.primitive["attributes"] = {
+        "POSITION": gltf.accessor(VERTICES),
+        "COLOR_0": gltf.accessor(RGB, normalized=True),
     }
-    maker.primitive["indices"] = maker.accessor(5125, FACES.size, "SCALAR")
-    attributes = {"POSITION": position, "COLOR_0": colour}
-    maker.primitive["extensions"] = {
-        "KHR_draco_mesh_compression": {"bufferView": view, "attributes": attributes}
-    }
-    maker.needs("KHR_draco_mesh_compression")
+    gltf.primitive["indices"] = gltf.accessor(FACES.reshape(-1, 1))
+    stored = {"bufferView": gltf.view(data), "attributes": attributes}
+    gltf.primitive["extensions"] = {DRACO: stored}
+    needs(gltf, DRACO)
 
 
 @pytest.mark.parametrize(
-    ("make", "library"), [(quantised, None), (meshopt, "meshoptimizer"), (draco, "DracoPy")]
+    ("make", "library"),
+    [(write_quantised, None), (write_meshopt, "meshoptimizer"), (write_draco, "DracoPy")],
 )
 def test_a_compressed_file_is_read_as_the_plain_one(make, library, tmp_path):
     if library is not None:
         pytest.importorskip(library)
-    maker = Maker()
-    make(maker)
-    (part,) = load_mesh(maker.save(tmp_path), "z").parts
+    gltf = Gltf()
+    make(gltf)
+    (part,) = load_mesh(gltf.store_glb(tmp_path), "z").parts
     assert len(part.faces) == len(FACES)
     assert np.abs(np.linalg.norm(part.vertices_m, axis=1) - 2.0).max() < 2e-4
     volume = trimesh.Trimesh(part.vertices_m, part.faces, process=False).volume
@@ -158,39 +113,106 @@ def test_a_compressed_file_is_read_as_the_plain_one(make, library, tmp_path):
     np.testing.assert_allclose(part.vertices_m[order], VERTICES[expected], atol=2e-4)
 
 
-@pytest.mark.parametrize(("make", "library"), [(meshopt, "meshoptimizer"), (draco, "DracoPy")])
-def test_without_its_library_a_file_is_refused_with_advice(make, library, tmp_path, monkeypatch):
-    pytest.importorskip(library)
-    maker = Maker()
-    make(maker)
-    path = maker.save(tmp_path)
-    monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(InputError, match=r"synfeal\[meshes\].*gltf-transform") as caught:
-        load_mesh(path)
-    assert "\n" not in str(caught.value)
-
-
 def test_what_is_damaged_is_named(tmp_path):
     pytest.importorskip("meshoptimizer")
-    maker = Maker()
-    meshopt(maker)
-    maker.binary = maker.binary[:40] + b"\xff" * (len(maker.binary) - 40)
-    path = maker.save(tmp_path)
+    gltf = Gltf()
+    write_meshopt(gltf)
+    gltf.binary = gltf.binary[:40] + b"\xff" * (len(gltf.binary) - 40)
     with pytest.raises(InputError, match=r"scene\.glb: cannot be read as a mesh"):
-        load_mesh(path)
+        load_mesh(gltf.store_glb(tmp_path))
 
 
-@pytest.mark.parametrize(("codec", "levels"), [("UASTC", 1), ("ETC1S", 8)])
-def test_ktx2_textures_are_read(codec, levels, tmp_path):
+def test_ktx2_textures_are_read(tmp_path):
     pytest.importorskip("opengl_basisu")
-    content = zlib.decompress(base64.b64decode(KTX2[codec]))
+    content = zlib.decompress(base64.b64decode(KTX2))
     (tmp_path / "paint.ktx2").write_bytes(content)
-    header, binary = triangle_gltf(textured(), ["paint.ktx2"])
-    header["textures"] = [{"extensions": {"KHR_texture_basisu": {"source": 0}}}]
-    header["extensionsRequired"] = ["KHR_texture_basisu"]
-    (part,) = load_mesh(store_gltf(tmp_path, header, binary)).parts
+    gltf = triangle_gltf(textured(), ["paint.ktx2"])
+    gltf.header["textures"] = [{"extensions": {"KHR_texture_basisu": {"source": 0}}}]
+    gltf.header["extensionsRequired"] = ["KHR_texture_basisu"]
+    (part,) = load_mesh(gltf.store(tmp_path)).parts
     assert part.texture is not None
     assert part.texture.shape == (8, 8, 3)
     corners = part.texture[[0, 0, 7, 7], [0, 7, 0, 7]].astype(int)
     expected = [[200, 180, 90], [40, 180, 90], [200, 20, 90], [40, 20, 90]]
-    np.testing.assert_allclose(corners, expected, atol=levels)
+    np.testing.assert_allclose(corners, expected, atol=1)
+
+
+@pytest.fixture
+def without_decoders(monkeypatch):
+    for library in ("meshoptimizer", "DracoPy", "opengl_basisu"):
+        monkeypatch.setitem(sys.modules, library, None)
+
+
+def load_changed(folder, change, alone):
+    Image.new("RGB", (2, 2), (1, 2, 3)).save(folder / "paint.png")
+    gltf = triangle_gltf(textured(), ["paint.png"])
+    change(gltf, alone)
+    load_mesh(gltf.store(folder))
+
+
+# By what a file has of an extension: beside the plain form, or alone.
+def draco(gltf, alone):
+    gltf.primitive["extensions"] = {DRACO: {"bufferView": 0}}
+    if alone:
+        del gltf.header["accessors"][0]["bufferView"]
+
+
+def meshopt(gltf, alone, name=MESHOPT):
+    gltf.header["bufferViews"][0]["extensions"] = {name: {"buffer": 0}}
+    gltf.header["buffers"][0]["extensions"] = {name: {"fallback": True}}
+    if alone:
+        del gltf.header["buffers"][0]["uri"]
+
+
+def meshopt_of_khronos(gltf, alone):
+    meshopt(gltf, alone, "KHR_meshopt_compression")
+
+
+def basisu(gltf, alone):
+    gltf.header["images"].append({"uri": "paint.ktx2", "mimeType": "image/ktx2"})
+    gltf.header["textures"][0]["extensions"] = {BASISU: {"source": 1}}
+    if alone:
+        del gltf.header["textures"][0]["source"]
+
+
+def instancing(gltf, _):
+    gltf.header["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": {}}}
+
+
+def sparse(gltf, _):
+    gltf.header["accessors"][0]["sparse"] = {"count": 1}
+
+
+def requires(*names):
+    return lambda gltf, _: gltf.header.update(extensionsRequired=names)
+
+
+@pytest.mark.usefixtures("without_decoders")
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (draco, [DRACO, "synfeal[meshes]", "gltf-transform copy"]),
+        (meshopt, [MESHOPT, "gltf-transform dequantize"]),
+        (meshopt_of_khronos, ["KHR_meshopt_compression", "gltf-transform dequantize"]),
+        (basisu, [BASISU, "gltf-transform ktxdecompress"]),
+        (instancing, ["EXT_mesh_gpu_instancing", "one node per instance"]),
+        (requires("ACME_voxels"), ["ACME_voxels", "export it without"]),
+        *((requires(name), [name]) for name in (DRACO, MESHOPT, BASISU)),  # even beside the plain
+        (sparse, ["sparse"]),
+    ],
+)
+def test_what_is_not_read_is_refused_by_name(tmp_path, change, words):
+    with pytest.raises(InputError) as caught:
+        load_changed(tmp_path, change, alone=True)
+    message = str(caught.value)
+    assert all(word in message for word in [*words, "scene.gltf"]), message
+    assert "\n" not in message
+
+
+HARMLESS = requires("KHR_materials_unlit", "KHR_texture_transform", "KHR_mesh_quantization")
+
+
+@pytest.mark.usefixtures("without_decoders")
+@pytest.mark.parametrize("change", [draco, meshopt, basisu, HARMLESS])
+def test_compressed_forms_beside_plain_ones_and_harmless_extensions_pass(tmp_path, change):
+    load_changed(tmp_path, change, alone=False)

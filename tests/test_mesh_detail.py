@@ -5,7 +5,7 @@ import pytest
 
 from synfeal.mesh.detail import with_fewer_faces, with_smaller_textures
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from tests.render_backends import BACKENDS, LOOK_ALONG_X, PYOPENGL_WARNS, camera_of, opener_of
+from tests.small_room import BACKENDS, LOOK_ALONG_X, PYOPENGL_WARNS, camera_of, opener_of
 
 pytestmark = pytest.mark.filterwarnings(PYOPENGL_WARNS)
 N = 24  # cells along each side of a grid

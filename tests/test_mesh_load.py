@@ -16,9 +16,6 @@ from tests.mesh_samples import (
     FACE,
     TRIANGLE,
     UV,
-    add_attribute,
-    store_glb,
-    store_gltf,
     textured,
     triangle_gltf,
     write_gltf,
@@ -42,41 +39,46 @@ def test_gltf_transforms_axes_and_units_and_glb_is_the_same(tmp_path, paint):
     in_file = 2.0 * TRIANGLE + [10.0, 20.0, 30.0]  # scale, then translation
     np.testing.assert_allclose(load_mesh(path).parts[0].vertices_m, z_up(in_file))
     np.testing.assert_allclose(load_mesh(path, "z", 0.01).parts[0].vertices_m, 0.01 * in_file)
-    header, binary = triangle_gltf(textured(), paint)
-    plain = load_mesh(store_gltf(tmp_path, header, binary)).parts[0]
-    packed = load_mesh(store_glb(tmp_path, header, binary)).parts[0]
+    gltf = triangle_gltf(textured(), paint)
+    plain = load_mesh(gltf.store(tmp_path)).parts[0]
+    packed = load_mesh(gltf.store_glb(tmp_path)).parts[0]
     np.testing.assert_array_equal(packed.vertices_m, plain.vertices_m)
     np.testing.assert_array_equal(packed.uv, plain.uv)
     np.testing.assert_array_equal(packed.texture, plain.texture)
 
 
 def test_nodes_nest_make_instances_need_no_scene_and_keep_the_order_of_the_file(tmp_path, paint):
-    header, binary = triangle_gltf(textured(), paint)
+    gltf = triangle_gltf(textured(), paint)
     quarter_turn = [0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)]  # about y: x becomes -z
-    header["nodes"] = [
+    gltf.header["nodes"] = [
         {"children": [1, 2], "translation": [5.0, 0.0, 0.0]},
         {"mesh": 0, "rotation": quarter_turn, "name": "turned"},
         {"mesh": 0, "scale": [3.0, 1.0, 1.0], "name": "stretched"},
     ]
-    parts = load_mesh(store_gltf(tmp_path, header, binary), "z").parts
+    parts = load_mesh(gltf.store(tmp_path), "z").parts
     x, y, z = TRIANGLE.T
     np.testing.assert_allclose(parts[0].vertices_m, np.stack([z + 5.0, y, -x], axis=1), atol=1e-6)
     np.testing.assert_allclose(parts[1].vertices_m, TRIANGLE * [3.0, 1.0, 1.0] + [5.0, 0.0, 0.0])
     assert parts[0].texture is parts[1].texture  # decoded once
-    header, binary = triangle_gltf(textured(), paint)
-    expected = load_mesh(store_gltf(tmp_path, header, binary)).parts[0].vertices_m
-    header["nodes"].append({"children": [0]})
-    del header["scenes"], header["scene"]
-    (part,) = load_mesh(store_gltf(tmp_path, header, binary)).parts
+    gltf = triangle_gltf(textured(), paint)
+    expected = load_mesh(gltf.store(tmp_path)).parts[0].vertices_m
+    gltf.header["nodes"].append({"children": [0]})
+    del gltf.header["scenes"], gltf.header["scene"]
+    (part,) = load_mesh(gltf.store(tmp_path)).parts
     np.testing.assert_array_equal(part.vertices_m, expected)
-    header, binary = triangle_gltf(textured(), paint)
-    primitive = header["meshes"][0]["primitives"][0]
-    header["meshes"] = [
+    gltf = triangle_gltf(textured(), paint)
+    primitive = gltf.primitive
+    gltf.header["meshes"] = [
         {"name": "z", "primitives": [primitive, dict(primitive)]},
         {"name": "a", "primitives": [dict(primitive)]},
     ]
-    header["nodes"] = [{"children": [1, 2, 3]}, {"mesh": 1}, {"mesh": 0}, {"mesh": 0, "name": "n"}]
-    path = store_gltf(tmp_path, header, binary)
+    gltf.header["nodes"] = [
+        {"children": [1, 2, 3]},
+        {"mesh": 1},
+        {"mesh": 0},
+        {"mesh": 0, "name": "n"},
+    ]
+    path = gltf.store(tmp_path)
     for _ in range(3):  # trimesh names the nodes of such primitives at random
         assert [part.name for part in load_mesh(path).parts] == ["z", "z", "z_1", "z_1", "a"]
 
@@ -108,12 +110,12 @@ def test_gltf_vertex_colours_are_linear(
     tmp_path: Path, values: np.ndarray, expected: list[int], has_material: bool
 ) -> None:
     # IEC 61966-2-1: linear 0.214 is display 0.5.
-    header, binary = triangle_gltf({}, [])
+    gltf = triangle_gltf({}, [])
     if not has_material:
-        del header["meshes"][0]["primitives"][0]["material"], header["materials"]
+        del gltf.primitive["material"], gltf.header["materials"]
     is_integer = values.dtype.kind == "u"
-    binary = add_attribute(header, binary, "COLOR_0", values, normalized=is_integer)
-    part = load_mesh(store_gltf(tmp_path, header, binary)).parts[0]
+    gltf.add("COLOR_0", values, normalized=is_integer)
+    part = load_mesh(gltf.store(tmp_path)).parts[0]
     np.testing.assert_allclose(part.vertex_rgb, [expected] * 3, atol=1)
 
 
@@ -216,27 +218,31 @@ def test_unusable_files_are_one_line(tmp_path, name, content, message):
     assert "\n" not in str(caught.value)
 
 
-def short_buffer(header):
-    header["bufferViews"][0]["byteLength"] = 360
-    header["accessors"][0]["count"] = 30
+def short_buffer(gltf):
+    gltf.header["bufferViews"][0]["byteLength"] = 360
+    gltf.header["accessors"][0]["count"] = 30
 
 
-def absent_buffer(header):
-    header["buffers"][0]["uri"] = "nowhere.bin"
+def absent_buffer(gltf):
+    gltf.header["buffers"][0]["uri"] = "nowhere.bin"
 
 
-def wild_index(header):
-    header["accessors"][1] = {**header["accessors"][0], "componentType": 5125, "type": "SCALAR"}
-    header["meshes"][0]["primitives"][0]["indices"] = 1
+def wild_index(gltf):
+    gltf.header["accessors"][1] = {
+        **gltf.header["accessors"][0],
+        "componentType": 5125,
+        "type": "SCALAR",
+    }
+    gltf.primitive["indices"] = 1
 
 
-def endless_scene(header):
-    header["scenes"][0]["nodes"] = [7]
+def endless_scene(gltf):
+    gltf.header["scenes"][0]["nodes"] = [7]
 
 
 @pytest.mark.parametrize("damage", [short_buffer, absent_buffer, wild_index, endless_scene])
 def test_contradictory_gltf_is_one_line(tmp_path, damage):
-    header, binary = triangle_gltf({}, [])
-    damage(header)
+    gltf = triangle_gltf({}, [])
+    damage(gltf)
     with pytest.raises(InputError, match=r"scene\.gltf"):
-        load_mesh(store_gltf(tmp_path, header, binary))
+        load_mesh(gltf.store(tmp_path))

@@ -1,8 +1,11 @@
-"""The pages: their numbers are those of the tracked result files."""
+"""Publishing a run: small, whole and of one run; the pages have their numbers from it."""
 
+import hashlib
 import importlib
+import json
 import re
 import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +17,8 @@ from synfeal.report import pages
 from synfeal.report.findings import HERE, PAPER, effects, mean_factor, sentences
 from synfeal.report.findings_figure import is_drawn_from, write_findings_figure
 from synfeal.report.pages import PAGES, PARTS, headline, main, part_of, rewritten
-from synfeal.report.publish import PUBLISHED
+from synfeal.report.publish import FINISHED, PUBLISHED, publish
+from synfeal.report.publish import main as publish_main
 from tests.report_results import change_cell
 
 REPOSITORY = Path(__file__).parent.parent
@@ -58,21 +62,16 @@ TABLES, SCENES = "published/mini/tables", "benchmarks/scene_difficulty"
     [
         ("size", f"{TABLES}/table4_size", "position_m_true", "7.654", "4.42 m"),  # over sqrt(3)
         ("size", f"{TABLES}/table4_size", "published_position_m", "6.54", "*(6.54, "),
+        ("size", f"{TABLES}/table4_size", "position_m_true", "", "| failed *("),
         ("labels", f"{TABLES}/table2_ground_truth", "orientation_deg_true", "99.87", "99.9°"),
         ("difficulty", f"{SCENES}/large_room-sift", "covered_share_mean", "0.99", "| 99 % ("),
         ("difficulty", f"{SCENES}/large_room-repetition", "far_share", "0.777", "77.7 %"),
     ],
 )
 def test_changing_a_result_changes_the_text(root, part, file, column, value, shown):
-    before = PARTS[part](root)
-    assert shown not in before
+    assert shown not in PARTS[part](root)
     change_cell(root.parent.parent / f"{file}.csv", column, value)
     assert shown in PARTS[part](root)
-
-
-def test_a_failed_cell_says_so(root):
-    change_cell(root / "tables/table4_size.csv", "position_m_true", "")
-    assert "| failed *(" in PARTS["size"](root)
 
 
 def test_parts_are_replaced_and_nothing_else():
@@ -95,10 +94,9 @@ def test_the_headline_is_of_the_largest_profile_published(root):
 
 
 def test_unknown_parts_and_unpublished_results_are_input_errors(root):
-    for name in PARTS:
-        if name != "difficulty":
-            with pytest.raises(InputError, match="results/published/paper"):
-                part_of(name, "paper")
+    for name in set(PARTS) - {"difficulty"}:
+        with pytest.raises(InputError, match="results/published/paper"):
+            part_of(name, "paper")
     with pytest.raises(InputError, match="<!-- sizes mini -->: no such part"):
         part_of("sizes", "mini")
 
@@ -108,7 +106,7 @@ def test_check_writes_nothing_and_publishing_writes_all(root, capsys):
         page.parent.mkdir(exist_ok=True)
         page.write_text("<!-- size headline --><!-- /size -->\n")
     assert main(["--check"]) == 1
-    assert all(str(page) in capsys.readouterr().out for page in PAGES[:1])
+    assert str(PAGES[0]) in capsys.readouterr().out
     assert PAGES[0].read_text() == "<!-- size headline --><!-- /size -->\n"
     assert not pages.FIGURE.exists()
     assert main([]) == 0
@@ -154,7 +152,99 @@ def test_sentences_follow_the_results(root):
 def test_a_figure_knows_what_it_was_drawn_from(tmp_path):
     found = effects(MINI)
     png = tmp_path / "figure.png"
-    assert not is_drawn_from(png, found)
     write_findings_figure(found, png)
     assert is_drawn_from(png, found)
     assert not is_drawn_from(png, found.assign(factor=found.factor * 1.01))
+
+
+REPOSITORY = Path(__file__).parent.parent
+LIMIT_MB = 4.0
+
+
+@pytest.fixture
+def finished(tmp_path, monkeypatch):
+    """A finished run in ``results/mini``, and pages that show one of its two figures."""
+    monkeypatch.chdir(tmp_path)
+    run = tmp_path / "results/mini"
+    texts = {
+        "tables/table1_meshes.csv": "scene\n",
+        "tables/table1_meshes.tex": "\\begin{table}\n",
+        "figures/shown.png": "png",
+        "figures/unseen.png": "png",
+        "runs/model.pt": "weights",
+        "report.html": "<html>",
+        **dict.fromkeys(FINISHED, "text\n"),
+    }
+    recorded = {
+        name: hashlib.sha256(text.encode()).hexdigest()
+        for name, text in texts.items()
+        if name.startswith(("tables", "figures"))
+    }
+    texts["provenance.json"] = json.dumps({"files": recorded})
+    for name, text in texts.items():
+        (run / name).parent.mkdir(parents=True, exist_ok=True)
+        (run / name).write_text(text)
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "README.md").write_text("![x](results/published/mini/figures/shown.png)\n")
+    (tmp_path / "docs/a.md").write_text("[x](../results/published/stretch/figures/other.png)\n")
+    return run
+
+
+def files_below(folder):
+    return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_a_run_is_published_without_what_no_page_shows_and_so_is_one_of_labels_alone(finished):
+    target = finished.parent / "published/mini"
+    (target / "tables").mkdir(parents=True)
+    (target / "tables/of_an_older_design.csv").write_text("old")
+    assert publish_main(["--profile", "mini"]) == 0
+    tables = {f"tables/table1_meshes.{end}" for end in ("csv", "tex")}
+    assert files_below(target) == tables | {"figures/shown.png"} | set(FINISHED)
+    assert all((target / name).read_bytes() == (finished / name).read_bytes() for name in tables)
+    for name in FINISHED:
+        (finished / name).unlink()
+    assert publish_main([]) == 0
+    assert "figures/shown.png" in files_below(finished.parent / "published/mini")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("claims.csv", None, "claims.csv: missing; finish the run"),
+        ("figures/shown.png", None, r"shown.png: missing, and README.md shows it"),
+        ("tables/table1_meshes.csv", "another run's", "is not the file of .*provenance.json"),
+    ],
+)
+def test_what_does_not_belong_together_is_not_published(finished, name, text, said):
+    if text is None:
+        (finished / name).unlink()
+    else:
+        (finished / name).write_text(text)
+    target = Path("results/published/mini")
+    target.mkdir(parents=True)
+    (target / "kept.txt").touch()
+    with pytest.raises(InputError, match=said):
+        publish(Path("results/mini"), target, [Path("README.md")])
+    assert files_below(target) == {"kept.txt"}
+
+
+def test_tracked_results_are_small_and_of_their_provenance():
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "results"], cwd=REPOSITORY, capture_output=True, check=True
+    )
+    paths = [REPOSITORY / name for name in listed.stdout.decode().split("\0") if name]
+    assert {p.relative_to(REPOSITORY).parts[1] for p in paths} == {"published", "benchmarks"}
+    assert sum(p.stat().st_size for p in paths) <= LIMIT_MB * 1e6
+
+
+@pytest.mark.parametrize("profile", ["mini", "night"])
+def test_published_results_are_those_of_a_recorded_run(profile):
+    finished = REPOSITORY / "results/published" / profile
+    record = json.loads((finished / "provenance.json").read_text())
+    assert len(record["commit"]) >= 40
+    assert record["stages"]
+    paths = [finished / "claims.csv", finished / "summary.md", *(finished / "tables").glob("*.csv")]
+    for path in [*paths, *(finished / "figures").glob("*")]:
+        sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+        assert record["files"][path.relative_to(finished).as_posix()] == sha256

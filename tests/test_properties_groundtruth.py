@@ -25,8 +25,15 @@ from baselines.groundtruth.chain import (
 )
 from synfeal.config.models import GroundTruthConfig
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
-from tests.property_support import few, fewer, poses, seeds, table_of
-from tests.walks import random_poses, relative_to_first
+from tests.property_support import (
+    few,
+    fewer,
+    poses,
+    random_poses,
+    relative_to_first,
+    seeds,
+    table_of,
+)
 
 CFG = GroundTruthConfig(batch_frames=4)
 

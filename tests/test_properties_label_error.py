@@ -16,11 +16,11 @@ from tests.property_support import (
     pose_of,
     poses,
     poses_near,
+    random_poses,
     seeds,
     table_of,
     turn,
 )
-from tests.walks import random_poses
 
 
 @few

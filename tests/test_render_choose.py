@@ -11,11 +11,11 @@ import pytest
 from synfeal.config.models import RenderConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.render import choose, open_renderer, pyrender_backend
+from synfeal.render import choose, open_renderer
 from synfeal.render.opengl import backend as opengl
 from synfeal.render.opengl import context
 from synfeal.render.pieces import pieces
-from tests.render_backends import (
+from tests.small_room import (
     BACKENDS,
     LOOK_ALONG_X,
     PYOPENGL_WARNS,
@@ -164,15 +164,6 @@ def test_a_process_without_egl_still_draws(lacking, tmp_path):
         assert f"render.backend: {backend} does not work here" in error
         assert "libegl1" in error
         assert f"WARNING render.backend: {backend} does not work here" in done.stderr
-
-
-def test_without_egl_the_packages_are_named(monkeypatch):
-    def fail():
-        raise ImportError("libEGL.so.1: cannot open shared object file")
-
-    monkeypatch.setattr(pyrender_backend, "_pyrender", fail)
-    with pytest.raises(InputError, match="libegl1 libgl1-mesa-dri"):
-        pyrender_backend._context.__wrapped__()
 
 
 def test_parts_with_too_many_vertices_are_drawn_in_pieces():

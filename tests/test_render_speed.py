@@ -17,9 +17,8 @@ from synfeal.report.figures.sources import Results
 from synfeal.report.speed_vs_error import speeds_of
 from synfeal.scenes import render_speed as speed
 from synfeal.scenes.render_speed import SCHEMA
-from tests.render_backends import BACKENDS, PYOPENGL_WARNS, camera_of
 from tests.report_results import design_of, read
-from tests.small_room import furnished_room, room_poses
+from tests.small_room import BACKENDS, PYOPENGL_WARNS, camera_of, furnished_room, room_poses
 
 pytestmark = pytest.mark.filterwarnings(PYOPENGL_WARNS)
 SMALL, LARGE = camera_of(width=48, height=36), camera_of(width=80, height=60)

@@ -22,8 +22,7 @@ from synfeal.config.models import AugmentationConfig, CameraConfig, NetworkConfi
 from synfeal.dataset.packed import fit_frame
 from synfeal.errors import InputError
 from synfeal.render import open_renderer
-from tests.render_backends import PYOPENGL_WARNS
-from tests.small_room import furnished_room, room_poses
+from tests.small_room import PYOPENGL_WARNS, furnished_room, room_poses
 
 pytestmark = pytest.mark.filterwarnings(PYOPENGL_WARNS)
 

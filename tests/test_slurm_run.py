@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.slurm_run.__main__ import CLUSTER
-from tests.slurm_run.page import differing_files, page
+from tests.slurm_run.__main__ import CLUSTER, differing_files, page
 
 JOBS = """\
 JobId=7 UserId=root(0) GroupId=root(0) Name=wrap JobState=NODE_FAIL Partition=gpu TimeLimit=5 \
