@@ -18,7 +18,7 @@ from synfeal.cli import main
 from synfeal.config import Run, load_config, read_design
 from synfeal.dataset.pose_table import COLUMNS, write_pose_table
 from synfeal.files import write_json
-from synfeal.report.predictions.package import POSES
+from synfeal.report.predictions.keep import POSES
 from tests.property_support import random_table
 from tests.test_workflow import snakemake
 

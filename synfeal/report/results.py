@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
 from synfeal.errors import InputError, why
@@ -51,3 +52,16 @@ def shaped(path: Path, value: Any, shape: Any, remedy: str) -> Any:
         return ADAPTER_OF(shape).validate_json(json.dumps(value), strict=True)
     except ValidationError as error:
         raise InputError(f"{path}: {why(error)}; {remedy}") from None
+
+
+def unequal_leaves(a: Mapping[str, Any], b: Mapping[str, Any]) -> pd.DataFrame:
+    """Leaves of two nested mappings that differ.
+
+    Columns are ``key``, dotted, in order; ``a`` and ``b``, values as JSON, NaN where one lacks it.
+    """
+    leaves = {}
+    for name, whole in (("a", a), ("b", b)):
+        [flat] = pd.json_normalize(dict(whole)).to_dict("records")
+        leaves[name] = {key: json.dumps(value) for key, value in flat.items()}
+    table = pd.DataFrame(leaves, dtype=object).sort_index()
+    return table[table["a"].ne(table["b"])].rename_axis("key").reset_index()

@@ -38,7 +38,7 @@ from synfeal.effects.light import GROUPS as LIGHT_GROUPS
 from synfeal.errors import InputError
 from synfeal.labels import seed_names
 from synfeal.provenance import config_hash
-from synfeal.report.predictions.restored import restored_files
+from synfeal.report.predictions.restore import restored_files
 from synfeal.run_lock import begin_run
 from synfeal.seeds import seed_of
 

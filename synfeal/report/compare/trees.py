@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -16,7 +15,7 @@ from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
 from synfeal.report.compare.runs import KEY, find_runs, read_run
 from synfeal.report.compare.stats import compare_errors
-from synfeal.report.results import read_result
+from synfeal.report.results import read_result, unequal_leaves
 from synfeal.report.stats import MEASURES
 
 PROVENANCE = "provenance.json"
@@ -122,11 +121,6 @@ def _sameness(a: PoseTable | None, b: PoseTable | None, count: int) -> Sameness:
 def _changes(path_a: Path, path_b: Path) -> pd.DataFrame | None:
     if not (path_a.exists() and path_b.exists()):
         return None
-    causes = {}
-    for tree, path in (("a", path_a), ("b", path_b)):
-        record = read_result(path, (), "delete it or run again")
-        cause = {key: value for key, value in record.items() if key not in OUTCOMES}
-        leaves = pd.json_normalize(cause).to_dict("records")[0]
-        causes[tree] = {key: json.dumps(value) for key, value in leaves.items()}
-    table = pd.DataFrame(causes, dtype=object).sort_index()
-    return table[table["a"].ne(table["b"])].rename_axis("key").reset_index()
+    records = (read_result(path, (), "delete it or run again") for path in (path_a, path_b))
+    causes = ({k: v for k, v in record.items() if k not in OUTCOMES} for record in records)
+    return unequal_leaves(*causes)

@@ -3,26 +3,103 @@
 Of each finished run: predictions, history, what it was trained from and what that took. Of its data
 set: true poses, test labels, and estimated labels with what estimation left. Not kept: models and
 frames, which are large, and whatever follows from the rest in no time.
+
+The file is a Data Package (datapackage.org, version 1) in a ZIP file: files, hashes and schemas.
+Members are compressed one by one, in order of name and without a date: the same files give the same
+bytes, and a package that has grown shares most of its bytes with the one before, so that git keeps
+the difference. LZMA makes tables of poses a quarter smaller than what ``unzip`` can read; Python,
+7-Zip and bsdtar read it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from pathlib import Path
+import hashlib
+import json
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path, PurePosixPath
+from typing import Any
 
+from tqdm import tqdm
+
+from synfeal.dataset.archive import EPOCH, PLAIN_FILE, UNIX
 from synfeal.errors import InputError
-from synfeal.report.predictions.package import write_package
+from synfeal.files import atomic_path
 
-PACKAGE, PREDICTIONS = "predictions.zip", "predictions.csv"
+DESCRIPTOR, SCHEMA = "datapackage.json", "schemas/poses.json"
+POSES: dict[str, Any] = {
+    "fields": [
+        {"name": "frame", "type": "integer", "description": "index of the frame in its split"},
+        {"name": "path", "type": "integer", "description": "index of its straight path"},
+        *(
+            {"name": f"t{axis}", "type": "number", "description": "camera centre, metres"}
+            for axis in "xyz"
+        ),
+        *(
+            {"name": f"q{axis}", "type": "number", "description": "world_from_cam, unit quaternion"}
+            for axis in "wxyz"
+        ),
+    ],
+    "missingValues": ["nan"],
+    "primaryKey": "frame",
+}
+POSE_HEADER = (",".join(field["name"] for field in POSES["fields"]) + "\n").encode()
+
+
+def write_package(root: Path, paths: Mapping[str, str], out: Path) -> None:
+    """Pack files below ``root`` in a ZIP file.
+
+    ``paths`` says which file holds each: itself, or a longer one that begins with the same bytes.
+    """
+    resources = []
+    with atomic_path(out) as temporary, zipfile.ZipFile(temporary, "w") as package:
+        for path in tqdm(sorted(paths), unit="file", desc="keep", leave=False, disable=None):
+            data = (root / path).read_bytes()
+            resources.append(_described(path, paths[path], data))
+            if paths[path] == path:
+                _add(package, path, data)
+        _add(package, SCHEMA, _json(POSES))
+        _add(package, DESCRIPTOR, _json({"name": "synfeal-run", "resources": resources}))
+
+
+def _described(path: str, member: str, data: bytes) -> dict[str, Any]:
+    """A resource as the standard has it; ``member`` is ours, of a file that another one holds."""
+    entry = {
+        "name": path.lower().replace("/", "."),
+        "path": path,
+        "format": PurePosixPath(path).suffix[1:],
+        "bytes": len(data),
+        "hash": f"sha256:{hashlib.sha256(data).hexdigest()}",
+    }
+    if data.startswith(POSE_HEADER):
+        entry["schema"] = SCHEMA
+    return entry if member == path else {**entry, "member": member}
+
+
+def _json(value: Any) -> bytes:
+    return (json.dumps(value, indent=1) + "\n").encode()
+
+
+def _add(package: zipfile.ZipFile, name: str, data: bytes) -> None:
+    info = zipfile.ZipInfo(name, EPOCH)
+    info.create_system, info.external_attr = UNIX, PLAIN_FILE << 16
+    package.writestr(info, data, zipfile.ZIP_LZMA)
+
+
+PREDICTIONS = "predictions.csv"
 OF_RUN = (PREDICTIONS, "common_predictions.csv", "history.csv", "training.json")
-OF_SCENE = (
-    *("properties.json", "collision_curve.csv", "render_speed.csv", "collection_speed.json"),
-    "test_depth.npy",
-)
 # Written by the job that estimates labels, so it tells them from labels that are computed.
 ESTIMATED = "assistance.json"
-OF_REFERENCE = ("metrics.json", "facts.json")  # their answers take minutes, not hours
-TRUTH = ("train.csv", "test.csv")
+# True poses, what estimation of labels left, records of the scene, and what references answered in
+# minutes rather than hours.
+OF_DATA_SET = (
+    *(f"labels/{{scene}}/{{size}}/synfeal/{split}.csv" for split in ("train", "test")),
+    "groundtruth/{scene}/{size}/*/*/batch-*.*",
+    *("scenes/{scene}/properties.json", "scenes/{scene}/collision_curve.csv"),
+    *("scenes/{scene}/render_speed.csv", "scenes/{scene}/collection_speed.json"),
+    *("scenes/{scene}/test_depth.npy", "frames/{scene}/*.json"),
+    *(f"references/{{scene}}/{{size}}/*/*/{name}.json" for name in ("metrics", "facts")),
+)
 
 
 def keep(root: Path, out: Path) -> int:
@@ -37,41 +114,24 @@ def keep(root: Path, out: Path) -> int:
     if not runs:
         raise InputError(f"{root}: holds no runs/**/{PREDICTIONS}; name results with finished runs")
     files = {file for run in runs for file in _of_run(root, run)}
-    for scene, size in sorted({_data_set(root, run)[:2] for run in runs}):
-        files.update(_of_data_set(root, scene, size))
+    for scene, size in {run.relative_to(root / "runs").parts[:2] for run in runs}:
+        for pattern in OF_DATA_SET:
+            files.update(root.glob(pattern.format(scene=scene, size=size)))
+        for record in root.glob(f"labels/{scene}/{size}/*/{ESTIMATED}"):
+            files.update(p for p in record.parent.iterdir() if p.suffix in (".csv", ".json"))
     names = sorted(file.relative_to(root).as_posix() for file in files)
     write_package(root, {name: name for name in names} | _beginnings(root, names), out)
     return len(runs)
 
 
-def _data_set(root: Path, run: Path) -> tuple[str, str, str]:
-    """Scene, size and labels of a run, by its path."""
-    scene, size, labels, *_ = run.relative_to(root / "runs").parts
-    return scene, size, labels
-
-
-def _of_run(root: Path, run: Path) -> Iterable[Path]:
-    scene, size, labels = _data_set(root, run)
-    label_set = root / "labels" / scene / size / labels
-    if not (label_set / "test.csv").is_file():
-        raise InputError(f"{label_set / 'test.csv'}: missing, and {run} was made from it")
-    yield label_set / "test.csv"
-    yield from (run / name for name in OF_RUN if (run / name).is_file())
-    measured = root / "benchmarks" / "train" / run.relative_to(root / "runs")
-    yield from measured.parent.glob(f"{measured.name}.tsv")
-
-
-def _of_data_set(root: Path, scene: str, size: str) -> Iterable[Path]:
-    """True poses, estimated labels, what estimation left, and records of the scene."""
-    label_sets = root / "labels" / scene / size
-    yield from (path for name in TRUTH if (path := label_sets / "synfeal" / name).is_file())
-    for record in label_sets.glob(f"*/{ESTIMATED}"):
-        yield from (path for path in record.parent.iterdir() if path.suffix in (".csv", ".json"))
-    yield from (root / "groundtruth" / scene / size).glob("*/*/batch-*.*")
-    yield from (path for name in OF_SCENE if (path := root / "scenes" / scene / name).is_file())
-    yield from (root / "frames" / scene).glob("*.json")
-    for name in OF_REFERENCE:
-        yield from (root / "references" / scene / size).glob(f"*/*/{name}")
+def _of_run(root: Path, run: Path) -> Iterator[Path]:
+    name = run.relative_to(root / "runs")
+    labels = root.joinpath("labels", *name.parts[:3], "test.csv")
+    if not labels.is_file():
+        raise InputError(f"{labels}: missing, and {run} was made from it")
+    measured = root / "benchmarks" / "train" / f"{name}.tsv"
+    found = (labels, measured, *(run / file for file in OF_RUN))
+    yield from (path for path in found if path.is_file())
 
 
 def _beginnings(root: Path, names: Iterable[str]) -> dict[str, str]:
