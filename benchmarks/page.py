@@ -15,7 +15,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from benchmarks.sweep import Picture, Sweep
 from synfeal.files import atomic_path
-from synfeal.report.figures.pareto import pareto_front
+from synfeal.report.figures.speed_vs_error import pareto_front
 from synfeal.report.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, RC, SKY, VERMILION
 
 COLORS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)

@@ -15,7 +15,7 @@ from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.files import write_json
 from synfeal.frames import read_frame
-from synfeal.report.figures.references_by_noise import figure_of
+from synfeal.report.figures.error_by_method import references_by_noise
 from synfeal.report.html.side_tables import references_table as html_table
 from synfeal.report.references import (
     crossing_finding,
@@ -91,7 +91,7 @@ def test_the_table_has_a_row_per_data_set_and_method_and_all_are_shown(table, ro
     page = html_table(root / "tables" / "references.csv")
     assert page.count("<tr") == 1 + len(table)
     rows = [row for row in design() if row.table == TABLE3]
-    (upper, lower) = figure_of(table, rows).axes
+    (upper, lower) = references_by_noise(table, rows).axes
     drawn = {line.get_label(): line.get_ydata() for line in upper.lines}
     assert list(drawn[REFERENCES["structure-depth"].title]) == list(STRUCTURE_M)
     assert len(lower.lines) == len(drawn) == len(REFERENCES) + len(MODELS) + 2

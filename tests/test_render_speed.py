@@ -12,7 +12,7 @@ from synfeal.geometry.rotations import quat_wxyz_from_matrix
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.render import choose
-from synfeal.report.figures import render_speed
+from synfeal.report.figures import speed_vs_error as figures
 from synfeal.report.figures.sources import Results
 from synfeal.report.speed_vs_error import speeds_of
 from synfeal.scenes import render_speed as speed
@@ -196,7 +196,7 @@ def test_rows_and_figure_say_what_each_variant_is(made_up):
     assert [float(row["error"]) for row in rows[:2]] == [2.0, 5.0]
     assert rows[4]["depth_error_mm"] == "0.5"
     assert [row["chosen"] for row in rows] == ["1", "0", "0", "0", "0", "1"]
-    figure = render_speed.draw(Results(made_up, design_of(())))
+    figure = figures.draw_render(Results(made_up, design_of(())))
     assert figure is not None
     small, large = figure.axes
     assert (small.get_xscale(), small.get_yscale()) == ("log", "log")
@@ -206,7 +206,7 @@ def test_rows_and_figure_say_what_each_variant_is(made_up):
         (ring,) = (line for line in axes.lines if line.get_markersize() > 10)
         np.testing.assert_allclose(ring.get_xydata(), [point])
     curves = {line.get_color(): line for line in small.lines if line.get_linestyle() != "None"}
-    opengl, textures = curves[render_speed.COLOURS["opengl"]], curves[render_speed.ORANGE]
+    opengl, textures = curves[figures.COLOURS["opengl"]], curves[figures.ORANGE]
     np.testing.assert_allclose(opengl.get_xydata(), [[4.0, 5.0], [8.0, 2.0]])
     np.testing.assert_allclose(textures.get_xydata(), [[8.0, 2.0], [7.0, 3.0]])
     assert {text.get_text() for text in small.texts} == {"1/4", "25%"}

@@ -7,9 +7,16 @@ import pytest
 from synfeal.config import MODELS
 from synfeal.evaluation.metrics import cumulative
 from synfeal.report.figures import Results, speed_vs_error
-from synfeal.report.figures.error_by_design import LEVEL, by_images, by_noise, by_size
-from synfeal.report.figures.localizer_lines import ASIDE, SHOWN, published_values
-from synfeal.report.figures.pareto import pareto_front
+from synfeal.report.figures.error_by_design import (
+    ASIDE,
+    LEVEL,
+    SHOWN,
+    by_images,
+    by_noise,
+    by_size,
+    published_values,
+)
+from synfeal.report.figures.speed_vs_error import pareto_front
 from synfeal.report.figures.style import METHOD_STYLES, MODEL_STYLES, PUBLISHED, SPLIT_STYLES
 from synfeal.report.layouts import TITLES
 from tests.report_results import ROWS, design_of

@@ -15,13 +15,11 @@ from synfeal.report.figures import (
     FIGURES,
     Results,
     cumulative_error,
-    frames,
-    label_error,
-    poses,
-    trajectories,
+    label_sets,
+    scenes,
     write_figures,
 )
-from synfeal.report.figures.plan_view import floor_m, plan_of
+from synfeal.report.figures.scenes import floor_m, plan_of
 from synfeal.report.figures.sources import read_labelled_set
 from synfeal.report.figures.style import METHOD_STYLES, RC
 from synfeal.report.layouts import SOURCES
@@ -76,7 +74,7 @@ def style():
 
 
 def test_label_error_draws_known_errors_borders_and_assisted_batches(results):
-    panels = np.reshape(label_error.draw(results).axes, (3, 2))
+    panels = np.reshape(label_sets.draw_label_error(results).axes, (3, 2))
     for place, count in enumerate((9, 5)):
         for line, step in enumerate((0.01, 1.0)):
             curves = {c.get_label(): c for c in panels[line, place].lines}
@@ -98,7 +96,7 @@ def test_label_error_draws_known_errors_borders_and_assisted_batches(results):
 
 
 def test_trajectories_draw_both_paths_and_ring_what_was_assisted(results):
-    panels = np.reshape(trajectories.draw(results).axes, (2, 2))
+    panels = np.reshape(label_sets.draw_trajectories(results).axes, (2, 2))
     for column, k in enumerate((1, 2)):
         lines = {line.get_label(): line.get_xydata() for line in panels[0, column].lines}
         labels = wrong_poses(9, 0.01 * k, k)[:, :2, 3]
@@ -118,7 +116,7 @@ def test_trajectories_draw_both_paths_and_ring_what_was_assisted(results):
 
 
 def test_poses_draw_every_camera_with_a_tick_where_it_looks(results):
-    small, large = poses.draw(results).axes
+    small, large = scenes.draw_poses(results).axes
     for axes, size in ((small, "6k"), (large, "20k")):
         dots = {c.get_label(): c for c in axes.collections}
         for split, y in (("train", 1.0), ("test", 1.2)):
@@ -130,9 +128,9 @@ def test_poses_draw_every_camera_with_a_tick_where_it_looks(results):
     down = np.diag([1.0, -1.0, -1.0])
     left = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # looks along y
     cameras[1, :3, :3], cameras[2, :3, :3] = down, left
-    ticks = poses.view_ticks(table_of(cameras))
+    ticks = scenes.view_ticks(table_of(cameras))
     np.testing.assert_allclose(ticks[:, 0], cameras[:, :2, 3])
-    expected = poses.TICK_M * np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
+    expected = scenes.TICK_M * np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
     np.testing.assert_allclose(ticks[:, 1] - ticks[:, 0], expected, atol=1e-12)
     np.testing.assert_allclose(LOOKS_ALONG_X @ [0, 0, 1], [1, 0, 0])
 
@@ -162,7 +160,7 @@ def test_a_plan_shows_what_is_between_floor_and_cut():
 
 
 def test_frames_show_the_files_in_order_with_their_numbers_in_the_test_set(results):
-    (part,) = frames.draw(results).subfigs
+    (part,) = scenes.draw_frames(results).subfigs
     shown = [axes for axes in part.axes if axes.images]
     assert [axes.texts[0].get_text() for axes in shown] == list("012345")
     for number, axes in enumerate(shown):
@@ -172,7 +170,7 @@ def test_frames_show_the_files_in_order_with_their_numbers_in_the_test_set(resul
 
 @pytest.mark.parametrize("count", [1, 5, 12, 13, 1000, 20_000])
 def test_frames_are_spread_evenly(count):
-    chosen = frames.evenly(count)
+    chosen = scenes.evenly(count)
     assert len(chosen) == len(set(chosen)) == min(12, count)
     assert (chosen[0], chosen[-1]) == (0, count - 1)
     if count > 1:

@@ -35,8 +35,7 @@ from synfeal.frames import (
 from synfeal.report.assistance import SCHEMA as ASSISTANCE
 from synfeal.report.assistance import TOTAL
 from synfeal.report.claims.table import claims_markdown
-from synfeal.report.findings import effects, sentences
-from synfeal.report.findings_figure import is_drawn_from, write_findings_figure
+from synfeal.report.findings import effects, is_drawn_from, sentences, write_findings_figure
 from synfeal.report.label_error import SCHEMA as LABEL_ERROR
 from synfeal.report.layouts import SOURCES, TITLES, scene_title
 from synfeal.report.publish import PUBLISHED, RESULTS

@@ -14,14 +14,10 @@ from synfeal.files import atomic_path
 from synfeal.report.figures import (
     cumulative_error,
     error_by_design,
-    frames,
-    label_error,
-    poses,
-    references_by_noise,
-    render_speed,
-    robustness,
+    error_by_method,
+    label_sets,
+    scenes,
     speed_vs_error,
-    trajectories,
 )
 from synfeal.report.figures.sources import Results
 from synfeal.report.figures.style import RC
@@ -39,24 +35,24 @@ class Entry:
 
 FIGURES: dict[str, Entry] = {
     "frames": Entry(
-        frames.draw,
+        scenes.draw_frames,
         "Collected frames as the localizers see them, evenly over the largest test set of each "
         "scene and labelled with their number in it.",
         (".png",),
     ),
     "poses": Entry(
-        poses.draw,
+        scenes.draw_poses,
         "Camera poses of every data set from above, training and test, each with a tick along its "
         "view, over the walls and furniture of the collision mesh (grey), with the frames used.",
     ),
     "trajectories": Entry(
-        trajectories.draw,
+        label_sets.draw_trajectories,
         "Camera paths as each ground-truth method estimated them, over the true ones, from above; "
         "dots are the first frames of batches, wide stretches batches that needed assistance, and "
         "rings the poses that assistance replaced by the true ones.",
     ),
     "label_error": Entry(
-        label_error.draw,
+        label_sets.draw_label_error,
         "Error of the labels of each ground-truth method along the training and the test sequence, "
         "against the true poses; vertical lines are the borders of batches, and the bars below say "
         "which batches were assisted.",
@@ -69,7 +65,7 @@ FIGURES: dict[str, Entry] = {
         "are the mean training pose, the nearest training image and structure on depth.",
     ),
     "references_by_noise": Entry(
-        references_by_noise.draw,
+        error_by_method.draw_references_by_noise,
         "Median error against the true poses over the errors of the labels that a method learns or "
         "builds its map from: localizers in colour, reference methods in grey; labels from images "
         "stand in the order of the error of structure on depth.",
@@ -87,7 +83,7 @@ FIGURES: dict[str, Entry] = {
         "images, each a training run of its own length, with 95 % limits.",
     ),
     "robustness": Entry(
-        robustness.draw,
+        error_by_method.draw_robustness,
         "Median error on the same test paths rendered with effects of a camera and of changing "
         "light, with 95 % limits, for methods that know ideal frames and for those that know "
         "frames with effects mixed in; dotted lines are their errors on ideal frames.",
@@ -105,7 +101,7 @@ FIGURES: dict[str, Entry] = {
         "Pareto front, the ring is the mesh that is used.",
     ),
     "speed_vs_error_render": Entry(
-        render_speed.draw,
+        speed_vs_error.draw_render,
         "How long a frame takes against its mean difference from 64 samples per pixel, by backend "
         "and samples per pixel, and with smaller textures or fewer triangles than the scene has; "
         "the ring is what frames are rendered with.",
