@@ -9,7 +9,7 @@ import pytest
 
 from synfeal.cli import main
 from synfeal.config.load import check_mesh_files, check_results
-from synfeal.report.cost.profiles import read_profile
+from synfeal.report.cost.runs import read_profile
 from tests.careless import FILES
 from tests.fuzzing import problem_with
 

@@ -11,29 +11,20 @@ from synfeal.config import MODELS
 from synfeal.dataset.pose_table import write_pose_table
 from synfeal.errors import InputError
 from synfeal.frames import read_records
-from synfeal.report.claims import labels as label_claims
-from synfeal.report.claims.model import (
-    HOLDS,
-    MIXED,
-    NO_EFFECT,
-    NOT_LEARNT,
-    OPPOSITE,
-    SMALLER,
-    UNDECIDED,
-    published_claims,
-)
-from synfeal.report.claims.model import NOT_TESTABLE as UNTESTED
-from synfeal.report.claims.registry import JUDGES
-from synfeal.report.claims.table import claims_markdown, write_claims
+from synfeal.report.claims import untrained
+from synfeal.report.claims.model import Verdict, published_claims
+from synfeal.report.claims.table import JUDGES, claims_markdown, write_claims
 from tests import claims_results as made
 from tests.claims_results import AXES, assisted, collected_at, curves, first_paths, put
 from tests.report_results import design_of, experiment, fill_assistance
+
+HOLDS, SMALLER, MIXED, NO_EFFECT, _, OPPOSITE, UNDECIDED, NOT_LEARNT, UNTESTED = Verdict
 
 
 @pytest.fixture(autouse=True)
 def _tracker_that_reaches_metres(monkeypatch):
     """Frames of these results lie metres apart."""
-    monkeypatch.setattr(label_claims, "FARTHEST_M", np.inf)
+    monkeypatch.setattr(untrained, "FARTHEST_M", np.inf)
 
 
 @pytest.fixture(scope="module")
@@ -189,7 +180,7 @@ def test_what_cannot_be_judged_says_why_and_the_rest_is_judged(results, tmp_path
     other = experiment("table4_size", scene="workshop")
     found = made.Results(tmp_path / "workshop", design=(other,)).rows().values()
     assert all(row["verdict_true"] == UNTESTED and row["reason"] for row in found)
-    monkeypatch.setattr(label_claims, "FARTHEST_M", 0.04)
+    monkeypatch.setattr(untrained, "FARTHEST_M", 0.04)
     row = results.rows()["C15"]
     assert (row["verdict_true"], "cm apart" in row["reason"]) == (UNTESTED, True)
     rows = made.papers_results(tmp_path / "short", n_paths=9).rows()

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from synfeal.bootstrap import limits
-from synfeal.report.claims.model import HOLDS, LESS, MIXED, NO_EFFECT, OPPOSITE, SMALLER, UNDECIDED
-from synfeal.report.claims.text import ERRORS, PERCENT, limits_text, values_text
+from synfeal.report.claims.model import ERRORS, PERCENT, Verdict, limits_text, values_text
 from synfeal.report.claims.verdicts import Condition, all_of, at_least, verdict_of
+
+HOLDS, SMALLER, MIXED, NO_EFFECT, LESS, OPPOSITE, UNDECIDED, *_ = Verdict
 
 
 def between(low, high):

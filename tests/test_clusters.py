@@ -10,7 +10,7 @@ from packaging.requirements import Requirement
 
 from baselines.training.record import training_mb
 from synfeal.report.cost.networks import pretext_work, training_work
-from synfeal.report.cost.profiles import read_profile
+from synfeal.report.cost.runs import read_profile
 from tests.test_containers import pins
 from tests.test_workflow import planned_jobs
 

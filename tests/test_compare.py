@@ -11,9 +11,8 @@ from synfeal.cli import main
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.files import write_json
 from synfeal.frames import read_records
-from synfeal.report.compare.run import OUTPUTS
-from synfeal.report.compare.summary import groups_of, remarks_of, summarise
-from synfeal.report.compare.trees import compare_trees, one_yardstick
+from synfeal.report.compare.run import OUTPUTS, remarks_of
+from synfeal.report.compare.trees import compare_trees, groups_of, one_yardstick, summary_of
 from synfeal.report.stats import MEASURES
 from tests.compare_trees import (
     BETTER,
@@ -78,7 +77,7 @@ def test_known_changes_are_found_against_both_yardsticks_counted_and_averaged(tr
             verdicts = [found.loc[labels, model, measure].verdict for model in MODELS]
             assert verdicts == ["better", "no difference seen", "worse"]
         assert found.loc[labels, SAME, "position_m"].difference == 0
-    summary = summarise(compare_trees(*trees).table).set_index("measure")
+    summary = summary_of(compare_trees(*trees).table).set_index("measure")
     position, orientation = summary.loc["position_m"], summary.loc["orientation_deg"]
     assert (position.better, position.worse, position.unseen) == (2, 2, 2)
     assert (position.lower, position.higher, position.p_sign) == (2, 2, 1.0)

@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from synfeal.report.compare.runs import RunErrors
-from synfeal.report.compare.stats import compare_errors, draws_of
+from synfeal.report.compare.stats import RunErrors, compare_errors, draws_of
 from synfeal.report.stats import MEASURES
 
 N = 120

@@ -15,8 +15,8 @@ from synfeal.report.cost.estimate import (
 )
 from synfeal.report.cost.jobs import COLUMNS
 from synfeal.report.cost.laws import LAW, fit_seconds
-from synfeal.report.cost.measured import last_look_s
 from synfeal.report.cost.networks import training_work
+from synfeal.report.cost.runs import last_look_s
 from tests.planned_runs import planned
 
 

@@ -22,9 +22,8 @@ from synfeal.report.cost.estimate import (
 )
 from synfeal.report.cost.jobs import job_of
 from synfeal.report.cost.laws import fit_laws, matched, seconds_of
-from synfeal.report.cost.measured import last_look_s, read_measured, write_measured
 from synfeal.report.cost.networks import training_work
-from synfeal.report.cost.profiles import read_run
+from synfeal.report.cost.runs import last_look_s, read_measured, read_run, write_measured
 from tests.planned_runs import ROOT, planned, run_jobs
 from tests.test_cost_laws import a_law
 

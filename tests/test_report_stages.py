@@ -10,7 +10,7 @@ from synfeal.errors import InputError
 from synfeal.frames import records_of
 from synfeal.provenance import config_hash, git_commit, processor_name, provenance
 from synfeal.report.cells import schema_of
-from synfeal.report.cost.measured import read_jobs
+from synfeal.report.cost.runs import read_jobs
 from synfeal.report.html.provenance import (
     cost_sentence,
     origin_html,

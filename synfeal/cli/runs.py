@@ -119,7 +119,7 @@ def run(arguments: argparse.Namespace) -> None:
     In a clone of Synfeal; shows its progress.
     """
     from synfeal.config.load import read_yaml
-    from synfeal.report.cost.profiles import is_default, profile_path
+    from synfeal.report.cost.runs import is_default, profile_path
 
     if not SNAKEFILE.is_file():
         raise InputError(f"{SNAKEFILE}: is not here; start the workflow in a clone of Synfeal")

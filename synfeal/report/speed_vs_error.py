@@ -24,7 +24,7 @@ from synfeal.frames import (
 )
 from synfeal.report import robustness
 from synfeal.report.assistance import TOTAL
-from synfeal.report.cost.measured import read_jobs
+from synfeal.report.cost.runs import read_jobs
 from synfeal.report.label_error import SCHEMA as LABEL_ERROR
 from synfeal.report.layouts import SOURCES, TITLES
 from synfeal.scenes.collision import CURVE_HEADER

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 from statistics import fmean
@@ -11,20 +11,20 @@ import numpy as np
 
 from synfeal.bootstrap import Array, difference, limits, mean_of, relative_change
 from synfeal.config import MODELS
-from synfeal.report.assistance import PUBLISHED_ASSISTED, assistance_record
 from synfeal.report.claims.evidence import QUANTITIES, Cell, Evidence
-from synfeal.report.claims.model import HOLDS, OPPOSITE, UNDECIDED, Claim, Missing, Outcome, Verdict
-from synfeal.report.claims.text import PERCENT, limits_text, values_text
+from synfeal.report.claims.model import (
+    PERCENT,
+    Claim,
+    Outcome,
+    Verdict,
+    limits_text,
+    values_text,
+)
 from synfeal.report.claims.verdicts import Condition, all_of
-from synfeal.report.layouts import SOURCES, TITLES, scene_title
-from synfeal.report.stats import kendall_tau, share_limits, sign_test
+from synfeal.report.layouts import SOURCES, TITLES
+from synfeal.report.stats import kendall_tau, sign_test
 
 RIVALS = ("sfm", "rgbd-toro", "rgbd-g2o")
-KINECT_FUSION = "kinect-fusion"
-# Distance of frames as published; at twice that most batches of the Large Room lose the camera.
-PAPERS_SPACING_M, FARTHEST_M = 0.03, 0.04
-# The paper says "few" and "does not cope" and gives no bound; these are our readings.
-FEW, HALF = 1 / 3, 1 / 2
 # Table 3, from no noise to the highest level of each block.
 LEVELS = {
     "orientation": ("synfeal", "noise-p0-r5", "noise-p0-r10", "noise-p0-r20"),
@@ -104,23 +104,6 @@ def labels_against_models(claim: Claim, evidence: Evidence) -> Outcome:
     return Outcome(verdict, measured, f"labels less model: {limits_text(PERCENT, gaps)}", reason)
 
 
-def few_assisted(claim: Claim, evidence: Evidence) -> Outcome:
-    """C4: each method needs assistance in fewer than a third of its batches, one-sided at 5 %."""
-    by_scene = {method: _assisted(evidence, method) for method in PUBLISHED_ASSISTED}
-    counts = {method: _of_all(parts) for method, parts in by_scene.items()}
-    spans = {method: share_limits(*count, 0.9) for method, count in counts.items()}
-    verdict: Verdict = UNDECIDED
-    if all(high < FEW for _, high in spans.values()):
-        verdict = HOLDS
-    elif any(share_limits(*count, 1 - 0.1 / len(counts))[0] > FEW for count in counts.values()):
-        verdict = OPPOSITE
-    shares = [f"{SOURCES[method]} {_counts_text(parts)}" for method, parts in by_scene.items()]
-    texts = [
-        f"{SOURCES[m]} {100 * low:.0f} to {100 * high:.0f} %" for m, (low, high) in spans.items()
-    ]
-    return Outcome(verdict, ", ".join(shares), ", ".join(texts), "few: fewer than a third")
-
-
 def kind_of_noise(claim: Claim, evidence: Evidence) -> Outcome:
     """C5: each block raises the error it names, and by more than the other; both raise both."""
     increases = {block: _increase(evidence, labels) for block, labels in LEVELS.items()}
@@ -148,59 +131,6 @@ def highest_noise(claim: Claim, evidence: Evidence) -> Outcome:
     outcome = effects(-changes(evidence, clean, noisy)[0], claim)
     over_clean = values_text(PERCENT, changes(evidence, noisy, clean)[0])
     return replace(outcome, measured=f"{outcome.measured} (over clean {over_clean})")
-
-
-def kinectfusion_fails(claim: Claim, evidence: Evidence) -> Outcome:
-    """C15: frame-to-model tracking needs assistance in more than half of its batches.
-
-    Frames farther apart than ``FARTHEST_M`` defeat any such tracker, whatever the scene: it starts
-    at the pose before and reaches a few centimetres (docs/groundtruth.md).
-    """
-    by_scene = _assisted(evidence, KINECT_FUSION)
-    poses = evidence.test_set("large_room", "6k").poses
-    steps_m = np.linalg.norm(np.diff(poses.position_m, axis=0), axis=1)
-    spacing_m = float(np.median(steps_m[np.diff(poses.path) == 0]))
-    if spacing_m > FARTHEST_M:
-        raise Missing(
-            f"frames are {100 * spacing_m:.0f} cm apart, and tracking is asked of frames"
-            f" {100 * PAPERS_SPACING_M:.0f} cm apart"
-        )
-    low, high = share_limits(*_of_all(by_scene))
-    verdict: Verdict = HOLDS if low > HALF else OPPOSITE if high < HALF else UNDECIDED
-    return Outcome(
-        verdict,
-        f"{_counts_text(by_scene)} batches assisted",
-        f"{100 * low:.0f} to {100 * high:.0f} %",
-        "does not cope: more than half of the batches are assisted",
-    )
-
-
-def _assisted(evidence: Evidence, method: str) -> dict[str, tuple[int, int]]:
-    """By scene, how many batches were assisted, of how many.
-
-    Scenes have equally many batches, so that the binomial limits of all batches together are no
-    narrower than those of a stratified sample.
-    """
-    evidence.need(scene="large_room", size="6k", labels=method)
-    counts = {}
-    for scene in [s for s, *names in evidence.estimated if names == ["6k", method]]:
-        evidence.file(f"labels/{scene}/6k/{method}/assistance.json")
-        record = assistance_record(evidence.root, scene, "6k", method)
-        counts[scene] = int(record["assisted"]), int(record["batches"])
-    return counts
-
-
-def _of_all(by_scene: Mapping[str, tuple[int, int]]) -> tuple[int, int]:
-    assisted, batches = zip(*by_scene.values(), strict=True)
-    return sum(assisted), sum(batches)
-
-
-def _counts_text(by_scene: Mapping[str, tuple[int, int]]) -> str:
-    parts = {scene: f"{assisted} of {batches}" for scene, (assisted, batches) in by_scene.items()}
-    if len(parts) == 1:
-        return next(iter(parts.values()))
-    named = ", ".join(f"{scene_title(scene)} {part}" for scene, part in parts.items())
-    return "{} of {} ({})".format(*_of_all(by_scene), named)
 
 
 def _sign_text(rival: str, found: Array) -> str:

@@ -1,35 +1,30 @@
-"""A claim of the paper, and what a run has to say about it."""
+"""A claim of the paper, what a run has to say about it, and samples as text."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cache
-from typing import Literal
 
+from synfeal.bootstrap import Array, limits
 from synfeal.frames import read_records
 from synfeal.report.cells import FOLDER
 
-Verdict = Literal[
-    "holds",
-    "same direction but smaller",
-    "mixed",
-    "no effect",
-    "smaller than published",
-    "opposite",
-    "undecided",
-    "not learnt at this scale",
-    "not testable here",
-]
-HOLDS: Verdict = "holds"
-SMALLER: Verdict = "same direction but smaller"
-MIXED: Verdict = "mixed"
-NO_EFFECT: Verdict = "no effect"
-LESS: Verdict = "smaller than published"
-OPPOSITE: Verdict = "opposite"
-UNDECIDED: Verdict = "undecided"
-NOT_LEARNT: Verdict = "not learnt at this scale"
-NOT_TESTABLE: Verdict = "not testable here"
-DECIDED = (HOLDS, SMALLER, MIXED, NO_EFFECT, LESS, OPPOSITE)
+
+class Verdict(StrEnum):
+    """What a run makes of a claim; ``verdicts.py`` has the rules."""
+
+    HOLDS = "holds"
+    SMALLER = "same direction but smaller"
+    MIXED = "mixed"
+    NO_EFFECT = "no effect"
+    LESS = "smaller than published"
+    OPPOSITE = "opposite"
+    UNDECIDED = "undecided"
+    NOT_LEARNT = "not learnt at this scale"
+    NOT_TESTABLE = "not testable here"
 
 
 @dataclass(frozen=True)
@@ -66,3 +61,31 @@ def published_claims() -> tuple[Claim, ...]:
     return tuple(
         Claim(numbers=tuple(map(float, row.pop("numbers").split())), **row) for row in rows
     )
+
+
+PERCENT = ("p {:+.1f} %", "o {:+.1f} %")
+# Positions in the paper's unit, the root mean square over the axes.
+ERRORS = ("p {:.2f} m RMS", "o {:.2f}°")
+
+
+def values_text(forms: Sequence[str], samples: Iterable[Array]) -> str:
+    """Observed values, e.g. ``p -55.0 %, o -60.0 %``."""
+    return ", ".join(_print(form, float(s[0])) for form, s in zip(forms, samples, strict=True))
+
+
+def limits_text(forms: Sequence[str], samples: Iterable[Array]) -> str:
+    """95 % limits, e.g. ``p -60.1 % to -40.2 %, o -70.0 % to -50.0 %``."""
+    pairs = [limits(sample) for sample in samples]
+    ends = [
+        (_print(form, low), _print(form.partition(" ")[2], high))
+        for form, (low, high) in zip(forms, pairs, strict=True)
+    ]
+    return ", ".join(f"{low} to {high}" for low, high in ends)
+
+
+def _print(form: str, value: float) -> str:
+    """A value; infinite where a run failed, unknown where two did."""
+    if math.isfinite(value):
+        return form.format(value)
+    name = form.partition("{")[0]
+    return f"{name}unknown" if math.isnan(value) else f"{name}{'+' if value > 0 else '-'}infinite"

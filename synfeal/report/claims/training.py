@@ -17,8 +17,7 @@ from synfeal.config import MODELS
 from synfeal.config.experiments import SHARES
 from synfeal.report.claims.evidence import QUANTITIES, Cell, Evidence
 from synfeal.report.claims.labels import changes, effects, every_localizer
-from synfeal.report.claims.model import HOLDS, OPPOSITE, UNDECIDED, Claim, Outcome, Verdict
-from synfeal.report.claims.text import ERRORS, limits_text, values_text
+from synfeal.report.claims.model import ERRORS, Claim, Outcome, Verdict, limits_text, values_text
 from synfeal.report.claims.verdicts import Condition, all_of, at_least
 from synfeal.report.layouts import STARTS, TITLES
 from synfeal.report.stats import kendall_tau
@@ -50,11 +49,11 @@ def sanctuary_at_6k(claim: Claim, evidence: Evidence) -> Outcome:
     means = mean_of(list(evidence.errors(*cells) / IN_PRINT))
     bounds = [NOT_YET * number for number in claim.numbers]
     spans = [limits(mean) for mean in means]
-    verdict: Verdict = UNDECIDED
+    verdict: Verdict = Verdict.UNDECIDED
     if all(low >= bound for (low, _), bound in zip(spans, bounds, strict=True)):
-        verdict = HOLDS
+        verdict = Verdict.HOLDS
     elif any(high < bound for (_, high), bound in zip(spans, bounds, strict=True)):
-        verdict = OPPOSITE
+        verdict = Verdict.OPPOSITE
     shares = [float(mean[0]) / n for mean, n in zip(means, claim.numbers, strict=True)]
     texts = [
         f"{q} {100 * s:.0f} % of the published" for q, s in zip(QUANTITIES, shares, strict=True)

@@ -38,13 +38,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from synfeal.bootstrap import Array, limits
-from synfeal.report.claims import model
 from synfeal.report.claims.model import Verdict
 
 # Percent. The paper prints 0.01 m, which is 5 % of its median cell, 0.20 m: it resolves no less.
 SMALLEST = 5.0
 ENOUGH = 2 / 3
-REFUTED = (model.SMALLER, model.NO_EFFECT, model.LESS, model.OPPOSITE)
+REFUTED = (Verdict.SMALLER, Verdict.NO_EFFECT, Verdict.LESS, Verdict.OPPOSITE)
 
 
 class Condition(NamedTuple):
@@ -62,14 +61,14 @@ def verdict_of(condition: Condition, comparisons: int = 1) -> Verdict:
     smallest = condition.smallest
     enough = max(ENOUGH * abs(condition.published), smallest)
     if low >= enough and low > 0:
-        return model.HOLDS
+        return Verdict.HOLDS
     if high <= -smallest and high < 0:
-        return model.OPPOSITE
+        return Verdict.OPPOSITE
     if -smallest <= low and high <= smallest:
-        return model.NO_EFFECT
+        return Verdict.NO_EFFECT
     if smallest <= low and high <= enough:
-        return model.SMALLER
-    return model.LESS if condition.published and high <= enough else model.UNDECIDED
+        return Verdict.SMALLER
+    return Verdict.LESS if condition.published and high <= enough else Verdict.UNDECIDED
 
 
 def all_of(conditions: Sequence[Condition], each: Sequence[Condition] = ()) -> tuple[Verdict, str]:
@@ -84,9 +83,9 @@ def all_of(conditions: Sequence[Condition], each: Sequence[Condition] = ()) -> t
     single = [verdict_of(condition, len(each)) for condition in each]
     refuted = {part for part in (*corrected, *single) if part in REFUTED}
     if refuted:
-        verdict = model.MIXED if model.HOLDS in (*parts, *single) else _together(refuted)
+        verdict = Verdict.MIXED if Verdict.HOLDS in (*parts, *single) else _together(refuted)
     else:
-        verdict = model.HOLDS if all(part == model.HOLDS for part in parts) else model.UNDECIDED
+        verdict = Verdict.HOLDS if {*parts} == {Verdict.HOLDS} else Verdict.UNDECIDED
     return verdict, _parts_text(conditions, parts) + _singles_text(each, single)
 
 
@@ -94,13 +93,20 @@ def _together(refuted: set[Verdict]) -> Verdict:
     """One verdict for conditions that are refuted, each in its way."""
     if len(refuted) == 1:
         return next(iter(refuted))
-    return model.LESS if model.LESS in refuted and model.OPPOSITE not in refuted else model.MIXED
+    less = Verdict.LESS in refuted and Verdict.OPPOSITE not in refuted
+    return Verdict.LESS if less else Verdict.MIXED
 
 
 def at_least(sample: Array, number: float) -> Verdict:
-    """Holds: interval starts at ``number`` or above. Opposite: it ends below it."""
-    low, high = limits(sample)
-    return model.HOLDS if low >= number else model.OPPOSITE if high < number else model.UNDECIDED
+    """Whether the interval of a sample lies at ``number`` or above."""
+    return compared(*limits(sample), number)
+
+
+def compared(low: float, high: float, number: float) -> Verdict:
+    """Holds: an interval starts at ``number`` or above. Opposite: it ends below it."""
+    if low >= number:
+        return Verdict.HOLDS
+    return Verdict.OPPOSITE if high < number else Verdict.UNDECIDED
 
 
 def _parts_text(conditions: Sequence[Condition], parts: Sequence[Verdict]) -> str:

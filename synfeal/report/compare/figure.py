@@ -10,9 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from synfeal.report.compare.runs import KEY
 from synfeal.report.compare.stats import Verdict
-from synfeal.report.compare.trees import Comparison, one_yardstick
+from synfeal.report.compare.trees import KEY, Comparison, one_yardstick
 
 # Okabe and Ito's colour-blind-safe colours; markers say the same in grey.
 STYLES: dict[Verdict, tuple[str, str]] = {

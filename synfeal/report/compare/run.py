@@ -9,13 +9,19 @@ from typing import Any
 
 import pandas as pd
 
-from synfeal.bootstrap import FEWEST_PATHS
+from synfeal.bootstrap import CONFIDENCE, FEWEST_PATHS
 from synfeal.files import atomic_path, refuse_foreign, write_text
 from synfeal.frames import write_frame
 from synfeal.report.compare.figure import comparison_figure
-from synfeal.report.compare.runs import KEY
-from synfeal.report.compare.summary import groups_of, remarks_of, summarise
-from synfeal.report.compare.trees import Comparison, compare_trees, one_yardstick
+from synfeal.report.compare.trees import (
+    KEY,
+    VERDICTS,
+    Comparison,
+    compare_trees,
+    groups_of,
+    one_yardstick,
+    summary_of,
+)
 from synfeal.report.sheet import MARKDOWN, PLAIN, text_table
 from synfeal.report.stats import MEASURES
 
@@ -36,6 +42,32 @@ LEGEND = (
 # Keys of provenance that are printed, and letters of their values.
 MOST_CHANGES, WIDEST_VALUE = 30, 40
 Rows = list[Sequence[str]]
+OUTPUTS = ("compare.csv", "compare.md", "compare.png")
+ONE_SEED = (
+    "Their intervals say how far the test frames decide; training again with another seed and no"
+    " change could also look better or worse. Compare several seeds (training.repetitions) to tell."
+)
+SEVERAL_SEEDS = (
+    "Intervals say how far the test frames decide; ± is the standard error from the spread over"
+    " seeds. They are different uncertainties and are not merged."
+)
+
+
+def compare(root_a: Path, root_b: Path, out: Path | None) -> str:
+    """Compare two result trees, before and after; the text to print.
+
+    ``compare.csv``, ``compare.md`` and ``compare.png`` go into ``out``, made if need be; earlier
+    files of these names are replaced.
+    """
+    if out is not None:
+        refuse_foreign(out, OUTPUTS, "a comparison")
+    comparison = compare_trees(root_a, root_b)
+    if out is not None:
+        with atomic_path(out / "compare.png") as temporary:
+            comparison_figure(comparison).savefig(temporary, dpi=150)
+        write_text(out / "compare.md", text_of(comparison, MARKDOWN))
+        write_frame(out / "compare.csv", comparison.table)
+    return text_of(comparison)
 
 
 def text_of(comparison: Comparison, form: str = PLAIN) -> str:
@@ -57,6 +89,73 @@ def text_of(comparison: Comparison, form: str = PLAIN) -> str:
     return text.removeprefix("#") if page else text.replace("`", "")
 
 
+def summary_rows(comparison: Comparison) -> Rows:
+    """One row per measure: verdicts, signs and the mean relative change."""
+    found = summary_of(comparison.table)
+    found["measure"] = found["measure"].map(TITLES)
+    found["p_sign"] = found["p_sign"].map("{:.2g}".format)
+    found["percent"] = found["percent"].map(percent_text)
+    signs = ("lower", "higher", "sign test p", "mean change")
+    return [("runs", *VERDICTS.values(), *signs), *_texts(found)]
+
+
+def group_rows(comparison: Comparison) -> Rows:
+    """Mean relative changes by scene, label source and model."""
+    found = groups_of(comparison.table)
+    for measure in MEASURES:
+        found[measure] = found[measure].map(percent_text)
+    return [("by", "", "runs", *SHORT), *_texts(found)]
+
+
+def _texts(table: pd.DataFrame) -> Rows:
+    return list(table.astype(str).itertuples(index=False, name=None))
+
+
+def remarks_of(comparison: Comparison) -> list[str]:
+    """Sentences on how the runs were matched and how far the numbers carry."""
+    runs = comparison.runs
+    only_a, only_b = comparison.only
+    by_chance = (1 - CONFIDENCE) * len(runs)
+    few = (runs[["n_paths_a", "n_paths_b"]].min(axis="columns") < FEWEST_PATHS).sum()
+    single = (runs[["n_seeds_a", "n_seeds_b"]].min(axis="columns") < 2).sum()
+    failed_a, failed_b = runs["failed_a"].sum(), runs["failed_b"].sum()
+    differ, unknown = ((runs["test_labels"] == found).sum() for found in ("differ", "unknown"))
+    changes = comparison.changes
+    found = {
+        f"Runs in both trees: {len(runs)}; only in A: {only_a}; only in B: {only_b}.": True,
+        _pairing(runs): True,
+        f"Runs with other test labels in B: {differ}; against the labels, their yardstick changed"
+        " too.": differ,
+        f"Runs whose test labels a tree lacks (labels/…/test.csv): {unknown}; whether their"
+        " yardstick changed is unknown.": unknown,
+        f"Runs with fewer than {FEWEST_PATHS} test paths: {few}; their intervals are too narrow,"
+        " hence the question marks.": few,
+        f"Runs with one seed in a tree: {single}. {ONE_SEED}": single,
+        SEVERAL_SEEDS: not single,
+        f"Failed predictions: {failed_a} in A, {failed_b} in B; each counts as an infinite"
+        " error.": failed_a + failed_b,
+        f"Were both trees equally good on all views, about {by_chance:.1f} of the {len(runs)}"
+        " intervals of a measure would still miss zero by the choice of test paths. Runs share test"
+        " frames, so the sign test is a guide, not a proof.": True,
+        f"Keys of provenance.json that differ: {0 if changes is None else len(changes)}.": (
+            changes is not None
+        ),
+    }
+    return [sentence for sentence, applies in found.items() if applies]
+
+
+def _pairing(runs: pd.DataFrame) -> str:
+    differ, unknown = ((runs["test_frames"] == found).sum() for found in ("differ", "unknown"))
+    if not differ + unknown:
+        return "Frames are paired: both trees test on the same paths and true poses (plans)."
+    reasons = [f"in {differ} the test frames differ"] if differ else []
+    reasons += [f"for {unknown} a tree lacks plans/<scene>/test.csv"] if unknown else []
+    return (
+        f"Frames are paired in {len(runs) - differ - unknown} of {len(runs)} runs; the intervals of"
+        f" the others are unpaired, hence wider: {' and '.join(reasons)}."
+    )
+
+
 def run_rows(comparison: Comparison) -> Rows:
     """A row per run and yardstick, below its heading; a data set is named in its first row."""
     errors = ("position A", "B", "B−A", "95 %", "", "orientation A", "B", "B−A", "95 %", "")
@@ -67,26 +166,6 @@ def run_rows(comparison: Comparison) -> Rows:
         for row in _run_rows(run):
             rows.append(("" if data_set == shown else data_set, *row))
             shown = data_set
-    return rows
-
-
-def summary_rows(comparison: Comparison) -> Rows:
-    """One row per measure: verdicts, signs and the mean relative change."""
-    headings = ("runs", "better", "worse", "no difference seen", "lower", "higher", "sign test p")
-    rows: Rows = [(*headings, "mean change")]
-    for s in summarise(comparison.table).to_dict("records"):
-        counts = (str(s[name]) for name in ("better", "worse", "unseen", "lower", "higher"))
-        tests = f"{s['p_sign']:.2g}", percent_text(s["percent"])
-        rows.append((TITLES[s["measure"]], *counts, *tests))
-    return rows
-
-
-def group_rows(comparison: Comparison) -> Rows:
-    """Mean relative changes by scene, label source and model."""
-    rows: Rows = [("by", "", "runs", *SHORT)]
-    for group in groups_of(comparison.table).to_dict("records"):
-        changes = (percent_text(group[measure]) for measure in MEASURES)
-        rows.append((group["grouping"], group["name"], str(group["n_runs"]), *changes))
     return rows
 
 
@@ -148,23 +227,3 @@ def _value_text(value: Any) -> str:
         return "(none)"
     text = str(value)
     return text if len(text) <= WIDEST_VALUE else f"{text[: WIDEST_VALUE - 1]}…"
-
-
-OUTPUTS = ("compare.csv", "compare.md", "compare.png")
-
-
-def compare(root_a: Path, root_b: Path, out: Path | None) -> str:
-    """Compare two result trees, before and after; the text to print.
-
-    ``compare.csv``, ``compare.md`` and ``compare.png`` go into ``out``, made if need be; earlier
-    files of these names are replaced.
-    """
-    if out is not None:
-        refuse_foreign(out, OUTPUTS, "a comparison")
-    comparison = compare_trees(root_a, root_b)
-    if out is not None:
-        with atomic_path(out / "compare.png") as temporary:
-            comparison_figure(comparison).savefig(temporary, dpi=150)
-        write_text(out / "compare.md", text_of(comparison, MARKDOWN))
-        write_frame(out / "compare.csv", comparison.table)
-    return text_of(comparison)

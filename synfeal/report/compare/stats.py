@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -11,7 +11,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from synfeal.bootstrap import CONFIDENCE, Counts, mean_of, medians, path_counts
-from synfeal.report.compare.runs import RunErrors
 from synfeal.report.stats import MEASURES
 from synfeal.seeds import generator_of
 
@@ -19,6 +18,23 @@ Array = NDArray[np.float64]
 Verdict = Literal["better", "worse", "no difference seen"]
 
 RESAMPLES = 1000
+
+
+@dataclass(frozen=True)
+class RunErrors:
+    """The errors of one run over its test frames."""
+
+    frame: NDArray[np.int64]  # (N,) index in the test split
+    path: NDArray[np.int64]  # (N,) index of the straight path the frame belongs to
+    # (seeds, 4, N) by :data:`~synfeal.report.stats.MEASURES`; a prediction that was not finite has
+    # infinite errors.
+    errors: NDArray[np.float64]
+
+    def counts(self) -> dict[str, int]:
+        """Test frames, the paths these belong to, seeds, and predictions that were not finite."""
+        paths, seeds = len(np.unique(self.path)), len(self.errors)
+        failed = int(np.isinf(self.errors[:, 0]).sum())
+        return {"n_test": len(self.frame), "n_paths": paths, "n_seeds": seeds, "failed": failed}
 
 
 def compare_errors(a: RunErrors, b: RunErrors, paired: bool) -> pd.DataFrame:
@@ -54,7 +70,7 @@ def draws_of(path: NDArray[np.int64], tree: str) -> tuple[Counts, Counts]:
 
 def _difference(
     errors_a: Array, errors_b: Array, draws_a: tuple[Counts, Counts], draws_b: tuple[Counts, Counts]
-) -> Mapping[str, Any]:
+) -> dict[str, Any]:
     """The difference of errors (seeds, N) of two runs."""
     medians_a, medians_b = np.median(errors_a, axis=1), np.median(errors_b, axis=1)
     a, b = float(medians_a.mean()), float(medians_b.mean())

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -10,19 +11,24 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from synfeal.dataset.pose_table import PoseTable, read_pose_table
+from synfeal.dataset.pose_table import HEADER, read_pose_table, whole_numbers
 from synfeal.errors import InputError
-from synfeal.report.compare.runs import KEY, find_runs, read_run
-from synfeal.report.compare.stats import compare_errors
+from synfeal.frames import read_numbers
+from synfeal.report.compare.stats import Array, RunErrors, compare_errors
 from synfeal.report.results import read_result, unequal_leaves
-from synfeal.report.stats import MEASURES
+from synfeal.report.stats import MEASURES, REMEDY, read_errors, read_metrics, sign_test
 
+# What a run is, apart from its seed: the directories below ``runs``, in order.
+KEY = ("scene", "size", "labels", "init", "model")
 PROVENANCE = "provenance.json"
 OUTCOMES = ("files", "stages", "time_utc")  # differ between any two runs; no reason for anything
 Sameness = Literal["same", "differ", "unknown"]
 # Trees of two machines may differ in the last digits of a pose; no picture shows that.
 TOLERANCE = 1e-6
+# Of runs, by what their intervals say.
+VERDICTS = {"better": "better", "worse": "worse", "unseen": "no difference seen"}
 ORDER = (
     *(*KEY, "measure", "a", "b", "difference", "low", "high", "change_percent", "verdict"),
     *("sd_a", "sd_b", "se_seeds", "test_frames", "test_labels"),
@@ -57,6 +63,37 @@ def one_yardstick(run: pd.DataFrame) -> bool:
     return labels.reset_index(drop=True).equals(truth.reset_index(drop=True))
 
 
+def summary_of(table: pd.DataFrame) -> pd.DataFrame:
+    """Runs by measure: how many are ``better``, ``worse`` or ``unseen`` by their intervals.
+
+    And how many are ``lower`` or ``higher``, by however little, with ``p_sign`` of a two-sided sign
+    test of these (1 without either); and ``percent``, the mean relative change.
+    """
+    rows = []
+    for measure, found in table.groupby("measure", sort=False):
+        counts = {name: (found["verdict"] == verdict).sum() for name, verdict in VERDICTS.items()}
+        lower, signed, p_sign = sign_test(found["difference"].tolist())
+        signs = {"lower": lower, "higher": signed - lower, "p_sign": p_sign}
+        percent = found["change_percent"].mean()
+        rows.append({"measure": measure, **counts, **signs, "percent": percent})
+    return pd.DataFrame(rows)
+
+
+def groups_of(table: pd.DataFrame) -> pd.DataFrame:
+    """Mean relative changes by scene, label source and model, in order of appearance.
+
+    Columns are ``grouping``, ``name``, ``n_runs``, and a mean for each measure, infinite where a
+    run of the group failed in B only.
+    """
+    parts = []
+    for grouping in ("scene", "labels", "model"):
+        groups = table.groupby([grouping, "measure"], sort=False)["change_percent"]
+        means = groups.mean().unstack("measure", sort=False)[list(MEASURES)]
+        means.insert(0, "n_runs", groups.size().unstack("measure")[MEASURES[0]])
+        parts.append(means.rename_axis("name").reset_index().assign(grouping=grouping))
+    return pd.concat(parts, ignore_index=True)[["grouping", "name", "n_runs", *MEASURES]]
+
+
 def compare_trees(root_a: Path, root_b: Path) -> Comparison:
     """Compare every run that is in both trees."""
     found_a, found_b = find_runs(root_a), find_runs(root_b)
@@ -68,11 +105,8 @@ def compare_trees(root_a: Path, root_b: Path) -> Comparison:
         )
 
     @cache
-    def poses(path: Path) -> PoseTable | None:
-        return read_pose_table(path) if path.exists() else None
-
     def sameness(place: str, count: int) -> Sameness:
-        return _sameness(poses(root_a / place), poses(root_b / place), count)
+        return _sameness(root_a / place, root_b / place, count)
 
     runs = [_compare_run(key, found_a[key], found_b[key], sameness) for key in shared]
     return Comparison(
@@ -106,14 +140,15 @@ def _compare_run(
     )
 
 
-def _sameness(a: PoseTable | None, b: PoseTable | None, count: int) -> Sameness:
+def _sameness(path_a: Path, path_b: Path, count: int) -> Sameness:
     """Whether the first ``count`` poses of two tables are the same."""
-    if a is None or b is None:
+    if not (path_a.exists() and path_b.exists()):
         return "unknown"
-    if min(len(a), len(b)) < count:
+    tables = read_pose_table(path_a), read_pose_table(path_b)
+    if min(map(len, tables)) < count:
         return "differ"
     a_rows, b_rows = (
-        np.column_stack([t.frame, t.path, t.position_m, t.quat_wxyz])[:count] for t in (a, b)
+        np.column_stack([t.frame, t.path, t.position_m, t.quat_wxyz])[:count] for t in tables
     )
     return "same" if np.allclose(a_rows, b_rows, rtol=0, atol=TOLERANCE) else "differ"
 
@@ -124,3 +159,58 @@ def _changes(path_a: Path, path_b: Path) -> pd.DataFrame | None:
     records = (read_result(path, (), "delete it or run again") for path in (path_a, path_b))
     causes = ({k: v for k, v in record.items() if k not in OUTCOMES} for record in records)
     return unequal_leaves(*causes)
+
+
+def find_runs(root: Path) -> dict[tuple[str, ...], list[Path]]:
+    """The directories of all seeds of every scored run of a tree, in the order of their names."""
+    found: dict[tuple[str, ...], list[Path]] = {}
+    for path in sorted(root.glob("runs/*/*/*/*/*/seed*/metrics.json")):
+        key = path.parent.relative_to(root / "runs").parts[:-1]
+        found.setdefault(key, []).append(path.parent)
+    if not found:
+        raise InputError(
+            f"{root}: not a results tree; name a directory that holds"
+            " runs/<scene>/<size>/<labels>/<init>/<model>/seed<k>/metrics.json"
+        )
+    return found
+
+
+def read_run(seeds: Sequence[Path]) -> RunErrors:
+    """The errors of a run from the directories of its seeds."""
+    index = [_read_index(seed) for seed in seeds]
+    for seed, found in zip(seeds, index, strict=True):
+        if not np.array_equal(found, index[0]):
+            raise InputError(f"{seed}: was tested on other frames than {seeds[0]}; run both again")
+    frame, path = index[0].T
+    return RunErrors(frame, path, np.stack([_read_seed(seed, frame) for seed in seeds]))
+
+
+def _read_index(seed: Path) -> NDArray[np.int64]:
+    """Frame and path (N, 2) of the predictions."""
+    path = seed / "predictions.csv"
+    values = read_numbers(path, HEADER, "table of predictions", finite=False)[:, :2]
+    if not len(values):
+        raise InputError(f"{path}: has no rows; predict again")
+    return whole_numbers(values, path)
+
+
+def _read_seed(seed: Path, frame: NDArray[np.int64]) -> Array:
+    """Errors (4, N) of one seed, which its scores are the medians of."""
+    path = seed / "errors.csv"
+    table = read_errors(path)
+    if not np.array_equal(table["frame"], frame):
+        raise InputError(f"{path}: its frames are not those of predictions.csv; {REMEDY}")
+    errors = table[list(MEASURES)].to_numpy().T
+    if (errors < 0).any():
+        raise InputError(f"{path}: holds an error below zero; {REMEDY}")
+    errors = np.where(np.isnan(errors), np.inf, errors)
+    path = seed / "metrics.json"
+    metrics = read_metrics(path)
+    for measure, median in zip(MEASURES, np.median(errors, axis=1), strict=True):
+        noted = math.inf if metrics[measure] is None else metrics[measure]
+        if not math.isclose(noted, median, rel_tol=1e-6):
+            raise InputError(
+                f"{path}: {measure} is {metrics[measure]}, the median of errors.csv {median:.6g};"
+                f" {REMEDY}"
+            )
+    return errors

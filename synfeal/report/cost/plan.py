@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
-from synfeal.config import Config
 from synfeal.frames import write_frame
 from synfeal.report.cost.dry_run import planned_jobs
 from synfeal.report.cost.estimate import (
@@ -25,10 +24,8 @@ from synfeal.report.cost.estimate import (
 )
 from synfeal.report.cost.jobs import jobs_of
 from synfeal.report.cost.laws import fit_laws
-from synfeal.report.cost.profiles import profile_path, read_profile, read_run, read_runs
-
-if TYPE_CHECKING:
-    from synfeal.report.cost.steps import StepRates
+from synfeal.report.cost.runs import profile_path, read_profile, read_run, read_runs
+from synfeal.report.cost.steps import timed_rates
 
 PLAN_COLUMNS = (
     *("profile", "cores", "gpus", "gpu_tflops", "part", "name", "jobs", "work", "unit"),
@@ -64,7 +61,7 @@ def plan_of(
     """
     profile = read_profile(profile_name)
     pairs, unknown = read_runs(measured)
-    timed = _timed(profile.config) if time_steps else None
+    timed = timed_rates(profile.config) if time_steps else None
     laws = fit_laws(pairs, timed.rates if timed and not timed.on_gpu else None)
     planned = planned_jobs(profile_path(profile_name))
     jobs = jobs_of(profile, planned.keys)
@@ -109,13 +106,7 @@ def _rates(run: Path, time_steps: bool) -> tuple[float, float] | None:
         return None
     config = read_profile(run.resolve().name).config
     training = config.training.model_copy(update={"device": "cpu"})
-    return _timed(config.model_copy(update={"training": training})).rates
-
-
-def _timed(config: Config) -> StepRates:
-    from synfeal.report.cost.steps import timed_rates  # torch takes a second to load
-
-    return timed_rates(config)
+    return timed_rates(config.model_copy(update={"training": training})).rates
 
 
 def write_plans(path: Path, plans: Sequence[Plan]) -> None:

@@ -18,7 +18,7 @@ from synfeal.config.experiments import split_init
 from synfeal.report.figures.sources import Array, Results, counted
 from synfeal.report.figures.style import MODEL_STYLES, PUBLISHED, add_legend, reference_styles
 from synfeal.report.layouts import STARTS, TITLES, scene_title
-from synfeal.report.references import NAME, read_references, titles_in
+from synfeal.report.references import NAME, STRUCTURE, read_references, titles_in
 
 PAPER = {
     "published (light grey; positions × √3,\nsince print has RMS over the axes)": Line2D(

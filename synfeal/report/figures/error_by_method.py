@@ -1,4 +1,4 @@
-"""Errors of localizers and reference methods side by side: by label noise, and by effects in frames."""
+"""Localizers beside reference methods: errors by label noise, and by effects in the frames."""
 
 from __future__ import annotations
 
@@ -118,7 +118,9 @@ def robustness_figure(table: pd.DataFrame) -> Figure:
         panels[0, column].set_title(robustness.METHODS[method].replace(", ", ",\n"), fontsize=9)
         for row, (measure, unit) in enumerate(UNITS.items()):
             axes = panels[row, column]
-            if column and method != references.STRUCTURE:  # which is off by a hundredth of the others
+            if (
+                column and method != references.STRUCTURE
+            ):  # which is off by a hundredth of the others
                 axes.sharex(panels[row, 0])
             rows = table[table.method == method]
             for trained_on, style in STYLES.items():

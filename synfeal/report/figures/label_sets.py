@@ -1,4 +1,4 @@
-"""Re-estimated labels of a data set: their error along the sequence, and camera paths from above."""
+"""Re-estimated labels of a data set: errors along the sequence, and camera paths from above."""
 
 from __future__ import annotations
 

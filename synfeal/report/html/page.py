@@ -22,7 +22,7 @@ from synfeal.inspect.surface import SurfacePoints, viewer_js, viewer_mesh
 from synfeal.mesh.load import load_mesh
 from synfeal.report import meshes
 from synfeal.report.cells import key_of, published_cells, read_cells
-from synfeal.report.claims.model import NOT_TESTABLE
+from synfeal.report.claims.model import Verdict
 from synfeal.report.figures import CAPTIONS
 from synfeal.report.html.provenance import cost_sentence, origin_html, read_origin
 from synfeal.report.html.side_tables import SIDE_TABLES, meshes_table
@@ -152,7 +152,7 @@ def untested_claims(claims: Claims) -> list[str]:
     return [
         f"{claim['id']} is not testable here: {claim['reason'] or 'no reason given'}"
         for claim in claims
-        if NOT_TESTABLE in (claim["verdict_labels"], claim["verdict_true"])
+        if Verdict.NOT_TESTABLE in (claim["verdict_labels"], claim["verdict_true"])
     ]
 
 

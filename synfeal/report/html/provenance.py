@@ -15,7 +15,7 @@ from pydantic import BaseModel
 from synfeal.files import write_json
 from synfeal.frames import records_of
 from synfeal.provenance import CPU_INFO, processor_name, provenance
-from synfeal.report.cost.measured import read_jobs, write_measured
+from synfeal.report.cost.runs import read_jobs, write_measured
 from synfeal.report.cost.text import duration
 from synfeal.report.html.tables import Column, render, sortable
 from synfeal.report.results import read_result, shaped

@@ -15,7 +15,7 @@ from markupsafe import Markup
 from synfeal.config.experiments import FROM_SCRATCH
 from synfeal.errors import InputError
 from synfeal.frames import TEXT, read_frame, records_of, rows_of
-from synfeal.report.claims import model
+from synfeal.report.claims.model import Verdict
 from synfeal.report.claims.table import COLUMNS
 from synfeal.report.layouts import (
     CHANGE,
@@ -214,15 +214,15 @@ def _score_cell(cell: Any, title: str, start: str, place: int, values: Values) -
 
 # A sign, a border and the words themselves tell verdicts apart without colour.
 BADGES: Mapping[str, tuple[str, str]] = {
-    model.HOLDS: ("✓", "holds"),
-    model.SMALLER: ("↘", "partly"),
-    model.MIXED: ("±", "partly"),
-    model.LESS: ("<", "fails"),
-    model.NO_EFFECT: ("=", "fails"),
-    model.OPPOSITE: ("✗", "fails"),
-    model.UNDECIDED: ("?", "undecided"),
-    model.NOT_LEARNT: ("–", "untestable"),
-    model.NOT_TESTABLE: ("–", "untestable"),
+    Verdict.HOLDS: ("✓", "holds"),
+    Verdict.SMALLER: ("↘", "partly"),
+    Verdict.MIXED: ("±", "partly"),
+    Verdict.LESS: ("<", "fails"),
+    Verdict.NO_EFFECT: ("=", "fails"),
+    Verdict.OPPOSITE: ("✗", "fails"),
+    Verdict.UNDECIDED: ("?", "undecided"),
+    Verdict.NOT_LEARNT: ("–", "untestable"),
+    Verdict.NOT_TESTABLE: ("–", "untestable"),
 }
 CLAIM_HEADINGS = ("Claim", "The paper says", "Published", "Measured here", "Verdict")
 Claims = Sequence[Mapping[str, str]]
@@ -234,9 +234,8 @@ def read_claims(path: Path) -> Claims:
     for row in rows:
         for score in SCORES:
             if row[f"verdict_{score}"] not in BADGES:
-                raise InputError(
-                    f"{path}: claim '{row['id']}': verdict_{score} must be one of {list(BADGES)}"
-                )
+                where = f"{path}: claim '{row['id']}': verdict_{score}"
+                raise InputError(f"{where} must be one of {', '.join(BADGES)}")
     return rows
 
 

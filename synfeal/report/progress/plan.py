@@ -13,7 +13,7 @@ from synfeal.errors import InputError
 from synfeal.report.cost.dry_run import key_of
 from synfeal.report.cost.jobs import Profile, jobs_of
 from synfeal.report.cost.laws import fit_laws, seconds_of
-from synfeal.report.cost.profiles import read_run
+from synfeal.report.cost.runs import read_run
 
 MEASURED = Path("results/published/mini")
 
