@@ -1,5 +1,6 @@
 """Which backend draws: failures are injected, and one process really cannot load EGL."""
 
+import importlib
 import logging
 import os
 import subprocess
@@ -12,9 +13,7 @@ from synfeal.config.models import RenderConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render import choose, open_renderer
-from synfeal.render.opengl import backend as opengl
-from synfeal.render.opengl import context
-from synfeal.render.pieces import pieces
+from synfeal.render.base import pieces
 from tests.small_room import (
     BACKENDS,
     LOOK_ALONG_X,
@@ -108,15 +107,24 @@ def test_auto_falls_back_with_one_warning(broken, said, monkeypatch, caplog):
 
 
 @pytest.mark.usefixtures("fresh")
-def test_a_context_that_cannot_be_made_names_the_packages(monkeypatch, caplog):
-    monkeypatch.setattr(context, "_attempts", lambda: [no_device, no_library])
-    with pytest.raises(InputError, match=r"found 0 devices.*libegl1 libgl1 libgl1-mesa-dri"):
-        context.shared_context.__wrapped__()
-    monkeypatch.setattr(opengl, "shared_context", context.shared_context.__wrapped__)
-    assert seen() != "OpenglRenderer"
-    assert "opengl does not work here" in caplog.text
-    with pytest.raises(InputError, match=r"render\.backend: opengl does not work here: .*libegl1"):
-        seen("opengl")
+@pytest.mark.parametrize(
+    ("name", "context", "opens"),
+    [
+        ("opengl", "shared_context", "moderngl.create_context"),
+        ("pyrender", "_context", "egl.get_device_by_index"),
+    ],
+)
+def test_a_context_that_cannot_be_made_names_the_packages(name, context, opens, monkeypatch):
+    if name not in BACKENDS:
+        pytest.skip(f"{name} does not work here anyway")
+    module = importlib.import_module(f"synfeal.render.{name}_backend")
+    monkeypatch.setattr(f"{module.__name__}.{opens}", no_device)
+    monkeypatch.setattr(module, context, getattr(module, context).__wrapped__)
+    assert seen() == ("OpenglRenderer" if name == "pyrender" else "PyrenderRenderer")
+    with pytest.raises(
+        InputError, match=rf"backend: {name} does not .*found 0 devices.*libegl1 libgl1 libgl1-mesa"
+    ):
+        seen(name)
 
 
 @pytest.mark.usefixtures("fresh")

@@ -1,17 +1,21 @@
-"""What the rest of the project knows of a renderer."""
+"""What the rest of the project knows of a renderer, what backends share, what they are to draw."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import RenderConfig
+from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.mesh.model import MeshPart
 
 Rgb = NDArray[np.uint8]
 Depth = NDArray[np.float32]
 DEFAULT_SUPERSAMPLING = RenderConfig().supersampling
+# Mesa's software renderer silently draws nonsense from a buffer of 2^24 vertices on.
+MOST_VERTICES = 1 << 23
 
 
 class Renderer(Protocol):
@@ -38,3 +42,54 @@ class Renderer(Protocol):
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def pieces(part: MeshPart, most_vertices: int = MOST_VERTICES) -> Iterator[MeshPart]:
+    """The part in pieces of at most ``most_vertices``, each with the vertices of its own faces."""
+    if len(part.vertices_m) <= most_vertices:
+        yield part
+        return
+    step = max(1, most_vertices // 3)
+    for start in range(0, len(part.faces), step):
+        yield part.over(part.faces[start : start + step])
+
+
+def thresholded(part: MeshPart) -> NDArray[np.uint8]:
+    """The part's texture with alpha 0 or 255, or without alpha where the part is opaque.
+
+    Texels that are not drawn take the mean colour of those that are: filtering mixes them in at the
+    edges and in every mip level, and their own colour is arbitrary.
+    """
+    assert part.texture is not None
+    if part.texture.shape[2] == 3 or part.alpha_cutoff is None:
+        return np.ascontiguousarray(part.texture[..., :3])
+    alpha = part.texture[..., 3] / 255.0 * (part.base_color[3] / 255.0)
+    drawn = alpha >= part.alpha_cutoff
+    rgba = np.dstack([part.texture[..., :3], np.where(drawn, 255, 0).astype(np.uint8)])
+    rgba[~drawn, :3] = rgba[drawn, :3].mean(axis=0)
+    return rgba
+
+
+SAMPLES_PER_AXIS = 8  # of a pixel, of reference images
+
+
+def reference_images(
+    # opens a renderer for a camera; best one without anti-aliasing of its own
+    opened: Callable[[CameraConfig], Renderer],
+    camera: CameraConfig,  # at most 1024 pixels wide and high
+    poses: Iterable[NDArray[np.float64]],  # ``world_from_cam``
+) -> Iterator[NDArray[np.float32]]:
+    """What images should be: means over 64 points of each pixel, (H, W, 3) in 0 to 255, unrounded.
+
+    The 64 pinhole images whose principal points differ by eighths of a pixel are, interleaved, one
+    image with eight times the pixels along each axis. It is drawn as that one image, so that a
+    texture is filtered over the eighth of a pixel a sample stands for, and not over a whole pixel
+    64 times.
+    """
+    count, width, height = SAMPLES_PER_AXIS, camera.width, camera.height
+    finer = {name: count * value for name, value in camera.intrinsics._asdict().items()}
+    finer |= {"width": count * width, "height": count * height}
+    with opened(camera.model_copy(update=finer)) as renderer:
+        for world_from_cam in poses:
+            samples = renderer.render(world_from_cam).reshape(height, count, width, count, 3)
+            yield np.asarray(samples.mean(axis=(1, 3), dtype=np.float32))

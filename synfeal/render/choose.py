@@ -34,7 +34,7 @@ def _opener(place: str) -> Opener:
 
 # Fastest first; results/benchmarks/rendering.md says by how much.
 BACKENDS: dict[str, Opener] = {
-    "opengl": _opener("synfeal.render.opengl.backend:OpenglRenderer"),
+    "opengl": _opener("synfeal.render.opengl_backend:OpenglRenderer"),
     "pyrender": _opener("synfeal.render.pyrender_backend:PyrenderRenderer"),
     "raycast": _opener("synfeal.render.raycast_backend:RaycastRenderer"),
 }
@@ -45,20 +45,26 @@ INSTALL = {
 }
 
 
-def open_chosen(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) -> Renderer:
-    """A renderer of the configured backend.
+def open_renderer(
+    mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig | None = None
+) -> Renderer:
+    """A renderer of ``mesh`` through ``camera``, by the configured backend; a context manager.
 
     Raises:
-        InputError: the backend named does not work on this machine, or with ``auto`` none does.
+        InputError: the backend named in ``render`` does not work on this machine, or none does.
     """
-    if render.backend == "auto":
-        return BACKENDS[fastest_working()](mesh, camera, render)
-    failure = why_not(render.backend)
+    if any(camera.distortion):
+        from synfeal.render.distorted import DistortedRenderer  # loads SciPy: only when needed
+
+        return DistortedRenderer(lambda pinhole: open_renderer(mesh, pinhole, render), camera)
+    render = render or RenderConfig()
+    name = fastest_working() if render.backend == "auto" else render.backend
+    failure = why_not(name)
     if failure is not None:
         raise InputError(
             f"render.backend: {render.backend} does not work here: {failure}; or choose auto"
         )
-    return BACKENDS[render.backend](mesh, camera, render)
+    return BACKENDS[name](mesh, camera, render)
 
 
 @functools.cache

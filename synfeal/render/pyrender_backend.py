@@ -3,76 +3,58 @@
 Images are unlit, since the light of a reconstruction is in its texture; surfaces show from both
 sides; textures are mip-mapped and a pixel is the mean of a grid of samples, so that small images do
 not alias. Depth is exact at the pixel's centre.
+
+pyrender by itself multi-samples, which takes depth from one of the samples, up to half a pixel from
+the centre and in 24 bits that are spent near the camera; it reads depth whether wanted or not; and
+it cannot test alpha in unlit renders. Here colours and depth are passes that draw into buffers of
+their own, with one shader for both.
 """
 
 from __future__ import annotations
 
 import functools
 import os
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.models import CameraConfig
-from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.render.base import DEFAULT_SUPERSAMPLING, Depth, Renderer, Rgb
-from synfeal.render.pieces import pieces, thresholded
+from synfeal.render.base import DEFAULT_SUPERSAMPLING, Depth, Renderer, Rgb, pieces, thresholded
+
+os.environ["PYOPENGL_PLATFORM"] = "egl"
+np.__dict__.setdefault("infty", np.inf)  # gone in NumPy 2, used by pyrender
+import pyrender  # noqa: E402
+from OpenGL import GL  # noqa: E402
+from pyrender.platforms import egl  # noqa: E402
+from pyrender.shader_program import ShaderProgramCache  # noqa: E402
 
 # OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
 CAM_FROM_GL: NDArray[np.float64] = np.diag([1.0, -1.0, -1.0, 1.0])
+SHADERS = Path(__file__).parent / "shaders"
+# Half a level sharper than the nearest one: samples are averaged, so that textures may alias a
+# little. Depth asks whether the very texel at the pixel's centre is cut out.
+COLOUR_BIAS, DEPTH_BIAS = -0.5, -100.0
 
 
 @functools.cache
-def _pyrender() -> Any:
-    """The pyrender module, set up for EGL and for the installed NumPy."""
-    os.environ["PYOPENGL_PLATFORM"] = "egl"
-    np.__dict__.setdefault("infty", np.inf)  # gone in NumPy 2, used by pyrender
-    import pyrender
-
-    return pyrender
-
-
-class _Context(NamedTuple):
-    """The OpenGL context of this process, and what is drawn in it."""
-
-    platform: Any
-    colour: Any
-    depth: Any
-
-
-@functools.cache
-def _context() -> _Context:
-    """The one context of this process.
+def _context() -> tuple[Any, _Pass, _Pass]:
+    """The one OpenGL context of this process, and its passes for colour and depth.
 
     Deleting one terminates the EGL display all others share, so it is made once and kept.
-
-    Raises:
-        InputError: there is no EGL, or it offers no device.
     """
-    try:
-        _pyrender()
-        from pyrender.platforms import egl
-
-        device = egl.get_device_by_index(int(os.environ.get("EGL_DEVICE_ID", "0")))
-        platform = egl.EGLPlatform(16, 16, device)
-        platform.init_context()
-        from OpenGL import GL
-
-        from synfeal.render.pyrender_passes import ColourPass, DepthPass
-
-        # Texture rows are packed; by default OpenGL expects each to start at a multiple of 4 bytes,
-        # which shears textures of odd width.
-        GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
-
-        uploaded: set[Any] = set()
-        return _Context(platform, ColourPass(uploaded), DepthPass(uploaded))
-    except Exception as error:  # what is missing decides what is raised
-        raise InputError(
-            f"rendering needs EGL, which does not work here ({type(error).__name__}: {error});"
-            " on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri"
-        ) from error
+    device = egl.get_device_by_index(int(os.environ.get("EGL_DEVICE_ID", "0")))
+    platform = egl.EGLPlatform(16, 16, device)
+    platform.init_context()
+    # Texture rows are packed; by default OpenGL expects each to start at a multiple of 4 bytes,
+    # which shears textures of odd width.
+    GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
+    uploaded: set[Any] = set()
+    rgb, depth = (GL.GL_RGB, GL.GL_UNSIGNED_BYTE), (GL.GL_RED, GL.GL_FLOAT)
+    colours = _Pass(uploaded, 0, COLOUR_BIAS, GL.GL_RGBA8, rgb, np.uint8)
+    return platform, colours, _Pass(uploaded, 1, DEPTH_BIAS, GL.GL_R32F, depth, np.float32)
 
 
 class PyrenderRenderer(Renderer):
@@ -87,10 +69,7 @@ class PyrenderRenderer(Renderer):
     ) -> None:
         """Prepare the mesh, which is uploaded by the first render."""
         self._supersampling = supersampling
-        self._context = _context()
-        pyrender = _pyrender()
-        flags = pyrender.RenderFlags
-        self._flags = flags.FLAT | flags.SKIP_CULL_FACES | flags.OFFSCREEN
+        self._platform, self._colour, self._depth = _context()
         self._size = (camera.width, camera.height)
         self._intrinsics = camera.intrinsics
         self._background = np.array([*background_rgb, 0]) / 255.0
@@ -108,29 +87,29 @@ class PyrenderRenderer(Renderer):
         centred = np.array(world_from_cam, np.float64)
         centred[:3, 3] -= self._centre_m
         self._scene.set_pose(self._camera, centred @ CAM_FROM_GL)
-        samples = self._drawn(self._context.colour, self._supersampling, self._background)
+        samples = self._drawn(self._colour, self._supersampling, self._background)
         return mean_of_samples(samples, self._supersampling)
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
         """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
         rgb = self.render(world_from_cam)
-        depth_m = self._drawn(self._context.depth, 1, np.zeros(4))
+        depth_m = self._drawn(self._depth, 1, np.zeros(4))[..., 0]
         return rgb, np.where(depth_m > 0.0, depth_m, np.float32(np.inf))
 
-    def _drawn(self, one_pass: Any, factor: int, background: NDArray[np.float64]) -> Any:
-        """What a pass makes of the scene, ``factor`` times as large as the image."""
+    def _drawn(self, one_pass: _Pass, factor: int, background: NDArray[np.float64]) -> Any:
+        """What a pass makes of the scene, ``factor`` times as large as the image (H, W, C)."""
         self._scene.bg_color = background
-        self._context.platform.make_current()
+        self._platform.make_current()
         one_pass.viewport_width, one_pass.viewport_height = (factor * n for n in self._size)
-        intrinsics = zip(("fx", "fy", "cx", "cy"), self._intrinsics, strict=True)
-        for name, value in intrinsics:
+        for name, value in zip(("fx", "fy", "cx", "cy"), self._intrinsics, strict=True):
             setattr(self._camera.camera, name, factor * value)
-        return one_pass.render(self._scene, self._flags)
+        flags = pyrender.RenderFlags
+        return one_pass.render(self._scene, flags.FLAT | flags.SKIP_CULL_FACES | flags.OFFSCREEN)
 
     def close(self) -> None:
         """Free the scene's buffers and textures."""
-        self._context.platform.make_current()
-        self._context.colour.forget(self._scene)
+        self._platform.make_current()
+        self._colour.forget(self._scene)
         self._scene.clear()
 
 
@@ -149,7 +128,7 @@ def _primitive(part: MeshPart, centre_m: NDArray[np.float64]) -> Any:
     if part.vertex_rgb is not None:
         rgb = part.vertex_rgb.astype(np.float32) / 255.0
         rgba = np.pad(rgb, ((0, 0), (0, 1)), constant_values=1)
-    return _pyrender().Primitive(
+    return pyrender.Primitive(
         positions=(part.vertices_m - centre_m).astype(np.float32),
         indices=part.faces.astype(np.uint32),
         texcoord_0=None if part.uv is None else part.uv.astype(np.float32),
@@ -160,7 +139,6 @@ def _primitive(part: MeshPart, centre_m: NDArray[np.float64]) -> Any:
 
 def _material(part: MeshPart) -> Any:
     """Base colour and texture; the alpha test is already decided in the texture."""
-    pyrender = _pyrender()
     texture = None
     if part.texture is not None:
         pixels = thresholded(part)
@@ -173,3 +151,72 @@ def _material(part: MeshPart) -> Any:
         baseColorFactor=np.append(part.base_color[:3] / 255.0, 1.0),
         doubleSided=True,
     )
+
+
+class _Pass(pyrender.Renderer):  # type: ignore[misc]  # pyrender is untyped
+    """Draws scenes with our shaders into a floating-point or byte buffer."""
+
+    def __init__(
+        self,
+        uploaded: set[Any],  # the meshes that are in the context, shared by both passes
+        output: int,  # of the shader that is drawn
+        level_bias: float,  # added to the mip level of textures
+        storage: Any,  # OpenGL's format of what is drawn
+        read_as: tuple[Any, Any],  # channels and their type
+        dtype: type,
+    ) -> None:
+        super().__init__(16, 16)
+        self._program_cache = ShaderProgramCache(str(SHADERS))
+        self._uploaded, self._level_bias = uploaded, level_bias
+        self._formats = (storage, GL.GL_DEPTH_COMPONENT32F)
+        self._read_as, self._dtype = read_as, dtype
+        self._outputs = [GL.GL_NONE] * output + [GL.GL_COLOR_ATTACHMENT0]
+        self._main_fb_dims: tuple[Any, Any]
+        self._main_fb_ms = GL.glGenFramebuffers(1)
+        self._buffers = GL.glGenRenderbuffers(2)
+
+    def _update_context(self, scene: Any, flags: int) -> None:
+        """Upload what is new; what other scenes use stays until it is forgotten."""
+        for primitive in _primitives(scene.meshes - self._uploaded):
+            primitive._add_to_context()
+            for texture in primitive.material.textures:
+                texture._add_to_context()
+        self._uploaded |= scene.meshes
+
+    def forget(self, scene: Any) -> None:
+        """Free what was uploaded for a scene."""
+        for primitive in _primitives(scene.meshes & self._uploaded):
+            primitive.delete()
+            for texture in primitive.material.textures:
+                texture.delete()
+        self._uploaded -= scene.meshes
+
+    def _configure_main_framebuffer(self) -> None:
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._main_fb_ms)
+        GL.glDrawBuffers(len(self._outputs), self._outputs)
+        size = (self.viewport_width, self.viewport_height)
+        if self._main_fb_dims == size:
+            return
+        self._main_fb_dims = size
+        places = (GL.GL_COLOR_ATTACHMENT0, GL.GL_DEPTH_ATTACHMENT)
+        for buffer, storage, place in zip(self._buffers, self._formats, places, strict=True):
+            GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, buffer)
+            GL.glRenderbufferStorage(GL.GL_RENDERBUFFER, storage, *size)
+            GL.glFramebufferRenderbuffer(GL.GL_FRAMEBUFFER, place, GL.GL_RENDERBUFFER, buffer)
+
+    def _bind_and_draw_primitive(
+        self, primitive: Any, pose: NDArray[Any], program: Any, flags: int
+    ) -> None:
+        program.set_uniform("level_bias", self._level_bias)
+        super()._bind_and_draw_primitive(primitive, pose, program, flags)
+
+    def _read_main_framebuffer(self, scene: Any, flags: int) -> NDArray[Any]:
+        """What was drawn (H, W, C)."""
+        GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self._main_fb_ms)
+        content = GL.glReadPixels(0, 0, *self._main_fb_dims, *self._read_as)
+        pixels: NDArray[Any] = np.frombuffer(content, self._dtype)
+        return pixels.reshape(*self._main_fb_dims[::-1], -1)[::-1]  # OpenGL begins at the bottom
+
+
+def _primitives(meshes: set[Any]) -> list[Any]:
+    return [primitive for mesh in meshes for primitive in mesh.primitives]

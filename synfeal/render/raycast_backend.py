@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from synfeal.config.models import CameraConfig
 from synfeal.mesh.model import TexturedMesh
 from synfeal.render.base import DEFAULT_SUPERSAMPLING, Depth, Renderer, Rgb
-from synfeal.render.raycast.triangles import Floats, Points, TexturedTriangles, View
+from synfeal.render.raycast_triangles import Floats, Points, TexturedTriangles, View
 
 RAYS_AT_ONCE = 1 << 15  # 30 MB
 

@@ -22,8 +22,7 @@ from synfeal.mesh.detail import with_fewer_faces, with_smaller_textures
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.render import choose, open_renderer
-from synfeal.render.base import Depth, Renderer, Rgb
-from synfeal.render.reference import SAMPLES_PER_AXIS, reference_images
+from synfeal.render.base import SAMPLES_PER_AXIS, Depth, Renderer, Rgb, reference_images
 from synfeal.scenes.speed import PAPER_CAMERA, seconds_of
 
 LARGEST_PX = 8192 // SAMPLES_PER_AXIS  # of a side, so that the reference is an image in OpenGL

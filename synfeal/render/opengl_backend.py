@@ -1,29 +1,97 @@
-"""The renderer: colours averaged over a grid of samples in each pixel, depth at pixel centres.
+"""Rendering with OpenGL on EGL: a GPU where there is one, Mesa's software renderer elsewhere.
 
-Samples are the pixels of a larger image, averaged on the device. 2x2 of them cost about what 4-fold
-multi-sampling costs (46 and 41 ms; plain pyrender 60) and come closer to an image of 64 samples
-(mean error 0.6 and 0.9 of 255 levels; plain pyrender 1.3), because texture too is sampled four
-times. At 128x96 they cost less (6.5 and 10.5 ms). Anisotropic filtering more than doubles the time
-in Mesa 22.3 and is further off. Depth is a pass of its own, 9 ms, drawn only when asked for.
+Samples are the pixels of a larger image, averaged on the device. With Mesa's llvmpipe, processor
+time of one 640x480 view of a room of 203,000 faces and 16-megapixel textures, 2x2 of them cost
+about what 4-fold multi-sampling costs (46 and 41 ms; plain pyrender 60) and come closer to an image
+of 64 samples (mean error 0.6 and 0.9 of 255 levels; plain pyrender 1.3), because texture too is
+sampled four times. At 128x96 they cost less (6.5 and 10.5 ms). Anisotropic filtering more than
+doubles the time in Mesa 22.3 and is further off. Depth, ``1 / gl_FragCoord.w`` at pixel centres, is
+a float image and a pass of its own, 9 ms, drawn only when asked for.
+``results/benchmarks/rendering.md`` has more.
 """
 
 from __future__ import annotations
 
+import ctypes
+import functools
+from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.dataset import CameraConfig
+from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import TexturedMesh
-from synfeal.render.base import DEFAULT_SUPERSAMPLING, Depth, Renderer, Rgb
-from synfeal.render.opengl import shaders
-from synfeal.render.opengl.context import finish, shared_context
-from synfeal.render.opengl.part import DevicePart
-from synfeal.render.pieces import pieces
+from synfeal.render.base import DEFAULT_SUPERSAMPLING, Depth, Renderer, Rgb, pieces
+from synfeal.render.opengl_part import DevicePart, program_of
+
+# Named in full: searching for them starts a compiler or ldconfig, which a container may lack.
+EGL_LIBRARY = "libEGL.so.1"
+GL_LIBRARIES = ("libGL.so.1", "libOpenGL.so.0")
+MOST_DEVICES = 8
+GL_VERSION = 330
+
+# One triangle that covers the image.
+COVER = """
+void main() {
+    gl_Position = vec4(gl_VertexID == 1 ? 3 : -1, gl_VertexID == 2 ? 3 : -1, 0, 1);
+}
+"""
+
+# The factor is a constant: a loop that the compiler unrolls takes half the time.
+MEAN = """
+const int FACTOR = %d;
+uniform sampler2D samples;
+out vec4 colour;
+void main() {
+    ivec2 first = ivec2(gl_FragCoord.xy) * FACTOR;
+    vec4 sum = vec4(0.0);
+    for (int y = 0; y < FACTOR; y++)
+        for (int x = 0; x < FACTOR; x++)
+            sum += texelFetch(samples, first + ivec2(x, y), 0);
+    colour = sum / float(FACTOR * FACTOR);
+}
+"""
+
+
+@functools.cache
+def shared_context() -> Any:
+    """The one moderngl context of this process, on the first EGL device that gives one.
+
+    It is current only while renderers draw, so that other users of OpenGL in the process, such as
+    pyrender, find their own.
+
+    Raises:
+        Exception: the first error, of any kind, where no device works.
+    """
+    errors = []
+    for device, library in product(range(MOST_DEVICES), GL_LIBRARIES):
+        egl: dict[str, Any] = {"backend": "egl", "libegl": EGL_LIBRARY, "libgl": library}
+        egl |= {"device_index": device, "require": GL_VERSION, "standalone": True}
+        try:
+            context: Any = moderngl.create_context(**egl)
+        except Exception as error:  # what is missing decides what is raised
+            errors.append(error)
+        else:
+            context.__exit__(None, None, None)
+            return context
+    raise errors[0]
+
+
+@functools.cache
+def finish() -> Callable[[], None]:
+    """``glFinish`` of the current context, which lets other Python threads run while it waits.
+
+    moderngl's own calls hold the interpreter for the whole frame, and threads that compress images
+    starve meanwhile.
+    """
+    address_of = ctypes.CDLL(EGL_LIBRARY).eglGetProcAddress
+    address_of.restype = ctypes.c_void_p
+    return ctypes.CFUNCTYPE(None)(address_of(b"glFinish"))
 
 
 class OpenglRenderer(Renderer):
@@ -74,11 +142,7 @@ class OpenglRenderer(Renderer):
         self._depth_target = context.framebuffer(
             [context.renderbuffer(size, 1, dtype="f4")], context.depth_renderbuffer(size)
         )
-        program = context.program(
-            vertex_shader=shaders.with_features(shaders.COVER, []),
-            fragment_shader=shaders.with_features(shaders.MEAN % supersampling, []),
-        )
-        self._mean = context.vertex_array(program, [])
+        self._mean = context.vertex_array(program_of(context, COVER, MEAN % supersampling), [])
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         """Colours (H, W, 3) seen from a pose (4, 4)."""

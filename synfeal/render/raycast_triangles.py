@@ -8,17 +8,19 @@ met where its own vanishes, and all else follows, derivatives from pixel to pixe
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
-from synfeal.render.pieces import thresholded
-from synfeal.render.raycast.mipmaps import MipMaps
+from synfeal.render.base import thresholded
 
 Floats = NDArray[np.float64]
+Rgba = NDArray[np.float32]
 Faces = NDArray[np.int64]
 
 # A ray goes on this much, of the mesh's extent, behind what it passes: twice what the ray caster
@@ -27,7 +29,6 @@ STEP = 2e-6
 EDGE_ON = 1e-3
 LEAST_ALPHA = 127.5  # of 255: what is left of cut-out textures after filtering
 MOST_LAYERS = 64  # that a ray passes before it counts as lost
-WHITE = np.full((1, 1, 3), 255, np.uint8)
 
 
 class View(NamedTuple):
@@ -44,10 +45,8 @@ class Points(NamedTuple):
 
     rays: Floats  # (N, 3) through which they are seen
     face: Faces  # (N,) index of the triangle
-    part: NDArray[np.intp]  # (N,) index of the drawn part
     depth_m: Floats  # (N,) along the optical axis
-    # (N, 2 | 5) texture coordinates and, if any part has them, vertex colours, 0 to 1
-    values: Floats
+    values: Floats  # (N, 2 | 5) texture coordinates and, if any part has them, colours, 0 to 1
 
 
 class TexturedTriangles:
@@ -56,9 +55,8 @@ class TexturedTriangles:
     def __init__(self, mesh: TexturedMesh) -> None:
         parts = [part for part in mesh.parts if part.is_drawn]
         vertices, faces = TexturedMesh(tuple(parts)).merged()
-        bounds = mesh.bounds_m
-        self.centre_m: Floats = bounds.mean(axis=0)
-        self._step_m = STEP * float(np.max(bounds[1] - bounds[0]))
+        self.centre_m: Floats = mesh.bounds_m.mean(axis=0)
+        self._step_m = STEP * float(np.ptp(mesh.bounds_m, axis=0).max())
         self._caster = RayCaster(vertices - self.centre_m, faces)
         self._rows = _rows(parts, self.centre_m)
         self._part_of = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
@@ -70,9 +68,7 @@ class TexturedTriangles:
     def first_drawn(self, view: View, rays: Floats) -> tuple[Faces, Floats]:
         """The first triangle (N,) that shows on each ray, -1 for none, and its depth (N,).
 
-        Args:
-            view: where from.
-            rays: (N, 3), of unit length along the optical axis.
+        ``rays`` (N, 3) are of unit length along the optical axis.
         """
         face, depth_m = self._first_hits(view, rays, np.full(len(rays), view.near_m))
         pending = np.flatnonzero(self._is_cut_out(face))
@@ -80,7 +76,7 @@ class TexturedTriangles:
             if not len(pending):
                 break
             points = self.points(view, rays[pending], face[pending], depth_m[pending])
-            alpha = self._texel(points, self._uv_per_px(view, points))[:, 3]
+            alpha = self._texel(view, points)[:, 3]
             pending = pending[alpha < LEAST_ALPHA]
             start_m = depth_m[pending] + self._step_m
             face[pending], depth_m[pending] = self._first_hits(view, rays[pending], start_m)
@@ -97,10 +93,9 @@ class TexturedTriangles:
         with np.errstate(divide="ignore", invalid="ignore"):
             exact_m = -constant[:, 0] / slope[:, 0]
         # A triangle seen edge-on has a plane that is met anywhere, or nowhere.
-        near_m, far_m = (1.0 - EDGE_ON) * depth_m, (1.0 + EDGE_ON) * depth_m
-        depth_m = np.fmax(np.fmin(exact_m, far_m), near_m)
+        depth_m = np.fmax(np.fmin(exact_m, (1.0 + EDGE_ON) * depth_m), (1.0 - EDGE_ON) * depth_m)
         values = constant[:, 1:] + depth_m[:, None] * slope[:, 1:]
-        return Points(rays, face, self._part_of[face], depth_m, values)
+        return Points(rays, face, depth_m, values)
 
     def _uv_per_px(self, view: View, points: Points) -> Floats:
         """How u and v change along x and y, (N, 4): du/dx, dv/dx, du/dy, dv/dy."""
@@ -114,17 +109,16 @@ class TexturedTriangles:
             changes += [away * slope[:, k] + depth_m * turn[:, k] for k in (1, 2)]
         return np.stack(changes, axis=1)
 
-    def rgb(self, view: View, points: Points) -> NDArray[np.float32]:
+    def rgb(self, view: View, points: Points) -> Rgba:
         """Colours (N, 3), 0 to 255."""
-        tint = self._tint[points.part]
+        tint = self._tint[self._part_of[points.face]]
         if points.values.shape[1] == 5:
             tint = tint * np.clip(points.values[:, 2:], 0.0, 1.0)
-        texel = self._texel(points, self._uv_per_px(view, points))
-        return texel[:, :3] * tint.astype(np.float32)
+        return self._texel(view, points)[:, :3] * tint.astype(np.float32)
 
-    def _texel(self, points: Points, uv_per_px: Floats) -> NDArray[np.float32]:
-        texture = self._texture_of[points.part]
-        return self._textures.rgba(texture, points.values[:, :2], uv_per_px)
+    def _texel(self, view: View, points: Points) -> Rgba:
+        uv, uv_per_px = points.values[:, :2], self._uv_per_px(view, points)
+        return self._textures.rgba(self._texture_of[self._part_of[points.face]], uv, uv_per_px)
 
     def _is_cut_out(self, face: Faces) -> NDArray[np.bool_]:
         """Whether a face was hit and has holes in its texture."""
@@ -139,16 +133,13 @@ class TexturedTriangles:
 
 def _textures(parts: list[MeshPart]) -> tuple[list[NDArray[np.uint8]], NDArray[np.intp]]:
     """The textures, white for parts without, and which one each part has; shared ones once."""
-    found: dict[object, int] = {}
-    textures: list[NDArray[np.uint8]] = []
-    texture_of = []
-    for part in parts:
-        key = part.texture is not None and (id(part.texture), part.alpha_cutoff, part.base_color[3])
-        if key not in found:
-            found[key] = len(textures)
-            textures.append(WHITE if part.texture is None else thresholded(part))
-        texture_of.append(found[key])
-    return textures, np.array(texture_of)
+    keys = [
+        p.texture is not None and (id(p.texture), p.alpha_cutoff, p.base_color[3]) for p in parts
+    ]
+    shown = dict(zip(keys, parts, strict=True))
+    order, white = list(shown), np.full((1, 1, 3), 255, np.uint8)
+    textures = [white if part.texture is None else thresholded(part) for part in shown.values()]
+    return textures, np.array([order.index(key) for key in keys])
 
 
 def _rows(parts: list[MeshPart], centre_m: Floats) -> Floats:
@@ -159,8 +150,8 @@ def _rows(parts: list[MeshPart], centre_m: Floats) -> Floats:
         corners = (part.vertices_m - centre_m)[part.faces]
         values = [np.zeros((len(part.vertices_m), 2)) if part.uv is None else part.uv]
         if is_coloured:
-            white = np.full((len(part.vertices_m), 3), 255, np.uint8)
-            values.append((white if part.vertex_rgb is None else part.vertex_rgb) / 255.0)
+            rgb = part.vertex_rgb
+            values.append(np.ones((len(part.vertices_m), 3)) if rgb is None else rgb / 255.0)
         rows.append(_linear(corners, np.hstack(values)[part.faces]))
     return np.concatenate(rows)
 
@@ -168,9 +159,7 @@ def _rows(parts: list[MeshPart], centre_m: Floats) -> Floats:
 def _linear(corners: Floats, values: Floats) -> Floats:
     """Rows (F, 1 + K, 4): the plane of each triangle, then what is linear between ``values``.
 
-    Args:
-        corners: (F, 3, 3) positions of the three corners.
-        values: (F, 3, K) values at the three corners.
+    ``corners`` (F, 3, 3) are the positions, ``values`` (F, 3, K) the values at the three corners.
     """
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(first, second)
@@ -185,3 +174,77 @@ def _linear(corners: Floats, values: Floats) -> Floats:
     at_corner = np.concatenate([np.zeros((len(values), 1)), values[:, 0]], axis=1)
     constant = at_corner - np.einsum("fkj,fj->fk", gradient, corners[:, 0])
     return np.concatenate([gradient, constant[:, :, None]], axis=2)
+
+
+class MipMaps:
+    """Several textures with all their mip levels in one buffer, so that one look-up serves all.
+
+    Looked up as OpenGL does it: repeated, and bilinear in the mip level just sharp enough.
+    """
+
+    def __init__(self, textures: Sequence[NDArray[np.uint8]]) -> None:
+        """Halve each texture (H, W, 3 | 4), first row at the top, down to one texel."""
+        sizes = [_sizes(texture.shape[1], texture.shape[0]) for texture in textures]
+        self._top_level = np.array([len(chain) - 1 for chain in sizes])
+        # Width and height, and where the level starts, by texture and level.
+        self._size = np.ones((len(sizes), max(map(len, sizes)), 2), np.int64)
+        self._start = np.zeros(self._size.shape[:2], np.int64)
+        self._texels = np.empty(sum(w * h for chain in sizes for w, h in chain), np.uint32)
+        end = 0
+        for row, (texture, chain) in enumerate(zip(textures, sizes, strict=True)):
+            for column, (size, texels) in enumerate(zip(chain, _levels(texture), strict=True)):
+                start, end = end, end + texels.size
+                self._size[row, column], self._start[row, column] = size, start
+                self._texels[start:end] = texels
+
+    def rgba(self, texture: NDArray[np.intp], uv: Floats, uv_per_px: Floats) -> Rgba:
+        """Colours (N, 4), 0 to 255, of textures (N,) at ``uv`` (N, 2), origin at the bottom left.
+
+        ``uv_per_px`` (N, 4) is the change from pixel to pixel: du/dx, dv/dx, du/dy, dv/dy.
+        """
+        ux, vx, uy, vy = (uv_per_px * np.tile(self._size[texture, 0], 2)).T
+        squared = np.maximum(np.maximum(ux**2 + vx**2, uy**2 + vy**2), 1.0)
+        level = np.minimum(0.5 * np.log2(squared), self._top_level[texture])
+        return self._bilinear(texture, level.astype(np.intp), uv)
+
+    def _bilinear(self, texture: NDArray[np.intp], level: NDArray[np.intp], uv: Floats) -> Rgba:
+        width, height = self._size[texture, level].T
+        left, right, x_share = _neighbours(uv[:, 0], width)
+        upper, lower, y_share = _neighbours(1.0 - uv[:, 1], height)
+        start = self._start[texture, level]
+        upper, lower = start + upper * width, start + lower * width
+        corners = (row + column for row in (upper, lower) for column in (left, right))
+        packed = (self._texels[corner].view(np.uint8) for corner in corners)
+        a, b, c, d = (rgba.reshape(-1, 4).astype(np.float32) for rgba in packed)
+        above, below = a + x_share * (b - a), c + x_share * (d - c)
+        return np.asarray(above + y_share * (below - above))
+
+
+def _sizes(width: int, height: int) -> list[tuple[int, int]]:
+    """Width and height of each level: halved and rounded down until one texel is left."""
+    top = max(width, height).bit_length() - 1
+    return [(max(1, width >> level), max(1, height >> level)) for level in range(top + 1)]
+
+
+def _levels(texture: NDArray[np.uint8]) -> Iterator[NDArray[np.uint32]]:
+    """Texels (H * W,) of each level as packed RGBA."""
+    height, width, channels = texture.shape
+    rgba = np.full((height, width, 4), 255, np.uint8)
+    rgba[..., :channels] = texture
+    # As RGBX: colours of RGBA images would be weighed by alpha, which OpenGL does not.
+    image = Image.frombuffer("RGBX", (width, height), rgba, "raw", "RGBX", 0, 1)
+    for size in _sizes(width, height):
+        if size != image.size:
+            image = image.resize(size, Image.Resampling.BOX)
+        yield np.asarray(image).reshape(-1, 4).view(np.uint32)[:, 0]
+
+
+def _neighbours(
+    position: Floats, size: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Rgba]:
+    """The texels before and after a repeated position, and the share (N, 1) of the latter."""
+    texel = position * size - 0.5
+    below = np.floor(texel)
+    share = (texel - below).astype(np.float32)[:, None]
+    first = below.astype(np.int64) % size
+    return first, (first + 1) % size, share

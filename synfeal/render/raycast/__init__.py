@@ -1,1 +1,0 @@
-"""What the ray-casting backend is made of: mip-mapped textures and textured triangles."""
