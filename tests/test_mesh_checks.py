@@ -11,11 +11,10 @@ from synfeal.config import check_mesh_files, load_config
 from synfeal.config.load import read_yaml
 from synfeal.config.models import SceneConfig
 from synfeal.errors import InputError
-from synfeal.mesh.checks import check_sampling_box
+from synfeal.mesh.checks import check_sampling_box, repaired
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import Findings, MeshPart, TexturedMesh
 from synfeal.mesh.properties import mesh_properties, mesh_topology
-from synfeal.mesh.repair import repaired
 from tests.mesh_samples import FACE, TRIANGLE
 from tests.test_workflow import snakemake
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from synfeal.mesh.detail import with_fewer_faces, with_smaller_textures
 from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.triangles import with_fewer_faces, with_smaller_textures
 from tests.small_room import BACKENDS, LOOK_ALONG_X, PYOPENGL_WARNS, camera_of, opener_of
 
 pytestmark = pytest.mark.filterwarnings(PYOPENGL_WARNS)

@@ -7,10 +7,9 @@ import pytest
 from PIL import Image
 
 from synfeal.errors import InputError
-from synfeal.mesh import textures
+from synfeal.mesh import materials
 from synfeal.mesh.load import load_mesh
-from synfeal.mesh.materials import linear_from_srgb, srgb_from_linear
-from synfeal.mesh.textures import MAX_SIDE_PX, to_rgb
+from synfeal.mesh.materials import MAX_SIDE_PX, linear_from_srgb, srgb_from_linear, to_rgb
 from tests.mesh_samples import FACE, TRIANGLE, UV, textured, triangle_gltf, write_gltf, write_obj
 
 COLOURS = np.array([[1, 2, 3, 4]] * 3, np.uint8)
@@ -202,7 +201,7 @@ def test_textures_too_wide_are_made_smaller_and_large_ones_no_bombs(painted, mon
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)  # Pillow refuses twice as many
     assert painted(Image.new("RGB", (64, 64)), textured()).parts[0].texture is not None
     assert Image.MAX_IMAGE_PIXELS == 100
-    monkeypatch.setattr(textures, "MAX_PIXELS", 100)
+    monkeypatch.setattr(materials, "MAX_PIXELS", 100)
     with pytest.raises(InputError, match="one colour"):
         painted(Image.new("RGB", (64, 64)), textured())
 

@@ -143,9 +143,12 @@ def _use_one_uv_set(attributes: Json, material: Json) -> None:
         attributes["TEXCOORD_0"] = attributes[f"TEXCOORD_{chosen}"]
 
 
-def image_uri(header: Json, texture: int) -> str | None:
-    """The file an image comes from: WebP where offered, as trimesh chooses; None if inside."""
-    stored = header["textures"][texture]
+def base_color_file(header: Json, material: Json) -> str | None:
+    """The file a base colour comes from: WebP where offered, as trimesh chooses; None if inside."""
+    slot = base_color(material).get("baseColorTexture")
+    if slot is None:
+        return None
+    stored = header["textures"][slot["index"]]
     webp = stored.get("extensions", {}).get("EXT_texture_webp", {})
     source = webp.get("source", stored.get("source"))
     uri = None if source is None else header["images"][int(source)].get("uri")

@@ -6,26 +6,26 @@ import io
 import json
 import logging
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, Literal
+from urllib.parse import unquote
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from PIL import Image
+from trimesh.resolvers import FilePathResolver
 
 from synfeal.errors import InputError, why
-from synfeal.mesh.checks import check_indices, check_mesh, refuse_extensions, refuse_kind
+from synfeal.mesh import checks
 from synfeal.mesh.compressed import decoded
-from synfeal.mesh.gltf import Gltf, read_gltf, simplified
-from synfeal.mesh.materials import BaseMaterial, MaterialReader, part_colours
+from synfeal.mesh.gltf import BIN_URI, DECODED_URI, Gltf, base_color_file, read_gltf, simplified
+from synfeal.mesh.materials import BaseMaterial, MaterialReader, large_images_allowed
 from synfeal.mesh.model import Findings, MeshPart, TexturedMesh
-from synfeal.mesh.repair import repaired
-from synfeal.mesh.resolver import RecordingResolver, report_missing
-from synfeal.mesh.textures import large_images_allowed
 
 UpAxis = Literal["auto", "y", "z"]
 GLTF_SUFFIXES = (".glb", ".gltf")
-PARSER_LOG = logging.getLogger("trimesh")
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tga", ".tif", ".tiff")
 
 # Rotates y-up files: their y becomes the world's z, their z points towards the viewer (-y).
 WORLD_FROM_Y_UP: NDArray[np.float64] = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
@@ -58,7 +58,7 @@ def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> Text
     except Exception as error:  # parsers of foreign files fail in every way there is
         raise InputError(f"{path}: cannot be read as a mesh ({why(error)})") from None
     mesh = TexturedMesh(parts, findings.sentences)
-    check_mesh(mesh, path)
+    checks.check_mesh(mesh, path)
     return mesh
 
 
@@ -70,7 +70,7 @@ def _check_file(path: Path) -> None:
         )
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the mesh file is empty; download or export it again")
-    refuse_kind(path)
+    checks.refuse_kind(path)
 
 
 def is_y_up(path: Path, up_axis: UpAxis) -> bool:
@@ -84,7 +84,7 @@ def _read_parts(
     """All parts that can be seen, in the order of the file's geometry, then of its nodes."""
     if gltf is not None:
         gltf = decoded(gltf, RecordingResolver(path).get)
-        refuse_extensions(path, gltf.header)
+        checks.refuse_extensions(path, gltf.header)
     materials = MaterialReader(None if gltf is None else gltf.header, findings)
     with large_images_allowed():
         scene = _read_scene(path, gltf, findings)
@@ -97,17 +97,21 @@ def _read_parts(
             file_from_part, name = scene.graph[node]
             geometry = scene.geometry[name]
             if isinstance(geometry, trimesh.Trimesh) and len(geometry.faces):
-                part = _part(_part_name(name), geometry, materials, findings)
-                check_indices(part, path)
+                prefix, _, rest = name.partition(":")  # save_glb writes their order before names
+                own = rest if prefix.isdigit() and rest else name
+                part = _part(own, geometry, materials, findings)
+                checks.check_indices(part, path)
                 parts.append(_placed(part, file_from_part, world_from_file))
-    kept = [repaired(part, findings) for part in parts]
+    kept = [checks.repaired(part, findings) for part in parts]
     return tuple(part for part in kept if len(part.faces) and _is_seen(part, findings))
 
 
 def _read_scene(path: Path, gltf: Gltf | None, findings: Findings) -> Any:
     """The file as a trimesh scene, without merging or reordering vertices."""
     resolver = RecordingResolver(path, gltf)
-    PARSER_LOG.setLevel(logging.ERROR)  # it prints tracebacks of what the findings name
+    logging.getLogger("trimesh").setLevel(
+        logging.ERROR
+    )  # it prints tracebacks of what the findings name
     try:
         if gltf is None:
             return trimesh.load_scene(str(path), resolver=resolver, process=False)
@@ -119,12 +123,6 @@ def _read_scene(path: Path, gltf: Gltf | None, findings: Findings) -> Any:
         report_missing(resolver.missing, findings, gltf)
         for name in dict.fromkeys(resolver.unreadable):
             findings.warn(f"'{name}' cannot be read as an image; base colours are used instead")
-
-
-def _part_name(name: str) -> str:
-    """Name without the order prefix that :func:`synfeal.mesh.save.save_glb` writes."""
-    prefix, _, rest = name.partition(":")
-    return rest if prefix.isdigit() and rest else name
 
 
 def _placed(
@@ -148,7 +146,7 @@ def _part(
         soup = np.arange(faces.size).reshape(-1, 3)
         face_rgb = np.repeat(np.asarray(visual.face_colors, np.uint8)[:, :3], 3, axis=0)
         return MeshPart(name, vertices[faces.ravel()], soup, vertex_rgb=face_rgb)
-    part = MeshPart(name, vertices, faces, vertex_rgb=part_colours(geometry, materials.is_gltf))
+    part = MeshPart(name, vertices, faces, vertex_rgb=materials.vertex_rgb(geometry))
     if visual.kind != "texture":
         return part
     return _with_material(part, visual.uv, materials.read(visual.material), findings)
@@ -172,3 +170,75 @@ def _is_seen(part: MeshPart, findings: Findings) -> bool:
     if not part.is_drawn:
         findings.note(f"part '{part.name}': nowhere opaque enough to be seen; left out")
     return part.is_drawn
+
+
+class RecordingResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is untyped
+    """Reads the files a mesh refers to and remembers those that cannot be read.
+
+    trimesh passes over missing textures silently; a grey scene should not surprise its user.
+    """
+
+    def __init__(self, source: Path, gltf: Gltf | None = None) -> None:
+        super().__init__(str(source), allow_anywhere=True)  # a user's own file, often ../textures
+        self.missing: list[str] = []
+        self.unreadable: list[str] = []
+        self._held = {} if gltf is None else {BIN_URI: gltf.binary, DECODED_URI: gltf.decoded}
+
+    def get(self, name: str) -> bytes:
+        """Bytes of a file the mesh refers to.
+
+        Raises:
+            FileNotFoundError: it is nowhere it could be meant to be.
+        """
+        if name in self._held:
+            return self._held[name]
+        for candidate in _spellings(str(name)):
+            path = Path(self.parent) / candidate
+            if path.is_file():
+                return self._checked(str(name), path.read_bytes())
+        self.missing.append(str(name))
+        raise FileNotFoundError(f"'{name}' is missing")
+
+    def _checked(self, name: str, content: bytes) -> bytes:
+        """The content, its name remembered if it should be an image and is none."""
+        if PurePosixPath(name).suffix.lower() in IMAGE_SUFFIXES:
+            try:
+                Image.open(io.BytesIO(content)).close()
+            except (OSError, SyntaxError, ValueError):
+                self.unreadable.append(name)
+        return content
+
+
+def _spellings(name: str) -> dict[str, None]:
+    """Paths a reference can mean: as written, percent-encoded, from Windows, without its folder.
+
+    Exporters write the absolute path of the artist's disk; the file then lies beside the mesh. An
+    MTL may put options before the name.
+    """
+    plain = name.split()[-1] if name.lstrip().startswith("-") else name.strip().strip('"')
+    slashes = unquote(plain).replace("\\", "/")
+    return dict.fromkeys([name, plain, unquote(plain), slashes, PurePosixPath(slashes).name])
+
+
+def report_missing(missing: list[str], findings: Findings, gltf: Gltf | None) -> None:
+    """A warning per missing file, and one finding for those that no unlit render needs."""
+    users: dict[str | None, list[str]] = {}
+    header = {} if gltf is None else gltf.header
+    for material in header.get("materials", []):
+        file = base_color_file(header, material)
+        users.setdefault(file, []).append(f"'{material.get('name', 'unnamed')}'")
+    unused = []
+    for name in dict.fromkeys(missing):
+        if gltf is None:
+            findings.warn(f"'{name}' is missing; base colours are used instead")
+        elif name in users:
+            findings.warn(
+                f"texture '{name}' of material {', '.join(users[name])} is missing; its base colour"
+                " is used"
+            )
+        else:
+            unused.append(f"'{name}'")
+    if unused:
+        findings.note(
+            f"{len(unused)} missing textures hold no colour and are not needed: {', '.join(unused)}"
+        )

@@ -1,25 +1,35 @@
-"""Materials and colours reduced to what an unlit render shows: base colour, texture, alpha cutoff.
+"""Materials, textures and colours reduced to what an unlit render shows.
 
-Metalness, roughness, normals and light are dropped on purpose: the light of a reconstruction is in
-its texture. Blended materials (glass, light shafts) become alpha-tested at one half, so that every
-pixel shows exactly one surface and its depth is that surface's.
+That is a base colour, a texture of 8 bits, and an alpha cutoff. Metalness, roughness, normals and
+light are dropped on purpose: the light of a reconstruction is in its texture. Blended materials
+(glass, light shafts) become alpha-tested at one half, so that every pixel shows exactly one surface
+and its depth is that surface's.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
+from PIL import Image
+from trimesh.visual.color import linear_to_srgb, srgb_to_linear, to_float
 
+from synfeal.errors import why
 from synfeal.mesh.gltf import Json, base_color
 from synfeal.mesh.model import WHITE, Findings
-from synfeal.mesh.textures import Pixels, decode
+
+Pixels = NDArray[np.uint8]
 
 BLEND_CUTOFF = 0.5
 GLTF_DEFAULT_CUTOFF = 0.5
+SRGB_ATTRIBUTE = "_SRGB"  # beside glTF's linear colours: the display colours, exact in 8 bits
+MAX_SIDE_PX = 16_384  # GL_MAX_TEXTURE_SIZE of Mesa's software renderer and of most GPUs
+MAX_PIXELS = 2**30  # 3 GB when decoded: what is larger is not decoded at all
 
 
 @dataclass(frozen=True)
@@ -47,33 +57,38 @@ class MaterialReader:
     """Reduces the materials of one file, each once, however many parts share it."""
 
     def __init__(self, header: Json | None, findings: Findings) -> None:
-        """Take the JSON of a glTF, or None for other files."""
+        """Take the JSON of a glTF, whose colours and factors are linear, or None."""
         self._header = header
         self._findings = findings
         self._known: dict[int, BaseMaterial] = {}
 
-    @property
-    def is_gltf(self) -> bool:
-        """Whether colours and factors of the file are linear."""
-        return self._header is not None
-
     def read(self, material: Any) -> BaseMaterial:
         """What a trimesh material amounts to."""
         if id(material) not in self._known:
-            self._known[id(material)] = self._reduce(material)
+            reduced = self._from_mtl if self._header is None else self._from_gltf
+            self._known[id(material)] = reduced(material)
         return self._known[id(material)]
 
-    def _reduce(self, material: Any) -> BaseMaterial:
-        if self._header is None:
-            return self._from_mtl(material)
-        described = self._header.get("materials", [])
-        index = int(material.name)  # given by synfeal.mesh.gltf.simplified
-        return self._from_gltf(material, described[index] if index < len(described) else {})
+    def vertex_rgb(self, geometry: trimesh.Trimesh) -> Pixels | None:
+        """Display colours (V, 3) of the vertices of a trimesh geometry, if it has any."""
+        exact = geometry.vertex_attributes.get(SRGB_ATTRIBUTE)
+        if exact is not None:
+            return np.asarray(exact, dtype=np.uint8)[:, :3]
+        visual = geometry.visual
+        extra = getattr(visual, "vertex_attributes", {})
+        stored: Any = visual.vertex_colors if visual.kind == "vertex" else extra.get("color")
+        if stored is None:
+            return None
+        colours = np.clip(np.nan_to_num(to_float(stored)), 0.0, 1.0)[:, :3]
+        is_linear = self._header is not None
+        return srgb_from_linear(colours) if is_linear else np.round(255 * colours).astype(np.uint8)
 
-    def _from_gltf(self, material: Any, described: Json) -> BaseMaterial:
+    def _from_gltf(self, material: Any) -> BaseMaterial:
+        index = int(material.name)  # given by synfeal.mesh.gltf.simplified
+        described = dict(enumerate((self._header or {}).get("materials", []))).get(index, {})
         owner = f"material '{described.get('name', 'unnamed')}'"
         colour = base_color(described)
-        texture = self._texture(material.baseColorTexture, owner)
+        texture = decode(material.baseColorTexture, owner, self._findings)
         base = srgb_from_linear(colour.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0]))
         mode = described.get("alphaMode", "OPAQUE")
         cutoff = BLEND_CUTOFF if mode == "BLEND" else None
@@ -91,7 +106,7 @@ class MaterialReader:
     def _from_mtl(self, material: Any) -> BaseMaterial:
         """An MTL or PLY material: alpha counts where ``map_d`` or ``d`` say so."""
         owner = f"material '{material.name or 'unnamed'}'"
-        texture = self._texture(material.image, owner)
+        texture = decode(material.image, owner, self._findings)
         # MTL writes Kd next to map_Kd without meaning the product; many exporters leave Kd at 0.
         base = np.array(material.diffuse, np.uint8) if material.image is None else WHITE.copy()
         extra = {key.lower(): value for key, value in material.kwargs.items()}
@@ -101,9 +116,6 @@ class MaterialReader:
             return BaseMaterial(None if texture is None else texture[..., :3], base)
         self._note_cutoff(owner, True, BLEND_CUTOFF)
         return BaseMaterial(texture, base, BLEND_CUTOFF)
-
-    def _texture(self, image: Any, owner: str) -> Pixels | None:
-        return None if image is None else decode(image, owner, self._findings)
 
     def _note_cutoff(self, owner: str, is_blended: bool, cutoff: float) -> None:
         kind = "blended transparency becomes an alpha test" if is_blended else "alpha-tested"
@@ -143,42 +155,79 @@ def uv_transform(slot: Json) -> NDArray[np.float64] | None:
 def srgb_from_linear(rgba: ArrayLike) -> Pixels:
     """Display colours (..., 4) uint8 of linear ones in 0 to 1; alpha is linear in both."""
     value = np.clip(np.asarray(rgba, dtype=np.float64), 0.0, 1.0)
-    curve = np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
-    curve[..., 3:] = value[..., 3:]
-    return np.round(255.0 * curve).astype(np.uint8)
+    value[..., :3] = linear_to_srgb(value[..., :3])
+    return np.round(255.0 * value).astype(np.uint8)
 
 
 def linear_from_srgb(rgba: ArrayLike) -> NDArray[np.float64]:
     """Linear colours (..., 4) in 0 to 1 of display colours uint8: what glTF stores."""
     value = np.asarray(rgba, dtype=np.float64) / 255.0
-    curve = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    curve[..., 3:] = value[..., 3:]
-    return curve
+    value[..., :3] = srgb_to_linear(value[..., :3])
+    return value
 
 
-SRGB_ATTRIBUTE = "_SRGB"  # beside glTF's linear colours: the display colours, exact in 8 bits
+@contextmanager
+def large_images_allowed() -> Iterator[None]:
+    """Inside, Pillow opens images beyond its limit against hostile files from the web.
 
-
-def part_colours(geometry: trimesh.Trimesh, is_linear: bool) -> Pixels | None:
-    """Display colours (V, 3) uint8 of the vertices of a trimesh geometry, if it has any.
-
-    ``is_linear`` says whether the file stores linear colours, as glTF does.
+    Textures of scans exceed it regularly; :func:`decode` has a limit of its own.
     """
-    exact = geometry.vertex_attributes.get(SRGB_ATTRIBUTE)
-    if exact is not None:
-        return np.asarray(exact, dtype=np.uint8)[:, :3]
-    visual = geometry.visual
-    is_plain = visual.kind == "vertex"
-    extra = getattr(visual, "vertex_attributes", {})
-    stored: Any = visual.vertex_colors if is_plain else extra.get("color")
-    if stored is None:
+    limit = Image.MAX_IMAGE_PIXELS
+    Image.MAX_IMAGE_PIXELS = None
+    try:
+        yield
+    finally:
+        Image.MAX_IMAGE_PIXELS = limit
+
+
+def decode(image: Image.Image | None, owner: str, findings: Findings) -> Pixels | None:
+    """Pixels (H, W, 3 | 4) uint8 of an image, if there is one that is neither broken nor too large.
+
+    What was converted, made smaller or given up goes to the findings, as ``owner``'s, such as
+    ``material 'Wall'``.
+    """
+    if image is None:
         return None
-    colours = as_fraction(stored)[:, :3]
-    return srgb_from_linear(colours) if is_linear else np.round(255.0 * colours).astype(np.uint8)
+    width, height = image.size
+    if width * height > MAX_PIXELS:
+        findings.warn(
+            f"{owner}: texture of {width} x {height} pixels is too large to be read; its base"
+            f" colour is used. Make it at most {MAX_SIDE_PX} pixels wide and high"
+        )
+        return None
+    try:
+        pixels = to_rgb(image)
+    except (OSError, SyntaxError, ValueError) as error:  # Pillow raises all three on damaged files
+        findings.warn(f"{owner}: texture cannot be decoded ({why(error)}); its base colour is used")
+        return None
+    if image.mode not in ("RGB", "RGBA") or pixels.shape[2] != len(image.getbands()):
+        kind = "RGBA" if pixels.shape[2] == 4 else "RGB"
+        findings.note(f"{owner}: texture converted from {image.mode} to 8-bit {kind}")
+    return within_limit(pixels, owner, findings)
 
 
-def as_fraction(stored: Any) -> NDArray[np.float64]:
-    """Values in 0 to 1 of integers, which span the range of their type, or of floats."""
-    values = np.asarray(stored)
-    largest = np.iinfo(values.dtype).max if values.dtype.kind in "iu" else 1
-    return np.asarray(np.clip(np.nan_to_num(values / largest), 0.0, 1.0), dtype=np.float64)
+def within_limit(pixels: Pixels, owner: str, findings: Findings) -> Pixels:
+    """The pixels, made smaller where a side exceeds what renderers take."""
+    height, width = pixels.shape[:2]
+    if max(height, width) <= MAX_SIDE_PX:
+        return pixels
+    factor = MAX_SIDE_PX / max(height, width)
+    size = (max(1, round(width * factor)), max(1, round(height * factor)))
+    findings.warn(
+        f"{owner}: texture made smaller from {width} x {height} to {size[0]} x {size[1]} pixels,"
+        " which is what renderers take"
+    )
+    return np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX))
+
+
+def to_rgb(image: Image.Image) -> Pixels:
+    """Pixels (H, W, 3), or (H, W, 4) where the image carries transparency, as uint8.
+
+    Palette, grey, grey with alpha, 16-bit, float, CMYK and YCbCr images are converted.
+    """
+    if image.mode.startswith("I") or image.mode == "F":  # of 16 bits, or 0 to 1
+        scale = 255.0 if image.mode == "F" else 255.0 / 65535.0
+        grey = np.clip(np.round(np.asarray(image, dtype=np.float64) * scale), 0, 255)
+        return np.repeat(grey.astype(np.uint8)[..., None], 3, axis=2)
+    has_alpha = image.mode in ("LA", "PA", "La", "RGBA", "RGBa") or "transparency" in image.info
+    return np.asarray(image.convert("RGBA" if has_alpha else "RGB"))

@@ -18,9 +18,9 @@ from synfeal.config.models import RenderSpeedConfig
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.render_sequence import resolved
 from synfeal.frames import COUNT, NUMBER, TEXT, frame_of, write_frame
-from synfeal.mesh.detail import with_fewer_faces, with_smaller_textures
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
+from synfeal.mesh.triangles import with_fewer_faces, with_smaller_textures
 from synfeal.render import choose, open_renderer
 from synfeal.render.base import SAMPLES_PER_AXIS, Depth, Renderer, Rgb, reference_images
 from synfeal.scenes.speed import PAPER_CAMERA, seconds_of
