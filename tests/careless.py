@@ -8,20 +8,11 @@ from PIL import Image
 PLACES = ("", "absent", "notes.txt/x", "loop", "loop/x", "x" * 300)
 NUMBERS = ("-1", "0", "nan", "inf", "-inf", "1e30")
 WHOLE = ("-1", "0", "99999999999", "9" * 400)
+TEXTS = ("empty", "notes.txt", "latin.txt")
 DATA_SETS = (*PLACES, "notes.txt", "empty", "photos", "text.glb")
 MESHES = (
-    *PLACES,
-    ".",
-    "x" * 5000,
-    "notes.txt",
-    "empty",
-    "text.glb",
-    "cut.glb",
-    "nothing.obj",
-    "latin.txt",
-    "image.glb",
-    "list.gltf",
-    "short.ply",
+    *(*PLACES, ".", "x" * 5000, "notes.txt", "empty", "text.glb", "cut.glb", "nothing.obj"),
+    *("latin.txt", "image.glb", "list.gltf", "short.ply"),
 )
 OUTS = ("/", ".", "notes.txt", "notes.txt/x", "loop", "loop/x", "x" * 300, "photos")
 
@@ -54,7 +45,7 @@ TABLE = {
     "collect spacing": (COLLECT, "--spacing", (*NUMBERS, "1e-9")),
     "collect view": (COLLECT, "--min-view-distance", ("-1", "nan", "inf", "1e30")),
     "collect path": (COLLECT, "--min-path", ("-1", "nan", "inf", "1e30")),
-    "collect unit": (COLLECT, "--unit-m", NUMBERS),
+    "collect unit": (COLLECT, "--unit-m", (*NUMBERS, "1e-5")),
     "collect box": (COLLECT, "--box", ("1 0 0 1 0 1", "nan 1 0 1 0 1", "50 51 0 1 0 1")),
     "collect roll": (COLLECT, "--roll", ("5 -5", "nan 1", "0 inf")),
     "collect pitch": (COLLECT, "--pitch", ("-90 90", "1 1")),
@@ -63,18 +54,11 @@ TABLE = {
     "collect width": (COLLECT, "--width", ("0", "-1", "8193", "100000", "9" * 400)),
     "collect height": (COLLECT, "--height", ("0", "8193")),
     "collect fov": (COLLECT, "--fov", (*NUMBERS, "180")),
-    "collect camera": (
-        COLLECT,
-        "--camera",
-        (*PLACES, ".", "empty", "notes.txt", "latin.txt", "x" * 5000),
-    ),
-    "collect poses": (
-        f"{COLLECT} --mode repeat",
-        "--poses",
-        (*PLACES[1:], ".", "empty", "notes.txt", "latin.txt", "room.glb"),
-    ),
-    "collect effects": (COLLECT, "--effects", (*PLACES, "empty", "notes.txt", "latin.txt")),
-    "collect clutter": (COLLECT, "--clutter", (*PLACES, "empty", "notes.txt", "latin.txt")),
+    "collect camera": (COLLECT, "--camera", (*PLACES, ".", *TEXTS, "x" * 5000)),
+    "collect poses": (f"{COLLECT} --mode repeat", "--poses", (*PLACES[1:], ".", *TEXTS)),
+    "collect mode": (COLLECT, "--mode", ("repeat", "teleport")),
+    "collect effects": (COLLECT, "--effects", (*PLACES, *TEXTS)),
+    "collect clutter": (COLLECT, "--clutter", (*PLACES, *TEXTS)),
     "collect background": (COLLECT, "--background", ("0 0 256", "-1 0 0")),
     "collect supersampling": (COLLECT, "--supersampling", ("0", "-1", "5", "9" * 400)),
     "collect workers": (COLLECT, "--workers", ("0", "-3")),
@@ -93,19 +77,16 @@ TABLE = {
     "export": ("export {} --to tum --out new", "", DATA_SETS),
     "export out": ("export set --to colmap", "--out", OUTS),
     "export camera": ("export set --to tum --out new", "--camera", (*PLACES, "latin.txt")),
-    "localize model": (
-        "localize {} photos",
-        "",
-        (*PLACES, "empty", "set", "notes.txt", "room.glb"),
-    ),
+    "localize model": ("localize {} photos", "", (*PLACES, *TEXTS, "set", "room.glb")),
     "localize images": ("localize model.pt {}", "", (*PLACES, "empty", "set", "latin.txt")),
     "localize out": ("localize model.pt photos", "--out", (*OUTS[:7], "model.pt")),
     "plan profile": ("plan", "--profile", (*PLACES, "empty", "notes.txt", *CONFIGURATION_FILES)),
     "run profile": ("run", "--profile", (*CONFIGURATION_FILES, "x")),
     "run cores": ("run", "--cores", ("0", "-1")),
-    "plan measured": ("plan", "--measured", PLACES[1:]),
+    "plan measured": ("plan", "--measured", (*PLACES[1:], "empty")),
     "plan cores": ("plan", "--cores", ("0", "-1")),
     "plan gpus": ("plan", "--gpus", ("-1",)),
+    "plan throughput": ("plan", "--gpu-tflops", NUMBERS[:4]),
     "compare": ("compare {} empty", "", DATA_SETS),
     "keep": ("keep {}", "", (*PLACES, "empty", "notes.txt")),
     "restore": ("restore {} new", "", (*PLACES, "empty", "notes.txt", "room.glb")),

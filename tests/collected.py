@@ -41,6 +41,13 @@ def tree_of(directory):
     }
 
 
+def refused(capfd, *arguments):
+    """What a command says when it refuses, on one line and with status 1."""
+    capfd.readouterr()
+    assert main([str(argument) for argument in arguments]) == 1
+    return only_error(capfd)
+
+
 def only_error(capfd):
     """The message; before it nothing but lines of progress, and no traceback of any process."""
     *before, last = capfd.readouterr().err.strip().splitlines()

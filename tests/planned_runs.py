@@ -2,13 +2,11 @@
 
 import contextlib
 from functools import cache
-from pathlib import Path
 
 from synfeal.report.cost.dry_run import planned_jobs
 from synfeal.report.cost.jobs import jobs_of
 from synfeal.report.cost.runs import profile_path, read_profile
-
-ROOT = Path(__file__).parent.parent
+from tests import ROOT
 
 
 @cache

@@ -14,7 +14,6 @@ import synfeal
 from synfeal.errors import InputError
 from tests.collected import collect, save_room
 
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 QUICKSTART = Path(__file__).parent.parent / "docs" / "quickstart.ipynb"
 
 

@@ -24,8 +24,6 @@ from tests.collected import tree_of
 from tests.damaged_sets import CAMERA
 from tests.test_dataset import FakeRenderer, poses_of
 
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-
 
 def archived(folder, out):
     """A copy with every sequence as an archive."""

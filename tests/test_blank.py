@@ -17,8 +17,6 @@ from synfeal.planning.plan import plan_split
 from synfeal.planning.seen_surface import empty_shares
 from synfeal.render import open_renderer
 
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-
 CAMERA = CameraConfig(width=64, height=48)
 SMALL = ("--frames", "30", "--spacing", "0.8", "--width", "64", "--height", "48")
 

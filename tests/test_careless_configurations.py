@@ -3,17 +3,16 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from synfeal.cli import main
 from synfeal.config.load import check_mesh_files, check_results
 from synfeal.report.cost.runs import read_profile
+from tests import ROOT
 from tests.careless import FILES
 from tests.fuzzing import problem_with
 
-ROOT = Path(__file__).parent.parent
 DIGITS = "9" * 5000
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"{after}: &{after} [{', '.join(9 * [f'*{before}'])}]\n"
@@ -24,35 +23,21 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
 TABLE = (
     # unknown keys, and keys at the wrong place
     ("profle: mine", "profle: unknown key; allowed here: archive_sequences, collection, dataset"),
-    ("scale: 0.1\nframes: 300", "frames: unknown key"),
     ("collection: {spacing: 0.1}", "collection.spacing: unknown key; allowed here: candidates"),
-    ("camera: {width: 64}", "camera: unknown key"),
     ("scenes: {large_room: {colour: red}}", "scenes.large_room.colour: unknown key"),
-    ("training: {epochs: 9}", "training.epochs: unknown key"),
-    ("references: {external: {mine: {file: a.csv}}}", "references.external.mine.title: missing"),
     ('"": 1', "'': unknown key"),
     ("null: 2", "None: Keys should be strings"),
     # values of another kind
     ("seed: one", "seed: Input should be a valid integer"),
-    ("seed: true", "seed: Input should not be true or false"),
-    ("scenes: large_room", "scenes: Input should be a valid dictionary"),
-    ("scenes: {large_room: {sizes: [6k]}}", "scenes.large_room.sizes: Input should be a valid"),
     ("scenes: {large_room: {sizes: {6k: 1500}}}", "scenes.large_room.sizes.6k: must hold a map"),
-    ("network_camera: {distortion: [0.1, 0]}", "network_camera.distortion"),
-    ("training: {samples_seen: 9}", "training.samples_seen"),
-    ("training: {repetitions: twice}", "training.repetitions"),
     # numbers out of range: negative, none at all, huge
     (f"seed: {DIGITS}", "cannot be read as YAML"),
-    ("seed: 99999999999999999999", "seed: "),
     ("scale: 1.5", "scale: Input should be less than or equal to 1"),
-    ("scale: .nan", "scale: "),
     ("collection: {frame_spacing_m: 1e-9}", "collection.frame_spacing_m: "),
-    ("collection: {frame_spacing_m: .nan}", "collection.frame_spacing_m: "),
     ("network_camera: {near_m: 5, far_m: 1}", "near_m: must be below far_m"),
     ("network_camera: {fx: 500}", "fx: fx, fy, cx and cy are given together"),
     # units
     ("scenes: {large_room: {angles: {pitch_deg: [-90, 90]}}}", "pitch_deg: must lie within"),
-    ("scenes: {large_room: {angles: {yaw_deg: [360, 0]}}}", "yaw_deg: the first number must be"),
     ("scenes: {large_room: {sampling_box: [0, 5, 0, 5]}}", "sampling_box: must hold a mapping"),
     ("scenes: {large_room: {sampling_box: {x: [5, 0], y: [0, 1], z: [0, 1]}}}", "x: the first"),
     ("scenes: {attic: {source: mesh, path: a.glb, sampling_box: {x: [0, 5]}}}", "box.y: missing"),
@@ -70,43 +55,24 @@ TABLE = (
     ("pretraining: {source: rooms}", "pretraining.source: "),
     ("pretraining: {source: imagenet}", "network.width: must be 1"),
     ("network_camera: {near_m: 200}", "network_camera.near_m: must be below far_m"),
-    ("localizers: {vit: {}}", "localizers.vit: Input should be 'posenet'"),
     ("localizers: {posenet: {lr: 1}}", "localizers.posenet.lr: unknown key; allowed here: beta"),
-    ("scenes: {sanctuary: {sampling_box: {w: [0, 1]}}}", "sampling_box.w: unknown key"),
     # paths
     ("experiments: absent.csv", "absent.csv: cannot be read as CSV (No such file or directory)"),
     ("experiments: config", "config: cannot be read as CSV (Is a directory)"),
     ("experiments: README.md", "README.md: "),
     ("results: README.md", "results: README.md is not a directory; choose another one"),
-    ("results: README.md/mine", "results: README.md is not a directory"),
     ('results: "a\\0b"', "results: Input should not hold the character NUL"),
     ("profile: ../mini", "profile: String should match pattern"),
     ("scenes: {attic: {source: mesh, path: absent.glb}}", "scenes.attic.path: absent.glb does not"),
-    ("scenes: {attic: {source: mesh, path: config}}", "scenes.attic.path: config is a directory"),
     ("network_camera: {calibration: absent.yaml}", "calibration: absent.yaml: cannot be read as"),
-    ("network_camera: {calibration: README.md}", "calibration: README.md: is no calibration"),
     # YAML that is more than plain values, or none
-    ("scenes: &a {x: *a}", "aliases (*name) are not read"),
-    ("a: &a {x: 1}\nb: {<<: *a}", "aliases (*name) are not read"),
-    ("seed: 1\nseed: 2", "the key 'seed' is there twice"),
-    ("network:\n  width: 1\n  width: 2", "line 2: the key 'width' is there twice"),
     ("seed:\n\t1", "line 2: found character '\\t' that cannot start any token"),
     ("seed: !!python/object/apply:os.getcwd []", "could not determine a constructor for the tag"),
-    ("seed: !mine 1", "could not determine a constructor for the tag"),
-    ("profile: !!python/object/apply:os.mkdir [made]", "could not determine a constructor"),
-    ("profile: !!python/object:pathlib.Path {}", "could not determine a constructor"),
-    ("profile: !!python/name:os.system", "could not determine a constructor"),
     ("seed: !!int x", "'x' is no number"),
     ("profile: 2026-13-45", "month"),
-    ("profile: &a mini\nseed: *a", "aliases (*name) are not read"),
     (BOMB, "aliases (*name) are not read"),
     ("profile", "must hold a mapping of keys, found 'profile'"),
-    ("- 1", "must hold a mapping of keys, found [1]"),
-    ("# nothing yet", "must hold a mapping of keys, found nothing"),
-    ("[" * 5000, "it is nested too deeply"),
     ("seed: 1\n---\nseed: 2", "expected a single document in the stream"),
-    ("seed 1", "must hold a mapping of keys, found 'seed 1'"),
-    ("? [a, b]\n: 1", "line 1: its parts do not fit together"),
 )
 
 
@@ -143,14 +109,11 @@ def test_run_hands_a_sound_profile_to_snakemake(tmp_path, monkeypatch):
     assert paths.split(os.pathsep)[0] == str(ROOT / "workflow/plugins")
 
 
-@pytest.mark.parametrize("name", ["absent.yaml", "deep.yaml", "latin.yaml", "profile.yaml"])
-def test_run_ends_in_one_line_where_snakemake_has_a_traceback(name, tmp_path):
-    """The command as it is typed; the last file only Snakemake itself comes to."""
-    path = tmp_path / name
-    if name in FILES:
-        path.write_bytes(FILES[name])
-    if name == "profile.yaml":
-        path.write_text("profile: ../mini\n")
+@pytest.mark.parametrize("content", [FILES["deep.yaml"], b"profile: ../mini\n"])
+def test_run_ends_in_one_line_where_snakemake_has_a_traceback(content, tmp_path):
+    """The command as it is typed; to the second file only Snakemake itself comes."""
+    path = tmp_path / "mine.yaml"
+    path.write_bytes(content)
     command = [sys.executable, "-m", "synfeal.cli", "run", "--profile", str(path), "--cores", "1"]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     (line,) = [line for line in run.stderr.splitlines() if line.strip() and "profiles/" not in line]

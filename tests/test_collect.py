@@ -13,10 +13,8 @@ from synfeal.dataset.sevenscenes import frame_paths, read_pose, read_split
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.validation.listing import list_sequences
 from synfeal.validation.manifest import check_manifest
-from tests.collected import collect, only_error, tree_of
+from tests.collected import collect, tree_of
 from tests.test_workflow import snakemake
-
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 
 
 def test_collect_makes_a_complete_data_set(calm):
@@ -111,28 +109,6 @@ def test_print_config_and_manifest_say_the_same(calm):
     assert manifest["scene"]["name"] == "scan"
     assert manifest["render"]["backend"] != "auto"
     assert "path" not in manifest["scene"]
-
-
-# Options beside those of a small collection, and what the one line has to say.
-REFUSED = {
-    "box": (["--box", "1", "0", "0", "1", "0", "1"], "--box: x: "),
-    "second box": (["--box=0 1 0 1 0 1", "--box=0 1 2 1 0 1"], "--box: "),
-    "far box": (["--box", "90", "91", "0", "1", "0", "1"], "--unit-m"),
-    "small scene": (["--unit-m", "1e-5"], "--unit-m"),
-    "roll": (["--roll", "5", "-5"], "--roll: the first number must be below"),
-    "pitch": (["--pitch", "-90", "0"], "--pitch: must lie within -90 and 90"),
-    "colour": (["--background", "0", "256", "0"], "--background: "),
-    "no poses": (["--mode", "repeat"], "--poses: "),
-    "long paths": (["--min-path", "1e6"], "--min-path"),
-}
-
-
-@pytest.mark.parametrize("case", REFUSED)
-def test_what_a_person_can_fix_is_one_line_and_nothing_is_written(case, mesh, tmp_path, capfd):
-    options, words = REFUSED[case]
-    assert collect(mesh, tmp_path / "set", *options) == 1
-    assert words in only_error(capfd)
-    assert not any(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("options", [["collect"], ["collect", "--frames", "many"], ["paint"], []])

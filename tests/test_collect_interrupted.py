@@ -15,8 +15,6 @@ from synfeal.run_lock import only_command
 from tests.collected import collect, command, only_error, save_room, tree_of
 from tests.small_disk import mounted, remount
 
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-
 
 class Interrupting:
     """A renderer that is interrupted after some frames, and counts those it rendered."""

@@ -1,6 +1,5 @@
 """What a run costs: counts, laws with a closed form, scaling, and how bad input ends."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -9,22 +8,14 @@ import pytest
 
 from baselines.training.device import open_device
 from synfeal.cli import main
-from synfeal.frames import read_records
-from synfeal.report.cost import steps
-from synfeal.report.cost.estimate import (
-    ALONE,
-    OWN,
-    Machine,
-    compare_cost,
-    job_costs,
-    summed,
-    table_costs,
-)
+from synfeal.report.cost import estimate, steps
 from synfeal.report.cost.jobs import job_of
 from synfeal.report.cost.laws import fit_laws, matched, seconds_of
 from synfeal.report.cost.networks import training_work
 from synfeal.report.cost.runs import last_look_s, read_measured, read_run, write_measured
-from tests.planned_runs import ROOT, planned, run_jobs
+from tests import ROOT
+from tests.planned_runs import planned, run_jobs
+from tests.report_results import read
 from tests.test_cost_laws import a_law
 
 HEADER = "s\tmax_rss\tcpu_time\n"
@@ -36,11 +27,6 @@ RATES = {"rendering": (0.004, 0.05), "training": (3e-4, 7.0), "sfm": (3.0,), "rg
 @pytest.fixture(autouse=True)
 def _at_the_root(monkeypatch):
     monkeypatch.chdir(ROOT)
-
-
-@pytest.fixture(scope="module")
-def config():
-    return planned("smoke")[0].config
 
 
 def write_job(benchmarks, job, seconds):
@@ -112,11 +98,9 @@ def test_a_measurement_of_another_design_is_left_out(stage, name):
 
 def test_processor_time_is_completed_and_one_file_keeps_the_measurements(tmp_path, made_up_run):
     root = tmp_path / "smoke"
-    write = {"a": (40, 7.5), "b": (4.4, 2.0), "c": (0.4, 0.0)}
-    for name, (wall_s, cpu_s) in write.items():
-        path = root / "benchmarks" / "train" / f"{name}.tsv"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(f"{HEADER}{wall_s}\t100\t{cpu_s}\n")
+    (root / "benchmarks" / "train").mkdir(parents=True)
+    for name, line in {"a": "40\t100\t7.5", "b": "4.4\t100\t2.0", "c": "0.4\t100\t0.0"}.items():
+        (root / "benchmarks" / "train" / f"{name}.tsv").write_text(f"{HEADER}{line}\n")
     # Half a core when last seen, after 15 s and 4 s; the shortest is taken to have had that too.
     assert read_measured(root).cpu_s.tolist() == pytest.approx([20, 2.2, 0.2])
     before = read_measured(made_up_run)
@@ -132,29 +116,25 @@ def test_processor_time_is_completed_and_one_file_keeps_the_measurements(tmp_pat
 def test_tables_add_up_to_the_run():
     jobs, needed = run_jobs("smoke"), planned("smoke")[1].needed
     laws = pd.concat([a_law(name, fixed_s=1.0) for name in jobs.law.unique()])
-    machine = Machine(1, 0, 1.0)
-    costs = job_costs(jobs, laws, machine)
-    rows = pd.DataFrame(table_costs(costs, needed, machine))
-    own, alone = rows[rows.part == OWN], rows[rows.part == ALONE]
+    machine = estimate.Machine(1, 0, 1.0)
+    costs = estimate.job_costs(jobs, laws, machine)
+    rows = pd.DataFrame(estimate.table_costs(costs, needed, machine))
+    own, alone = rows[rows.part == estimate.OWN], rows[rows.part == estimate.ALONE]
     assert own.jobs.sum() == len(jobs)
     assert own.cpu_mid.sum() == pytest.approx(len(jobs))
     assert alone.set_index("name").jobs.to_dict() == {t: len(keys) for t, keys in needed.items()}
-    assert summed(costs, machine)["wall_mid"] == pytest.approx(len(jobs))
+    assert estimate.summed(costs, machine)["wall_mid"] == pytest.approx(len(jobs))
     # By itself a table needs the training runs of its own rows, and from the meshes on.
-    rows4 = planned("smoke")[0].design.rows_of("table4_size")
     keys = needed["table4_size"]
-    trained = {name for stage, name in keys if stage == "train"}
-    starts = [f"{e.scene}/{e.size}/{e.label_id}/{e.init}" for e in rows4]
-    assert {name.rsplit("/", 2)[0] for name in trained} == set(starts)
+    trained = {name.rsplit("/", 2)[0] for stage, name in keys if stage == "train"}
+    rows4 = planned("smoke")[0].design.rows_of("table4_size")
+    assert trained == {f"{e.scene}/{e.size}/{e.label_id}/{e.init}" for e in rows4}
     assert {("tables", "table4_size"), ("scene", "large_room")} <= keys
     assert not any(stage in ("claims", "report", "hard_cases") for stage, _ in keys)
 
 
-def read_rows(path):
-    return [row for _, row in read_records(path)]
-
-
-def test_a_step_is_trained_and_timed_and_rates_are_found(config, monkeypatch):
+def test_a_step_is_trained_and_timed_and_rates_are_found(monkeypatch):
+    config = planned("smoke")[0].config
     hyper = config.localizers["posenet2"]
     assert 0 < steps._step_s("posenet2", hyper, config, open_device("cpu")) < 60
     batch = config.training.batch_size
@@ -177,7 +157,7 @@ def test_steps_that_are_timed_tell_what_a_small_run_does_not():
     for seed in range(4):
         factor = np.exp(np.random.default_rng(seed).normal(0, 0.15, len(jobs)))
         run = jobs[["stage", "job"]].assign(cpu_s=seconds_of(jobs, laws) * factor, peak_mb=np.nan)
-        total = compare_cost(fit_laws(matched(jobs, run), rates), mini).iloc[-1]
+        total = estimate.compare_cost(fit_laws(matched(jobs, run), rates), mini).iloc[-1]
         assert total.stage == "total"
         assert 1 / 1.5 < total.factor < 1.5
 
@@ -190,7 +170,7 @@ def test_the_command_prints_and_writes_the_plan(made_up_run, tmp_path, capsys):
     assert "Profile smoke on 1 core: " in text
     assert "Profile smoke on 4 cores: " in text
     assert "GPU" not in text
-    rows = {(row["cores"], row["part"], row["name"]): row for row in read_rows(out)}
+    rows = {(row["cores"], row["part"], row["name"]): row for row in read(out)}
     jobs = list(run_jobs("smoke").itertuples())
     expected_s = sum(true_seconds(job) for job in jobs if job.stage == "train")
     for cores in ("1", "4"):
@@ -215,33 +195,5 @@ def test_runs_are_predicted_from_each_other(made_up_run, tmp_path, capsys):
     text = capsys.readouterr().out
     assert f"{slow} predicted from {made_up_run}" in text
     assert f"{made_up_run} predicted from {slow}" in text
-    rows = [row for row in read_rows(out) if row["stage"] == "total"]
+    rows = [row for row in read(out) if row["stage"] == "total"]
     assert [float(row["factor"]) for row in rows] == pytest.approx([0.5, 2.0], rel=0.05)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (
-            ["--profile", "large"],
-            r"profile 'large': no such profile in config/; known: .*mini",
-        ),
-        (["--profile", "absent.yaml"], r"absent\.yaml: cannot be read as YAML"),
-        (["--measured", "{tmp}"], r"holds no benchmarks/\*\*/\*\.tsv and no benchmarks\.csv"),
-        (["--cores", "0"], r"--cores: must be at least 1, found 0"),
-        (["--gpus", "-1"], r"--gpus: must be at least 0, found -1"),
-        (["--gpu-tflops", "nan"], r"--gpu-tflops: must be above 0, found nan"),
-    ],
-)
-def test_bad_input_ends_in_one_line(arguments, message, tmp_path, capsys):
-    assert main(["plan", *(a.replace("{tmp}", str(tmp_path)) for a in arguments)]) == 1
-    error = capsys.readouterr().err
-    assert re.search(message, error)
-    assert error.count("\n") == 1
-
-
-def test_a_broken_measurement_is_named(made_up_run, tmp_path):
-    path = tmp_path / "smoke" / "benchmarks" / "sfm" / "a.tsv"
-    path.parent.mkdir(parents=True)
-    path.write_text(f"{HEADER}fast\t1\t1\n")
-    assert main(["plan", "--measured", str(tmp_path / "smoke")]) == 1

@@ -42,8 +42,6 @@ from synfeal.scenes.prepare import prepare_scene
 from synfeal.validation.listing import list_sequences
 from synfeal.validation.manifest import check_manifest
 
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-
 CAMERA = CameraConfig.model_validate({"width": 40, "height": 30})
 
 

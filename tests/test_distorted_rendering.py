@@ -16,8 +16,6 @@ from synfeal.render import open_renderer
 from synfeal.render.distorted import DistortedRenderer, covering_camera
 from tests.painted_room import random_texture
 
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-
 AHEAD = pose_matrix(rotation_from_rpy([0.0, 0.0, 0.0]), [0.0, 0.0, 0.0])
 LENSES = {
     "barrel": (-0.28, 0.09, 0.001, -0.0007, -0.01),

@@ -247,7 +247,6 @@ def test_bad_settings_are_one_line(changes, message):
     assert "\n" not in str(refusal.value)
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 def test_collected_with_effects_the_same_in_other_shards_and_workers(tmp_path):
     mesh, settings = save_room(tmp_path / "room.glb"), tmp_path / "effects.yaml"
     settings.write_text(yaml.safe_dump({**ALL, "share": 1.0}))

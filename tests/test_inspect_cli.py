@@ -17,8 +17,6 @@ from synfeal.inspect.run import top_view
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-
 BOX = ("--box", "-2.9", "2.9", "-2.5", "2.5", "-1.5", "1.5")
 OUTPUTS = ["inspect.html", "inspect.json", "inspect.png"]
 
