@@ -22,7 +22,7 @@ from synfeal.effects.light import GROUPS, Light
 from synfeal.errors import InputError
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.mesh.standing import Ground, described, moved
+from synfeal.mesh.standing import refuse_larger, standing
 from synfeal.render import open_renderer
 from synfeal.render.base import Depth, Renderer, Rgb
 
@@ -58,20 +58,9 @@ class Crowd:
         bounds_m[:, :2] += np.array([[-REACH_M], [REACH_M]])
         widest_m = max(float(np.ptp(kind.bounds_m, axis=0).max()) for _, kind in self.kinds)
         near = self._near(bounds_m[:, :2] + np.array([[-widest_m], [widest_m]]))
-        parts: list[MeshPart] = []
-        places = []
-        ground = Ground(near, path_m)
-        for number in range(self.count):
-            name, kind = self.kinds[number % len(self.kinds)]
-            found = ground.place(kind, bounds_m, rng, TRIES)
-            if found is None:
-                continue
-            standing = moved(kind, *found, f"object-{number}")
-            parts += standing
-            near = np.concatenate([near, *(p.vertices_m[p.faces] for p in standing)])
-            ground = Ground(near, path_m)
-            places.append(described(name, kind, *found))
-        return parts, places
+        found = standing(self.kinds, self.count, near, bounds_m, rng, TRIES, path_m)
+        placed = [each for each in found if each is not None]
+        return [part for parts, _ in placed for part in parts], [place for _, place in placed]
 
     def _near(self, bounds_m: Array) -> Array:
         """Triangles (N, 3, 3) that reach into bounds (2, 2) in x and y."""
@@ -91,13 +80,9 @@ def crowd_of(mesh: Path, render: RenderConfig) -> Crowd | None:
         return None
     scene = load_mesh(mesh)
     kinds = [(f.stem, load_mesh(f)) for f in settings.files or carton_files(mesh)]
-    room_m = np.sort(np.ptp(scene.bounds_m, axis=0))
     for name, kind in kinds:
         size_m = np.ptp(kind.bounds_m, axis=0)
-        if (np.sort(size_m) > room_m).any():
-            shown = " x ".join(f"{side:.3g}" for side in size_m)
-            where = f"render.effects.clutter.files: {name}"
-            raise InputError(f"{where} is {shown} m, larger than the scene; check its unit")
+        refuse_larger(size_m, scene, f"render.effects.clutter.files: {name}")
     return Crowd(scene, kinds, settings.count)
 
 

@@ -13,13 +13,25 @@ import copy
 import importlib
 import io
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+from trimesh.visual.color import to_float
 
-from synfeal.mesh.gltf import BASISU, DECODED_URI, DRACO, MESHOPT, Gltf, Json, stand_alone
+from synfeal.mesh.gltf import (
+    BASISU,
+    DECODED_URI,
+    DRACO,
+    MESHOPT,
+    Gltf,
+    Json,
+    listed,
+    primitives_of,
+    stand_alone,
+)
 
 LIBRARIES = dict.fromkeys(MESHOPT, "meshoptimizer")
 LIBRARIES |= {DRACO: "DracoPy", BASISU: "opengl_basisu"}
@@ -59,44 +71,44 @@ class _Decoder:
     def __init__(self, header: Json, binary: bytes, read: Callable[[str], bytes]) -> None:
         self.header = header
         self.store = bytearray()
+        self._views: list[Json] = header.setdefault("bufferViews", [])
         self._binary, self._read = binary, read
         self._buffers: dict[int, bytes] = {}
 
     def decode(self) -> None:
         """Decode what is there, in the order in which one form lies in another."""
-        needed = {*stand_alone(self.header), *self.header.get("extensionsRequired", [])}
-        for name in needed & {name for name in LIBRARIES if can_decode(name)}:
-            if name in MESHOPT:
-                self._decode_meshopt(name)
-            elif name == DRACO:
-                self._decode_draco()
-            else:
-                self._decode_basisu()
-            self._is_read(name)
+        header = self.header
+        needed = {*stand_alone(header), *header.get("extensionsRequired", [])}
+        decoders: dict[str, Callable[[], None]] = {
+            **{name: partial(self._decode_meshopt, name) for name in MESHOPT},
+            DRACO: self._decode_draco,
+            BASISU: self._decode_basisu,
+        }
+        for name, decode in decoders.items():
+            if name in needed and can_decode(name):
+                decode()
+                for key in ("extensionsRequired", "extensionsUsed"):  # it is no longer needed
+                    header[key] = [other for other in header.get(key, []) if other != name]
         self._dequantise()
         if self.store:
             buffer = {"uri": DECODED_URI, "byteLength": len(self.store)}
-            self.header.setdefault("buffers", []).append(buffer)
+            header.setdefault("buffers", []).append(buffer)
 
     def _decode_meshopt(self, name: str) -> None:
-        for view in self._list("bufferViews"):
+        for view in self._views:
             if name in view.get("extensions", {}):
-                self._decode_view(view, view.pop("extensions")[name])
-        for buffer in self._list("buffers"):
+                stored = view["extensions"][name]
+                start = stored.get("byteOffset", 0)
+                data = self._buffer(stored["buffer"])[start : start + stored["byteLength"]]
+                kept = {key: view[key] for key in ("byteStride", "target") if key in view}
+                view.clear()
+                view.update(self._stored(decode_meshopt(data, stored)) | kept)
+        for buffer in listed(self.header, "buffers"):
             if name in buffer.get("extensions", {}) and "uri" not in buffer:
                 buffer["uri"] = DECODED_URI  # a placeholder, to which no view points any more
 
-    def _decode_view(self, view: Json, stored: Json) -> None:
-        start = stored.get("byteOffset", 0)
-        data = self._buffer(stored["buffer"])[start : start + stored["byteLength"]]
-        content = decode_meshopt(data, stored)
-        target = {"target": view["target"]} if "target" in view else {}
-        stride = {"byteStride": view["byteStride"]} if "byteStride" in view else {}
-        view.clear()
-        view.update({**self._stored(content), **stride, **target})
-
     def _decode_draco(self) -> None:
-        primitives = [p for mesh in self._list("meshes") for p in mesh["primitives"]]
+        primitives = primitives_of(self.header)
         from DracoPy import decode
 
         for primitive in (p for p in primitives if DRACO in p.get("extensions", {})):
@@ -105,64 +117,45 @@ class _Decoder:
             values = {entry["unique_id"]: np.asarray(entry["data"]) for entry in mesh.attributes}
             for name, identity in stored["attributes"].items():
                 self._fill(primitive["attributes"][name], values[identity])
-            faces = np.asarray(mesh.faces, "<u4").reshape(-1, 1)
             if "indices" in primitive:
-                self._fill(primitive["indices"], faces)
+                self._fill(primitive["indices"], np.asarray(mesh.faces, "<u4").reshape(-1, 1))
 
     def _dequantise(self) -> None:
         """Positions and texture coordinates as floats, which is how they are read."""
-        for mesh in self._list("meshes"):
-            for primitive in mesh["primitives"]:
-                for name, index in primitive["attributes"].items():
-                    accessor = self.header["accessors"][index]
-                    is_scaled = name == "POSITION" and accessor.get("normalized", False)
-                    is_uv = name.startswith("TEXCOORD")
-                    if (is_scaled or is_uv) and accessor["componentType"] != FLOAT32:
-                        if "bufferView" not in accessor or "sparse" in accessor:
-                            continue  # refused for what it is
-                        self._fill(index, fractions(self._values(accessor), accessor))
+        for primitive in primitives_of(self.header):
+            for name, index in primitive["attributes"].items():
+                accessor = self.header["accessors"][index]
+                is_scaled = name == "POSITION" and accessor.get("normalized", False)
+                is_read = is_scaled or name.startswith("TEXCOORD")
+                is_held = "bufferView" in accessor and "sparse" not in accessor  # else refused
+                if is_read and is_held and accessor["componentType"] != FLOAT32:
+                    self._fill(index, fractions(self._values(accessor), accessor))
 
     def _decode_basisu(self) -> None:
-        textures = [t for t in self._list("textures") if BASISU in t.get("extensions", {})]
+        textures = [t for t in listed(self.header, "textures") if BASISU in t.get("extensions", {})]
         for texture in (t for t in textures if "source" not in t):
-            image = self.header["images"][texture["extensions"].pop(BASISU)["source"]]
-            if image.get("mimeType") == "image/png" and "bufferView" in image:
-                texture["source"] = self.header["images"].index(image)
-                continue  # decoded for another texture
-            content = png_of_ktx2(self._image_bytes(image))
-            self._list("bufferViews").append(self._stored(content))
-            image.pop("uri", None)
-            image.update(bufferView=len(self.header["bufferViews"]) - 1, mimeType="image/png")
-            texture["source"] = self.header["images"].index(image)
-
-    def _image_bytes(self, image: Json) -> bytes:
-        if "bufferView" in image:
-            return self._view_bytes(image["bufferView"])
-        return self._uri_bytes(image["uri"])
-
-    def _list(self, key: str) -> list[Json]:
-        found: list[Json] = (
-            self.header.setdefault(key, []) if key == "bufferViews" else (self.header.get(key, []))
-        )
-        return found
-
-    def _is_read(self, name: str) -> None:
-        """The extension is no longer needed."""
-        for key in ("extensionsRequired", "extensionsUsed"):
-            if name in self.header.get(key, []):
-                self.header[key].remove(name)
+            texture["source"] = texture["extensions"].pop(BASISU)["source"]
+            image = self.header["images"][texture["source"]]
+            is_inside = "bufferView" in image
+            if not (is_inside and image.get("mimeType") == "image/png"):  # decoded for another
+                read = self._view_bytes if is_inside else self._uri_bytes
+                content = png_of_ktx2(read(image["bufferView" if is_inside else "uri"]))
+                image.pop("uri", None)
+                image.update(bufferView=self._view_of(content), mimeType="image/png")
 
     def _fill(self, accessor_index: int, values: Values) -> None:
         """Make an accessor that of ``values`` (N, C), with a view of its own."""
-        values = np.ascontiguousarray(values)
         kind = next(code for code, name in DTYPES.items() if np.dtype(name) == values.dtype)
-        self._list("bufferViews").append(self._stored(values.tobytes()))
         accessor = self.header["accessors"][accessor_index]
         for key in ("byteOffset", "normalized", "sparse", "min", "max"):
             accessor.pop(key, None)
-        accessor.update(
-            bufferView=len(self.header["bufferViews"]) - 1, componentType=kind, count=len(values)
-        )
+        view = self._view_of(np.ascontiguousarray(values).tobytes())
+        accessor.update(bufferView=view, componentType=kind, count=len(values))
+
+    def _view_of(self, content: bytes) -> int:
+        """The index of a new view of ``content``."""
+        self._views.append(self._stored(content))
+        return len(self._views) - 1
 
     def _stored(self, content: bytes) -> Json:
         """A view of ``content``, kept in the buffer of what was decoded."""
@@ -174,7 +167,7 @@ class _Decoder:
 
     def _values(self, accessor: Json) -> Values:
         """Values (N, C) of an accessor as they are stored."""
-        view = self.header["bufferViews"][accessor["bufferView"]]
+        view = self._views[accessor["bufferView"]]
         dtype, width = np.dtype(DTYPES[accessor["componentType"]]), WIDTHS[accessor["type"]]
         row = width * dtype.itemsize
         stride, count = view.get("byteStride", row), accessor["count"]
@@ -185,7 +178,7 @@ class _Decoder:
         return layout
 
     def _view_bytes(self, index: int) -> bytes:
-        view = self.header["bufferViews"][index]
+        view = self._views[index]
         start = view.get("byteOffset", 0)
         return self._buffer(view["buffer"])[start : start + view["byteLength"]]
 
@@ -236,8 +229,7 @@ def fractions(values: Values, accessor: Json) -> NDArray[np.float32]:
     """Integers (N, C) as the numbers they stand for: fractions of their range where normalised."""
     if not accessor.get("normalized", False):
         return values.astype("<f4")
-    largest = np.iinfo(values.dtype).max
-    return np.maximum(values.astype(np.float64) / largest, -1.0).astype("<f4")
+    return np.asarray(np.maximum(to_float(values), -1.0), "<f4")
 
 
 def png_of_ktx2(content: bytes) -> bytes:

@@ -109,9 +109,8 @@ def _read_parts(
 def _read_scene(path: Path, gltf: Gltf | None, findings: Findings) -> Any:
     """The file as a trimesh scene, without merging or reordering vertices."""
     resolver = RecordingResolver(path, gltf)
-    logging.getLogger("trimesh").setLevel(
-        logging.ERROR
-    )  # it prints tracebacks of what the findings name
+    # It prints tracebacks of what the findings name.
+    logging.getLogger("trimesh").setLevel(logging.ERROR)
     try:
         if gltf is None:
             return trimesh.load_scene(str(path), resolver=resolver, process=False)

@@ -1,4 +1,4 @@
-"""Where objects can stand in a scene: on what lies flat, touching nothing.
+"""Objects that stand in a scene: on what lies flat, touching nothing.
 
 An object stands upright on what lies flat below it, turned at random. Its bounding box meets no
 triangle of the scene, by the separating-axis test of Akenine-Möller (Fast 3D triangle-box overlap
@@ -7,41 +7,77 @@ testing, JGT 6(1), 2001), and keeps its distance from paths.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
 
 Array = NDArray[np.float64]
+Standing = tuple[list[MeshPart], dict[str, Any]]  # an object, and where it stands, for manifests
 CLEARANCE_M = 0.002  # between an object and what it stands on
 FLAT_M = 0.008  # what it stands on may differ by at the corners
 PATH_CLEARANCE_M = 0.25  # between an object and a camera that passes
 
 
-@dataclass(frozen=True)
+def standing(
+    kinds: Sequence[tuple[str, TexturedMesh]],  # objects by name, taken in turn
+    count: int,  # how many are to stand
+    corners: Array,  # (N, 3, 3) of the triangles they stand on, and must not touch
+    bounds_m: Array,  # (2, 3) they are let down from random places between these corners
+    rng: np.random.Generator,
+    tries: int,  # places for each of them
+    path_m: Array | None = None,  # (P, 3) positions that a camera passes one after the other
+) -> Iterator[Standing | None]:
+    """One object after the other, none touching another; None for each that finds no place."""
+    ground = Ground(corners, path_m)
+    for number in range(count):
+        name, kind = kinds[number % len(kinds)]
+        found = ground.place(kind, bounds_m, rng, tries)
+        if found is None:
+            yield None
+            continue
+        foot_m, yaw_rad = found
+        lower, upper = kind.bounds_m
+        middle = np.array([*(lower + upper)[:2] / 2, lower[2]])
+        parts = [
+            replace(
+                part,
+                name=f"object-{number}",
+                vertices_m=(part.vertices_m - middle) @ _about_z(yaw_rad).T + foot_m,
+            )
+            for part in kind.parts
+        ]
+        corners = np.concatenate([corners, *(part.vertices_m[part.faces] for part in parts)])
+        ground = Ground(corners, path_m)
+        place = {"position_m": foot_m.round(4).tolist(), "yaw_deg": round(np.degrees(yaw_rad), 2)}
+        yield parts, {"name": name, **place, "size_m": (upper - lower).round(4).tolist()}
+
+
+def refuse_larger(size_m: Array, mesh: TexturedMesh, what: str) -> None:
+    """Check that an object of a size (3,) fits into the bounds of a scene, however it is turned."""
+    if (np.sort(size_m) > np.sort(np.ptp(mesh.bounds_m, axis=0))).any():
+        shown = " x ".join(f"{side:.3g}" for side in size_m)
+        raise InputError(f"{what} is {shown} m, larger than the scene; check its unit")
+
+
 class Ground:
     """What objects stand on, and must not touch."""
 
-    corners: Array  # (N, 3, 3) of its triangles
-    path_m: Array | None = None  # (P, 3) positions that a camera passes one after the other
-
-    @cached_property
-    def _caster(self) -> RayCaster:
-        count = len(self.corners)
-        return RayCaster(self.corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))
-
-    @cached_property
-    def _steps(self) -> Array:
-        """The path, or its only position, as triangles (P - 1, 3, 3) without an area."""
-        path_m = np.zeros((0, 3)) if self.path_m is None else self.path_m
+    def __init__(self, corners: Array, path_m: Array | None) -> None:
+        """Take what :func:`standing` takes."""
+        self._corners = corners
+        index = np.arange(3 * len(corners)).reshape(-1, 3)
+        self._caster = RayCaster(corners.reshape(-1, 3), index)
+        path_m = np.zeros((0, 3)) if path_m is None else path_m
+        # The path, or its only position, as triangles (P - 1, 3, 3) without an area.
         ends_m = path_m[1:] if len(path_m) > 1 else path_m
-        return np.stack([path_m[: len(ends_m)], ends_m, ends_m], axis=1)
+        self._steps = np.stack([path_m[: len(ends_m)], ends_m, ends_m], axis=1)
 
     def place(
         self, kind: TexturedMesh, bounds_m: Array, rng: np.random.Generator, tries: int
@@ -64,30 +100,9 @@ class Ground:
             centre_m = foot_m + np.array([0.0, 0.0, half_m[2]])
             if meets_box(self._steps, centre_m, half_m + PATH_CLEARANCE_M, yaw_rad).any():
                 continue
-            if not meets_box(self.corners, centre_m, half_m, yaw_rad).any():
+            if not meets_box(self._corners, centre_m, half_m, yaw_rad).any():
                 return foot_m, yaw_rad
         return None
-
-
-def moved(kind: TexturedMesh, foot_m: Array, yaw_rad: float, name: str) -> list[MeshPart]:
-    """An object with the middle of its bottom at a place, turned."""
-    lower, upper = kind.bounds_m
-    middle = np.array([*(lower + upper)[:2] / 2, lower[2]])
-    turn = _about_z(yaw_rad)
-    return [
-        replace(part, name=name, vertices_m=(part.vertices_m - middle) @ turn.T + foot_m)
-        for part in kind.parts
-    ]
-
-
-def described(name: str, kind: TexturedMesh, foot_m: Array, yaw_rad: float) -> dict[str, Any]:
-    """Where an object stands, for the manifest."""
-    return {
-        "name": name,
-        "position_m": foot_m.round(4).tolist(),
-        "yaw_deg": round(np.degrees(yaw_rad), 2),
-        "size_m": np.ptp(kind.bounds_m, axis=0).round(4).tolist(),
-    }
 
 
 def _about_z(yaw_rad: float) -> Array:
@@ -95,11 +110,8 @@ def _about_z(yaw_rad: float) -> Array:
     return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
-def meets_box(
-    corners: Array, centre_m: Array, half_m: Sequence[float] | Array, yaw_rad: float
-) -> NDArray[np.bool_]:
+def meets_box(corners: Array, centre_m: Array, half: Array, yaw_rad: float) -> NDArray[np.bool_]:
     """Which triangles (N, 3, 3) meet a box that is turned about z, its inside included: (N,)."""
-    half = np.asarray(half_m, np.float64)
     corners = (corners - centre_m) @ _about_z(yaw_rad)
     meets = ((corners.min(axis=1) <= half) & (corners.max(axis=1) >= -half)).all(axis=1)
     near = corners[meets]

@@ -20,7 +20,7 @@ from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.properties import mesh_properties
 from synfeal.mesh.save import save_glb
-from synfeal.mesh.standing import Ground, described, moved
+from synfeal.mesh.standing import refuse_larger, standing
 from synfeal.mesh.triangles import Triangles, merge_vertices, save_collision_mesh
 from synfeal.planning.plan import sampling_box_of
 from synfeal.scenes import build_scene, materials
@@ -132,30 +132,24 @@ def cluttered(
     Raises:
         InputError: an object is larger than the scene, cannot be read, or finds no place.
     """
-    room_m = np.ptp(mesh.bounds_m, axis=0)
     kinds = [(path.stem, load_mesh(path)) for path in clutter.files]
     if not kinds:
-        _refuse_larger(np.full(3, clutter.size_m[1]), room_m, f"{key}: size_m: a carton")
+        refuse_larger(np.full(3, clutter.size_m[1]), mesh, f"{key}: size_m: a carton")
         kinds = [(f"carton-{n}", _carton(clutter, rng)) for n in range(min(clutter.count, CARTONS))]
     for name, kind in kinds:
-        _refuse_larger(np.ptp(kind.bounds_m, axis=0), room_m, f"{key}: {name}")
+        refuse_larger(np.ptp(kind.bounds_m, axis=0), mesh, f"{key}: {name}")
     vertices, faces = mesh.merged()
-    corners = vertices[faces]
     parts: list[MeshPart] = []
     places: list[dict[str, Any]] = []
-    for number in range(clutter.count):
-        name, kind = kinds[number % len(kinds)]
-        found = Ground(corners).place(kind, bounds_m, rng, TRIES)
-        if found is None:
+    found = standing(kinds, clutter.count, vertices[faces], bounds_m, rng, TRIES)
+    for number, each in enumerate(found):
+        if each is None:
             raise InputError(
-                f"{key}: no place left for {name}, object {number + 1} of {clutter.count}; give"
-                " fewer or smaller ones"
+                f"{key}: no place left for {kinds[number % len(kinds)][0]}, object {number + 1} of"
+                f" {clutter.count}; give fewer or smaller ones"
             )
-        foot_m, yaw_rad = found
-        standing = moved(kind, foot_m, yaw_rad, f"object-{number}")
-        parts += standing
-        corners = np.concatenate([corners, *(p.vertices_m[p.faces] for p in standing)])
-        places.append(described(name, kind, foot_m, yaw_rad))
+        parts += each[0]
+        places.append(each[1])
     return TexturedMesh(tuple(parts)), places
 
 
@@ -164,12 +158,6 @@ def save_cartons(mesh: Path) -> None:
     rng, usual = generator_of("cartons"), ClutterConfig()
     for path in carton_files(mesh):
         save_glb(path, _carton(usual, rng))
-
-
-def _refuse_larger(size_m: Array, room_m: Array, what: str) -> None:
-    if (np.sort(size_m) > np.sort(room_m)).any():
-        shown = " x ".join(f"{side:.3g}" for side in size_m)
-        raise InputError(f"{what} is {shown} m, larger than the scene; check its unit")
 
 
 def _carton(clutter: ClutterConfig, rng: np.random.Generator) -> TexturedMesh:
