@@ -36,11 +36,13 @@ class Kind:
     dtype: str  # of the column in memory
     optional: bool = False  # cells may be empty; in memory they are missing values
     expected: bool = True  # files must have the column; without it, all its cells are missing
+    finite: bool = True
 
 
 TEXT = Kind("str")
 COUNT = Kind("int64")
-NUMBER = Kind("float64")  # finite
+NUMBER = Kind("float64")
+LIMITLESS = Kind("float64", finite=False)  # may be infinite
 MAYBE_COUNT = Kind("Int64", optional=True)
 MAYBE = Kind("float64", optional=True)
 EXTRA = Kind("float64", optional=True, expected=False)
@@ -151,7 +153,7 @@ def _value(cell: str, kind: Kind) -> object:
         number = float(cell)
     except ValueError:
         return _BAD
-    if not math.isfinite(number):
+    if math.isnan(number) or (kind.finite and math.isinf(number)):
         return _BAD
     if kind.dtype == "float64":
         return number

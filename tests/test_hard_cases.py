@@ -8,13 +8,21 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from synfeal.frames import read_records
+from synfeal.frames import read_frame
 from synfeal.report import stats
-from synfeal.report.document import hard_cases_latex
+from synfeal.report.columns import side_sheet
 from synfeal.report.hard_cases import estimates, exact, scenes
 from synfeal.report.hard_cases import table as hard_table
-from synfeal.report.hard_cases.table import CASES, SCHEMA, row_of, rows_of, write_hard_cases
-from synfeal.report.html.side_tables import hard_cases_table
+from synfeal.report.hard_cases.table import (
+    CASES,
+    SCHEMA,
+    row_of,
+    rows_of,
+    side_table,
+    write_hard_cases,
+)
+from synfeal.report.html.tables import side_html
+from synfeal.report.sheet import sheet_latex
 from tests.report_results import write_rows
 
 ALL = {(family.name, name): family for family in CASES for name in family.cases}
@@ -32,13 +40,16 @@ def test_every_case_keeps_its_bound_and_pages_mark_what_exceeds_it(all_rows, tmp
     assert [(row["case"], row["our_error"]) for row in all_rows if not row["ok"]] == []
     assert len(ALL) == len(all_rows) >= 45
     write_rows(tmp_path / "table.csv", SCHEMA, all_rows)
-    lines = ET.fromstring(hard_cases_table(tmp_path / "table.csv")).findall(".//tbody/tr")
+    table = side_table(read_frame(tmp_path / "table.csv", SCHEMA))
+    lines = ET.fromstring(side_html(table)).findall(".//tbody/tr")
     for row, line in zip(all_rows, lines, strict=True):
         assert ("✗" in "".join(line[2].itertext())) == (row["naive_error"] > row["bound"])
         assert "✗" not in "".join(line[3].itertext())
-    text = hard_cases_latex([row for _, row in read_records(tmp_path / "table.csv")])
-    refused = r"\textcolor{red!85!black}{\textbf{answered}} & refused &"
-    assert text.count(refused) == sum(row["quantity"] == exact.REFUSAL for row in all_rows)
+    text = sheet_latex(side_sheet(table))
+    for row in all_rows:
+        if row["quantity"] == exact.REFUSAL:
+            formulas = f"$\\times$ answered ({row['naive']}) & refused ({row['ours']}) &"
+            assert formulas.replace("_", r"\_") in text
     assert {c for c in text if ord(c) > 127} <= {"µ", "ö"}  # those LaTeX knows
 
 

@@ -1,5 +1,7 @@
 """The table of references and what is made of it, from scores that are known."""
 
+import xml.etree.ElementTree as ET
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -15,16 +17,18 @@ from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.files import write_json
 from synfeal.frames import read_frame
+from synfeal.report import robustness
+from synfeal.report.columns import side_sheet
 from synfeal.report.figures.error_by_method import references_by_noise
-from synfeal.report.html.side_tables import references_table as html_table
+from synfeal.report.html.tables import side_html
+from synfeal.report.layouts import label_title
 from synfeal.report.references import (
     crossing_finding,
-    label_title,
     read_references,
-    references_sheet,
+    side_table,
     write_references_table,
 )
-from synfeal.report.robustness import printed, robustness_sheet, write_robustness
+from synfeal.report.robustness import printed, write_robustness
 from tests.coloured_frames import answering, save
 from tests.report_results import experiment, metrics, write_run
 
@@ -82,14 +86,19 @@ def test_the_table_has_a_row_per_data_set_and_method_and_all_are_shown(table, ro
     assert (row.noise_m, row.noise_deg, row.kind) == (0.1, 5, "reference")
     mine = table[table.method == "mine"].iloc[0]
     assert (mine.title, mine.kind, mine.labels) == ("Mine", "external", "synfeal")
-    sheet = references_sheet(table)
+    sheet = side_sheet(side_table(table))
     titles = [reference.title for reference in REFERENCES.values()]
     assert list(sheet.headings[2:-1]) == ["Mean training pose", *titles, "Mine"]
     (clean,) = sheet.lines.index[sheet.lines.label == "Synfeal"]  # its labels are the truth
     best = sheet.values[(sheet.values.line == clean) & (sheet.values["column"] == "Best localizer")]
     assert best.text.tolist() == ["PoseNet, 0.2 m, 12°, 0 %"]
-    page = html_table(root / "tables" / "references.csv")
-    assert page.count("<tr") == 1 + len(table)
+    took = sheet.values[sheet.values["column"] == REFERENCES["structure-depth"].title].text
+    assert took.tolist()[-2:] == ["40 ms", "0 of 500"]
+    # On the page stand all localizers; a row in two scores has a line for each.
+    page = ET.fromstring(side_html(side_table(table)))
+    rows = page.findall(".//tbody/tr")
+    assert len(page.findall(".//thead/tr/th")) == 1 + len(sheet.headings) + len(MODELS)
+    assert [row.get("class") for row in rows] == [*("labels", "true") * 3, None, None, None]
     rows = [row for row in design() if row.table == TABLE3]
     (upper, lower) = references_by_noise(table, rows).axes
     drawn = {line.get_label(): line.get_ydata() for line in upper.lines}
@@ -179,7 +188,7 @@ def test_errors_are_those_of_known_answers(tmp_path):
         **{"nearest-thumbnail": 2, "nearest-vlad": 2, "posenet": 2},
         "structure-depth": 1,
     }
-    sheet = robustness_sheet(again)
+    sheet = side_sheet(robustness.side_table(again))
     assert "1 of the 2 test frames" in sheet.remarks[0]
     assert [printed(v, 2) for v in (1.234, 0.1, 0.00212)] == ["1.23", "0.10", "0.0021"]
     assert sheet.lines.groupby("block", sort=False).size().tolist() == [3, 3]

@@ -150,7 +150,10 @@ def test_assistance_counts_each_split_and_both_beside_the_papers_counts(results,
     }
     for column, values in expected.items():
         assert tuple(row[column] for row in rows[:3]) == values, column
-    assert "3 of 34" in (tmp_path / "a.tex").read_text()
+    own, paper = (tmp_path / "a.tex").read_text().splitlines()[10:12]
+    assert "SfM & 17 & 6 & 0 & 427 & 421 & 6 & 0.10 m" in own
+    printed = [r"\textcolor{gray}{" + text + "}" for text in ("paper", "34", "3")]
+    assert paper.startswith(f" & {' & '.join(printed)} & ")
 
 
 GOLDEN = r"""\begin{table*}[tp]

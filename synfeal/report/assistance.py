@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from pydantic import BaseModel
 
@@ -12,9 +13,9 @@ from baselines.groundtruth.chain import BatchRecord
 from baselines.groundtruth.methods import METHODS
 from synfeal.config import Design
 from synfeal.frames import COUNT, MAYBE, MAYBE_COUNT, TEXT, frame_of, write_frame
-from synfeal.report.layouts import SOURCES, scene_title
+from synfeal.report.columns import Column, SideTable, write_side_latex
+from synfeal.report.layouts import SOURCES, data_set_titles
 from synfeal.report.results import read_result, shaped
-from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
 
 NAME = "assistance"
 PUBLISHED_ASSISTED = {
@@ -39,6 +40,24 @@ SCHEMA = {
     **dict.fromkeys(LAST_POSE, MAYBE),
     **dict.fromkeys(("published_assisted", "published_batches"), MAYBE_COUNT),
 }
+CAPTION = "Assistance that the ground-truth methods needed."
+COLUMNS = (
+    Column("Data set", "data_set"),
+    Column("Labels from", "title"),
+    Column("Batches", "batches", "{:.0f}", paper="published_batches"),
+    Column("Assisted", "assisted", "{:.0f}", paper="published_assisted"),
+    Column("Lost", "lost", "{:.0f}"),
+    Column("Frames", "frames", "{:.0f}"),
+    Column("Registered", "registered", "{:.0f}"),
+    Column("Filled", "filled", "{:.0f}"),
+    Column("Last pose, before", "last_m_before_median", text="before"),
+    Column("Last pose, after", "last_m_after_median", text="after"),
+)
+REMARK = (
+    "Batches of both splits together. Assisted: the last pose was replaced by the true one; lost:"
+    " no motion was found. Last pose: its error before and after assistance, median over the"
+    " batches. In grey: what section 4.1 of the paper counts, of the batches its images make."
+)
 Records = list[dict[str, Any]]
 
 
@@ -64,7 +83,7 @@ def write_assistance_table(design: Design, root: Path, out_csv: Path, out_tex: P
     ]
     table = frame_of(records, SCHEMA)
     write_frame(out_csv, table)
-    write_latex(out_tex, assistance_sheet(table[table.split == TOTAL]))
+    write_side_latex(out_tex, side_table(table))
 
 
 def assistance_record(
@@ -101,34 +120,17 @@ def batch_records(root: Path, scene: str, size: str, method: str, split: str) ->
     return records
 
 
-def assistance_sheet(table: pd.DataFrame) -> Sheet:
-    """The rows of both splits together, as printed."""
-    texts = pd.DataFrame(
-        {
-            "Labels from": table.method.map(SOURCES),
-            "Data set": table.scene.map(scene_title) + ", " + table["size"],
-            "Batches": table.batches.astype(str),
-            "Assisted": table.assisted.astype(str),
-            "Published": [
-                "–" if pd.isna(assisted) else f"{assisted} of {batches}"
-                for assisted, batches in table[["published_assisted", "published_batches"]].values
-            ],
-            "Lost": table.lost.astype(str),
-            "Frames": table.frames.astype(str),
-            "Filled": table.filled.astype(str),
-            "Last pose off by": last_pose(table, "before"),
-        }
-    )
-    remark = (
-        "Training and test batches together. Last pose off by: median over the batches before "
-        "assistance. Published: counts of section 4.1, of the batches its images make."
-    )
-    return sheet_of_texts(
-        NAME, "Assistance that the ground-truth methods needed.", texts, (remark,)
-    )
+def side_table(table: pd.DataFrame) -> SideTable:
+    """The rows of both splits together."""
+    rows = of_both_splits(table)
+    for when in ("before", "after"):
+        errors = rows[[f"last_m_{when}_median", f"last_deg_{when}_median"]].to_numpy(float)
+        rows[when] = ["–" if np.isnan(m) else f"{m:.2f} m, {deg:.2f}°" for m, deg in errors]
+    return SideTable(NAME, CAPTION, COLUMNS, rows, REMARK, block="data_set")
 
 
-def last_pose(table: pd.DataFrame, when: str) -> list[str]:
-    """How far off last poses of batches were before or after assistance, in median."""
-    errors = table[[f"last_m_{when}_median", f"last_deg_{when}_median"]].to_numpy(float)
-    return ["–" if pd.isna(m) else f"{m:.2f} m, {deg:.2f}°" for m, deg in errors]
+def of_both_splits(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of both splits together, with titles of their data set and method."""
+    rows = table[table.split == TOTAL]
+    titles = rows.method.map(lambda method: SOURCES.get(method, method))
+    return rows.assign(data_set=data_set_titles(rows), title=titles)

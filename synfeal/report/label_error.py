@@ -22,10 +22,9 @@ from baselines.groundtruth.methods import METHODS, stages_of
 from synfeal.config import Design
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.frames import COUNT, MAYBE, NUMBER, TEXT, frame_of, write_frame
-from synfeal.report.assistance import SPLITS, TOTAL, batch_records
-from synfeal.report.layouts import SOURCES, scene_title
+from synfeal.report.assistance import SPLITS, TOTAL, batch_records, of_both_splits
+from synfeal.report.columns import Column, SideTable, write_side_latex
 from synfeal.report.results import read_result
-from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
 
 NAME = "label_error"
 # Labels without assistance, and the labels of the data set, by the name of their files.
@@ -46,6 +45,29 @@ SCHEMA = {
     **dict.fromkeys(("share_within_5cm_5deg", "share_filled"), NUMBER),
     **dict.fromkeys(("seconds_per_frame", "peak_memory_mb"), NUMBER),
 }
+CAPTION = "Errors of re-estimated labels against the true poses, before and after assistance."
+COLUMNS = (
+    Column("Data set", "data_set"),
+    Column("Labels from", "title"),
+    Column("Assistance", "assistance"),
+    Column("Median, m", "position_m_median", "{:.3g}"),
+    Column("RMSE, m", "position_m_rmse", "{:.3g}"),
+    Column("Max, m", "position_m_max", "{:.3g}"),
+    Column("Median, °", "orientation_deg_median", "{:.3g}"),
+    Column("RMSE, °", "orientation_deg_rmse", "{:.3g}"),
+    Column("Max, °", "orientation_deg_max", "{:.3g}"),
+    Column("Drift, %", "relative_25_m_per_m", "{:.2g}", 100),
+    Column("Drift, °/m", "relative_25_deg_per_m", "{:.2g}"),
+    Column("Within 5 cm, 5°, %", "share_within_5cm_5deg", "{:.0f}", 100),
+    Column("Filled, %", "share_filled", "{:.1f}", 100),
+    Column("s per frame", "seconds_per_frame", "{:.2g}"),
+    Column("Memory, MB", "peak_memory_mb", "{:,.0f}"),
+)
+REMARK = (
+    "Both splits, without alignment: the first pose is the true one. Before assistance: what the"
+    " labels were had no last pose been replaced. Drift: errors of the motion over 25 frames, by"
+    " the metre travelled; a replaced pose adds to it. Figures show both along the sequence."
+)
 
 
 def write_label_error_table(design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
@@ -62,7 +84,7 @@ def write_label_error_table(design: Design, root: Path, out_csv: Path, out_tex: 
     ]
     table = frame_of(records, SCHEMA)
     write_frame(out_csv, table)
-    write_latex(out_tex, label_error_sheet(table[table.split == TOTAL]))
+    write_side_latex(out_tex, side_table(table))
 
 
 def label_records(
@@ -128,40 +150,6 @@ def cost_record(
     return {"seconds_per_frame": seconds / frames, "peak_memory_mb": max(peaks)}
 
 
-def label_error_sheet(table: pd.DataFrame) -> Sheet:
-    """The rows of both splits together, as printed: a line before and a line after assistance."""
-    data_set = table.scene.map(scene_title) + ", " + table["size"]
-    texts = pd.DataFrame(
-        {
-            "block": data_set,
-            "row": data_set + table.method,
-            "Labels from": table.method.map(SOURCES).where(table.assistance == "before", ""),
-            "Assistance": table.assistance,
-            **{
-                title: _pairs(table, f"position_m_{which}", f"orientation_deg_{which}")
-                for title, which in {"Median": "median", "RMSE": "rmse", "Maximum": "max"}.items()
-            },
-            "Drift over 25 frames": _pairs(
-                table, "relative_25_m_per_m", "relative_25_deg_per_m", (" m/m", "°/m")
-            ),
-            "Within 5 cm, 5°": [f"{100 * share:.0f} %" for share in table.share_within_5cm_5deg],
-            "Filled": [f"{100 * share:.1f} %" for share in table.share_filled],
-            "s per frame": [f"{seconds:.3g}" for seconds in table.seconds_per_frame],
-            "Memory": [f"{megabytes:.0f} MB" for megabytes in table.peak_memory_mb],
-        }
-    )
-    caption = "Errors of re-estimated labels against the true poses, before and after assistance."
-    remark = (
-        "Positions and orientations without alignment: the first pose is the true one. Drift: "
-        "errors of the motion over 25 frames, by the metre travelled."
-    )
-    return sheet_of_texts(NAME, caption, texts, (remark,))
-
-
-def _pairs(
-    table: pd.DataFrame, first: str, second: str, units: tuple[str, str] = (" m", "°")
-) -> list[str]:
-    texts = [
-        f"{a:.3g}{units[0]}, {b:.3g}{units[1]}" for a, b in table[[first, second]].to_numpy(float)
-    ]
-    return [text.replace("nan", "–") for text in texts]
+def side_table(table: pd.DataFrame) -> SideTable:
+    """A row before and a row after assistance for every method and data set."""
+    return SideTable(NAME, CAPTION, COLUMNS, of_both_splits(table), REMARK, block="data_set")

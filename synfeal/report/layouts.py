@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pandas as pd
@@ -72,6 +73,17 @@ UNITS = {"position_m": " m", "orientation_deg": "°"}
 def scene_title(scene: str) -> str:
     """A scene's name as printed, e.g. ``Large Room``."""
     return scene.replace("_", " ").title()
+
+
+def data_set_titles(table: pd.DataFrame) -> pd.Series:
+    """Data sets of a table with ``scene`` and ``size``, as in ``Large Room, 6k``."""
+    return table.scene.map(scene_title) + ", " + table["size"]
+
+
+def label_title(labels: str) -> str:
+    """A label set as tables call it: ``noise-p0.1-r5`` is noise 0.1 m, 5°."""
+    found = re.fullmatch(r"(\w+)-p([\d.]+)-r([\d.]+)", labels)
+    return f"{found[1]} {found[2]} m, {found[3]}°" if found else SOURCES.get(labels, labels)
 
 
 def row_label(name: str, cell: Any) -> str:

@@ -7,11 +7,20 @@ from pathlib import Path
 
 import pandas as pd
 
-from synfeal.frames import COUNT, MAYBE, MAYBE_COUNT, NUMBER, TEXT, frame_of, write_frame
+from synfeal.frames import (
+    COUNT,
+    MAYBE,
+    MAYBE_COUNT,
+    NUMBER,
+    TEXT,
+    frame_of,
+    records_of,
+    write_frame,
+)
 from synfeal.report.cells import MeshFacts, published_meshes
+from synfeal.report.columns import Column, SideTable, write_side_latex
 from synfeal.report.layouts import scene_title
 from synfeal.report.results import read_result
-from synfeal.report.sheet import PAPER, Sheet, sheet_of_texts, write_latex
 
 NAME = "table1_meshes"
 # Title, and how numbers are written.
@@ -25,9 +34,10 @@ SCHEMA = {
     **{"published_vertices": MAYBE_COUNT, "published_faces": MAYBE_COUNT},
     "published_volume_m3": MAYBE,
 }
+CAPTION = "Properties of the 3D textured meshes used."
 REMARK = (
     "Vertices at distinct positions, as a scan file counts them: copies along texture seams count"
-    " once. Volume of the axis-aligned bounding box. Lines marked paper: the meshes of the paper."
+    " once. Volume of the axis-aligned bounding box. In grey: the meshes of the paper."
 )
 
 
@@ -35,7 +45,7 @@ def write_meshes_table(scenes: Sequence[str], root: Path, out_csv: Path, out_tex
     """Write Table 1 from the properties of the scenes' meshes: a row per scene, ``SCHEMA``."""
     meshes = read_meshes(scenes, root)
     write_frame(out_csv, meshes)
-    write_latex(out_tex, meshes_sheet(meshes))
+    write_side_latex(out_tex, side_table(meshes))
 
 
 def read_meshes(scenes: Sequence[str], root: Path) -> pd.DataFrame:
@@ -58,21 +68,14 @@ def read_mesh_facts(root: Path, scene: str) -> MeshFacts:
     return facts
 
 
-def meshes_sheet(meshes: pd.DataFrame) -> Sheet:
-    """Table 1 as printed: properties down, scenes across."""
-    scenes = meshes.set_index(meshes.scene.map(scene_title))
-    lines = [
-        {"row": fact, "kind": kind, " ": title, "  ": against}
-        | {
-            scene: "–" if pd.isna(value) else form.format(value)
-            for scene, value in scenes[f"{start}{fact}"].items()
-        }
-        for fact, (label, form) in FACTS.items()
-        for start, kind, title, against in (
-            ("", "", label, "regenerated"),
-            ("published_", PAPER, "", "paper"),
-        )
-    ]
-    return sheet_of_texts(
-        NAME, "Properties of the 3D textured meshes used.", pd.DataFrame(lines), (REMARK,)
-    )
+def side_table(meshes: pd.DataFrame) -> SideTable:
+    """Table 1 as the paper prints it: properties down, scenes across."""
+    columns = [Column("Property", "fact")]
+    rows = pd.DataFrame({"fact": [title for title, _ in FACTS.values()]})
+    for mesh in records_of(meshes):
+        scene, printed = mesh["scene"], f"published_{mesh['scene']}"
+        columns.append(Column(scene_title(scene), scene, text=scene, paper=printed))
+        for name, start in {scene: "", printed: "published_"}.items():
+            values = [(mesh[f"{start}{fact}"], form) for fact, (_, form) in FACTS.items()]
+            rows[name] = [None if pd.isna(value) else form.format(value) for value, form in values]
+    return SideTable(NAME, CAPTION, columns, rows, REMARK)

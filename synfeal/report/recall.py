@@ -1,27 +1,27 @@
 """The scores that localization papers print beside medians: means, recalls, reprojection error.
 
-``recall.csv`` has every run of the design, its repetitions averaged; on paper stand the rows of
-Table 4, where labels are true poses and there is one number for each score.
+``recall.csv`` has every run of the design, its repetitions averaged; on paper stand those of
+Table 4, whose labels are true poses: there is one number for each score.
 """
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import pandas as pd
 from pydantic import FiniteFloat
 
+from baselines.groundtruth.methods import SIMULATOR
 from synfeal.config import MODELS, Design, Run
-from synfeal.evaluation.metrics import BOUNDS, MEANS, POSITION
+from synfeal.evaluation.metrics import BOUNDS, MEANS, ORIENTATION, POSITION
 from synfeal.evaluation.reprojection import DCRE_BOUNDS
 from synfeal.frames import COUNT, MAYBE, TEXT, frame_of, write_frame
-from synfeal.report.layouts import TITLES, scene_title
+from synfeal.report.columns import Column, SideTable, write_side_latex
+from synfeal.report.layouts import TITLES, data_set_titles, label_title
 from synfeal.report.results import read_result, shaped
-from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
 from synfeal.report.stats import REMEDY
 
-NAME, PRINTED = "recall", "table4_size"
+NAME = "recall"
 KEYS = ["scene", "size", "labels", "init", "model"]
 DCRE = ("dcre", *(f"dcre_below_{bound:g}" for bound in DCRE_BOUNDS))
 SCORES = (*MEANS.values(), *(bound.name for bound in BOUNDS), *DCRE)
@@ -41,17 +41,31 @@ REMARK = (
     " visual-localization benchmark's; 50 cm, 15° suits regression at this scale. DCRE: median over"
     " the frames, and the share of frames below 15 %."
 )
+SHOWN = (
+    Column("Data set", "data_set"),
+    Column("Labels", "labels", on_paper=False),
+    Column("Start", "init", on_paper=False),
+    Column("Localizer", "model"),
+    Column("Mean, m", MEANS[POSITION], "{:.2f} m", scored=True),
+    Column("Mean, °", MEANS[ORIENTATION], "{:.1f}°", scored=True),
+    *(Column(bound.title, bound.name, "{:.1f} %", 100, scored=True) for bound in BOUNDS),
+    Column("DCRE", DCRE[0], "{:.1f} %", 100, scored=True),
+    *(
+        Column(f"DCRE < {bound:.0%}", f"dcre_below_{bound:g}", "{:.1f} %", 100, scored=True)
+        for bound in DCRE_BOUNDS
+    ),
+)
 
 
 def write_recall_table(design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
-    """Write one row per cell of any table, and the rows of Table 4 as LaTeX.
+    """Write one row per cell of any table; in LaTeX those whose labels are true poses.
 
     Scores against the labels, under names that end in ``_true`` against the true poses, each with
     95 % limits; empty where a run failed.
     """
     table = recall_table(design, root)
     write_frame(out_csv, table)
-    write_latex(out_tex, recall_sheet(design, table))
+    write_side_latex(out_tex, side_table(table))
 
 
 def recall_table(design: Design, root: Path) -> pd.DataFrame:
@@ -80,33 +94,13 @@ def _read(path: Path) -> dict[str, float | None]:
     return scores
 
 
-def recall_sheet(design: Design, table: pd.DataFrame) -> Sheet:
-    """The rows of Table 4 as printed, a block for each; those of all tables where it has none."""
-    rows = design.rows_of(PRINTED) or design.rows
-    keys = pd.DataFrame(
-        [(r.scene, r.size, r.label_id, r.init) for r in rows],
-        columns=["scene", "size", "labels", "init"],
+def side_table(table: pd.DataFrame) -> SideTable:
+    """A row for every run; on paper those whose labels are true, if there are any."""
+    true = (table.labels == SIMULATOR) & (table.init == "pretrained")
+    rows = table.assign(
+        data_set=data_set_titles(table),
+        labels=table.labels.map(label_title),
+        model=table.model.map(TITLES),
+        on_paper=true | (not true.any()),
     )
-    chosen = keys.merge(table, how="left", on=list(keys))
-    records = [record for _, record in chosen.iterrows()]
-    scores = {bound.title: bound.name for bound in BOUNDS}
-    scores |= {"DCRE": DCRE[0], f"DCRE < {DCRE_BOUNDS[-1]:.0%}": DCRE[-1]}
-    texts = pd.DataFrame(
-        {
-            "block": chosen.scene.map(scene_title) + ", " + chosen["size"],
-            "Localizer": chosen.model.map(TITLES),
-            "Mean error": [", ".join(shown(r, score) for score in MEANS.values()) for r in records],
-            **{title: [shown(r, score) for r in records] for title, score in scores.items()},
-        }
-    )
-    return sheet_of_texts(NAME, CAPTION, texts, (REMARK,))
-
-
-def shown(record: pd.Series, score: str, end: str = "_true") -> str:
-    """A score as printed; a dash where there is none."""
-    value = float(record[f"{score}{end}"])
-    if math.isnan(value):
-        return "–"
-    if score in MEANS.values():
-        return f"{value:.2f} m" if score == MEANS[POSITION] else f"{value:.1f}°"
-    return f"{100 * value:.1f} %"
+    return SideTable(NAME, CAPTION, SHOWN, rows, REMARK, block="data_set")

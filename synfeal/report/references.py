@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import fmean
 from typing import Any, NamedTuple
@@ -29,12 +28,20 @@ from synfeal.frames import (
     TEXT,
     frame_of,
     read_frame,
+    records_of,
+    rows_of,
     write_frame,
 )
 from synfeal.report.cells import LIMITS
-from synfeal.report.layouts import SOURCES, TITLES, scene_title
+from synfeal.report.columns import (
+    Column,
+    SideTable,
+    by_method,
+    method_columns,
+    write_side_latex,
+)
+from synfeal.report.layouts import SOURCES, TITLES, data_set_titles, label_title, scene_title
 from synfeal.report.results import read_result
-from synfeal.report.sheet import Sheet, sheet_of_texts, write_latex
 from synfeal.report.stats import MEASURES, REMEDY, combine, read_metrics
 
 NAME, LOCALIZER = "references", "localizer"
@@ -47,6 +54,15 @@ SCHEMA = {
     **dict.fromkeys(("n_train", "n_test", "n_seeds"), COUNT),
     **{"failed": MAYBE_COUNT, "seconds_per_frame": MAYBE},
 }
+LINES = ["data_set", "labels", "against"]
+CAPTION = (
+    "Reference methods beside the localizers, all from the labels of the data set: median errors,"
+    " and the share of the test frames within 5 cm and 5 degrees."
+)
+REMARK = (
+    "Answers that failed count as infinite errors. The best localizer is the best by position."
+    " Times: of one processor core, without what is done once for all label sets; median over them."
+)
 
 
 def write_references_table(
@@ -58,7 +74,7 @@ def write_references_table(
     """
     table = references_table(design, external, root)
     write_frame(out_csv, table)
-    write_latex(out_tex, references_sheet(table))
+    write_side_latex(out_tex, side_table(table))
 
 
 def references_table(design: Design, external: Externals, root: Path) -> pd.DataFrame:
@@ -104,70 +120,63 @@ def _record(folders: Sequence[Path]) -> dict[str, Any]:
     return scores | {column: fmean(m[name] for m in every) for name, column in names.items()}
 
 
-def references_sheet(table: pd.DataFrame) -> Sheet:
-    """A block per scene and size, a row per label set, a column per method.
+def side_table(table: pd.DataFrame) -> SideTable:
+    """A row for each label set and score, a column per method; below, what an answer takes.
 
-    Lines are against the labels and, where these are not the true poses, against those too.
+    Where labels are the true poses, both scores are one.
     """
-    titles = titles_in(table[table.kind != LOCALIZER])
-    records = []
-    for (scene, size, labels), part in table.groupby(["scene", "size", "labels"], sort=False):
-        exact = labels == SIMULATOR
-        for against, end in {"labels": "", "true poses": "_true"}.items():
-            if exact and not end:
-                continue
-            shown = {str(row.method): _shown(row, end) for _, row in part.iterrows()}
-            records.append(
-                {
-                    "block": f"{scene_title(str(scene))}, {size}",
-                    "row": f"{scene} {size} {labels}",
-                    "Labels": label_title(str(labels)) if exact or not end else "",
-                    "Against": against,
-                    **{title: shown.get(name, "–") for name, title in titles.items()},
-                    "Best localizer": _best(part[part.kind == LOCALIZER], end),
-                }
-            )
-    return sheet_of_texts(
-        NAME,
-        "Reference methods beside the best of the localizers (by position): median errors, and the "
-        "share of the test frames within 5 cm and 5 degrees.",
-        pd.DataFrame(records),
-        (
-            "Every method answers from the labels of the data set, as the localizers do; answers "
-            "that failed count as infinite errors.",
-        ),
+    inexact = _cells(table[table.labels != SIMULATOR], "labels", "")
+    cells = pd.concat([inexact, _cells(table, "true poses", "_true")]).sort_index(kind="stable")
+    localizers = cells[cells.kind == LOCALIZER].dropna(subset="number").sort_values("number")
+    named = localizers.assign(text=localizers.title + ", " + localizers.text)
+    best = named.drop_duplicates(LINES).assign(method="best", title="Best localizer")
+    rows = by_method(pd.concat([cells, best, _cost(table)]), LINES)
+    followed = rows.against.map({"labels": "labels", "true poses": "true", "": ""})
+    columns = [
+        *(Column("Data set", "data_set"), Column("Labels", "labels"), Column("Against", "against")),
+        *method_columns(titles_in(table[table.kind != LOCALIZER]) | titles_in(best)),
+        *method_columns(titles_in(table[table.kind == LOCALIZER]), on_paper=False),
+    ]
+    rows["style"] = followed.where(rows.labels != SOURCES[SIMULATOR], "")
+    return SideTable(NAME, CAPTION, columns, rows, REMARK, block="data_set")
+
+
+def _cells(table: pd.DataFrame, against: str, end: str) -> pd.DataFrame:
+    """The cells of one of two scores, whose columns have names with this end."""
+    return table.assign(
+        data_set=data_set_titles(table),
+        labels=table.labels.map(label_title),
+        against=against,
+        number=table[f"position_m{end}"],
+        text=[_text(row, end) for row in records_of(table)],
     )
+
+
+def _cost(table: pd.DataFrame) -> pd.DataFrame:
+    """Cells of what a method's answers take, and of how many failed, over all label sets."""
+    methods = table[table.seconds_per_frame.notna()].groupby("method")
+    seconds, counts = methods.seconds_per_frame.median(), methods[["failed", "n_test"]].sum()
+    texts = {
+        "Time per frame": [f"{1e3 * s:.2g} ms" for s in seconds],
+        "Failed answers": [f"{row.failed:,} of {row.n_test:,}" for row in rows_of(counts)],
+    }
+    same = {"data_set": "All data sets", "against": "", "method": seconds.index, "number": seconds}
+    return pd.concat(pd.DataFrame({**same, "labels": k, "text": t}) for k, t in texts.items())
+
+
+def _text(row: Mapping[str, Any], end: str) -> str:
+    position_m, orientation_deg = row[f"position_m{end}"], row[f"orientation_deg{end}"]
+    if pd.isna(position_m):
+        return "failed"
+    # Two digits, and all before the point.
+    degrees = f"{orientation_deg:.0f}" if orientation_deg >= 10 else f"{orientation_deg:.2g}"
+    share = row[f"within_5cm_5deg{end}"]
+    return f"{position_m:.2g} m, {degrees}°" + ("" if pd.isna(share) else f", {100 * share:.0f} %")
 
 
 def titles_in(table: pd.DataFrame) -> dict[str, str]:
     """Titles of the methods of a table by name, in its order."""
     return dict(zip(table["method"], table["title"], strict=True))
-
-
-def label_title(labels: str) -> str:
-    """A label set as tables call it: ``noise-p0.1-r5`` is noise 0.1 m, 5°."""
-    found = re.fullmatch(r"(\w+)-p([\d.]+)-r([\d.]+)", labels)
-    return f"{found[1]} {found[2]} m, {found[3]}°" if found else SOURCES.get(labels, labels)
-
-
-def _best(trained: pd.DataFrame, end: str) -> str:
-    """Which localizer has the lowest position error, and its errors."""
-    scored = trained.dropna(subset=f"position_m{end}")
-    if scored.empty:
-        return "–"
-    best = scored.nsmallest(1, f"position_m{end}").iloc[0]
-    return f"{best.title}, {_shown(best, end)}"
-
-
-def _shown(row: pd.Series, end: str) -> str:
-    position_m, orientation_deg = row[f"position_m{end}"], row[f"orientation_deg{end}"]
-    if pd.isna(position_m):
-        return "failed"
-    share = row[f"within_5cm_5deg{end}"]
-    within = "" if pd.isna(share) else f", {100 * share:.0f} %"
-    # Two digits, and all before the point.
-    degrees = f"{orientation_deg:.0f}" if orientation_deg >= 10 else f"{orientation_deg:.2g}"
-    return f"{position_m:.2g} m, {degrees}°{within}"
 
 
 STRUCTURE, ADJUSTED = "structure-depth", "structure-adjusted"

@@ -1,4 +1,4 @@
-"""The robustness table as it is printed: effects down, methods across, a block a training set."""
+"""The robustness table: effects down, methods across, a block for each training set."""
 
 from __future__ import annotations
 
@@ -14,8 +14,14 @@ from baselines.references.robustness import SCHEMA, STRUCTURE, robustness_table
 from synfeal.config.effects import CLEAN, MIXED
 from synfeal.config.models import MODELS
 from synfeal.frames import read_frame, write_frame
+from synfeal.report.columns import (
+    Column,
+    SideTable,
+    by_method,
+    method_columns,
+    write_side_latex,
+)
 from synfeal.report.layouts import TITLES
-from synfeal.report.sheet import LINE, VALUE, Sheet, with_bold, write_latex
 
 NAME = "robustness"
 BLOCKS = {CLEAN: "Trained on ideal frames", MIXED: "Trained on frames with effects mixed in"}
@@ -69,7 +75,7 @@ def write_robustness_table(
 def write_robustness(table: pd.DataFrame, out_csv: Path, out_tex: Path) -> None:
     """Write what :func:`baselines.references.robustness.robustness_table` found, and its LaTeX."""
     write_frame(out_csv, table)
-    write_latex(out_tex, robustness_sheet(table))
+    write_side_latex(out_tex, side_table(table))
 
 
 def read_robustness(path: Path) -> pd.DataFrame:
@@ -77,49 +83,24 @@ def read_robustness(path: Path) -> pd.DataFrame:
     return read_frame(path, SCHEMA)
 
 
-def robustness_sheet(table: pd.DataFrame) -> Sheet:
-    """A row for each of the effects; the lowest error of each method and block is bold."""
-    titles = {name: METHODS[name] for name in table.method.unique()}
-    rows = table[["trained_on", "effects"]].drop_duplicates()
-    blocks = rows.groupby("trained_on", sort=False).ngroup()
-    rows = rows.iloc[blocks.argsort(kind="stable")].reset_index(drop=True)
-    cells = table.merge(rows.rename_axis(index="line").reset_index())
-    failed = cells[list(UNITS)].isna().any(axis=1)
-    parts = [
-        pd.DataFrame(
-            {
-                "line": cells.line,
-                "column": cells.method.map(titles),
-                "place": place,
-                "text": cells[measure]
-                .map(partial(printed, digits=digits))
-                .add(unit)
-                .where(~failed, "failed" if not place else ""),
-                "number": cells[measure]
-                .map(lambda v, n=digits: float(printed(v, n)))
-                .where(~failed),
-                **{"tone": "", "note": "", "block": cells.trained_on},
-            }
-        )[~(failed & (place > 0))]
-        for place, (measure, (unit, digits)) in enumerate(UNITS.items())
+def side_table(table: pd.DataFrame) -> SideTable:
+    """A row for each training set and each of the effects, a column per method."""
+    texts = [
+        table[measure].map(partial(printed, digits=digits)) + unit
+        for measure, (unit, digits) in UNITS.items()
     ]
-    values = pd.concat(parts, ignore_index=True)
-    lines = pd.DataFrame(
-        {
-            "block": rows.trained_on.map(BLOCKS),
-            "row": rows.index,
-            **{"kind": "truth", "label_note": "", "against": "true poses"},
-            "label": rows.effects.map(effects_title),
-        }
+    cells = table.assign(
+        trained_on=table.trained_on.map(BLOCKS),
+        effects=table.effects.map(effects_title),
+        number=table.position_m,
+        text=texts[0].str.cat(texts[1], ", ").where(table.position_m.notna(), "failed"),
     )
-    return Sheet(
-        NAME,
-        CAPTION,
-        ("Test frames", "Against", *titles.values()),
-        lines[list(LINE)],
-        with_bold(values, [values[key] for key in ("block", "column", "place")])[list(VALUE)],
-        remarks(table),
-    )
+    columns = [
+        *(Column("Training frames", "trained_on"), Column("Test frames", "effects")),
+        *method_columns({name: METHODS[name] for name in table.method.unique()}),
+    ]
+    rows = by_method(cells, ["trained_on", "effects"])
+    return SideTable(NAME, CAPTION, columns, rows, remark_on(table), block="trained_on")
 
 
 def printed(value: float, digits: int) -> str:
@@ -127,14 +108,14 @@ def printed(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if value >= 10.0 ** (1 - digits) else f"{value:.2g}"
 
 
-def remarks(table: pd.DataFrame) -> tuple[str, ...]:
+def remark_on(table: pd.DataFrame) -> str:
     """How many of the test frames structure-based poses are tested on, and on which map."""
     counts = table.groupby(table.method == STRUCTURE).n_test.max()
     if True not in counts:
-        return ()
+        return ""
     return (
         f"{METHODS[STRUCTURE]}: {counts[True]:,} of the {counts[False]:,} test frames, spread "
-        "evenly and as large as its features need; its map is of ideal frames.",
+        "evenly and as large as its features need; its map is of ideal frames."
     )
 
 

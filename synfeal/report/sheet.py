@@ -32,7 +32,8 @@ SPECIAL = str.maketrans(
         **{"|": r"\textbar{}", "…": r"\ldots{}", "–": "--", "°": r"$^\circ$", "ᵀ": r"$^\top$"},
         **{"²": "$^2$", "³": "$^3$", "−": "$-$", "±": r"$\pm$", "×": r"$\times$", "·": r"$\cdot$"},
         **{"→": r"$\to$", "≥": r"$\ge$", "≤": r"$\le$", "√": r"$\surd$", "Σ": r"$\Sigma$"},
-        **{"τ": r"$\tau$", "β": r"$\beta$", "θ": r"$\theta$", "π": r"$\pi$"},
+        **{"τ": r"$\tau$", "β": r"$\beta$", "θ": r"$\theta$", "π": r"$\pi$", "✗": r"$\times$"},
+        **{"<": "$<$", ">": "$>$"},
     }
 )
 PAPER = "paper"
@@ -61,40 +62,6 @@ class _Format:
     cell: Callable[[str, str], str] = lambda text, kind: text
 
 
-def sheet_of_texts(
-    name: str, caption: str, texts: pd.DataFrame, remarks: tuple[str, ...] = ()
-) -> Sheet:
-    """A sheet of cells that are text.
-
-    ``texts`` has columns ``block``, ``row`` and ``kind`` where the sheet has them (one block, a row
-    per line, nothing grey), then one per heading.
-    """
-    texts = texts.reset_index(drop=True)
-    usual = {"block": "", "row": texts.index, "kind": "", "label_note": ""}
-    given = {column: texts.pop(column) for column in usual if column in texts}
-    label, against = texts.columns[:2]
-    named = {"label": texts[label], "against": texts[against]}
-    lines = pd.DataFrame({**usual, **given, **named}, index=texts.index)[list(LINE)]
-    values = (
-        texts.drop(columns=[label, against])
-        .rename_axis(index="line")
-        .reset_index()
-        .melt("line", var_name="column", value_name="text")
-        .assign(place=0, bold=False, tone="", note="")
-    )
-    return Sheet(name, caption, tuple(texts.columns), lines, values[list(VALUE)], remarks)
-
-
-def with_bold(values: pd.DataFrame, keys: Sequence[pd.Series]) -> pd.DataFrame:
-    """Values whose ``number`` becomes ``bold``: the lowest of those with the same ``keys``.
-
-    Ties as printed are all bold; where fewer than two have a number there is nothing to compare.
-    """
-    numbers = values.number.groupby(list(keys))
-    bold = (values.number == numbers.transform("min")) & (numbers.transform("count") > 1)
-    return values.drop(columns="number").assign(bold=bold)
-
-
 def footnotes(sheet: Sheet) -> dict[str, str]:
     """Marks (a, b, c, ...) of all distinct footnotes in reading order."""
     order = {heading: place for place, heading in enumerate(sheet.headings)}
@@ -114,7 +81,7 @@ def sheet_latex(sheet: Sheet) -> str:
     """The table environment of a sheet, ending in a newline."""
     marks = footnotes(sheet)
     table = _table(sheet, _LATEX, marks)
-    table.columns = table.columns.map(escape)
+    table.columns = pd.Index(map(_heading, sheet.headings, range(len(sheet.headings))))
     if sheet.lines.block.any():
         table.insert(0, "", _upright(sheet.lines.block), allow_duplicates=True)
     layout = "l" * table.shape[1]
@@ -137,6 +104,12 @@ def sheet_latex(sheet: Sheet) -> str:
         r"\end{table*}",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _heading(heading: str, place: int) -> str:
+    """A heading; what follows a comma stands below but in the first column."""
+    first, comma, rest = escape(heading).partition(", ")
+    return rf"\shortstack[l]{{{first}\\{rest}}}" if place and comma else first + comma + rest
 
 
 def escape(text: str) -> str:

@@ -24,9 +24,10 @@ from synfeal.frames import (
 )
 from synfeal.report import robustness
 from synfeal.report.assistance import TOTAL
+from synfeal.report.columns import Column, SideTable
 from synfeal.report.cost.runs import read_jobs
 from synfeal.report.label_error import SCHEMA as LABEL_ERROR
-from synfeal.report.layouts import SOURCES, TITLES
+from synfeal.report.layouts import SOURCES, TITLES, scene_title
 from synfeal.scenes.collision import CURVE_HEADER
 from synfeal.scenes.render_speed import SCHEMA as RENDERED
 from synfeal.scenes.speed import EFFECTS_SCHEMA
@@ -217,3 +218,25 @@ READERS: dict[str, Callable[[Path, str], pd.DataFrame]] = {
     "training": training_rows,
     "effects": effect_rows,
 }
+
+COLUMNS = (
+    Column("Stage", "stage"),
+    Column("Scene", "scene"),
+    Column("Variant", "variant"),
+    Column("Faces", "faces", "{:,.0f}"),
+    Column("Items per second", "items_per_s", "{:,.0f}"),
+    Column("Error", "error", "{:.3g}"),
+    Column("Error unit", "error_unit"),
+    Column("Used", "used"),
+)
+CAPTION = (
+    "What a stage could choose among; marked rows are what the run used. Speeds are measured and"
+    " differ between runs."
+)
+
+
+def side_table(table: pd.DataFrame) -> SideTable:
+    """What each stage could choose among, how fast and how wrong each is."""
+    used, style = (table.chosen.map({1: text, 0: ""}) for text in ("✓", "used"))
+    rows = table.assign(scene=table.scene.map(scene_title), used=used, style=style)
+    return SideTable(NAME, CAPTION, COLUMNS, rows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,20 +11,15 @@ import pandas as pd
 from synfeal.config import Design
 from synfeal.files import write_text
 from synfeal.frames import read_frame, rows_of
-from synfeal.report import recall, references, robustness
+from synfeal.report import meshes, recall, references, robustness
 from synfeal.report.cells import read_cells
+from synfeal.report.columns import side_sheet
 from synfeal.report.layouts import TITLES, scene_title
-from synfeal.report.meshes import meshes_sheet, read_meshes
 from synfeal.report.references import crossing_findings
-from synfeal.report.sheet import Sheet, sheet_markdown
+from synfeal.report.sheet import sheet_markdown
 from synfeal.report.tables import sheet_of
 
-# Tables that a run may lack, and how they are printed.
-SHEETS: dict[Any, Callable[[Design, pd.DataFrame], Sheet]] = {
-    references: lambda _, table: references.references_sheet(table),
-    recall: recall.recall_sheet,
-    robustness: lambda _, table: robustness.robustness_sheet(table),
-}
+SIDE_TABLES: Sequence[Any] = (references, recall, robustness)  # a run may lack some
 ALIVE = "table4_size"
 INTRO = """\
 # Results of profile `{profile}`
@@ -40,14 +35,15 @@ def write_summary(design: Design, root: Path, out_md: Path, out_txt: Path) -> No
     """Write checks, then every table beside the paper's; and what a person sees when a run ends."""
     cells = {name: read_cells(name, design, root) for name in design.tables}
     findings = run_sentences(cells)
-    meshes = read_meshes([*dict.fromkeys(row.scene for row in design.rows)], root)
-    sheets = [meshes_sheet(meshes), *(sheet_of(name, found) for name, found in cells.items())]
-    for module, sheet in SHEETS.items():
+    mesh_facts = meshes.read_meshes([*dict.fromkeys(row.scene for row in design.rows)], root)
+    sheets = [side_sheet(meshes.side_table(mesh_facts))]
+    sheets += [sheet_of(name, found) for name, found in cells.items()]
+    for module in SIDE_TABLES:
         path = root / "tables" / f"{module.NAME}.csv"
         if path.exists():
             table = read_frame(path, module.SCHEMA)
             findings += crossing_findings(table) if module is references else []
-            sheets.append(sheet(design, table))
+            sheets.append(side_sheet(module.side_table(table)))
     parts = [
         INTRO.format(profile=root.name),
         "## Do the localizers localize?\n",

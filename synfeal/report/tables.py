@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ from synfeal.report.layouts import (
     row_label,
     scene_title,
 )
-from synfeal.report.sheet import LINE, PAPER, VALUE, Sheet, with_bold, write_latex
+from synfeal.report.sheet import LINE, PAPER, VALUE, Sheet, write_latex
 
 # Kinds of lines in their order, and what their numbers are measured against; after those of a
 # score stands its change, in Table 5.
@@ -108,7 +109,17 @@ def printed_values(name: str, cells: pd.DataFrame) -> pd.DataFrame:
     parts.append(_part(in_print, "unit", 0, texts))
     values = pd.concat(parts, ignore_index=True)
     blocks = values.row.map(blocks_of(cells).groupby(cells.row).first())
-    return with_bold(values, [blocks, values.kind, values["column"], values.place])
+    return _with_bold(values, [blocks, values.kind, values["column"], values.place])
+
+
+def _with_bold(values: pd.DataFrame, keys: Sequence[pd.Series]) -> pd.DataFrame:
+    """Values whose ``number`` becomes ``bold``: the lowest of those with the same ``keys``.
+
+    Ties as printed are all bold; where fewer than two have a number there is nothing to compare.
+    """
+    numbers = values.number.groupby(list(keys))
+    bold = (values.number == numbers.transform("min")) & (numbers.transform("count") > 1)
+    return values.drop(columns="number").assign(bold=bold)
 
 
 def _part(

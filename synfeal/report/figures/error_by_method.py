@@ -23,6 +23,7 @@ from synfeal.report.figures.style import (
     reference_styles,
     set_log,
 )
+from synfeal.report.layouts import label_title
 
 LABELS = "table2_ground_truth"
 PARTS = {**BLOCKS, "": "labels from images"}
@@ -53,7 +54,7 @@ def references_by_noise(table: pd.DataFrame, rows: Sequence[Experiment]) -> Figu
     for column, block in enumerate(blocks):
         labels = _ordered(dict.fromkeys(r.label_id for r in rows if r.block == block), table)
         panels[0, column].set_title(PARTS[block], fontsize=9)
-        names = [references.label_title(name).removeprefix("noise ") for name in labels]
+        names = [label_title(name).removeprefix("noise ") for name in labels]
         names = [name.replace(", ", "\n").replace(" w/ ", "\n") for name in names]
         panels[1, column].set_xticks(range(len(labels)), names, rotation=30 if not block else 0)
         for axes, measure in zip(panels[:, column], UNITS, strict=True):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -124,32 +124,6 @@ def _error(trial: Trial, answer: Any) -> float:
         return 0.0 if isinstance(answer, str) and isinstance(trial.truth, str) else math.inf
     error = trial.error(answer, trial.truth)
     return math.inf if math.isnan(error) else error
-
-
-Row = Mapping[str, str]
-
-
-def judged(row: Row) -> str:
-    """What the error of a row is of, and its unit."""
-    return row["quantity"] if row["unit"] == "1" else f"{row['quantity']}, {row['unit']}"
-
-
-def error_text(row: Row, column: str) -> str:
-    """An error of a row as it is printed; of a case to be refused, whether it was."""
-    error = float(row[column])
-    if row["quantity"] == REFUSAL:
-        return "refused" if error == 0 else "answered"
-    return short(error)
-
-
-def short(error: float) -> str:
-    """An error at two digits; ``none`` where there is no finite one."""
-    if math.isinf(error):
-        return "none"
-    if error == 0 or 1e-3 <= error < 1e4:
-        return f"{error:.2g}" if error < 100 else f"{error:,.0f}"
-    mantissa, exponent = f"{error:.1e}".split("e")
-    return f"{mantissa}e{int(exponent)}".replace("-", "\u2212")
 
 
 def quat_of(angle: Any, axis: Sequence[Any]) -> list[Any]:

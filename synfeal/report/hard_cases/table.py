@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
-from synfeal.frames import COUNT, NUMBER, TEXT, frame_of, write_frame
+from synfeal.frames import COUNT, LIMITLESS, NUMBER, TEXT, frame_of, write_frame
+from synfeal.report.columns import Column, SideTable
 from synfeal.report.hard_cases import estimates, rotations, scenes
 from synfeal.report.hard_cases.exact import MPMATH, RATIONAL, REFUSAL, Family, examine
 
 NAME = "hard_cases"
 SCHEMA = {
     **dict.fromkeys(("family", "case", "quantity", "unit", "naive", "ours"), TEXT),
-    **dict.fromkeys(("naive_error", "our_error", "bound"), NUMBER),
+    **{"naive_error": LIMITLESS, "our_error": LIMITLESS, "bound": NUMBER},
     **{"ok": COUNT, "reference": TEXT, "naive_seconds": NUMBER, "our_seconds": NUMBER},
 }
 PI, NEARLY_PI, INF = rotations.PI, rotations.NEARLY_PI, np.inf
@@ -155,3 +159,51 @@ def row_of(family: Family, name: str) -> dict[str, object]:
     outcome = examine(family.cases[name]())
     ok = int(outcome["our_error"] <= family.bound)
     return {"family": family.name, "case": name, "ok": ok, **family._asdict(), **outcome}
+
+
+COLUMNS = (
+    Column("What", "family"),
+    Column("Case", "case", small="judged"),
+    Column("First thought", "naive_error", text="naive_text", small="naive", bad="naive_bad"),
+    Column("Ours", "our_error", text="our_text", small="ours", bad="our_bad"),
+    Column("Bound", "bound", text="bound_text"),
+    Column("Truth", "reference", on_paper=False),
+    Column("First, µs", "naive_seconds", text="naive_time", on_paper=False),
+    Column("Ours, µs", "our_seconds", text="our_time", on_paper=False),
+)
+CAPTION = (
+    "Errors against exact answers: of the formula somebody would write first, and of the function"
+    " this project uses. ✗ marks errors above the bound that ours promises."
+)
+REMARK = (
+    "None: no answer, or no number; cases without one right answer are to be refused. Times are"
+    " those of one call, medians, and differ between runs."
+)
+
+
+def side_table(table: pd.DataFrame) -> SideTable:
+    """Every case with both errors, the formulas that made them, the bound and the times."""
+    unit = ", " + table.unit
+    rows = table.assign(
+        judged=table.quantity + unit.where(table.unit != "1", ""),
+        bound_text=table.bound.map(short),
+        style=(table.family != table.family.shift()).map({True: "first", False: ""}),
+    )
+    for which in ("naive", "our"):
+        error, seconds = table[f"{which}_error"], table[f"{which}_seconds"]
+        refusal = error.map(lambda e: "answered" if e else "refused")
+        rows[f"{which}_error"] = error.clip(upper=sys.float_info.max)  # to sort by
+        rows[f"{which}_text"] = error.map(short).where(table.quantity != REFUSAL, refusal)
+        rows[f"{which}_bad"] = error > table.bound
+        rows[f"{which}_time"] = [f"{1e6 * s:,.0f}" if s >= 1e-6 else "< 1" for s in seconds]
+    return SideTable(NAME, CAPTION, COLUMNS, rows, REMARK, block="family")
+
+
+def short(error: float) -> str:
+    """An error at two digits; ``none`` where there is no finite one."""
+    if math.isinf(error):
+        return "none"
+    if error == 0 or 1e-3 <= error < 1e4:
+        return f"{error:.2g}" if error < 100 else f"{error:,.0f}"
+    mantissa, exponent = f"{error:.1e}".split("e")
+    return f"{mantissa}e{int(exponent)}".replace("-", "\u2212")

@@ -7,6 +7,7 @@ import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,20 +19,30 @@ from synfeal.config import Design, Experiment
 from synfeal.config.learning import KEYS
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.files import write_text
+from synfeal.frames import read_frame
 from synfeal.inspect.surface import SurfacePoints, viewer_js, viewer_mesh
 from synfeal.mesh.load import load_mesh
-from synfeal.report import meshes
+from synfeal.report import (
+    assistance,
+    label_error,
+    meshes,
+    recall,
+    references,
+    robustness,
+    speed_vs_error,
+)
 from synfeal.report.cells import key_of, published_cells, read_cells
 from synfeal.report.claims.model import Verdict
 from synfeal.report.figures import CAPTIONS
+from synfeal.report.hard_cases import table as hard_cases
 from synfeal.report.html.provenance import cost_sentence, origin_html, read_origin
-from synfeal.report.html.side_tables import SIDE_TABLES, meshes_table
 from synfeal.report.html.tables import (
     Claims,
     claims_table,
     read_claims,
     render,
     score_table,
+    side_html,
     table_title,
     verdict_counts,
 )
@@ -73,6 +84,10 @@ def _smaller(png: bytes) -> bytes:
 
 
 CLAIMS, PROVENANCE = "claims.csv", "provenance.json"
+# Modules of the tables that follow tables 1 to 7.
+SIDE_TABLES: Sequence[Any] = (
+    *(references, recall, robustness, assistance, label_error, speed_vs_error, hard_cases),
+)
 
 
 def write_report(design: Design, root: Path, out_html: Path) -> None:
@@ -85,7 +100,7 @@ def write_report(design: Design, root: Path, out_html: Path) -> None:
     origin = read_origin(root / PROVENANCE) if (root / PROVENANCE).exists() else {}
     figures = figure_files(root / "figures", CAPTIONS)
     tables = list(_tables(cells, root))
-    files = (CLAIMS, PROVENANCE, *(f"tables/{name}.csv" for name in (meshes.NAME, *SIDE_TABLES)))
+    files = (CLAIMS, PROVENANCE, *(f"tables/{m.NAME}.csv" for m in (meshes, *SIDE_TABLES)))
     page = render(
         "page.html",
         profile=root.name,
@@ -119,13 +134,13 @@ def write_report(design: Design, root: Path, out_html: Path) -> None:
 
 def _tables(cells: Mapping[str, pd.DataFrame], root: Path) -> Iterator[dict[str, str]]:
     """Name, title and HTML of every table; no HTML where its file is missing."""
-    scored = {name: (table_title(name), score_table(name, found)) for name, found in cells.items()}
-    for name, (title, table) in {meshes.NAME: ("Table 1", meshes_table), **SIDE_TABLES}.items():
-        path = root / "tables" / f"{name}.csv"
-        yield {"name": name, "title": title, "body": table(path) if path.exists() else ""}
-        if name == meshes.NAME:
-            for score_name, (score_title, body) in scored.items():
-                yield {"name": score_name, "title": score_title, "body": body}
+    for module in (meshes, *SIDE_TABLES):
+        path = root / "tables" / f"{module.NAME}.csv"
+        found = module.side_table(read_frame(path, module.SCHEMA)) if path.exists() else None
+        body = side_html(found) if found else ""
+        yield {"name": module.NAME, "title": table_title(module.NAME), "body": body}
+        for name, scores in cells.items() if module is meshes else ():
+            yield {"name": name, "title": table_title(name), "body": score_table(name, scores)}
 
 
 RowKey = tuple[str, str, str, str, float, float, str]

@@ -15,9 +15,10 @@ from pydantic import BaseModel
 from synfeal.files import write_json
 from synfeal.frames import records_of
 from synfeal.provenance import CPU_INFO, processor_name, provenance
+from synfeal.report.columns import Column, SideTable
 from synfeal.report.cost.runs import read_jobs, write_measured
 from synfeal.report.cost.text import duration
-from synfeal.report.html.tables import Column, render, sortable
+from synfeal.report.html.tables import render, side_html
 from synfeal.report.results import read_result, shaped
 
 
@@ -110,7 +111,19 @@ def read_origin(path: Path) -> Record:
 
 def origin_html(record: Record) -> Markup:
     """Facts, and the stages as a table."""
-    return render("origin.html", record=record, stages=_stages(record))
+    columns = [
+        *(Column("Stage", "stage"), Column("Jobs", "jobs", "{:,.0f}")),
+        Column("All jobs", "seconds", text="all"),
+        Column("Median job", "median_seconds", text="median"),
+        Column("Peak memory (MB)", "peak_mb", "{:,.0f}"),
+    ]
+    stages = pd.DataFrame(record["stages"], columns=list(_Stage.model_fields))
+    stages["all"] = stages.seconds.map(duration)
+    stages["median"] = stages.median_seconds.map(duration)
+    caption = "Time and largest resident memory of the jobs of each stage."
+    return render(
+        "origin.html", record=record, stages=side_html(SideTable("cost", caption, columns, stages))
+    )
 
 
 def cost_sentence(record: Record) -> str:
@@ -122,16 +135,3 @@ def cost_sentence(record: Record) -> str:
         f"{jobs} jobs took {duration(seconds)} of computing together, on {machine['processor']}"
         f" ({machine['usable_cores']} cores)."
     )
-
-
-def _stages(record: Record) -> Markup:
-    columns = [
-        *(Column("Stage", "stage"), Column("Jobs", "jobs", "{:,.0f}")),
-        Column("All jobs", "seconds", text="all"),
-        Column("Median job", "median_seconds", text="median"),
-        Column("Peak memory (MB)", "peak_mb", "{:,.0f}"),
-    ]
-    stages = pd.DataFrame(record["stages"], columns=list(_Stage.model_fields))
-    texts = {"all": stages.seconds.map(duration), "median": stages.median_seconds.map(duration)}
-    caption = "<b>Cost.</b> Time and largest resident memory of the jobs of each stage."
-    return sortable("stages", caption, columns, stages.assign(**texts))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from synfeal.errors import InputError
 from synfeal.frames import TEXT, read_frame, records_of, rows_of
 from synfeal.report.claims.model import Verdict
 from synfeal.report.claims.table import COLUMNS
+from synfeal.report.columns import SCORES, Column, SideTable, cells_of
 from synfeal.report.layouts import (
     CHANGE,
     HEADINGS,
@@ -44,83 +44,15 @@ def render(template: str, **values: Any) -> Markup:
     return Markup(ENVIRONMENT.get_template(template).render(**values))
 
 
-# The score that the switch on the page shows, and how names of its columns end.
-SCORES = {"labels": "", "true": "_true"}
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column of a table on the page."""
-
-    title: str  # its heading
-    name: str = ""  # of the frame's column that it shows
-    form: str = ""  # how its numbers are written, for :meth:`str.format`; empty for text
-    factor: float = 1.0  # so many times the number is shown
-    text: str = ""  # column of the frame that says how a number is written, in place of ``form``
-    paper: str = ""  # column with the paper's number, set below
-    small: str = ""  # column with more text, set small below
-    bad: str = ""  # column that says whether a number is marked as bad
-    # There are two numbers, against the labels and the true poses (``<name>_true``), with 95 %
-    # limits (``_low``, ``_high``).
-    scored: bool = False
-
-    @property
-    def is_number(self) -> bool:
-        """Set to the right, digits aligned."""
-        return bool(self.form or self.text)
-
-
-def sortable(name: str, caption: str, columns: Sequence[Column], frame: pd.DataFrame) -> Markup:
-    """A table with a row per row of a frame; ``caption`` is HTML.
-
-    A column ``style`` of the frame, where there is one, names a class for each row.
-    """
+def side_html(table: SideTable) -> Markup:
+    """A side table, a row per row."""
     rows = [
-        {"style": row.get("style", ""), "cells": [_cell(row, column) for column in columns]}
-        for row in frame.to_dict("records")
+        {"style": row.get("style", ""), "cells": [cells_of(row, c) for c in table.columns]}
+        for row in records_of(table.rows)
     ]
-    values = {"name": name, "caption": Markup(caption), "columns": columns}
-    return render("plain_table.html", **values, rows=rows)
-
-
-NOTHING = {"scores": [], "is_number": False, "sort": "", "paper": "", "bad": False}
-
-
-def _cell(row: dict[Any, Any], column: Column) -> dict[str, Any]:
-    small = row[column.small] if column.small else ""
-    if column.scored:
-        return NOTHING | {"scores": [_score(row, column, style) for style in SCORES]}
-    value = row[column.name]
-    if not column.is_number:
-        return NOTHING | {"text": value, "small": small}
-    return {
-        "scores": [],
-        "is_number": True,
-        "sort": "" if pd.isna(value) else value,
-        "text": row[column.text] if column.text else shown(value, column),
-        "paper": shown(row[column.paper], column, "") if column.paper else "",
-        "small": small,
-        "bad": bool(column.bad) and row[column.bad],
-    }
-
-
-def _score(row: dict[Any, Any], column: Column, style: str) -> dict[str, Any]:
-    """One of two scores with its limits."""
-    name = f"{column.name}{SCORES[style]}"
-    number = column.form.partition("}")[0] + "}"  # without its unit
-    value, low, high = (row[f"{name}{end}"] for end in ("", "_low", "_high"))
-    limits = (
-        ""
-        if pd.isna([low, high]).any()
-        else "–".join(number.format(column.factor * limit) for limit in (low, high))
-    )
-    sort = "" if pd.isna(value) else value
-    return {"style": style, "sort": sort, "text": shown(value, column), "small": limits}
-
-
-def shown(value: float, column: Column, missing: str = "–") -> str:
-    """A number as a column writes it."""
-    return missing if pd.isna(value) else column.form.format(column.factor * value)
+    switched = any(row["style"] in SCORES for row in rows) or any(c.scored for c in table.columns)
+    title = table_title(table.name)
+    return render("side_table.html", table=table, title=title, rows=rows, switched=switched)
 
 
 # The switch's two scores: kind of line, and how names of its columns end.
@@ -161,8 +93,9 @@ def score_table(name: str, cells: pd.DataFrame) -> Markup:
 
 
 def table_title(name: str) -> str:
-    """As in ``Table 4``."""
-    return f"Table {name.split('_')[0].removeprefix('table')}"
+    """As in ``Table 4`` or ``Label error``."""
+    found = re.match(r"table(\d+)", name)
+    return f"Table {found[1]}" if found else name.replace("_", " ").capitalize()
 
 
 def interval(low: Any, high: Any) -> str:
