@@ -15,7 +15,7 @@ from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.errors import InputError
 from synfeal.evaluation.estimates import Estimates
 from synfeal.validation.frames import read_poses
-from synfeal.validation.listing import Frame, SequenceListing, list_sequences
+from synfeal.validation.listing import Frame, SequenceListing, frames_of, list_sequences
 from synfeal.validation.manifest import read_splits
 from synfeal.validation.poses import check_rigid
 
@@ -48,7 +48,7 @@ def read_scored_frames(dataset: Path, split: str) -> ScoredFrames:
         InputError: the data set or its split cannot be read, or poses are missing or damaged.
     """
     sequences = _of_split(dataset, split, list_sequences(dataset))
-    frames = tuple(frame for sequence in sequences for frame in sequence.frames)
+    frames = tuple(frames_of(sequences))
     poses, unreadable = read_poses(sequences)
     problems = check_rigid(poses, unreadable).failures
     missing = [frame for frame in frames if frame not in poses]

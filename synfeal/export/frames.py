@@ -20,6 +20,7 @@ from synfeal.validation.listing import (
     COLOR,
     DEPTH,
     Frame,
+    frames_of,
     list_sequences,
     read_color,
     read_depth_mm,
@@ -95,8 +96,7 @@ def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
         raise InputError(f"{problems[0]}; synfeal validate says more")
     frames = tuple(
         ExportFrame(frame, poses[frame], split_of.get(frame.sequence))
-        for sequence in sequences
-        for frame in sequence.frames
+        for frame in frames_of(sequences)
     )
     _check_size(frames[0].color, camera.config)
     has_depth = DEPTH in kinds_of(sequences)

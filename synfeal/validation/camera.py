@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import pycolmap
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
@@ -55,46 +53,37 @@ Array = NDArray[np.float64]
 
 
 class Lens:
-    """A camera with the rays of a grid of its pixels.
+    """A camera with the rays of a grid of its pixels, every ``step``-th along both axes.
 
-    Args:
-        camera: intrinsics and distortion.
-        step: every ``step``-th row and column belongs to the grid.
-        moved: added to (cx, cy), pixels, and to the logarithm of the focal lengths.
+    ``moved`` is added to (cx, cy), pixels, and to the logarithm of the focal lengths.
     """
 
     def __init__(
         self, camera: CameraConfig, step: int, moved: tuple[float, float, float] = (0.0, 0.0, 0.0)
     ) -> None:
+        import pycolmap  # takes long to load, and only comparing frames needs it
+
         fx, fy, cx, cy = camera.intrinsics
         self.focal_px = np.array([fx, fy])
         scale = float(np.exp(moved[2]))
-        k1, k2, p1, p2, k3 = camera.distortion
-        parameters = [fx * scale, fy * scale, cx + moved[0], cy + moved[1], k1, k2, p1, p2, k3]
+        pinhole = [fx * scale, fy * scale, cx + moved[0], cy + moved[1]]
         self._camera = pycolmap.Camera(
             model="FULL_OPENCV",
             width=camera.width,
             height=camera.height,
-            params=[*parameters, 0.0, 0.0, 0.0],
+            params=[*pinhole, *camera.distortion, 0.0, 0.0, 0.0],
         )
         self.rows, self.columns = np.mgrid[
             step // 2 : camera.height : step, step // 2 : camera.width : step
         ].reshape(2, -1)
+        pixels = np.stack([self.columns, self.rows], axis=1) + 0.5
         centre = [camera.width / 2.0, camera.height / 2.0]
-        pixels = np.stack([self.columns, self.rows], axis=1) + 0.5
         self.places = (pixels - centre) / (camera.width / 2.0)
-
-    @cached_property
-    def rays(self) -> Array:
-        """Points (N, 3) at depth 1 that the pixels of the grid see."""
-        pixels = np.stack([self.columns, self.rows], axis=1) + 0.5
         rays = np.asarray(self._camera.cam_from_img(pixels), np.float64)
-        return np.column_stack([rays, np.ones(len(rays))])
-
-    @cached_property
-    def _radius(self) -> float:
-        """Beyond the corners of the image a distortion polynomial may fold back."""
-        return 1.1 * float(np.nanmax(np.linalg.norm(self.rays[:, :2], axis=1)))
+        # Points (N, 3) at depth 1 that the pixels of the grid see.
+        self.rays = np.column_stack([rays, np.ones(len(rays))])
+        # Beyond the corners of the image a distortion polynomial may fold back.
+        self._radius = 1.1 * float(np.nanmax(np.linalg.norm(rays, axis=1)))
 
     def project(self, points_m: Array) -> Array:
         """Pixels (N, 2) of points (N, 3) in the camera, NaN where the camera cannot see them."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
@@ -20,6 +21,7 @@ from synfeal.validation.listing import (
     Frame,
     Pixels,
     SequenceListing,
+    frames_of,
     read_color,
     read_depth_mm,
 )
@@ -37,7 +39,7 @@ def check_names(sequences: Sequence[SequenceListing]) -> Check:
     """Frames are numbered 0, 1, 2, ... and have a file of each kind."""
     kinds = kinds_of(sequences)
     failures = [failure for sequence in sequences for failure in _gaps(sequence, kinds)]
-    n_frames = sum(len(sequence.frames) for sequence in sequences)
+    n_frames = len(frames_of(sequences))
     text = f"{n_frames} frames in {len(sequences)} sequences, each with {', '.join(kinds)}"
     return Check("names", text, tuple(failures))
 
@@ -66,7 +68,7 @@ def check_images(
     Without a camera all must be of the size of the first one, and depth, which then comes from a
     sensor, does not tell what is empty.
     """
-    size = (camera.height, camera.width) if camera else None
+    size = (camera.width, camera.height) if camera else None
     readers: dict[str, Callable[[FrameFile], Pixels]] = {COLOR: read_color, DEPTH: read_depth_mm}
     failures: list[str] = []
     content, n_images = Content(), 0
@@ -82,33 +84,30 @@ def check_images(
                 except InputError as error:
                     failures.append(str(error))
                     continue
-                shape = images[kind].shape[:2]
-                size = size or shape
-                if shape != size:
-                    found, wanted = _size(shape), _size(size)
-                    failures.append(f"{frame.path(kind)}: is {found}, must be {wanted}")
+                height, width = images[kind].shape[:2]
+                size = size or (width, height)
+                if (width, height) != size:
+                    wrong = f"is {width} x {height}, must be {size[0]} x {size[1]}"
+                    failures.append(f"{frame.path(kind)}: {wrong}")
                 elif kind == DEPTH and camera:
-                    failures += _before_camera(images[kind], camera, str(frame.path(kind)))
+                    near_m = _median_m(images[kind])
+                    if near_m < camera.near_m - 0.001:
+                        failures.append(
+                            f"{frame.path(kind)}: shows surfaces {near_m:.3g} m away, before the"
+                            f" near plane of the camera at {camera.near_m:g} m; store depth in"
+                            " millimetres"
+                        )
             if COLOR in images:
                 content.add(frame, images[COLOR], images.get(DEPTH) if camera else None)
             on_frame()
-    text = f"{n_images} images decoded" + (f", {_size(size)}" if size else "")
+    text = f"{n_images} images decoded" + (f", {size[0]} x {size[1]}" if size else "")
     return [Check("images", text, tuple(failures)), content.check()]
 
 
-def _before_camera(depth_mm: Pixels, camera: CameraConfig, path: str) -> list[str]:
-    """What is wrong where most of a frame is nearer than its camera draws anything."""
+def _median_m(depth_mm: Pixels) -> float:
+    """Of the depths that are known, infinite where there are none."""
     known = depth_mm[(depth_mm > 0) & (depth_mm < 65535)]
-    if not known.size or np.median(known) >= 1000.0 * camera.near_m - 1.0:
-        return []
-    return [
-        f"{path}: shows surfaces {np.median(known) / 1000.0:.3g} m away, before the near plane of"
-        f" the camera at {camera.near_m:g} m; store depth in millimetres"
-    ]
-
-
-def _size(shape: tuple[int, ...]) -> str:
-    return f"{shape[1]} x {shape[0]}"
+    return float(np.median(known)) / 1000.0 if known.size else math.inf
 
 
 def read_poses(sequences: Iterable[SequenceListing]) -> tuple[Poses, tuple[str, ...]]:
@@ -116,12 +115,12 @@ def read_poses(sequences: Iterable[SequenceListing]) -> tuple[Poses, tuple[str, 
     poses: Poses = {}
     failures: list[str] = []
     for sequence in sequences:
-        for frame in sequence.frames:
-            if frame.number in sequence.numbers[POSE]:
-                try:
-                    poses[frame] = read_pose(frame.path(POSE))
-                except InputError as error:
-                    failures.append(str(error))
+        for number in sorted(sequence.numbers[POSE]):
+            frame = Frame(sequence.path, number)
+            try:
+                poses[frame] = read_pose(frame.path(POSE))
+            except InputError as error:
+                failures.append(str(error))
     return poses, tuple(failures)
 
 
@@ -148,8 +147,8 @@ class Content:
         usual = np.median(rgb.reshape(-1, 3), axis=0)
         if np.mean((np.abs(rgb - usual) <= SAME).all(axis=2)) >= ONE_COLOUR:
             self.of_one_colour.append(frame)
-        no_depth = None if depth_mm is None else (depth_mm == 0) | (depth_mm == 65535)
-        empty = (rgb == 0).all(axis=2) if no_depth is None else no_depth
+        black = (rgb == 0).all(axis=2)
+        empty = black if depth_mm is None else (depth_mm == 0) | (depth_mm == 65535)
         if np.mean(empty) > MOSTLY:
             self.mostly_empty.append(frame)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -25,7 +26,6 @@ from synfeal.dataset.png import IMAGE_DAMAGE
 from synfeal.errors import InputError, why
 
 COLOR, DEPTH, POSE = "color.png", "depth.png", "pose.txt"
-KINDS = (COLOR, DEPTH, POSE)
 _FRAME = re.compile(r"frame-(\d{6,})\.(color\.png|depth\.png|pose\.txt)")
 
 
@@ -46,7 +46,7 @@ class SequenceListing:
     """The frames of one sequence, by kind of file."""
 
     path: Path
-    numbers: dict[str, frozenset[int]]
+    numbers: dict[str, set[int]]
 
     @property
     def name(self) -> str:
@@ -56,7 +56,7 @@ class SequenceListing:
     @cached_property
     def frames(self) -> tuple[Frame, ...]:
         """All frames of which any file is there, in order."""
-        numbers = sorted(frozenset().union(*self.numbers.values()))
+        numbers = sorted(set[int]().union(*self.numbers.values()))
         return tuple(Frame(self.path, number) for number in numbers)
 
 
@@ -79,17 +79,18 @@ def list_sequences(dataset: Path) -> list[SequenceListing]:
     return [_list(path) for path in sorted(found, key=lambda path: (int(path.stem[4:]), path.stem))]
 
 
+def frames_of(sequences: Iterable[SequenceListing]) -> list[Frame]:
+    """All frames of several sequences, in order."""
+    return [frame for sequence in sequences for frame in sequence.frames]
+
+
 def _list(path: Path) -> SequenceListing:
-    numbers: dict[str, set[int]] = {kind: set() for kind in KINDS}
     try:
-        names = sequence_names(path)
+        found = [match for name in sequence_names(path) if (match := _FRAME.fullmatch(name))]
     except OSError as error:
         raise InputError(f"{path}: cannot be read as a sequence ({why(error)})") from None
-    for name in names:
-        match = _FRAME.fullmatch(name)
-        if match:
-            numbers[match[2]].add(int(match[1]))
-    return SequenceListing(path, {kind: frozenset(found) for kind, found in numbers.items()})
+    kinds = (COLOR, DEPTH, POSE)
+    return SequenceListing(path, {k: {int(m[1]) for m in found if m[2] == k} for k in kinds})
 
 
 @dataclass(frozen=True)
@@ -111,8 +112,6 @@ class Check:
 
 Pixels = NDArray[Any]
 
-_COLOR_MODES = ("RGB", "RGBA", "L", "P")
-
 
 def read_color(path: FrameFile) -> NDArray[np.uint8]:
     """Colours (H, W, 3).
@@ -121,7 +120,7 @@ def read_color(path: FrameFile) -> NDArray[np.uint8]:
         InputError: the file is missing, truncated, damaged, or no 8-bit PNG.
     """
     image = _decoded(path)
-    if image.mode not in _COLOR_MODES:
+    if image.mode not in ("RGB", "RGBA", "L", "P"):
         raise InputError(f"{path}: is not an 8-bit colour image but of mode {image.mode}")
     return np.asarray(image.convert("RGB"))
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from synfeal.dataset.pose_table import PoseTable, read_pose_table
+from synfeal.dataset.pose_table import read_pose_table
 from synfeal.errors import InputError
 from synfeal.validation.frames import Poses
-from synfeal.validation.listing import POSE, Check, Frame, SequenceListing
+from synfeal.validation.listing import POSE, Check, Frame, SequenceListing, frames_of
 
 # Text with ten decimals is exact to 1e-10; 7-Scenes' own poses have eight significant digits.
 ORTHONORMAL_BOUND = 1e-6
@@ -22,15 +22,15 @@ TABLE_RATIO = 1e-10
 
 def check_rigid(poses: Poses, unreadable: tuple[str, ...]) -> Check:
     """Rotations are orthonormal with determinant +1, the last row is 0 0 0 1."""
-    frames = list(poses)
-    defects = rigid_defects(np.array([poses[frame] for frame in frames]).reshape(-1, 4, 4))
+    names = ("R'R differs from 1", "det R differs from +1", "the last row differs from 0 0 0 1")
+    defects = rigid_defects(np.array(list(poses.values())).reshape(-1, 4, 4))
     failures = [
-        f"{frames[index].path(POSE)}: no rigid pose, {_worst(row)}"
-        for index, row in enumerate(defects)
+        f"{frame.path(POSE)}: no rigid pose, {names[row.argmax()]} by {row.max():.2g}"
+        for frame, row in zip(poses, defects, strict=True)
         if row.max() > ORTHONORMAL_BOUND
     ]
     worst = defects.max(initial=0.0)
-    text = f"{len(frames)} poses, farthest from rigid {worst:.1e} (bound {ORTHONORMAL_BOUND:g})"
+    text = f"{len(poses)} poses, farthest from rigid {worst:.1e} (bound {ORTHONORMAL_BOUND:g})"
     return Check("poses", text, (*unreadable, *failures))
 
 
@@ -55,78 +55,51 @@ def rigid_poses(poses: Poses) -> Poses:
     }
 
 
-def _worst(defects: NDArray[np.float64]) -> str:
-    names = ("R'R differs from 1", "det R differs from +1", "the last row differs from 0 0 0 1")
-    worst = int(np.argmax(defects))
-    return f"{names[worst]} by {defects[worst]:.2g}"
-
-
 def check_tables(
     dataset: Path, poses: Poses, splits: Mapping[str, Iterable[SequenceListing]]
 ) -> Check:
     """The poses of the frames are those of ``train.csv`` and ``test.csv``."""
     failures: list[str] = []
-    n_compared, worst, bound = 0, 0.0, TABLE_BOUND
+    differences: list[float] = []
+    bound = TABLE_BOUND
     for split, sequences in splits.items():
-        path = dataset / f"{split}.csv"
-        frames = [frame for sequence in sequences for frame in sequence.frames]
+        path, frames = dataset / f"{split}.csv", frames_of(sequences)
         if not path.exists():
             continue
         try:
             table = read_pose_table(path)
-        except (InputError, ValueError) as error:
-            failures.append(str(error) if isinstance(error, InputError) else f"{path}: {error}")
+        except InputError as error:
+            failures.append(str(error))
             continue
         if len(table) != len(frames):
             failures.append(f"{path}: {len(table)} rows for {len(frames)} frames")
             continue
-        difference = _differences(frames, table.world_from_cam, poses)
-        n_compared += len(difference)
-        worst = max([worst, *difference.values()])
         bound = max(bound, TABLE_RATIO * float(np.abs(table.position_m).max(initial=0.0)))
-        failures += [
-            f"{frame.path(POSE)}: differs from {path.name} by {value:.2g}"
-            for frame, value in difference.items()
-            if value > bound
-        ]
-        failures += _negative(path, table)
-    if not n_compared and not failures:
+        for frame, row in zip(frames, table.world_from_cam, strict=True):
+            if frame in poses:
+                differences.append(float(np.abs(poses[frame] - row).max()))
+                if differences[-1] > bound:
+                    wrong = f"differs from {path.name} by {differences[-1]:.2g}"
+                    failures.append(f"{frame.path(POSE)}: {wrong}")
+        rows = np.flatnonzero(table.quat_wxyz[:, 0] < 0.0)
+        if len(rows):
+            failures.append(
+                f"{path}: row {rows[0] + 2} and {len(rows) - 1} others hold quaternions with"
+                " qw < 0; of the two of a rotation the one with qw >= 0 belongs here: change the"
+                " sign of all four numbers"
+            )
+    if not differences and not failures:
         return Check("tables", "no train.csv or test.csv", skipped=True)
-    text = f"{n_compared} poses, farthest from its row {worst:.1e} (bound {bound:.1g})"
+    worst = max(differences, default=0.0)
+    text = f"{len(differences)} poses, farthest from its row {worst:.1e} (bound {bound:.1g})"
     return Check("tables", text, tuple(failures))
-
-
-def _negative(path: Path, table: PoseTable) -> list[str]:
-    """A failure if a quaternion is the one of the two of its rotation that has w < 0."""
-    rows = np.flatnonzero(table.quat_wxyz[:, 0] < 0.0)
-    if not len(rows):
-        return []
-    return [
-        f"{path}: row {rows[0] + 2} and {len(rows) - 1} others hold quaternions with qw < 0; of the"
-        " two of a rotation the one with qw >= 0 belongs here: change the sign of all four numbers"
-    ]
-
-
-def _differences(
-    frames: list[Frame], table: NDArray[np.float64], poses: Poses
-) -> dict[Frame, float]:
-    """The largest difference between an entry of a frame's matrix and of its row's."""
-    return {
-        frame: float(np.abs(poses[frame] - row).max())
-        for frame, row in zip(frames, table, strict=True)
-        if frame in poses
-    }
 
 
 def check_leaks(poses: Poses, splits: Mapping[str, list[SequenceListing]]) -> Check:
     """No test frame is taken from the pose of a training frame."""
-    train = {
-        poses[frame].tobytes(): frame
-        for sequence in splits.get("train", [])
-        for frame in sequence.frames
-        if frame in poses
-    }
-    test = [f for sequence in splits.get("test", []) for f in sequence.frames if f in poses]
+    frames = frames_of(splits.get("train", []))
+    train = {poses[frame].tobytes(): frame for frame in frames if frame in poses}
+    test = [frame for frame in frames_of(splits.get("test", [])) if frame in poses]
     if not (train and test):
         return Check("overlap", "not both training and test frames", skipped=True)
     failures = [
@@ -154,8 +127,7 @@ def choose_pairs(
     kinds = [
         [
             (frame, Frame(frame.sequence, frame.number + gap))
-            for sequence in sequences
-            for frame in sequence.frames
+            for frame in frames_of(sequences)
             if frame in usable and Frame(frame.sequence, frame.number + gap) in usable
         ]
         for gap in GAPS

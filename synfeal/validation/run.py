@@ -11,7 +11,7 @@ from synfeal.errors import InputError
 from synfeal.validation.camera import KnownCamera, camera_of_dataset
 from synfeal.validation.consistency import check_consistency
 from synfeal.validation.frames import Poses, check_images, check_names, kinds_of, read_poses
-from synfeal.validation.listing import DEPTH, Check, SequenceListing, list_sequences
+from synfeal.validation.listing import DEPTH, Check, SequenceListing, frames_of, list_sequences
 from synfeal.validation.manifest import check_manifest, check_splits, read_splits
 from synfeal.validation.poses import (
     check_leaks,
@@ -34,7 +34,7 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
     sequences = list_sequences(dataset)
     camera, camera_failures = _camera(dataset, camera_file)
     splits, split_failures = read_splits(dataset, sequences)
-    n_frames = sum(len(sequence.frames) for sequence in sequences)
+    n_frames = len(frames_of(sequences))
     size = None if camera is None or camera.assumed else camera.config
     poses, pose_failures = read_poses(sequences)
     with tqdm(
@@ -87,11 +87,9 @@ def report(dataset: Path, checks: Sequence[Check]) -> str:
 
 def error_lines(checks: Sequence[Check]) -> list[str]:
     """One line for each check that failed: its first failure, and how many more there are."""
-    lines = []
-    for check in checks:
-        if check.failures:
-            more = len(check.failures) - 1
-            lines.append(
-                f"{check.name}: {check.failures[0]}" + (f" (and {more} more)" * bool(more))
-            )
-    return lines
+    return [
+        f"{check.name}: {check.failures[0]}"
+        + f" (and {len(check.failures) - 1} more)" * (len(check.failures) > 1)
+        for check in checks
+        if check.failures
+    ]
