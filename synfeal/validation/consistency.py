@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from statistics import median_low
@@ -29,8 +29,8 @@ MIN_OVERLAP = 0.2
 # Frames that moved and turned by less must share most of what they see, in any scene.
 SMALL_STEP_M = 0.3
 SMALL_TURN = 0.25  # of the field of view
-# Seen from much nearer or farther, a texture is drawn at another level of detail.
-MIN_OVERLAP_OF_COLOURS = 0.6
+# From much nearer or farther, a texture is drawn at another level of detail.
+COLOUR_OVERLAP = 0.6
 
 LUMA = np.array([0.299, 0.587, 0.114], np.float32)
 # What is moved to see how the depths follow: principal point, pixels, and log of the focal length.
@@ -51,20 +51,12 @@ class Measure:
     min_overlap: float = MIN_OVERLAP
 
 
+TIMES = " times what rounding and slant explain"
 MEASURES = (
-    Measure(
-        *("depth", "depth", 1.0, " times what rounding and slant explain"),
-        "median difference in depth",
-    ),
+    Measure("depth", "depth", 1.0, TIMES, "median difference in depth"),
     Measure("surfaces", "in_front", 0.05, "", "share of points in front of what is seen"),
-    Measure(
-        *("colours", "grey", 15.0, " grey levels", "median difference in grey"),
-        MIN_OVERLAP_OF_COLOURS,
-    ),
-    Measure(
-        *("alignment", "shift_px", 0.12, " px", "shift that explains the grey"),
-        MIN_OVERLAP_OF_COLOURS,
-    ),
+    Measure("colours", "grey", 15.0, " grey levels", "median difference in grey", COLOUR_OVERLAP),
+    Measure("alignment", "shift_px", 0.12, " px", "shift that explains the grey", COLOUR_OVERLAP),
 )
 
 
@@ -84,43 +76,30 @@ def check_consistency(
     on_pair: Callable[[], object],
 ) -> list[Check]:
     """Compare every pair; one check for each measure and one for the camera."""
+    config = camera.config
+    step = max(1, round(math.sqrt(config.width * config.height / GRID_PIXELS)))
+    lens = Lens(config, step)
+    moved = [Lens(config, step, tuple(row)) for row in np.diag(DELTA).tolist()]
+    view = lru_cache(GAPS[-1] + 2)(lambda frame: _view(frame, poses[frame], config))
     compared: list[Pair] = []
     system = np.zeros((len(DELTA), len(DELTA) + 1))
-    for pair, normal in _compare_all(pairs, poses, camera.config):
-        compared.append(pair)
-        system += normal
+    for a, b in pairs:
+        view_a, view_b, residual = view(a), view(b), None
+        if view_a and view_b:
+            residual = compare(view_a, view_b, lens)
+            if residual and residual.overlap < MIN_OVERLAP:
+                residual = None
+            if residual and not residual.hidden:
+                system += camera_normal(view_a, view_b, lens, moved, DELTA)
+        compared.append(Pair(a, b, residual))
         on_pair()
-    checks = [_overlap_check(compared, poses, camera.config)]
+    checks = [_overlap_check(compared, poses, config)]
     checks += [measure_check(measure, compared) for measure in MEASURES]
     checks.append(_camera_check(system, camera))
     if not camera.assumed:
         return checks
     why = "not judged, the camera is assumed"
     return [Check(check.name, f"{check.text}; {why}", skipped=True) for check in checks]
-
-
-def _compare_all(
-    pairs: Iterable[tuple[Frame, Frame]], poses: Poses, camera: CameraConfig
-) -> Iterator[tuple[Pair, NDArray[np.float64]]]:
-    step = max(1, round(math.sqrt(camera.width * camera.height / GRID_PIXELS)))
-    lens = Lens(camera, step)
-    moved = [Lens(camera, step, tuple(row)) for row in np.diag(DELTA).tolist()]
-
-    @lru_cache(maxsize=GAPS[-1] + 2)
-    def view(frame: Frame) -> View | None:
-        return _view(frame, poses[frame], camera)
-
-    for a, b in pairs:
-        view_a, view_b = view(a), view(b)
-        normal = np.zeros((len(DELTA), len(DELTA) + 1))
-        residual = None
-        if view_a and view_b:
-            residual = compare(view_a, view_b, lens)
-        if residual and residual.overlap < MIN_OVERLAP:
-            residual = None
-        if view_a and view_b and residual and not residual.hidden:
-            normal = camera_normal(view_a, view_b, lens, moved, DELTA)
-        yield Pair(a, b, residual), normal
 
 
 def _view(frame: Frame, world_from_cam: NDArray[np.float64], camera: CameraConfig) -> View | None:
@@ -151,15 +130,18 @@ def _overlap_check(pairs: list[Pair], poses: Poses, camera: CameraConfig) -> Che
     )
     near = [pair for pair in pairs if _are_neighbours(pair, poses, camera)]
     lost = [pair for pair in near if pair.residual is None]
+    failures: tuple[str, ...] = ()
     if 2 * len(lost) > len(near):
-        failure = f"{lost[0].a.path(DEPTH)}: puts next to nothing into the view of a frame near it"
-        others = f"and so do {len(lost) - 1} others of {len(near)}"
-        return Check("pairs", text, (f"{failure}, {others}",))
-    if 2 * len(hidden) > len(seen):
-        failure = f"{hidden[0].a.path(DEPTH)}: all of it is hidden in frame {hidden[0].b.number}"
-        others = f"and so it is in {len(hidden) - 1} others of {len(seen)} pairs"
-        return Check("pairs", text, (f"{failure}, {others}; is depth in millimetres?",))
-    return Check("pairs", text)
+        failures = (
+            f"{lost[0].a.path(DEPTH)}: puts next to nothing into the view of a frame near it, and"
+            f" so do {len(lost) - 1} others of {len(near)}",
+        )
+    elif 2 * len(hidden) > len(seen):
+        failures = (
+            f"{hidden[0].a.path(DEPTH)}: all of it is hidden in frame {hidden[0].b.number}, and so"
+            f" it is in {len(hidden) - 1} others of {len(seen)} pairs; is depth in millimetres?",
+        )
+    return Check("pairs", text, failures)
 
 
 def _are_neighbours(pair: Pair, poses: Poses, camera: CameraConfig) -> bool:
@@ -171,39 +153,30 @@ def _are_neighbours(pair: Pair, poses: Poses, camera: CameraConfig) -> bool:
 def measure_check(measure: Measure, pairs: list[Pair]) -> Check:
     """Whether each frame agrees with most of those it is compared with."""
     values = [
-        (pair, getattr(pair.residual, measure.field))
+        (pair, value)
         for pair in pairs
         if pair.residual and pair.residual.overlap >= measure.min_overlap
+        if math.isfinite(value := getattr(pair.residual, measure.field))
     ]
-    values = [(pair, value) for pair, value in values if math.isfinite(value)]
     if not values:
         return Check(measure.name, "no pair of frames shows it", skipped=True)
-    frames = _by_frame(values)
-    bound = f"(bound {measure.bound:g}{measure.unit})"
+    by_frame = defaultdict(list)
+    for pair, value in values:
+        by_frame[pair.a].append(value)
+        by_frame[pair.b].append(value)
+    # Beyond the bound where more than half of its pairs are: a wrong frame disagrees with most
+    # others, and one pair of right ones can disagree alone, where an edge hides from one of them
+    # what the other sees.
+    frames = {frame: median_low(of_frame) for frame, of_frame in by_frame.items()}
     worst = f"worst of {len(frames)} frames {max(frames.values()):.2g}{measure.unit}"
+    bound = f"(bound {measure.bound:g}{measure.unit})"
     text = f"{measure.what}, {worst} by the median of its pairs {bound}"
-    blamed = {frame for frame, value in frames.items() if value > measure.bound}
-    if not blamed:
-        return Check(measure.name, text)
     wrong = [
         (pair, value)
         for pair, value in values
-        if value > measure.bound and blamed & {pair.a, pair.b}
+        if value > measure.bound < max(frames[pair.a], frames[pair.b])
     ]
-    return Check(measure.name, text, (_blame(measure, wrong, len(values)),))
-
-
-def _by_frame(values: list[tuple[Pair, float]]) -> dict[Frame, float]:
-    """Of each frame the lower median over its pairs: beyond a bound where more than half are.
-
-    A wrong frame disagrees with most others. One pair of right ones can disagree alone, where an
-    edge hides from one of them what the other sees.
-    """
-    found = defaultdict(list)
-    for pair, value in values:
-        found[pair.a].append(value)
-        found[pair.b].append(value)
-    return {frame: median_low(of_frame) for frame, of_frame in found.items()}
+    return Check(measure.name, text, (_blame(measure, wrong, len(values)),) if wrong else ())
 
 
 def _blame(measure: Measure, wrong: list[tuple[Pair, float]], total: int) -> str:
@@ -231,7 +204,6 @@ def _camera_check(system: NDArray[np.float64], camera: KnownCamera) -> Check:
     said = f"principal point ({change[0]:+.2f}, {change[1]:+.2f}) px, focal length {change[2]:+.2%}"
     bounds = f"{CAMERA_BOUNDS[0]:g} px, {CAMERA_BOUNDS[2]:.1%}"
     text = f"correction that fits depth best: {said} (bounds {bounds})"
-    if (np.abs(change) <= CAMERA_BOUNDS).all():
-        return Check("camera", text)
+    fits = (np.abs(change) <= CAMERA_BOUNDS).all()
     failure = f"{camera.source}: camera: depth fits best with {said}; bounds {bounds}"
-    return Check("camera", text, (failure,))
+    return Check("camera", text, () if fits else (failure,))

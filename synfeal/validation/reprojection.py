@@ -61,8 +61,7 @@ class Residual:
     overlap: float  # share of the pixels of a with depth that b sees, hidden ones included
     # whether so many of them are behind what b sees that all that follows is NaN
     hidden: bool = True
-    depth_mm: float = math.nan  # median difference in depth
-    depth: float = math.nan  # the same, each difference as a multiple of what may differ there
+    depth: float = math.nan  # median difference in depth, in multiples of what may differ there
     in_front: float = math.nan  # share of points that lie in front of what b sees, which cannot be
     grey: float = math.nan  # median difference of grey levels
     # by how much b's image must be moved, turned and zoomed to explain the differences of grey
@@ -84,14 +83,13 @@ class _Seen:
 
 def compare(a: View, b: View, lens: Lens) -> Residual | None:
     """The residuals of a pair, None if b sees fewer than ``MIN_PIXELS`` of a's grid."""
-    lifted = a.depth_m[lens.rows, lens.columns]
     seen = _look(a, b, lens)
     if np.count_nonzero(seen.mask) < MIN_PIXELS:
         return None
-    overlap = float(np.sum(seen.mask) / np.sum(np.isfinite(lifted)))
-    on_surface = np.isfinite(seen.depth_m)
+    known = np.isfinite(a.depth_m[lens.rows, lens.columns])
+    overlap = float(np.sum(seen.mask) / np.sum(known))
     ratio = seen.predicted_m / seen.depth_m
-    visible = on_surface & (ratio < OCCLUSION_RATIO)
+    visible = np.isfinite(seen.depth_m) & (ratio < OCCLUSION_RATIO)
     if np.count_nonzero(visible) < MIN_PIXELS:
         return Residual(overlap)
     difference_m = np.abs(seen.predicted_m - seen.depth_m)[visible]
@@ -100,7 +98,6 @@ def compare(a: View, b: View, lens: Lens) -> Residual | None:
     return Residual(
         overlap,
         hidden=False,
-        depth_mm=1000.0 * float(np.median(difference_m)),
         depth=float(np.median(difference_m / seen.tolerance_m[visible])),
         in_front=float(np.mean(ratio[visible] * OCCLUSION_RATIO < 1.0)),
         grey=float(np.median(np.abs(grey_error))),
@@ -128,7 +125,9 @@ def _look(a: View, b: View, lens: Lens) -> _Seen:
     with np.errstate(divide="ignore", invalid="ignore"):
         magnified = _magnification(points, lens.rays @ b_from_a[:3, :3].T, inverse, slope, lens)
         seen[magnified <= 0.0] = np.nan
-        tolerance = ROUNDING_M * (1.0 + np.abs(magnified)) + _unevenness_m(b.depth_m, corner, seen)
+        v00, v01, v10, v11 = 1.0 / _corners(b.depth_m, corner)
+        off_plane = seen**2 * np.abs(v00 + v11 - v01 - v10) / 2.0
+    tolerance = ROUNDING_M * (1.0 + np.abs(magnified)) + off_plane
     tolerance += POSE_ROUNDING * max(np.abs(v.world_from_cam[:3, 3]).max() for v in (a, b))
     grey, gradient = _interpolate(b.grey, corner, fraction)
     return _Seen(mask, points[:, 2], seen, tolerance, grey, gradient)
@@ -139,29 +138,19 @@ def _magnification(
 ) -> Array:
     """By how much more depth in b changes than depth in a, for points (N, 3) on the surface, (N,).
 
+    Of ``inverse`` (N,) depth in b, which changes by ``slope`` (N, 2) from pixel to pixel; points
+    and rays at depth 1 in a are in the frame of b.
+
     On a plane ``normal @ point = offset`` the inverse of depth is linear in x / z and y / z, with
     ``normal / offset`` as its coefficients. Moved along the ray of a, the plane is met in b nearer
     or farther by ``normal @ ray_of_a / normal @ ray_of_b``. Below 0, a sees the surface from its
     other side: it can only be another one, behind a thin wall.
-
-    Args:
-        points: in the frame of b.
-        rays_of_a: (N, 3) at depth 1 in a, in the frame of b.
-        inverse: (N,) of the depth of b.
-        slope: (N, 2) how it changes from pixel to pixel.
-        lens: the camera.
     """
     along = slope * lens.focal_px
     place = points[:, :2] / points[:, 2:]
     constant = inverse - np.einsum("ni,ni->n", along, place)
     normal = np.column_stack([along, constant])
     return np.asarray(np.einsum("ni,ni->n", normal, rays_of_a) / inverse)
-
-
-def _unevenness_m(depth_m: NDArray[Any], corner: NDArray[np.int_], seen_m: Array) -> Array:
-    """By how much the depths (N,) between four pixels may be off because these lie on no plane."""
-    v00, v01, v10, v11 = 1.0 / _corners(depth_m, corner)
-    return np.asarray(seen_m**2 * np.abs(v00 + v11 - v01 - v10) / 2.0)
 
 
 def _corners(image: NDArray[Any], corner: NDArray[np.int_]) -> Array:
@@ -185,11 +174,7 @@ def _shift_px(grey_error: Array, gradient: Array, place: Array) -> float:
     """Root mean square of the shifts ``d`` that solve ``error + gradient @ d = 0``.
 
     A shift is that of an image moved, turned and zoomed, so a camera that goes forward shows too.
-
-    Args:
-        grey_error: (N,) grey levels.
-        gradient: (N, 2) grey levels per pixel.
-        place: (N, 2) places in the image, -1 to 1 across its width.
+    Of errors (N,), gradients (N, 2) per pixel and places (N, 2), -1 to 1 across the image's width.
     """
     x, y = place.T
     shifts = np.stack([[1 + 0 * x, 0 * x, x, -y], [0 * x, 1 + 0 * x, y, x]])  # (2, 4, N)
@@ -197,12 +182,13 @@ def _shift_px(grey_error: Array, gradient: Array, place: Array) -> float:
     scale = 1.0 + 1.4826 * np.median(np.abs(grey_error))
     weight = 1.0 / (1.0 + (grey_error / scale) ** 2)
     normal = (columns * weight[:, None]).T @ columns
-    if np.linalg.eigvalsh(normal)[0] * MAX_SHIFT_ERROR_PX**2 < GREY_NOISE**2:
-        return float("nan")
+    told = np.linalg.eigvalsh(normal)[0] * MAX_SHIFT_ERROR_PX**2
+    if told < GREY_NOISE**2:
+        return math.nan
     solution = np.linalg.solve(normal, columns.T @ (weight * grey_error))
     left = 1.4826 * float(np.median(np.abs(grey_error - columns @ solution)))
-    if np.linalg.eigvalsh(normal)[0] * MAX_SHIFT_ERROR_PX**2 < left**2:
-        return float("nan")  # seen from elsewhere, a texture differs by more than a shift
+    if told < left**2:
+        return math.nan  # seen from elsewhere, a texture differs by more than a shift
     moved = np.einsum("kpn,p->kn", shifts, solution)
     return float(np.sqrt(np.mean(np.sum(moved**2, axis=0))))
 
@@ -210,14 +196,8 @@ def _shift_px(grey_error: Array, gradient: Array, place: Array) -> float:
 def camera_normal(a: View, b: View, lens: Lens, moved: Sequence[Lens], delta: Array) -> Array:
     """Normal equations (P, P + 1) of what moving the camera's parameters does to the depths.
 
-    Depths count in multiples of what may differ.
-
-    Args:
-        a: frame whose depth is lifted.
-        b: frame it is compared with.
-        lens: the camera as it is said to be.
-        moved: the camera with one parameter moved, for each of P parameters.
-        delta: (P,) by how much each is moved.
+    Depths count in multiples of what may differ; ``moved`` are P cameras, of which each has one
+    parameter moved by that of ``delta`` (P,).
     """
     here, *there = (_look(a, b, each) for each in (lens, *moved))
     residual = here.predicted_m - here.depth_m
