@@ -37,54 +37,74 @@ def doubts_of(extents_m: Array, floors_m2: Array, space: FreeSpace) -> list[str]
 
     ``floors_m2`` (3,) is what :func:`floor_areas_m2` found along x, y and z.
     """
-    doubts = [*_unit(extents_m), *_up_axis(floors_m2)]
-    if space.floor_m is None:
-        doubts.append(
+    longest_m, axis = float(extents_m.max()), int(floors_m2.argmax())
+    unit = "0.01 or 0.001" if longest_m > EXTENTS_M[1] else "more than 1"
+    turn = "try the other --up-axis" if axis == 1 else "turn the mesh before exporting it"
+    can_stand = space.floor_m is not None
+    return _that_hold(
+        (
+            not EXTENTS_M[0] <= longest_m <= EXTENTS_M[1],
+            f"the mesh is {longest_m:.3g} m long: the unit is probably wrong; try --unit-m {unit}",
+        ),
+        (
+            axis != 2 and floors_m2[axis] >= FLOOR_RATIO * floors_m2[2],
+            f"the up axis is probably wrong (a floor of {floors_m2[axis]:.3g} m^2 if {'xyz'[axis]}"
+            f" were up, {floors_m2[2]:.3g} m^2 now); {turn}",
+        ),
+        (
+            not can_stand,
             "no place to stand with walls around it was found, so no box is suggested: check unit"
-            " and up axis, or give --box where cameras shall go"
-        )
-        return doubts
-    if space.enclosure < MIN_ENCLOSURE:
-        doubts.append(
+            " and up axis, or give --box where cameras shall go",
+        ),
+        (
+            can_stand and space.enclosure < MIN_ENCLOSURE,
             f"the mesh is open: from half of its free points, more than {1 - space.enclosure:.0%}"
-            " of the level and upward rays leave it; images will show its background"
-        )
-    if space.elsewhere > MAX_ELSEWHERE:
-        doubts.append(
+            " of the level and upward rays leave it; images will show its background",
+        ),
+        (
+            can_stand and space.elsewhere > MAX_ELSEWHERE,
             f"{space.elsewhere:.0%} of the places to stand are in other rooms or on other floors,"
-            " which cannot be seen from the suggested box; give --box to look at one of them"
-        )
-    return doubts
+            " which cannot be seen from the suggested box; give --box to look at one of them",
+        ),
+    )
+
+
+def _that_hold(*doubts: tuple[bool, str]) -> list[str]:
+    return [sentence for holds, sentence in doubts if holds]
 
 
 def colour_doubts(mesh: TexturedMesh, area_m2: dict[str, float]) -> list[str]:
     """Whether there is anything to see; ``area_m2`` is the surface by what colours it."""
-    if shows_one_colour(mesh):
-        return [
+    of_one, plain = shows_one_colour(mesh), area_m2["plain"] / max(sum(area_m2.values()), 1e-12)
+    return _that_hold(
+        (
+            of_one,
             "the mesh is of one colour, and collect refuses it; put its texture files (of an OBJ"
-            " also the .mtl) where it names them"
-        ]
-    plain = area_m2["plain"] / max(sum(area_m2.values()), 1e-12)
-    if plain > MAX_PLAIN:
-        return [f"{plain:.0%} of the surface has one plain colour: little to localize by"]
-    return []
+            " also the .mtl) where it names them",
+        ),
+        (
+            not of_one and plain > MAX_PLAIN,
+            f"{plain:.0%} of the surface has one plain colour: little to localize by",
+        ),
+    )
 
 
 def suggestion_doubts(suggestion: Suggestion) -> list[str]:
     """What planning the suggested command once has shown."""
-    doubts, empty = [], suggestion.empty
-    if suggestion.is_narrow:
-        doubts.append(
+    empty = suggestion.empty
+    return _that_hold(
+        (
+            suggestion.is_narrow,
             "the free space is too narrow for the default paths; the command below allows shorter"
-            " ones (--min-path) and nearer views (--min-view-distance)"
-        )
-    if empty.share > MAX_EMPTY:
-        doubts.append(
+            " ones (--min-path) and nearer views (--min-view-distance)",
+        ),
+        (
+            empty.share > MAX_EMPTY,
             f"{empty.share:.0%} of the pixels that the command below makes will be empty, and"
             f" {empty.mostly_empty_frames:.0%} of its frames more than half: cameras look out where"
-            " the mesh is open; pitch bounds or a smaller --box show less of that"
-        )
-    return doubts
+            " the mesh is open; pitch bounds or a smaller --box show less of that",
+        ),
+    )
 
 
 def floor_areas_m2(normal: Array, position_m: Array, area_m2: float) -> Array:
@@ -102,25 +122,6 @@ def floor_areas_m2(normal: Array, position_m: Array, area_m2: float) -> Array:
             _, counts = np.unique(np.floor(heights / FLOOR_BIN_M), return_counts=True)
             areas[axis] = counts.max() * area_m2 / len(position_m)
     return areas
-
-
-def _unit(extents_m: Array) -> list[str]:
-    longest = float(extents_m.max())
-    if EXTENTS_M[0] <= longest <= EXTENTS_M[1]:
-        return []
-    hint = "0.01 or 0.001" if longest > EXTENTS_M[1] else "more than 1"
-    return [f"the mesh is {longest:.3g} m long: the unit is probably wrong; try --unit-m {hint}"]
-
-
-def _up_axis(floors_m2: Array) -> list[str]:
-    axis = int(floors_m2.argmax())
-    if axis == 2 or floors_m2[axis] < FLOOR_RATIO * floors_m2[2]:
-        return []
-    areas = (
-        f"a floor of {floors_m2[axis]:.3g} m^2 if {'xy'[axis]} were up, {floors_m2[2]:.3g} m^2 now"
-    )
-    remedy = "try the other --up-axis" if axis == 1 else "turn the mesh before exporting it"
-    return [f"the up axis is probably wrong ({areas}); {remedy}"]
 
 
 UNITS_M = {0.001: "millimetres", 0.01: "centimetres", 0.0254: "inches", 10.0: "", 100.0: ""}
@@ -141,20 +142,27 @@ def load_as_meant(
         The scene as it was taken, the mesh, and a sentence for each thing that was assumed.
     """
     mesh, notes = _load(scene), []
-    extents_m = mesh.bounds_m[1] - mesh.bounds_m[0]
+    extents_m = np.ptp(mesh.bounds_m, axis=0)
     if not unit_is_given and not EXTENTS_M[0] <= extents_m.max() <= EXTENTS_M[1]:
         # What makes the smallest extent most like the height of a room.
         height = max(extents_m.min(), 1e-9) / STOREY_M
         unit_m = min(UNITS_M, key=lambda unit: abs(np.log(unit * height)))
         scene = scene.model_copy(update={"unit_m": unit_m})
         mesh = _load(scene)
-        notes.append(_unit_note(extents_m, unit_m))
+        before, after = (" x ".join(f"{m:.3g}" for m in k * extents_m) for k in (1.0, unit_m))
+        notes.append(
+            f"the mesh spans {before}, which no room does in metres; taken as"
+            f" {UNITS_M[unit_m] or f'units of {unit_m:g} m'} (--unit-m {unit_m:g}), which makes it"
+            f" {after} m; if that is wrong, give --unit-m"
+        )
     if scene.up_axis == "auto":
-        floors_m2 = _floors_m2(mesh)
-        other = "z" if is_y_up(cast(Path, scene.path), "auto") else "y"
-        turned = scene.model_copy(update={"up_axis": other})
+        points = SurfacePoints.of(mesh, np.random.default_rng(0), N_POINTS)
+        area_m2 = sum(float(triangle_areas_m2(part).sum()) for part in mesh.parts)
+        floors_m2 = floor_areas_m2(points.normal, points.position_m, area_m2)
         if floors_m2.argmax() == 1 and floors_m2[1] >= FLOOR_RATIO * floors_m2[2]:
-            scene, mesh = turned, _load(turned)
+            other = "z" if is_y_up(cast(Path, scene.path), "auto") else "y"
+            scene = scene.model_copy(update={"up_axis": other})
+            mesh = _load(scene)
             notes.append(
                 f"taken with {other} up, where its largest floor is {floors_m2[1]:.3g} m^2 and not"
                 f" {floors_m2[2]:.3g} m^2; if that is wrong, give --up-axis"
@@ -162,25 +170,9 @@ def load_as_meant(
     return scene, mesh, notes
 
 
-def _unit_note(extents: Array, unit_m: float) -> str:
-    before = " x ".join(f"{extent:.3g}" for extent in extents)
-    after = " x ".join(f"{extent:.3g}" for extent in unit_m * extents)
-    name = UNITS_M[unit_m] or f"units of {unit_m:g} m"
-    return (
-        f"the mesh spans {before}, which no room does in metres; taken as {name} (--unit-m"
-        f" {unit_m:g}), which makes it {after} m; if that is wrong, give --unit-m"
-    )
-
-
 def _load(scene: SceneConfig) -> TexturedMesh:
     assert scene.path is not None
     return load_mesh(scene.path, scene.up_axis, scene.unit_m)
-
-
-def _floors_m2(mesh: TexturedMesh) -> Array:
-    points = SurfacePoints.of(mesh, np.random.default_rng(0), N_POINTS)
-    area_m2 = sum(float(triangle_areas_m2(part).sum()) for part in mesh.parts)
-    return floor_areas_m2(points.normal, points.position_m, area_m2)
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,8 @@ def facts_of(found: Inspection) -> dict[str, Any]:
     scene, mesh, space, suggestion = found.scene, found.mesh, found.space, found.suggestion
     title = title_of(Path(str(scene.path)))
     detail, collect, box = detail_of(mesh), None, None
+    area_m2, surface = detail["area_m2"], found.surface
+    floors_m2 = floor_areas_m2(surface.normal, surface.position_m, sum(area_m2.values()))
     topology = asdict(mesh_topology(*merge_vertices(*mesh.merged())))
     lengths = list(topology.pop("hole_lengths_m"))
     if suggestion is not None:  # the command, and what planning it once showed
@@ -63,7 +65,7 @@ def facts_of(found: Inspection) -> dict[str, Any]:
             "definition": DEFINITION,
             "box_m": found.box_m.tolist(),
             "share": space.share,
-            "volume_m3": space.share * float(np.prod(found.box_m[1] - found.box_m[0])),
+            "volume_m3": space.share * float(np.prod(np.ptp(found.box_m, axis=0))),
             "enclosure": space.enclosure,
             "floor_m": space.floor_m,
             "elsewhere": space.elsewhere,
@@ -71,21 +73,14 @@ def facts_of(found: Inspection) -> dict[str, Any]:
         "back_faces_share": back_face_share(mesh, found.caster, space),
         "suggested_sampling_box": box,
         "collect": collect,
-        "doubts": _doubts(found, detail["area_m2"]),
+        "doubts": [
+            *found.assumed,
+            *colour_doubts(mesh, area_m2),
+            *doubts_of(np.ptp(mesh.bounds_m, axis=0), floors_m2, space),
+            *([] if suggestion is None else suggestion_doubts(suggestion)),
+        ],
         "version": synfeal.__version__,
     }
-
-
-def _doubts(found: Inspection, area_m2: dict[str, float]) -> list[str]:
-    """What was assumed first, then what looks wrong."""
-    bounds_m, surface = found.mesh.bounds_m, found.surface
-    floors_m2 = floor_areas_m2(surface.normal, surface.position_m, sum(area_m2.values()))
-    return [
-        *found.assumed,
-        *colour_doubts(found.mesh, area_m2),
-        *doubts_of(bounds_m[1] - bounds_m[0], floors_m2, found.space),
-        *([] if found.suggestion is None else suggestion_doubts(found.suggestion)),
-    ]
 
 
 def _part(part: MeshPart) -> dict[str, Any]:
@@ -93,7 +88,7 @@ def _part(part: MeshPart) -> dict[str, Any]:
     return {
         "name": part.name,
         "faces": len(part.faces),
-        "area_m2": float(triangle_areas_m2(part).sum()),
+        "area_m2": _area_m2([part]),
         "colour": _colour(part),
         "texture_px": texture,
         "alpha_cutoff": part.alpha_cutoff,
@@ -106,11 +101,11 @@ def _colour(part: MeshPart) -> str:
     return "plain" if part.vertex_rgb is None else "vertices"
 
 
-def _material_key(part: MeshPart) -> tuple[str, bytes, float | None]:
+def _material_key(part: MeshPart) -> tuple[str, str, bytes, float | None]:
     """Equal for parts that are drawn alike."""
-    texture = b"" if part.texture is None else part.texture.tobytes()
-    kind = f"{_colour(part)} {hashlib.sha256(texture).hexdigest()}"
-    return kind, part.base_color.tobytes(), part.alpha_cutoff
+    texels = b"" if part.texture is None else part.texture.tobytes()
+    texture = hashlib.sha256(texels).hexdigest()
+    return _colour(part), texture, part.base_color.tobytes(), part.alpha_cutoff
 
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -124,17 +119,21 @@ def detail_of(mesh: TexturedMesh) -> dict[str, Any]:
     root of vertices per square metre over all parts coloured by their vertices. None where there
     are no such parts.
     """
-    textured = [part for part in mesh.parts if part.texture is not None]
-    by_vertex = [p for p in mesh.parts if p.texture is None and p.vertex_rgb is not None]
-    plain = [p for p in mesh.parts if p.texture is None and p.vertex_rgb is None]
+    textured, by_vertex, plain = (
+        [part for part in mesh.parts if _colour(part) == colour]
+        for colour in ("texture", "vertices", "plain")
+    )
+    vertex_m2, per_m = _area_m2(by_vertex), None
+    if vertex_m2 > 0.0:
+        per_m = float(np.sqrt(sum(len(np.unique(part.faces)) for part in by_vertex) / vertex_m2))
     return {
         "area_m2": {
             "textured": _area_m2(textured),
-            "coloured_by_vertex": _area_m2(by_vertex),
+            "coloured_by_vertex": vertex_m2,
             "plain": _area_m2(plain),
         },
         "texels_per_m": texels_per_m(textured),
-        "coloured_vertices_per_m": _vertices_per_m(by_vertex),
+        "coloured_vertices_per_m": per_m,
     }
 
 
@@ -166,13 +165,6 @@ def _area_m2(parts: list[MeshPart]) -> float:
     return float(sum(triangle_areas_m2(part).sum() for part in parts))
 
 
-def _vertices_per_m(parts: list[MeshPart]) -> float | None:
-    area_m2 = _area_m2(parts)
-    if area_m2 <= 0.0:
-        return None
-    return float(np.sqrt(sum(len(np.unique(part.faces)) for part in parts) / area_m2))
-
-
 N_RAYS = 5000
 
 
@@ -181,12 +173,11 @@ def back_face_share(mesh: TexturedMesh, caster: RayCaster, space: FreeSpace) -> 
 
     A face shows its front where its vertices run counter-clockwise. None if nothing is hit.
     """
-    index = np.argwhere(space.is_clear)
-    if not len(index):
+    clear_m = space.clear_m
+    if not len(clear_m):
         return None
     rng = np.random.default_rng(0)
-    index = index[rng.integers(len(index), size=N_RAYS)]
-    start = np.stack([axis[index[:, i]] for i, axis in enumerate(space.axes_m)], axis=1)
+    start = clear_m[rng.integers(len(clear_m), size=N_RAYS)]
     direction: NDArray[np.float64] = rng.standard_normal((N_RAYS, 3))
     _, face = caster.first_hits(start, direction)
     vertices, faces = mesh.merged()

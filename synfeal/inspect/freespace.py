@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from scipy.stats import mode
 
 from synfeal.mesh.rays import RayCaster
 from synfeal.planning.start import ConnectedSpace, seeing_groups
@@ -67,6 +68,11 @@ class FreeSpace:
         """Share of the box that is free."""
         return float(self.is_free.mean())
 
+    @property
+    def clear_m(self) -> Array:
+        """The clear points (N, 3)."""
+        return np.stack(np.meshgrid(*self.axes_m, indexing="ij"), axis=-1)[self.is_clear]
+
 
 def survey(caster: RayCaster, surface_m: Array, box_m: Array) -> Survey:
     """Cast rays from a grid of points in a box (2, 3), metres.
@@ -102,9 +108,13 @@ def find_free_space(caster: RayCaster, found: Survey, slack: float = SLACK) -> F
         return FreeSpace(found.axes_m, nothing, nothing, 0.0, None)
     best = float(np.quantile(found.enclosure[found.is_stand], 0.95))
     is_enclosed = found.enclosure >= max(best - slack, MIN_ENCLOSURE)
-    hubs_m, share = _largest_space(caster, found.points_m[found.is_stand & is_enclosed])
+    # Some of the places of the largest group that see each other.
+    stands_m = found.points_m[found.is_stand & is_enclosed]
+    places_m = np.random.default_rng(0).permutation(stands_m)[:N_PLACES]
+    group = seeing_groups(caster, places_m)
+    largest_m = places_m[group == np.bincount(group).argmax()]
     is_free = is_enclosed.copy()
-    space = ConnectedSpace(caster, hubs_m)
+    space = ConnectedSpace(caster, largest_m[:N_HUBS])
     is_free[is_enclosed] = space.contains(found.points_m[is_enclosed])
     floors_m = _floors_m(caster, found.points_m[is_free & found.is_stand])
     return FreeSpace(
@@ -113,28 +123,17 @@ def find_free_space(caster: RayCaster, found: Survey, slack: float = SLACK) -> F
         is_clear=(is_free & found.is_clear).reshape(shape),
         enclosure=float(np.median(found.enclosure[is_free])),
         floor_m=_most_frequent(floors_m),
-        elsewhere=1.0 - share,
+        elsewhere=1.0 - len(largest_m) / len(places_m),
     )
-
-
-def _largest_space(caster: RayCaster, stands_m: Array) -> tuple[Array, float]:
-    """Some (H, 3) of the places (N, 3) of the largest group that see each other, and its share."""
-    rng = np.random.default_rng(0)
-    places = rng.permutation(stands_m)[:N_PLACES]
-    group = seeing_groups(caster, places)
-    largest = places[group == np.bincount(group).argmax()]
-    return largest[:N_HUBS], len(largest) / len(places)
 
 
 def viewpoint(space: FreeSpace, box_m: Array | None) -> Array | None:
     """The clear point (3,) nearest to the middle of the box; of the clear space without a box."""
-    if not space.is_clear.any():
+    points = space.clear_m
+    if not len(points):
         return None
-    index = np.argwhere(space.is_clear)
-    points = np.stack([space.axes_m[i][index[:, i]] for i in range(3)], axis=1)
     middle = points.mean(axis=0) if box_m is None else box_m.mean(axis=0)
-    nearest: Array = points[np.argmin(np.linalg.norm(points - middle, axis=1))]
-    return nearest
+    return np.asarray(points[np.argmin(np.linalg.norm(points - middle, axis=1))])
 
 
 def ray_directions() -> Array:
@@ -169,8 +168,6 @@ def step_m_of(axis: Array) -> float:
 
 def _floors_m(caster: RayCaster, points: Array) -> Array:
     """Height (N,) of what lies straight below points (N, 3); -inf where nothing does."""
-    if not len(points):
-        return np.empty(0)
     return points[:, 2] - caster.first_hit_m(
         points, np.broadcast_to([0.0, 0.0, -1.0], points.shape)
     )
@@ -181,6 +178,5 @@ def _most_frequent(heights_m: Array) -> float | None:
     heights_m = heights_m[np.isfinite(heights_m)]
     if not len(heights_m):
         return None
-    bins, counts = np.unique(np.round(heights_m / FLOOR_BIN_M), return_counts=True)
-    chosen = np.round(heights_m / FLOOR_BIN_M) == bins[counts.argmax()]
-    return float(np.median(heights_m[chosen]))
+    bins = np.round(heights_m / FLOOR_BIN_M)
+    return float(np.median(heights_m[bins == mode(bins).mode]))

@@ -83,24 +83,13 @@ def suggest(
                 continue
             x, y, z = ((low, high) for low, high in box_m.T.tolist())
             boxed = each.model_copy(update={"sampling_box": Box(x=x, y=y, z=z)})
-            suggestion = _planned(caster, boxed, collection)
-            if suggestion is not None:
-                return space, suggestion
+            rng = generator_of(0, "plan", SCENE, "train")
+            try:
+                plan = plan_split(caster, box_m, boxed, collection, N_FRAMES, rng)
+            except InputError:
+                continue
+            return space, Suggestion(boxed, collection, empty_pixels(caster, plan, CameraConfig()))
     return spaces[0], None
-
-
-def _planned(
-    caster: RayCaster, scene: SceneConfig, collection: CollectionConfig
-) -> Suggestion | None:
-    """The suggestion, if paths can be planned as ``synfeal collect`` does with its defaults."""
-    assert scene.sampling_box is not None
-    box_m = box_array(scene.sampling_box)
-    try:
-        rng = generator_of(0, "plan", SCENE, "train")
-        plan = plan_split(caster, box_m, scene, collection, N_FRAMES, rng)
-    except InputError:
-        return None
-    return Suggestion(scene, collection, empty_pixels(caster, plan, CameraConfig()))
 
 
 Mask = NDArray[np.bool_]
@@ -163,8 +152,8 @@ def suggest_box(space: FreeSpace) -> Array | None:
     if not is_candidate.any():
         return None
     lower, upper = largest_box(is_candidate)
-    reach_m = [step_m_of(axis) / 4.0 for axis in space.axes_m]
-    axes = list(zip(space.axes_m, lower, upper, reach_m, strict=True))
-    low = [axis[first] - reach for axis, first, _, reach in axes]
-    high = [axis[last] + reach for axis, _, last, reach in axes]
-    return np.round(np.array([low, high]), 2)
+    limits = [
+        (axis[first] - step_m_of(axis) / 4.0, axis[last] + step_m_of(axis) / 4.0)
+        for axis, first, last in zip(space.axes_m, lower, upper, strict=True)
+    ]
+    return np.round(np.array(limits, np.float64).T, 2)
