@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,9 +30,22 @@ from synfeal.render import open_renderer
 Array = NDArray[np.float64]
 
 
+Rgb = NDArray[np.uint8]
+
 OUTPUTS = ("inspect.json", "inspect.png", "inspect.html")
 N_LEVEL_RAYS = 64
 BOX_RGB = (213, 94, 0)
+BOX_COLOUR = "#{:02x}{:02x}{:02x}".format(*BOX_RGB)
+SIZE_INCH, DPI = (16.0, 8.8), 100
+LOOKS_ALONG = {0: "+x", 90: "+y", 180: "-x", 270: "-y"}  # by yaw, degrees
+OUTLINE = [withStroke(linewidth=3, foreground="white")]
+ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": "black", "path_effects": OUTLINE}
+POINTS: dict[str, Any] = {"textcoords": "offset points", "path_effects": OUTLINE}
+VIEW_CAMERA = CameraConfig(width=640, height=480, horizontal_fov_deg=75.0)
+TOP_PX = 1100  # the longer side of the top view
+TOP_FOV_DEG = 2.0  # so far away that the view is as good as orthographic
+MARGIN = 0.04
+WORLD_FROM_CAM_ABOVE: Array = np.diag([1.0, -1.0, -1.0])  # x right, y up in the image
 
 
 def inspect_mesh(scene: SceneConfig, out: Path, unit_is_given: bool = True) -> str:
@@ -47,7 +60,7 @@ def inspect_mesh(scene: SceneConfig, out: Path, unit_is_given: bool = True) -> s
     refuse_foreign(out, OUTPUTS, "an inspection")
     found = Inspection.of(scene, unit_is_given or scene.sampling_box is not None)
     facts = facts_of(found)
-    picture = _picture(facts, found)
+    picture = picture_png(facts, found)
     edges = [] if found.suggested_m is None else box_lines(found.suggested_m)
     heading = heading_from_opening(found.caster, found.viewpoint_m)
     drawing = viewer_mesh(found.mesh, found.surface).scene(
@@ -56,8 +69,9 @@ def inspect_mesh(scene: SceneConfig, out: Path, unit_is_given: bool = True) -> s
     page = page_html(
         facts["title"], facts["doubts"], sections_of(facts), how_to_go_on(facts), picture, drawing
     )
-    _write(out / OUTPUTS[1], picture)
-    _write(out / OUTPUTS[2], page.encode("utf-8"))
+    for name, content in zip(OUTPUTS[1:], (picture, page.encode("utf-8")), strict=True):
+        with atomic_path(out / name) as temporary:
+            temporary.write_bytes(content)
     write_json(out / OUTPUTS[0], facts)
     return plain_text(facts)
 
@@ -84,51 +98,27 @@ def heading_from_opening(caster: RayCaster, position_m: Array) -> float:
     return float(np.arctan2(-out[1], -out[0]))
 
 
-def _picture(facts: Facts, found: Inspection) -> bytes:
-    """Title, numbers and views; the mesh is cut at mid-height of the box, if there is one."""
-    mesh, suggested_m, position_m = found.mesh, found.suggested_m, found.viewpoint_m
-    low, high = mesh.bounds_m
-    cut_m = float(low[2] + 0.6 * (high[2] - low[2]))
-    if suggested_m is not None:
-        cut_m = float(suggested_m[:, 2].mean())
+def picture_png(facts: Facts, found: Inspection) -> bytes:
+    """Title, numbers, the mesh from above and four views from inside as PNG, 1600 x 880 pixels.
+
+    It is cut at mid-height of the suggested box, if there is one.
+    """
+    (_, _, low), (_, _, high) = found.mesh.bounds_m.tolist()
+    box_m, position_m = found.suggested_m, found.viewpoint_m
+    cut_m = low + 0.6 * (high - low) if box_m is None else float(box_m[:, 2].mean())
     values = facts["properties"]
     size = " × ".join(f"{extent:.2f}" for extent in values["extents_m"])
     caption = (
         f"{values['vertices']:,} vertices, {values['faces']:,} faces, {size} m,"
         f" {facts['free_space']['share']:.0%} of the box is free space"
     )
-    views, top = inside_views(mesh, position_m), top_view(mesh, cut_m)
-    return picture_png(facts["title"], caption, top, cut_m, suggested_m, position_m, views)
-
-
-def _write(path: Path, content: bytes) -> None:
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(content)
-
-
-SIZE_INCH, DPI = (16.0, 8.8), 100
-ACCENT = "#d55e00"
-LOOKS_ALONG = {0: "+x", 90: "+y", 180: "-x", 270: "-y"}
-OUTLINE = [withStroke(linewidth=3, foreground="white")]
-ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": "black", "path_effects": OUTLINE}
-POINTS: dict[str, Any] = {"textcoords": "offset points", "path_effects": OUTLINE}
-
-
-def picture_png(
-    title: str,  # heading
-    caption: str,  # one line below it
-    top: TopView,  # the mesh from above
-    cut_m: float,  # height above which ``top`` shows nothing
-    box_m: Array | None,  # (2, 3) the suggested sampling box, if there is one
-    position_m: Array,  # (3,) where ``views`` were taken
-    views: Sequence[Rgb],  # one image for each of ``YAWS_DEG``
-) -> bytes:
-    """The picture as PNG, 1600 x 880 pixels."""
     figure = Figure(figsize=SIZE_INCH, dpi=DPI)
-    figure.text(0.02, 0.96, title, fontsize=17, weight="bold", va="center", parse_math=False)
-    figure.text(0.02, 0.92, caption, fontsize=11, color="0.35", va="center", parse_math=False)
-    _draw_top(figure.add_axes((0.045, 0.07, 0.385, 0.79)), top, cut_m, box_m, position_m)
-    for index, (yaw, view) in enumerate(zip(YAWS_DEG, views, strict=True)):
+    text = partial(figure.text, va="center", parse_math=False)
+    text(0.02, 0.96, facts["title"], fontsize=17, weight="bold")
+    text(0.02, 0.92, caption, fontsize=11, color="0.35")
+    views = inside_views(found.mesh, position_m)
+    _draw_top(figure, top_view(found.mesh, cut_m), cut_m, box_m, position_m)
+    for index, (yaw, view) in enumerate(zip(LOOKS_ALONG, views, strict=True)):
         left, bottom = 0.45 + 0.272 * (index % 2), 0.50 - 0.43 * (index // 2)
         axes = figure.add_axes((left, bottom, 0.265, 0.36))
         axes.imshow(view)
@@ -143,34 +133,29 @@ def picture_png(
 
 
 def _draw_top(
-    axes: Axes, top: TopView, cut_m: float, box_m: Array | None, position_m: Array
+    figure: Figure, top: TopView, cut_m: float, box_m: Array | None, position_m: Array
 ) -> None:
+    axes = figure.add_axes((0.045, 0.07, 0.385, 0.79))
     axes.imshow(top.rgb, extent=top.extent_m, interpolation="antialiased")
     axes.set_title(f"From above, cut at z = {cut_m:.2f} m", fontsize=11, loc="left")
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
-    axes.set_anchor("N")
+    axes.set(xlabel="x (m)", ylabel="y (m)", anchor="N")
     if box_m is not None:
-        _draw_box(axes, box_m)
+        (x0, y0, z0), (x1, y1, z1) = box_m
+        frame = Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, edgecolor=BOX_COLOUR, linewidth=2)
+        frame.set_linestyle("--")
+        frame.set_path_effects([withStroke(linewidth=4, foreground="white")])
+        axes.add_patch(frame)
+        text = f"suggested sampling box, z {z0:.2f} to {z1:.2f} m"
+        axes.annotate(text, (x0, y1), (0, 4), va="bottom", fontsize=9, color=BOX_COLOUR, **POINTS)
     reach = 0.05 * max(top.extent_m[1] - top.extent_m[0], top.extent_m[3] - top.extent_m[2])
     _draw_position(axes, position_m, reach)
     _draw_scale(axes, top)
 
 
-def _draw_box(axes: Axes, box_m: Array) -> None:
-    (x0, y0, z0), (x1, y1, z1) = box_m
-    frame = Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, edgecolor=ACCENT, linewidth=2)
-    frame.set_linestyle("--")
-    frame.set_path_effects([withStroke(linewidth=4, foreground="white")])
-    axes.add_patch(frame)
-    text = f"suggested sampling box, z {z0:.2f} to {z1:.2f} m"
-    axes.annotate(text, (x0, y1), (0, 4), va="bottom", fontsize=9, color=ACCENT, **POINTS)
-
-
 def _draw_position(axes: Axes, position_m: Array, reach: float) -> None:
     """A dot with an arrow for each view."""
     x, y = position_m[:2]
-    for yaw in YAWS_DEG:
+    for yaw in LOOKS_ALONG:
         dx, dy = reach * math.cos(math.radians(yaw)), reach * math.sin(math.radians(yaw))
         axes.annotate("", (x + dx, y + dy), (x, y), arrowprops=ARROW)
         label = axes.text(x + 1.35 * dx, y + 1.35 * dy, f"{yaw}°", ha="center", va="center")
@@ -179,32 +164,16 @@ def _draw_position(axes: Axes, position_m: Array, reach: float) -> None:
 
 
 def _draw_scale(axes: Axes, top: TopView) -> None:
-    """A bar of a round length near a fifth of the width, below the image on the right."""
+    """A bar of 1, 2 or 5 times a power of ten, a fifth of the width or less, at the lower right."""
     x0, x1, y0, y1 = top.extent_m
-    length = round_length_m((x1 - x0) / 5.0)
+    fifth = (x1 - x0) / 5.0
+    power = 10.0 ** math.floor(math.log10(fifth))
+    length = max(k * power for k in (1.0, 2.0, 5.0) if k * power <= fifth * (1 + 1e-9))
     right, height = x1 - 0.03 * (x1 - x0), y0 + 0.025 * (y1 - y0)
     bar = axes.plot([right - length, right], [height] * 2, color="black", linewidth=4)
     bar[0].set_path_effects([withStroke(linewidth=7, foreground="white")])
     middle = (right - length / 2, height)
     axes.annotate(f"{length:g} m", middle, (0, 5), ha="center", fontsize=10, **POINTS)
-
-
-def round_length_m(length_m: float) -> float:
-    """The largest of 1, 2 and 5 times a power of ten that is at most ``length_m``."""
-    power = 10.0 ** math.floor(math.log10(length_m))
-    return max(
-        factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= length_m * (1 + 1e-9)
-    )
-
-
-Rgb = NDArray[np.uint8]
-
-YAWS_DEG = (0, 90, 180, 270)
-VIEW_CAMERA = CameraConfig(width=640, height=480, horizontal_fov_deg=75.0)
-TOP_PX = 1100  # the longer side of the top view
-TOP_FOV_DEG = 2.0  # so far away that the view is as good as orthographic
-MARGIN = 0.04
-WORLD_FROM_CAM_ABOVE: Array = np.diag([1.0, -1.0, -1.0])  # x right, y up in the image
 
 
 class TopView(NamedTuple):
@@ -215,9 +184,9 @@ class TopView(NamedTuple):
 
 
 def inside_views(mesh: TexturedMesh, position_m: Array) -> list[Rgb]:
-    """What a level camera at (3,) sees at each of ``YAWS_DEG``."""
+    """What a level camera at (3,) sees at each of ``LOOKS_ALONG``."""
     with open_renderer(mesh, VIEW_CAMERA) as renderer:
-        turns = rotation_from_rpy([[0.0, 0.0, math.radians(yaw)] for yaw in YAWS_DEG])
+        turns = rotation_from_rpy([[0.0, 0.0, math.radians(yaw)] for yaw in LOOKS_ALONG])
         return [renderer.render(pose_matrix(turn, position_m)) for turn in turns]
 
 

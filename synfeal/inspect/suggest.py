@@ -19,7 +19,7 @@ from synfeal.inspect.freespace import (
     step_m_of,
 )
 from synfeal.mesh.rays import RayCaster
-from synfeal.planning.plan import box_array, plan_split
+from synfeal.planning.plan import plan_split
 from synfeal.planning.seen_surface import EmptyPixels, empty_pixels
 from synfeal.seeds import generator_of
 from synfeal.settings import SCENE
@@ -35,16 +35,11 @@ NARROW_M = 0.6  # least path and view in a space too narrow for the defaults
 class Suggestion:
     """What was planned, and what came of it."""
 
-    scene: SceneConfig  # with the suggested sampling box
+    scene: SceneConfig  # with the sampling box
     # how the camera moves; the defaults unless the space is too narrow for them
     collection: CollectionConfig
     empty: EmptyPixels  # how much of the images would show nothing
-
-    @property
-    def box_m(self) -> Array:
-        """The box (2, 3)."""
-        assert self.scene.sampling_box is not None
-        return box_array(self.scene.sampling_box)
+    box_m: Array  # (2, 3) the sampling box
 
     @property
     def is_narrow(self) -> bool:
@@ -88,7 +83,8 @@ def suggest(
                 plan = plan_split(caster, box_m, boxed, collection, N_FRAMES, rng)
             except InputError:
                 continue
-            return space, Suggestion(boxed, collection, empty_pixels(caster, plan, CameraConfig()))
+            empty = empty_pixels(caster, plan, CameraConfig())
+            return space, Suggestion(boxed, collection, empty, box_m)
     return spaces[0], None
 
 
