@@ -16,7 +16,7 @@ import trimesh
 
 from synfeal.errors import InputError
 from synfeal.inspect.surface import SurfacePoints, split_longest_edges, viewer_mesh
-from synfeal.inspect.text import Section, page_html
+from synfeal.inspect.text import page_html
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.triangles import Triangles, simplify
 
@@ -155,7 +155,7 @@ def test_splitting_keeps_the_surface_and_the_limits():
 
 
 def page_of(mesh, lines):
-    sections = [Section("<b>", (("a & b", "</script><script>alert(1)</script>"),))]
+    sections = [("<b>", [("a & b", "</script><script>alert(1)</script>")])]
     scene = small_copy(mesh).scene(lines)
     return page_html("a <mesh>", ["look & see"], sections, "x: {y: [1, 2]}", b"png", scene)
 

@@ -43,12 +43,7 @@ class SurfacePoints:
 
 def triangle_areas_m2(part: MeshPart) -> Array:
     """Area (F,) of each triangle, square metres."""
-    return np.asarray(np.linalg.norm(_cross(part), axis=1) / 2.0)
-
-
-def _cross(part: MeshPart) -> Array:
-    """Normals (F, 3) of the triangles, as long as twice their area."""
-    return np.asarray(cross(part.vertices_m[part.faces]))
+    return np.asarray(np.linalg.norm(cross(part.vertices_m[part.faces]), axis=1) / 2.0)
 
 
 def _sample(
@@ -58,21 +53,15 @@ def _sample(
     expected = area_m2 * per_m2
     counts = np.maximum(1, np.floor(expected + rng.random(len(expected)))).astype(np.int64)
     index = np.repeat(np.arange(len(counts)), counts)
-    weight = _barycentric(len(index), rng)
+    u, v = rng.random((2, len(index)))
+    root = np.sqrt(u)
+    weight = np.stack([1.0 - root, root * (1.0 - v), root * v], axis=1)  # uniform on triangles
     corners = part.faces[index]
     position = np.einsum("nc,ncd->nd", weight, part.vertices_m[corners])
-    cross = _cross(part)[index]
-    normal = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-30)
+    normal = _normals(part.vertices_m[part.faces])[index]
     rgba = _rgba(part, corners, weight)
     cutoff = -1.0 if part.alpha_cutoff is None else part.alpha_cutoff
     return position, normal, np.round(rgba[:, :3]).astype(np.uint8), rgba[:, 3] / 255.0 >= cutoff
-
-
-def _barycentric(count: int, rng: np.random.Generator) -> Array:
-    """Weights (count, 3) of the corners, uniform over the triangle."""
-    u, v = rng.random((2, count))
-    root = np.sqrt(u)
-    return np.stack([1.0 - root, root * (1.0 - v), root * v], axis=1)
 
 
 def _rgba(part: MeshPart, corners: NDArray[np.int64], weight: Array) -> Array:

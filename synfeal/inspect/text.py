@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 from textwrap import wrap
-from typing import Any, NamedTuple
+from typing import Any
 
 from jinja2 import Environment, PackageLoader
 
@@ -15,37 +15,32 @@ from synfeal.inspect.surface import viewer_js
 from synfeal.mesh.gltf import slug_of
 
 Facts = Mapping[str, Any]
+Rows = list[tuple[str, str]]  # labels and values
+Sections = list[tuple[str, Rows]]  # under titles
 
 MAX_PARTS = 20
 VALUE_WIDTH = 72
 
 
-class Section(NamedTuple):
-    """Labelled values under a title."""
-
-    title: str
-    rows: tuple[tuple[str, str], ...]
-
-
-def sections_of(facts: Facts) -> list[Section]:
+def sections_of(facts: Facts) -> Sections:
     """All sections, in the order they are read."""
     found = [
-        Section("Mesh", _mesh_rows(facts)),
-        Section("Surface", _surface_rows(facts)),
-        Section("Topology, seam copies merged", _topology_rows(facts["topology"])),
-        Section("Free space", _space_rows(facts)),
-        Section("Parts", _part_rows(facts["parts"])),
+        ("Mesh", _mesh_rows(facts)),
+        ("Surface", _surface_rows(facts)),
+        ("Topology, seam copies merged", _topology_rows(facts["topology"])),
+        ("Free space", _space_rows(facts)),
+        ("Parts", _part_rows(facts["parts"])),
     ]
     if facts["findings"]:
-        rows = tuple((str(i), text) for i, text in enumerate(facts["findings"], start=1))
-        found.append(Section("Found or repaired on reading", rows))
+        rows = [(str(i), text) for i, text in enumerate(facts["findings"], start=1)]
+        found.append(("Found or repaired on reading", rows))
     return found
 
 
 def plain_text(facts: Facts) -> str:
     """The sections, the doubts and the snippet as aligned text."""
     sections = sections_of(facts)
-    width = max(len(label) for section in sections for label, _ in section.rows)
+    width = max(len(label) for _, rows in sections for label, _ in rows)
     lines: list[str] = []
     for title, rows in sections:
         lines += [title, *(line for row in rows for line in _aligned(*row, width)), ""]
@@ -76,117 +71,106 @@ def _aligned(label: str, value: str, width: int) -> list[str]:
 
 def snippet(facts: Facts) -> str:
     """A scene in YAML, ready to paste under ``scenes:``."""
-    mesh = facts["mesh"]
-    lines = [
-        f"  {slug_of(facts['title'])}:",
-        "    source: mesh",
-        f"    path: {json.dumps(mesh['path'], ensure_ascii=False)}",
-        f"    sha256: {mesh['sha256']}",
-        f"    up_axis: {mesh['up_axis']}",
-        f"    unit_m: {mesh['unit_m']:g}",
-    ]
-    box = facts["suggested_sampling_box"]
-    if box is None:
-        lines.append("    # sampling_box: no suggestion; see the free space")
-    else:
+    mesh, box = facts["mesh"], facts["suggested_sampling_box"]
+    sampling_box = "# sampling_box: no suggestion; see the free space"
+    if box is not None:
         inner = ", ".join(f"{axis}: [{low:z.2f}, {high:z.2f}]" for axis, (low, high) in box.items())
-        lines.append(f"    sampling_box: {{{inner}}}")
-    return "\n".join(lines)
+        sampling_box = f"sampling_box: {{{inner}}}"
+    return f"""\
+  {slug_of(facts["title"])}:
+    source: mesh
+    path: {json.dumps(mesh["path"], ensure_ascii=False)}
+    sha256: {mesh["sha256"]}
+    up_axis: {mesh["up_axis"]}
+    unit_m: {mesh["unit_m"]:g}
+    {sampling_box}"""
 
 
-def _mesh_rows(facts: Facts) -> tuple[tuple[str, str], ...]:
+def _mesh_rows(facts: Facts) -> Rows:
     values, volume = facts["properties"], facts["topology"]["enclosed_volume_m3"]
-    low, high = values["bounds_m"]
-    bounds = ", ".join(
-        f"{axis} {a:z.2f} to {b:z.2f}" for axis, a, b in zip("xyz", low, high, strict=True)
-    )
-    facing = "" if volume is None else ", faces look inwards" if volume < 0 else ""
-    return (
+    enclosed = "none: not watertight"
+    if volume is not None:
+        enclosed = f"{abs(volume):.2f} m^3" + ", faces look inwards" * (volume < 0)
+    return [
         ("vertices", f"{values['vertices']:,}"),
         ("  with texture-seam copies", f"{values['vertices_with_seams']:,}"),
         ("faces", f"{values['faces']:,}"),
         ("volume of the bounding box", f"{values['volume_m3']:.2f} m^3 (as in Table 1)"),
-        (
-            "enclosed volume",
-            "none: not watertight" if volume is None else f"{abs(volume):.2f} m^3{facing}",
-        ),
+        ("enclosed volume", enclosed),
         ("extents", " x ".join(f"{extent:.2f}" for extent in values["extents_m"]) + " m"),
-        ("bounds", f"{bounds} m"),
+        ("bounds", _limits(zip("xyz", zip(*values["bounds_m"], strict=True), strict=True))),
         ("parts, materials", f"{values['parts']}, {facts['materials']}"),
-    )
+    ]
 
 
-def _surface_rows(facts: Facts) -> tuple[tuple[str, str], ...]:
-    detail = facts["detail"]
+def _limits(axes: Iterable[tuple[str, tuple[float, float]]]) -> str:
+    return ", ".join(f"{axis} {low:z.2f} to {high:z.2f}" for axis, (low, high) in axes) + " m"
+
+
+def _surface_rows(facts: Facts) -> Rows:
+    detail, backs = facts["detail"], facts["back_faces_share"]
     area = sum(detail["area_m2"].values())
     shares = ", ".join(
         f"{value / max(area, 1e-12):.0%} {name.replace('_', ' ')}"
         for name, value in detail["area_m2"].items()
     )
     rows = [("area", f"{area:.1f} m^2: {shares}")]
-    texels, vertices = detail["texels_per_m"], detail["coloured_vertices_per_m"]
-    if texels is not None:
-        low, middle, high = texels
+    if detail["texels_per_m"] is not None:
+        low, middle, high = detail["texels_per_m"]
         text = f"{middle:.0f} (5 % of the textured area below {low:.0f}, 5 % above {high:.0f})"
         rows.append(("texels per metre, median", text))
-    if vertices is not None:
-        rows.append(("coloured vertices per metre", f"{vertices:.0f}"))
-    backs = facts["back_faces_share"]
+    if detail["coloured_vertices_per_m"] is not None:
+        rows.append(("coloured vertices per metre", f"{detail['coloured_vertices_per_m']:.0f}"))
     if backs is not None:
         text = f"{backs:.0%} of what cameras see; drawn like front faces"
         rows.append(("back sides of faces", text))
-    return tuple(rows)
+    return rows
 
 
-def _topology_rows(topology: Facts) -> tuple[tuple[str, str], ...]:
+def _topology_rows(topology: Facts) -> Rows:
     holes = f"{topology['holes']}"
     if topology["longest_holes_m"]:
         lengths = ", ".join(f"{length:.2f}" for length in topology["longest_holes_m"][:5])
         holes += f", the longest with rims of {lengths} m"
-    return (
+    return [
         ("watertight", "yes" if topology["watertight"] else "no"),
         ("connected pieces", f"{topology['components']:,}"),
         ("holes", holes),
         ("boundary edges", f"{topology['boundary_edges']:,}"),
         ("non-manifold edges", f"{topology['non_manifold_edges']:,}"),
-    )
+    ]
 
 
-def _space_rows(facts: Facts) -> tuple[tuple[str, str], ...]:
-    space, suggested = facts["free_space"], facts["suggested_sampling_box"]
-    box = "none"
-    if suggested is not None:
-        box = ", ".join(f"{axis} {a:z.2f} to {b:z.2f}" for axis, (a, b) in suggested.items()) + " m"
+def _space_rows(facts: Facts) -> Rows:
+    space, box = facts["free_space"], facts["suggested_sampling_box"]
     floor = "not found" if space["floor_m"] is None else f"z = {space['floor_m']:z.2f} m"
-    return (
+    return [
         ("share of the box", f"{space['share']:.1%} ({space['volume_m3']:.1f} m^3)"),
         ("enclosed, median", f"{space['enclosure']:.0%} over free points"),
         ("floor", floor),
-        ("suggested sampling box", box),
+        ("suggested sampling box", "none" if box is None else _limits(box.items())),
         ("definition", space["definition"]),
-    )
+    ]
 
 
-def _part_rows(parts: Sequence[Facts]) -> tuple[tuple[str, str], ...]:
-    by_area = sorted(parts, key=lambda part: -part["area_m2"])
-    rows = [(part["name"], _part_text(part)) for part in by_area[:MAX_PARTS]]
+def _part_rows(parts: Sequence[Facts]) -> Rows:
+    by_area, rows = sorted(parts, key=lambda part: -part["area_m2"]), []
+    for part in by_area[:MAX_PARTS]:
+        colour = {"vertices": "vertex colours", "plain": "one plain colour"}.get(part["colour"], "")
+        if part["texture_px"] is not None:
+            colour = "texture {} x {}".format(*part["texture_px"])
+        cut = "" if part["alpha_cutoff"] is None else f", alpha cut at {part['alpha_cutoff']:.2f}"
+        size = f"{part['faces']:>9,} faces  {part['area_m2']:>8.1f} m^2"
+        rows.append((part["name"], f"{size}  {colour}{cut}"))
     if len(by_area) > MAX_PARTS:
         rows.append(("...", f"and {len(by_area) - MAX_PARTS} more, see inspect.json"))
-    return tuple(rows)
-
-
-def _part_text(part: Facts) -> str:
-    colour = {"vertices": "vertex colours", "plain": "one plain colour"}.get(part["colour"], "")
-    if part["texture_px"] is not None:
-        colour = "texture {} x {}".format(*part["texture_px"])
-    cut = "" if part["alpha_cutoff"] is None else f", alpha cut at {part['alpha_cutoff']:.2f}"
-    return f"{part['faces']:>9,} faces  {part['area_m2']:>8.1f} m^2  {colour}{cut}"
+    return rows
 
 
 def page_html(
     title: str,  # heading
     doubts: Sequence[str],  # sentences to stand out at the top
-    sections: Sequence[Section],  # tables of numbers
+    sections: Sections,
     snippet: str,  # lines for a configuration file and for a shell
     picture_png: bytes,  # the picture
     scene: dict[str, Any],  # what :meth:`synfeal.inspect.surface.ViewerMesh.scene` returns
