@@ -8,7 +8,7 @@ import math
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -65,6 +65,15 @@ def _finite(text: str) -> float:
 def _whole(text: str) -> int:
     _finite(text)
     return int(text)
+
+
+def dotted(record: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested mappings as one: their keys joined by dots."""
+    flat: dict[str, Any] = {}
+    for key, value in record.items():
+        inner = dotted(value, f"{prefix}{key}.") if isinstance(value, Mapping) else None
+        flat |= {f"{prefix}{key}": value} if inner is None else inner
+    return flat
 
 
 def write_json(path: Path, value: Any) -> None:

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from synfeal.errors import InputError, why
-from synfeal.files import read_json, refuse_existing, write_json, writing_to
+from synfeal.files import dotted, read_json, refuse_existing, write_json, writing_to
 
 LOCK = ".lock"
 # Names that atomic_path, atomic_directory and the writer of frames give what is not finished.
@@ -203,28 +203,14 @@ def check_settings(part: Path, settings: Mapping[str, Any]) -> None:
         raise InputError(
             f"{path}: cannot be read ({why(error)}); delete {part} to start anew"
         ) from None
-    differing = differences(found, settings)
+    before, now = dotted(found), dotted(settings)
+    differing = [
+        f"{key} was {before.get(key)}, is {now.get(key)}"
+        for key in {**now, **before}
+        if before.get(key) != now.get(key)
+    ]
     if differing:
         raise InputError(
             f"{path}: is of another data set ({'; '.join(differing)}); go on with the options of"
             f" that one, or delete {part} to start anew"
         )
-
-
-def differences(found: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
-    """What two records disagree on, one phrase each, in the order of ``asked``."""
-    before, now = dict(_flat(found)), dict(_flat(asked))
-    return [
-        f"{key} was {before.get(key)}, is {now.get(key)}"
-        for key in {**now, **before}
-        if before.get(key) != now.get(key)
-    ]
-
-
-def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Nested keys joined by dots."""
-    for key, value in record.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value

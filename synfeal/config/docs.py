@@ -14,15 +14,12 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_origin
-
-from pydantic import BaseModel
-from pydantic.fields import FieldInfo
+from typing import Any
 
 from synfeal.config.experiments import Experiment
-from synfeal.config.load import read_yaml
+from synfeal.config.load import merge, read_yaml
 from synfeal.config.models import Config
-from synfeal.files import atomic_path
+from synfeal.files import atomic_path, dotted
 
 PROFILES = ("smoke", "mini", "night", "gpu", "paper")
 DEFAULT_PROFILE = "mini"
@@ -38,6 +35,9 @@ COMPARED = (
     "pretraining.source",
 )
 STORAGE_LIMIT = 1e9  # larger bounds are those of a file or a data type: schema.json has them
+TYPES = {"string": "text"}  # where this page has another name
+SIGNS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
+Node = Mapping[str, Any]  # a JSON schema, or a part of one
 INTRO = """\
 # Configuration
 
@@ -99,39 +99,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def documents(folder: Path) -> dict[str, str]:
     """Contents of the generated files by name; ``folder`` holds the shipped profiles."""
-    schema = json.dumps(Config.model_json_schema(), indent=2) + "\n"
-    keys = table(("key", "value", "meaning"), joined(key_rows(Config)))
+    schema, columns = Config.model_json_schema(), Experiment.model_json_schema()["properties"]
+    keys = joined(key_rows(schema, schema["$defs"]))
     parts = [
         INTRO,
         KEYS,
-        keys,
+        table(("key", "value", "meaning"), keys),
         SETTINGS,
         table(("key", *PROFILES), setting_rows(folder)),
         EXPERIMENTS,
-        table(("column", "type", "meaning"), experiment_rows()),
+        table(
+            ("column", "type", "meaning"),
+            ((f"`{name}`", type_name(node), node["description"]) for name, node in columns.items()),
+        ),
     ]
-    return {"schema.json": schema, "README.md": "\n".join(parts)}
+    return {"schema.json": json.dumps(schema, indent=2) + "\n", "README.md": "\n".join(parts)}
 
 
 def key_rows(
-    model: type[BaseModel], prefix: str = "", told: dict[type[BaseModel], str] | None = None
+    schema: Node, defs: Node, prefix: str = "", told: dict[str, str] | None = None
 ) -> Iterator[tuple[str, ...]]:
-    """Dotted key, value and meaning of every key below a model, depth first.
+    """Dotted key, value and meaning of every key of an object's schema, depth first.
 
     Keys of a model that is told already are told by where; ``told`` collects these places.
     """
     told = {} if told is None else told
-    for name, field in model.model_fields.items():
-        inner, key = _model_below(field.annotation, f"{prefix}{name}")
-        if inner is None:
-            yield f"`{key}`", value_of(field), _text(field)
-        elif inner in told:
-            kind = "list, " if get_origin(field.annotation) is tuple else ""
-            yield f"`{key}`", f"{kind}as `{told[inner]}`", _text(field)
+    for name, field in schema["properties"].items():
+        model, key = _model_below(field, f"{prefix}{name}")
+        if not model:
+            yield f"`{key}`", value_of(field), field["description"]
+        elif model in told:
+            kind = "list, " if "items" in field else ""
+            yield f"`{key}`", f"{kind}as `{told[model]}`", field["description"]
         else:
-            told[inner] = key
-            yield f"`{key}`", "required" if field.is_required() else "", _text(field)
-            yield from key_rows(inner, f"{key}.", told)
+            told[model] = key
+            needed = name in schema.get("required", ())
+            yield f"`{key}`", "required" if needed else "", field["description"]
+            yield from key_rows(defs[model], defs, f"{key}.", told)
 
 
 def joined(rows: Iterator[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
@@ -141,31 +145,15 @@ def joined(rows: Iterator[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
         yield ", ".join([first, *(f"`{key.strip('`').rpartition('.')[2]}`" for key in more)]), *said
 
 
-def experiment_rows() -> Iterator[tuple[str, ...]]:
-    """Name, type and meaning of the columns of the table of experiments."""
-    for name, field in Experiment.model_fields.items():
-        yield f"`{name}`", type_name(field), _text(field)
-
-
 def setting_rows(folder: Path) -> Iterator[tuple[str, ...]]:
     """What the shipped profiles set for the keys that tell them apart."""
-    base = flattened(read_yaml(folder / "config.yaml"))
+    base = read_yaml(folder / "config.yaml")
     others = {name: folder / f"{name}.yaml" for name in PROFILES if name != DEFAULT_PROFILE}
-    set_by = {name: base | flattened(read_yaml(path)) for name, path in others.items()}
-    set_by[DEFAULT_PROFILE] = base
+    merged = {name: merge(base, read_yaml(path)) for name, path in others.items()}
+    values = {name: dotted(profile) for name, profile in {**merged, DEFAULT_PROFILE: base}.items()}
     for key in COMPARED:
-        yield (f"`{key}`", *(set_by[name].get(key, "-") for name in PROFILES))
-
-
-def flattened(values: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
-    """Nested mappings as dotted keys; everything else as it reads in YAML."""
-    flat: dict[str, str] = {}
-    for key, value in values.items():
-        if isinstance(value, dict):
-            flat |= flattened(value, f"{prefix}{key}.")
-        else:
-            flat[f"{prefix}{key}"] = f"`{value}`"
-    return flat
+        found = (values[name].get(key) for name in PROFILES)
+        yield (f"`{key}`", *("-" if value is None else f"`{value}`" for value in found))
 
 
 def table(heading: Sequence[str], rows: Iterator[tuple[str, ...]]) -> str:
@@ -174,83 +162,52 @@ def table(heading: Sequence[str], rows: Iterator[tuple[str, ...]]) -> str:
     return "".join([lines[0], "|" + "---|" * len(heading) + "\n", *lines[1:]])
 
 
-def value_of(field: FieldInfo) -> str:
+def value_of(field: Node) -> str:
     """Default and bounds, e.g. ``500, ≥ 1``; where there is no default, the type."""
     kind = type_name(field)
-    if field.is_required():
+    if "default" not in field:
         return f"required: {kind}"
-    default = _default(field)
-    if default in ("`null`", "`[]`", ""):
+    value = field["default"]
+    if value in (None, [], ""):
         return kind
+    default = f"`{value if isinstance(value, str) else json.dumps(value)}`"
     if default in kind.split(", "):
         return kind.replace(default, f"**{default}**")
     bounds = re.search("[≥>].*", kind)
     return f"{default}, {bounds[0]}" if bounds else default
 
 
-def type_name(field: FieldInfo) -> str:
-    """A field's type and bounds, e.g. ``integer ≥ 1``; ``or null`` if not the default."""
-    name = _bounded(_name(field.annotation), field.metadata)
-    return name.removesuffix(" or null") if field.default is None else name
+def type_name(node: Node) -> str:
+    """A schema's type and bounds, e.g. ``integer ≥ 1``; ``or null`` if not the default."""
+    if "anyOf" in node:
+        name = " or ".join(map(type_name, node["anyOf"]))
+        return name.removesuffix(" or null") if node.get("default", 0) is None else name
+    if "enum" in node:
+        return ", ".join(f"`{value}`" for value in node["enum"] if value)
+    if "prefixItems" in node:
+        return f"list of {len(node['prefixItems'])}: {type_name(node['prefixItems'][0])}"
+    if "items" in node:
+        return f"list of {type_name(node['items'])}"
+    if node["type"] == "object":
+        return type_name(_values(node))
+    limits = {sign: node.get(key, STORAGE_LIMIT) for key, sign in SIGNS.items()}
+    bounds = [f"{sign} {limit:g}" for sign, limit in limits.items() if limit < STORAGE_LIMIT]
+    plain = "path" if node.get("format") == "path" else TYPES.get(node["type"], node["type"])
+    return f"{plain} {', '.join(bounds)}".rstrip()
 
 
-def _bounded(name: str, metadata: Sequence[Any]) -> str:
-    bounds = ", ".join(dict.fromkeys(note for item in metadata for note in _bounds(item)))
-    return f"{name} {bounds}".rstrip()
+def _values(node: Node) -> Node:
+    """The schema of the values of a mapping, whatever is said of its keys."""
+    found: Node = node.get("additionalProperties") or next(iter(node["patternProperties"].values()))
+    return found
 
 
-def _name(annotation: Any) -> str:
-    names = {int: "integer", float: "number", str: "text", Path: "path", bool: "boolean"}
-    names[type(None)] = "null"
-    if annotation in names:
-        return names[annotation]
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin is Annotated:
-        return _bounded(_name(arguments[0]), arguments[1:])
-    if origin is list or (origin is tuple and arguments[-1] is Ellipsis):
-        return f"list of {_name(arguments[0])}"
-    if origin is tuple:
-        return f"list of {len(arguments)}: {_name(arguments[0])}"
-    if origin is dict:
-        return _name(arguments[1])
-    if "Literal" in str(origin):
-        return ", ".join(f"`{argument}`" for argument in arguments if argument)
-    return " or ".join(_name(argument) for argument in arguments)  # a union
-
-
-def _bounds(item: Any) -> list[str]:
-    """Bounds in a pydantic ``Field`` or in one of its unpacked constraints."""
-    constraints = item.metadata if isinstance(item, FieldInfo) else [item]
-    signs = {"ge": "≥", "gt": ">", "le": "≤", "lt": "<"}
-    found = [
-        (sign, getattr(constraint, name, None))
-        for constraint in constraints
-        for name, sign in signs.items()
-    ]
-    return [f"{sign} {b:g}" for sign, b in found if b is not None and b < STORAGE_LIMIT]
-
-
-def _model_below(annotation: Any, key: str) -> tuple[type[BaseModel] | None, str]:
-    """The model a key leads to, through mappings (``key.<name>``) and ``| None``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation, key
-    if get_origin(annotation) is dict:
-        return _model_below(get_args(annotation)[1], f"{key}.<name>")
-    found = [m for m in get_args(annotation) if isinstance(m, type) and issubclass(m, BaseModel)]
-    return (found[0] if found else None), key
-
-
-def _default(field: FieldInfo) -> str:
-    """The default as YAML has it; nothing for an empty text."""
-    if field.is_required():
-        return "required"
-    value = field.get_default(call_default_factory=True)
-    text = str(value) if isinstance(value, str | Path) else json.dumps(value)
-    return f"`{text}`" if text else ""
-
-
-def _text(field: FieldInfo) -> str:
-    return str(field.description)
+def _model_below(node: Node, key: str) -> tuple[str, str]:
+    """The model a key leads to, through lists, mappings (``key.<name>``) and ``| None``."""
+    if node.get("type") == "object":
+        return _model_below(_values(node), f"{key}.<name>")
+    inner = [node, node.get("items", {}), *node.get("anyOf", ())]
+    return next((n["$ref"].rpartition("/")[2] for n in inner if "$ref" in n), ""), key
 
 
 if __name__ == "__main__":

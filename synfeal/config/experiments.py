@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal, cast
 
@@ -31,7 +31,6 @@ SHARES = {"": 1.0, "half": 0.5, "quarter": 0.25}
 # one by path, a bend of space, another scale (`synfeal/labels.py`).
 INJECTED = ("noise", "offset", "bend", "scale")
 FROM_SCRATCH: TableName = "table5_from_scratch"
-COLUMNS = ("table", "block", "scene", "size", "labels", "noise_m", "noise_deg", "init")
 
 
 class Experiment(Strict):
@@ -88,6 +87,9 @@ class Experiment(Strict):
         return self.model_copy(update={"init": "pretrained"})
 
 
+COLUMNS = tuple(Experiment.model_fields)
+
+
 @dataclass(frozen=True, order=True)
 class Run:
     """One training run: what the path of its results spells out."""
@@ -139,61 +141,48 @@ def read_experiments(config: Config) -> tuple[Experiment, ...]:
         InputError: naming file, row and column of the first problem.
     """
     path = config.experiments
-    rows = read_records(path, COLUMNS, f"the header must be {','.join(COLUMNS)}")
-    places = [f"{path}: row {line}" for line, _ in rows]
-    experiments = tuple(
-        _parse(row, where, config) for (_, row), where in zip(rows, places, strict=True)
-    )
-    if not experiments:
-        raise InputError(f"{path}: has no rows; nothing would be run")
-    _refuse_repeats(experiments, places)
-    if any(config.groundtruth_camera.distortion):
-        _refuse_depth_methods(experiments, places)
-    return experiments
-
-
-def _refuse_repeats(experiments: Sequence[Experiment], places: Sequence[str]) -> None:
     seen: dict[tuple[str, ...], str] = {}
-    for experiment, where in zip(experiments, places, strict=True):
+    experiments = []
+    for line, row in read_records(path, COLUMNS, f"the header must be {','.join(COLUMNS)}"):
+        where = f"{path}: row {line}"
+        try:
+            experiment = Experiment.model_validate(row)
+        except ValidationError as error:
+            raise InputError(f"{where}: {describe(error)}") from None
         keys = KEYS[experiment.table]
         identity = (experiment.table, *(str(getattr(experiment, key)) for key in keys))
+        problem = _problem(experiment, config)
         if identity in seen:
-            message = (
-                f"{experiment.table} shows each {', '.join(keys)} once, as in {seen[identity]}"
-            )
-            raise InputError(f"{where}: {message}")
+            shown = f"{experiment.table} shows each {', '.join(keys)} once"
+            problem = f"{shown}, as in {seen[identity]}"
+        if problem:
+            raise InputError(f"{where}: {problem}")
         seen[identity] = where
+        experiments.append(experiment)
+    if not experiments:
+        raise InputError(f"{path}: has no rows; nothing would be run")
+    return tuple(experiments)
 
 
-def _refuse_depth_methods(experiments: Sequence[Experiment], places: Sequence[str]) -> None:
-    """Refuse labels that are estimated from depth; of the estimators only SfM knows distortion."""
-    for experiment, where in zip(experiments, places, strict=True):
-        if experiment.estimated and experiment.labels != "sfm":
-            raise InputError(
-                f"{where}: labels '{experiment.labels}' need pinhole images; leave"
-                " groundtruth_camera.distortion at zero (a calibration sets it) or drop the row"
-            )
-
-
-def _parse(row: dict[str, str], where: str, config: Config) -> Experiment:
-    try:
-        experiment = Experiment.model_validate(row)
-    except ValidationError as error:
-        raise InputError(f"{where}: {describe(error)}") from None
-    if experiment.scene not in config.scenes:
-        raise InputError(f"{where}: scene '{experiment.scene}': allowed: {sorted(config.scenes)}")
-    if experiment.scene in config.rooms:
-        raise InputError(
-            f"{where}: scene '{experiment.scene}': is a room that backbones are pretrained on"
+def _problem(row: Experiment, config: Config) -> str:
+    """Why a profile cannot run a row; nothing where it can."""
+    if row.scene not in config.scenes:
+        return f"scene '{row.scene}': allowed: {sorted(config.scenes)}"
+    if row.scene in config.rooms:
+        return f"scene '{row.scene}': is a room that backbones are pretrained on"
+    sizes = config.scenes[row.scene].sizes
+    if row.size not in sizes:
+        return f"size '{row.size}': allowed: {sorted(sizes)}"
+    if not sizes[row.size].test:
+        return f"size '{row.size}' has no test frames to score on"
+    if row.size not in config.training.samples_seen:
+        return f"size '{row.size}' has no training.samples_seen entry"
+    if any(config.groundtruth_camera.distortion) and row.estimated and row.labels != "sfm":
+        return (
+            f"labels '{row.labels}' need pinhole images; leave groundtruth_camera.distortion at"
+            " zero (a calibration sets it) or drop the row"
         )
-    sizes = config.scenes[experiment.scene].sizes
-    if experiment.size not in sizes:
-        raise InputError(f"{where}: size '{experiment.size}': allowed: {sorted(sizes)}")
-    if not sizes[experiment.size].test:
-        raise InputError(f"{where}: size '{experiment.size}' has no test frames to score on")
-    if experiment.size not in config.training.samples_seen:
-        raise InputError(f"{where}: size '{experiment.size}' has no training.samples_seen entry")
-    return experiment
+    return ""
 
 
 class Design(Strict):
@@ -264,11 +253,7 @@ def common_every(counts: Collection[int]) -> int:
 
 
 def read_design(config: Config) -> Design:
-    """The design of a profile.
-
-    Raises:
-        InputError: naming file, row and column of the first problem.
-    """
+    """The design of a profile: :func:`read_experiments`, and what its further scenes need."""
     rows, more_scenes = read_experiments(config), config.groundtruth.more_scenes
     design = Design(rows=rows, repetitions=config.training.repetitions, more_scenes=more_scenes)
     known = {(row.scene, row.size) for row in rows}

@@ -42,11 +42,6 @@ assert set(KEYS) == set(get_args(TableName))
 Repetitions = dict[Literal["default", TableName], Count]
 
 
-def once() -> Repetitions:
-    """One seed per run."""
-    return {"default": 1}
-
-
 InceptionName = Literal["googlenet", "inception_v3"]
 # Of the backbones that come with the package.
 SHIPPED_WIDTH = 0.25
@@ -136,8 +131,9 @@ class TrainingConfig(Strict):
     )
     batch_size: Count = Field(32, description="images per step")
     samples_seen: dict[str, Count] = Field(description="images shown in all, by size")
-    repetitions: Repetitions = part(
-        once, "seeds per run, by table; a run that several tables show gets the most"
+    repetitions: Repetitions = Field(
+        {"default": 1},
+        description="seeds per run, by table; a run that several tables show gets the most",
     )
     device: Literal["auto", "cpu", "cuda"] = Field("auto", description="where to train")
 
@@ -178,7 +174,7 @@ class ExternalConfig(Strict):
         "", description="path of its answers, e.g. `mine/{scene}-{size}-{labels}.csv`"
     )
     command: str = Field("", description="or what writes them")
-    labels: list[str] = part(list, "label sets it answers for; none: all")
+    labels: list[str] = Field([], description="label sets it answers for; none: all")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
