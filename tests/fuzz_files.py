@@ -28,7 +28,8 @@ from baselines.training.score import score_run
 from synfeal.camera.calibration import read_calibration
 from synfeal.config import Config, load_config, read_experiments
 from synfeal.config.models import CameraConfig, LocalizerConfig, NetworkConfig, RenderConfig
-from synfeal.dataset.packed import join_packed, pack_frames, read_packed, write_packed_record
+from synfeal.dataset.packed import join_packed, pack_frames, read_packed
+from synfeal.dataset.packed import write_packed as write_joined
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.dataset.sevenscenes import pose_text, read_depth_m, read_pose, read_split
 from synfeal.files import write_json
@@ -161,8 +162,9 @@ def write_record(path):
 
 
 def recorded(path, out):
-    frames = Path(shutil.copy(path.with_name("train.npy"), out))
-    write_packed_record(frames, [path], path.with_name("train.csv"), CAMERA, RenderConfig())
+    frames, parts = out / "train.npy", [path.with_name("train.npy")]
+    given = (path.with_name("train.csv"), parts, [path], CAMERA, RenderConfig(), "square")
+    write_joined(*given, frames)
     return json.loads(frames.with_suffix(".json").read_text())["shards"][0]
 
 

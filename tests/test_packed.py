@@ -18,7 +18,7 @@ from synfeal.dataset.packed import (
     new_packed,
     pack_frames,
     read_packed,
-    write_packed_record,
+    write_packed,
 )
 from synfeal.dataset.pose_table import write_pose_table
 from synfeal.dataset.render_sequence import render_packed, render_sequence
@@ -59,13 +59,11 @@ def test_frames_rendered_into_an_array_are_those_of_the_files(tmp_path):
         given = tmp_path / "mesh.glb", CAMERA, tmp_path / "plan.csv", *rows
         render_packed(*given, 24, "square", RenderConfig(), shard)
         render_sequence(*given, False, RenderConfig(), shard.with_suffix(""))
-    join_packed(shards, tmp_path / "train.npy")
+    records = [shard.with_suffix(".json") for shard in shards]
+    given = (tmp_path / "plan.csv", shards, records, CAMERA, RenderConfig(), "square")
+    write_packed(*given, tmp_path / "train.npy")
     pack_frames([shard.with_suffix("") for shard in shards], 24, tmp_path / "files.npy")
     assert (tmp_path / "train.npy").read_bytes() == (tmp_path / "files.npy").read_bytes()
-    records = [shard.with_suffix(".json") for shard in shards]
-    write_packed_record(
-        tmp_path / "train.npy", records, tmp_path / "plan.csv", CAMERA, RenderConfig()
-    )
     record = json.loads((tmp_path / "train.json").read_text())
     assert (record["frames"], record["input_px"]) == (5, 24)
     assert [(s["name"], s["frames"]) for s in record["shards"]] == [("seq-01", 3), ("seq-02", 2)]

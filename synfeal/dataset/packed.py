@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -120,36 +120,6 @@ def fit_frame(image: Image.Image, input_px: int, view: View = "square") -> NDArr
     return np.asarray(small.crop((left, top, left + input_px, top + input_px)))
 
 
-FORMATS: dict[View, str] = {
-    "square": "uint8 (N, S, S, 3); short side resized to S + 1 px, then centre crop",
-    "whole": "uint8 (N, S, S, 3); the whole frame resized to S x S px",
-}
-
-
-def write_packed_record(
-    frames: Path,  # packed frames
-    shards: Sequence[Path],  # records of the parts they were joined from, in order
-    plan: Path,  # pose table of the frames
-    camera: CameraConfig,  # what they were rendered through, before they were made smaller
-    render: RenderConfig,  # how they were rendered
-    view: View = "square",  # what of a frame was packed
-) -> None:
-    """Write ``<frames>.json`` in place of ``.npy``."""
-    packed = read_packed(frames)
-    record = {
-        "format": FORMATS[view],
-        "frames": len(packed),
-        "input_px": packed.shape[1],
-        "camera": camera.record,
-        "render": render.model_dump(mode="json"),
-        "plan_sha256": file_sha256(plan),
-        "sha256": file_sha256(frames),
-        "shards": [_read_shard(path) for path in shards],
-        "versions": frame_versions(),
-    }
-    write_json(frames.with_suffix(".json"), record)
-
-
 def _read_shard(path: Path) -> dict[str, object]:
     try:
         record = read_json(path)
@@ -164,14 +134,28 @@ def _read_shard(path: Path) -> dict[str, object]:
 
 
 def write_packed(
-    plan: Path,
-    shards: list[Path],
-    records: list[Path],
-    camera: CameraConfig,
-    render: RenderConfig,
-    view: View,
+    plan: Path,  # pose table of the frames
+    shards: list[Path],  # parts of packed frames, in order
+    records: list[Path],  # of the parts
+    camera: CameraConfig,  # what they were rendered through, before they were made smaller
+    render: RenderConfig,  # how they were rendered
+    view: View,  # what of a frame was packed
     out_frames: Path,
 ) -> None:
-    """Join parts of packed frames, in order, and write their record."""
+    """Join parts of packed frames, and write ``.json`` beside them in place of ``.npy``."""
     join_packed(shards, out_frames)
-    write_packed_record(out_frames, records, plan, camera, render, view)
+    square = "short side resized to S + 1 px, then centre crop"
+    seen = square if view == "square" else "the whole frame resized to S x S px"
+    packed = read_packed(out_frames)
+    record = {
+        "format": f"uint8 (N, S, S, 3); {seen}",
+        "frames": len(packed),
+        "input_px": packed.shape[1],
+        "camera": camera.record,
+        "render": render.model_dump(mode="json"),
+        "plan_sha256": file_sha256(plan),
+        "sha256": file_sha256(out_frames),
+        "shards": [_read_shard(path) for path in records],
+        "versions": frame_versions(),
+    }
+    write_json(out_frames.with_suffix(".json"), record)

@@ -17,8 +17,7 @@ from synfeal.dataset.sevenscenes import Split, frame_paths, read_split
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
 
-TILE_WIDTH_PX = 320
-TITLE_PX = 16
+TILE_WIDTH_PX, TITLE_PX = 320, 16
 
 
 def write_preview(
@@ -111,9 +110,7 @@ def _tile(frame: Image.Image, width: int) -> Image.Image:
     return frame.resize((width, height), Image.Resampling.LANCZOS)
 
 
-SHEET_FRAMES = 24
-SHEET_COLUMNS = 6
-SHEET_TILE_PX = 240
+SHEET_FRAMES, SHEET_COLUMNS, SHEET_TILE_PX = 24, 6, 240
 
 
 def write_contact_sheet(frames: Sequence[FrameFile], out: Path) -> None:
