@@ -162,15 +162,15 @@ def test_more_cameras_cover_more_of_the_free_space(seed, count, more):
     space = ConnectedSpace(EMPTY, np.array([[0.0, 0.0, 1.0]]))
     plan = table_of(poses_of(inside_poses(seed, count + more)))
     some, all_ = (free_space_coverage(space, ROOM, p) for p in (plan.first(count), plan))
-    assert some.voxels == all_.voxels == 24 * 16 * 10
-    assert (some.voxel_m, some.within_m) == (0.25, 0.5)
-    assert 0.0 < some.positions_share <= all_.positions_share <= 1.0
-    assert some.headings_share <= all_.headings_share <= all_.positions_share
+    assert some["voxels"] == all_["voxels"] == 24 * 16 * 10
+    assert (some["voxel_m"], some["within_m"]) == (0.25, 0.5)
+    assert 0.0 < some["positions_share"] <= all_["positions_share"] <= 1.0
+    assert some["headings_share"] <= all_["headings_share"] <= all_["positions_share"]
     alike = table_of(poses_of(inside_poses(seed, count) * [1, 1, 1, 1, 1, 0] + YAW))
     same_way = free_space_coverage(space, ROOM, alike)
-    assert same_way.headings_share == pytest.approx(same_way.positions_share / 8)
+    assert same_way["headings_share"] == pytest.approx(same_way["positions_share"] / 8)
     # No camera reaches more than the centres within a ball of radius 2 edges.
-    assert all_.positions_share <= (count + more) * 1.4 * (4 / 3 * np.pi * 8) / all_.voxels
+    assert all_["positions_share"] <= (count + more) * 1.4 * (4 / 3 * np.pi * 8) / all_["voxels"]
 
 
 @settings(few, max_examples=3)

@@ -8,12 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from synfeal.config.models import CollectionConfig, SceneConfig
 from synfeal.errors import InputError
-from synfeal.mesh.triangles import save_collision_mesh
+from synfeal.mesh.triangles import load_collision_mesh, save_collision_mesh
 from synfeal.planning.coverage import plan_coverage, scene_coverage
 from synfeal.planning.path import CandidateStream, independent_poses
 from synfeal.planning.plan import (
     plan_mesh,
-    plan_scene,
     plan_split,
     sampling_box_of,
     sampling_boxes_of,
@@ -187,10 +186,13 @@ def test_a_scene_is_planned_and_measured_from_its_collision_mesh(seed, tmp_path_
     mesh, path = mesh_of(ROOM), tmp_path_factory.mktemp("scene") / "collision.ply"
     save_collision_mesh(path, mesh)
     collection = CollectionConfig(frame_spacing_m=0.2)
-    plan = plan_scene(path, SCENE, collection, 20, np.random.default_rng(seed))
+    asked = ("room", SCENE, collection, 20)
+    plan, direct = (
+        plan_mesh(given, *asked, np.random.default_rng(seed), "train")
+        for given in (load_collision_mesh(path), mesh)
+    )
     same = plan_split(EMPTY, ROOM, SCENE, collection, 20, np.random.default_rng(seed))
     np.testing.assert_allclose(plan.position_m, same.position_m, atol=1e-9)
-    direct = plan_mesh(mesh, "room", SCENE, collection, 20, np.random.default_rng(seed), "train")
     np.testing.assert_array_equal(plan.position_m, direct.position_m)
     found = scene_coverage(path, SCENE, plan, SQUARE)
     assert found == plan_coverage(mesh, ROOM, SCENE, plan, SQUARE)

@@ -32,7 +32,7 @@ from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.planning.coverage import scene_coverage
-from synfeal.planning.plan import plan_scene
+from synfeal.planning.plan import plan_mesh
 from synfeal.planning.seen_surface import empty_pixels
 from synfeal.run_lock import WORK, clean_up, growing, place_of
 from synfeal.scenes.prepare import prepare_mesh, save_cartons
@@ -160,23 +160,15 @@ def _plan(job: CollectJob, scene: Path, part: Path) -> dict[Split, PoseTable]:
     splits = [split for split in SPLITS if job.counts[split]]
     coverage = part / "coverage.json"
     if not coverage.is_file():  # which is written last
-        collision = scene / "collision.ply"
-        plans = {
-            split: plan_scene(
-                collision,
-                config.scenes[name],
-                config.collection,
-                job.counts[split],
-                generator_of(config.seed, "plan", name, split),
-                split,
-            )
-            for split in splits
-        }
-        mesh, path = load_collision_mesh(collision), str(config.scenes[name].path)
-        refuse_blank(RayCaster(*mesh), plans, config.network_camera, path)
+        collision, camera = scene / "collision.ply", config.network_camera
+        mesh, settings, plans = load_collision_mesh(collision), config.scenes[name], {}
+        for split in splits:
+            rng = generator_of(config.seed, "plan", name, split)
+            asked = (settings, config.collection, job.counts[split], rng, split)
+            plans[split] = plan_mesh(mesh, str(collision), *asked)
+        refuse_blank(RayCaster(*mesh), plans, camera, str(settings.path))
         for split, plan in plans.items():
             write_pose_table(part / f"{split}.csv", plan)
-        camera, settings = config.network_camera, config.scenes[name]
         covered = {s: scene_coverage(collision, settings, plans[s], camera) for s in splits}
         write_json(coverage, covered)
     return {split: read_pose_table(part / f"{split}.csv") for split in splits}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,16 +53,6 @@ DEFINITIONS = {
 }
 
 
-class FreeSpaceCoverage(NamedTuple):
-    """How much of the free space cameras come near to; see ``DEFINITIONS``."""
-
-    voxel_m: float
-    voxels: int
-    within_m: float
-    positions_share: float | None
-    headings_share: float | None
-
-
 def plan_coverage(
     mesh: Triangles, boxes_m: Array, scene: SceneConfig, plan: PoseTable, camera: CameraConfig
 ) -> dict[str, object]:
@@ -82,7 +71,7 @@ def plan_coverage(
     visible = max(counts.visible, 1)
     return {
         "frames": len(plan),
-        "free_space": free_space_coverage(space, boxes_m, plan)._asdict(),
+        "free_space": free_space_coverage(space, boxes_m, plan),
         "surface": {
             "farthest_m": FARTHEST_M,
             "frames_looked_at": len(shown_frames(len(plan))),
@@ -114,8 +103,11 @@ def scene_coverage(
 
 def free_space_coverage(
     space: ConnectedSpace, boxes_m: Array, plan: PoseTable
-) -> FreeSpaceCoverage:
-    """Which voxels of the connected space in the boxes (B, 2, 3) have cameras near them."""
+) -> dict[str, float | None]:
+    """Which voxels of the connected space in the boxes (B, 2, 3) have cameras near them.
+
+    See ``DEFINITIONS``.
+    """
     cells = [voxel_centres(box_m) for box_m in np.reshape(boxes_m, (-1, 2, 3))]
     centres, edge_m = np.concatenate([found for found, _ in cells]), max(edge for _, edge in cells)
     centres = centres[space.contains(centres)]
@@ -126,13 +118,13 @@ def free_space_coverage(
         cameras = plan.position_m[heading == sector]
         if len(cameras) and len(centres):
             covered[sector] = cKDTree(cameras).query(centres)[0] <= within_m
-    return FreeSpaceCoverage(
-        voxel_m=round(edge_m, 6),
-        voxels=len(centres),
-        within_m=round(within_m, 6),
-        positions_share=float(covered.any(axis=0).mean()) if len(centres) else None,
-        headings_share=float(covered.mean()) if len(centres) else None,
-    )
+    return {
+        "voxel_m": round(edge_m, 6),
+        "voxels": len(centres),
+        "within_m": round(within_m, 6),
+        "positions_share": float(covered.any(axis=0).mean()) if len(centres) else None,
+        "headings_share": float(covered.mean()) if len(centres) else None,
+    }
 
 
 def voxel_centres(box_m: Array) -> tuple[Array, float]:

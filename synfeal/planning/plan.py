@@ -33,21 +33,8 @@ def write_plan(
     out_plan: Path,
 ) -> None:
     """Plan one split of a scene; see :func:`plan_split`."""
-    rng = np.random.default_rng(seed)
-    write_pose_table(out_plan, plan_scene(collision, scene, collection, n_frames, rng, split))
-
-
-def plan_scene(
-    collision: Path,
-    scene: SceneConfig,
-    collection: CollectionConfig,
-    n_frames: int,
-    rng: np.random.Generator,
-    split: str = "train",
-) -> PoseTable:
-    """Plan one split of a scene from its collision mesh; see :func:`plan_split`."""
-    mesh = load_collision_mesh(collision)
-    return plan_mesh(mesh, str(collision), scene, collection, n_frames, rng, split)
+    given = (load_collision_mesh(collision), str(collision), scene, collection, n_frames)
+    write_pose_table(out_plan, plan_mesh(*given, np.random.default_rng(seed), split))
 
 
 def plan_mesh(
@@ -60,9 +47,9 @@ def plan_mesh(
     split: str,
 ) -> PoseTable:
     """Plan one split in a mesh called ``name``; see :func:`plan_split`."""
-    mesh_bounds = np.stack([mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)])
-    boxes = sampling_boxes_of(scene, mesh_bounds, name)
-    return plan_split(RayCaster(*mesh), boxes, scene, collection, n_frames, rng, split)
+    caster = RayCaster(*mesh)
+    boxes = sampling_boxes_of(scene, caster.bounds_m, name)
+    return plan_split(caster, boxes, scene, collection, n_frames, rng, split)
 
 
 def sampling_boxes_of(scene: SceneConfig, mesh_bounds_m: Array, name: str) -> Array:
@@ -188,20 +175,15 @@ class _Walk:
         asked = self._collection
         target = self._stream.next_target(self._at, asked.min_path_m, asked.max_tries)
         if target is None:
-            raise InputError(_no_target(self._at, self._space, asked))
+            where = ", ".join(f"{value:.2f}" for value in self._at[:3])
+            raise InputError(
+                f"plan: no admissible target from ({where}) in {asked.max_tries} rounds of"
+                f" {asked.candidates} candidates; lower min_path_m ({asked.min_path_m} m) or"
+                f" min_view_distance_m ({self._space.min_view_distance_m} m), or widen sampling_box"
+            )
         path = path_poses(self._at, target, asked.frame_spacing_m, asked.interpolation)
         self._at = target
         return path
-
-
-def _no_target(start: Array, space: PoseSpace, collection: CollectionConfig) -> str:
-    """What to relax when no path leads on from ``start`` (6,)."""
-    where = ", ".join(f"{value:.2f}" for value in start[:3])
-    return (
-        f"plan: no admissible target from ({where}) in {collection.max_tries} rounds of"
-        f" {collection.candidates} candidates; lower min_path_m ({collection.min_path_m} m) or"
-        f" min_view_distance_m ({space.min_view_distance_m} m), or widen sampling_box"
-    )
 
 
 def _table(paths: list[Array], n_frames: int) -> PoseTable:

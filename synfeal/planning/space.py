@@ -112,7 +112,3 @@ class PoseSpace:
     def has_free_view(self, poses: PoseVectors) -> NDArray[np.bool_]:
         """Which poses (N, 6) look far enough, (N,)."""
         return has_free_view(self.caster, poses, self.min_view_distance_m)
-
-    def admissible(self, start: PoseVectors, poses: PoseVectors) -> NDArray[np.bool_]:
-        """Which candidates (N, 6) do so and are reached on a free line from ``start``, (N,)."""
-        return admissible(self.caster, start, poses, self.min_view_distance_m)

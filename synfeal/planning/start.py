@@ -129,6 +129,6 @@ def draw_questions(
     starts = np.tile(sample_start(space, MAX_TRIES), (count, 1))
     for _ in range(N_MOVES):
         candidates = space.sample(count)
-        moves = space.admissible(starts, candidates)
+        moves = admissible(caster, starts, candidates, scene.min_view_distance_m)
         starts[moves] = candidates[moves]
     return Questions(starts, space.sample(count), scene.min_view_distance_m)

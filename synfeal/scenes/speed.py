@@ -26,7 +26,8 @@ from synfeal.effects.apply import Frame
 from synfeal.effects.scene import open_scene
 from synfeal.files import write_json
 from synfeal.frames import COUNT, NUMBER, TEXT, frame_of, write_frame
-from synfeal.planning.plan import plan_scene
+from synfeal.mesh.triangles import load_collision_mesh
+from synfeal.planning.plan import plan_mesh
 from synfeal.provenance import CPU_INFO, processor_name
 
 PAPER_CAMERA = CameraConfig(width=640, height=480)  # what the published code renders
@@ -61,7 +62,8 @@ def write_collection_speed(
     A frame is a PNG file and its pose. The mesh is loaded once before, as in a job of any length.
     """
     began = time.perf_counter()
-    plan = plan_scene(collision, scene, collection, FRAMES, np.random.default_rng(seed))
+    asked = (scene, collection, FRAMES, np.random.default_rng(seed), "train")
+    plan = plan_mesh(load_collision_mesh(collision), str(collision), *asked)
     planning_s = (time.perf_counter() - began) / PARTS
     with (
         tempfile.TemporaryDirectory(dir=out_speed.parent) as folder,
