@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 LONGEST = 900  # characters of a message
 
@@ -56,6 +57,23 @@ def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
         print(f"error: interrupted; {str(interrupt) or if_interrupted}", file=sys.stderr)
         return 130
     return 0
+
+
+@contextmanager
+def read_as(path: object, what: str, *damage: type[Exception], remedy: str = "") -> Iterator[None]:
+    """Say in one line that a file could not be read in the block.
+
+    ``what`` it is no good as ("a pose"), and ``damage`` what then is raised: else ``OSError`` and
+    ``ValueError``; ``remedy`` is what to do ("; make it again").
+
+    Raises:
+        InputError: in place of any of these.
+    """
+    kinds = damage or (OSError, ValueError)
+    try:
+        yield
+    except kinds as error:
+        raise InputError(f"{path}: cannot be read as {what} ({why(error)}){remedy}") from None
 
 
 def why(error: BaseException) -> str:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError, read_as, why
 from synfeal.files import atomic_path
 
 if TYPE_CHECKING:
@@ -87,13 +87,13 @@ def read_records(
     Raises:
         InputError: as :func:`read_frame`, but for what cells hold.
     """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:  # spreadsheets add a mark
-            reader = csv.reader(file, strict=True, delimiter=sep)
-            header = next(reader, [])
-            rows = [(reader.line_num, row) for row in reader if row]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: cannot be read as CSV ({why(error)}); {remedy}") from None
+    with (
+        read_as(path, "CSV", OSError, UnicodeDecodeError, csv.Error, remedy=f"; {remedy}"),
+        path.open(encoding="utf-8-sig", newline="") as file,  # spreadsheets add a mark
+    ):
+        reader = csv.reader(file, strict=True, delimiter=sep)
+        header = next(reader, [])
+        rows = [(reader.line_num, row) for row in reader if row]
     absent = [name for name in needed if name not in header]
     if absent:
         raise InputError(f"{path}: column {', '.join(absent)} missing; {remedy}")
@@ -179,10 +179,8 @@ def read_numbers(
             ``finite``, anything but finite ones.
     """
     n_columns = header.count(",") + 1
-    try:
+    with read_as(path, f"a {kind}"):
         found, *lines = path.read_text(encoding="utf-8").splitlines() or [""]
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a {kind} ({why(error)})") from None
     if passed_over and found == f"{header},{passed_over}":
         found, lines = header, [line.rpartition(",")[0] for line in lines]
     if found != header:

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from synfeal.config.collection import SceneConfig
 from synfeal.config.models import Config
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError, read_as
 from synfeal.files import PlainLoader
 
 
@@ -44,10 +44,8 @@ def read_yaml(path: Path) -> dict[str, Any]:
     Raises:
         InputError: the file is missing, is not UTF-8, is not YAML, or is no mapping.
     """
-    try:
+    with read_as(path, "YAML", OSError, ValueError, RecursionError, yaml.YAMLError):
         value = yaml.load(path.read_text(encoding="utf-8"), PlainLoader)  # noqa: S506 (a SafeLoader)
-    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: cannot be read as YAML ({why(error)})") from None
     if not isinstance(value, dict):
         found = "nothing" if value is None else _shortened(reprlib.repr(value))
         raise InputError(f"{path}: must hold a mapping of keys, found {found}")

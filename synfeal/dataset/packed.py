@@ -19,7 +19,7 @@ from PIL import Image
 from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.dataset.png import read_image
 from synfeal.dataset.sevenscenes import frame_paths
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError, read_as
 from synfeal.files import atomic_path, file_sha256, read_json, write_json
 from synfeal.provenance import frame_versions
 
@@ -76,12 +76,9 @@ def read_packed(path: Path) -> np.memmap[Any, np.dtype[np.uint8]]:
     Raises:
         InputError: the file is missing or holds no packed frames.
     """
-    try:
+    # A damaged header is refused in every way there is.
+    with read_as(path, "packed frames", Exception, remedy="; render it again"):
         frames: np.memmap[Any, np.dtype[np.uint8]] = np.lib.format.open_memmap(path, mode="r")
-    except Exception as error:  # a damaged header is refused in every way there is
-        raise InputError(
-            f"{path}: cannot be read as packed frames ({why(error)}); render it again"
-        ) from None
     side = frames.shape[1] if frames.ndim == 4 else 0
     if frames.dtype != np.uint8 or frames.shape[1:] != (side, side, 3) or np.isfortran(frames):
         raise InputError(f"{path}: holds {frames.dtype} {frames.shape}, not packed frames")
@@ -121,16 +118,13 @@ def fit_frame(image: Image.Image, input_px: int, view: View = "square") -> NDArr
 
 
 def _read_shard(path: Path) -> dict[str, object]:
-    try:
+    damage = (OSError, ValueError, TypeError, LookupError)
+    with read_as(path, "the record of a shard", *damage, remedy="; render it again"):
         record = read_json(path)
         frames, backend = record["frames"], record["backend"]
         if type(frames) is not int or type(backend) is not str:
             raise ValueError("frames must be a whole number, backend a name")
-        return {"name": path.stem, "frames": frames, "backend": backend}
-    except (OSError, ValueError, TypeError, LookupError) as error:
-        raise InputError(
-            f"{path}: cannot be read as the record of a shard ({why(error)}); render it again"
-        ) from None
+    return {"name": path.stem, "frames": frames, "backend": backend}
 
 
 def write_packed(

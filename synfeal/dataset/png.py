@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.dataset.archive import FrameFile
-from synfeal.errors import InputError, why
+from synfeal.errors import read_as
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 GREY, RGB = 0, 2  # colour types of the format
@@ -69,9 +69,9 @@ def read_image(path: FrameFile, mode: str | None = None) -> Image.Image:
     Raises:
         InputError: it cannot be read.
     """
-    try:
-        with Image.open(io.BytesIO(path.read_bytes())) as image:
-            image.load()
-            return image.convert(mode) if mode else image.copy()
-    except IMAGE_DAMAGE as error:
-        raise InputError(f"{path}: cannot be read as an image ({why(error)})") from None
+    with (
+        read_as(path, "an image", *IMAGE_DAMAGE),
+        Image.open(io.BytesIO(path.read_bytes())) as image,
+    ):
+        image.load()
+        return image.convert(mode) if mode else image.copy()

@@ -6,6 +6,7 @@ Depth is along the optical axis, 16-bit PNG in millimetres, 65535 where nothing 
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from synfeal.dataset.archive import FrameFile, frame_file, sequence_at, sequence_names
 from synfeal.dataset.png import read_image
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError, read_as
 from synfeal.files import atomic_path
 
 INVALID_MM = 65535
@@ -56,11 +57,9 @@ def read_pose(path: FrameFile) -> NDArray[np.float64]:
     Raises:
         InputError: the file does not hold sixteen finite numbers in four rows.
     """
-    try:
+    with read_as(path, "a pose"):
         rows = [line.split() for line in path.read_text(encoding="utf-8").splitlines() if line]
         pose = np.array(rows, np.float64)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as a pose ({why(error)})") from None
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise InputError(f"{path}: a pose is four rows of four finite numbers")
     return pose
@@ -74,10 +73,8 @@ def frame_paths(sequences: Iterable[Path], kind: str) -> list[FrameFile]:
     """
     paths: list[FrameFile] = []
     for sequence in sequences:
-        try:
+        with read_as(sequence, "a sequence", OSError):
             names = sequence_names(sequence)
-        except OSError as error:
-            raise InputError(f"{sequence}: cannot be read as a sequence ({why(error)})") from None
         found = [name for name in names if name.startswith("frame-") and name.endswith(f".{kind}")]
         if not found:
             raise InputError(f"{sequence}: holds no frame-XXXXXX.{kind}; render it again")
@@ -101,12 +98,10 @@ def read_split(dataset_dir: Path, split: str) -> list[Path]:
         InputError: the split file is missing or holds a line that names no sequence.
     """
     path = dataset_dir / SPLIT_FILES[split]
-    try:
+    if not os.path.lexists(path):
+        raise InputError(f"{path}: missing; a 7-Scenes data set has one")
+    with read_as(path, "a list of sequences"):
         lines = path.read_text(encoding="utf-8").split()
-    except FileNotFoundError:
-        raise InputError(f"{path}: missing; a 7-Scenes data set has one") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a list of sequences ({why(error)})") from None
     bad = [line for line in lines if not SEQUENCE.fullmatch(line)]
     if bad:
         raise InputError(f"{path}: '{bad[0][:40]}' names no sequence; lines look like 'sequence1'")

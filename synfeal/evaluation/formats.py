@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 
 from synfeal.dataset.pose_table import COLUMNS, IMAGE
 from synfeal.dataset.sevenscenes import read_pose
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError, read_as
 from synfeal.evaluation.estimates import Convention, Estimates
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.validation.listing import POSE, list_sequences
@@ -48,7 +49,10 @@ def read_estimates(path: Path) -> Estimates:
         return _from_directory(path)
     if path.name in MODELS:
         return read_colmap(path.parent)
-    text = _text(path)
+    if not os.path.lexists(path):
+        raise InputError(f"{path}: missing; give a file of poses, or a directory")
+    with read_as(path, "poses"):
+        text = path.read_text(encoding="utf-8-sig")
     rows = [(i, line.split()) for i, line in enumerate(text.splitlines(), start=1)]
     rows = [(i, row) for i, row in rows if row and not row[0].startswith("#")]
     if not rows:
@@ -56,15 +60,6 @@ def read_estimates(path: Path) -> Estimates:
     if "," in rows[0][1][0]:
         return read_csv(path, text)
     return read_lines(path, rows)
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{path}: missing; give a file of poses, or a directory") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as poses ({why(error)})") from None
 
 
 def _from_directory(path: Path) -> Estimates:
@@ -122,12 +117,11 @@ def read_colmap(path: Path) -> Estimates:
     both = [name for name in MODELS if (path / name).is_file()]
     if len(both) > 1:
         raise InputError(f"{path}: holds images.txt and images.bin; leave one of them")
-    try:
+    damage = (RuntimeError, ValueError, IndexError, KeyError, MemoryError)
+    with read_as(path, "a COLMAP model", *damage):
         model = pycolmap.Reconstruction(path)
         images = sorted(model.images.values(), key=lambda image: image.name)
         poses = [image.cam_from_world() for image in images if image.has_pose]
-    except (RuntimeError, ValueError, IndexError, KeyError, MemoryError) as error:
-        raise InputError(f"{path}: cannot be read as a COLMAP model ({why(error)})") from None
     if not poses:
         raise InputError(f"{path}: this COLMAP model has no image with a pose")
     names = tuple(image.name for image in images if image.has_pose)
@@ -143,10 +137,8 @@ def read_colmap(path: Path) -> Estimates:
 
 def read_csv(path: Path, text: str) -> Estimates:
     """A table of poses with a header."""
-    try:
+    with read_as(path, "CSV"):
         table = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
-    except (pd.errors.ParserError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as CSV ({why(error)})") from None
     header = tuple(table.columns)
     if header not in (COLUMNS, (*COLUMNS, IMAGE), (IMAGE, *COLUMNS[2:])):
         raise InputError(

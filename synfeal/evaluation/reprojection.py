@@ -24,7 +24,7 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.dataset.sevenscenes import INVALID_MM
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError, read_as
 from synfeal.evaluation.metrics import Metrics, draws, is_pose, means, with_limits
 from synfeal.files import atomic_path
 from synfeal.geometry.poses import relative
@@ -116,12 +116,8 @@ def read_cell_depth(path: Path, n_frames: int) -> Array:
     Raises:
         InputError: the file is missing, damaged or too short.
     """
-    try:
+    with read_as(path, "depths", OSError, ValueError, EOFError, remedy="; make it again"):
         depth_mm = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(
-            f"{path}: cannot be read as depths ({why(error)}); make it again"
-        ) from None
     if depth_mm.dtype != np.uint16 or depth_mm.shape[1:] != (CELLS[0] * CELLS[1],):
         raise InputError(f"{path}: does not hold depths of {CELLS[0]} x {CELLS[1]} cells")
     if len(depth_mm) < n_frames:

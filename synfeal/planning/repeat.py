@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from synfeal.dataset.archive import FrameFile
 from synfeal.dataset.pose_table import PoseTable, check_unit, read_pose_table
 from synfeal.dataset.sevenscenes import SPLIT_FILES, frame_paths, read_pose, read_split
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.geometry.rotations import canonical_quat_wxyz
 
@@ -105,10 +105,8 @@ def _rigid(path: FrameFile) -> NDArray[np.float64]:
 
 def _read_tum(path: Path) -> PoseTable:
     """A trajectory of lines ``timestamp tx ty tz qx qy qz qw``; ``#`` starts a comment."""
-    try:
+    with read_as(path, "a trajectory"):
         lines = [line.partition("#")[0].split() for line in path.read_text("utf-8").splitlines()]
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a trajectory ({why(error)})") from None
     rows = {number: line for number, line in enumerate(lines, 1) if line}
     values = np.array([_tum_row(path, number, line) for number, line in rows.items()])
     values = values.reshape(-1, 8)
