@@ -91,7 +91,7 @@ def read_sweep(path: Path) -> Sweep:
     try:
         sweep = Sweep.model_validate(read_yaml(path))
     except ValidationError as error:
-        raise InputError(f"{path}: {describe(error, Sweep)}") from None
+        raise InputError(f"{path}: {describe(error)}") from None
     if sweep.measure not in MEASURES:
         raise InputError(f"{path}: measure: '{sweep.measure}' must be one of {', '.join(MEASURES)}")
     return sweep
@@ -136,7 +136,7 @@ def _run(
         case = model.model_validate(_filled(raw, str(results)))
     except ValidationError as error:
         where = ", ".join(f"{name} {value}" for name, value in key.items())
-        raise InputError(f"{sweep.title} ({where}): {describe(error, model)}") from None
+        raise InputError(f"{sweep.title} ({where}): {describe(error)}") from None
     return Run(key, case, hashlib.sha256(settings.encode()).hexdigest()[:12])
 
 

@@ -105,7 +105,7 @@ def render_configs(options: Mapping[str, Any]) -> tuple[CameraConfig, RenderConf
             try:
                 found.append(model.model_validate(values.pop(key, {})))
             except ValidationError as error:
-                raise InputError(f"{key}.{describe(error, model)}") from None
+                raise InputError(f"{key}.{describe(error)}") from None
         if values:
             raise InputError(f"{next(iter(options))}: is not an option of a renderer")
     return found[0], found[1]
@@ -139,7 +139,7 @@ def options_named() -> Iterator[None]:
     try:
         yield
     except ValidationError as error:
-        raise InputError(in_words_of_options(describe(error, DatasetConfig))) from None
+        raise InputError(in_words_of_options(describe(error))) from None
     except InputError as error:
         raise InputError(in_words_of_options(str(error))) from None
 

@@ -67,7 +67,7 @@ def parse_description(value: Any, path: Path) -> ModelDescription:
     try:
         return ModelDescription.model_validate(value)
     except ValidationError as error:
-        reason = describe(error, ModelDescription)
+        reason = describe(error)
         raise InputError(f"{path}: its description cannot be used ({reason})") from None
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, get_origin
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
@@ -27,7 +28,6 @@ Fraction = Annotated[float, Field(ge=0, lt=1)]
 Count = Annotated[int, Field(ge=1, le=10**9)]
 MOST_FRAMES = 10**7  # of a split: at 30 frames/s four days, and 1.3 GB of poses while it is planned
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Interval = tuple[Finite, Finite]
 Channel = Annotated[int, Field(ge=0, le=255)]
 
 
@@ -42,17 +42,25 @@ class Strict(BaseModel):
         values: dict[str, Any] = handler(self)
         return {k: v for k, v in values.items() if v is not None or k not in self.unless_none}
 
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_unknown(cls, values: Any) -> Any:
+        keys = values if isinstance(values, dict) else ()
+        if unknown := [k for k in keys if isinstance(k, str) and k not in cls.model_fields]:
+            allowed = ", ".join(sorted(cls.model_fields))
+            raise ValueError(f"{unknown[0] or repr('')}: unknown key; allowed here: {allowed}")
+        return values
+
     @field_validator("*", mode="before")
     @classmethod
     def _refuse_coercion(cls, value: Any, info: ValidationInfo) -> Any:
         """Refuse true and false where a number is meant, and NUL, which no path can hold."""
         annotation = cls.model_fields[str(info.field_name)].annotation
-        is_flag = annotation is bool
         parts = value if isinstance(value, list | tuple) else [value]
         if isinstance(value, dict) and get_origin(annotation) is dict:  # else another model's keys
             parts = list(value.values())
         for part in parts:
-            if isinstance(part, bool) and not is_flag:
+            if isinstance(part, bool) and annotation is not bool:
                 raise PydanticCustomError("no_number", "Input should not be true or false")
             if isinstance(part, str | Path) and "\0" in str(part):
                 raise PydanticCustomError("no_text", "Input should not hold the character NUL")
@@ -64,9 +72,13 @@ def part(model: Callable[[], Any], description: str) -> Any:
     return Field(default_factory=model, description=description)
 
 
-def _ordered(name: str, interval: Interval) -> None:
+def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
     if not interval[0] < interval[1]:
-        raise ValueError(f"{name}: the first number must be below the second, got {list(interval)}")
+        raise PydanticCustomError("order", "the first number must be below the second")
+    return interval
+
+
+Interval = Annotated[tuple[Finite, Finite], AfterValidator(_ordered)]
 
 
 class Box(Strict):
@@ -75,12 +87,6 @@ class Box(Strict):
     x: Interval = Field(description="bounds, metres")
     y: Interval = Field(description="bounds, metres")
     z: Interval = Field(description="bounds, metres")
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        for axis in ("x", "y", "z"):
-            _ordered(axis, getattr(self, axis))
-        return self
 
 
 class Angles(Strict):
@@ -92,8 +98,6 @@ class Angles(Strict):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        for name in ("roll_deg", "pitch_deg", "yaw_deg"):
-            _ordered(name, getattr(self, name))
         if not -90 < self.pitch_deg[0] < self.pitch_deg[1] < 90:
             raise ValueError(
                 "pitch_deg: must lie within -90 and 90, where yaw and roll are distinct"
@@ -115,15 +119,10 @@ class ClutterConfig(Strict):
     files: tuple[Path, ...] = Field(
         (), description="meshes in metres, taken in turn; none: cartons"
     )
-    size_m: tuple[Positive, Positive] = Field(
+    size_m: Annotated[tuple[Positive, Positive], AfterValidator(_ordered)] = Field(
         (0.12, 0.4), description="cartons: shortest and longest side, metres"
     )
     seed: int = Field(0, ge=0, lt=2**63, description="of the layout")
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        _ordered("size_m", self.size_m)
-        return self
 
 
 class SceneConfig(Strict):

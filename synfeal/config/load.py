@@ -7,10 +7,10 @@ import reprlib
 import stat
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any
 
 import yaml
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from synfeal.config.collection import SceneConfig
 from synfeal.config.models import Config
@@ -19,11 +19,7 @@ from synfeal.files import PlainLoader
 
 
 def parse_config(raw: Mapping[str, Any], origin: str = "config") -> Config:
-    """Check a merged mapping.
-
-    Raises:
-        InputError: naming ``origin``, the first offending key, and what is allowed there.
-    """
+    """Check a merged mapping; an :class:`InputError` names ``origin`` and the first wrong key."""
     try:
         return Config.model_validate(dict(raw))
     except ValidationError as error:
@@ -39,11 +35,7 @@ def load_config(*paths: Path) -> Config:
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """A YAML mapping from a file.
-
-    Raises:
-        InputError: the file is missing, is not UTF-8, is not YAML, or is no mapping.
-    """
+    """A YAML mapping from a file."""
     with read_as(path, "YAML", OSError, ValueError, RecursionError, yaml.YAMLError):
         value = yaml.load(path.read_text(encoding="utf-8"), PlainLoader)  # noqa: S506 (a SafeLoader)
     if not isinstance(value, dict):
@@ -61,22 +53,14 @@ def merge(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, Any
     return merged
 
 
-def describe(error: ValidationError, model: type[BaseModel] = Config) -> str:
-    """The first problem in one line: dotted key, what is wrong, what was found, what is allowed.
-
-    ``model`` is what was validated: its keys are named where one is unknown.
-    """
+def describe(error: ValidationError) -> str:
+    """The first problem in one line: dotted key, what is wrong, what was found, what is allowed."""
     first = error.errors()[0]
     key = ".".join(str(part) or "''" for part in first["loc"] if part != "[key]")
-    if first["type"] == "extra_forbidden":
-        return f"{key}: unknown key; allowed here: {', '.join(_siblings(model, first['loc']))}"
     if first["type"] == "missing":
         return f"{key}: missing; it has no default"
-    message = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "path_type":
-        message = "must be a path"
-    if first["type"] == "model_type":
-        message = "must hold a mapping of keys"
+    own = {"path_type": "must be a path", "model_type": "must hold a mapping of keys"}
+    message = own.get(first["type"], first["msg"].removeprefix("Value error, "))
     if first["type"] == "value_error":
         return f"{key}.{message}" if key else message
     more = len(error.errors()) - 1
@@ -87,27 +71,6 @@ def describe(error: ValidationError, model: type[BaseModel] = Config) -> str:
 
 def _shortened(text: str, length: int = 60) -> str:
     return text if len(text) <= length else f"{text[:length]}..."
-
-
-def _siblings(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
-    """Keys allowed beside the unknown one at ``location`` of a model."""
-    annotation: Any = model
-    for part in location[:-1]:
-        annotation = _value_type(annotation, part)
-    return sorted(_fields(annotation))
-
-
-def _value_type(annotation: Any, key: int | str) -> Any:
-    """What stands under ``key`` of a model or mapping, without ``| None``."""
-    fields = _fields(annotation)
-    found = fields[str(key)].annotation if fields else get_args(annotation)[1]
-    models = [a for a in get_args(found) if _fields(a)]
-    return models[0] if models and get_origin(found) is not dict else found
-
-
-def _fields(annotation: Any) -> dict[str, Any]:
-    fields: dict[str, Any] = getattr(annotation, "model_fields", {})
-    return fields
 
 
 DOCUMENTATION = "config/scenes/README.md"

@@ -46,7 +46,7 @@ def _config(path: Path, values: object) -> CameraConfig:
     try:
         return CameraConfig.model_validate(values)
     except ValidationError as error:
-        raise InputError(f"{path}: camera: {describe(error, CameraConfig)}") from None
+        raise InputError(f"{path}: camera: {describe(error)}") from None
 
 
 Array = NDArray[np.float64]
