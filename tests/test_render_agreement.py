@@ -213,7 +213,7 @@ def test_textures_and_images_beyond_the_devices_limit(monkeypatch):
     assert np.abs(reduced - full).mean() < 2.0
     monkeypatch.setitem(shared_context().info, "GL_MAX_TEXTURE_SIZE", 128)
     with pytest.raises(InputError, match=r"camera: 64x48 pixels at 3 .* lower render\.supersamp"):
-        OpenglRenderer(soup(10), camera_of(), supersampling=3)
+        OpenglRenderer(soup(10), camera_of(), RenderConfig(supersampling=3))
 
 
 @needs_opengl

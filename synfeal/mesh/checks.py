@@ -144,11 +144,15 @@ def refuse_extensions(path: Path, header: Json) -> None:
         raise _refusal(path, "EXT_mesh_gpu_instancing")
     for name in stand_alone(header):
         raise _refusal(path, name)
-    if any("sparse" in accessor for accessor in _used_accessors(header)):
-        raise InputError(
-            f"{path}: stores vertices in sparse accessors, which are not read;"
-            " export it again without morph targets or as OBJ"
-        )
+    for primitive in primitives_of(header):  # positions, triangles, colours, texture coordinates
+        attributes = primitive["attributes"]
+        read = [attributes[key] for key in attributes if key.startswith(("POS", "TEX", "COL"))]
+        read += [primitive["indices"]] if "indices" in primitive else []
+        if any("sparse" in header["accessors"][index] for index in read):
+            raise InputError(
+                f"{path}: stores vertices in sparse accessors, which are not read;"
+                " export it again without morph targets or as OBJ"
+            )
 
 
 def _refusal(path: Path, name: str) -> InputError:
@@ -156,16 +160,6 @@ def _refusal(path: Path, name: str) -> InputError:
     if name in LIBRARIES:
         remedy = f"pip install '{EXTRA}', or {remedy}"
     return InputError(f"{path}: needs the glTF extension {name}, which is not read; {remedy}")
-
-
-def _used_accessors(header: Json) -> list[Json]:
-    """Accessors that hold what is read: positions, triangles, colours, texture coordinates."""
-    used = []
-    for primitive in primitives_of(header):
-        attributes = primitive["attributes"]
-        used += [attributes[key] for key in attributes if key.startswith(("POS", "TEX", "COL"))]
-        used += [primitive["indices"]] if "indices" in primitive else []
-    return [header["accessors"][index] for index in used]
 
 
 def repaired(part: MeshPart, findings: Findings) -> MeshPart:
@@ -179,9 +173,16 @@ def repaired(part: MeshPart, findings: Findings) -> MeshPart:
     first = _first_of_each(faces)
     _count(findings, part, len(faces) - len(first), "duplicate", "removed")
     faces = faces[first]
-    doubled = _on_another(part.vertices_m, faces)
+    _, place = np.unique(part.vertices_m, axis=0, return_inverse=True)
+    doubled = len(faces) - len(_first_of_each(place.reshape(-1)[faces]))
     _count(findings, part, doubled, "coincident", "kept: their vertices or texture differ")
-    return _compact(_finite_uv(replace(part, faces=faces), findings), findings)
+    part = _finite_uv(replace(part, faces=faces), findings)
+    unused = len(part.vertices_m) - len(np.unique(faces))  # they would stretch its bounds
+    if not unused:
+        return part
+    noun = "vertex" if unused == 1 else "vertices"
+    findings.note(f"part '{part.name}': {unused} unused {noun} removed")
+    return part.over(faces)
 
 
 def _count(findings: Findings, part: MeshPart, count: int, kind: str, what: str) -> None:
@@ -208,12 +209,6 @@ def _first_of_each(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.sort(first)
 
 
-def _on_another(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> int:
-    """How many faces have their corners exactly where those of another face are."""
-    _, place = np.unique(vertices, axis=0, return_inverse=True)
-    return len(faces) - len(_first_of_each(place.reshape(-1)[faces]))
-
-
 def _finite_uv(part: MeshPart, findings: Findings) -> MeshPart:
     if part.uv is None:
         return part
@@ -224,13 +219,3 @@ def _finite_uv(part: MeshPart, findings: Findings) -> MeshPart:
         f"part '{part.name}': {bad.sum()} texture coordinates that are NaN or infinite set to 0"
     )
     return replace(part, uv=np.where(bad, 0.0, part.uv))
-
-
-def _compact(part: MeshPart, findings: Findings) -> MeshPart:
-    """The part without the vertices that no face names; they would stretch its bounds."""
-    unused = len(part.vertices_m) - len(np.unique(part.faces))
-    if not unused:
-        return part
-    noun = "vertex" if unused == 1 else "vertices"
-    findings.note(f"part '{part.name}': {unused} unused {noun} removed")
-    return part.over(part.faces)

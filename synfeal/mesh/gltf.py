@@ -12,6 +12,7 @@ import json
 import re
 import struct
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -41,11 +42,16 @@ def read_gltf(path: Path) -> Gltf:
     Raises:
         InputError: the file is cut short, is no glTF 2.0, or its JSON is broken.
     """
-    if path.suffix.lower() == ".gltf":
-        return Gltf(_parse_json(path, path.read_bytes()))
     content = path.read_bytes()
+    if path.suffix.lower() == ".gltf":
+        return Gltf(_parse_json(path, content))
     _check_glb_head(path, content)
-    chunks = dict(reversed(list(_chunks(content))))  # the first of each kind counts
+    chunks: dict[bytes, bytes] = {}
+    start = 12
+    while start + 8 <= len(content):
+        length, kind = struct.unpack_from("<I4s", content, start)
+        chunks.setdefault(kind, content[start + 8 : start + 8 + length])  # the first counts
+        start += 8 + length
     if JSON_CHUNK not in chunks:
         raise InputError(f"{path}: the GLB holds no JSON; export it again")
     return Gltf(_parse_json(path, chunks[JSON_CHUNK]), chunks.get(BIN_CHUNK, b""))
@@ -61,16 +67,6 @@ def _check_glb_head(path: Path, content: bytes) -> None:
         raise InputError(
             f"{path}: ends after {len(content)} of {length} bytes; download or export it again"
         )
-
-
-def _chunks(content: bytes) -> list[tuple[bytes, bytes]]:
-    """Kind and content of all chunks of a GLB."""
-    chunks, start = [], 12
-    while start + 8 <= len(content):
-        length, kind = struct.unpack_from("<I4s", content, start)
-        chunks.append((kind, content[start + 8 : start + 8 + length]))
-        start += 8 + length
-    return chunks
 
 
 def _parse_json(path: Path, text: bytes) -> Json:
@@ -161,8 +157,23 @@ DRACO, BASISU = "KHR_draco_mesh_compression", "KHR_texture_basisu"
 
 def stand_alone(header: Json) -> list[str]:
     """Extensions without which something that is drawn cannot be read."""
-    found = (check(header) for check in (_draco_alone, _meshopt_alone, _basisu_alone))
-    return [name for name in found if name is not None]
+    found = []
+    for primitive in primitives_of(header):
+        positions = header["accessors"][primitive["attributes"]["POSITION"]]
+        if DRACO in primitive.get("extensions", {}) and "bufferView" not in positions:
+            found.append(DRACO)  # no plain positions beside it
+    for name, view in product(MESHOPT, listed(header, "bufferViews")):
+        buffer = header["buffers"][view["buffer"]]
+        is_placeholder = "uri" not in buffer and name in buffer.get("extensions", {})
+        if name in view.get("extensions", {}) and is_placeholder:
+            found.append(name)
+    for material in listed(header, "materials"):
+        slot = base_color(material).get("baseColorTexture")
+        texture = {} if slot is None else header["textures"][slot["index"]]
+        others = "source" in texture or "EXT_texture_webp" in texture.get("extensions", {})
+        if BASISU in texture.get("extensions", {}) and not others:
+            found.append(BASISU)
+    return found
 
 
 def listed(header: Json, key: str) -> list[Json]:
@@ -174,37 +185,6 @@ def listed(header: Json, key: str) -> list[Json]:
 def primitives_of(header: Json) -> list[Json]:
     """The primitives of all meshes."""
     return [primitive for mesh in listed(header, "meshes") for primitive in mesh["primitives"]]
-
-
-def _draco_alone(header: Json) -> str | None:
-    """Draco, if a primitive has no plain positions beside it."""
-    for primitive in primitives_of(header):
-        positions = header["accessors"][primitive["attributes"]["POSITION"]]
-        if DRACO in primitive.get("extensions", {}) and "bufferView" not in positions:
-            return DRACO
-    return None
-
-
-def _meshopt_alone(header: Json) -> str | None:
-    """Meshopt, if a compressed view points to a buffer that is only a placeholder."""
-    for name in MESHOPT:
-        for view in listed(header, "bufferViews"):
-            buffer = header["buffers"][view["buffer"]]
-            is_placeholder = "uri" not in buffer and name in buffer.get("extensions", {})
-            if name in view.get("extensions", {}) and is_placeholder:
-                return name
-    return None
-
-
-def _basisu_alone(header: Json) -> str | None:
-    """KTX2, if a base colour has no other image."""
-    for material in listed(header, "materials"):
-        slot = base_color(material).get("baseColorTexture")
-        texture = {} if slot is None else header["textures"][slot["index"]]
-        others = "source" in texture or "EXT_texture_webp" in texture.get("extensions", {})
-        if BASISU in texture.get("extensions", {}) and not others:
-            return BASISU
-    return None
 
 
 # Names that exporters and download sites give to every file.

@@ -93,7 +93,15 @@ class _Materials:
         """The material of a part."""
         key = (id(part.texture), part.base_color.tobytes(), part.alpha_cutoff)
         if key not in self._made:
-            self._made[key] = _material(part, f"{len(self._made)}:{part.name}")
+            self._made[key] = PBRMaterial(
+                name=f"{len(self._made)}:{part.name}",
+                baseColorTexture=None if part.texture is None else _FastPng(part.texture),
+                metallicFactor=0.0,
+                roughnessFactor=1.0,
+                doubleSided=True,
+                alphaMode="OPAQUE" if part.alpha_cutoff is None else "MASK",
+                alphaCutoff=part.alpha_cutoff,
+            )
         return self._made[key]
 
     def set_exact_factors(self, tree: dict[str, Any]) -> None:
@@ -104,18 +112,6 @@ class _Materials:
             factor = linear_from_srgb(colours[int(index)]).tolist()
             material.setdefault("pbrMetallicRoughness", {})["baseColorFactor"] = factor
             material["name"] = name
-
-
-def _material(part: MeshPart, name: str) -> PBRMaterial:
-    return PBRMaterial(
-        name=name,
-        baseColorTexture=None if part.texture is None else _FastPng(part.texture),
-        metallicFactor=0.0,
-        roughnessFactor=1.0,
-        doubleSided=True,
-        alphaMode="OPAQUE" if part.alpha_cutoff is None else "MASK",
-        alphaCutoff=part.alpha_cutoff,
-    )
 
 
 def _geometry(

@@ -13,7 +13,7 @@ from synfeal.mesh.model import MeshPart
 
 Rgb = NDArray[np.uint8]
 Depth = NDArray[np.float32]
-DEFAULT_SUPERSAMPLING = RenderConfig().supersampling
+DEFAULTS = RenderConfig()
 # Mesa's software renderer silently draws nonsense from a buffer of 2^24 vertices on.
 MOST_VERTICES = 1 << 23
 
@@ -21,8 +21,7 @@ MOST_VERTICES = 1 << 23
 class Renderer(Protocol):
     """Unlit images of one mesh through one camera.
 
-    What draws a mesh takes ``(mesh, camera, supersampling, background_rgb)``: the camera without
-    distortion, samples per pixel along each axis of the image, the colour where nothing is.
+    What draws a mesh takes ``(mesh, camera, render)``, the camera without distortion.
     """
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:

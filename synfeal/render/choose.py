@@ -24,12 +24,7 @@ EGL_PACKAGES = "on Debian and Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri
 
 def _opener(place: str) -> Opener:
     """Opens the class at ``module:name``, which is loaded by then: backends take up to a second."""
-
-    def opened(mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig) -> Renderer:
-        backend: Callable[..., Renderer] = resolve_name(place)
-        return backend(mesh, camera, render.supersampling, render.background_rgb)
-
-    return opened
+    return lambda mesh, camera, render: resolve_name(place)(mesh, camera, render)
 
 
 # Fastest first; results/benchmarks/rendering.md says by how much.

@@ -22,11 +22,11 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import CameraConfig
+from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import TexturedMesh
-from synfeal.render.base import DEFAULT_SUPERSAMPLING, Depth, Renderer, Rgb, pieces
+from synfeal.render.base import DEFAULTS, Depth, Renderer, Rgb, pieces
 from synfeal.render.opengl_part import DevicePart, program_of
 
 # Named in full: searching for them starts a compiler or ldconfig, which a container may lack.
@@ -98,11 +98,7 @@ class OpenglRenderer(Renderer):
     """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
 
     def __init__(
-        self,
-        mesh: TexturedMesh,
-        camera: CameraConfig,
-        supersampling: int = DEFAULT_SUPERSAMPLING,
-        background_rgb: tuple[int, int, int] = (0, 0, 0),
+        self, mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig = DEFAULTS
     ) -> None:
         """Upload the mesh."""
         self._context = shared_context()
@@ -111,16 +107,16 @@ class OpenglRenderer(Renderer):
         # Vertex buffers hold single precision: exact around the scene's own centre, wherever it is.
         self._centre_m = mesh.bounds_m.mean(axis=0)
         self._size = (camera.width, camera.height)
-        self._background = [level / 255.0 for level in background_rgb]
+        self._background = [level / 255.0 for level in render.background_rgb]
         with self._context:
-            self._check_size(supersampling)
+            self._check_size(render.supersampling)
             self._parts = [
                 DevicePart(self._context, piece, self._centre_m)
                 for part in mesh.parts
                 if part.is_drawn
                 for piece in pieces(part)
             ]
-            self._open_images(supersampling)
+            self._open_images(render.supersampling)
 
     def _check_size(self, supersampling: int) -> None:
         limit = self._context.info["GL_MAX_TEXTURE_SIZE"]

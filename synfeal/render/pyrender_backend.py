@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import CameraConfig
+from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.render.base import DEFAULT_SUPERSAMPLING, Depth, Renderer, Rgb, pieces, thresholded
+from synfeal.render.base import DEFAULTS, Depth, Renderer, Rgb, pieces, thresholded
 
 os.environ["PYOPENGL_PLATFORM"] = "egl"
 np.__dict__.setdefault("infty", np.inf)  # gone in NumPy 2, used by pyrender
@@ -61,18 +61,14 @@ class PyrenderRenderer(Renderer):
     """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
 
     def __init__(
-        self,
-        mesh: TexturedMesh,
-        camera: CameraConfig,
-        supersampling: int = DEFAULT_SUPERSAMPLING,
-        background_rgb: tuple[int, int, int] = (0, 0, 0),
+        self, mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig = DEFAULTS
     ) -> None:
         """Prepare the mesh, which is uploaded by the first render."""
-        self._supersampling = supersampling
+        self._supersampling = render.supersampling
         self._platform, self._colour, self._depth = _context()
         self._size = (camera.width, camera.height)
         self._intrinsics = camera.intrinsics
-        self._background = np.array([*background_rgb, 0]) / 255.0
+        self._background = np.array([*render.background_rgb, 0]) / 255.0
         self._scene = pyrender.Scene()
         # Vertex buffers hold single precision: exact around the scene's own centre, wherever it is.
         self._centre_m = mesh.bounds_m.mean(axis=0)

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import CameraConfig
+from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.mesh.model import TexturedMesh
-from synfeal.render.base import DEFAULT_SUPERSAMPLING, Depth, Renderer, Rgb
+from synfeal.render.base import DEFAULTS, Depth, Renderer, Rgb
 from synfeal.render.raycast_triangles import Floats, Points, TexturedTriangles, View
 
 RAYS_AT_ONCE = 1 << 15  # 30 MB
@@ -24,20 +24,16 @@ class RaycastRenderer(Renderer):
     """Implements :class:`synfeal.render.base.Renderer`; several may live in one process."""
 
     def __init__(
-        self,
-        mesh: TexturedMesh,
-        camera: CameraConfig,
-        supersampling: int = DEFAULT_SUPERSAMPLING,
-        background_rgb: tuple[int, int, int] = (0, 0, 0),
+        self, mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig = DEFAULTS
     ) -> None:
         """Prepare triangles and textures."""
         self._triangles = TexturedTriangles(mesh)
         self._camera = camera
         self._intrinsics = camera.intrinsics
-        steps = (np.arange(supersampling) + 0.5) / supersampling
+        steps = (np.arange(render.supersampling) + 0.5) / render.supersampling
         self._samples_px: Floats = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-        self._background = np.array(background_rgb, np.float32)
-        self._sample_size = 1.0 / supersampling
+        self._background = np.array(render.background_rgb, np.float32)
+        self._sample_size = 1.0 / render.supersampling
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         """Colours (H, W, 3) seen from a pose (4, 4)."""

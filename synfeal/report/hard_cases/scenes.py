@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from synfeal.config.models import CameraConfig
+from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.mesh import rays
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render import raycast_backend
@@ -113,7 +113,9 @@ def depth_of_plane(depth_m: float, slope: float) -> Trial:
     x, y = 2.0 * depth_m * SIGNS.T
     corners = np.column_stack([x, y, depth_m + slope * x])
     part = MeshPart("plane", corners, QUAD, vertex_rgb=np.full((4, 3), 255, np.uint8))
-    renderer = raycast_backend.RaycastRenderer(TexturedMesh((part,)), CAMERA, 1)
+    renderer = raycast_backend.RaycastRenderer(
+        TexturedMesh((part,)), CAMERA, RenderConfig(supersampling=1)
+    )
     truth = _depths_m(corners)
     exact_m = np.array([float(depth) for depth in truth])
     return Trial(
