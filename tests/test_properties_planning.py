@@ -5,19 +5,19 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from scipy.stats import kstest
 
 from synfeal.config.models import CollectionConfig, SceneConfig
 from synfeal.errors import InputError
 from synfeal.mesh.triangles import load_collision_mesh, save_collision_mesh
 from synfeal.planning.coverage import plan_coverage, scene_coverage
-from synfeal.planning.path import CandidateStream, independent_poses
 from synfeal.planning.plan import (
     plan_mesh,
     plan_split,
     sampling_box_of,
     sampling_boxes_of,
 )
-from synfeal.planning.space import PoseSpace, admissible, farthest_admissible, has_free_view
+from synfeal.planning.space import PoseSpace, admissible, has_free_view
 from synfeal.planning.start import (
     Questions,
     connected_space,
@@ -32,6 +32,7 @@ from tests.empty_room import (
     ROOM,
     SCENE,
     SQUARE,
+    caster_of,
     divided,
     inside_poses,
     mesh_of,
@@ -57,6 +58,8 @@ def test_in_an_empty_room_a_candidate_needs_a_free_view_and_no_more(seed, least_
     expected, near = free_by_closed_form(candidates, least_m)
     found = has_free_view(EMPTY, candidates, least_m)
     np.testing.assert_array_equal(found[~near], expected[~near])
+    into_the_void = np.array([[9.0, 0, 1, 0, 0, 0]])
+    assert not has_free_view(EMPTY, into_the_void, least_m).any()
     starts = inside_poses(seed + 1, 40)
     for start in (starts[0], starts):
         np.testing.assert_array_equal(admissible(EMPTY, start, candidates, least_m), found)
@@ -71,38 +74,6 @@ def test_no_candidate_behind_a_wall_is_admissible(seed, wall):
     found = admissible(divided(wall), start, candidates, 0.0)
     assert not found[candidates[:, 0] > wall].any()
     assert found[candidates[:, 0] < wall - 1e-3].all()
-
-
-@few
-@given(seeds, st.integers(1, 4), st.integers(1, 5), st.floats(0.0, 7.0), walls)
-def test_target_is_what_trying_one_after_the_other_finds(seed, n_rounds, k, min_path_m, wall):
-    rounds = inside_poses(seed, n_rounds * k).reshape(n_rounds, k, 6)
-    has_view = np.random.default_rng(seed).random((n_rounds, k)) < 0.5
-    start, caster = np.array([-2.0, 0, 1, 0, 0, 0]), divided(wall)
-    expected = None
-    for r, c in np.ndindex(n_rounds, k):
-        length_m = np.linalg.norm(rounds[r, c, :3] - start[:3])
-        fit = has_view[r, c] and rounds[r, c, 0] < wall and length_m >= min_path_m
-        if fit and (expected is None or (expected[0] == r and length_m > expected[1])):
-            expected = (r, length_m, c)
-    found = farthest_admissible(caster, start, rounds, has_view, min_path_m)
-    assert found == (expected and (expected[0], expected[2]))
-
-
-@few
-@given(seeds, st.integers(1, 9), st.floats(0.0, 2.0), st.floats(0.0, 2.0))
-def test_targets_of_the_stream_are_far_enough_and_have_a_view(seed, k, view_m, min_path_m):
-    stream = CandidateStream(PoseSpace(EMPTY, BOUNDS, view_m, np.random.default_rng(seed)), k)
-    start = np.array([0.0, 0, 1.2, 0, 0, 0])
-    for _ in range(3):
-        target = stream.next_target(start, min_path_m, 500)
-        assert target is not None
-        assert np.linalg.norm(target[:3] - start[:3]) >= min_path_m
-        free, near = free_by_closed_form(target[None], view_m)
-        assert free[0] or near[0]
-        assert ((target >= BOUNDS[0]) & (target <= BOUNDS[1])).all()
-        start = target
-    assert stream.next_target(start, 10.0, 3) is None  # farther than the room is long
 
 
 @fewer
@@ -141,22 +112,6 @@ def test_questions_start_where_a_camera_can_get_to(seed, wall):
     assert side.all() or not side.any()
     assert has_free_view(caster, found.starts, 0.5).all()
     assert ((found.candidates >= BOUNDS[0]) & (found.candidates <= BOUNDS[1])).all()
-
-
-@settings(few, max_examples=3)
-@given(seeds, walls, st.integers(1, 300))
-def test_independent_poses_fill_the_larger_part_and_fewer_are_a_prefix(seed, wall, count):
-    caster = divided(wall)
-
-    def drawn(n):
-        space = PoseSpace(caster, BOUNDS, 0.5, np.random.default_rng(seed))
-        return independent_poses(space, CollectionConfig(mode="random"), n)
-
-    found = drawn(count)
-    assert found.shape == (count, 6)
-    assert (found[:, 0] < wall).all()
-    assert has_free_view(caster, found, 0.5).all()
-    np.testing.assert_array_equal(drawn(count + 100)[:count], found)
 
 
 @fewer
@@ -215,3 +170,55 @@ def test_the_box_is_the_configured_one_and_else_the_mesh(a, b):
     else:
         with pytest.raises(InputError, match=r"^scene: .* lies outside the mesh"):
             sampling_box_of(scene, ROOM, "scene")
+
+
+# A wall with a door leaves the last 2 m of the room, and a cupboard shuts off a corner.
+WALL = [[1.0, -1.5, 0.0], [1.1, 2.0, 2.5]]
+CUPBOARD = np.array([[-3.0, -2.0, 0.0], [-1.5, -0.5, 2.5]])
+VIEWS = SCENE.model_copy(update={"min_view_distance_m": 0.8})
+
+
+@pytest.fixture(scope="module")
+def flat():
+    return caster_of(ROOM, WALL, CUPBOARD)
+
+
+def random_plan(caster, n_frames, seed=0, **values):
+    collection = CollectionConfig.model_validate({"mode": "random", **values})
+    return plan_split(caster, ROOM, VIEWS, collection, n_frames, np.random.default_rng(seed))
+
+
+def test_random_poses_have_a_free_view_in_the_connected_space(flat):
+    plan = random_plan(flat, 3000)
+    np.testing.assert_array_equal(plan.frame, np.arange(3000))
+    np.testing.assert_array_equal(plan.path, np.arange(3000))  # no two are of one path
+    view_m = flat.first_hit_m(plan.position_m, plan.world_from_cam[:, :3, 2])
+    assert ((view_m > 0.8) & np.isfinite(view_m)).all()
+    at = plan.position_m
+    assert not ((at > CUPBOARD[0]) & (at < CUPBOARD[1])).all(axis=1).any()
+    assert np.mean(at[:, 0] > 1.1) > 0.1  # beyond the door too: one space, not one convex part
+
+
+def test_random_poses_are_uniform_where_all_views_are_free():
+    box = np.array([[-1.0, -0.5, 1.0], [1.0, 0.5, 1.5]])  # at least 1 m from every wall
+    scene = VIEWS.model_copy(update={"min_view_distance_m": 0.5})
+    random = CollectionConfig(mode="random")
+    plan = plan_split(EMPTY, box, scene, random, 5000, np.random.default_rng(3))
+    share = (plan.position_m - box[0]) / (box[1] - box[0])
+    assert min(kstest(share[:, axis], "uniform").pvalue for axis in range(3)) > 0.01
+    step = np.linalg.norm(np.diff(plan.position_m, axis=0), axis=1)
+    assert np.median(step) > 0.5  # neighbours in the list are no neighbours in space
+
+
+def test_random_plans_are_prefixes_and_repeatable_whatever_the_round(flat):
+    longer = random_plan(flat, 500).position_m
+    np.testing.assert_array_equal(random_plan(flat, 100).position_m, longer[:100])
+    np.testing.assert_array_equal(random_plan(flat, 500, candidates=1).position_m, longer)
+    assert not np.array_equal(random_plan(flat, 100, seed=1).position_m, longer[:100])
+
+
+def test_nothing_admissible_ends_in_one_line(flat):
+    scene = VIEWS.model_copy(update={"min_view_distance_m": 50.0})
+    collection = CollectionConfig(mode="random", max_tries=50)
+    with pytest.raises(InputError, match="min_view_distance_m"):
+        plan_split(flat, ROOM, scene, collection, 10, np.random.default_rng(0))
