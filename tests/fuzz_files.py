@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import torch
-import trimesh
 from PIL import Image
 
 from baselines.groundtruth.batches import BatchTrajectory, read_trajectory, write_trajectory
@@ -35,7 +34,7 @@ from synfeal.dataset.sevenscenes import pose_text, read_depth_m, read_pose, read
 from synfeal.files import write_json
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.save import save_glb
-from synfeal.mesh.triangles import Triangles, load_collision_mesh, save_collision_mesh
+from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.planning.repeat import read_poses
 from synfeal.report.assistance import assistance_record
 from synfeal.report.stats import combine, read_metrics
@@ -58,8 +57,6 @@ POSES = straight_path(N, 0.1, 3.0)
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of file: a sound one, and what a stage does with it."""
-
     name: str
     file: str  # below a folder
     write: Callable[[Path], object]  # there, and around it what belongs to it
@@ -104,31 +101,20 @@ def is_rigid(pose):
 
 
 def is_pose_table(table):
-    whole = (table.frame >= 0).all() and (table.path >= 0).all()
-    return bool(whole and (np.abs(table.frame) < 1e12).all() and is_rigid(table.world_from_cam))
-
-
-def finite_numbers(value):
-    """No text where numbers are, and all of them finite."""
-    if isinstance(value, dict):
-        return all(map(finite_numbers, value.values()))
-    if isinstance(value, list | tuple):
-        return all(map(finite_numbers, value))
-    return not isinstance(value, float) or math.isfinite(value)
+    counts = np.array([table.frame, table.path])
+    return bool((counts >= 0).all() and (counts < 1e12).all() and is_rigid(table.world_from_cam))
 
 
 write_color, write_depth = image((18, 24, 3), 256), image((18, 24), 4000, np.uint16)
 repeated = partial(read_poses, split="train")
 write_data_set = partial(write_planar_set, camera=CAMERA, counts=(2, 2))
+write_packed = partial(np.save, arr=noise((N, 8, 8, 3), 256))
 LINEAR = torch.nn.Linear(3, 2)
+is_finite = partial(json.dumps, allow_nan=False)  # raises where a number is not
 
 
 def write_table(path):
     write_pose_table(path, POSES)
-
-
-def write_pose(path):
-    path.write_text(pose_text(POSES.world_from_cam[0]))
 
 
 def write_graph(path):
@@ -145,10 +131,6 @@ def is_graph(graph):
 def packed(path, out):
     pack_frames([path.parent], 8, out / "packed.npy")
     return np.load(out / "packed.npy")
-
-
-def write_packed(path):
-    np.save(path, noise((N, 8, 8, 3), 256))
 
 
 def is_packed(frames):
@@ -171,56 +153,13 @@ def recorded(path, out):
 TUM = "# timestamp tx ty tz qx qy qz qw\n" + "".join(f"{i} 0.1 0.2 {i} 0 0 0 1\n" for i in range(N))
 K = [[500.0, 0, 320.0], [0, 500.0, 240.0], [0, 0, 1]]
 JSON_CAMERA = json.dumps({"K": K, "dist": [0.1, 0, 0, 0, 0], "image_size": [640, 480]})
+WRITE_POSE = text(pose_text(POSES.world_from_cam[0]))
 COLMAP = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS\n1 OPENCV 640 480 500 500 320 240 0.1 0 0 0\n"
 
 
 def is_camera(calibration):
     values = (calibration.fx, calibration.fy, *calibration.distortion)
     return calibration.fx > 0 and calibration.fy > 0 and all(map(math.isfinite, values))
-
-
-def with_wall(write):
-    """A writer of a scene whose texture lies beside it."""
-
-    def writes(path):
-        Image.new("RGB", (4, 4), (9, 99, 199)).save(path.parent / "wall.png")
-        write(path.parent)
-
-    return writes
-
-
-def write_glb(path):
-    save_glb(path, meshes.box_mesh())
-
-
-def load_obj(path):
-    return load_mesh(path.with_name("scene.obj"))
-
-
-write_scene = with_wall(meshes.write_obj)
-WALL = meshes.triangle_gltf(meshes.textured(), ["wall.png"])
-write_gltf = with_wall(WALL.store)
-
-
-def write_ply(path):
-    colours = np.full((3, 4), 99, np.uint8)
-    mesh = trimesh.Trimesh(meshes.TRIANGLE, meshes.FACE, vertex_colors=colours)
-    path.write_bytes(mesh.export(file_type="ply", encoding="ascii"))
-
-
-def write_collision(path):
-    (part,) = meshes.box_mesh().parts
-    save_collision_mesh(path, Triangles(part.vertices_m, part.faces))
-
-
-def is_triangles(mesh):
-    in_range = mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices_m)
-    return bool(len(mesh.faces) and in_range and np.isfinite(mesh.vertices_m).all())
-
-
-def is_mesh(mesh):
-    triangles = [Triangles(part.vertices_m, part.faces) for part in mesh.parts]
-    return bool(triangles) and all(map(is_triangles, triangles))
 
 
 def is_statistics(found):
@@ -230,13 +169,13 @@ def is_statistics(found):
 
 def scored(path, out):
     write_table(labels := out / "labels.csv")
-    score_run(path, labels, labels, labels, out / "e.csv", out / "m.json", {})
-    return json.loads((out / "m.json").read_text())
+    score_run(path, labels, labels, labels, out / "errors.csv", out / "metrics.json", {})
+    return json.loads((out / "metrics.json").read_text())
 
 
 def write_metrics(path):
-    write_table(labels := path.with_name("labels.csv"))
-    score_run(labels, labels, labels, labels, path.with_name("errors.csv"), path, {})
+    write_table(predictions := path.with_name("predictions.csv"))
+    scored(predictions, path.parent)
 
 
 def read_design(path):
@@ -248,9 +187,9 @@ def read_design(path):
 
 def is_design(rows):
     """Whether every run and label set has a directory of its own below the results."""
-    for run in design_of(rows).runs:
-        assert all(part.strip(".") and "\0" not in part for part in Path(run.directory).parts)
-        assert len(Path(run.directory).parts) == 6
+    for parts in (Path(run.directory).parts for run in design_of(rows).runs):
+        assert len(parts) == 6
+        assert all(part.strip(".") and "\0" not in part for part in parts)
     label_sets = {(row.scene, row.size, row.label_id) for row in rows}
     noise = {(row.scene, row.size, row.labels, row.noise_m, row.noise_deg) for row in rows}
     return len(label_sets) == len(noise)
@@ -266,8 +205,8 @@ KINDS = (
          lambda p: write_trajectory(p, BatchTrajectory(POSES.world_from_cam, np.ones(N, bool))),
          read_trajectory, lambda t: is_rigid(t.first_from_cam), ","),
     Kind("pose graph", "batch.g2o", write_graph, posegraph.read_g2o, is_graph, " "),
-    Kind("pose", POSE, write_pose, read_pose, lambda p: bool(np.isfinite(p).all()), "\t"),
-    Kind("pose to repeat", POSE, write_pose, lambda p: repeated(p.parent), is_pose_table, "\t"),
+    Kind("pose", POSE, WRITE_POSE, read_pose, lambda p: bool(np.isfinite(p).all()), "\t"),
+    Kind("pose to repeat", POSE, WRITE_POSE, lambda p: repeated(p.parent), is_pose_table, "\t"),
     Kind("split", "TrainSplit.txt", text("sequence1\nsequence2\n"),
          lambda p: read_split(p.parent, "train"), form="e"),
     Kind("colour image", COLOR, write_color, read_color, lambda rgb: rgb.ndim == 3),
@@ -283,7 +222,7 @@ KINDS = (
          lambda p: join_packed([p], p.with_name("all.npy"))),
     Kind("packed frames, training", "train.npy", write_packed, lambda p: read_images(p, N, 8, CPU)),
     Kind("record of packed frames", "seq-01.json", write_record, elsewhere(recorded),
-         finite_numbers, "json"),
+         is_finite, "json"),
     Kind("manifest, camera", "manifest.json", lambda p: write_data_set(p.parent),
          lambda p: camera_of_dataset(p.parent, None), form="json"),
     *(Kind(f"{file}, validated", file, lambda p, up=up: write_data_set(p.parents[up]),
@@ -292,25 +231,27 @@ KINDS = (
     Kind("OpenCV's camera", "camera.yaml", text(OLD_OPENCV), read_calibration, is_camera, " "),
     Kind("JSON camera", "camera.json", text(JSON_CAMERA), read_calibration, is_camera, "json"),
     Kind("calibration of COLMAP", "cameras.txt", text(COLMAP), read_calibration, is_camera, " "),
-    Kind("GLB", "scene.glb", write_glb, load_mesh, is_mesh, n_flips=60),
-    Kind("glTF", "scene.gltf", write_gltf, load_mesh, is_mesh, "json"),
-    Kind("OBJ", "scene.obj", write_scene, load_mesh, is_mesh, " "),
-    Kind("PLY", "scene.ply", write_ply, load_mesh, is_mesh, " "),
-    Kind("material", "scene.mtl", write_scene, load_obj, is_mesh, " "),
-    Kind("texture", "wall.png", write_scene, load_obj, is_mesh),
-    Kind("collision mesh", "collision.ply", write_collision, load_collision_mesh, is_triangles,
+    Kind("GLB", "scene.glb", lambda p: save_glb(p, meshes.box_mesh()), load_mesh, meshes.is_sound,
          n_flips=60),
+    Kind("glTF", "scene.gltf", meshes.write_painted_gltf, load_mesh, meshes.is_sound, "json"),
+    *(Kind(name, file, meshes.write_painted_obj, lambda p: load_mesh(p.with_name("scene.obj")),
+           meshes.is_sound, form)
+      for name, file, form in (("OBJ", "scene.obj", " "), ("material", "scene.mtl", " "),
+                               ("texture", "wall.png", ""))),
+    Kind("PLY", "scene.ply", meshes.write_ply, load_mesh, meshes.is_sound, " "),
+    Kind("collision mesh", "collision.ply", meshes.write_collision, load_collision_mesh,
+         meshes.is_sound_triangles, n_flips=60),
     Kind("checkpoint", "model.pt",
          lambda p: save(p, untrained("posenet2", TINY, LocalizerConfig())),
          lambda p: read_checkpoint(p, CPU).statistics, is_statistics, n_flips=40),
     Kind("backbone", "googlenet.pt", lambda p: torch.save(dict(LINEAR.state_dict()), p),
          lambda p: load_backbone_weights(LINEAR, p), n_flips=40),
-    Kind("predictions", "predictions.csv", write_table, elsewhere(scored), finite_numbers, ","),
+    Kind("predictions", "predictions.csv", write_table, elsewhere(scored), is_finite, ","),
     Kind("metrics", "metrics.json", write_metrics, lambda p: combine([read_metrics(p)]),
          form="json"),
     Kind("assistance", "labels/large_room/6k/sfm/assistance.json",
          lambda p: fill_assistance(p.parents[4], {"sfm": 1}, batches=(1, 1)),
-         lambda p: assistance_record(p.parents[4], "large_room", "6k", "sfm"), finite_numbers,
+         lambda p: assistance_record(p.parents[4], "large_room", "6k", "sfm"), is_finite,
          "json"),
     Kind("profile", "mine.yaml", lambda p: shutil.copy(CONFIG / "config.yaml", p), load_config,
          lambda config: isinstance(config, Config), n_flips=60),

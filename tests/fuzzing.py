@@ -12,6 +12,8 @@ import signal
 import traceback
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 
 import numpy as np
@@ -40,50 +42,38 @@ class TooSlow(BaseException):
 
 @dataclass(frozen=True)
 class Damage:
-    """What stands in place of a file.
+    """What stands in place of a file."""
 
-    Attributes:
-        label: how it was made.
-        content: bytes; None for nothing at all.
-        special: ``directory`` or ``loop`` (a link to itself, which nobody can open).
-    """
-
-    label: str
-    content: bytes | None = None
-    special: str = ""
+    label: str  # how it was made
+    content: bytes | None = None  # None for nothing at all
+    special: str = ""  # `directory` or `loop` (a link to itself, which nobody can open)
 
 
 def damages(data, others, seed, n_flips=40):
     """What can happen to any file."""
+    middle = len(data) // 2
     yield Damage("missing")
     yield Damage("a directory", special="directory")
     yield Damage("a link to itself", special="loop")
-    yield Damage("empty", b"")
-    for length in sorted({1, 4, 11, len(data) // 3, len(data) // 2, len(data) - 9, len(data) - 1}):
-        if 0 < length < len(data):
-            yield Damage(f"cut at {length} of {len(data)}", data[:length])
-    for name, content in others.items():
-        if content != data:
-            yield Damage(f"swapped with {name}", content)
-    yield Damage("twice", data + data)
-    yield Damage("zeros", bytes(len(data)))
-    middle = len(data) // 2
-    yield Damage("zeros inside", data[:middle] + bytes(64) + data[middle + 64 :])
-    yield Damage("latin-1", b"caf\xe9\n" + data)
-    yield Damage("latin-1 inside", data[:middle] + b"\xe9\xff" + data[middle:])
-    yield Damage("byte order mark", b"\xef\xbb\xbf" + data)
-    yield Damage("UTF-16", b"\xff\xfe" + data.decode("latin-1").encode("utf-16-le"))
+    cuts = {0, 1, 4, 11, len(data) // 3, middle, len(data) - 9, len(data) - 1}
+    changed = {
+        **{f"cut at {n} of {len(data)}": data[:n] for n in sorted(cuts) if 0 <= n < len(data)},
+        **{f"swapped with {name}": content for name, content in others.items() if content != data},
+        "twice": data + data,
+        "zeros": bytes(len(data)),
+        "zeros inside": data[:middle] + bytes(64) + data[middle + 64 :],
+        "latin-1": b"caf\xe9\n" + data,
+        "latin-1 inside": data[:middle] + b"\xe9\xff" + data[middle:],
+        "byte order mark": b"\xef\xbb\xbf" + data,
+        "UTF-16": b"\xff\xfe" + data.decode("latin-1").encode("utf-16-le"),
+    }
+    yield from (Damage(label, content) for label, content in changed.items())
     rng = np.random.default_rng(seed)
-    for place in rng.integers(0, min(len(data), 400), n_flips):  # headers, where most is decided
-        yield _flipped(data, int(place), int(rng.integers(1, 256)))
-    for place in rng.integers(0, len(data), n_flips):
-        yield _flipped(data, int(place), int(rng.integers(1, 256)))
-
-
-def _flipped(data, place, bits):
-    changed = bytearray(data)
-    changed[place] ^= bits
-    return Damage(f"byte {place} xor {bits:#x}", bytes(changed))
+    for most in (min(len(data), 400), len(data)):  # in headers most is decided
+        for place in rng.integers(0, most, n_flips):
+            bits, flipped = int(rng.integers(1, 256)), bytearray(data)
+            flipped[place] ^= bits
+            yield Damage(f"byte {place} xor {bits:#x}", bytes(flipped))
 
 
 def text_damages(data, separator):
@@ -91,97 +81,84 @@ def text_damages(data, separator):
     lines = data.decode().splitlines()
     middle = len(lines) // 2
     changed = {
-        "CRLF": "\r\n".join(lines),
-        "blank lines": "\n\n".join(lines),
-        "one line": " ".join(lines),
-        "backwards": "\n".join(lines[::-1]),
-        "without its first line": "\n".join(lines[1:]),
-        "without a line": "\n".join(lines[:middle] + lines[middle + 1 :]),
-        "without its last line": "\n".join(lines[:-1]),
-        "first line only": lines[0],
-        "a line twice": "\n".join([*lines[: middle + 1], *lines[middle:]]),
-        "a line of noise": "\n".join([*lines, "\x1b[31m" + "x" * 100_000]),
-        "quotes": "\n".join([*lines, '"open quote']),
-        "NUL": "\n".join([*lines, "\0"]),
+        "CRLF": [line + "\r" for line in lines],
+        "blank lines": [line + "\n" for line in lines],
+        "one line": [" ".join(lines)],
+        "backwards": lines[::-1],
+        "without its first line": lines[1:],
+        "without a line": lines[:middle] + lines[middle + 1 :],
+        "without its last line": lines[:-1],
+        "first line only": lines[:1],
+        "a line twice": [*lines[: middle + 1], *lines[middle:]],
+        "a line of noise": [*lines, "\x1b[31m" + "x" * 100_000],
+        "quotes": [*lines, '"open quote'],
+        "NUL": [*lines, "\0"],
     }
-    for label, text in changed.items():
-        yield Damage(label, text.encode())
     rows = [line.split(separator) for line in lines]
-    for column in range(len(rows[1])):
-        without = [row[:column] + row[column + 1 :] for row in rows]
-        yield Damage(f"without column {column}", _joined(without, separator))
-        doubled = [row[: column + 1] + row[column:] for row in rows]
-        yield Damage(f"column {column} twice", _joined(doubled, separator))
-        if column:
-            order = [*range(column - 1), column, column - 1]
-            swapped = [
-                [*(row[i] for i in order if i < len(row)), *row[column + 1 :]] for row in rows
-            ]
-            yield Damage(f"columns {column - 1} and {column} swapped", _joined(swapped, separator))
+    for n in range(len(rows[1])):
+        for label, columns in (("without", ()), ("twice", (n, n)), ("before", (n, n - 1))):
+            first = n - 1 if label == "before" else n
+            if first >= 0:
+                changed[f"{label} column {n}"] = [
+                    separator.join(
+                        [*row[:first], *(row[c] for c in columns if c < len(row)), *row[n + 1 :]]
+                    )
+                    for row in rows
+                ]
         for word in WORDS:
-            cells = [*rows[1][:column], word, *rows[1][column + 1 :]]
-            table = [rows[0], cells, *rows[2:]]
-            yield Damage(f"column {column} is {word[:20]!r}", _joined(table, separator))
-
-
-def _joined(rows, separator):
-    return "\n".join(separator.join(row) for row in rows).encode() + b"\n"
+            cells = [*rows[1][:n], word, *rows[1][n + 1 :]]
+            changed[f"column {n} is {word[:20]!r}"] = [lines[0], separator.join(cells), *lines[2:]]
+    for label, text in changed.items():
+        yield Damage(label, "\n".join([*text, ""]).encode())
 
 
 def json_damages(data):
     """Each value of a JSON file replaced and removed, and what is no mapping at all."""
     value = json.loads(data)
-    for junk in JUNK:
-        yield Damage(f"only {str(junk)[:20]!r}", json.dumps(junk).encode())
     yield Damage("deep lists", b"[" * DEEP)
     yield Damage("deep mappings", b'{"a":' * DEEP)
     yield Damage("a number of 5000 digits", b'{"a": ' + b"9" * 5000 + b"}")
     yield Damage("a lone surrogate", b'{"\\ud800": "\\ud800"}')
-    for place in _places(value):
+    for place in ((), *places(value, ends_alone=True)):
         name = "/".join(map(str, place))
-        for junk in JUNK:
-            text = json.dumps(replaced(value, place, junk))
-            yield Damage(f"{name} is {str(junk)[:20]!r}", text.encode())
-        yield Damage(f"without {name}", json.dumps(removed(value, place)).encode())
-        beside = replaced(value, (*place, "surplus"), 1) if is_mapping(value, place) else value
-        yield Damage(f"more in {name}", json.dumps(beside).encode())
+        changed = {f"{name} is {str(junk)[:20]!r}": replaced(value, place, junk) for junk in JUNK}
+        if place:
+            changed[f"without {name}"] = removed(value, place)
+        if isinstance(at(value, place), dict):
+            changed[f"more in {name}"] = replaced(value, (*place, "surplus"), 1)
+        yield from (Damage(label, json.dumps(new).encode()) for label, new in changed.items())
 
 
-def _places(value, place=()):
-    """Keys that lead to every value; of a list, its first and its last."""
-    entries = []
-    if isinstance(value, dict):
-        entries = list(value.items())
-    elif isinstance(value, list):
-        entries = [(i, value[i]) for i in sorted({0, len(value) - 1}) if value]
+def places(value, place=(), ends_alone=False):
+    """Keys that lead to every value; of a list all, or its first and its last."""
+    entries = list(value.items()) if isinstance(value, dict) else []
+    if isinstance(value, list):
+        entries = list(enumerate(value))
+        if ends_alone:
+            entries = entries[:1] + entries[1:][-1:]
     for key, inner in entries:
         yield (*place, key)
-        yield from _places(inner, (*place, key))
+        yield from places(inner, (*place, key), ends_alone)
+
+
+def at(value, place):
+    """What stands at a place."""
+    return reduce(getitem, place, value)
 
 
 def replaced(value, place, new):
     """A copy in which another value stands at ``place``."""
     if not place:
         return new
-    changed = copy.copy(value)
-    changed[place[0]] = replaced(value[place[0]], place[1:], new) if place[1:] else new
+    changed = copy.deepcopy(value)
+    at(changed, place[:-1])[place[-1]] = new
     return changed
-
-
-def is_mapping(value, place):
-    """Whether a mapping stands at ``place``."""
-    for key in place:
-        value = value[key]
-    return isinstance(value, dict)
 
 
 def removed(value, place):
     """A copy without what stands at ``place``."""
-    changed = copy.copy(value)
-    if len(place) == 1:
-        del changed[place[0]]
-    else:
-        changed[place[0]] = removed(value[place[0]], place[1:])
+    changed = copy.deepcopy(value)
+    del at(changed, place[:-1])[place[-1]]
     return changed
 
 
@@ -200,27 +177,23 @@ def put(path, damage):
 
 @contextmanager
 def at_most(seconds):
-    """End what takes longer, with :class:`TooSlow`: processor seconds, as others work here too.
-
-    What waits without working is ended after ten times as long.
-    """
+    """End what takes longer in processor time, or ten times as long on the clock."""
 
     def late(*_):
         raise TooSlow
 
-    limits = {
-        signal.SIGPROF: (signal.ITIMER_PROF, seconds),
-        signal.SIGALRM: (signal.ITIMER_REAL, 10 * seconds),
-    }
-    before = {number: signal.signal(number, late) for number in limits}
-    for timer, limit in limits.values():
+    limits = (
+        (signal.SIGPROF, signal.ITIMER_PROF, seconds),
+        (signal.SIGALRM, signal.ITIMER_REAL, 10 * seconds),
+    )
+    before = [signal.signal(number, late) for number, *_ in limits]
+    for _, timer, limit in limits:
         signal.setitimer(timer, limit)
     try:
         yield
     finally:
-        for timer, _ in limits.values():
+        for (number, timer, _), handler in zip(limits, before, strict=True):
             signal.setitimer(timer, 0)
-        for number, handler in before.items():
             signal.signal(number, handler)
 
 
@@ -240,27 +213,21 @@ def little_memory():
 def problem_with(read, is_valid, names, folder=None):
     """What is wrong with how a reader took an input; None if nothing is.
 
-    Args:
-        read: reads it.
-        is_valid: whether a value keeps what the reader promises.
-        names: of which a refusal has to say one.
-        folder: in which a refusal may leave nothing.
+    It may give a value that ``is_valid``, or refuse in a line that says one of ``names``, and then
+    leave nothing in ``folder``.
     """
-    before = _tree(folder)
+    before = tree(folder)
     try:
         with at_most(SECONDS):
             value = read()
     except InputError as refusal:
-        if _tree(folder) != before:
+        if tree(folder) != before:
             return "refused, but something was written"
         return problem_with_message(str(refusal), names)
     except TooSlow:
         return f"took more than {SECONDS:g} s"
     except Exception as error:
-        at = traceback.extract_tb(error.__traceback__)[-1]
-        ours = [f for f in traceback.extract_tb(error.__traceback__) if "site-p" not in f.filename]
-        mine = f"{Path(ours[-1].filename).name}:{ours[-1].lineno} " if ours else ""
-        return f"{mine}{type(error).__name__}: {str(error)[:90]} ({Path(at.filename).name})"
+        return "".join(traceback.format_exception_only(error))[:120]
     try:
         return None if is_valid(value) else f"accepted: {str(value)[:90]!r}"
     except Exception as error:
@@ -276,19 +243,18 @@ JARGON = re.compile(
 
 
 def problem_with_message(message, names):
-    if "\n" in message or len(message.splitlines()) > 1:
-        return f"more than one line: {message[:90]!r}"
-    if len(message) > LONGEST_MESSAGE:
-        return f"a line of {len(message)} characters: {message[:90]!r}"
-    if jargon := JARGON.search(message):
-        return f"says {jargon.group()!r}: {message[:200]!r}"
-    if not any(name in message for name in names):
-        return f"names none of {names}: {message[:90]!r}"
-    return None
+    jargon = JARGON.search(message)
+    problems = {
+        "more than one line": len(message.splitlines()) > 1,
+        f"a line of {len(message)} characters": len(message) > LONGEST_MESSAGE,
+        f"says {jargon and jargon.group()!r}": jargon,
+        f"names none of {names}": not any(name in message for name in names),
+    }
+    found = [problem for problem, is_there in problems.items() if is_there]
+    return f"{found[0]}: {message[:200]!r}" if found else None
 
 
-def _tree(folder):
-    if folder is None:
-        return {}
-    found = ((path, path.lstat()) for path in folder.rglob("*"))
-    return {str(path): (at.st_size, at.st_mtime_ns) for path, at in found}
+def tree(folder):
+    """Size and time of all files below a folder."""
+    found = ((path, path.lstat()) for path in (folder.rglob("*") if folder else ()))
+    return {str(path): (state.st_size, state.st_mtime_ns) for path, state in found}

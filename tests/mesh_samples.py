@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from PIL import Image
 
 from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.triangles import Triangles, save_collision_mesh
 
 TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 3]])
 FACE = np.array([[0, 1, 2]])
@@ -128,3 +130,34 @@ def write_obj(folder, mtl="Kd 0.2 0.4 0.6\nmap_Kd wall.png\n"):
     path = folder / "scene.obj"
     path.write_text("mtllib scene.mtl\n" + vertices + uv + "usemtl wall\nf 1/1 2/2 3/3\n")
     return path
+
+
+def write_painted_obj(path):
+    """A scene, its material and its texture, where one of the three is to lie."""
+    Image.new("RGB", (4, 4), (9, 99, 199)).save(path.parent / "wall.png")
+    write_obj(path.parent)
+
+
+def write_painted_gltf(path):
+    Image.new("RGB", (4, 4), (9, 99, 199)).save(path.parent / "wall.png")
+    write_gltf(path.parent, textured(), ["wall.png"])
+
+
+def write_ply(path):
+    colours = np.full((3, 4), 99, np.uint8)
+    mesh = trimesh.Trimesh(TRIANGLE, FACE, vertex_colors=colours)
+    path.write_bytes(mesh.export(file_type="ply", encoding="ascii"))
+
+
+def write_collision(path):
+    (part,) = box_mesh().parts
+    save_collision_mesh(path, Triangles(part.vertices_m, part.faces))
+
+
+def is_sound_triangles(mesh):
+    in_range = mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices_m)
+    return bool(len(mesh.faces) and in_range and np.isfinite(mesh.vertices_m).all())
+
+
+def is_sound(mesh):
+    return bool(mesh.parts) and all(map(is_sound_triangles, mesh.parts))

@@ -8,7 +8,7 @@ from synfeal.cli import main
 from tests import CONFIG
 from tests.careless import TABLE, arguments_of, make_folder
 from tests.coloured_frames import save, untrained
-from tests.fuzzing import JARGON, TooSlow, at_most
+from tests.fuzzing import JARGON, TooSlow, at_most, tree
 
 SECONDS = 20.0
 
@@ -21,11 +21,6 @@ def folder(mesh, calm, tmp_path_factory):
     make_folder(folder, mesh, calm, model)
     (folder / "config").symlink_to(CONFIG)
     return folder
-
-
-def tree(folder):
-    found = ((path, path.lstat()) for path in folder.rglob("*"))
-    return {str(path): (at.st_size, at.st_mtime_ns) for path, at in found}
 
 
 def problem_with(arguments, names, capfd):

@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from synfeal.config import Config, load_config, parse_config
 from synfeal.config.collection import ClutterConfig
-from tests.fuzzing import problem_with, removed, replaced
+from tests.fuzzing import at, places, problem_with, removed, replaced
 
 pytestmark = pytest.mark.slow
 REPOSITORY = Path(__file__).parent.parent
@@ -34,21 +34,6 @@ def full(profile):
     raw = config.model_dump(mode="json")
     next(iter(raw["scenes"].values()))["clutter"] = ClutterConfig().model_dump(mode="json")
     return raw
-
-
-def places(value, place=()):
-    entries = value.items() if isinstance(value, dict) else ()
-    if isinstance(value, list):
-        entries = enumerate(value)
-    for key, inner in entries:
-        yield (*place, key)
-        yield from places(inner, (*place, key))
-
-
-def at(value, place):
-    for key in place:
-        value = value[key]
-    return value
 
 
 def wrong_values(profile):
