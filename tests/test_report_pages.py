@@ -3,7 +3,6 @@
 import shutil
 import subprocess
 
-import pandas as pd
 import pytest
 from PIL import Image
 
@@ -15,10 +14,10 @@ from synfeal.report.cells import FOLDER, read_cells
 from synfeal.report.document import CLAIM_COLUMNS, write_document, write_report_document
 from synfeal.report.figures import CAPTIONS
 from synfeal.report.sheet import (
-    LINE,
     PAPER,
-    VALUE,
+    Line,
     Sheet,
+    Value,
     escape,
     sheet_latex,
     sheet_markdown,
@@ -178,25 +177,19 @@ Set & Error against & PoseNet & PoseNet2 \\
 
 
 def small_sheet():
-    lines = pd.DataFrame(
-        [
-            ("", 0, "labels", "6k", "", "labels"),
-            ("", 0, PAPER, "6k", "", "paper"),
-            ("", 1, "labels", "20k", "", "labels"),
-        ],
-        columns=list(LINE),
-    )
-    values = [
-        *((0, "PoseNet", 0, "0.50 m"), (0, "PoseNet", 1, "9.00°"), (0, "PoseNet2", 0, "0.40 m")),
-        *((0, "PoseNet2", 1, "8.00°"), (1, "PoseNet", 0, "0.29 m")),
-        (1, "PoseNet2", 0, "0.14 m", False, "", "Misprint."),
-        *((2, "PoseNet", 0, "0.45 m", True), (2, "PoseNet", 1, "7.00°", True)),
-        (2, "PoseNet2", 0, "+2.0%", False, "worse"),
+    def line(row, kind, label, *cells):
+        return Line("", row, kind, [[Value(label)], [Value(kind)], *cells])
+
+    own = [Value("0.50 m"), Value("9.00°")], [Value("0.40 m"), Value("8.00°")]
+    paper = [Value("0.29 m")], [Value("0.14 m", note="Misprint.")]
+    best = [Value("0.45 m", bold=True), Value("7.00°", bold=True)], [Value("+2.0%", tone="worse")]
+    lines = [
+        line(0, "labels", "6k", *own),
+        line(0, PAPER, "6k", *paper),
+        line(1, "labels", "20k", *best),
     ]
-    whole = [(*value, *(False, "", "")[len(value) - 4 :]) for value in values]
     headings = ("Set", "Error against", "PoseNet", "PoseNet2")
-    table = pd.DataFrame(whole, columns=list(VALUE))
-    return Sheet("small", "Errors of 2 & 3.", headings, lines, table, ("A remark.",))
+    return Sheet("small", "Errors of 2 & 3.", headings, lines, ("A remark.",))
 
 
 def test_a_small_table_letter_by_letter():

@@ -14,7 +14,7 @@ from typing import Any
 import pandas as pd
 
 from synfeal.frames import records_of
-from synfeal.report.sheet import LINE, PAPER, VALUE, Sheet, write_latex
+from synfeal.report.sheet import PAPER, Line, Sheet, Value, write_latex
 
 # The score that the switch on the page shows, and how names of its columns end.
 SCORES = {"labels": "", "true": "_true"}
@@ -134,34 +134,26 @@ def side_sheet(table: SideTable) -> Sheet:
     Lines with the label of the one above belong to the same row, and do not repeat it.
     """
     columns = [column for column in table.columns if column.on_paper and column.name != table.block]
-    label = columns[0].title
-    records = []
+    lines: list[Line] = []
     for row in records_of(table.rows):
         if not row.get("on_paper", True):
             continue
-        cells = {column.title: cells_of(row, column)[-1] for column in columns}
+        cells = [cells_of(row, column)[-1] for column in columns]
+        label, *texts = map(_printed, cells)
         block = str(row[table.block]) if table.block else ""
-        line = {"block": block, "row": cells[label].text, "kind": ""}
-        records.append(line | {title: _plain(cell) for title, cell in cells.items()})
-        if any(cell.paper for cell in cells.values()):
-            printed = {title: cell.paper for title, cell in cells.items()}
-            records.append(line | {"kind": PAPER} | printed | {label: "paper"})
-    texts = pd.DataFrame(records)
-    own = texts[texts.kind != PAPER][["block", "row"]]
-    texts.loc[own.index[(own == own.shift()).all(axis=1)], label] = ""
-    return _sheet_of_texts(table, texts, [column.title for column in columns])
+        repeated = bool(lines) and (lines[-1].block, lines[-1].row) == (block, label)
+        lines.append(_line(block, label, "", ["" if repeated else label, *texts]))
+        if any(cell.paper for cell in cells):
+            lines.append(_line(block, label, PAPER, ["paper", *(c.paper for c in cells[1:])]))
+    headings = tuple(column.title for column in columns)
+    return Sheet(table.name, table.caption, headings, lines, (table.remark,) * bool(table.remark))
 
 
-def _plain(cell: Cell) -> str:
+def _printed(cell: Cell) -> str:
+    """The text of a cell without limits of a score."""
     mark, small = "✗ " if cell.bad else "", f" ({cell.small})" if cell.small else ""
-    return f"{mark}{cell.text}" if cell.style else f"{mark}{cell.text}{small}"
+    return f"{mark}{cell.text}{'' if cell.style else small}"
 
 
-def _sheet_of_texts(table: SideTable, texts: pd.DataFrame, headings: list[str]) -> Sheet:
-    label, against, *others = headings
-    lines = texts.assign(label=texts[label], against=texts[against], label_note="")[list(LINE)]
-    values = texts[others].rename_axis(index="line").reset_index()
-    values = values.melt("line", var_name="column", value_name="text")
-    values = values.assign(place=0, bold=False, tone="", note="")[list(VALUE)]
-    remarks = (table.remark,) if table.remark else ()
-    return Sheet(table.name, table.caption, tuple(headings), lines, values, remarks)
+def _line(block: str, row: str, kind: str, texts: Sequence[str]) -> Line:
+    return Line(block, row, kind, [[Value(text)] for text in texts])

@@ -1,26 +1,22 @@
 """A table as it is read on paper: LaTeX by pandas' Styler, Markdown by tabulate.
 
-A sheet has lines (the regenerated errors of a data set, the same against the true poses, the
-paper's) and values, one row per printed number. Text is Unicode; the writers translate it.
+A sheet has lines: the regenerated errors of a data set, the same against the true poses, the
+paper's. Text is Unicode; the writers translate it.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import pandas as pd
 
 from synfeal.files import write_text
-from synfeal.frames import rows_of
 
-# Columns of lines: a rule stands between blocks, a thin gap between rows.
-LINE = ("block", "row", "kind", "label", "label_note", "against")
-# Columns of values: `line` counts the lines, `column` is a heading, `place` an order in the cell.
-VALUE = ("line", "column", "place", "text", "bold", "tone", "note")
 PACKAGES = ("booktabs", "graphicx", "xcolor")
 HEADER = f"% Needs \\usepackage{{{','.join(PACKAGES)}}}\n"
 # Plain xcolor mixes, so that no package option is needed; both stay apart from black in grey print.
@@ -40,16 +36,32 @@ PAPER = "paper"
 PLAIN, MARKDOWN = "plain", "pipe"  # tables of text for a terminal, for a page
 
 
+class Value(NamedTuple):
+    """A printed number, or a text."""
+
+    text: str
+    bold: bool = False
+    tone: str = ""  # ``better``, ``worse`` or none
+    note: str = ""  # footnote of the cell, on its first value
+
+
+class Line(NamedTuple):
+    """A printed line; a rule stands between blocks, a thin gap between rows."""
+
+    block: str
+    row: Hashable
+    kind: str  # lines of kind ``PAPER`` are grey
+    cells: Sequence[Sequence[Value]]  # label, what errors are against, and every column
+
+
 @dataclass(frozen=True)
 class Sheet:
     """A table and what stands around it."""
 
     name: str  # file name without suffix; also the label references use
     caption: str  # one or two sentences
-    headings: tuple[str, ...]  # of the label, of what errors are against, and of every column
-    # Columns ``LINE``, one row per printed line; those of kind ``PAPER`` are grey.
-    lines: pd.DataFrame
-    values: pd.DataFrame  # columns ``VALUE``; a ``tone`` is ``better``, ``worse`` or empty
+    headings: tuple[str, ...]  # of the cells of a line
+    lines: Sequence[Line]
     remarks: tuple[str, ...] = ()  # sentences below the table that belong to no single cell
 
 
@@ -57,19 +69,15 @@ class Sheet:
 class _Format:
     """How a language writes a number, the mark of a footnote, and a cell of a line."""
 
-    value: Callable[[Any, str], str]
+    value: Callable[[Value, str], str]
     mark: Callable[[str], str]
     cell: Callable[[str, str], str] = lambda text, kind: text
 
 
 def footnotes(sheet: Sheet) -> dict[str, str]:
     """Marks (a, b, c, ...) of all distinct footnotes in reading order."""
-    order = {heading: place for place, heading in enumerate(sheet.headings)}
-    labels = sheet.lines.assign(line=sheet.lines.index, at=-1, note=sheet.lines.label_note)
-    cells = sheet.values.assign(at=sheet.values["column"].map(order))
-    notes = pd.concat([frame[["line", "at", "note"]] for frame in (labels, cells)])
-    found = notes[notes.note != ""].sort_values(["line", "at"], kind="stable").note.unique()
-    return {note: chr(ord("a") + place) for place, note in enumerate(found)}
+    notes = [value.note for line in sheet.lines for cell in line.cells for value in cell]
+    return {note: chr(ord("a") + k) for k, note in enumerate(dict.fromkeys(filter(None, notes)))}
 
 
 def write_latex(path: Path, sheet: Sheet) -> None:
@@ -82,8 +90,8 @@ def sheet_latex(sheet: Sheet) -> str:
     marks = footnotes(sheet)
     table = _table(sheet, _LATEX, marks)
     table.columns = pd.Index(map(_heading, sheet.headings, range(len(sheet.headings))))
-    if sheet.lines.block.any():
-        table.insert(0, "", _upright(sheet.lines.block), allow_duplicates=True)
+    if any(line.block for line in sheet.lines):
+        table.insert(0, "", _titles(sheet, upright=True), allow_duplicates=True)
     layout = "l" * table.shape[1]
     tabular = table.style.hide(axis="index").to_latex(hrules=True, column_format=layout)
     head, _, tail = tabular.partition("\\midrule\n")
@@ -121,9 +129,8 @@ def sheet_markdown(sheet: Sheet) -> str:
     """A table with its caption above and its footnotes below, ending in a newline."""
     marks = footnotes(sheet)
     table = _table(sheet, _MARKDOWN, marks)
-    if sheet.lines.block.any():
-        first = sheet.lines.block != sheet.lines.block.shift()
-        table.insert(0, "", sheet.lines.block.where(first, ""), allow_duplicates=True)
+    if any(line.block for line in sheet.lines):
+        table.insert(0, "", _titles(sheet, upright=False), allow_duplicates=True)
     notes = "\n".join(f"({mark}) {note}  " for note, mark in marks.items())
     parts = (f"**{sheet.caption}**", markdown_table(table), notes)
     return "\n\n".join(part for part in parts if part) + "\n"
@@ -145,33 +152,16 @@ def text_table(rows: Sequence[Sequence[str]], n_left: int = 1, form: str = PLAIN
 
 def _table(sheet: Sheet, form: _Format, marks: Mapping[str, str]) -> pd.DataFrame:
     """Lines by heading, as text of a language."""
-    cells = dict(iter(sheet.values.groupby(["line", "column"], sort=False)))
     rows = []
-    for line in rows_of(sheet.lines):
-        texts = [form.value(_Plain(text), line.kind) for text in (line.label, line.against)]
-        texts[0] += form.mark(marks[line.label_note]) if line.label_note else ""
-        for heading in sheet.headings[2:]:
-            cell = cells.get((line.Index, heading))
-            texts.append("" if cell is None else _cell(cell, line.kind, form, marks))
-        rows.append([form.cell(text, line.kind) for text in texts])
-    return pd.DataFrame(rows, columns=list(sheet.headings), index=sheet.lines.index)
+    for line in sheet.lines:
+        texts = [", ".join(form.value(value, line.kind) for value in cell) for cell in line.cells]
+        notes = [cell[0].note if cell else "" for cell in line.cells]
+        signs = [form.mark(marks[note]) if note else "" for note in notes]
+        rows.append([form.cell(t + s, line.kind) for t, s in zip(texts, signs, strict=True)])
+    return pd.DataFrame(rows, columns=list(sheet.headings))
 
 
-def _cell(values: pd.DataFrame, kind: str, form: _Format, marks: Mapping[str, str]) -> str:
-    """The numbers of a cell, and the mark of its footnote."""
-    texts = [form.value(value, kind) for value in rows_of(values.sort_values("place"))]
-    note = values.note.iloc[0]
-    return ", ".join(texts) + (form.mark(marks[note]) if note else "")
-
-
-@dataclass(frozen=True)
-class _Plain:
-    text: str
-    bold: bool = False
-    tone: str = ""
-
-
-def _latex_value(value: Any, kind: str) -> str:
+def _latex_value(value: Value, kind: str) -> str:
     text = escape(value.text)
     if value.tone:
         sign = text.replace("-", "$-$").replace("+", "$+$")
@@ -179,7 +169,7 @@ def _latex_value(value: Any, kind: str) -> str:
     return rf"\textbf{{{text}}}" if value.bold else text
 
 
-def _markdown_value(value: Any, kind: str) -> str:
+def _markdown_value(value: Value, kind: str) -> str:
     # Each number is emphasised by itself: renderers disagree on emphasis inside emphasis.
     emphasis = ("*" if kind == PAPER else "") + ("**" if value.bold else "")
     return f"{emphasis}{value.text}{emphasis}" if value.text else ""
@@ -193,24 +183,25 @@ _LATEX = _Format(
 _MARKDOWN = _Format(_markdown_value, lambda mark: f" ({mark})")
 
 
-def _upright(blocks: pd.Series) -> list[str]:
-    """A block's title at its middle, upright where the block is tall enough for it."""
-    titles = [""] * len(blocks)
-    for title, lines in blocks.groupby(blocks, sort=False):
-        bold = rf"\textbf{{{escape(str(title))}}}"
-        if len(str(title)) <= 2 * len(lines):
+def _titles(sheet: Sheet, upright: bool) -> list[str]:
+    """By line, the title of its block: at the first, or at the middle and upright if it fits."""
+    titles: list[str] = []
+    for block, lines in groupby(line.block for line in sheet.lines):
+        n, title, place = len([*lines]), block, 0
+        if upright:
+            title, place = rf"\textbf{{{escape(block)}}}", n // 2
+        if upright and len(block) <= 2 * n:
             # A box without height leaves the line spacing alone; no package for it is needed.
-            bold = rf"\smash{{\rotatebox[origin=c]{{90}}{{{bold}}}}}"
-        titles[blocks.index.get_loc(lines.index[len(lines) // 2])] = bold
+            title = rf"\smash{{\rotatebox[origin=c]{{90}}{{{title}}}}}"
+        titles += [title if k == place else "" for k in range(n)]
     return titles
 
 
-def _ruled(body: Sequence[str], lines: pd.DataFrame) -> list[str]:
+def _ruled(body: Sequence[str], lines: Sequence[Line]) -> list[str]:
     """Lines of a table with a rule before each new block, a thin gap before each new row."""
-    ruled: list[str] = []
-    blocks, rows = (lines[name].ne(lines[name].shift()) for name in ("block", "row"))
-    for text, block, row in zip(body, blocks, rows, strict=True):
-        if ruled and (block or row):
-            ruled.append(r"\midrule" if block else r"\addlinespace")
+    ruled = [body[0]]
+    for text, line, above in zip(body[1:], lines[1:], lines, strict=False):
+        if (line.block, line.row) != (above.block, above.row):
+            ruled.append(r"\midrule" if line.block != above.block else r"\addlinespace")
         ruled.append(text)
     return ruled

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -28,7 +29,7 @@ from synfeal.report.layouts import (
     row_label,
     scene_title,
 )
-from synfeal.report.sheet import LINE, PAPER, VALUE, Sheet, write_latex
+from synfeal.report.sheet import PAPER, Line, Sheet, Value, write_latex
 
 # Kinds of lines in their order, and what their numbers are measured against; after those of a
 # score stands its change, in Table 5.
@@ -55,25 +56,30 @@ def write_table(table: str, design: Design, root: Path, out_csv: Path, out_tex: 
 def sheet_of(name: str, cells: pd.DataFrame) -> Sheet:
     """Lay out one of tables 2 to 7, from what :func:`synfeal.report.cells.read_cells` read."""
     one_truth = bool((cells.labels == "synfeal").all())
-    values = printed_values(name, cells)
-    if one_truth:  # both scores are one line, and the true poses score zero
-        values = values[
-            ~values.kind.str.startswith("truth") & (values.column != REFERENCES["floor"])
-        ]
-    second = (values.text == FAILED) & (values.place == 1)
-    lines = _lines(name, cells, values, one_truth)
-    number = pd.Series(lines.index, pd.MultiIndex.from_frame(lines[["row", "kind"]]))
-    keys = pd.MultiIndex.from_frame(values[["row", "kind"]])
-    values = values.assign(line=number[keys].to_numpy())[~second]
+    against = AGAINST | ({"labels": "labels = truth"} if one_truth else {})
     references = [*REFERENCES.values()][: 1 if one_truth else 2]
-    return Sheet(
-        name,
-        f"{CAPTIONS[name]} {_where(cells)} Best scores in bold.",
-        (HEADINGS[name], "Error against", *TITLES.values(), *references),
-        lines.assign(kind=lines.kind.str.removesuffix(" change"))[list(LINE)],
-        values[list(VALUE)],
-        (REMARK, UNTRAINED, PUBLISHED, *([CHANGE] if name == FROM_SCRATCH else [])),
-    )
+    headings = (HEADINGS[name], "Error against", *TITLES.values(), *references)
+    printed: dict[tuple[int, str, str], list[Value]] = defaultdict(list)
+    values = printed_values(name, cells).sort_values("place", kind="stable")
+    for v in rows_of(values[(values.text != FAILED) | (values.place == 0)]):  # said once
+        printed[v.row, v.kind, v.column].append(Value(v.text, v.bold, v.tone, v.note))
+    in_print = published_labels(name, cells)
+    rows = cells.assign(title=blocks_of(cells)).drop_duplicates("row")
+    blocks = rows.groupby("title", sort=False).ngroup()
+    lines = []
+    for row in rows_of(rows.iloc[blocks.argsort(kind="stable")]):
+        # Where labels are the truth, both scores are one line.
+        for kind in (k for k in against if not (one_truth and k.startswith("truth"))):
+            label = Value(row_label(name, row) if kind == "labels" else "")
+            if kind == PAPER:
+                label = Value(in_print.get(row.row, ""), note=row.published_row_note)
+            numbers = [printed[row.row, kind, heading] for heading in headings[2:]]
+            if any(numbers):
+                texts = [[label], [Value(against[kind])], *numbers]
+                lines.append(Line(row.title, row.row, kind.removesuffix(" change"), texts))
+    remarks = (REMARK, UNTRAINED, PUBLISHED, *([CHANGE] if name == FROM_SCRATCH else []))
+    caption = f"{CAPTIONS[name]} {_where(cells)} Best scores in bold."
+    return Sheet(name, caption, headings, lines, remarks)
 
 
 def blocks_of(cells: pd.DataFrame) -> pd.Series:
@@ -166,22 +172,6 @@ def _changes(cells: pd.DataFrame, kind: str, place: int, change: str) -> pd.Data
         "" if pd.isna(value) else "worse" if round(value, 1) > 0 else "better" for value in values
     ]
     return _part(found, kind, place, texts, tone=tones)
-
-
-def _lines(name: str, cells: pd.DataFrame, values: pd.DataFrame, one_truth: bool) -> pd.DataFrame:
-    """The printed lines in order, blocks together; columns ``LINE``."""
-    rows = cells.assign(block=blocks_of(cells)).groupby("row", sort=False).first()
-    rows = rows.assign(group=rows.groupby("block", sort=False).ngroup())
-    kinds = values[["row", "kind"]].drop_duplicates()
-    lines = kinds.assign(order=kinds.kind.map(list(AGAINST).index), label="", label_note="")
-    lines = lines.join(rows[["group", "block", "published_row_note"]], on="row")
-    lines["against"] = lines.kind.map(AGAINST | ({"labels": "labels = truth"} if one_truth else {}))
-    own, paper = lines.kind == "labels", lines.kind == PAPER
-    labels = {row.Index: row_label(name, row) for row in rows_of(cells.set_index("row"))}
-    lines.loc[own, "label"] = lines.row.map(labels)
-    lines.loc[paper, "label"] = lines.row.map(published_labels(name, cells))
-    lines.loc[paper, "label_note"] = lines.published_row_note
-    return lines.sort_values(["group", "row", "order"]).reset_index(drop=True)
 
 
 def _plain(value: float, unit: str) -> str:
