@@ -57,7 +57,7 @@ test-all: check  ## the same with what is slow, as continuous integration runs i
 test-slurm: $(SLURM_INSTALLED)  ## the smoke profile here and through a SLURM cluster of one node, which is killed
 	setup/slurm_cluster.sh install
 	$(BIN)/python -m tests.slurm_run --work results/slurm_test $(if $(LOCAL),--local $(LOCAL))
-	$(BIN)/pytest tests/test_clusters.py tests/test_slurm_run.py
+	$(BIN)/pytest tests/test_containers.py tests/test_slurm_run.py
 
 test-isolated: $(SLURM_INSTALLED)  ## the smoke profile here, and with every job alone in an empty folder (docs/clusters.md)
 	command -v rsync || apt-get install --yes --no-install-recommends rsync

@@ -23,11 +23,7 @@ PX = {"googlenet": 224, "inception_v3": 299, "resnet34": 224}
 # With the classifiers of the official files, and with what these files do to their images.
 INCEPTION = {"aux_logits": True, "transform_input": True, "init_weights": False}
 ARGUMENTS = {"googlenet": INCEPTION, "inception_v3": INCEPTION, "resnet34": {}}
-WEIGHTS = {
-    "googlenet": "GoogLeNet_Weights",
-    "inception_v3": "Inception_V3_Weights",
-    "resnet34": "ResNet34_Weights",
-}
+TITLES = {"googlenet": "GoogLeNet", "inception_v3": "Inception_V3", "resnet34": "ResNet34"}
 # Operators that torchvision describes as it is imported; no backbone calls them.
 MISSING = ("nms", "qnms")
 
@@ -106,5 +102,5 @@ def test_maps_are_those_of_torchvision(models, name, training, tmp_path):
 
 @all_backbones
 def test_the_file_is_the_one_torchvision_downloads(models, name):
-    url = getattr(models, WEIGHTS[name]).IMAGENET1K_V1.url
+    url = getattr(models, f"{TITLES[name]}_Weights").IMAGENET1K_V1.url
     assert url.rsplit("/", 1)[1] == IMAGENET_FILES[name]

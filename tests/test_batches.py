@@ -27,18 +27,6 @@ def perfect(truth, batches):
     ]
 
 
-def turned_last(trajectory, angle_deg):
-    poses = trajectory.first_from_cam.copy()
-    poses[-1, :3, :3] = Rotation.from_euler("z", angle_deg, degrees=True).as_matrix()
-    return BatchTrajectory(poses, trajectory.registered)
-
-
-def moved_last(trajectory, offset_m):
-    poses = trajectory.first_from_cam.copy()
-    poses[-1, :3, 3] += offset_m
-    return BatchTrajectory(poses, trajectory.registered)
-
-
 @pytest.mark.parametrize(("n_frames", "batch_frames"), [(0, 5), (5, 0)])
 def test_impossible_splits_are_refused(n_frames, batch_frames):
     with pytest.raises(
@@ -50,7 +38,10 @@ def test_impossible_splits_are_refused(n_frames, batch_frames):
 def test_an_error_as_large_as_the_threshold_is_none():
     truth = straight_truth(6)
     batches = batches_of(6, 5)
-    off = turned_last(moved_last(perfect(truth, batches)[0], [0, 0.125, 0]), 7.0)
+    poses = perfect(truth, batches)[0].first_from_cam.copy()
+    poses[-1, :3, :3] = Rotation.from_euler("z", 7.0, degrees=True).as_matrix()
+    poses[-1, 1, 3] += 0.125
+    off = BatchTrajectory(poses, np.ones(6, dtype=bool))
     error_deg = chain_batches(batches, [off], truth, CFG)[1][0].error_before_deg
 
     def assisted(limit_m, limit_deg):
@@ -62,17 +53,6 @@ def test_an_error_as_large_as_the_threshold_is_none():
     assert not assisted(0.125, error_deg)
     assert assisted(0.124, error_deg)
     assert assisted(0.125, np.nextafter(error_deg, 0.0))
-
-
-def test_only_the_last_pose_is_replaced():
-    truth = straight_truth(6)
-    batches = batches_of(6, 5)
-    poses = perfect(truth, batches)[0].first_from_cam.copy()
-    poses[1:, 1, 3] = 0.5
-    trajectory = BatchTrajectory(poses, np.ones(6, dtype=bool))
-    labels, assistance = chain_batches(batches, [trajectory], truth, CFG)
-    assert assistance[0].assisted
-    np.testing.assert_allclose(labels.position_m[:, 1], [0, 0.5, 0.5, 0.5, 0.5, 0], atol=1e-14)
 
 
 def test_failed_batch_is_assisted_counted_and_interpolated():

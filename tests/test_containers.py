@@ -1,14 +1,19 @@
-"""Images, conda and lock files agree with the project; that they work only building them tells."""
+"""Images, locks and cluster profiles agree with the project; that they work only use tells."""
 
 import re
 import tomllib
-from pathlib import Path
 
 import pytest
+import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-ROOT = Path(__file__).parent.parent
+from baselines.training.record import training_mb
+from synfeal.report.cost.networks import pretext_work, training_work
+from synfeal.report.cost.runs import read_profile
+from tests import ROOT
+from tests.test_workflow import planned_jobs
+
 CPU, CUDA = "requirements.lock", "requirements-cuda.lock"
 
 
@@ -29,9 +34,12 @@ def pins(name):
 def test_every_dependency_is_locked_within_its_range():
     project = tomllib.loads(read("pyproject.toml"))["project"]
     locked = pins(CPU)
-    for text in (*project["dependencies"], *project["optional-dependencies"]["dev"]):
+    slurm = pins("requirements-slurm.lock")
+    assert not slurm.keys() & locked.keys()
+    further = project["optional-dependencies"]
+    for text in (*project["dependencies"], *further["dev"], *further["slurm"]):
         requirement = Requirement(text)
-        version = locked[canonicalize_name(requirement.name)]
+        version = (locked | slurm)[canonicalize_name(requirement.name)]
         assert requirement.specifier.contains(version, prereleases=True), requirement
 
 
@@ -55,3 +63,66 @@ def test_images_are_built_by_the_makefile_and_the_one_list_of_packages(name):
     assert "LOCK=requirements.lock" in text
     assert "apt-get" not in text
     assert "pip install" not in text
+
+
+PROFILES = {
+    name: ROOT / f"workflow/profiles/{name}/profile.yaml" for name in ("slurm", "kubernetes")
+}
+WORKFLOW = "".join(path.read_text() for path in sorted((ROOT / "workflow/rules").glob("*.smk")))
+RULES = frozenset(re.findall(r"^(?:rule|use rule call as) (\w+)", WORKFLOW, re.MULTILINE))
+
+
+def profile(name):
+    return yaml.safe_load(PROFILES[name].read_text())
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_every_rule_a_profile_names_is_a_rule(name):
+    settings = profile(name)
+    assert RULES.issuperset({*settings["set-resources"], *settings["groups"]})
+    assert settings["group-components"].keys() <= set(settings["groups"].values())
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_no_setting_is_lost_to_the_default_profile(name):
+    default = yaml.safe_load((ROOT / "profiles/default/profile.yaml").read_text())
+    assert not default.keys() & profile(name).keys()
+
+
+def test_jobs_of_a_group_go_to_one_partition():
+    settings = profile("slurm")
+    partitions = {}
+    for rule, group in settings["groups"].items():
+        chosen = {**settings["default-resources"], **settings["set-resources"].get(rule, {})}
+        partitions.setdefault(group, set()).add(chosen["slurm_partition"])
+    assert all(len(names) == 1 for names in partitions.values()), partitions
+
+
+def test_the_papers_design_is_planned_for_slurm(tmp_path):
+    pytest.importorskip("snakemake_executor_plugin_slurm")
+    arguments = ("--profile", "workflow/profiles/slurm", "--configfile", "config/paper.yaml")
+    jobs = planned_jobs(tmp_path, *arguments, "--", "all")
+    assert jobs["sfm"] == jobs["rgbd"] == jobs["estimate"] == 24 + 10  # 6,000 and 2,500 by 250
+    assert jobs["render_packed"] == 80 + 20 + 95 + 20  # thousands of frames of both scenes
+    assert jobs["train"] == jobs["score"] == 125
+
+
+@pytest.mark.parametrize(
+    ("name", "models"), [("mini", ["hourglass"]), ("paper", ["hourglass", "posenet", "poselstm"])]
+)
+def test_a_training_asks_for_what_the_largest_network_takes_and_not_for_twice_that(name, models):
+    config = read_profile(name).config
+    batch = config.training.batch_size
+    works = [training_work(m, config.network, config.localizers[m]) for m in models]
+    counted_mb = max(work.held_bytes(batch) for work in works) / 1e6
+    frames, frame_mb = 10_000, 3 * config.network.input_px**2 / 1e6
+    asked_mb = training_mb(frames, config.network, batch)
+    assert counted_mb + frames * frame_mb < asked_mb - 900  # the program itself takes 0.5 to 0.9 GB
+    assert asked_mb - 1000 < 2 * (counted_mb + frames * frame_mb)
+
+
+def test_a_pretraining_fits_too():
+    config = read_profile("mini").config
+    batch = config.pretraining.batch_size
+    counted_mb = pretext_work("resnet34", config.network).held_bytes(batch) / 1e6
+    assert counted_mb < training_mb(0, config.network, batch) - 900
