@@ -12,12 +12,18 @@ from synfeal.mesh.save import save_glb
 SMALL = ("--width", "40", "--height", "33", "--spacing", "0.2", "--sequence-frames", "10")
 
 
+def painted(mesh, rgb=None, seed=0, inwards=False):
+    """A mesh of trimesh's whose corners all have one colour, or each another."""
+    n = len(mesh.vertices)
+    random = np.random.default_rng(seed).integers(0, 256, (n, 3), np.uint8)
+    colours = random if rgb is None else np.tile(np.array(rgb, np.uint8), (n, 1))
+    faces = np.asarray(mesh.faces)[:, :: -1 if inwards else 1]
+    return TexturedMesh((MeshPart("mesh", np.asarray(mesh.vertices), faces, vertex_rgb=colours),))
+
+
 def save_room(path, seed=0):
     """A closed room of 6 x 5 x 3 m with coloured corners."""
-    box = trimesh.creation.box((6.0, 5.0, 3.0))
-    colors = np.random.default_rng(seed).integers(0, 256, (8, 3), np.uint8)
-    part = MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces), vertex_rgb=colors)
-    save_glb(path, TexturedMesh((part,)))
+    save_glb(path, painted(trimesh.creation.box((6.0, 5.0, 3.0)), seed=seed))
     return path
 
 

@@ -10,12 +10,12 @@ import trimesh
 from synfeal.cli import main
 from synfeal.config.models import CameraConfig, CollectionConfig, RenderConfig, SceneConfig
 from synfeal.mesh.load import load_mesh
-from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.save import save_glb
 from synfeal.planning.plan import plan_split
 from synfeal.planning.seen_surface import empty_shares
 from synfeal.render import open_renderer
+from tests.collected import painted, refused
 
 CAMERA = CameraConfig(width=64, height=48)
 SMALL = ("--frames", "30", "--spacing", "0.8", "--width", "64", "--height", "48")
@@ -27,10 +27,7 @@ def box_room(scale=1.0):
 
 
 def save(path, mesh, rgb=None):
-    if rgb is None:
-        rgb = np.random.default_rng(0).integers(0, 256, (len(mesh.vertices), 3), np.uint8)
-    part = MeshPart("room", np.asarray(mesh.vertices), np.asarray(mesh.faces), vertex_rgb=rgb)
-    save_glb(path, TexturedMesh((part,)))
+    save_glb(path, painted(mesh, rgb))
     return path
 
 
@@ -43,9 +40,7 @@ def kilometres(folder):
 
 
 def one_grey(folder):
-    return save(
-        folder / "room.glb", box_room(), np.full((len(box_room().vertices), 3), 99, np.uint8)
-    )
+    return save(folder / "room.glb", box_room(), (99, 99, 99))
 
 
 def obj_without_its_mtl(folder):
@@ -71,8 +66,7 @@ def obj_without_its_mtl(folder):
 def test_what_is_certainly_blank_is_refused_before_rendering(make, words, tmp_path, capsys, caplog):
     mesh = make(tmp_path)
     before = sorted(tmp_path.iterdir())
-    assert main(["collect", "--mesh", str(mesh), "--out", str(tmp_path / "set"), *SMALL]) == 1
-    (line,) = capsys.readouterr().err.strip().splitlines()
+    line = refused(capsys, "collect", "--mesh", mesh, "--out", tmp_path / "set", *SMALL)
     assert all(word in line for word in words), line
     assert sorted(tmp_path.iterdir()) == before
 

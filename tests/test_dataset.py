@@ -1,7 +1,5 @@
 """Data sets on disk: 7-Scenes files, packed frames, manifests, and what prepares a scene."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import weakref
@@ -11,55 +9,39 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.config.models import CameraConfig, RenderConfig, SceneConfig
+from synfeal.dataset import sevenscenes
 from synfeal.dataset.finish import write_manifest
 from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.dataset.preview import write_contact_sheet
 from synfeal.dataset.render_sequence import MOST_WAITING, render_sequence, write_sequence
-from synfeal.dataset.sevenscenes import (
-    depth_mm_of,
-    frame_paths,
-    pose_text,
-    read_depth_m,
-    read_pose,
-    read_split,
-    sequences_of,
-    write_splits,
-)
 from synfeal.errors import InputError
 from synfeal.files import atomic_directory
 from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.load import load_mesh
-from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.scenes.prepare import prepare_scene
 from synfeal.validation.listing import list_sequences
 from synfeal.validation.manifest import check_manifest
+from tests.collected import painted
 
-CAMERA = CameraConfig.model_validate({"width": 40, "height": 30})
+CAMERA = CameraConfig(width=40, height=30)
 
 
 def poses_of(count):
     rng = np.random.default_rng(0)
-    poses = pose_matrix(
-        rotation_from_rpy(rng.uniform(-0.5, 0.5, (count, 3))), rng.uniform(-0.5, 0.5, (count, 3))
-    )
+    rpy, position_m = rng.uniform(-0.5, 0.5, (2, count, 3))
+    poses = pose_matrix(rotation_from_rpy(rpy), position_m)
     index = np.arange(count)
     return PoseTable(index, index, poses[:, :3, 3].copy(), quat_wxyz_of(poses))
 
 
-def room_mesh():
-    box = trimesh.creation.box((4.0, 4.0, 4.0))
-    colors = np.random.default_rng(0).integers(0, 256, (8, 3), np.uint8)
-    return TexturedMesh(
-        (MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces), vertex_rgb=colors),)
-    )
+ROOM = painted(trimesh.creation.box((4.0, 4.0, 4.0)))
 
 
 class FakeRenderer:
@@ -81,7 +63,7 @@ class FakeRenderer:
 
 @given(st.integers(0, 300), st.integers(0, 300), st.integers(1, 60))
 def test_sequences_cover_every_frame_once(n_train, n_test, shard):
-    sequences = sequences_of(n_train, n_test, shard)
+    sequences = sevenscenes.sequences_of(n_train, n_test, shard)
     for split, count in (("train", n_train), ("test", n_test)):
         frames = [i for s in sequences if s.split == split for i in range(s.start, s.stop)]
         assert frames == list(range(count))
@@ -90,46 +72,45 @@ def test_sequences_cover_every_frame_once(n_train, n_test, shard):
 
 
 def test_split_files_are_those_of_7_scenes(tmp_path):
-    write_splits(tmp_path, sequences_of(5, 3, 3))
+    sevenscenes.write_splits(tmp_path, sevenscenes.sequences_of(5, 3, 3))
     assert (tmp_path / "TrainSplit.txt").read_text() == "sequence1\nsequence2\n"
     assert (tmp_path / "TestSplit.txt").read_text() == "sequence3\n"
-    assert read_split(tmp_path, "train") == [tmp_path / "seq-01", tmp_path / "seq-02"]
+    assert sevenscenes.read_split(tmp_path, "train") == [tmp_path / "seq-01", tmp_path / "seq-02"]
     (tmp_path / "TestSplit.txt").write_text("seq-3\n")
     with pytest.raises(InputError, match="seq-3"):
-        read_split(tmp_path, "test")
+        sevenscenes.read_split(tmp_path, "test")
 
 
 def test_depth_is_16_bit_millimetres_and_a_pose_four_exact_rows(tmp_path):
     depth = np.array([[0.5, 1.2344, np.inf], [65.534, 65.536, 100.0]], np.float32)
-    (tmp_path / "depth.png").write_bytes(encode_png(depth_mm_of(depth)))
+    (tmp_path / "depth.png").write_bytes(encode_png(sevenscenes.depth_mm_of(depth)))
     stored = np.asarray(Image.open(tmp_path / "depth.png"))
     assert stored.tolist() == [[500, 1234, 65535], [65534, 65535, 65535]]
-    back = read_depth_m(tmp_path / "depth.png")
+    back = sevenscenes.read_depth_m(tmp_path / "depth.png")
     np.testing.assert_allclose(back[0, :2], [0.5, 1.234], atol=1e-6)
     assert np.isinf(back[[0, 1, 1], [2, 1, 2]]).all()
     pose = poses_of(1).world_from_cam[0]
-    (tmp_path / "pose.txt").write_text(pose_text(pose))
+    (tmp_path / "pose.txt").write_text(sevenscenes.pose_text(pose))
     rows = (tmp_path / "pose.txt").read_text().splitlines()
     assert [len(row.split()) for row in rows] == [4, 4, 4, 4]
-    np.testing.assert_allclose(read_pose(tmp_path / "pose.txt"), pose, atol=1e-10)
+    np.testing.assert_allclose(sevenscenes.read_pose(tmp_path / "pose.txt"), pose, atol=1e-10)
 
 
 def test_rendered_sequence_holds_what_the_poses_see(tmp_path):
-    save_glb(tmp_path / "mesh.glb", room_mesh())
+    save_glb(tmp_path / "mesh.glb", ROOM)
     poses = poses_of(3)
     write_pose_table(tmp_path / "plan.csv", poses)
     directory = tmp_path / "out" / "seq-01"
     rows, files = (tmp_path / "plan.csv", 0, 3), (tmp_path / "mesh.glb", CAMERA)
     render_sequence(*files, *rows, True, RenderConfig(), directory)
     assert len(list(directory.iterdir())) == 9
-    assert sorted(p.name for p in directory.glob("*000001*")) == [
-        "frame-000001.color.png",
-        "frame-000001.depth.png",
-        "frame-000001.pose.txt",
-    ]
-    for index, path in enumerate(frame_paths([directory], "pose.txt")):
-        np.testing.assert_allclose(read_pose(path), poses.world_from_cam[index], atol=1e-9)
-    centre = read_depth_m(directory / "frame-000002.depth.png")[15, 20]
+    found = {p.name for p in directory.glob("*000001*")}
+    assert found == {f"frame-000001.{kind}" for kind in ("color.png", "depth.png", "pose.txt")}
+    for index, path in enumerate(sevenscenes.frame_paths([directory], "pose.txt")):
+        np.testing.assert_allclose(
+            sevenscenes.read_pose(path), poses.world_from_cam[index], atol=1e-9
+        )
+    centre = sevenscenes.read_depth_m(directory / "frame-000002.depth.png")[15, 20]
     origin, forward = poses.position_m[2], poses.world_from_cam[2, :3, 2]
     wall = np.min((2.0 - np.sign(forward) * origin) / np.abs(forward))  # the box is 4 m wide
     assert centre == pytest.approx(wall, abs=0.05)
@@ -141,8 +122,7 @@ class Remembering:
     """Counts frames that were handed over and not yet written, as ``write_sequence`` sees them."""
 
     def __init__(self):
-        self.shown: list[weakref.ref[NDArray[np.uint8]]] = []
-        self.most = 0
+        self.shown, self.most = [], 0
 
     def render(self, world_from_cam):
         rgb = np.full((240, 320, 3), len(self.shown) % 256, np.uint8)
@@ -171,7 +151,7 @@ def test_nothing_is_left_half_written_overwritten_or_taken_for_frames(tmp_path):
     assert (tmp_path / "mine" / "thesis.txt").read_text() == "years of work"
     (tmp_path / "seq-04").mkdir()
     with pytest.raises(InputError, match="seq-04"):
-        frame_paths([tmp_path / "seq-04"], "color.png")
+        sevenscenes.frame_paths([tmp_path / "seq-04"], "color.png")
 
 
 def write_frames(directory, values, size=(40, 30)):
@@ -208,7 +188,7 @@ def test_other_pixels_are_no_frames(pixels):
 def test_manifest_finds_a_changed_pixel(tmp_path):
     write_frames(tmp_path / "seq-01", [1, 2])
     write_frames(tmp_path / "seq-02", [3])
-    write_manifest(tmp_path, sequences_of(2, 1, 2), CAMERA, {"scene": "room"})
+    write_manifest(tmp_path, sevenscenes.sequences_of(2, 1, 2), CAMERA, {"scene": "room"})
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert manifest["frames"] == {"train": 2, "test": 1}
     assert manifest["camera"]["fx"] == pytest.approx(20 / np.tan(np.pi / 6))
@@ -222,7 +202,7 @@ def test_manifest_finds_a_changed_pixel(tmp_path):
 
 def test_contact_sheet_shows_frames_in_reading_order(tmp_path):
     write_frames(tmp_path / "seq-01", list(range(0, 240, 5)))  # 48 frames: every second is shown
-    paths = frame_paths([tmp_path / "seq-01"], "color.png")
+    paths = sevenscenes.frame_paths([tmp_path / "seq-01"], "color.png")
     write_contact_sheet(paths, tmp_path / "preview.png")
     with Image.open(tmp_path / "preview.png") as sheet:
         assert sheet.size == (6 * 240, 4 * 180)
@@ -232,11 +212,9 @@ def test_contact_sheet_shows_frames_in_reading_order(tmp_path):
 
 
 def test_a_mesh_scene_is_prepared(tmp_path):
-    save_glb(tmp_path / "room.glb", room_mesh())
+    save_glb(tmp_path / "room.glb", ROOM)
     sha256 = hashlib.sha256((tmp_path / "room.glb").read_bytes()).hexdigest()
-    scene = SceneConfig.model_validate(
-        {"source": "mesh", "path": tmp_path / "room.glb", "sha256": sha256, "unit_m": 2.0}
-    )
+    scene = SceneConfig(source="mesh", path=tmp_path / "room.glb", sha256=sha256, unit_m=2.0)
     prepare_scene("room", scene, 0.995, 0, tmp_path / "out" / "mesh.glb")
     properties = json.loads((tmp_path / "out" / "properties.json").read_text())
     assert (properties["vertices"], properties["faces"]) == (8, 12)
@@ -255,7 +233,7 @@ def test_a_mesh_scene_is_prepared(tmp_path):
     ],
 )
 def test_a_scene_that_contradicts_its_config_is_refused(tmp_path, values, message):
-    save_glb(tmp_path / "room.glb", room_mesh())
+    save_glb(tmp_path / "room.glb", ROOM)
     scene = SceneConfig.model_validate({"source": "mesh", "path": tmp_path / "room.glb", **values})
     with pytest.raises(InputError, match=message):
         prepare_scene("room", scene, 0.995, 0, tmp_path / "out" / "mesh.glb")

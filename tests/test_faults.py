@@ -26,12 +26,13 @@ from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_ta
 from synfeal.errors import InputError
 from synfeal.files import atomic_directory, atomic_path, read_json, write_json, write_text
 from synfeal.mesh.load import load_mesh
-from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import Triangles, load_collision_mesh, save_collision_mesh
 from synfeal.report.figures.registry import save
 from synfeal.run_lock import begin_run
+from tests.collected import painted
 from tests.small_disk import mounted, remount
+from tests.test_core import run_job
 from tests.test_workflow import snakemake
 
 N = 2000  # rows, vertices or values: more than the disk holds
@@ -50,9 +51,7 @@ def sphere():
 
 
 def write_mesh(path):
-    vertices, faces = sphere()
-    colors = np.zeros((len(vertices), 3), np.uint8)
-    save_glb(path, TexturedMesh((MeshPart("sphere", vertices, faces, vertex_rgb=colors),)))
+    save_glb(path, painted(trimesh.creation.icosphere(4)))
 
 
 def write_graph(path):
@@ -120,24 +119,17 @@ def test_a_full_disk_is_named_and_nothing_is_left(name, disk):
 
 
 def test_a_job_tells_of_a_full_disk_where_its_log_lies_too(disk):
-    script = (
-        "from pathlib import Path\nfrom synfeal.files import write_json\n"
-        f"from synfeal.job import job\nwith job({str(disk / 'job.log')!r}):\n"
-        f"    write_json(Path({str(disk / 'facts.json')!r}), ['word'] * 9000)\n"
-    )
-    (disk / "other").write_bytes(bytes(8192))  # the log's first page is the last that is free
-    run = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=False
-    )
-    assert run.returncode == 1
     place = disk / "facts.json"
+    (disk / "other").write_bytes(bytes(8192))  # the log's first page is the last that is free
+    write = f"import pathlib; write_json(pathlib.Path({str(place)!r}), ['word'] * 9000)"
+    run = run_job(disk, f"from synfeal.files import write_json; {write}")
+    assert run.returncode == 1
     assert run.stderr == f"error: {place}: No space left on device; fix that and start again\n"
     assert not place.exists()
     for path in disk.iterdir():
         path.unlink()
 
 
-ROOT = Path(__file__).parent.parent
 HOLD = "import sys, time; from pathlib import Path; from synfeal.run_lock import begin_run\n"
 HOLD += "begin_run(Path(sys.argv[1])); print('begun', flush=True); time.sleep(600)"
 
@@ -230,16 +222,12 @@ def test_too_little_memory_is_a_memory_error_and_one_line(tmp_path):
     with pytest.raises(RuntimeError, match="shape") as caught, memory_errors():
         torch.zeros(3).reshape(2)
     assert not isinstance(caught.value, MemoryError)
-    log = tmp_path / "job.log"
-    script = f"from synfeal.job import job\nwith job({str(log)!r}):\n    bytes(2**60)\n"
-    run = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=False
-    )
+    run = run_job(tmp_path, "bytes(2**60)")
     assert run.returncode == 1
     (line,) = run.stderr.splitlines()
     assert line.startswith("error: out of memory (no more is to be had); ")
     assert "--cores" in line
-    assert "MemoryError" in log.read_text()
+    assert "MemoryError" in (tmp_path / "job.log").read_text()
 
 
 @pytest.mark.slow
