@@ -56,6 +56,11 @@ TABLE = (
     ("pretraining: {source: imagenet}", "network.width: must be 1"),
     ("network_camera: {near_m: 200}", "network_camera.near_m: must be below far_m"),
     ("localizers: {posenet: {lr: 1}}", "localizers.posenet.lr: unknown key; allowed here: beta"),
+    # effects
+    ("render: {effects: {motion_blur: {exposure_s: 0.7}}}", "0.7 s is longer than the 0.5 s"),
+    ("render: {effects: {light: {ev: [1, -1]}}}", "light.ev: the first number"),
+    ("render: {effects: {light: {states: [disco]}}}", "light.states.0: "),
+    ("render: {effects: {clutter: {}, light: {states: [night]}}}", "effects.clutter: it is not"),
     # paths
     ("experiments: absent.csv", "absent.csv: cannot be read as CSV (No such file or directory)"),
     ("experiments: config", "config: cannot be read as CSV (Is a directory)"),

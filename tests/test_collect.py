@@ -2,6 +2,7 @@
 
 import json
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image
@@ -13,7 +14,7 @@ from synfeal.dataset.sevenscenes import frame_paths, read_pose, read_split
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.validation.listing import list_sequences
 from synfeal.validation.manifest import check_manifest
-from tests.collected import collect, tree_of
+from tests.collected import collect, refused, tree_of
 from tests.test_workflow import snakemake
 
 
@@ -116,3 +117,25 @@ def test_wrong_usage_exits_with_2(options):
     with pytest.raises(SystemExit) as caught:
         main(options)
     assert caught.value.code == 2
+
+
+def test_a_preview_shows_two_sets_side_by_side(damaged, tmp_path, monkeypatch, capsys):
+    preview = ["preview", str(damaged), str(damaged), "--frames", "9"]
+    assert main(preview) == 0
+    with Image.open(damaged / "preview.gif") as picture:
+        assert (picture.n_frames, picture.width) == (9, 640)
+    film = tmp_path / "film.mp4"
+    assert main([*preview, "--out", str(film)]) == 0
+    decoder = cv2.VideoCapture(str(film))
+    shown = [decoder.read()[1] for _ in range(9)]
+    assert not decoder.read()[0]
+    with Image.open(damaged / "seq-01" / "frame-000004.color.png") as frame:
+        ideal = np.asarray(frame.convert("RGB").resize((320, 240), Image.Resampling.LANCZOS))
+    assert shown[4].shape == (16 + 240, 640, 3)
+    off = shown[4][16:, :320, ::-1].astype(int) - ideal
+    assert np.abs(off).mean() < 4  # grey levels, of coding
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    line = refused(capsys, "preview", damaged, "--out", tmp_path / "other.mp4")
+    assert "apt-get install ffmpeg or pip install 'synfeal[video]'" in line
+    assert [path.name for path in tmp_path.glob("*.mp4")] == ["film.mp4"]

@@ -16,6 +16,7 @@ from synfeal.config.models import SceneConfig
 from synfeal.inspect.run import top_view
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
+from tests.collected import painted
 
 BOX = ("--box", "-2.9", "2.9", "-2.5", "2.5", "-1.5", "1.5")
 OUTPUTS = ["inspect.html", "inspect.json", "inspect.png"]
@@ -25,11 +26,8 @@ OUTPUTS = ["inspect.html", "inspect.json", "inspect.png"]
 def mesh(tmp_path_factory):
     """A closed room of 6 x 5 x 3 m whose walls face inwards."""
     box = trimesh.creation.box((6.0, 5.0, 3.0)).subdivide().subdivide()
-    colors = np.random.default_rng(0).integers(0, 256, (len(box.vertices), 3), np.uint8)
-    faces = np.asarray(box.faces)[:, ::-1]
-    part = MeshPart("walls", np.asarray(box.vertices), faces, vertex_rgb=colors)
     path = tmp_path_factory.mktemp("mesh") / "My Room.glb"
-    save_glb(path, TexturedMesh((part,)))
+    save_glb(path, painted(box, inwards=True))
     return path
 
 
@@ -44,13 +42,13 @@ def inspected(mesh, tmp_path_factory):
 
 
 def test_files_and_numbers_are_those_of_the_room_and_what_is_printed_can_be_pasted(inspected, mesh):
-    out, _ = inspected
+    out, printed = inspected
     assert sorted(path.name for path in out.iterdir()) == OUTPUTS
     assert (out / "inspect.html").stat().st_size < 10e6
     with Image.open(out / "inspect.png") as picture:
         assert picture.width == 1600
         assert 800 <= picture.height <= 1000
-    facts = json.loads((inspected[0] / "inspect.json").read_text())
+    facts = json.loads((out / "inspect.json").read_text())
     assert facts["properties"]["volume_m3"] == pytest.approx(90.0)
     assert facts["topology"]["watertight"] is True
     assert facts["topology"]["enclosed_volume_m3"] == pytest.approx(-90.0)
@@ -59,16 +57,14 @@ def test_files_and_numbers_are_those_of_the_room_and_what_is_printed_can_be_past
     assert facts["free_space"]["volume_m3"] == pytest.approx(5.8 * 5.0 * 3.0, rel=0.03)
     assert facts["mesh"]["sha256"] == hashlib.sha256(mesh.read_bytes()).hexdigest()
     assert facts["doubts"] == []
-    printed = inspected[1]
     assert printed.isascii()
     assert "90.00 m^3" in printed
     text = printed[printed.index("  my_room:") :].split("\n\n")[0]
     scene = SceneConfig.model_validate(yaml.safe_load("scenes:\n" + text)["scenes"]["my_room"])
     assert scene.path == mesh
     assert scene.sampling_box is not None
-    np.testing.assert_allclose(scene.sampling_box.x, [-2.7, 2.7], atol=0.2)
-    np.testing.assert_allclose(scene.sampling_box.y, [-2.2, 2.2], atol=0.2)
-    np.testing.assert_allclose(scene.sampling_box.z, [-0.7, 0.5], atol=0.2)
+    box = [scene.sampling_box.x, scene.sampling_box.y, scene.sampling_box.z]
+    np.testing.assert_allclose(box, [[-2.7, 2.7], [-2.2, 2.2], [-0.7, 0.5]], atol=0.2)
 
 
 def test_the_top_view_shows_the_floor_in_its_place():

@@ -1,14 +1,18 @@
 """Surface points, texel density and doubts, on surfaces small enough to work out by hand."""
 
+import sys
+
 import numpy as np
 import pytest
 import trimesh
 
+from synfeal.errors import InputError
 from synfeal.inspect.doubts import colour_doubts, doubts_of, floor_areas_m2
 from synfeal.inspect.facts import detail_of, texels_per_m
 from synfeal.inspect.freespace import FreeSpace
 from synfeal.inspect.surface import SurfacePoints, nearest_texels
 from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.triangles import Triangles, simplify
 
 UNIT_UV = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 TWO = np.array([[0, 1, 2], [0, 2, 3]])
@@ -111,3 +115,10 @@ def test_the_largest_floor_tells_the_up_axis(turn, words):
     assert found.isascii()
     assert words in found
     assert bool(found) == bool(words)
+
+
+def test_open3d_is_an_extra(monkeypatch):
+    """Who installs the simulator alone may lack it."""
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    with pytest.raises(InputError, match=r"pip install 'synfeal\[inspect\]'"):
+        simplify(Triangles(np.eye(3), np.array([[0, 1, 2]])), 1)

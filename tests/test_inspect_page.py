@@ -1,24 +1,20 @@
 """The mesh in the page: small, in place, in its colours; the page: one file that draws."""
 
-from __future__ import annotations
-
 import base64
 import json
 import re
 import shutil
 import subprocess
-import sys
 from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import numpy as np
 import pytest
 import trimesh
 
-from synfeal.errors import InputError
 from synfeal.inspect.surface import SurfacePoints, split_longest_edges, viewer_mesh
 from synfeal.inspect.text import page_html
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.mesh.triangles import Triangles, simplify
+from tests.collected import painted
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 FLAGS = (
@@ -71,12 +67,8 @@ function drag(dy) {
 
 
 def colored_box(rgb, *, inwards):
-    box = trimesh.creation.box((4.0, 3.0, 2.0))
-    faces = np.asarray(box.faces)[:, ::-1] if inwards else np.asarray(box.faces)
-    colours = np.tile(np.array(rgb, np.uint8), (8, 1))
-    return TexturedMesh(
-        (MeshPart("box", np.asarray(box.vertices) + 100.0, faces, vertex_rgb=colours),)
-    )
+    box = trimesh.creation.box((4.0, 3.0, 2.0)).apply_translation([100.0] * 3)
+    return painted(box, rgb, inwards=inwards)
 
 
 def small_copy(mesh):
@@ -103,15 +95,10 @@ def test_the_copy_lies_where_the_mesh_does_in_its_colours_without_what_is_cut_ou
     assert (copy.rgb == [200, 10, 20]).all()
     front = trimesh.creation.box((4.0, 0.02, 3.0))
     side = np.asarray(front.face_normals)[:, 1]
-    parts = [
-        MeshPart(
-            name,
-            np.asarray(front.vertices),
-            np.asarray(front.faces)[side * sign > 0.5],
-            base_color=np.array([*rgb, 255], np.uint8),
-        )
-        for name, sign, rgb in (("back", 1, (255, 0, 0)), ("front", -1, (0, 0, 255)))
-    ]
+    parts = []
+    for sign, rgb in ((1, (255, 0, 0)), (-1, (0, 0, 255))):
+        faces, colour = front.faces[side * sign > 0.5], np.array([*rgb, 255], np.uint8)
+        parts.append(MeshPart("side", np.asarray(front.vertices), faces, base_color=colour))
     copy = small_copy(TexturedMesh(tuple(parts)))
     y = copy.positions[:, 1]
     assert (copy.rgb[y > 0] == [255, 0, 0]).all()
@@ -120,13 +107,12 @@ def test_the_copy_lies_where_the_mesh_does_in_its_colours_without_what_is_cut_ou
     texture = np.full((8, 8, 4), 255, np.uint8)
     texture[:, 4:, 3] = 0
     corners = np.column_stack([4.0 * uv, np.zeros(4)])
-    part = MeshPart(
-        "leaf", corners, np.array([[0, 1, 2], [0, 2, 3]]), uv, texture, alpha_cutoff=0.5
-    )
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    part = MeshPart("leaf", corners, faces, uv, texture, alpha_cutoff=0.5)
     assert area_m2(corners_m(small_copy(TexturedMesh((part,))))) == pytest.approx(8.0, rel=0.02)
 
 
-def test_large_meshes_keep_their_shape_and_need_open3d(monkeypatch):
+def test_large_meshes_keep_their_shape():
     sphere = trimesh.creation.icosphere(6, radius=2.0)  # 81,920 faces
     rgb = np.where(sphere.vertices[:, 2:] > 0, [255, 0, 0], [0, 0, 255]).astype(np.uint8)
     part = MeshPart("ball", np.asarray(sphere.vertices), np.asarray(sphere.faces), vertex_rgb=rgb)
@@ -136,10 +122,6 @@ def test_large_meshes_keep_their_shape_and_need_open3d(monkeypatch):
     np.testing.assert_allclose(np.linalg.norm(points, axis=1), 2.0, atol=0.01)
     assert (copy.rgb[points[:, 2] > 0.2] == [255, 0, 0]).all()
     assert (copy.rgb[points[:, 2] < -0.2] == [0, 0, 255]).all()
-    # Open3D is an extra: who installs the simulator alone may lack it.
-    monkeypatch.setitem(sys.modules, "open3d", None)
-    with pytest.raises(InputError, match=r"pip install 'synfeal\[inspect\]'"):
-        simplify(Triangles(np.eye(3), np.array([[0, 1, 2]])), 1)
 
 
 def test_splitting_keeps_the_surface_and_the_limits():
@@ -168,7 +150,6 @@ def test_the_page_needs_nothing_else_and_escapes_what_it_shows():
     assert "a &lt;mesh&gt;" in page
     assert page.count("</script>") == 2  # the mesh and the viewer
     found = re.search(r'<script id="scene" type="application/json">(.*?)</script>', page)
-    assert found is not None
     scene = json.loads(found[1])
     assert scene["polylines"] == [{"points": line.tolist(), "colour": [0, 255, 0]}]
     positions = np.frombuffer(base64.b64decode(scene["positions"]), "<i2").reshape(-1, 3)
@@ -180,8 +161,7 @@ def test_the_page_needs_nothing_else_and_escapes_what_it_shows():
 class Reply(HTTPServer):
     """Waits for what one page has to say, however long its browser takes."""
 
-    body: bytes | None = None
-    timeout = 40.0
+    body, timeout = None, 40.0
 
     class RequestHandlerClass(BaseHTTPRequestHandler):
         def do_POST(self):
@@ -199,7 +179,6 @@ class Reply(HTTPServer):
 
 def answer(page, folder, script):
     """What a script, put at the end of a page, sends to ``REPLY``, and what the console says."""
-    assert CHROMIUM is not None
     head, _, tail = page.rpartition("</script>")
     path, profile = folder / "page.html", f"--user-data-dir={folder / 'profile'}"
     with Reply() as reply:
@@ -208,9 +187,8 @@ def answer(page, folder, script):
         text = f"{head}{script.replace('REPLY', address)}</script>{tail}"
         path.write_text(text, encoding="utf-8")
         command = [CHROMIUM, *FLAGS, profile, path.as_uri()]
-        browser = subprocess.Popen(
-            command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-        )
+        pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+        browser = subprocess.Popen(command, **pipes, text=True)
         reply.handle_request()
         browser.terminate()
         _, said = browser.communicate(timeout=30)
