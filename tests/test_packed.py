@@ -24,7 +24,7 @@ from synfeal.dataset.pose_table import write_pose_table
 from synfeal.dataset.render_sequence import render_packed, render_sequence
 from synfeal.mesh.save import save_glb
 from synfeal.render.choose import BACKENDS
-from tests.test_dataset import CAMERA, poses_of, room_mesh, write_frames
+from tests.test_dataset import CAMERA, ROOM, poses_of, write_frames
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 
@@ -51,7 +51,7 @@ def test_frames_are_resized_and_cropped_about_the_centre(size):
 
 
 def test_frames_rendered_into_an_array_are_those_of_the_files(tmp_path):
-    save_glb(tmp_path / "mesh.glb", room_mesh())
+    save_glb(tmp_path / "mesh.glb", ROOM)
     plan, bounds = poses_of(5), ((0, 3), (3, 5))
     shards = [tmp_path / f"seq-{number:02d}.npy" for number in (1, 2)]
     write_pose_table(tmp_path / "plan.csv", plan)
