@@ -121,10 +121,7 @@ def refuse_foreign(out: Path, own: Collection[str], origin: str) -> None:
 def writing_to(path: Path, remedy: Callable[[], str]) -> Iterator[None]:
     """Say in one line that a file could not be written: a full disk, a read-only one.
 
-    Names ``path`` where the system names no file, and what to do then.
-
-    Raises:
-        InputError: in place of any OSError.
+    In place of any ``OSError``; names ``path`` where the system names no file, and what to do then.
     """
     try:
         yield

@@ -82,11 +82,7 @@ def read_frame(path: Path, schema: Schema, remedy: str = REMEDY, sep: str = ",")
 def read_records(
     path: Path, needed: Iterable[str] = (), remedy: str = REMEDY, sep: str = ","
 ) -> list[tuple[int, dict[str, str]]]:
-    """Rows of a file, each with its line: cells by column, as text.
-
-    Raises:
-        InputError: as :func:`read_frame`, but for what cells hold.
-    """
+    """Rows of a file, each with its line: cells by column, as text. See :func:`read_frame`."""
     with (
         read_as(path, "CSV", OSError, UnicodeDecodeError, csv.Error, remedy=f"; {remedy}"),
         path.open(encoding="utf-8-sig", newline="") as file,  # spreadsheets add a mark
@@ -172,11 +168,8 @@ def read_numbers(
 ) -> NDArray[np.float64]:
     """Values (N, columns of ``header``) of a file, whose ``kind`` messages name.
 
-    It may have a further, last column of names, which is ``passed_over``.
-
-    Raises:
-        InputError: the file is missing, has another header, or holds anything but numbers; with
-            ``finite``, anything but finite ones.
+    It may have a further, last column of names, which is ``passed_over``. Anything else than that
+    header and rows of numbers below it, with ``finite`` of finite ones, is refused.
     """
     n_columns = header.count(",") + 1
     with read_as(path, f"a {kind}"):

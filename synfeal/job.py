@@ -30,7 +30,11 @@ def job(log: str | Path) -> Iterator[None]:
     sys.stderr.flush()
     real_stderr = os.dup(2)
     try:
-        _print_to(log)
+        with Path(log).open("w", encoding="utf-8") as file:
+            os.dup2(file.fileno(), 1)
+            os.dup2(file.fileno(), 2)
+        sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
+        logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
         yield
     except (InputError, MemoryError, OSError) as error:
         line = f"error: {_sentence(error)}\n"
@@ -77,14 +81,6 @@ def call(snakemake: Any) -> None:
         )
     left = {name for name in {*asked} - needed if name in bare or name not in given}
     validate_call(function)(**{name: given[name] for name in asked if name not in left})
-
-
-def _print_to(log: str | Path) -> None:
-    with Path(log).open("w", encoding="utf-8") as file:
-        os.dup2(file.fileno(), 1)
-        os.dup2(file.fileno(), 2)
-    sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
-    logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
 
 
 def _sentence(error: InputError | MemoryError | OSError) -> InputError:

@@ -50,12 +50,7 @@ def begin_run(root: Path) -> None:
 
 @contextmanager
 def only_command(directory: Path, lock: Path) -> Iterator[None]:
-    """Keep other commands out of ``directory`` during the block, by a lock on the file ``lock``.
-
-    Raises:
-        InputError: another command is at work there.
-        OSError: the lock cannot be written.
-    """
+    """Keep other commands out of ``directory`` during the block, by a lock on the file ``lock``."""
     descriptor = _lock(lock, directory)
     try:
         yield
@@ -161,11 +156,7 @@ def _holds_files(part: Path) -> bool:
 
 
 def place_of(out: Path) -> Path:
-    """``out`` as an absolute path.
-
-    Raises:
-        InputError: nothing can be renamed to it.
-    """
+    """``out`` as an absolute path, to which something can be renamed."""
     try:
         place = out.resolve()
         if place.is_mount():
@@ -191,7 +182,7 @@ def _kept(part: Path) -> str:
 
 
 def check_settings(part: Path, settings: Mapping[str, Any]) -> None:
-    """Whether ``part`` was begun with the same settings; they are written where there are none."""
+    """Check that ``part`` was begun with these settings; they are written where there are none."""
     path = part / WORK / SETTINGS
     if not os.path.lexists(path):
         write_json(path, settings)

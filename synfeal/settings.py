@@ -76,11 +76,7 @@ def dataset_config(options: Mapping[str, Any], out: Path | None = None) -> Datas
 
 
 def scene_config(options: Mapping[str, Any]) -> SceneConfig:
-    """The scene alone, without sizes: of a command that collects nothing.
-
-    Raises:
-        InputError: naming the option that is wrong.
-    """
+    """The scene alone, without sizes: of a command that collects nothing."""
     check_mesh_file(Path(options["mesh"]), "--mesh")
     scene = _nested(options)["scenes"][SCENE]
     with options_named():
@@ -91,11 +87,7 @@ def scene_config(options: Mapping[str, Any]) -> SceneConfig:
 
 
 def render_configs(options: Mapping[str, Any]) -> tuple[CameraConfig, RenderConfig]:
-    """The camera and how it draws, of the options that say so.
-
-    Raises:
-        InputError: naming the option that is wrong.
-    """
+    """The camera and how it draws, of the options that say so."""
     if options.get("effects") is not None:
         raise InputError("effects: act on the frames of paths; use collect for them")
     values = _nested(options)

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from baselines.localize import Localized
     from baselines.training.checkpoint import FrameCamera, ModelDescription
     from synfeal.dataset.packed import View
-    from synfeal.evaluation.run import Evaluation
 
 FORMATS = ("ace", "colmap", "hloc", "mstransformer", "nerfstudio", "tum")
 CONVENTIONS = tuple(
@@ -126,32 +125,21 @@ def export(arguments: argparse.Namespace) -> None:
 )
 def evaluate(arguments: argparse.Namespace) -> None:
     """Scores poses of any common format against a data set: errors, recalls, reprojection error."""
-    from synfeal.evaluation.run import Settings
-    from synfeal.evaluation.run import evaluate as score
-    from synfeal.evaluation.text import report_text
+    from synfeal.evaluation import run
+    from synfeal.evaluation.text import report_text, write_files
     from synfeal.files import refuse_foreign
 
     out: Path | None = arguments.out
     if out:
         refuse_foreign(out, FILES, "an evaluation")
     names = ("split", "align", "convention", "rate", "labels", "camera")
-    settings = Settings(*(getattr(arguments, name) for name in names))
-    found = score(arguments.dataset, arguments.poses, settings)
+    settings = run.Settings(*(getattr(arguments, name) for name in names))
+    found = run.evaluate(arguments.dataset, arguments.poses, settings)
     print(report_text(arguments.poses, settings, found), end="")
     if out:
-        _write(out, f"{arguments.poses} on {arguments.dataset}", found)
+        title = f"{arguments.poses} on {arguments.dataset}"
+        write_files([out / name for name in FILES], title, found)
         print(f"\n{out}: {', '.join(FILES)}")
-
-
-def _write(out: Path, title: str, found: Evaluation) -> None:
-    from synfeal.evaluation.text import errors_table, figure_of, scores_table
-    from synfeal.files import atomic_path
-
-    for name, table in zip(FILES, (scores_table(found), errors_table(found)), strict=False):
-        with atomic_path(out / name) as temporary:
-            table.to_csv(temporary, index=False, lineterminator="\n")
-    with atomic_path(out / FILES[2]) as temporary:
-        figure_of(title, found).savefig(temporary, dpi=150)
 
 
 @command(

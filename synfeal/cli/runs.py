@@ -76,11 +76,7 @@ def plan(arguments: argparse.Namespace) -> None:
 
 
 def _machines(arguments: argparse.Namespace) -> list[Machine]:
-    """What to plan for.
-
-    Raises:
-        InputError: a number is out of range, or there are more of one kind than of the other.
-    """
+    """What to plan for: as many numbers of GPUs as of cores, or one for all."""
     from synfeal.report.cost.estimate import Machine
 
     cores, gpus = arguments.cores or [os.cpu_count() or 1], arguments.gpus
@@ -130,17 +126,12 @@ def run(arguments: argparse.Namespace) -> None:
     for path in paths:
         read_yaml(path)  # Snakemake would end in a traceback; what it holds the Snakefile checks
     paths = [path for path in paths if not is_default(path)]
-    command = snakemake_command(paths, cores, arguments.snakemake)
+    display = ["--logger", "synfeal", "--quiet", "host"]  # one line that stays, a table of scores
+    files = ["--configfile", *map(str, paths)] if paths else []
+    command = ["snakemake", *display, *files, "--cores", str(cores), *arguments.snakemake]
     found = (str(PLUGINS.resolve()), os.environ.get("PYTHONPATH"))
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, found))}
     os.execve(sys.executable, [sys.executable, "-m", *command], environment)
-
-
-def snakemake_command(profiles: list[Path], cores: int, further: list[str]) -> list[str]:
-    """What is started: one line that stays and a table of scores, all else in Snakemake's log."""
-    display = ["--logger", "synfeal", "--quiet", "host"]
-    files = ["--configfile", *map(str, profiles)] if profiles else []
-    return ["snakemake", *display, *files, "--cores", str(cores), *further]
 
 
 @command(

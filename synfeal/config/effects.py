@@ -170,11 +170,7 @@ def _shortened(effects: EffectsConfig, collection: CollectionConfig) -> EffectsC
 
 
 def refuse_long_exposure(effects: EffectsConfig, collection: CollectionConfig, key: str) -> None:
-    """Refuse to expose for longer than there is between two frames.
-
-    Raises:
-        ValueError: naming what stands under ``key``.
-    """
+    """Refuse to expose for longer than there is between two frames; ``key`` holds the effects."""
     blur = effects.motion_blur
     if blur is None or collection.mode == "repeat":
         return

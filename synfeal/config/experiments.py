@@ -135,10 +135,9 @@ def split_init(init: str) -> tuple[Start, str]:
 
 
 def read_experiments(config: Config) -> tuple[Experiment, ...]:
-    """Read and check ``config.experiments`` against the scenes and sizes of the profile.
+    """The rows of ``config.experiments``, checked against the scenes and sizes of the profile.
 
-    Raises:
-        InputError: naming file, row and column of the first problem.
+    What is wrong is said with file, row and column.
     """
     path = config.experiments
     seen: dict[tuple[str, ...], str] = {}

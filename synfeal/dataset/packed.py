@@ -50,11 +50,7 @@ def pack_frames(sequences: list[Path], input_px: int, out: Path, view: View = "s
 
 
 def join_packed(parts: list[Path], out: Path) -> None:
-    """Write packed frames one after the other into one file; a few of them are in memory.
-
-    Raises:
-        InputError: a part cannot be read, or its frames have another size.
-    """
+    """Write packed frames of one size one after the other into one file; a few are in memory."""
     arrays = [read_packed(path) for path in parts]
     input_px = arrays[0].shape[1]
     for path, array in zip(parts, arrays, strict=True):
@@ -71,11 +67,7 @@ def join_packed(parts: list[Path], out: Path) -> None:
 
 
 def read_packed(path: Path) -> np.memmap[Any, np.dtype[np.uint8]]:
-    """Packed frames (N, S, S, 3) as a memory map.
-
-    Raises:
-        InputError: the file is missing or holds no packed frames.
-    """
+    """Packed frames (N, S, S, 3) as a memory map."""
     # A damaged header is refused in every way there is.
     with read_as(path, "packed frames", Exception, remedy="; render it again"):
         frames: np.memmap[Any, np.dtype[np.uint8]] = np.lib.format.open_memmap(path, mode="r")

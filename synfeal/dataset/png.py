@@ -64,11 +64,7 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def read_image(path: FrameFile, mode: str | None = None) -> Image.Image:
-    """A decoded image, converted to ``mode`` if one is given.
-
-    Raises:
-        InputError: it cannot be read.
-    """
+    """A decoded image, converted to ``mode`` if one is given."""
     with (
         read_as(path, "an image", *IMAGE_DAMAGE),
         Image.open(io.BytesIO(path.read_bytes())) as image,

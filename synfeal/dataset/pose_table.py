@@ -92,11 +92,7 @@ def read_pose_table(path: Path) -> PoseTable:
 
 
 def read_frames(path: Path, start: int, stop: int) -> PoseTable:
-    """Frames ``start`` to ``stop`` (exclusive) of a pose table.
-
-    Raises:
-        InputError: as :func:`read_pose_table`, or the table is too short.
-    """
+    """Frames ``start`` to ``stop`` (exclusive) of a pose table, which must have as many."""
     table = read_pose_table(path)
     if len(table) < stop:
         raise InputError(f"{path}: holds {len(table)} poses, {stop} are needed; make it again")
@@ -104,11 +100,7 @@ def read_frames(path: Path, start: int, stop: int) -> PoseTable:
 
 
 def whole_numbers(values: NDArray[np.float64], path: Path) -> NDArray[np.int64]:
-    """The leading columns (N, C) of a table as the indices they are.
-
-    Raises:
-        InputError: naming the first row with anything but whole numbers, 0 or above.
-    """
+    """The leading columns (N, C) of a table as indices: whole numbers, 0 or above."""
     good = ((values >= 0) & (values < 2**53) & (values == np.floor(values))).all(axis=1)
     if not good.all():
         row = int(np.argmin(good)) + 2

@@ -52,9 +52,6 @@ def encoder() -> str:
     """The program that encodes films: the system's, or that of the wheel ``imageio-ffmpeg``.
 
     It is run as a program of its own, so its licence (GPL, for x264) does not reach this one.
-
-    Raises:
-        InputError: there is none.
     """
     found = shutil.which("ffmpeg")
     if found is None and importlib.util.find_spec("imageio_ffmpeg") is not None:

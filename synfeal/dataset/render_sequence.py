@@ -101,9 +101,6 @@ def write_sequence(
 
     The directory they are written to gets its name when they are whole, so they need no temporary
     ones. ``on_frame`` is called for each frame that is whole.
-
-    Raises:
-        OSError: a file cannot be written.
     """
     with _new_sequence(out) as directory, ThreadPoolExecutor(THREADS) as threads:
         waiting: deque[Future[None]] = deque()

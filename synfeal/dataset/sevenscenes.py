@@ -33,11 +33,7 @@ def depth_mm_of(depth_m: NDArray[np.float32]) -> NDArray[np.uint16]:
 
 
 def read_depth_m(path: FrameFile) -> NDArray[np.float32]:
-    """Depth (H, W) in metres along the optical axis, inf where it is invalid.
-
-    Raises:
-        InputError: the file cannot be read, or is no 16-bit image.
-    """
+    """Depth (H, W) in metres along the optical axis of a 16-bit image, inf where it is invalid."""
     depth_mm = np.asarray(read_image(path))
     if depth_mm.ndim != 2 or depth_mm.dtype == np.uint8:
         raise InputError(f"{path}: must be a 16-bit grey image, millimetres")
@@ -52,11 +48,7 @@ def pose_text(world_from_cam: NDArray[np.float64]) -> str:
 
 
 def read_pose(path: FrameFile) -> NDArray[np.float64]:
-    """A pose (4, 4).
-
-    Raises:
-        InputError: the file does not hold sixteen finite numbers in four rows.
-    """
+    """A pose (4, 4), from a file of sixteen finite numbers in four rows."""
     with read_as(path, "a pose"):
         rows = [line.split() for line in path.read_text(encoding="utf-8").splitlines() if line]
         pose = np.array(rows, np.float64)
@@ -66,10 +58,9 @@ def read_pose(path: FrameFile) -> NDArray[np.float64]:
 
 
 def frame_paths(sequences: Iterable[Path], kind: str) -> list[FrameFile]:
-    """Files of one kind (``color.png``, ``depth.png`` or ``pose.txt``) in frame order.
+    """Files of one kind (``color.png``, ``depth.png``, ``pose.txt``), at least one, in frame order.
 
-    Raises:
-        InputError: a sequence (``seq-01`` or ``seq-01.zip``) cannot be read or has no such file.
+    ``sequences`` are ``seq-01`` or ``seq-01.zip``.
     """
     paths: list[FrameFile] = []
     for sequence in sequences:
@@ -92,11 +83,7 @@ def write_splits(dataset_dir: Path, sequences: Iterable[Sequence]) -> None:
 
 
 def read_split(dataset_dir: Path, split: str) -> list[Path]:
-    """The sequences of a split in order, each the directory or the archive that is there.
-
-    Raises:
-        InputError: the split file is missing or holds a line that names no sequence.
-    """
+    """The sequences of a split in order, each the directory or the archive that is there."""
     path = dataset_dir / SPLIT_FILES[split]
     if not os.path.lexists(path):
         raise InputError(f"{path}: missing; a 7-Scenes data set has one")

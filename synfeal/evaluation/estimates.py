@@ -70,13 +70,10 @@ GOOD_M, GOOD_DEG = 0.05, 5.0
 def checked_convention(
     path: Path, estimates: Estimates, rows: NDArray[np.int64], reference: Array
 ) -> None:
-    """Refuse poses that another convention fits far better.
+    """Refuse poses that another convention fits far better, and name that, for ``--convention``.
 
     ``rows`` (M,) are those that belong to a frame, ``reference`` (M, 4, 4) the ``world_from_cam``
     of these frames.
-
-    Raises:
-        InputError: naming the better convention, for ``--convention``.
     """
     taken = _medians(estimates, estimates.convention, rows, reference)
     if taken[0] < GOOD_M or taken[1] < GOOD_DEG:

@@ -107,11 +107,7 @@ def read_sevenscenes(path: Path) -> Estimates:
 
 
 def read_colmap(path: Path) -> Estimates:
-    """A COLMAP model, text or binary.
-
-    Raises:
-        InputError: it has both, lacks a file, or is damaged.
-    """
+    """A COLMAP model, text or binary, but not both."""
     import pycolmap
 
     both = [name for name in MODELS if (path / name).is_file()]

@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 NAME = re.compile(r"(?:seq-?(\d+)[/_-])?frame-(\d{6,})(?:\D|$)")
 TIME_SLACK = 0.25  # of a frame
 
+Key = tuple[str, int]  # sequence and number of a frame
+
 
 @dataclass(frozen=True)
 class ScoredFrames:
@@ -42,11 +44,7 @@ class ScoredFrames:
 
 
 def read_scored_frames(dataset: Path, split: str) -> ScoredFrames:
-    """The frames of a split, all with rigid poses.
-
-    Raises:
-        InputError: the data set or its split cannot be read, or poses are missing or damaged.
-    """
+    """The frames of a split, all of which must have rigid poses."""
     sequences = _of_split(dataset, split, list_sequences(dataset))
     frames = tuple(frames_of(sequences))
     poses, unreadable = read_poses(sequences)
@@ -118,9 +116,6 @@ def match(frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float
             f" ({frames.names[0]}, ...); is it of this data set, and of this --split?"
         )
     return Matched(row, foreign)
-
-
-Key = tuple[str, int]
 
 
 def _keys(frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float) -> list[Key]:

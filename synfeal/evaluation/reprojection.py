@@ -111,11 +111,7 @@ def write_cell_depth(path: Path, depth_m: Array) -> None:
 
 
 def read_cell_depth(path: Path, n_frames: int) -> Array:
-    """Depths (n_frames, 48) of the first frames; ``inf`` where there is none.
-
-    Raises:
-        InputError: the file is missing, damaged or too short.
-    """
+    """Depths (n_frames, 48) of the first frames of a file of as many or more; ``inf`` for none."""
     with read_as(path, "depths", OSError, ValueError, EOFError, remedy="; make it again"):
         depth_mm = np.load(path, allow_pickle=False)
     if depth_mm.dtype != np.uint16 or depth_mm.shape[1:] != (CELLS[0] * CELLS[1],):
@@ -129,11 +125,7 @@ def read_cell_depth(path: Path, n_frames: int) -> Array:
 
 
 def depth_of_images(paths: Iterable[FrameFile], camera: CameraConfig) -> Iterator[Array]:
-    """Depths (48,) of the cells' middles, read from the depth images of frames.
-
-    Raises:
-        InputError: an image cannot be read, or is of another size than the camera's.
-    """
+    """Depths (48,) of the cells' middles, read from depth images of the size of the camera's."""
     column, row = cell_pixels(camera, *CELLS).reshape(-1, 2).astype(int).T
     for path in paths:
         depth_mm = read_depth_mm(path)

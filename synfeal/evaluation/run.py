@@ -65,11 +65,7 @@ class Evaluation:
 
 
 def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
-    """Score poses.
-
-    Raises:
-        InputError: the data set, the poses or the labels cannot be read, or do not belong together.
-    """
+    """Score poses."""
     frames = read_scored_frames(dataset, settings.split)
     estimates, matched, convention = _read(poses, frames, settings, settings.convention)
     predicted = _of_frames(estimates, matched, convention)

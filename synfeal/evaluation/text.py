@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ from synfeal.evaluation.metrics import (
 )
 from synfeal.evaluation.reprojection import DCRE_BOUNDS
 from synfeal.evaluation.run import Evaluation, Settings
+from synfeal.files import atomic_path
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -148,3 +150,12 @@ def figure_of(title: str, found: Evaluation) -> Figure:
     if len(found.ends) > 1:
         panels[0].legend(frameon=False, fontsize=8)
     return figure
+
+
+def write_files(out: Sequence[Path], title: str, found: Evaluation) -> None:
+    """Write scores (.csv), errors (.csv) and the figure (.png)."""
+    for path, table in zip(out, (scores_table(found), errors_table(found)), strict=False):
+        with atomic_path(path) as temporary:
+            table.to_csv(temporary, index=False, lineterminator="\n")
+    with atomic_path(out[2]) as temporary:
+        figure_of(title, found).savefig(temporary, dpi=150)

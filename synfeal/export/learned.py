@@ -42,11 +42,7 @@ from synfeal.geometry.poses import quat_wxyz_of
 
 
 def export_ace(data: ExportSet, out: Path, place: Place) -> None:
-    """Write the splits.
-
-    Raises:
-        InputError: there are no splits, or the camera is more than ACE knows.
-    """
+    """Write the splits; ACE knows one focal length and no distortion."""
     need_splits(data)
     camera = data.camera.intrinsics
     if any(data.camera.distortion) or abs(camera.fx - camera.fy) > 1e-5 * camera.fx:

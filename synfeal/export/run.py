@@ -29,10 +29,8 @@ FORMATS: dict[str, Exporter] = {
 def export(dataset: Path, to: str, out: Path, copy: bool, camera_file: Path | None) -> int:
     """Write a data set in another format, a key of ``FORMATS``; returns the number of frames.
 
-    Colour images are linked to, or copied. A calibration file is needed where there is no manifest.
-
-    Raises:
-        InputError: ``out`` holds something, or the data set is damaged or its camera not known.
+    Colour images are linked to, or copied. ``out`` is new; a calibration file is needed where there
+    is no manifest.
     """
     refuse_existing(out)
     data = read_export_set(dataset, camera_file)

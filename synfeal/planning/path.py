@@ -91,7 +91,10 @@ class CandidateStream:
         """
         tried, window = 0, max(1, FIRST_WINDOW // self._candidates)
         while tried < max_rounds:
-            poses, has_view = self._ahead(min(window, max_rounds - tried))
+            if self._at == len(self._poses):
+                self._draw()
+            ahead = slice(self._at, self._at + min(window, max_rounds - tried))
+            poses, has_view = self._poses[ahead], self._has_view[ahead]
             found = farthest_admissible(self._space.caster, start, poses, has_view, min_path_m)
             if found is not None:
                 self._at += found[0] + 1
@@ -101,13 +104,6 @@ class CandidateStream:
             tried += len(poses)
             window *= 2
         return None
-
-    def _ahead(self, count: int) -> tuple[PoseVectors, NDArray[np.bool_]]:
-        """The next rounds (R, k, 6), 1 to ``count``, and which have a free view (R, k)."""
-        if self._at == len(self._poses):
-            self._draw()
-        part = slice(self._at, self._at + count)
-        return self._poses[part], self._has_view[part]
 
     def _draw(self) -> None:
         """Replace the block, which is used up, by the next."""

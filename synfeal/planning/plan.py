@@ -167,11 +167,7 @@ class _Walk:
         self._stream = CandidateStream(space, collection.candidates)
 
     def next_path(self) -> Array:
-        """Poses (n, 4, 4) of the next path.
-
-        Raises:
-            InputError: no admissible target; says what to relax.
-        """
+        """Poses (n, 4, 4) of the next path; where no target is admissible, says what to relax."""
         asked = self._collection
         target = self._stream.next_target(self._at, asked.min_path_m, asked.max_tries)
         if target is None:

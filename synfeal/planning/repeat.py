@@ -25,12 +25,9 @@ log = logging.getLogger("synfeal")
 def repeated_poses(
     source: Path, split: str, n_frames: int, mesh_bounds_m: NDArray[np.float64]
 ) -> PoseTable:
-    """The first ``n_frames`` poses of ``source``; see :func:`read_poses`.
+    """The first ``n_frames`` poses of ``source``, which must have as many; see :func:`read_poses`.
 
     Logs a warning if some lie outside the mesh's bounds (2, 3).
-
-    Raises:
-        InputError: the source cannot be read, or holds fewer poses.
     """
     table = read_poses(source, split)
     if len(table) < n_frames:
@@ -54,9 +51,6 @@ def read_poses(source: Path, split: str) -> PoseTable:
     of its frames (``frame-XXXXXX.pose.txt``), a pose table (``.csv``) or a trajectory in the
     format of the TUM benchmark (``.txt``). The last three hold one list of poses, which is the
     training split. Each sequence and each trajectory is one path, where no table says otherwise.
-
-    Raises:
-        InputError: a file is missing, or holds what is no pose.
     """
     if (source / f"{split}.csv").is_file():
         return _read_table(source / f"{split}.csv")
