@@ -25,6 +25,7 @@ SizeName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$", max_length=64)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, lt=1)]
+Seed = Annotated[int, Field(ge=0, lt=2**63)]
 Count = Annotated[int, Field(ge=1, le=10**9)]
 MOST_FRAMES = 10**7  # of a split: at 30 frames/s four days, and 1.3 GB of poses while it is planned
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -116,13 +117,11 @@ class ClutterConfig(Strict):
     """Objects that stand about, on the floor or on tables, wherever cameras can be above them."""
 
     count: int = Field(10, ge=1, le=1000, description="how many")
-    files: tuple[Path, ...] = Field(
-        (), description="meshes in metres, taken in turn; none: cartons"
-    )
+    files: tuple[Path, ...] = Field((), description="meshes in metres, used in turn; none: cartons")
     size_m: Annotated[tuple[Positive, Positive], AfterValidator(_ordered)] = Field(
         (0.12, 0.4), description="cartons: shortest and longest side, metres"
     )
-    seed: int = Field(0, ge=0, lt=2**63, description="of the layout")
+    seed: Seed = Field(0, description="of the layout")
 
 
 class SceneConfig(Strict):
@@ -130,19 +129,13 @@ class SceneConfig(Strict):
 
     unless_none = ("clutter",)
 
-    source: Literal["procedural", "mesh"] = Field(
-        description="`procedural`: a stand-in; `mesh`: a file"
-    )
+    source: Literal["procedural", "mesh"] = Field(description="a stand-in, or a file")
     builder: Literal["large_room", "sanctuary", "random_room"] | None = Field(
         None, description="procedural: which stand-in"
     )
-    seed: Annotated[int, Field(ge=0, lt=2**63)] | None = Field(
-        None, description="procedural: in place of the profile's seed"
-    )
+    seed: Seed | None = Field(None, description="procedural: in place of the profile's seed")
     path: Path | None = Field(None, description="mesh: the file (.glb, .gltf, .obj, .ply)")
-    sha256: str | None = Field(
-        None, pattern=r"^[0-9a-f]{64}$", description="mesh: expected hash of the file"
-    )
+    sha256: str | None = Field(None, pattern=r"^[0-9a-f]{64}$", description="mesh: the file's hash")
     up_axis: Literal["auto", "y", "z"] = Field(
         "auto", description="mesh: axis that points up; `auto`: y for glTF, else z"
     )
@@ -184,16 +177,12 @@ class CollectionConfig(Strict):
         description="mode `repeat`: data set, directory of 7-Scenes frames, pose table (.csv) or"
         " TUM trajectory (.txt)",
     )
-    candidates: int = Field(
-        8, ge=1, le=10**4, description="target poses tried per path (the paper's k)"
-    )
+    candidates: int = Field(8, ge=1, le=10**4, description="targets tried per path (the paper's k)")
     frame_spacing_m: float = Field(
         0.03, ge=1e-4, le=1e4, description="distance between frames (the paper's other d)"
     )
     min_path_m: NonNegative = Field(1.5, description="shorter paths are drawn again")
-    max_tries: int = Field(
-        2000, ge=1, le=10**6, description="rounds of candidates before a scene counts as too narrow"
-    )
+    max_tries: int = Field(2000, ge=1, le=10**6, description="rounds until a scene is too narrow")
     interpolation: Literal["rpy", "slerp"] = Field(
         "rpy", description="`rpy`: the paper's, angle by angle, each the short way"
     )

@@ -17,6 +17,7 @@ from synfeal.config.collection import (
     Finite,
     Positive,
     SceneConfig,
+    Seed,
     Slug,
     Strict,
     part,
@@ -41,9 +42,7 @@ class CameraConfig(Strict):
     )
     width: int = Field(640, ge=16, le=8192, description="pixels")
     height: int = Field(480, ge=16, le=8192, description="pixels")
-    horizontal_fov_deg: float = Field(
-        60.0, gt=1, lt=170, description="field of view; unused with fx"
-    )
+    horizontal_fov_deg: float = Field(60.0, gt=1, lt=170, description="without fx: field of view")
     fx: Positive | None = Field(None, description="focal length, pixels")
     fy: Positive | None = Field(None, description="focal length, pixels")
     cx: Finite | None = Field(None, description="principal point, pixels")
@@ -119,16 +118,14 @@ class RenderConfig(Strict):
     background_rgb: tuple[Channel, Channel, Channel] = Field(
         (0, 0, 0), description="where nothing is hit"
     )
-    effects: EffectsConfig | None = Field(
-        None, description="what is added to ideal frames (docs/variation.md)"
-    )
+    effects: EffectsConfig | None = Field(None, description="added to frames (docs/variation.md)")
 
 
 class DatasetConfig(Strict):
     """Scenes, how many frames of them, and how they are planned and drawn."""
 
     profile: Slug = Field(description="name, and directory under `results`")
-    seed: int = Field(0, ge=0, lt=2**63, description="root of all seeds")
+    seed: Seed = Field(0, description="root of all seeds")
     scale: float = Field(gt=0, le=1, description="share of the paper's frames")
     results: Path = Field(Path("results"), description="where runs are written")
     shard_frames: Count = Field(500, description="frames of a render job, and of a sequence")

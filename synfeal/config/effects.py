@@ -12,6 +12,7 @@ from synfeal.config.collection import (
     Count,
     NonNegative,
     Positive,
+    Seed,
     SizeName,
     Slug,
     Strict,
@@ -28,9 +29,7 @@ class LightConfig(Strict):
     states: tuple[Literal["all", "lamps", "daylight", "dusk", "night"], ...] = Field(
         (), description="stand-ins: which lights are on; one drawn per path"
     )
-    ev: tuple[Stops, Stops] = Field(
-        (0.0, 0.0), description="brightness, stops, drawn per path between these"
-    )
+    ev: tuple[Stops, Stops] = Field((0.0, 0.0), description="brightness, stops; drawn per path")
     temperature_k: tuple[Kelvin, Kelvin] = Field(
         (6500.0, 6500.0),
         description="colour temperature, drawn between these, uniform in mired; 6500 leaves the"
@@ -62,9 +61,7 @@ class ExposureConfig(Strict):
 
     ev: Stops = Field(0.0, description="compensation, stops: 1 doubles the light")
     time_constant_s: Positive | None = Field(None, description="lag of auto-exposure; null: none")
-    target: float = Field(
-        0.18, gt=0, lt=1, description="auto-exposure: mean light aimed at, white is 1"
-    )
+    target: float = Field(0.18, gt=0, lt=1, description="auto-exposure: mean light, white is 1")
     most_ev: float = Field(3.0, ge=0, le=10, description="auto-exposure: largest correction, stops")
 
 
@@ -79,9 +76,7 @@ class PathObjectsConfig(Strict):
     """Objects that stand about, differently along every path, none in the way of the camera."""
 
     count: int = Field(8, ge=1, le=100, description="how many, where they fit")
-    files: tuple[Path, ...] = Field(
-        (), description="meshes in metres, taken in turn; none: cartons"
-    )
+    files: tuple[Path, ...] = Field((), description="meshes in metres, used in turn; none: cartons")
 
 
 class EffectsConfig(Strict):
@@ -89,24 +84,18 @@ class EffectsConfig(Strict):
 
     unless_none = ("clutter",)
 
-    seed: int = Field(0, ge=0, lt=2**63, description="of noise, lights and the choice of paths")
+    seed: Seed = Field(0, description="of noise, lights and the choice of paths")
     share: float = Field(1.0, gt=0, le=1, description="share of the paths that each effect acts on")
-    speed_m_s: Positive = Field(
-        0.5, description="speed of the camera: gives the time between frames"
-    )
+    speed_m_s: Positive = Field(0.5, description="camera's speed: gives the time between frames")
     light: LightConfig | None = Field(None, description="light by path")
     motion_blur: MotionBlurConfig | None = Field(None, description="movement during exposure")
     exposure: ExposureConfig | None = Field(None, description="fixed or automatic")
     noise: NoiseConfig | None = Field(None, description="shot and read noise")
-    white_balance_k: Kelvin | None = Field(
-        None, description="colour temperature taken for white, in light of 6500"
-    )
+    white_balance_k: Kelvin | None = Field(None, description="taken for white, in light of 6500 K")
     jpeg_quality: Annotated[int, Field(ge=1, le=95)] | None = Field(
         None, description="libjpeg's scale"
     )
-    clutter: PathObjectsConfig | None = Field(
-        None, description="objects that stand about, other ones along each path"
-    )
+    clutter: PathObjectsConfig | None = Field(None, description="other objects along each path")
 
     @model_validator(mode="after")
     def _check(self) -> Self:

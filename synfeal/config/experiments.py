@@ -37,9 +37,7 @@ class Experiment(Strict):
     """One table row: five cells, one per localizer."""
 
     table: TableName = Field(description="tables 6 and 7 are our own")
-    block: Literal["", "orientation", "position", "both"] = Field(
-        description="of table 3; else empty"
-    )
+    block: Literal["", "orientation", "position", "both"] = Field(description="only of table 3")
     scene: str = Field(description="a key of `scenes`")
     size: str = Field(description="a key of `scenes.<scene>.sizes` and of `training.samples_seen`")
     labels: str = Field(
@@ -48,9 +46,7 @@ class Experiment(Strict):
     )
     noise_m: NonNegative = Field(description="median position error put into labels, metres")
     noise_deg: NonNegative = Field(description="the same of orientation, degrees; 0 with `scale`")
-    init: Init = Field(
-        description="start; `-half`, `-quarter`: with that share of `training.samples_seen`"
-    )
+    init: Init = Field(description="start, and share of `training.samples_seen`")
 
     @model_validator(mode="after")
     def _check(self) -> Experiment:

@@ -59,9 +59,7 @@ class NetworkConfig(Strict):
     view: Literal["square", "whole"] = Field(
         "square", description="what it sees: a frame's central square, or the whole of it, squeezed"
     )
-    width: float = Field(
-        1.0, gt=0, le=1, description="factor on all channels; ImageNet weights need 1"
-    )
+    width: float = Field(1.0, gt=0, le=1, description="factor on channels; ImageNet weights need 1")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -94,12 +92,8 @@ class AugmentationConfig(Strict):
     not see is filled with its border.
     """
 
-    tilt_deg: float = Field(
-        0.0, ge=0, le=45, description="largest rotation about the camera's x and y axes"
-    )
-    roll_deg: float = Field(
-        0.0, ge=0, le=180, description="largest rotation about its optical axis"
-    )
+    tilt_deg: float = Field(0.0, ge=0, le=45, description="largest rotation about camera x and y")
+    roll_deg: float = Field(0.0, ge=0, le=180, description="largest rotation about camera z")
 
     @property
     def turns(self) -> bool:
@@ -123,9 +117,7 @@ class TrainingConfig(Strict):
     patience: Count | None = Field(
         None, description="`published`: stop after so many evaluations (of 20) without a new best"
     )
-    augmentation: AugmentationConfig = part(
-        AugmentationConfig, "`corrected`: rotation augmentation"
-    )
+    augmentation: AugmentationConfig = part(AugmentationConfig, "`corrected`: rotations of images")
     precision: Literal["auto", "float32", "bfloat16"] = Field(
         "auto", description="`auto`: bfloat16 where the device multiplies in it"
     )
@@ -170,9 +162,7 @@ class ExternalConfig(Strict):
     """
 
     title: str = Field(description="as tables and figures call it")
-    poses: str = Field(
-        "", description="path of its answers, e.g. `mine/{scene}-{size}-{labels}.csv`"
-    )
+    poses: str = Field("", description="its answers, e.g. `mine/{scene}-{size}-{labels}.csv`")
     command: str = Field("", description="or what writes them")
     labels: list[str] = Field([], description="label sets it answers for; none: all")
 
@@ -187,13 +177,7 @@ class ReferencesConfig(Strict):
     """Methods that localizers are read against: retrieval, structure-based poses."""
 
     max_features: Count = Field(1000, description="structure: SIFT features per image")
-    contrast: Positive = Field(
-        0.013, description="structure: least contrast of a feature (OpenCV's default is 0.04)"
-    )
-    retrieved: Count = Field(
-        20, description="structure: training images a test image is matched with"
-    )
-    coordinate_samples: Count = Field(
-        2000, description="scene coordinates: images shown in training"
-    )
+    contrast: Positive = Field(0.013, description="structure: least contrast (OpenCV: 0.04)")
+    retrieved: Count = Field(20, description="structure: training images matched with a test image")
+    coordinate_samples: Count = Field(2000, description="scene coordinates: images shown in all")
     external: dict[Slug, ExternalConfig] = part(dict, "localizers of somebody else's")

@@ -59,19 +59,13 @@ class SfmConfig(Strict):
     max_features: Count = Field(2000, description="SIFT features per image")
     peak_threshold: Positive = Field(0.0067, description="SIFT: least contrast; white is 1")
     overlap: Count = Field(5, description="images further on that each image is matched with")
-    quadratic_overlap: bool = Field(
-        True, description="these: 1, 2, 4, 8, … further on, else 1, 2, 3, 4, …"
-    )
-    guided_matching: bool = Field(
-        False, description="match a verified pair again along epipolar lines"
-    )
+    quadratic_overlap: bool = Field(True, description="these: 1, 2, 4, 8, …, else 1, 2, 3, 4, …")
+    guided_matching: bool = Field(False, description="match a pair again, along epipolar lines")
     min_num_inliers: Count = Field(15, description="least inliers of a verified pair")
     mapper: Literal["incremental", "global"] = Field(
         "incremental", description="COLMAP's: image by image, or all at once (GLOMAP)"
     )
-    init_min_tri_angle_deg: Positive = Field(
-        4.0, description="incremental: least angle of the initial pair"
-    )
+    init_min_tri_angle_deg: Positive = Field(4.0, description="incremental: of the initial pair")
     min_explained: float = Field(
         0.67,
         ge=0,
@@ -79,9 +73,7 @@ class SfmConfig(Strict):
         description="incremental: a model that explains less of the matched points is tried anew"
         " from another start, up to four",
     )
-    max_mapping_s: Count = Field(
-        1800, description="incremental: stop then with the best model so far"
-    )
+    max_mapping_s: Count = Field(1800, description="incremental: stop then with the best model")
 
 
 class DepthConfig(Strict):
@@ -103,9 +95,7 @@ class RgbdConfig(DepthConfig):
         "motion", description="first guess: the motion before, feature matches, none"
     )
     keyframe_every: Count = Field(10, description="frames between keyframes")
-    loops_per_keyframe: int = Field(
-        3, ge=0, le=10**9, description="most loop closures of a keyframe"
-    )
+    loops_per_keyframe: int = Field(3, ge=0, le=10**9, description="loop closures per keyframe")
     max_rmse_m: Positive = Field(0.05, description="motions with a larger residual are rejected")
     min_fitness: Fraction = Field(0.3, description="motions with less overlap are rejected")
 
@@ -129,12 +119,8 @@ class GroundTruthConfig(Strict):
     """Label replacement as in section 4.1."""
 
     batch_frames: int = Field(250, ge=2, le=10**9, description="frames per batch")
-    more_scenes: tuple[Slug, ...] = Field(
-        (), description="further scenes whose labels are estimated, to count assistance in"
-    )
-    assist_position_m: Positive = Field(
-        0.20, description="assist a batch whose last position is off by more"
-    )
+    more_scenes: tuple[Slug, ...] = Field((), description="more scenes to count assistance in")
+    assist_position_m: Positive = Field(0.20, description="assist a batch whose end is off by more")
     assist_orientation_deg: Positive = Field(10.0, description="or whose last orientation is")
     sfm: SfmConfig = part(SfmConfig, "structure from motion")
     rgbd: RgbdConfig = part(RgbdConfig, "RGB-D odometry")
@@ -150,21 +136,15 @@ class Config(DatasetConfig):
         None, description="scenes of the target `datasets`; null: those of the design"
     )
     groundtruth_camera: CameraConfig = part(
-        CameraConfig, "camera of the frames that labels are estimated from"
+        CameraConfig, "of frames that labels are estimated from"
     )
     render_speed: RenderSpeedConfig = part(RenderSpeedConfig, "what rendering is measured on")
-    groundtruth: GroundTruthConfig = part(
-        GroundTruthConfig, "estimated labels (docs/groundtruth.md)"
-    )
-    references: ReferencesConfig = part(
-        ReferencesConfig, "what localizers are compared with (docs/references.md)"
-    )
+    groundtruth: GroundTruthConfig = part(GroundTruthConfig, "labels (docs/groundtruth.md)")
+    references: ReferencesConfig = part(ReferencesConfig, "other methods (docs/references.md)")
     robustness: RobustnessConfig = part(RobustnessConfig, "tests with effects (docs/variation.md)")
     network: NetworkConfig = part(NetworkConfig, "shape of all localizers")
     training: TrainingConfig = Field(description="docs/localizers.md")
-    pretraining: PretrainingConfig = part(
-        PretrainingConfig, "what pretrained runs start from (docs/start.md)"
-    )
+    pretraining: PretrainingConfig = part(PretrainingConfig, "what runs start from (docs/start.md)")
     localizers: dict[ModelName, LocalizerConfig] = Field(description="hyper-parameters of each")
 
     @model_validator(mode="after")
