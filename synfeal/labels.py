@@ -18,14 +18,13 @@ the training poses. A scale turns nothing, so it has no orientation error.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from synfeal.config.experiments import INJECTED
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.geometry.rotations import canonical_quat_wxyz
 
@@ -84,7 +83,7 @@ OF_SPACE = ("bend", "scale")
 
 
 def with_error(
-    kind: str,  # one of ``INJECTED``
+    kind: str,  # one of :data:`synfeal.config.experiments.INJECTED`
     table: PoseTable,  # true poses of a split
     train: PoseTable,  # true poses of the training split
     noise_m: float,  # median position error, metres
@@ -94,44 +93,29 @@ def with_error(
     rng: np.random.Generator,
 ) -> PoseTable:
     """The same frames with erroneous poses."""
-    return _KINDS[kind](table, train, noise_m, noise_deg, rng)
+    angle_rad = np.radians(noise_deg)
+    if kind == "noise":
+        return add_noise(table, noise_m, noise_deg, rng)
+    if kind == "offset":  # one displacement and one rotation per path
+        paths, place = np.unique(table.path, return_inverse=True)
+        shift, axis = unit_vectors(len(paths), rng), unit_vectors(len(paths), rng)
+        return displaced(table, noise_m * shift[place], angle_rad * axis[place])
+    if kind == "bend":  # two fields in space, of displacements and of rotation vectors
+        # Both sizes are given, so the rotations are not those that the displacements would imply.
+        fields = [_smooth_field(train.position_m, size, rng) for size in (noise_m, angle_rad)]
+        return displaced(table, *(field(table.position_m) for field in fields))
+    if kind == "scale":  # by one factor about the first training camera, where a map would begin
+        origin_m = train.position_m[0]
+        distance_m = np.median(np.linalg.norm(train.position_m - origin_m, axis=1))
+        share = noise_m / distance_m if distance_m > 0 else 0.0
+        shift_m = share * (table.position_m - origin_m)
+        return displaced(table, shift_m, np.zeros_like(shift_m))
+    raise ValueError(f"labels have no error of the kind '{kind}'")
 
 
 def seed_names(kind: str, split: str) -> tuple[str, ...]:
     """What the seed of a label set depends on beside the scene and the size; never on a level."""
     return (kind,) if kind in OF_SPACE else (kind, split)
-
-
-def _offset(
-    table: PoseTable, train: PoseTable, noise_m: float, noise_deg: float, rng: np.random.Generator
-) -> PoseTable:
-    """One displacement and one rotation per path, of exactly the nominal sizes."""
-    paths, place = np.unique(table.path, return_inverse=True)
-    shift, axis = unit_vectors(len(paths), rng), unit_vectors(len(paths), rng)
-    return displaced(table, noise_m * shift[place], np.radians(noise_deg) * axis[place])
-
-
-def _bend(
-    table: PoseTable, train: PoseTable, noise_m: float, noise_deg: float, rng: np.random.Generator
-) -> PoseTable:
-    """Two fields in space, of displacements and of rotation vectors, each of one wavelength.
-
-    Both sizes are given, so the rotations are not those that the displacements would imply.
-    """
-    shift_m = _smooth_field(train.position_m, noise_m, rng)
-    rotvec_rad = _smooth_field(train.position_m, np.radians(noise_deg), rng)
-    return displaced(table, shift_m(table.position_m), rotvec_rad(table.position_m))
-
-
-def _scale(
-    table: PoseTable, train: PoseTable, noise_m: float, noise_deg: float, rng: np.random.Generator
-) -> PoseTable:
-    """Too large by one factor about the first training camera, where a map would begin."""
-    origin_m = train.position_m[0]
-    distance_m = np.median(np.linalg.norm(train.position_m - origin_m, axis=1))
-    share = noise_m / distance_m if distance_m > 0 else 0.0
-    shift_m = share * (table.position_m - origin_m)
-    return displaced(table, shift_m, np.zeros_like(shift_m))
 
 
 def _smooth_field(
@@ -152,14 +136,6 @@ def _smooth_field(
 
     size = median / np.median(np.linalg.norm(shape(position_m), axis=1))
     return lambda at_m: size * shape(at_m)
-
-
-Kind = Callable[[PoseTable, PoseTable, float, float, np.random.Generator], PoseTable]
-_KINDS: Mapping[str, Kind] = {
-    "noise": lambda table, train, *given: add_noise(table, *given),
-    **{"offset": _offset, "bend": _bend, "scale": _scale},
-}
-assert set(_KINDS) == set(INJECTED)
 
 
 def write_erroneous_labels(

@@ -10,9 +10,9 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from synfeal.config.dataset import DatasetConfig
 from synfeal.config.load import check_mesh_file, describe, read_yaml
@@ -20,6 +20,7 @@ from synfeal.config.models import CameraConfig, RenderConfig, SceneConfig
 from synfeal.errors import InputError
 from synfeal.files import file_sha256
 
+Model = TypeVar("Model", bound=BaseModel)
 SCENE, SIZE = "scan", "all"  # as the configuration of a collection calls its scene and its size
 KEYS: Mapping[str, str] = {
     "mesh": f"scenes.{SCENE}.path",
@@ -80,10 +81,7 @@ def scene_config(options: Mapping[str, Any]) -> SceneConfig:
     check_mesh_file(Path(options["mesh"]), "--mesh")
     scene = _nested(options)["scenes"][SCENE]
     with options_named():
-        try:
-            return SceneConfig.model_validate({"source": "mesh", **scene})
-        except ValidationError as error:
-            raise InputError(f"scenes.{SCENE}.{describe(error)}") from None
+        return _checked(SceneConfig, {"source": "mesh", **scene}, f"scenes.{SCENE}")
 
 
 def render_configs(options: Mapping[str, Any]) -> tuple[CameraConfig, RenderConfig]:
@@ -92,15 +90,18 @@ def render_configs(options: Mapping[str, Any]) -> tuple[CameraConfig, RenderConf
         raise InputError("effects: act on the frames of paths; use collect for them")
     values = _nested(options)
     with options_named():
-        found: list[Any] = []
-        for key, model in (("network_camera", CameraConfig), ("render", RenderConfig)):
-            try:
-                found.append(model.model_validate(values.pop(key, {})))
-            except ValidationError as error:
-                raise InputError(f"{key}.{describe(error)}") from None
+        camera = _checked(CameraConfig, values.pop("network_camera", {}), "network_camera")
+        render = _checked(RenderConfig, values.pop("render", {}), "render")
         if values:
             raise InputError(f"{next(iter(options))}: is not an option of a renderer")
-    return found[0], found[1]
+    return camera, render
+
+
+def _checked(model: type[Model], values: Any, key: str) -> Model:
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise InputError(f"{key}.{describe(error)}") from None
 
 
 def in_words_of_options(message: str) -> str:

@@ -34,7 +34,7 @@ def build_parser() -> argparse.ArgumentParser:
         )
         for flag, details in command.options:
             added.add_argument(flag, **details)
-        added.set_defaults(action=command.action)
+        added.set_defaults(action=command)
     return parser
 
 

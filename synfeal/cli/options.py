@@ -21,6 +21,10 @@ class Command(NamedTuple):
     options: tuple[Option, ...]
     action: Action  # imports what it needs when it is called: ``--help`` is quick
 
+    def __call__(self, arguments: argparse.Namespace) -> None:
+        """Carry it out."""
+        self.action(arguments)
+
 
 def option(flag: str, text: str, **details: Any) -> Option:
     """A flag, or the name of what stands without one, and its help; ``details`` are argparse's."""
