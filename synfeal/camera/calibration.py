@@ -61,7 +61,7 @@ class Calibration:
     def __post_init__(self) -> None:
         for name in ("fx", "fy"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
+            if value <= 0:
                 raise ValueError(f"{name}: a focal length is a positive number, found {value:g}")
         for name, side in (("cx", self.width), ("cy", self.height)):
             value = getattr(self, name)
@@ -70,8 +70,6 @@ class Calibration:
                     f"{name}: the principal point {value:g} lies outside the image of"
                     f" {self.width}x{self.height}; are both of the same calibration?"
                 )
-        if not all(map(math.isfinite, self.distortion)):
-            raise ValueError(f"distortion: must be finite, found {list(self.distortion)}")
 
     def scaled(self, width: int | None, height: int | None) -> Calibration:
         """The same lens with an image of another size, in pixels, as when the image is resized.
@@ -83,12 +81,9 @@ class Calibration:
         """
         if width is None and height is None:
             return self
-        if width is None:
-            assert height is not None
-            width = round(height * self.width / self.height)
+        width = width or round((height or 0) * self.width / self.height)
         kept = round(width * self.height / self.width)
-        if height is None:
-            height = kept
+        height = height or kept
         if abs(width * self.height / self.width - height) >= 1.0:
             raise ValueError(
                 f"is of {self.width}x{self.height}, which does not scale to"
@@ -164,12 +159,18 @@ def _from_mapping(values: Any) -> Calibration:
     return Calibration(*size, fx, fy, cx + 0.5, cy + 0.5, distortion)
 
 
-def _size(values: Mapping[str, Any]) -> tuple[int, int]:
+def _size(
+    values: Mapping[str, Any], names: Sequence[str] = ("image_width", "image_height")
+) -> tuple[int, int]:
+    """Whole pixels along both sides: of two names, or of one that stands for both."""
     if any(name in values for name in SIZE):
-        width, height = _numbers(values, SIZE, (2,))
-        return _side(SIZE[0], width), _side(SIZE[0], height)
-    width, height = (_numbers(values, (name,), (1,))[0] for name in ("image_width", "image_height"))
-    return _side("image_width", width), _side("image_height", height)
+        names, held = (SIZE[0], SIZE[0]), _numbers(values, SIZE, (2,))
+    else:
+        held = [_numbers(values, (name,), (1,))[0] for name in names]
+    for name, value in zip(names, held, strict=True):
+        if not (value >= 1 and value == int(value)):
+            raise ValueError(f"{name}: must be a whole number of pixels, found {value:g}")
+    return int(held[0]), int(held[1])
 
 
 def _numbers(values: Mapping[str, Any], names: Sequence[str], counts: Sequence[int]) -> list[float]:
@@ -203,12 +204,6 @@ def _flattened(held: Any) -> Iterator[float]:
         yield float(held)
 
 
-def _side(name: str, value: float) -> int:
-    if not (value >= 1 and value == int(value)):
-        raise ValueError(f"{name}: must be a whole number of pixels, found {value:g}")
-    return int(value)
-
-
 def _five(name: str, found: Sequence[float]) -> Distortion:
     """The first five coefficients, k1, k2, p1, p2 and k3; the others must be 0."""
     if any(found[5:]):
@@ -237,12 +232,12 @@ def _from_colmap(text: str) -> Calibration:
         )
     names = COLMAP_MODELS[model]
     values = {"WIDTH": width, "HEIGHT": height, "PARAMS": parameters}
-    w, h = (_side(name, *_numbers(values, (name,), (1,))) for name in ("WIDTH", "HEIGHT"))
+    size = _size(values, ("WIDTH", "HEIGHT"))
     held = dict(zip(names, _numbers(values, ("PARAMS",), (len(names),)), strict=True))
-    order = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-    distortion = _five("PARAMS", [held.get(name, 0.0) for name in order])
+    coefficients = COLMAP_MODELS["FULL_OPENCV"][4:]
+    distortion = _five("PARAMS", [held.get(name, 0.0) for name in coefficients])
     fx, fy = (held[name if name in held else "f"] for name in ("fx", "fy"))
-    return Calibration(w, h, fx, fy, held["cx"], held["cy"], distortion)
+    return Calibration(*size, fx, fy, held["cx"], held["cy"], distortion)
 
 
 def _shortened(value: Any) -> str:

@@ -12,8 +12,6 @@ from synfeal.camera.distortion import distort, undistort
 
 Array = NDArray[np.float64]
 
-_CHECKED = 33  # points along each side on which a lens is checked, corners of the image included
-
 
 class Intrinsics(NamedTuple):
     """Pinhole intrinsics in pixels; the centre of the top-left pixel is (0.5, 0.5)."""
@@ -24,12 +22,10 @@ class Intrinsics(NamedTuple):
     cy: float
 
     def matrix(self, centre_shift_px: float = 0.0) -> Array:
-        """The camera matrix (3, 3).
+        """The camera matrix (3, 3), with a shift of the principal point.
 
-        Args:
-            centre_shift_px: added to the principal point: 0 where the centre of the first pixel is
-                at (0.5, 0.5), as here and in COLMAP; -0.5 where it is at (0, 0), as in OpenCV and
-                Open3D.
+        It is 0 where the centre of the first pixel is at (0.5, 0.5), as here and in COLMAP; -0.5
+        where it is at (0, 0), as in OpenCV and Open3D.
         """
         cx, cy = self.cx + centre_shift_px, self.cy + centre_shift_px
         return np.array([[self.fx, 0.0, cx], [0.0, self.fy, cy], [0.0, 0.0, 1.0]])
@@ -95,10 +91,8 @@ def refuse_fold(camera: Camera) -> None:
     Raises:
         ValueError: the lens folds over within the image; names the pixel nearest to the centre.
     """
-    column, row = np.meshgrid(
-        np.linspace(0.0, camera.width, _CHECKED), np.linspace(0.0, camera.height, _CHECKED)
-    )
-    pixel = np.stack([column, row], axis=-1)
+    sides = (np.linspace(0.0, side, 33) for side in (camera.width, camera.height))
+    pixel = np.stack(np.meshgrid(*sides), axis=-1)
     folded = pixel[np.isnan(normalised_of_pixels(camera, pixel)).any(axis=-1)]
     if len(folded):
         _, _, cx, cy = camera.intrinsics

@@ -134,9 +134,10 @@ class _Path:
 
     def frames(self, begin: int, end: int, with_depth: bool) -> Iterator[Frame]:
         """The frames of some rows, with those before them for auto-exposure alone."""
-        meter = AutoExposure(self.config.exposure) if self.config.exposure else None
-        lagging = meter is not None and meter.lags
-        for row in range(self.first if lagging else begin, end):
+        exposure = self.config.exposure
+        meter = AutoExposure(exposure) if exposure else None
+        lags = exposure is not None and exposure.time_constant_s is not None
+        for row in range(self.first if lags else begin, end):
             seen, depth_m = self._seen(row, with_depth)
             if meter is not None:
                 seen *= np.float32(2.0 ** meter.next_ev(seen, self._seconds(row)))

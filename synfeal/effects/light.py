@@ -129,11 +129,6 @@ class AutoExposure:
         self._goal_ev: float | None = None
         self._ev = 0.0
 
-    @property
-    def lags(self) -> bool:
-        """Whether a frame depends on those before it."""
-        return self._config.time_constant_s is not None
-
     def next_ev(self, light: Light, since_s: float) -> float:
         """Exposure of a frame (H, W, 3), stops, ``since_s`` after the last; the first is settled.
 

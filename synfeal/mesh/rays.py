@@ -48,11 +48,8 @@ class RayCaster:
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Distance (N,) in metres to the first triangle on each ray, and its index (N,).
 
-        Where there is none, the distance is ``inf`` and the index -1.
-
-        Args:
-            origins: (N, 3) starting points, world, metres.
-            directions: (N, 3), of any length but zero.
+        Where there is none, the distance is ``inf`` and the index -1. Rays start at ``origins``
+        (N, 3), world, metres; ``directions`` (N, 3) are of any length but zero.
         """
         hit = self._scene.run(self._starts(origins), _unit(directions), output=True)
         face = hit["primID"].astype(np.int64)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
 from typing import Protocol, Self
 
 import numpy as np
@@ -14,6 +15,7 @@ from synfeal.mesh.model import MeshPart
 Rgb = NDArray[np.uint8]
 Depth = NDArray[np.float32]
 DEFAULTS = RenderConfig()
+SHADERS = Path(__file__).parent / "shaders"
 # Mesa's software renderer silently draws nonsense from a buffer of 2^24 vertices on.
 MOST_VERTICES = 1 << 23
 

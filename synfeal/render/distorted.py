@@ -95,12 +95,9 @@ def covering_camera(camera: CameraConfig) -> CameraConfig:
 def resampled_depth(
     depth_m: Depth, index: NDArray[np.int32], weight: NDArray[np.floating]
 ) -> Depth:
-    """Depth at points between the pixels of a pinhole image; metres, inf for nothing.
+    """Depth (...) at points between the pixels of a pinhole image (h, w); metres, inf for nothing.
 
-    Args:
-        depth_m: (h, w), along the optical axis.
-        index: (..., 4), the neighbours of each point in the flat image.
-        weight: (..., 4), of each neighbour.
+    ``index`` (..., 4) are the neighbours of each point in the flat image, ``weight`` theirs.
     """
     inverse = 1.0 / depth_m
     values = inverse.reshape(-1)[index]

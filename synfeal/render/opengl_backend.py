@@ -35,28 +35,6 @@ GL_LIBRARIES = ("libGL.so.1", "libOpenGL.so.0")
 MOST_DEVICES = 8
 GL_VERSION = 330
 
-# One triangle that covers the image.
-COVER = """
-void main() {
-    gl_Position = vec4(gl_VertexID == 1 ? 3 : -1, gl_VertexID == 2 ? 3 : -1, 0, 1);
-}
-"""
-
-# The factor is a constant: a loop that the compiler unrolls takes half the time.
-MEAN = """
-const int FACTOR = %d;
-uniform sampler2D samples;
-out vec4 colour;
-void main() {
-    ivec2 first = ivec2(gl_FragCoord.xy) * FACTOR;
-    vec4 sum = vec4(0.0);
-    for (int y = 0; y < FACTOR; y++)
-        for (int x = 0; x < FACTOR; x++)
-            sum += texelFetch(samples, first + ivec2(x, y), 0);
-    colour = sum / float(FACTOR * FACTOR);
-}
-"""
-
 
 @functools.cache
 def shared_context() -> Any:
@@ -77,6 +55,7 @@ def shared_context() -> Any:
         except Exception as error:  # what is missing decides what is raised
             errors.append(error)
         else:
+            context.gc_mode = "context_gc"  # what is dropped is released where it is current
             context.__exit__(None, None, None)
             return context
     raise errors[0]
@@ -109,36 +88,32 @@ class OpenglRenderer(Renderer):
         self._size = (camera.width, camera.height)
         self._background = [level / 255.0 for level in render.background_rgb]
         with self._context:
-            self._check_size(render.supersampling)
+            self._open_images(render.supersampling)
             self._parts = [
                 DevicePart(self._context, piece, self._centre_m)
                 for part in mesh.parts
                 if part.is_drawn
                 for piece in pieces(part)
             ]
-            self._open_images(render.supersampling)
-
-    def _check_size(self, supersampling: int) -> None:
-        limit = self._context.info["GL_MAX_TEXTURE_SIZE"]
-        if max(self._size) * supersampling > limit:
-            raise InputError(
-                f"camera: {self._size[0]}x{self._size[1]} pixels at {supersampling} samples per"
-                f" axis are more than the {limit} OpenGL draws here; lower render.supersampling"
-            )
 
     def _open_images(self, supersampling: int) -> None:
         """Make the images that are drawn into: samples, their means, and depth."""
         context, size = self._context, self._size
         large = (size[0] * supersampling, size[1] * supersampling)
+        limit = context.info["GL_MAX_TEXTURE_SIZE"]
+        if max(large) > limit:
+            raise InputError(
+                f"camera: {size[0]}x{size[1]} pixels at {supersampling} samples per axis are more"
+                f" than the {limit} OpenGL draws here; lower render.supersampling"
+            )
         self._samples = context.texture(large, 4)
-        self._sample_target = context.framebuffer(
-            [self._samples], context.depth_renderbuffer(large)
-        )
+        depths = (context.depth_renderbuffer(large), context.depth_renderbuffer(size))
+        self._sample_target = context.framebuffer([self._samples], depths[0])
         self._mean_target = context.simple_framebuffer(size, 4)
-        self._depth_target = context.framebuffer(
-            [context.renderbuffer(size, 1, dtype="f4")], context.depth_renderbuffer(size)
-        )
-        self._mean = context.vertex_array(program_of(context, COVER, MEAN % supersampling), [])
+        metres = context.renderbuffer(size, 1, dtype="f4")
+        self._depth_target = context.framebuffer([metres], depths[1])
+        program = program_of(context, "cover.vert", "mean.frag", [f"FACTOR {supersampling}"])
+        self._mean = context.vertex_array(program, [])
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         """Colours (H, W, 3) seen from a pose (4, 4)."""
@@ -186,16 +161,10 @@ class OpenglRenderer(Renderer):
 
     def close(self) -> None:
         """Give the mesh's memory back; the renderer must not be used afterwards."""
+        del self._parts, self._mean, self._samples
+        del self._sample_target, self._mean_target, self._depth_target
         with self._context:
-            for part in self._parts:
-                part.release()
-            self._mean.program.release()
-            self._mean.release()
-            for target in (self._sample_target, self._mean_target, self._depth_target):
-                for image in (*target.color_attachments, target.depth_attachment):
-                    if image is not None:
-                        image.release()
-                target.release()
+            self._context.gc()
 
 
 def clip_from_cam(camera: CameraConfig) -> NDArray[np.float64]:

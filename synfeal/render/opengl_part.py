@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.mesh.model import MeshPart
-from synfeal.render.base import thresholded
+from synfeal.render.base import SHADERS, thresholded
 
 Floats = NDArray[np.float64]
 # 64 to 512 cost the same; with one sample per pixel culling takes a tenth off a frame at 640x480,
@@ -29,68 +29,6 @@ MARGIN = 1e-4  # of the part's size: far beyond what single precision on the dev
 # is a fifth larger (blur), with a whole level fine checkerboards alias.
 LEVEL_BIAS = -0.5
 FILTER = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
-
-VERTEX = """
-uniform mat4 clip_from_mesh;
-in vec3 position;
-#ifdef TEXTURED
-in vec2 corner_uv;
-out vec2 uv;
-#endif
-#ifdef COLOURED
-in vec3 corner_rgb;
-out vec3 rgb;
-#endif
-void main() {
-#ifdef TEXTURED
-    uv = corner_uv;
-#endif
-#ifdef COLOURED
-    rgb = corner_rgb;
-#endif
-    gl_Position = clip_from_mesh * vec4(position, 1.0);
-}
-"""
-
-COLOUR = """
-uniform vec3 base_rgb;
-#ifdef TEXTURED
-uniform sampler2D image;
-uniform float level_bias;
-in vec2 uv;
-#endif
-#ifdef COLOURED
-in vec3 rgb;
-#endif
-out vec4 colour;
-void main() {
-    colour = vec4(base_rgb, 1.0);
-#ifdef COLOURED
-    colour.rgb *= rgb;
-#endif
-#ifdef TEXTURED
-    vec4 texel = texture(image, uv, level_bias);
-    colour.rgb *= texel.rgb;
-#endif
-#ifdef CUT_OUT
-    if (texel.a < 0.5) discard;
-#endif
-}
-"""
-
-DEPTH = """
-#ifdef CUT_OUT
-uniform sampler2D image;
-in vec2 uv;
-#endif
-out float depth_m;
-void main() {
-#ifdef CUT_OUT
-    if (textureLod(image, uv, 0.0).a < 0.5) discard;
-#endif
-    depth_m = 1.0 / gl_FragCoord.w;
-}
-"""
 
 
 class Chunks(NamedTuple):
@@ -151,12 +89,10 @@ def visible_runs(chunks: Chunks, clip_from_mesh: Floats) -> list[tuple[int, int]
 
 
 def program_of(context: Any, vertex: str, fragment: str, features: Collection[str] = ()) -> Any:
-    """A program with each of ``TEXTURED``, ``COLOURED`` and ``CUT_OUT`` that is named switched on.
-
-    ``CUT_OUT`` needs ``TEXTURED``.
-    """
+    """A program of two files in ``shaders``, which begin with what is named defined."""
     header = "#version 330\n" + "".join(f"#define {name}\n" for name in sorted(features))
-    return context.program(vertex_shader=header + vertex, fragment_shader=header + fragment)
+    vertex, fragment = (header + (SHADERS / name).read_text() for name in (vertex, fragment))
+    return context.program(vertex_shader=vertex, fragment_shader=fragment)
 
 
 class DevicePart:
@@ -167,7 +103,7 @@ class DevicePart:
         vertices_m = part.vertices_m - centre_m
         self._chunks = chunks_of(vertices_m, part.faces)
         used = self._chunks.vertices
-        self._buffers = [context.buffer(self._chunks.faces.astype(np.uint32))]
+        self._index = context.buffer(self._chunks.faces.astype(np.uint32))
         is_textured = part.texture is not None and part.uv is not None
         pixels = thresholded(part) if is_textured else None
         self._texture = None if pixels is None else _upload(context, pixels)
@@ -181,21 +117,20 @@ class DevicePart:
         features = ["TEXTURED"] * bool(uv) + ["COLOURED"] * bool(rgb)
         if pixels is not None and pixels.shape[2] == 4:
             features.append("CUT_OUT")
-        self.colour = self._program(COLOUR, features, [position, *uv, *rgb])
+        self.colour = self._program("colour.frag", features, [position, *uv, *rgb])
         self.colour.program["base_rgb"].value = tuple(part.base_color[:3] / 255.0)
         if uv:
             self.colour.program["level_bias"].value = LEVEL_BIAS
         cut_out = ["TEXTURED", "CUT_OUT"] if "CUT_OUT" in features else []
-        self.depth = self._program(DEPTH, cut_out, [position, *(uv if cut_out else [])])
+        self.depth = self._program("depth.frag", cut_out, [position, *(uv if cut_out else [])])
 
     def _attribute(self, values: NDArray[Any], layout: str, name: str) -> tuple[Any, str, str]:
-        self._buffers.append(self._context.buffer(np.ascontiguousarray(values)))
-        return self._buffers[-1], layout, name
+        return self._context.buffer(np.ascontiguousarray(values)), layout, name
 
     def _program(self, fragment: str, features: list[str], attributes: list[Any]) -> Any:
         """A vertex array that draws the part's triangles with a program of its own."""
-        program = program_of(self._context, VERTEX, fragment, features)
-        return self._context.vertex_array(program, attributes, self._buffers[0])
+        program = program_of(self._context, "part.vert", fragment, features)
+        return self._context.vertex_array(program, attributes, self._index)
 
     def draw(self, triangles: Any, clip_from_mesh: NDArray[np.float64]) -> None:
         """Draw ``colour``, or as ``depth`` distances along the optical axis in metres.
@@ -208,16 +143,6 @@ class DevicePart:
             self._texture.use(0)
         for first, count in visible_runs(self._chunks, clip_from_mesh):
             triangles.render(moderngl.TRIANGLES, vertices=count, first=first)
-
-    def release(self) -> None:
-        """Free what lies on the device."""
-        for triangles in (self.colour, self.depth):
-            triangles.program.release()
-            triangles.release()
-        for buffer in self._buffers:
-            buffer.release()
-        if self._texture is not None:
-            self._texture.release()
 
 
 def _upload(context: Any, pixels: NDArray[np.uint8]) -> Any:

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import functools
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 
 from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.render.base import DEFAULTS, Depth, Renderer, Rgb, pieces, thresholded
+from synfeal.render.base import DEFAULTS, SHADERS, Depth, Renderer, Rgb, pieces, thresholded
 
 os.environ["PYOPENGL_PLATFORM"] = "egl"
 np.__dict__.setdefault("infty", np.inf)  # gone in NumPy 2, used by pyrender
@@ -33,7 +32,6 @@ from pyrender.shader_program import ShaderProgramCache  # noqa: E402
 
 # OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
 CAM_FROM_GL: NDArray[np.float64] = np.diag([1.0, -1.0, -1.0, 1.0])
-SHADERS = Path(__file__).parent / "shaders"
 # Half a level sharper than the nearest one: samples are averaged, so that textures may alias a
 # little. Depth asks whether the very texel at the pixel's centre is cut out.
 COLOUR_BIAS, DEPTH_BIAS = -0.5, -100.0
