@@ -12,7 +12,7 @@ from synfeal.report.cost import estimate, steps
 from synfeal.report.cost.jobs import job_of
 from synfeal.report.cost.laws import fit_laws, matched, seconds_of
 from synfeal.report.cost.networks import training_work
-from synfeal.report.cost.runs import last_look_s, read_measured, read_run, write_measured
+from synfeal.report.cost.runs import last_look_s, read_measured, read_runs, write_measured
 from tests import ROOT
 from tests.planned_runs import planned, run_jobs
 from tests.report_results import read
@@ -149,7 +149,7 @@ def test_a_step_is_trained_and_timed_and_rates_are_found(monkeypatch):
 
 def test_steps_that_are_timed_tell_what_a_small_run_does_not():
     """Mini is predicted from a smoke run whose jobs are each 15 % off, one way or the other."""
-    mini, _ = read_run(Path("results/published/mini"))
+    mini, _ = read_runs(Path("results/published/mini"))
     laws = fit_laws(mini)
     jobs = run_jobs("smoke")
     jobs = jobs[jobs.law.isin(laws.index)]

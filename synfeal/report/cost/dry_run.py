@@ -18,8 +18,7 @@ from typing import Any
 
 from synfeal.errors import InputError
 from synfeal.files import read_json, write_json
-
-Key = tuple[str, str]
+from synfeal.report.cost.jobs import Key
 
 
 @dataclass(frozen=True)
@@ -41,36 +40,34 @@ def planned_jobs(profile: Path) -> PlannedJobs:
             said = [line for line in run.stderr.splitlines() if line.strip()] or ["it says nothing"]
             raise InputError(f"{profile}: Snakemake cannot plan a run of it here: {said[-1]}")
         records = read_json(out)
-    keys = [key_of(record["benchmark"]) for record in records]
-    return PlannedJobs(tuple(filter(None, keys)), _needed(records))
+    keys = tuple(key_of(record["benchmark"]) for record in records if record["benchmark"])
+    return PlannedJobs(keys, _needed(records))
 
 
-def key_of(benchmark: str | None) -> Key | None:
-    """Stage and name of a job from the path of its measurement; None where it has none."""
-    if benchmark is None:
-        return None
-    stage, _, name = benchmark.partition("/benchmarks/")[2].removesuffix(".tsv").partition("/")
+def job_name(benchmark: str) -> str:
+    """``stage/name`` of a job, from the file that measures it."""
+    return benchmark.partition("/benchmarks/")[2].removesuffix(".tsv")
+
+
+def key_of(benchmark: str) -> Key:
+    """Stage and name of a job, from the file that measures it."""
+    stage, _, name = job_name(benchmark).partition("/")
     return stage, name
 
 
 def _needed(records: list[dict[str, Any]]) -> dict[str, frozenset[Key]]:
     """By table, the jobs that it comes from and its own."""
     makers = {path: place for place, record in enumerate(records) for path in record["output"]}
-    keys = [key_of(record["benchmark"]) for record in records]
-
-    def with_makers(place: int, found: set[int]) -> set[int]:
-        if place not in found:
-            found.add(place)
-            for path in records[place]["input"]:
-                if path in makers:
-                    with_makers(makers[path], found)
-        return found
-
-    needed = {
-        key[1]: frozenset(filter(None, (keys[job] for job in with_makers(place, set()))))
-        for place, key in enumerate(keys)
-        if key and records[place]["rule"] in ("table1_meshes", "table")
-    }
+    needed = {}
+    for place, record in enumerate(records):
+        if record["rule"] in ("table1_meshes", "table"):
+            found, asked = set(), {place}
+            while asked:
+                found |= asked
+                inputs = {path for job in asked for path in records[job]["input"]}
+                asked = {makers[path] for path in inputs & makers.keys()} - found
+            measured = (records[job]["benchmark"] for job in found)
+            needed[key_of(record["benchmark"])[1]] = frozenset(map(key_of, filter(None, measured)))
     return dict(sorted(needed.items()))
 
 

@@ -22,7 +22,7 @@ from synfeal.report.cost.networks import Work, pretext_work, training_work
 TRAINING = "training"
 LAW_OF_UNIT = {"Msamples": "rendering", "TFLOP": TRAINING}
 COLUMNS = ("stage", "job", "law", "unit", "other", "size", "disk_bytes", "held_bytes")
-NUMBERS = ("other", "size", "disk_bytes", "held_bytes")
+NUMBERS = COLUMNS[4:]
 
 # Bytes on disk, of the published small run (docs/cost.md): of a pose in a table, a scored frame, a
 # frame's descriptors, matches and observations; per pixel of an image; of a procedural scene.
@@ -33,7 +33,7 @@ SCENE = 50e6
 # Bytes of memory per pixel of a batch: what peaks differ by between profiles; of a SIFT feature.
 SFM_PER_PX, RGBD_PER_PX, FEATURE = 10, 26, 128 + 24
 
-Key = tuple[str, str]
+Key = tuple[str, str]  # stage and name
 Part = Mapping[str, str]
 BATCH, RUN = "scene/size/split/batch", "scene/size/labels/init/model/seed"
 
@@ -180,8 +180,7 @@ def _frames(profile: Profile, part: Part, kind: Stage) -> int:
 def _scene(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
     """A prepared scene takes as much as the user's mesh, or as a procedural one."""
     path = profile.config.scenes[part["scene"]].path
-    known = path is not None and path.is_file()
-    return {"disk_bytes": path.stat().st_size if path is not None and known else SCENE}
+    return {"disk_bytes": path.stat().st_size if path and path.is_file() else SCENE}
 
 
 def _pretrain(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
@@ -214,9 +213,8 @@ def _learning(
 
 
 def _features(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
-    job = _of_frames(profile, part, kind)
-    features = profile.config.references.max_features
-    return job | {"held_bytes": _frames(profile, part, kind) * features * FEATURE}
+    held = _frames(profile, part, kind) * profile.config.references.max_features * FEATURE
+    return _of_frames(profile, part, kind) | {"held_bytes": held}
 
 
 def _coordinates(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:

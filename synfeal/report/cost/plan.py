@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -24,15 +23,9 @@ from synfeal.report.cost.estimate import (
 )
 from synfeal.report.cost.jobs import jobs_of
 from synfeal.report.cost.laws import fit_laws
-from synfeal.report.cost.runs import profile_path, read_profile, read_run, read_runs
+from synfeal.report.cost.runs import profile_path, read_profile, read_runs
 from synfeal.report.cost.steps import timed_rates
 
-PLAN_COLUMNS = (
-    *("profile", "cores", "gpus", "gpu_tflops", "part", "name", "jobs", "work", "unit"),
-    *("cpu_h", "cpu_h_low", "cpu_h_high", "gpu_h", "gpu_h_low", "gpu_h_high"),
-    *("wall_h", "wall_h_low", "wall_h_high", "disk_gb", "peak_memory_gb", "times_measured_size"),
-    "measured",
-)
 # By the runs that were predicted from and the run that was predicted.
 Comparisons = dict[tuple[str, str], pd.DataFrame]
 
@@ -60,7 +53,7 @@ def plan_of(
     training steps that are timed here, on the GPU if there is one.
     """
     profile = read_profile(profile_name)
-    pairs, unknown = read_runs(measured)
+    pairs, unknown = read_runs(*measured)
     timed = timed_rates(profile.config) if time_steps else None
     laws = fit_laws(pairs, timed.rates if timed and not timed.on_gpu else None)
     planned = planned_jobs(profile_path(profile_name))
@@ -92,8 +85,7 @@ def compare_runs(measured: Sequence[Path], compared: Path, time_steps: bool = Fa
     With ``time_steps`` training steps of the run that is predicted are timed here, on a core.
     """
     named, name = ", ".join(map(str, measured)), str(compared)
-    pairs, _ = read_runs(measured)
-    others, _ = read_run(compared)
+    (pairs, _), (others, _) = read_runs(*measured), read_runs(compared)
     return {
         (named, name): compare_cost(fit_laws(pairs, _rates(compared, time_steps)), others),
         (name, named): compare_cost(fit_laws(others, _rates(measured[0], time_steps)), pairs),
@@ -111,36 +103,44 @@ def _rates(run: Path, time_steps: bool) -> tuple[float, float] | None:
 
 def write_plans(path: Path, plans: Sequence[Plan]) -> None:
     """Plans as one table: hours, 10^9 bytes; a row per stage, per table alone, and for all."""
-    table = pd.concat([_rows(plan) for plan in plans])
-    write_frame(path, table.reindex(columns=list(PLAN_COLUMNS)), "%.4g")
+    write_frame(path, pd.concat(map(_rows, plans)), "%.4g")
 
 
 def _rows(plan: Plan) -> pd.DataFrame:
     machine, costs = plan.machine, plan.costs[plan.costs["part"] != OWN]
-    columns: dict[str, Any] = {"profile": plan.profile, "cores": machine.cores}
-    columns |= {"gpus": machine.gpus}
-    columns |= {"gpu_tflops": f"{machine.gpu_tflops:g}" if machine.gpus else ""}
-    columns["work"] = costs["work"].map("{:.6g}".format, na_action="ignore")
-    for what in ("cpu", "gpu", "wall"):
-        for end, name in (("mid", "h"), ("low", "h_low"), ("high", "h_high")):
-            columns[f"{what}_{name}"] = costs[f"{what}_{end}"] / 3600
     is_whole = costs["part"] != ALONE  # what a table leaves behind others share
-    columns["disk_gb"] = (costs["disk_bytes"] / 1e9).where(is_whole)
-    columns["peak_memory_gb"] = (costs["peak_mb"] / 1e3).where(is_whole)
-    return costs.assign(**columns, times_measured_size=costs["beyond"])
+    ends = {"": "mid", "_low": "low", "_high": "high"}
+    columns = {
+        **{"profile": plan.profile, "cores": machine.cores, "gpus": machine.gpus},
+        "gpu_tflops": f"{machine.gpu_tflops:g}" if machine.gpus else "",
+        **{name: costs[name] for name in ("part", "name", "jobs")},
+        "work": costs["work"].map("{:.6g}".format, na_action="ignore"),
+        "unit": costs["unit"],
+        **{
+            f"{what}_h{end}": costs[f"{what}_{column}"] / 3600
+            for what in ("cpu", "gpu", "wall")
+            for end, column in ends.items()
+        },
+        "disk_gb": (costs["disk_bytes"] / 1e9).where(is_whole),
+        "peak_memory_gb": (costs["peak_mb"] / 1e3).where(is_whole),
+        **{"times_measured_size": costs["beyond"], "measured": costs["measured"]},
+    }
+    return pd.DataFrame(columns)
 
 
 def write_check(path: Path, comparisons: Comparisons) -> None:
     """Predictions beside measurements, processor seconds."""
     tables = [
-        rows.assign(predicted_from=source, predicted=predicted)
+        pd.DataFrame(
+            {
+                **{"predicted_from": source, "predicted": predicted},
+                **{name: rows[name] for name in ("stage", "jobs")},
+                "predicted_cpu_s": rows["mid"],
+                **{f"predicted_{end}_cpu_s": rows[end] for end in ("low", "high")},
+                "measured_cpu_s": rows["cpu_s"],
+                "factor": rows["factor"].map("{:.3g}".format),
+            }
+        )
         for (source, predicted), rows in comparisons.items()
     ]
-    table = pd.concat(tables)
-    table["factor"] = table["factor"].map("{:.3g}".format)
-    names = {"mid": "predicted", "low": "predicted_low", "high": "predicted_high"}
-    table = table.rename(columns={end: f"{name}_cpu_s" for end, name in names.items()})
-    table = table.rename(columns={"cpu_s": "measured_cpu_s"})
-    predicted = ("predicted_cpu_s", "predicted_low_cpu_s", "predicted_high_cpu_s")
-    columns = ["predicted_from", "predicted", "stage", "jobs", *predicted]
-    write_frame(path, table[[*columns, "measured_cpu_s", "factor"]], "%.4g")
+    write_frame(path, pd.concat(tables), "%.4g")

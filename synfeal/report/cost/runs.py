@@ -8,7 +8,7 @@ below ``<root>/benchmarks`` and path below that, without ``.tsv``; ``wall_s`` fr
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from math import floor
 from pathlib import Path
 
@@ -111,21 +111,18 @@ def profile_path(name: str) -> Path:
     return found[name]
 
 
-def read_run(root: Path) -> tuple[pd.DataFrame, int]:
-    """Measured jobs of a run with their sizes, and how many the profile cannot have.
+def read_runs(*roots: Path) -> tuple[pd.DataFrame, int]:
+    """Measured jobs of runs with their sizes, and how many their profiles cannot have.
 
-    The run's directory is called like its profile, as the workflow calls it.
+    A run's directory is called like its profile, as the workflow calls it.
     """
-    measured = read_measured(root)
-    profile = read_profile(root.resolve().name)
-    keys = zip(measured["stage"], measured["job"], strict=True)
-    pairs = matched(jobs_of(profile, keys), measured)
-    if pairs.empty:
-        raise InputError(f"{root}: none of its measured jobs is one of the profile's")
-    return pairs, len(measured) - len(pairs)
-
-
-def read_runs(roots: Sequence[Path]) -> tuple[pd.DataFrame, int]:
-    """The same of several runs together."""
-    runs = [read_run(root) for root in roots]
-    return pd.concat([pairs for pairs, _ in runs]), sum(left for _, left in runs)
+    parts, left = [], 0
+    for root in roots:
+        measured = read_measured(root)
+        profile = read_profile(root.resolve().name)
+        keys = zip(measured["stage"], measured["job"], strict=True)
+        parts.append(matched(jobs_of(profile, keys), measured))
+        left += len(measured) - len(parts[-1])
+        if parts[-1].empty:
+            raise InputError(f"{root}: none of its measured jobs is one of the profile's")
+    return pd.concat(parts), left

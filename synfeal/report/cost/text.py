@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -37,8 +38,8 @@ def comparison_text(comparisons: Comparisons) -> str:
 
 def _plan_lines(plan: Plan) -> Iterator[str]:
     machine, whole = plan.machine, plan.costs[plan.costs["part"] == RUN].iloc[0]
-    on = counted(machine.cores, "core")
-    on += f" and {counted(machine.gpus, 'GPU')}" if machine.gpus else ""
+    on = f"{machine.cores} core{'s' * (machine.cores > 1)}"
+    on += f" and {machine.gpus} GPU{'s' * (machine.gpus > 1)}" if machine.gpus else ""
     yield f"Profile {plan.profile} on {on}: {_spoken(whole, 'wall')}"
     parts = [f"processor time {_spoken(whole, 'cpu')}"]
     if machine.gpus:
@@ -57,33 +58,27 @@ def _plan_lines(plan: Plan) -> Iterator[str]:
 
 
 def _row(r: dict[Any, Any], on_gpu: bool) -> list[str]:
-    is_stage, unknown = r["part"] == STAGE, r["measured"] == "no"
+    is_stage = r["part"] == STAGE
     work = f"{number(r['work'])} {r['unit']}" if is_stage and r["unit"] else ""
-    row = [r["name"], f"{r['jobs']:,}", work]
-    disk = scaled(r["disk_bytes"], SIZES) if r["disk_bytes"] or not is_stage else ""
-    if unknown:
-        return [*row, "not measured", "", *([""] * 2 * on_gpu), "", disk, "", ""]
+    cpu = ["not measured", ""] if r["measured"] == "no" else _time(r, "cpu")
     gpu = _time(r, "gpu") if r["gpu_mid"] or not is_stage else ["", ""]
-    times = [*_time(r, "cpu"), *(gpu if on_gpu else []), duration(r["wall_mid"])]
+    disk = scaled(r["disk_bytes"], SIZES) if r["disk_bytes"] or not is_stage else ""
     peak = "" if pd.isna(r["peak_mb"]) and is_stage else _memory(r["peak_mb"])
-    return [*row, *times, disk, peak, "" if pd.isna(r["beyond"]) else number(r["beyond"])]
+    beyond = "" if pd.isna(r["beyond"]) else number(r["beyond"])
+    times = [*cpu, *gpu[: 2 * on_gpu], duration(r["wall_mid"])]
+    return [r["name"], f"{r['jobs']:,}", work, *times, disk, peak, beyond]
 
 
 def _table_table(plan: Plan) -> str:
     """One line per table of the paper: its own jobs, and all it needs."""
-    on_gpu = bool(plan.machine.gpus)
-    gpu = ["GPU time"] if on_gpu else []
+    own, alone = (plan.costs[plan.costs["part"] == part] for part in (OWN, ALONE))
+    shares = own.merge(alone, "left", "name", suffixes=("", "_alone"))
+    used = ["cpu_mid", "gpu_mid"] if plan.machine.gpus else ["cpu_mid"]
+    gpu = ["GPU time"] if plan.machine.gpus else []
     rows = [["needed by", "jobs", "CPU time", *gpu, "alone: CPU time", *gpu, "wall time", "range"]]
-    alone = plan.costs[plan.costs["part"] == ALONE].set_index("name").to_dict("index")
-    for r in plan.costs[plan.costs["part"] == OWN].to_dict("records"):
-        row = [r["name"], f"{r['jobs']:,}"]
-        for share in (r, alone.get(r["name"])):
-            times = (
-                [""] * 2 if share is None else [duration(share[c]) for c in ("cpu_mid", "gpu_mid")]
-            )
-            row += times[: 1 + on_gpu]
-        whole = alone.get(r["name"])
-        rows.append([*row, *(["", ""] if whole is None else _time(whole, "wall"))])
+    for r in shares.to_dict("records"):
+        times = [duration(r[f"{c}{end}"]) for end in ("", "_alone") for c in used]
+        rows.append([r["name"], f"{r['jobs']:,}", *times, *_time(r, "wall", "_alone")])
     return text_table(rows)
 
 
@@ -94,10 +89,10 @@ def _notes(plan: Plan) -> Iterator[str]:
     yield (
         "CPU time    of a core like that run's; range: 10 and 90 % of its jobs about the fitted law"
     )
+    each = ", one training run for each GPU" if machine.gpus else ""
     yield (
-        "wall time   stage after stage, one job for each core"
-        + (", one training run for each GPU" if machine.gpus else "")
-        + ", longest first, no waiting for disks"
+        f"wall time   stage after stage, one job for each core{each}, longest first, no waiting for"
+        " disks"
     )
     yield "memory      of one job; several run at a time"
     yield "x measured  largest planned job over largest measured one; far above 1 is extrapolated"
@@ -130,13 +125,8 @@ def scaled(value: float, units: Sequence[tuple[float, float, str]]) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Seconds in the unit that suits them."""
-    return scaled(seconds, DURATIONS)
-
-
-def counted(n: int, what: str) -> str:
-    """As in ``1 core``, ``16 cores``."""
-    return f"{n} {what}" + "s" * (n != 1)
+    """Seconds in the unit that suits them; nothing where they are not known."""
+    return "" if math.isnan(seconds) else scaled(seconds, DURATIONS)
 
 
 def _memory(peak_mb: float) -> str:
@@ -149,12 +139,14 @@ def _spoken(costs: Any, what: str) -> str:
     return mid if low == high else f"{mid} ({low} to {high})"
 
 
-def _time(costs: Any, what: str) -> list[str]:
-    return _span(*(costs[f"{what}_{end}"] for end in ("low", "mid", "high")))
+def _time(costs: Any, what: str, of: str = "") -> list[str]:
+    return _span(*(costs[f"{what}_{end}{of}"] for end in ("low", "mid", "high")))
 
 
 def _span(low: float, mid: float, high: float) -> list[str]:
     """The middle, and both ends in the unit of the upper one."""
+    if math.isnan(mid):
+        return ["", ""]
     _, unit, name = next(u for u in DURATIONS if high >= u[0])
     ends = number(low / unit), number(high / unit)
     return [duration(mid), "" if ends[0] == ends[1] else f"{ends[0]} - {ends[1]} {name}"]

@@ -10,10 +10,10 @@ from statistics import median
 
 from synfeal.config import Config, Design, Run
 from synfeal.errors import InputError
-from synfeal.report.cost.dry_run import key_of
+from synfeal.report.cost.dry_run import job_name, key_of
 from synfeal.report.cost.jobs import Profile, jobs_of
 from synfeal.report.cost.laws import fit_laws, seconds_of
-from synfeal.report.cost.runs import read_run
+from synfeal.report.cost.runs import read_runs
 
 MEASURED = Path("results/published/mini")
 
@@ -38,18 +38,13 @@ def plan_run(config: Config, design: Design, benchmarks: Iterable[str], cores: i
     return RunPlan(config.root, expected_s, tuple(design.runs), cores)
 
 
-def job_name(benchmark: str) -> str:
-    """``stage/name`` of a job, from the file that measures it."""
-    return benchmark.partition("/benchmarks/")[2].removesuffix(".tsv")
-
-
 def _expected_s(profile: Profile, benchmarks: Iterable[str]) -> dict[str, float]:
     """Seconds by job from the planner's laws (docs/cost.md); none where no run was published."""
     try:
-        laws = fit_laws(read_run(MEASURED)[0])
+        laws = fit_laws(read_runs(MEASURED)[0])
     except InputError:
         return {}
-    jobs = jobs_of(profile, filter(None, map(key_of, benchmarks)))
+    jobs = jobs_of(profile, map(key_of, benchmarks))
     names = jobs["stage"].str.cat(jobs["job"], sep="/").str.rstrip("/")
     return dict(seconds_of(jobs, laws).set_axis(names).dropna())
 

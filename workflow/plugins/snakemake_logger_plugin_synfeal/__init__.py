@@ -12,7 +12,7 @@ from rich.console import Console
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from synfeal.report.progress.plan import job_name
+from synfeal.report.cost.dry_run import job_name
 from synfeal.report.progress.view import RunView
 
 SAID = ("Nothing to be done", "Complete log")
