@@ -12,6 +12,7 @@ that is not there, or cannot be read, ends in an ``InputError``, as everywhere.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -36,7 +37,7 @@ from synfeal.evaluation.metrics import pose_errors
 from synfeal.labels import constant_pose
 from synfeal.report.claims.model import Missing
 from synfeal.report.layouts import TITLES
-from synfeal.report.stats import COLUMNS, COMMON_COLUMNS, MEASURES, read_errors
+from synfeal.report.stats import COLUMNS, COMMON_COLUMNS, MEASURES, REMEDY, read_errors
 from synfeal.seeds import generator_of
 
 # A localizer has learnt where its whole interval lies below this share of the mean pose's error.
@@ -106,7 +107,8 @@ class Evidence:
     def runs_of(self, cell: Cell) -> Sequence[Run]:
         """The repetitions of a cell."""
         if cell not in self.runs:
-            raise Missing(f"this profile has no row {_name(cell)}")
+            named = " ".join((cell.scene, cell.size, cell.labels, cell.init))
+            raise Missing(f"this profile has no row {named}")
         return self.runs[cell]
 
     def errors(self, *cells: Cell) -> Array:
@@ -136,9 +138,7 @@ class Evidence:
         _, columns, measures = SCORES[self.score]
         table = read_errors(path, columns)
         if not np.array_equal(table["frame"], test.poses.frame):
-            raise InputError(
-                f"{path}: its frames are not those of the test set; score that run again"
-            )
+            raise InputError(f"{path}: its frames are not those of the test set; {REMEDY}")
         return [medians(table[m].to_numpy(), test.path, test.counts) for m in measures]
 
     def test_set(self, scene: str, size: str) -> TestSet:
@@ -149,7 +149,10 @@ class Evidence:
         paths = [self.file(f"labels/{scene}/{one}/synfeal/test.csv") for one in sorted(sizes)]
         key = scene, size, common
         if key not in self._tests:
-            poses = _thinned([read_pose_table(path) for path in paths])
+            tables = [read_pose_table(path) for path in paths]
+            largest = max(tables, key=len)
+            every = common_every([*map(len, tables)])
+            poses = largest.at(np.arange(0, len(largest), every))
             straight, place = np.unique(poses.path, return_inverse=True)
             draw = (COMMON, scene) if common else (scene, size)
             counts = path_counts(len(straight), generator_of("claims", *draw))
@@ -164,10 +167,9 @@ class Evidence:
         found = []
         for cell in cells:
             constant = self.test_set(cell.scene, cell.size).constant
-            pairs = zip(QUANTITIES, self._errors_of(cell), constant, strict=True)
-            for name, own, mean_pose in pairs:
-                with np.errstate(invalid="ignore", divide="ignore"):
-                    share = 100 * own / mean_pose
+            with np.errstate(invalid="ignore", divide="ignore"):
+                shares = 100 * self._errors_of(cell) / constant
+            for name, share in zip(QUANTITIES, shares, strict=True):
                 low, high = limits(share)
                 if not high < 100 * LEARNT:
                     text = f"{share[0]:.0f} % ({low:.0f} to {high:.0f}) of the mean pose's"
@@ -177,18 +179,7 @@ class Evidence:
 
 def evidence_of(design: Design, root: Path) -> Evidence:
     """The results of a profile."""
-    runs: dict[Cell, list[Run]] = {}
+    runs = defaultdict[Cell, list[Run]](list)
     for run in design.runs:
-        cell = Cell(run.model, run.scene, run.size, run.labels, run.init)
-        runs.setdefault(cell, []).append(run)
-    return Evidence(root, runs, design.estimated)
-
-
-def _name(cell: Cell) -> str:
-    return f"{cell.scene} {cell.size} {cell.labels} {cell.init}"
-
-
-def _thinned(tables: Sequence[PoseTable]) -> PoseTable:
-    """The common test set of a scene with these test sets."""
-    largest = max(tables, key=len)
-    return largest.at(np.arange(0, len(largest), common_every([*map(len, tables)])))
+        runs[Cell(run.model, run.scene, run.size, run.labels, run.init)].append(run)
+    return Evidence(root, dict(runs), design.estimated)

@@ -80,9 +80,11 @@ def lowest_of_all(claim: Claim, evidence: Evidence) -> Outcome:
     verdict, reason = every_localizer(-found, [SOURCES[rival] for rival in RIVALS], " with ")
     lowest = _effects(np.all(found < 0, axis=0)).sum(axis=0).astype(float)
     low, high = limits(lowest)
-    observed = found[..., 0].reshape(len(RIVALS), -1)
-    tests = [_sign_text(rival, each) for rival, each in zip(RIVALS, observed, strict=True)]
-    measured = f"lowest in {lowest[0]:.0f} of {observed.shape[1]} columns"
+    tests = []
+    for rival, each in zip(RIVALS, found[..., 0], strict=True):
+        lower, counted, chance = sign_test(each.ravel().tolist())
+        tests.append(f"{SOURCES[rival]} {lower} of {counted} lower (p = {chance:.3g})")
+    measured = f"lowest in {lowest[0]:.0f} of {found[0, ..., 0].size} columns"
     interval = f"{low:.0f} to {high:.0f} columns"
     return Outcome(verdict, f"{measured}; sign tests: {', '.join(tests)}", interval, reason)
 
@@ -131,11 +133,6 @@ def highest_noise(claim: Claim, evidence: Evidence) -> Outcome:
     outcome = effects(-changes(evidence, clean, noisy)[0], claim)
     over_clean = values_text(PERCENT, changes(evidence, noisy, clean)[0])
     return replace(outcome, measured=f"{outcome.measured} (over clean {over_clean})")
-
-
-def _sign_text(rival: str, found: Array) -> str:
-    lower, counted, chance = sign_test(found.tolist())
-    return f"{SOURCES[rival]} {lower} of {counted} lower (p = {chance:.3g})"
 
 
 def _increase(evidence: Evidence, labels: Sequence[str]) -> Array:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -22,8 +24,8 @@ JUDGES: Mapping[str, Callable[[Claim, Evidence], Outcome]] = {
     "C4": untrained.few_assisted,
     "C5": labels.kind_of_noise,
     "C6": labels.highest_noise,
-    "C7": training.large_room_grows,
-    "C8": training.sanctuary_grows,
+    "C7": partial(training.grows, scene="large_room"),
+    "C8": partial(training.grows, scene="sanctuary"),
     "C9": training.sanctuary_at_6k,
     "C10": training.worse_when_small,
     "C11": training.better_when_large,
@@ -145,18 +147,12 @@ def _joined(reasons: Mapping[str, str]) -> str:
 
 def _short(row: Row) -> list[str]:
     same = row["measured_true"] == row["measured_labels"]
-    measured = [row["measured_labels"], "the same" if same else row["measured_true"]]
-    first, second = map(_without_details, measured)
+    measured = row["measured_labels"], "the same" if same else row["measured_true"]
+    # The statistic the rule decides on; what is only reported beside it stays in the CSV.
+    first, second = (re.split("; (?:sign tests|tau)", text)[0] for text in measured)
     verdicts = [f"**{row[f'verdict_{score}']}**" for score in ("labels", "true")]
     head = [row["id"], row["statement"], row["published"]]
     return [*head, first or "–", verdicts[0], second if first else "–", verdicts[1]]
-
-
-def _without_details(measured: str) -> str:
-    """The statistic the rule decides on; what is only reported beside it stays in the CSV."""
-    for detail in ("; sign tests", "; tau"):
-        measured = measured.partition(detail)[0]
-    return measured
 
 
 def _remarks(row: Row) -> list[str]:

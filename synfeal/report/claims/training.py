@@ -33,14 +33,16 @@ LENGTHS = {f"-{name}" if name else "": share for name, share in SHARES.items()}
 IN_PRINT = np.array([[np.sqrt(3)], [1.0]])
 
 
-def large_room_grows(claim: Claim, evidence: Evidence) -> Outcome:
-    """C7: the errors fall by two thirds of the published share, or more, mean of the localizers."""
-    return _grows(claim, evidence, "large_room")
-
-
-def sanctuary_grows(claim: Claim, evidence: Evidence) -> Outcome:
-    """C8: as C7."""
-    return _grows(claim, evidence, "sanctuary")
+def grows(claim: Claim, evidence: Evidence, scene: str) -> Outcome:
+    """C7, C8: the errors fall by two thirds of the published share, or more, mean of localizers."""
+    sizes = SIZES[scene]
+    series = np.array([evidence.errors(*(Cell(m, scene, size) for size in sizes)) for m in MODELS])
+    outcome = effects(mean_of(list(relative_change(series[:, -1], series[:, 0]))), claim)
+    taus = []
+    for model, errors in zip(MODELS, series[..., 0], strict=True):
+        position, orientation = (kendall_tau(range(len(sizes)), e.tolist()) for e in errors.T)
+        taus.append(f"{TITLES[model]} {position:+.2f}/{orientation:+.2f}")
+    return replace(outcome, measured=f"{outcome.measured}; tau p/o: {', '.join(taus)}")
 
 
 def sanctuary_at_6k(claim: Claim, evidence: Evidence) -> Outcome:
@@ -117,12 +119,11 @@ def longer(claim: Claim, evidence: Evidence) -> Outcome:
 
 def _log_ratio(evidence: Evidence, model: str) -> Array:
     """Logarithm (1 + RESAMPLES,) of images from scratch over images with transfer learning."""
-    curves = {
-        start: np.log(evidence.errors(*(Cell(model, init=f"{start}{end}") for end in LENGTHS)))
-        for start in STARTS
-    }
-    means = {start: curve.mean(axis=1) for start, curve in curves.items()}
-    return images_ratio(means["scratch"], means["pretrained"])
+    new, old = (
+        np.log(evidence.errors(*(Cell(model, init=f"{start}{end}") for end in LENGTHS)))
+        for start in ("scratch", "pretrained")
+    )
+    return images_ratio(new.mean(axis=1), old.mean(axis=1))
 
 
 def images_ratio(new: Array, old: Array) -> Array:
@@ -140,17 +141,6 @@ def images_ratio(new: Array, old: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = images @ (new + old) / 2 / (images @ images)
         return np.where(slope < 0, (new.mean(axis=0) - old.mean(axis=0)) / -slope, np.nan)
-
-
-def _grows(claim: Claim, evidence: Evidence, scene: str) -> Outcome:
-    sizes = SIZES[scene]
-    series = np.array([evidence.errors(*(Cell(m, scene, size) for size in sizes)) for m in MODELS])
-    outcome = effects(mean_of(list(relative_change(series[:, -1], series[:, 0]))), claim)
-    taus = []
-    for model, errors in zip(MODELS, series[..., 0], strict=True):
-        position, orientation = (kendall_tau(range(len(sizes)), e.tolist()) for e in errors.T)
-        taus.append(f"{TITLES[model]} {position:+.2f}/{orientation:+.2f}")
-    return replace(outcome, measured=f"{outcome.measured}; tau p/o: {', '.join(taus)}")
 
 
 def _from_scratch(evidence: Evidence, size: str) -> Array:

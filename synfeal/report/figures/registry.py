@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +18,8 @@ from synfeal.report.figures import (
     scenes,
     speed_vs_error,
 )
-from synfeal.report.figures.sources import Results
+from synfeal.report.figures.sources import Draw, Results
+from synfeal.report.figures.speed_vs_error import of_stage
 from synfeal.report.figures.style import RC
 
 
@@ -27,8 +27,7 @@ from synfeal.report.figures.style import RC
 class Entry:
     """A figure."""
 
-    # Makes it, or returns None when the design does not make what it shows.
-    draw: Callable[[Results], Figure | None]
+    draw: Draw
     caption: str  # one sentence
     suffixes: tuple[str, ...] = (".svg", ".png")  # the files it is written to
 
@@ -95,24 +94,24 @@ FIGURES: dict[str, Entry] = {
         "at the largest size of each scene; the grey line is the median.",
     ),
     "speed_vs_error_collision": Entry(
-        speed_vs_error.draw_collision,
+        of_stage("collision", speed_vs_error.collision_figure),
         "How fast rays are answered against how many decisions of the planner differ from the full "
         "mesh's, for the face counts of the collision mesh that were tried; filled marks form the "
         "Pareto front, the ring is the mesh that is used.",
     ),
     "speed_vs_error_render": Entry(
-        speed_vs_error.draw_render,
+        of_stage("render", speed_vs_error.render_figure),
         "How long a frame takes against its mean difference from 64 samples per pixel, by backend "
         "and samples per pixel, and with smaller textures or fewer triangles than the scene has; "
         "the ring is what frames are rendered with.",
     ),
     "speed_vs_error_labels": Entry(
-        speed_vs_error.draw_labels,
+        of_stage("labels", speed_vs_error.labels_figure),
         "Frames that each ground-truth method labels per second of processor time against the "
         "median position error of its labels after assistance; filled marks form the Pareto front.",
     ),
     "speed_vs_error_training": Entry(
-        speed_vs_error.draw_training,
+        of_stage("training", speed_vs_error.training_figure),
         "Images that each localizer learns from per second of processor time, and its median "
         "position error against the true poses, at the largest size of each scene; filled marks "
         "form the Pareto front.",

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from synfeal.config import Design
@@ -55,6 +56,10 @@ class Results:
         """Data set sizes of a scene in the design, the smallest first."""
         names = dict.fromkeys(row.size for row in self.design.rows if row.scene == scene)
         return sorted(names, key=lambda size: len(self.labels(scene, size, "synfeal", "train")))
+
+
+# Makes a figure, or returns None when the design does not make what it shows.
+Draw = Callable[[Results], Figure | None]
 
 
 def counted(n_train: int, n_test: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import cycle
 from typing import Any
 
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from baselines.groundtruth.methods import METHODS
 from synfeal.frames import rows_of
-from synfeal.report.figures.sources import Results
+from synfeal.report.figures.sources import Draw, Results
 from synfeal.report.figures.style import (
     BLACK,
     BLUE,
@@ -54,14 +55,18 @@ SIZE = (6.4, 4.6)
 RING: Style = {"marker": "o", "markerfacecolor": "none", "markersize": 13, "linestyle": ""}
 
 
-def draw_collision(results: Results) -> Figure | None:
-    """Meshes for collisions, one line per scene; nothing when the table has no rows of them."""
-    rows = results.speeds("collision")
-    return collision_figure(rows) if len(rows) else None
+def of_stage(stage: str, figure: Callable[[pd.DataFrame], Figure]) -> Draw:
+    """What draws the rows of a stage of ``speed_vs_error.csv``; nothing where there are none."""
+
+    def draw(results: Results) -> Figure | None:
+        rows = results.speeds(stage)
+        return figure(rows) if len(rows) else None
+
+    return draw
 
 
 def collision_figure(rows: pd.DataFrame) -> Figure:
-    """The figure of the rows of ``speed_vs_error.csv`` whose stage is ``collision``."""
+    """Meshes for collisions, one line per scene."""
     figure = Figure(figsize=SIZE, layout="constrained")
     axes = figure.subplots()
     for (_, scene), style in zip(rows.groupby("scene", sort=False), cycle(SCENE_STYLES)):
@@ -95,11 +100,8 @@ def _draw_meshes(axes: Axes, rows: pd.DataFrame, style: Style) -> None:
         axes.plot(speed[place], error[place], label=label, markeredgecolor=colour, **RING)
 
 
-def draw_labels(results: Results) -> Figure | None:
-    """Methods that estimate labels; nothing when the table has no rows of them."""
-    rows = results.speeds("labels")
-    if rows.empty:
-        return None
+def labels_figure(rows: pd.DataFrame) -> Figure:
+    """Methods that estimate labels."""
     figure = Figure(figsize=SIZE, layout="constrained")
     axes = figure.subplots()
     for _, scene in rows.groupby("scene", sort=False):
@@ -111,14 +113,8 @@ def draw_labels(results: Results) -> Figure | None:
     return figure
 
 
-def draw_training(results: Results) -> Figure | None:
-    """A panel for every scene; nothing when the table has no rows of training runs."""
-    rows = results.speeds("training")
-    return training_figure(rows) if len(rows) else None
-
-
 def training_figure(rows: pd.DataFrame) -> Figure:
-    """The figure of the rows of ``speed_vs_error.csv`` whose stage is ``training``."""
+    """Training runs, a panel for every scene."""
     scenes = dict(list(rows.groupby("scene", sort=False)))
     figure = Figure(figsize=(1.0 + 3.4 * len(scenes), 3.6), layout="constrained")
     panels = figure.subplots(1, len(scenes), squeeze=False, sharey=True)[0]
@@ -160,14 +156,8 @@ DETAIL_COLOURS = {TEXTURES: ORANGE, FACES: PURPLE}
 USED = RING | {"markeredgecolor": BLACK}
 
 
-def draw_render(results: Results) -> Figure | None:
-    """One row of panels per scene; nothing when the table has no rows of rendering."""
-    rows = results.speeds("render")
-    return render_figure(rows) if len(rows) else None
-
-
 def render_figure(rows: pd.DataFrame) -> Figure:
-    """The figure of the rows of ``speed_vs_error.csv`` whose stage is ``render``."""
+    """Ways to draw a frame, a row of panels per scene, a panel for every size of the image."""
     panels = [
         [panel for _, panel in of_scene.groupby(["width", "height"], sort=False)]
         for _, of_scene in rows.groupby("scene", sort=False)
