@@ -196,8 +196,7 @@ def test_rows_and_figure_say_what_each_variant_is(made_up):
     assert [float(row["error"]) for row in rows[:2]] == [2.0, 5.0]
     assert rows[4]["depth_error_mm"] == "0.5"
     assert [row["chosen"] for row in rows] == ["1", "0", "0", "0", "0", "1"]
-    figure = figures.draw_render(Results(made_up, design_of(())))
-    assert figure is not None
+    figure = figures.render_figure(Results(made_up, design_of(())).speeds("render"))
     small, large = figure.axes
     assert (small.get_xscale(), small.get_yscale()) == ("log", "log")
     assert small.get_title() == "Large Room, 128 × 96"

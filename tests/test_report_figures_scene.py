@@ -19,8 +19,8 @@ from synfeal.report.figures import (
     scenes,
     write_figures,
 )
+from synfeal.report.figures.label_sets import read_labelled_set
 from synfeal.report.figures.scenes import floor_m, plan_of
-from synfeal.report.figures.sources import read_labelled_set
 from synfeal.report.figures.style import METHOD_STYLES, RC
 from synfeal.report.layouts import SOURCES
 from synfeal.report.references import SCHEMA as REFERENCE

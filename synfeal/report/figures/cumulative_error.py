@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -12,7 +11,7 @@ from matplotlib.figure import Figure
 from synfeal.config import MODELS, Experiment
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import cumulative, joint_error
-from synfeal.report.figures.sources import Array, Results, counted
+from synfeal.report.figures.sources import SPLITS, Array, Results, counted
 from synfeal.report.figures.style import MODEL_STYLES, add_legend, set_log
 from synfeal.report.layouts import TITLES, scene_title
 from synfeal.report.stats import read_errors
@@ -26,59 +25,45 @@ AXES = {**MEASURES, JOINT: "both errors against the true poses: at most x cm and
 MARKED_AT = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 
-@dataclass(frozen=True)
-class SceneErrors:
-    """Errors at the largest size of a scene."""
-
-    title: str  # scene, size and frames
-    # By localizer and measure, the errors (N,) of all test frames of all repetitions; infinite
-    # where a prediction failed.
-    errors: dict[str, dict[str, Array]]
-
-
 def draw(results: Results) -> Figure | None:
     """Scenes across, measures down; nothing when the design has no rows of Table 4."""
     rows = results.design.rows_of("table4_size")
-    if not rows:
-        return None
     largest = {scene: results.sizes(scene)[-1] for scene in dict.fromkeys(r.scene for r in rows)}
     rows = [row for row in rows if row.size == largest[row.scene]]
-    return figure_of([scene_errors(results, row) for row in rows])
-
-
-def scene_errors(results: Results, row: Experiment) -> SceneErrors:
-    """The errors of the five localizers on one data set."""
-    errors: dict[str, dict[str, Array]] = {}
-    for model in MODELS:
-        parts = []
-        for run in results.design.runs_of(row, model):
-            path = results.root / "runs" / run.directory / "errors.csv"
-            parts.append(read_errors(path))
-            if parts[-1].empty:
-                raise InputError(f"{path}: needs rows; score that run again")
-        values = pd.concat(parts)
-        errors[model] = {measure: values[measure].to_numpy() for measure in MEASURES}
-        errors[model][JOINT] = joint_error(errors[model], "_true")
-    counts = [len(results.labels(row.scene, row.size, "synfeal", s)) for s in ("train", "test")]
-    return SceneErrors(f"{scene_title(row.scene)}, {row.size}\n{counted(*counts)}", errors)
-
-
-def figure_of(scenes: list[SceneErrors]) -> Figure:
-    """The figure of some scenes."""
-    figure = Figure(figsize=(1.2 + 4.0 * len(scenes), 10.0), layout="constrained")
-    panels = figure.subplots(len(AXES), len(scenes), squeeze=False, sharey=True, sharex="row")
-    for column, scene in enumerate(scenes):
-        panels[0, column].set_title(scene.title)
-        for axes, (measure, label) in zip(panels[:, column], AXES.items(), strict=True):
-            draw_curves(axes, {model: found[measure] for model, found in scene.errors.items()})
+    if not rows:
+        return None
+    figure = Figure(figsize=(1.2 + 4.0 * len(rows), 10.0), layout="constrained")
+    panels = figure.subplots(len(AXES), len(rows), squeeze=False, sharey=True, sharex="row")
+    for column, row in zip(panels.T, rows, strict=True):
+        counts = [len(results.labels(row.scene, row.size, "synfeal", split)) for split in SPLITS]
+        column[0].set_title(f"{scene_title(row.scene)}, {row.size}\n{counted(*counts)}")
+        errors = {model: _errors(results, row, model) for model in MODELS}
+        for axes, (measure, label) in zip(column, AXES.items(), strict=True):
+            _draw_curves(axes, {model: found[measure] for model, found in errors.items()})
             axes.set_xlabel(label)
     for axes in panels[:, 0]:
         axes.set_ylabel("test frames with at most this error (%)")
-    add_legend(figure, panels[0, 0], 2 if len(scenes) == 1 else 5)
+    add_legend(figure, panels[0, 0], 2 if len(rows) == 1 else 5)
     return figure
 
 
-def draw_curves(axes: Axes, errors: Mapping[str, Array]) -> None:
+def _errors(results: Results, row: Experiment, model: str) -> dict[str, Array]:
+    """By measure, a localizer's errors (N,) of all test frames of all repetitions on a data set.
+
+    They are infinite where a prediction failed.
+    """
+    parts = []
+    for run in results.design.runs_of(row, model):
+        path = results.root / "runs" / run.directory / "errors.csv"
+        parts.append(read_errors(path))
+        if parts[-1].empty:
+            raise InputError(f"{path}: needs rows; score that run again")
+    values = pd.concat(parts)
+    errors = {measure: values[measure].to_numpy() for measure in MEASURES}
+    return errors | {JOINT: joint_error(errors, "_true")}
+
+
+def _draw_curves(axes: Axes, errors: Mapping[str, Array]) -> None:
     """One curve per localizer; one whose predictions failed ends below 100 %."""
     axes.axhline(50, color="0.85", linewidth=0.8, zorder=0)
     for model, values in errors.items():

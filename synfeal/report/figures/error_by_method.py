@@ -104,13 +104,14 @@ OFFSET = 0.17  # of the marks of a line, in lines
 
 
 def draw_robustness(results: Results) -> Figure | None:
-    """Nothing where the robustness table is not made."""
+    """Measures down, methods across; a line for each of the effects, ideal frames first.
+
+    Nothing where the robustness table is not made.
+    """
     path = results.root / "tables" / f"{robustness.NAME}.csv"
-    return robustness_figure(robustness.read_robustness(path)) if path.exists() else None
-
-
-def robustness_figure(table: pd.DataFrame) -> Figure:
-    """Measures down, methods across; a line for each of the effects, ideal frames first."""
+    if not path.exists():
+        return None
+    table = robustness.read_robustness(path)
     effects, methods = list(table.effects.unique()), list(table.method.unique())
     size = (1.9 + 1.55 * len(methods), 1.4 + 0.4 * len(effects))
     figure = Figure(figsize=size, layout="constrained")

@@ -2,26 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure, SubFigure
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from synfeal.report.figures.scenes import Plan, draw_plan, draw_scale_bar, read_plan
-from synfeal.report.figures.sources import (
-    SPLITS,
-    Array,
-    LabelledSet,
-    LabelledSplit,
-    Results,
-    counted,
-    read_labelled_set,
-)
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.geometry.poses import pose_error
+from synfeal.report.assistance import batch_records
+from synfeal.report.figures.scenes import draw_plan, read_plan
+from synfeal.report.figures.sources import SPLITS, Array, Results, counted
 from synfeal.report.figures.style import METHOD_STYLES, TRUTH, Style, add_legend
 from synfeal.report.layouts import SOURCES, scene_title
+
+
+@dataclass(frozen=True)
+class LabelledSplit:
+    """One split with the labels of one method."""
+
+    labels: PoseTable  # the poses the method found, chained and assisted
+    truth: PoseTable  # the true poses of the same frames
+    # Records of assistance in the order of their frames ``start`` to ``stop`` (exclusive); each
+    # begins with the last frame of the one before.
+    batches: Sequence[Mapping[str, Any]]
+
+    @property
+    def errors(self) -> tuple[Array, Array]:
+        """Position error in metres (N,) and orientation error in degrees (N,)."""
+        position, angle = pose_error(self.labels.world_from_cam, self.truth.world_from_cam)
+        return position, np.degrees(angle)
+
+
+@dataclass(frozen=True)
+class LabelledSet:
+    """A data set with the labels of all methods: by split, then by method."""
+
+    title: str  # its scene and size
+    scene: str
+    splits: dict[str, dict[str, LabelledSplit]]
+
+    @property
+    def n_frames(self) -> list[int]:
+        """Frames of each split."""
+        return [len(next(iter(methods.values())).labels) for methods in self.splits.values()]
+
+
+def read_labelled_set(results: Results) -> LabelledSet | None:
+    """The first data set of the design that ground-truth methods label; none if there is none."""
+    sets = results.design.estimated
+    if not sets:
+        return None
+    scene, size, _ = sets[0]
+    methods = [method for *data_set, method in sets if data_set == [scene, size]]
+    splits = {
+        split: {
+            method: LabelledSplit(
+                results.labels(scene, size, method, split),
+                results.labels(scene, size, "synfeal", split),
+                batch_records(results.root, scene, size, method, split),
+            )
+            for method in methods
+        }
+        for split in SPLITS
+    }
+    return LabelledSet(f"{scene_title(scene)}, {size}", scene, splits)
+
 
 UNITS = ("position error\nof the label (m)", "orientation error\nof the label (°)")
 MARKS = 24  # along a line, the lines one after another: optimisers often coincide
@@ -37,30 +87,29 @@ MARKED = {
 
 def draw_label_error(results: Results) -> Figure | None:
     """Errors and a strip of batches below each other, training and test side by side."""
-    found = read_labelled_set(results)
-    return None if found is None else label_error_figure(found)
-
-
-def label_error_figure(data: LabelledSet) -> Figure:
-    """The figure of one data set; axes by row: position, orientation, batches."""
-    splits = {s: {m: parts[s] for m, parts in data.methods.items()} for s in SPLITS}
-    counts = [len(next(iter(methods.values())).labels) for methods in splits.values()]
-    figure = Figure(figsize=(11.0, 5.6 + 0.25 * len(data.methods)), layout="constrained")
-    figure.suptitle(f"{scene_title(data.scene)}, {data.size}: {counted(*counts)}")
+    data = read_labelled_set(results)
+    if data is None:
+        return None
+    counts, n_methods = data.n_frames, len(data.splits["train"])
+    figure = Figure(figsize=(11.0, 5.6 + 0.25 * n_methods), layout="constrained")
+    figure.suptitle(f"{data.title}: {counted(*counts)}")
     panels = figure.subplots(
         *(3, 2),
         sharex="col",
         sharey="row",
         width_ratios=[max(count, 0.3 * sum(counts)) for count in counts],
-        height_ratios=[3, 3, STRIP * len(data.methods)],
+        height_ratios=[3, 3, STRIP * n_methods],
     )
-    for column, (split, methods) in enumerate(splits.items()):
+    for column, (split, methods) in enumerate(data.splits.items()):
         panels[0, column].set_title(split)
         _draw_errors(panels[0, column], panels[1, column], methods)
         _draw_batches(panels[2, column], methods)
         panels[2, column].set_xlabel("frame")
         for axes in panels[:, column]:
-            _draw_borders(axes, next(iter(methods.values())))
+            # Where batches meet: all methods are cut at the same frames.
+            for batch in next(iter(methods.values())).batches[1:]:
+                axes.axvline(batch["start"], color="0.82", linewidth=0.7, zorder=0)
+            axes.set_xlim(0, counts[column] - 1)
     for axes, label in zip(panels[:2, 0], UNITS, strict=True):
         axes.set_ylabel(label)
         axes.set_ylim(bottom=0)  # of both splits, once all lines are drawn
@@ -71,23 +120,19 @@ def label_error_figure(data: LabelledSet) -> Figure:
 def _draw_errors(position: Axes, orientation: Axes, methods: Mapping[str, LabelledSplit]) -> None:
     for axes, floor, which in ((position, FLOORS[0], 0), (orientation, FLOORS[1], 1)):
         for start, (method, part) in enumerate(methods.items()):
+            # Marks on every so many frames, on others for each line.
+            step = max(len(methods), len(part.labels) // MARKS)
             axes.plot(
                 *(part.labels.frame, part.errors[which]),
                 label=SOURCES[method],
                 linewidth=1.1,
                 markersize=4,
-                markevery=_marked(len(part.labels), start, len(methods)),
+                markevery=(start * step // len(methods), step),
                 **METHOD_STYLES[method],
             )
         axes.set_yscale("symlog", linthresh=floor, linscale=0.4)
         axes.yaxis.set_major_formatter("{x:g}")
         axes.grid(axis="y", color="0.93")
-
-
-def _marked(n_frames: int, place: int, n_lines: int) -> tuple[int, int]:
-    """First marked frame of a line and the step to the next, so that no two lines share one."""
-    step = max(n_lines, n_frames // MARKS)
-    return place * step // n_lines, step
 
 
 def _draw_batches(axes: Axes, methods: Mapping[str, LabelledSplit]) -> None:
@@ -109,13 +154,6 @@ def _draw_batches(axes: Axes, methods: Mapping[str, LabelledSplit]) -> None:
     axes.tick_params(axis="y", length=0)
 
 
-def _draw_borders(axes: Axes, part: LabelledSplit) -> None:
-    """Where batches meet; all methods are cut at the same frames."""
-    for frame in sorted({batch["start"] for batch in part.batches} - {0}):
-        axes.axvline(frame, color="0.82", linewidth=0.7, zorder=0)
-    axes.set_xlim(0, len(part.labels) - 1)
-
-
 ACROSS = 6
 PANEL_IN, LEGEND_IN = 2.4, 7.0
 
@@ -123,46 +161,31 @@ PANEL_IN, LEGEND_IN = 2.4, 7.0
 def draw_trajectories(results: Results) -> Figure | None:
     """A panel per method, training above test."""
     data = read_labelled_set(results)
-    return None if data is None else trajectories_figure(data, read_plan(results, data.scene))
-
-
-def trajectories_figure(data: LabelledSet, plan: Plan) -> Figure:
-    """The figure of one data set."""
-    across = min(ACROSS, len(data.methods))
-    down = -(-len(data.methods) // across)
+    if data is None:
+        return None
+    plan, n_methods = read_plan(results, data.scene), len(data.splits["train"])
+    across = min(ACROSS, n_methods)
+    down = -(-n_methods // across)
     width_m, depth_m = np.ptp(plan.bounds_m, axis=0)
     height = down * (PANEL_IN * depth_m / width_m + 0.3) + 0.3
     figure = Figure(
         figsize=(max(0.4 + PANEL_IN * across, LEGEND_IN), 1.0 + len(SPLITS) * height),
         layout="constrained",
     )
-    figure.suptitle(f"{scene_title(data.scene)}, {data.size}")
+    figure.suptitle(data.title)
     halves = figure.subfigures(len(SPLITS), 1, squeeze=False)[:, 0]
-    for part, split in zip(halves, SPLITS, strict=True):
-        _draw_split(part, data, plan, split, (down, across))
+    for part, (split, methods), count in zip(
+        halves, data.splits.items(), data.n_frames, strict=True
+    ):
+        part.suptitle(f"{split}: {count:,} frames", weight="bold", fontsize=10)
+        panels = part.subplots(down, across, squeeze=False).ravel()
+        for axes, (method, labelled) in zip(panels, methods.items(), strict=False):
+            draw_plan(axes, plan)
+            draw_paths(axes, labelled, method)
+        for axes in panels[n_methods:]:
+            axes.set_axis_off()
     add_legend(figure, figure.axes[0], 3)  # colours as in the first panel
     return figure
-
-
-def _draw_split(
-    part: SubFigure, data: LabelledSet, plan: Plan, split: str, shape: tuple[int, int]
-) -> None:
-    panels = part.subplots(*shape, squeeze=False).ravel()
-    for axes, (method, parts) in zip(panels, data.methods.items(), strict=False):
-        draw_plan(axes, plan)
-        draw_scale_bar(axes, plan)
-        draw_paths(axes, parts[split], method)
-        axes.set_title(title_of(parts[split], method), fontsize=9)
-    for axes in panels[len(data.methods) :]:
-        axes.set_axis_off()
-    frames = len(next(iter(data.methods.values()))[split].labels)
-    part.suptitle(f"{split}: {frames:,} frames", weight="bold", fontsize=10)
-
-
-def title_of(part: LabelledSplit, method: str) -> str:
-    """The method, and how many of its batches were assisted."""
-    assisted = sum(batch["assisted"] for batch in part.batches)
-    return f"{SOURCES[method]}\n{assisted} of {len(part.batches)} batches assisted"
 
 
 def draw_paths(axes: Axes, part: LabelledSplit, method: str) -> None:
@@ -170,6 +193,9 @@ def draw_paths(axes: Axes, part: LabelledSplit, method: str) -> None:
 
     Assisted batches are drawn wide; a ring is where the last label is the true pose.
     """
+    assisted = [batch for batch in part.batches if batch["assisted"]]
+    title = f"{SOURCES[method]}\n{len(assisted)} of {len(part.batches)} batches assisted"
+    axes.set_title(title, fontsize=9)
     truth, labels = part.truth.position_m[:, :2], part.labels.position_m[:, :2]
     offsets = LineCollection(list(np.stack([truth, labels], axis=1)), colors="0.4")
     offsets.set(linewidths=0.4, alpha=0.6, zorder=3, label="from true to estimated position")
@@ -177,7 +203,6 @@ def draw_paths(axes: Axes, part: LabelledSplit, method: str) -> None:
     axes.plot(*truth.T, label="true path", zorder=2, **TRUTH)
     colour = METHOD_STYLES[method]["color"]
     axes.plot(*labels.T, label="estimated path", zorder=4, color=colour, linewidth=1.0)
-    assisted = [batch for batch in part.batches if batch["assisted"]]
     wide = LineCollection([labels[batch["start"] : batch["stop"]] for batch in assisted])
     wide.set(color=colour, linewidth=4.0, alpha=0.3, zorder=3.5, label="assisted batch")
     axes.add_collection(wide)

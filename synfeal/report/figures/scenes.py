@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 from trimesh.intersections import slice_faces_plane
 from trimesh.triangles import area
 
@@ -29,7 +28,8 @@ OUTLINE = [withStroke(linewidth=2.5, foreground="black")]
 
 def draw_frames(results: Results) -> Figure | None:
     """Two rows of six test frames per scene, evenly over the largest test set."""
-    scenes = {scene: test_frames(results, scene) for scene in results.scenes}
+    packed = results.root / "frames"
+    scenes = {scene: read_packed(packed / scene / "test.npy") for scene in results.scenes}
     if not scenes:
         return None
     height, width = next(iter(scenes.values())).shape[1:3]
@@ -45,31 +45,16 @@ def draw_frames(results: Results) -> Figure | None:
         for axes in panels.flat:
             axes.set_axis_off()
         for axes, number in zip(panels.flat, numbers, strict=False):
-            _draw_tile(axes, number, frames[number])
+            axes.imshow(frames[number], interpolation="lanczos")
+            look = {"color": "white", "fontsize": 9, "path_effects": OUTLINE}
+            axes.text(0.03, 0.04, f"{number}", transform=axes.transAxes, **look)
     return figure
-
-
-def test_frames(results: Results, scene: str) -> NDArray[np.uint8]:
-    """All test frames of a scene (N, H, W, 3), as a memory map."""
-    return read_packed(results.root / "frames" / scene / "test.npy")
 
 
 def evenly(count: int) -> list[int]:
     """At most twelve indices below ``count``, spread evenly, the first and the last among them."""
     n_tiles = min(LINES * COLUMNS, count)
     return [round(place) for place in np.linspace(0, count - 1, n_tiles)]
-
-
-def _draw_tile(axes: Axes, number: int, rgb: NDArray[np.uint8]) -> None:
-    axes.imshow(rgb, interpolation="lanczos")
-    axes.text(
-        *(0.03, 0.04),
-        f"{number}",
-        transform=axes.transAxes,
-        color="white",
-        fontsize=9,
-        path_effects=OUTLINE,
-    )
 
 
 # Dust on a scanned floor and skirting are no furniture.
@@ -113,7 +98,8 @@ def floor_m(corners_m: Array) -> float:
 
 
 def draw_plan(axes: Axes, plan: Plan) -> None:
-    """Draw the plan to scale; walls are seen edge-on, so edges are drawn as well."""
+    """Draw the plan to scale, with a bar of one metre below the lower left corner."""
+    # Walls are seen edge-on, so edges are drawn as well.
     surface = PolyCollection(list(plan.corners_m), facecolors=GREY, edgecolors=GREY, linewidths=0.7)
     surface.set(zorder=0, rasterized=True)  # tens of thousands of triangles
     axes.add_collection(surface)
@@ -122,11 +108,6 @@ def draw_plan(axes: Axes, plan: Plan) -> None:
     axes.set_ylim(y0 - 0.15, y1 + 0.15)
     axes.set_aspect("equal")
     axes.set_axis_off()
-
-
-def draw_scale_bar(axes: Axes, plan: Plan) -> None:
-    """A bar of one metre below the lower left corner."""
-    (x0, y0), _ = plan.bounds_m
     axes.plot([x0, x0 + 1.0], [y0 - 0.3] * 2, color="black", linewidth=2, clip_on=False)
     axes.text(x0 + 1.15, y0 - 0.3, "1 m", va="center", fontsize=8)
 
@@ -171,7 +152,6 @@ def view_ticks(table: PoseTable) -> Array:
 
 def _draw_set(axes: Axes, plan: Plan, tables: dict[str, PoseTable], title: str) -> None:
     draw_plan(axes, plan)
-    draw_scale_bar(axes, plan)
     for order, (split, table) in enumerate(tables.items(), start=2):
         style = SPLIT_STYLES[split]
         thinner = max(1.0, len(table) / SMALL_SET) ** -0.5

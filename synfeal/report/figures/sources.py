@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,9 +14,7 @@ from numpy.typing import NDArray
 from synfeal.config import Design
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.frames import MAYBE, read_frame
-from synfeal.geometry.poses import pose_error
 from synfeal.report import speed_vs_error
-from synfeal.report.assistance import batch_records
 from synfeal.report.cells import schema_of
 
 Array = NDArray[np.float64]
@@ -65,50 +62,3 @@ Draw = Callable[[Results], Figure | None]
 def counted(n_train: int, n_test: int) -> str:
     """Frames of a data set as figures say it."""
     return f"{n_train:,} training, {n_test:,} test frames"
-
-
-@dataclass(frozen=True)
-class LabelledSplit:
-    """One split with the labels of one method."""
-
-    labels: PoseTable  # the poses the method found, chained and assisted
-    truth: PoseTable  # the true poses of the same frames
-    # Records of assistance in the order of their frames ``start`` to ``stop`` (exclusive); each
-    # begins with the last frame of the one before.
-    batches: Sequence[Mapping[str, Any]]
-
-    @property
-    def errors(self) -> tuple[Array, Array]:
-        """Position error in metres (N,) and orientation error in degrees (N,)."""
-        position, angle = pose_error(self.labels.world_from_cam, self.truth.world_from_cam)
-        return position, np.degrees(angle)
-
-
-@dataclass(frozen=True)
-class LabelledSet:
-    """A data set with the labels of all methods: by method, then by split."""
-
-    scene: str
-    size: str
-    methods: dict[str, dict[str, LabelledSplit]]
-
-
-def read_labelled_set(results: Results) -> LabelledSet | None:
-    """The first data set of the design that ground-truth methods label; none if there is none."""
-    sets = results.design.estimated
-    if not sets:
-        return None
-    scene, size, _ = sets[0]
-    methods = [method for *data_set, method in sets if data_set == [scene, size]]
-    return LabelledSet(scene, size, {m: _read(results, scene, size, m) for m in methods})
-
-
-def _read(results: Results, scene: str, size: str, method: str) -> dict[str, LabelledSplit]:
-    return {
-        split: LabelledSplit(
-            results.labels(scene, size, method, split),
-            results.labels(scene, size, "synfeal", split),
-            batch_records(results.root, scene, size, method, split),
-        )
-        for split in SPLITS
-    }
