@@ -100,12 +100,12 @@ def labels_table(root: Path) -> str:
 def assistance(root: Path) -> str:
     """Batches that needed assistance, and how good the labels are."""
     errors = _table(root, "label_error", LABEL_ERROR)
-    errors = errors[errors.assistance == "after"].set_index(["scene", "method", "split"])
-    median = errors.apply(
-        lambda e: f"{100 * e.position_m_median:.1f} cm, {e.orientation_deg_median:.2f}°", axis=1
-    )
+    errors = errors[errors.assistance == "after"]
+    position, orientation = 100 * errors.position_m_median, errors.orientation_deg_median
+    errors["text"] = position.map("{:.1f} cm, ".format) + orientation.map("{:.2f}°".format)
+    median = errors.pivot(index=["scene", "method"], columns="split", values="text")
     counts = _table(root, "assistance", ASSISTANCE)
-    counts = counts[counts.split == TOTAL]
+    counts = counts[counts.split == TOTAL].join(median, on=["scene", "method"])
     published = [
         ""
         if pd.isna(row.published_assisted)
@@ -119,13 +119,8 @@ def assistance(root: Path) -> str:
                 "labels from": counts.method.map(SOURCES),
                 "batches": counts.batches,
                 "assisted": counts.assisted.astype(str) + published,
-                **{
-                    f"median error, {title}": [
-                        median[scene, method, split]
-                        for scene, method in zip(counts.scene, counts.method, strict=True)
-                    ]
-                    for split, title in {"train": "training", "test": "test"}.items()
-                },
+                "median error, training": counts["train"],
+                "median error, test": counts["test"],
             }
         )
     )

@@ -16,13 +16,14 @@ from __future__ import annotations
 import hashlib
 import json
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from tqdm import tqdm
 
 from synfeal.dataset.archive import EPOCH, PLAIN_FILE, UNIX
+from synfeal.dataset.pose_table import HEADER
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
 
@@ -43,49 +44,6 @@ POSES: dict[str, Any] = {
     "missingValues": ["nan"],
     "primaryKey": "frame",
 }
-POSE_HEADER = (",".join(field["name"] for field in POSES["fields"]) + "\n").encode()
-
-
-def write_package(root: Path, paths: Mapping[str, str], out: Path) -> None:
-    """Pack files below ``root`` in a ZIP file.
-
-    ``paths`` says which file holds each: itself, or a longer one that begins with the same bytes.
-    """
-    resources = []
-    with atomic_path(out) as temporary, zipfile.ZipFile(temporary, "w") as package:
-        for path in tqdm(sorted(paths), unit="file", desc="keep", leave=False, disable=None):
-            data = (root / path).read_bytes()
-            resources.append(_described(path, paths[path], data))
-            if paths[path] == path:
-                _add(package, path, data)
-        _add(package, SCHEMA, _json(POSES))
-        _add(package, DESCRIPTOR, _json({"name": "synfeal-run", "resources": resources}))
-
-
-def _described(path: str, member: str, data: bytes) -> dict[str, Any]:
-    """A resource as the standard has it; ``member`` is ours, of a file that another one holds."""
-    entry = {
-        "name": path.lower().replace("/", "."),
-        "path": path,
-        "format": PurePosixPath(path).suffix[1:],
-        "bytes": len(data),
-        "hash": f"sha256:{hashlib.sha256(data).hexdigest()}",
-    }
-    if data.startswith(POSE_HEADER):
-        entry["schema"] = SCHEMA
-    return entry if member == path else {**entry, "member": member}
-
-
-def _json(value: Any) -> bytes:
-    return (json.dumps(value, indent=1) + "\n").encode()
-
-
-def _add(package: zipfile.ZipFile, name: str, data: bytes) -> None:
-    info = zipfile.ZipInfo(name, EPOCH)
-    info.create_system, info.external_attr = UNIX, PLAIN_FILE << 16
-    package.writestr(info, data, zipfile.ZIP_LZMA)
-
-
 PREDICTIONS = "predictions.csv"
 OF_RUN = (PREDICTIONS, "common_predictions.csv", "history.csv", "training.json")
 # Written by the job that estimates labels, so it tells them from labels that are computed.
@@ -120,7 +78,16 @@ def keep(root: Path, out: Path) -> int:
         for record in root.glob(f"labels/{scene}/{size}/*/{ESTIMATED}"):
             files.update(p for p in record.parent.iterdir() if p.suffix in (".csv", ".json"))
     names = sorted(file.relative_to(root).as_posix() for file in files)
-    write_package(root, {name: name for name in names} | _beginnings(root, names), out)
+    holders, resources = _beginnings(root, names), []
+    with atomic_path(out) as temporary, zipfile.ZipFile(temporary, "w") as package:
+        for name in tqdm(names, unit="file", desc="keep", leave=False, disable=None):
+            data, holder = (root / name).read_bytes(), holders.get(name, name)
+            resources.append(_described(name, holder, data))
+            if holder == name:
+                _add(package, name, data)
+        described = {"name": "synfeal-run", "resources": resources}
+        for name, value in ((SCHEMA, POSES), (DESCRIPTOR, described)):
+            _add(package, name, f"{json.dumps(value, indent=1)}\n".encode())
     return len(runs)
 
 
@@ -145,3 +112,23 @@ def _beginnings(root: Path, names: Iterable[str]) -> dict[str, str]:
         if content.startswith(data):
             held[name] = larger
     return held
+
+
+def _described(path: str, member: str, data: bytes) -> dict[str, Any]:
+    """A resource as the standard has it; ``member`` is ours, of a file that another one holds."""
+    entry = {
+        "name": path.lower().replace("/", "."),
+        "path": path,
+        "format": PurePosixPath(path).suffix[1:],
+        "bytes": len(data),
+        "hash": f"sha256:{hashlib.sha256(data).hexdigest()}",
+    }
+    if data.startswith(f"{HEADER}\n".encode()):
+        entry["schema"] = SCHEMA
+    return entry if member == path else {**entry, "member": member}
+
+
+def _add(package: zipfile.ZipFile, name: str, data: bytes) -> None:
+    info = zipfile.ZipInfo(name, EPOCH)
+    info.create_system, info.external_attr = UNIX, PLAIN_FILE << 16
+    package.writestr(info, data, zipfile.ZIP_LZMA)

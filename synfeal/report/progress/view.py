@@ -26,7 +26,6 @@ from synfeal.report.layouts import TITLES
 from synfeal.report.progress.plan import RunPlan, TimeLeft
 from synfeal.report.stats import read_metrics
 
-Row = tuple[str, str, str, str]  # scene, size, labels, init
 HEADING = ("m, degrees", *TITLES.values())
 MISSING = "…"
 
@@ -37,10 +36,10 @@ class FirstScores:
     def __init__(self, root: Path, runs: Sequence[Run]) -> None:
         self._run_of = {root / "runs" / run.directory / "metrics.json": run for run in runs}
         # By row and run; None of a run without scores, nothing of one that is still to come.
-        self._scores: dict[Row, dict[Run, tuple[float, float] | None]] = {}
-        self._expected = Counter(map(_row, {*runs}))
+        self._scores: dict[str, dict[Run, tuple[float, float] | None]] = {}
+        self._expected = Counter(map(label, {*runs}))
 
-    def add(self, metrics: Path) -> Row | None:
+    def add(self, metrics: Path) -> str | None:
         """Read the scores of a run; its row, or None where the file is of no run of the design."""
         run = self._run_of.get(metrics)
         if run is None:
@@ -48,16 +47,16 @@ class FirstScores:
         scores = read_metrics(metrics)
         position_m, deg = scores["position_m_true"], scores["orientation_deg_true"]
         found = None if position_m is None or deg is None else (position_m, deg)
-        self._scores.setdefault(_row(run), {})[run] = found
-        return _row(run)
+        self._scores.setdefault(label(run), {})[run] = found
+        return label(run)
 
-    def complete(self, row: Row) -> bool:
+    def complete(self, row: str) -> bool:
         """Whether every run of a row has its scores."""
         return len(self._scores.get(row, {})) == self._expected[row]
 
-    def cells(self, row: Row) -> list[str]:
+    def cells(self, row: str) -> list[str]:
         """Label and cells of a row; of repetitions the mean of those there are."""
-        texts = [label(row)]
+        texts = [row]
         for model in MODELS:
             known = [s for run, s in self._scores.get(row, {}).items() if run.model == model]
             finished = [score for score in known if score is not None]
@@ -68,15 +67,10 @@ class FirstScores:
         return texts
 
 
-def label(row: Row) -> str:
-    """A data set in few letters: what is usual goes without saying."""
-    scene, size, labels, init = row
-    rest = [part for part in (labels, init) if part not in ("synfeal", "pretrained")]
-    return " ".join([scene, size, *rest]).replace("noise-", "")
-
-
-def _row(run: Run) -> Row:
-    return run.scene, run.size, run.labels, run.init
+def label(run: Run) -> str:
+    """The data set of a run in few letters: what is usual goes without saying."""
+    rest = [part for part in (run.labels, run.init) if part not in ("synfeal", "pretrained")]
+    return " ".join([run.scene, run.size, *rest]).replace("noise-", "")
 
 
 INTERVAL_S = 60.0
@@ -97,7 +91,7 @@ class RunView:
         self._said_s = self._begin_s = clock()
         self._time_left = TimeLeft({}, 1)
         self._scores = FirstScores(Path(), ())
-        self._open_rows: list[Row] = []
+        self._open_rows: list[str] = []
         self._done, self._total = 0, 0
         self._headed = False
         self._live = Live(
@@ -202,7 +196,7 @@ class RunView:
         line.add_row(bar, Text(self.line(), no_wrap=True))
         return Group(table, line)
 
-    def _print_row(self, row: Row) -> None:
+    def _print_row(self, row: str) -> None:
         table = _columns(self._console.width)
         if not self._headed:
             table.add_row(*HEADING, style="bold")
