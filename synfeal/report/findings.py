@@ -18,17 +18,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from synfeal.config.learning import KEYS
 from synfeal.files import atomic_path
-from synfeal.frames import TEXT, read_frame
+from synfeal.frames import TEXT, Schema, read_frame
 from synfeal.report.cells import schema_of
 from synfeal.report.figures.style import BLUE, RC, VERMILION, Style
 from synfeal.report.layouts import scene_title
 
 MEASURES = ("position_m", "orientation_deg")
-PUBLISHED = tuple(f"published_{measure}" for measure in MEASURES)
 HERE, PAPER = "here", "paper"
 COLUMNS = ("group", "change", "spoken", "model", "measure", "source", "factor")
+
+
+def read_table(root: Path, name: str, schema: Schema | None = None) -> pd.DataFrame:
+    """A published table; of localizers, where no columns are named."""
+    return read_frame(root / "tables" / f"{name}.csv", schema or schema_of(name), "publish again")
 
 
 def effects(root: Path) -> pd.DataFrame:
@@ -54,19 +57,19 @@ def sentences(root: Path) -> list[str]:
 
 def _changes(root: Path) -> Iterator[pd.DataFrame]:
     """Every change, in the order in which it is told."""
-    size = _table(root, "table4_size")
+    size = read_table(root, "table4_size")
     for scene, rows in size.groupby("scene", sort=False):
         first, last = rows["size"].iloc[[0, -1]]
         title = scene_title(str(scene))
         name = ("size", f"{last} frames, not {first}, {title}")
         spoken = f"From {first} to {last} frames of the {title}"
         yield _factors(name, spoken, rows[rows["size"] == first], rows[rows["size"] == last])
-    rows = _table(root, "table2_ground_truth")
+    rows = read_table(root, "table2_ground_truth")
     for source, title in (("sfm", "SfM"), ("rgbd-toro", "RGB-D SLAM")):
         name = ("labels", f"exact labels, not {title}'s")
         spoken = f"With exact labels in place of those of {title}"
         yield _factors(name, spoken, rows[rows.labels == source], rows[rows.labels == "synfeal"])
-    rows = _table(root, "table3_inconsistencies").query("block == 'both'")
+    rows = read_table(root, "table3_inconsistencies").query("block == 'both'")
     clean, noisy = rows[rows.noise_m == 0], rows[rows.noise_m == rows.noise_m.max()]
     noise = f"{rows.noise_m.max():g} m and {rows.noise_deg.max():g}°"
     spoken = f"With noise of {noise} in the labels, measured against those labels as in the paper,"
@@ -75,7 +78,7 @@ def _changes(root: Path) -> Iterator[pd.DataFrame]:
     name = ("noise", f"label noise of {noise}, against the truth")
     found = _factors(name, "measured against the true poses", clean, noisy)
     yield found.query("source == @HERE")
-    scratch = _table(root, "table5_from_scratch")
+    scratch = read_table(root, "table5_from_scratch")
     for last in scratch["size"].iloc[[0, -1]]:
         rows = scratch[scratch["size"] == last]
         pretrained = size[(size["size"] == last) & size.scene.isin(rows.scene)]
@@ -101,13 +104,6 @@ def _factors(
             parts.append(part.assign(measure=measure, source=source))
     found = pd.concat(parts).assign(group=names[0], change=names[1], spoken=spoken)
     return found.dropna(subset="factor")[list(COLUMNS)]
-
-
-def _table(root: Path, name: str) -> pd.DataFrame:
-    schema = schema_of(name)
-    columns = [*KEYS[name], "model", *MEASURES, *(f"{m}_true" for m in MEASURES), *PUBLISHED]
-    path = root / "tables" / f"{name}.csv"
-    return read_frame(path, {column: schema[column] for column in columns}, "publish again")
 
 
 def _claims_sentence(root: Path) -> str:

@@ -23,10 +23,8 @@ from synfeal.errors import InputError
 from synfeal.files import atomic_path
 from synfeal.frames import (
     COUNT,
-    MAYBE,
     NUMBER,
     TEXT,
-    Schema,
     read_frame,
     read_records,
     records_of,
@@ -35,7 +33,13 @@ from synfeal.frames import (
 from synfeal.report.assistance import SCHEMA as ASSISTANCE
 from synfeal.report.assistance import TOTAL
 from synfeal.report.claims.table import claims_markdown
-from synfeal.report.findings import effects, is_drawn_from, sentences, write_findings_figure
+from synfeal.report.findings import (
+    effects,
+    is_drawn_from,
+    read_table,
+    sentences,
+    write_findings_figure,
+)
 from synfeal.report.label_error import SCHEMA as LABEL_ERROR
 from synfeal.report.layouts import SOURCES, TITLES, scene_title
 from synfeal.report.publish import PUBLISHED, RESULTS
@@ -46,12 +50,6 @@ PAGES = (Path("README.md"), Path("docs/results.md"), Path("docs/scenes.md"))
 FIGURE = Path("docs/images/findings.png")
 HEADLINES = ("night", "mini")
 PAPER_FRAMES = {"6k": 6000}
-CELL = {
-    "model": TEXT,
-    **dict.fromkeys(("n_train", "n_test"), COUNT),
-    **dict.fromkeys(("position_m_true", "orientation_deg_true"), MAYBE),
-    **dict.fromkeys(("published_position_m", "published_orientation_deg"), MAYBE),
-}
 SIFT = dict.fromkeys(
     ("covered_share_mean", "covered_share_q10", "covered_share_q90", "keypoints_mean"), NUMBER
 )
@@ -70,7 +68,7 @@ def findings(root: Path) -> str:
 def origin(root: Path) -> str:
     """Which run the numbers are of."""
     record = read_result(root / "provenance.json", ("commit", "machine", "stages"), "publish again")
-    cells = _table(root, "table4_size", {"size": TEXT, "n_train": COUNT, "n_seeds": COUNT})
+    cells = read_table(root, "table4_size")
     first, seeds = cells.iloc[0], sorted(set(cells.n_seeds))
     share = PAPER_FRAMES[first["size"]] / first.n_train
     frames = "the paper's frames" if share == 1 else f"1/{share:.3g} of the paper's frames"
@@ -85,7 +83,7 @@ def origin(root: Path) -> str:
 
 def size_table(root: Path) -> str:
     """Table 4: errors against the true poses, published errors in brackets."""
-    cells = _table(root, "table4_size", {"scene": TEXT, "size": TEXT, **CELL})
+    cells = read_table(root, "table4_size")
     frames = "(" + cells.n_train.astype(str) + ", " + cells.n_test.astype(str) + ")"
     labels = cells.scene.map(scene_title) + " " + cells["size"] + " " + frames
     return _localizer_table(cells, "scene, size (frames here)", labels)
@@ -93,18 +91,18 @@ def size_table(root: Path) -> str:
 
 def labels_table(root: Path) -> str:
     """Table 2, the same way."""
-    cells = _table(root, "table2_ground_truth", {"labels": TEXT, **CELL})
+    cells = read_table(root, "table2_ground_truth")
     return _localizer_table(cells, "labels from", cells.labels.map(lambda n: SOURCES.get(n, n)))
 
 
 def assistance(root: Path) -> str:
     """Batches that needed assistance, and how good the labels are."""
-    errors = _table(root, "label_error", LABEL_ERROR)
+    errors = read_table(root, "label_error", LABEL_ERROR)
     errors = errors[errors.assistance == "after"]
     position, orientation = 100 * errors.position_m_median, errors.orientation_deg_median
     errors["text"] = position.map("{:.1f} cm, ".format) + orientation.map("{:.2f}°".format)
     median = errors.pivot(index=["scene", "method"], columns="split", values="text")
-    counts = _table(root, "assistance", ASSISTANCE)
+    counts = read_table(root, "assistance", ASSISTANCE)
     counts = counts[counts.split == TOTAL].join(median, on=["scene", "method"])
     published = [
         ""
@@ -165,10 +163,6 @@ def part_of(name: str, profile: str) -> str:
     if name not in PARTS:
         raise InputError(f"<!-- {name} {profile} -->: no such part; known: {', '.join(PARTS)}")
     return PARTS[name](PUBLISHED / (headline() if profile == "headline" else profile))
-
-
-def _table(root: Path, name: str, schema: Schema) -> pd.DataFrame:
-    return read_frame(root / "tables" / f"{name}.csv", schema, "publish again")
 
 
 def _localizer_table(cells: pd.DataFrame, heading: str, labels: pd.Series) -> str:

@@ -11,7 +11,7 @@ import pandas as pd
 
 from synfeal.bootstrap import CONFIDENCE, FEWEST_PATHS
 from synfeal.files import atomic_path, refuse_foreign, write_text
-from synfeal.frames import write_frame
+from synfeal.frames import rows_of, write_frame
 from synfeal.report.compare.figure import comparison_figure
 from synfeal.report.compare.trees import (
     KEY,
@@ -94,7 +94,7 @@ def summary_rows(comparison: Comparison) -> Rows:
     found = summary_of(comparison.table)
     found["measure"] = found["measure"].map(TITLES)
     found["p_sign"] = found["p_sign"].map("{:.2g}".format)
-    found["percent"] = found["percent"].map(percent_text)
+    found["percent"] = found["percent"].map(_signed)
     signs = ("lower", "higher", "sign test p", "mean change")
     return [("runs", *VERDICTS.values(), *signs), *_texts(found)]
 
@@ -103,7 +103,7 @@ def group_rows(comparison: Comparison) -> Rows:
     """Mean relative changes by scene, label source and model."""
     found = groups_of(comparison.table)
     for measure in MEASURES:
-        found[measure] = found[measure].map(percent_text)
+        found[measure] = found[measure].map(_signed)
     return [("by", "", "runs", *SHORT), *_texts(found)]
 
 
@@ -157,73 +157,50 @@ def _pairing(runs: pd.DataFrame) -> str:
 
 
 def run_rows(comparison: Comparison) -> Rows:
-    """A row per run and yardstick, below its heading; a data set is named in its first row."""
+    """A row per run and yardstick, below its heading; a data set is named in its first row.
+
+    Where the labels are the true poses, both yardsticks are one.
+    """
     errors = ("position A", "B", "B−A", "95 %", "", "orientation A", "B", "B−A", "95 %", "")
     rows: Rows = [("data set", "model", "against", *errors, "paths")]
     shown = ""
     for key, run in comparison.table.groupby(list(KEY), sort=False):
-        data_set = "/".join(map(str, key[:-1]))
-        for row in _run_rows(run):
-            rows.append(("" if data_set == shown else data_set, *row))
+        *parts, model = map(str, key)
+        data_set, by_measure = "/".join(parts), {row.measure: row for row in rows_of(run)}
+        yardsticks = {"both": ""} if one_yardstick(run) else {"labels": "", "true": "_true"}
+        for place, (against, end) in enumerate(yardsticks.items()):
+            position, orientation = (by_measure[f"{m}{end}"] for m in MEASURES[:2])
+            names = ("" if data_set == shown else data_set, "" if place else model, against)
+            paths = min(position.n_paths_a, position.n_paths_b)
+            rows.append((*names, *_cells(position, 3), *_cells(orientation, 2), str(paths)))
             shown = data_set
     return rows
 
 
+def _cells(row: Any, digits: int) -> tuple[str, ...]:
+    """Both errors, their difference, its limits, and the verdict."""
+    number, signed = f"{{:.{digits}f}}", f"{{:+.{digits}f}}"
+    errors = ["failed" if math.isinf(e) else number.format(e) for e in (row.a, row.b)]
+    low, difference, high = (_signed(v, signed) for v in (row.low, row.difference, row.high))
+    spread = "" if math.isnan(row.se_seeds) else f" ± {number.format(row.se_seeds)}"
+    doubt = "?" if min(row.n_paths_a, row.n_paths_b) < FEWEST_PATHS else ""
+    verdict = UNSEEN if row.verdict == VERDICTS["unseen"] else row.verdict + doubt
+    return (*errors, difference + spread, f"[{low}, {high}]", verdict)
+
+
+def _signed(value: float, form: str = "{:+.1f} %") -> str:
+    """E.g. ``+3.1 %``."""
+    if math.isinf(value):
+        return "+∞" if value > 0 else "-∞"
+    return form.format(value) if value else "0"
+
+
 def change_rows(changes: pd.DataFrame) -> Rows:
     """Keys of ``provenance.json`` that differ, the first of them."""
-    shown = changes[["key", "a", "b"]].head(MOST_CHANGES).itertuples(index=False)
     rows: Rows = [("provenance.json", "A", "B")]
-    rows += [(key, *map(_value_text, values)) for key, *values in shown]
+    for key, *values in changes.fillna("(none)").head(MOST_CHANGES).itertuples(index=False):
+        texts = (v if len(v) <= WIDEST_VALUE else f"{v[: WIDEST_VALUE - 1]}…" for v in values)
+        rows.append((key, *texts))
     if len(changes) > MOST_CHANGES:
         rows.append((f"… and {len(changes) - MOST_CHANGES} more", "", ""))
     return rows
-
-
-def percent_text(percent: float) -> str:
-    """E.g. ``+3.1 %``."""
-    if math.isinf(percent):
-        return "+∞"
-    return f"{percent:+.1f} %" if percent else "0"
-
-
-def _run_rows(run: pd.DataFrame) -> list[tuple[str, ...]]:
-    """Against labels and against true poses; a single row where these are the same numbers."""
-    yardsticks = {"both": ""} if one_yardstick(run) else {"labels": "", "true": "_true"}
-    first, by_measure = run.iloc[0], {row.measure: row for row in run.itertuples()}
-    paths = min(first["n_paths_a"], first["n_paths_b"])
-    doubt = "?" if paths < FEWEST_PATHS else ""
-    return [
-        (
-            *("" if i else first["model"], against),
-            *_cells(by_measure[f"position_m{end}"], 3, doubt),
-            *_cells(by_measure[f"orientation_deg{end}"], 2, doubt),
-            str(paths),
-        )
-        for i, (against, end) in enumerate(yardsticks.items())
-    ]
-
-
-def _cells(row: Any, digits: int, doubt: str) -> tuple[str, ...]:
-    spread = "" if math.isnan(row.se_seeds) else f" ± {row.se_seeds:.{digits}f}"
-    limits = f"[{_signed(row.low, digits)}, {_signed(row.high, digits)}]"
-    seen = row.verdict != "no difference seen"
-    difference = _signed(row.difference, digits) + spread
-    verdict = row.verdict + doubt if seen else UNSEEN
-    return _error(row.a, digits), _error(row.b, digits), difference, limits, verdict
-
-
-def _error(value: float, digits: int) -> str:
-    return "failed" if math.isinf(value) else f"{value:.{digits}f}"
-
-
-def _signed(value: float, digits: int) -> str:
-    if math.isinf(value):
-        return "+∞" if value > 0 else "-∞"
-    return f"{value:+.{digits}f}" if value else "0"
-
-
-def _value_text(value: Any) -> str:
-    if pd.isna(value):
-        return "(none)"
-    text = str(value)
-    return text if len(text) <= WIDEST_VALUE else f"{text[: WIDEST_VALUE - 1]}…"
