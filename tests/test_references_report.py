@@ -16,7 +16,7 @@ from synfeal.dataset.packed import new_packed
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.files import write_json
-from synfeal.frames import read_frame
+from synfeal.frames import read_frame, write_frame
 from synfeal.report import robustness
 from synfeal.report.columns import side_sheet
 from synfeal.report.figures.error_by_method import references_by_noise
@@ -28,7 +28,8 @@ from synfeal.report.references import (
     side_table,
     write_references_table,
 )
-from synfeal.report.robustness import printed, write_robustness
+from synfeal.report.robustness import printed
+from synfeal.report.sheet import sheet_latex
 from tests.coloured_frames import answering, save
 from tests.report_results import experiment, metrics, write_run
 
@@ -187,7 +188,7 @@ def test_errors_are_those_of_known_answers(tmp_path):
     turned = table[table.method == "posenet"].orientation_deg
     assert turned.tolist() == pytest.approx([90] * 6, abs=1e-3)
 
-    write_robustness(table, tmp_path / "r.csv", tmp_path / "r.tex")
+    write_frame(tmp_path / "r.csv", table)
     again = read_frame(tmp_path / "r.csv", SCHEMA)
     assert again.n_test.groupby(again.method).first().to_dict() == {
         **{"nearest-thumbnail": 2, "nearest-vlad": 2, "posenet": 2},
@@ -199,4 +200,4 @@ def test_errors_are_those_of_known_answers(tmp_path):
     blocks = [line.block for line in sheet.lines]
     assert [blocks.count(block) for block in dict.fromkeys(blocks)] == [3, 3]
     assert text_of(sheet.lines[1].cells[0]) == "dark, strength 2"
-    assert "swapped, strength 1" in (tmp_path / "r.tex").read_text()
+    assert "swapped, strength 1" in sheet_latex(sheet)

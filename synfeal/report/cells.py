@@ -8,7 +8,6 @@ impossible and is left out of comparisons) and ``suspect`` (probably a copy of i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -27,7 +26,6 @@ from synfeal.frames import (
     Schema,
     frame_of,
     read_frame,
-    records_of,
 )
 from synfeal.report.stats import (
     BASELINES,
@@ -50,16 +48,6 @@ SCHEMA = {
     **dict.fromkeys(("position_change_percent", "orientation_change_percent"), EXTRA),
     **dict.fromkeys(("flag", "printed_row", "row_note", "cell_note"), TEXT),
 }
-MESHES = {"scene": TEXT, "vertices": COUNT, "faces": COUNT, "volume_m3": NUMBER}
-
-
-@dataclass(frozen=True)
-class MeshFacts:
-    """Properties of a scene's mesh: counts, and the volume of its bounding box in cubic metres."""
-
-    vertices: int
-    faces: int
-    volume_m3: float
 
 
 def key_of(row: Experiment, model: str) -> Key:
@@ -81,13 +69,6 @@ def published_frame(table: str) -> pd.DataFrame:
     """Columns ``SCHEMA`` of one of the tables 2 to 5; no rows of one that the paper has not."""
     path = FOLDER / f"{table}.csv"
     return read_frame(path, SCHEMA) if path.is_file() else frame_of((), SCHEMA)
-
-
-@cache
-def published_meshes() -> dict[str, MeshFacts]:
-    """Table 1 by scene."""
-    frame = read_frame(FOLDER / "table1_meshes.csv", MESHES)
-    return {row.pop("scene"): MeshFacts(**row) for row in records_of(frame)}
 
 
 LIMITS = tuple(f"{measure}_{end}" for measure in MEASURES for end in ("low", "high"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
@@ -14,10 +15,11 @@ from synfeal.frames import (
     NUMBER,
     TEXT,
     frame_of,
+    read_frame,
     records_of,
     write_frame,
 )
-from synfeal.report.cells import MeshFacts, published_meshes
+from synfeal.report.cells import FOLDER
 from synfeal.report.columns import Column, SideTable, write_side_latex
 from synfeal.report.layouts import scene_title
 from synfeal.report.results import read_result
@@ -48,17 +50,23 @@ def write_meshes_table(scenes: Sequence[str], root: Path, out_csv: Path, out_tex
     write_side_latex(out_tex, side_table(meshes))
 
 
+@dataclass(frozen=True)
+class MeshFacts:
+    """Properties of a scene's mesh: counts, and the volume of its bounding box in cubic metres."""
+
+    vertices: int
+    faces: int
+    volume_m3: float
+
+
 def read_meshes(scenes: Sequence[str], root: Path) -> pd.DataFrame:
     """Columns ``SCHEMA`` of some scenes; what the paper has not is missing."""
-    printed = {
-        scene: {f"published_{fact}": value for fact, value in vars(facts).items()}
-        for scene, facts in published_meshes().items()
-    }
-    records = [
-        {"scene": scene} | vars(read_mesh_facts(root, scene)) | printed.get(scene, {})
-        for scene in scenes
-    ]
-    return frame_of(records, SCHEMA)
+    own = pd.DataFrame([{"scene": s} | vars(read_mesh_facts(root, s)) for s in scenes])
+    published = read_frame(
+        FOLDER / f"{NAME}.csv", {name: SCHEMA[name] for name in ("scene", *FACTS)}
+    )
+    printed = published.rename(columns={fact: f"published_{fact}" for fact in FACTS})
+    return frame_of(records_of(own.merge(printed, how="left", on="scene")), SCHEMA)
 
 
 def read_mesh_facts(root: Path, scene: str) -> MeshFacts:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import fmean
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -199,57 +199,33 @@ def crossing_finding(table: pd.DataFrame) -> str:
     """
     both = table.labels.str.startswith("noise-") & (table.noise_m > 0) & (table.noise_deg > 0)
     noisy = table[both | (table.labels == "synfeal")]
-    levels = noisy[["noise_m", "noise_deg"]].drop_duplicates().sort_values("noise_m")
-    if len(levels) < 2 or not {STRUCTURE, *MODELS} <= set(noisy.method):
+    errors = noisy.pivot(index=["noise_m", "noise_deg"], columns="method", values=list(TRUE))
+    if len(errors) < 2 or not {STRUCTURE, *MODELS} <= set(noisy.method):
         return ""
-    first, *later = [_at_level(noisy, *level) for level in levels.itertuples(index=False)]
+    failed = errors.fillna(np.inf)
+    structure = failed.xs(STRUCTURE, axis=1, level="method")
+    localizers = {m: failed.loc[:, [(m, name) for name in MODELS]] for m in TRUE}
+    better = [localizers[m].lt(structure[m], axis=0).sum(axis=1) for m in TRUE]
+    levels = [f"{noise_m:g} m and {noise_deg:g}°" for noise_m, noise_deg in errors.index]
     parts = [
-        "{} in position and {} in orientation {}".format(*level.better, level.name)
-        for level in later
+        f"{n_m} in position and {n_deg} in orientation at {level}"
+        for level, n_m, n_deg in zip(levels, *better, strict=True)
     ]
-    structure_m, structure_deg = first.structure
-    best_m, best_deg = first.best
-    return (
+    best_m, best_deg = (localizers[measure].iloc[0].min() for measure in TRUE)
+    sentence = (
         f"{scene_title(str(noisy.scene.iloc[0]))}, {noisy['size'].iloc[0]}: with exact labels"
-        f" structure-based poses are off by {100 * structure_m:.2g} cm and {structure_deg:.2g}°,"
-        f" the best localizer by {100 * best_m:.2g} cm and {best_deg:.2g}°; of the {len(MODELS)}"
-        f" localizers are closer to the truth than structure on the same noisy labels"
-        f" {', '.join(parts)}.{_adjusted(noisy, *levels.iloc[-1])}"
+        f" structure-based poses are off by {_off(*structure.iloc[0])}, the best localizer by"
+        f" {_off(best_m, best_deg)}; of the {len(MODELS)} localizers are closer to the truth than"
+        f" structure on the same noisy labels {', '.join(parts[1:])}."
     )
-
-
-def _adjusted(table: pd.DataFrame, noise_m: float, noise_deg: float) -> str:
-    """What bundle adjustment of the map makes of a level; empty where it was not asked."""
-    level = table[(table.noise_m == noise_m) & (table.noise_deg == noise_deg)]
-    found = level.loc[level.method == ADJUSTED, list(TRUE)].dropna()
-    if found.empty:
-        return ""
-    off_m, off_deg = found.iloc[0]
+    adjusted = [errors.iloc[-1].get((measure, ADJUSTED), np.nan) for measure in TRUE]
+    if np.isnan(adjusted).any():  # was not asked, or failed
+        return sentence
     return (
-        f" On a map that was bundle-adjusted from labels with {noise_m:g} m and {noise_deg:g}°,"
-        f" structure-based poses are off by {100 * off_m:.2g} cm and {off_deg:.2g}°."
+        f"{sentence} On a map that was bundle-adjusted from labels with {levels[-1]},"
+        f" structure-based poses are off by {_off(*adjusted)}."
     )
 
 
-class Level(NamedTuple):
-    """One level of noise: position (m) and orientation (degrees) of structure, of the best."""
-
-    name: str
-    better: tuple[int, int]
-    structure: tuple[float, float]
-    best: tuple[float, float]
-
-
-def _at_level(table: pd.DataFrame, noise_m: float, noise_deg: float) -> Level:
-    """Median errors against the truth at a level; infinite where structure failed."""
-    level = table[(table.noise_m == noise_m) & (table.noise_deg == noise_deg)]
-    errors = level.set_index("method")[list(TRUE)].fillna(np.inf)
-    structure = errors.loc[[STRUCTURE]].to_numpy(dtype=float)[0]
-    localizers = errors.loc[list(MODELS)].to_numpy(dtype=float)
-    better, best = (localizers < structure).sum(axis=0), localizers.min(axis=0)
-    return Level(
-        f"at {noise_m:g} m and {noise_deg:g}°",
-        (int(better[0]), int(better[1])),
-        (float(structure[0]), float(structure[1])),
-        (float(best[0]), float(best[1])),
-    )
+def _off(position_m: float, orientation_deg: float) -> str:
+    return f"{100 * position_m:.2g} cm and {orientation_deg:.2g}°"

@@ -69,17 +69,12 @@ def write_robustness_table(
     answers = dict(zip(tests, structure, strict=bool(structure)))
     vectors = dict(zip(models, descriptors, strict=True))
     table = robustness_table(models, vectors, answers, tests, labels[0].parent, device)
-    write_robustness(table, out_csv, out_tex)
-
-
-def write_robustness(table: pd.DataFrame, out_csv: Path, out_tex: Path) -> None:
-    """Write what :func:`baselines.references.robustness.robustness_table` found, and its LaTeX."""
     write_frame(out_csv, table)
     write_side_latex(out_tex, side_table(table))
 
 
 def read_robustness(path: Path) -> pd.DataFrame:
-    """The table that :func:`write_robustness` wrote."""
+    """The table that :func:`write_robustness_table` wrote."""
     return read_frame(path, SCHEMA)
 
 

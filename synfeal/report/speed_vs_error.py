@@ -53,19 +53,14 @@ def training_rows(root: Path, scene: str) -> pd.DataFrame:
     cells = read_frame(path, CELL) if path.exists() else frame_of((), CELL)
     cells = cells[cells.scene == scene]
     cells = cells[cells.n_train == cells.n_train.max()].dropna(subset="position_m_true")
-    runs = [
-        [f"{c.scene}/{c.size}/{KIND}/{c.model}/seed{k}" for k in range(c.n_seeds)]
+    seconds = [
+        _seconds_per_image(root, f"{c.scene}/{c.size}/{KIND}/{c.model}", c.n_seeds)
         for c in rows_of(cells)
     ]
-    seconds = _processor_seconds(root, [name for names in runs for name in names])
     return pd.DataFrame(
         {
             "variant": cells.model.map(TITLES),
-            "seconds_per_item": [
-                sum(seconds[name] for name in names)
-                / sum(_images_shown(root / "runs" / name / "history.csv") for name in names)
-                for names in runs
-            ],
+            "seconds_per_item": seconds,
             "error": cells.position_m_true,
             "error_unit": "m",
             "chosen": 0,
@@ -73,23 +68,20 @@ def training_rows(root: Path, scene: str) -> pd.DataFrame:
     )
 
 
-def _processor_seconds(root: Path, runs: Sequence[str]) -> dict[str, float]:
-    """Processor seconds by run; no other jobs are looked at, for the rule names no others."""
-    folder = root / "benchmarks"
-    paths = {name: folder / "train" / f"{name}.tsv" for name in runs}
-    measured = read_jobs([path for path in paths.values() if path.exists()], folder)
-    seconds = dict(zip(measured["job"], measured["cpu_s"], strict=True))
-    for name, path in paths.items():
-        if not seconds.get(name, 0.0) > 0.0:
-            raise InputError(f"{path}: missing, or measured no time; train it again")
-    return seconds
-
-
-def _images_shown(history: Path) -> float:
-    shown = read_frame(history, {"samples_seen": COUNT}, "train it again").samples_seen
-    if shown.empty or shown.iloc[-1] <= 0:
-        raise InputError(f"{history}: shows no images; train it again")
-    return float(shown.iloc[-1])
+def _seconds_per_image(root: Path, run: str, n_seeds: int) -> float:
+    """Processor seconds of the training runs of a localizer by the images shown in them."""
+    seconds, shown = 0.0, 0
+    for seed in range(n_seeds):
+        measured = root / "benchmarks" / "train" / f"{run}/seed{seed}.tsv"
+        job = read_jobs([measured] if measured.exists() else [], root / "benchmarks")
+        if not job.cpu_s.sum() > 0.0:
+            raise InputError(f"{measured}: missing, or measured no time; train it again")
+        history = root / "runs" / f"{run}/seed{seed}" / "history.csv"
+        images = read_frame(history, {"samples_seen": COUNT}, "train it again").samples_seen
+        if images.empty or images.iloc[-1] <= 0:
+            raise InputError(f"{history}: shows no images; train it again")
+        seconds, shown = seconds + job.cpu_s.sum(), shown + images.iloc[-1]
+    return float(seconds / shown)
 
 
 NAME = "speed_vs_error"

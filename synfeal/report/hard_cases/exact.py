@@ -47,23 +47,16 @@ def rounded(values: Any) -> Any:
     return np.array(nested, dtype=object).astype(np.float64)
 
 
-def flat(values: Any) -> list[Any]:
-    """The numbers of a matrix, an array or nested lists, in order."""
-    if isinstance(values, (list, tuple, np.ndarray, MP.matrix)):
-        return [number for item in values for number in flat(item)]
-    return [values]
-
-
 def max_abs(answer: Any, truth: Any) -> float:
     """Largest absolute difference: 0 between equal infinities, ``inf`` where one is no number."""
-    pairs = zip(flat(np.asarray(answer).tolist()), flat(truth), strict=True)
-    return max(_apart(a, t) for a, t in pairs)
-
-
-def _apart(answer: float, truth: Any) -> float:
-    if not math.isfinite(answer) or truth in (math.inf, -math.inf):
-        return 0.0 if answer == truth else math.inf
-    return float(abs(mpf(answer) - mpf(truth)))
+    nested = truth.tolist() if isinstance(truth, MP.matrix) else truth
+    numbers = np.array(nested, dtype=object).ravel()
+    return max(
+        float(abs(mpf(a) - mpf(t)))
+        if math.isfinite(a) and t not in (math.inf, -math.inf)
+        else (0.0 if a == t else math.inf)
+        for a, t in zip(np.ravel(answer).tolist(), numbers, strict=True)
+    )
 
 
 @dataclass(frozen=True)
