@@ -1,19 +1,28 @@
-"""``synfeal collect``: what is on disk afterwards, whatever happens on the way."""
+"""``synfeal collect``, and the same from Python: what is on disk afterwards."""
 
+import copy
 import json
+import re
+import subprocess
+import sys
 
 import cv2
+import nbformat
 import numpy as np
 import pytest
+from nbclient import NotebookClient
 from PIL import Image
 
+import synfeal
 from synfeal.cli import main
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.sevenscenes import frame_paths, read_pose, read_split
+from synfeal.errors import InputError
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.validation.listing import list_sequences
 from synfeal.validation.manifest import check_manifest
+from tests import ROOT
 from tests.collected import collect, refused, tree_of
 from tests.test_workflow import snakemake
 
@@ -139,3 +148,48 @@ def test_a_preview_shows_two_sets_side_by_side(damaged, tmp_path, monkeypatch, c
     line = refused(capsys, "preview", damaged, "--out", tmp_path / "other.mp4")
     assert "apt-get install ffmpeg or pip install 'synfeal[video]'" in line
     assert [path.name for path in tmp_path.glob("*.mp4")] == ["film.mp4"]
+
+
+def texts(notebook):
+    """What each cell of code says: printed, or its value."""
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    said = [[o.get("text") or o.data.get("text/plain", "") for o in c.outputs] for c in cells]
+    return ["".join(parts).split(" at 0x")[0] for parts in said]
+
+
+def test_the_quick_start_runs(tmp_path):
+    shown = nbformat.read(ROOT / "docs" / "quickstart.ipynb", as_version=4)
+    ran = copy.deepcopy(shown)
+    place = {"metadata": {"path": tmp_path}}
+    NotebookClient(ran, timeout=600, startup_timeout=600, resources=place).execute()
+    for notebook in (shown, ran):  # what stands in the file, and what comes of it now
+        _, seen, made, scored = texts(notebook)
+        assert "(120, 160, 3) nearest surface at" in seen
+        assert "40 training frames, 10 test frames, camera 160\nwrong with it: nothing" in made
+        assert re.search(r"position_m +0\.080", scored)
+    assert synfeal.open_dataset(tmp_path / "mydata").train.poses.position_m.shape == (40, 3)
+
+
+def test_the_functions_make_what_the_command_makes(mesh, calm, tmp_path):
+    options = {"width": 40, "height": 33, "spacing": 0.2, "sequence_frames": 10, "depth": True}
+    data = synfeal.collect(mesh, tmp_path / "called", 24, test_frames=8, **options)
+    assert tree_of(data.path) == tree_of(calm)
+    assert data.test.images[0] == data.path / "seq-04" / "frame-000000.color.png"
+    with pytest.raises(InputError, match=r"^--spacing: "):
+        synfeal.plan(mesh, 10, spacing=-1)
+    with pytest.raises(InputError, match=r"^colour: no such option"):
+        synfeal.plan(mesh, 10, colour="red")
+
+
+def loaded_by(code, among):
+    """Which of some modules a fresh interpreter has loaded after some code."""
+    code = f"{code}\nimport sys; print(*sorted({among!r} & set(sys.modules)))"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return run.stdout.strip()
+
+
+def test_nothing_is_loaded_early_and_collecting_needs_no_networks():
+    assert not loaded_by("import synfeal", {"numpy", "pydantic", "scipy", "torch", "trimesh"})
+    names = ("api", "inspect.run", "validation.run", "export.run", "evaluation.run")
+    code = "\n".join(f"import synfeal.{name}" for name in names)
+    assert not loaded_by(code, {"baselines", "cv2", "gtsam", "open3d", "snakemake", "torch"})

@@ -1,4 +1,4 @@
-"""What every stage leans on: whole files or none, seeds by name, one line for a person."""
+"""What every stage leans on: whole files or none, tables, seeds by name, one line for a person."""
 
 import io
 import json
@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from PIL import Image
@@ -15,6 +16,17 @@ from snakemake.iocontainers import Namedlist
 
 from synfeal.errors import InputError, why
 from synfeal.files import atomic_path, write_json
+from synfeal.frames import (
+    COUNT,
+    EXTRA,
+    MAYBE,
+    MAYBE_COUNT,
+    NUMBER,
+    TEXT,
+    frame_of,
+    read_frame,
+    write_frame,
+)
 from synfeal.job import call
 from synfeal.seeds import generator_of, seed_of
 from tests.fuzzing import JARGON
@@ -139,3 +151,23 @@ def test_a_rule_calls_its_function_with_files_and_the_results_of_its_job(tmp_pat
     )
     with pytest.raises(InputError, match=f"^{root}/scenes/hall/properties.json: "):
         call(job)
+
+
+SCHEMA = {"name": TEXT, "n": COUNT, "x": NUMBER, "y": MAYBE, "k": MAYBE_COUNT}
+ROWS = [
+    {"name": 'a,"b"\nc', "n": 2**53 - 1, "x": 0.1 + 0.2, "y": None, "k": 1234567},
+    {"name": "", "n": 0, "x": -1e-300, "y": 5e-324, "k": None},
+]
+
+
+def test_digits_text_and_columns_come_back(tmp_path):
+    frame = frame_of(ROWS, SCHEMA)
+    write_frame(tmp_path / "a.csv", frame, float_format=None)
+    pd.testing.assert_frame_equal(read_frame(tmp_path / "a.csv", SCHEMA), frame, check_exact=True)
+    write_frame(tmp_path / "a.csv", frame_of([ROWS[0] | {"name": "a"}], SCHEMA))
+    assert (tmp_path / "a.csv").read_text() == "name,n,x,y,k\na,9007199254740991,0.3,,1234567\n"
+    (tmp_path / "a.csv").write_text("z,x,name\n9,1.5,a\n")
+    found = read_frame(tmp_path / "a.csv", {"name": TEXT, "x": NUMBER, "x_sd": EXTRA})
+    assert list(found.columns) == ["name", "x", "x_sd"]
+    assert found.x.tolist() == [1.5]
+    assert np.isnan(found.x_sd[0])

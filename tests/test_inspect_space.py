@@ -1,14 +1,21 @@
-"""Free space and the suggested box, in rooms whose free space is known."""
+"""Free space, surface points, texel density and doubts, known or worked out by hand."""
 
 import itertools
+import sys
 
 import numpy as np
 import pytest
 import trimesh
 
-from synfeal.inspect.freespace import find_free_space, survey, viewpoint
+from synfeal.errors import InputError
+from synfeal.inspect.doubts import colour_doubts, doubts_of, floor_areas_m2
+from synfeal.inspect.facts import detail_of, texels_per_m
+from synfeal.inspect.freespace import FreeSpace, find_free_space, survey, viewpoint
 from synfeal.inspect.suggest import UNWANTED_WEIGHT, largest_box, suggest_box
+from synfeal.inspect.surface import SurfacePoints, nearest_texels
+from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
+from synfeal.mesh.triangles import Triangles, simplify
 
 ROOM_M = (6.0, 4.0, 3.0)
 
@@ -89,3 +96,113 @@ def test_largest_box_against_trying_them_all(shape, seed):
         worth_of((a, c, e), (b, d, f)) for (a, b), (c, d), (e, f) in itertools.product(*limits)
     )
     assert worth_of(*largest_box(wanted)) == best
+
+
+UNIT_UV = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+TWO = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def square(side_m, texture=None, **values):
+    """A horizontal square with the whole texture on it."""
+    corners = np.column_stack([UNIT_UV * side_m, np.zeros(4)])
+    uv = None if texture is None else UNIT_UV
+    return MeshPart("square", corners, TWO, uv, texture, **values)
+
+
+def texture_of(height, width, channels=3):
+    return np.zeros((height, width, channels), np.uint8)
+
+
+def closed_space(enclosure=1.0):
+    mask = np.ones((2, 2, 2), np.bool_)
+    axis = np.array([0.0, 1.0])
+    return FreeSpace((axis, axis, axis), mask, mask, enclosure, 0.0)
+
+
+def test_texels_and_colours_of_squares():
+    assert texels_per_m([square(2.0, texture_of(64, 64))]) == pytest.approx([32.0] * 3)
+    assert texels_per_m([square(2.0, texture_of(64, 16))]) == pytest.approx([16.0] * 3)
+    rgb = np.zeros((4, 3), np.uint8)
+    detail = detail_of(
+        TexturedMesh((square(1.0, texture_of(8, 8)), square(2.0, vertex_rgb=rgb), square(3.0)))
+    )
+    assert detail["area_m2"] == pytest.approx(
+        {"textured": 1.0, "coloured_by_vertex": 4.0, "plain": 9.0}
+    )
+    assert detail["coloured_vertices_per_m"] == pytest.approx(1.0)  # 4 vertices on 4 m²
+    bare = detail_of(TexturedMesh((square(1.0),)))
+    assert bare["texels_per_m"] is None
+    assert bare["coloured_vertices_per_m"] is None
+    texture = np.arange(4, dtype=np.uint8).reshape(2, 2, 1)  # 0 1 above 2 3
+    uv = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [1.75, -0.25], [0.0, 0.0], [1.0, 1.0]])
+    assert nearest_texels(texture, uv)[:, 0].tolist() == [2, 3, 0, 1, 2, 2]
+
+
+def test_points_are_spread_by_area_and_carry_the_texture():
+    texture = texture_of(2, 2, 4)
+    texture[:, 0] = [255, 0, 0, 255]
+    texture[:, 1] = [0, 0, 255, 100]
+    part = square(2.0, texture, alpha_cutoff=0.5)
+    points = SurfacePoints.of(TexturedMesh((part,)), np.random.default_rng(0), 20_000)
+    assert len(points.position_m) == pytest.approx(20_000, rel=0.02)
+    np.testing.assert_allclose(points.position_m.mean(axis=0), [1.0, 1.0, 0.0], atol=0.03)
+    np.testing.assert_allclose(points.position_m[:, :2].var(axis=0), [1 / 3, 1 / 3], atol=0.01)
+    assert (points.normal == [0, 0, 1]).all()
+    left = points.position_m[:, 0] < 1.0
+    assert (points.rgb[left] == [255, 0, 0]).all()
+    assert (points.rgb[~left] == [0, 0, 255]).all()
+    assert (points.is_drawn == left).all()
+
+
+def doubts(extents, **values):
+    floors = np.array([1.0, 1.0, 10.0])
+    given = {"floors_m2": floors, "space": closed_space(), **values}
+    return "\n".join(doubts_of(np.array(extents), **given))
+
+
+@pytest.mark.parametrize(
+    ("extents", "words"),
+    [
+        ((5.0, 6.0, 3.0), []),
+        ((5000.0, 6000.0, 3000.0), ["6e+03 m", "0.001"]),
+        ((0.5, 0.4, 0.3), ["0.5 m", "more than 1"]),
+    ],
+)
+def test_sizes_that_are_not_metres_are_doubted(extents, words):
+    found = doubts(extents)
+    assert bool(found) == bool(words)
+    assert all(word in found for word in words)
+
+
+def test_plain_and_open_meshes_are_doubted_and_a_flat_floor_is_a_floor():
+    plain = {"textured": 1.0, "coloured_by_vertex": 0.0, "plain": 3.0}
+    two = (square(1.0, vertex_rgb=np.eye(4, 3, dtype=np.uint8) * 255), square(2.0))
+    assert "75%" in colour_doubts(TexturedMesh(two), plain)[0]
+    assert "of one colour" in colour_doubts(TexturedMesh(two[1:]), plain)[0]
+    assert not colour_doubts(TexturedMesh(two), {**plain, "plain": 0.5})
+    assert "25%" in doubts((5.0, 5.0, 3.0), space=closed_space(0.75))
+    points = np.column_stack([np.random.default_rng(0).random((100, 2)), np.zeros(100)])
+    normals = np.tile([0.0, 0.0, -1.0], (100, 1))
+    assert floor_areas_m2(normals, points, 7.0).tolist() == [0.0, 0.0, pytest.approx(7.0)]
+
+
+@pytest.mark.parametrize(
+    ("turn", "words"), [((0, 1, 2), ""), ((0, 2, 1), "--up-axis"), ((2, 1, 0), "turn the mesh")]
+)
+def test_the_largest_floor_tells_the_up_axis(turn, words):
+    room = trimesh.creation.box((8.0, 6.0, 3.0))  # its floor has 48 m², its walls 18 and 24
+    points, faces = trimesh.sample.sample_surface(room, 20_000, seed=0)
+    points, normals = np.asarray(points)[:, turn], np.asarray(room.face_normals)[faces][:, turn]
+    floors = floor_areas_m2(normals, points, room.area)
+    np.testing.assert_allclose(floors, np.array([18.0, 24.0, 48.0])[list(turn)], rtol=0.05)
+    found = doubts((8.0, 6.0, 3.0), floors_m2=floors)
+    assert found.isascii()
+    assert words in found
+    assert bool(found) == bool(words)
+
+
+def test_open3d_is_an_extra(monkeypatch):
+    """Who installs the simulator alone may lack it."""
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    with pytest.raises(InputError, match=r"pip install 'synfeal\[inspect\]'"):
+        simplify(Triangles(np.eye(3), np.array([[0, 1, 2]])), 1)
