@@ -7,8 +7,6 @@ import trimesh
 from PIL import Image
 from scipy.ndimage import map_coordinates
 
-from synfeal.mesh.model import TexturedMesh
-
 
 def write_obj_scene(folder, mesh):
     """OBJ, MTL and PNG textures; what is cut out of a texture is cut out by its alpha."""
@@ -40,16 +38,6 @@ def mtl_lines(folder, part, index):
         lines.append(f"map_d {name}")
     Image.fromarray(pixels).save(folder / name, compress_level=1)
     return [*lines, f"map_Kd {name}"]
-
-
-def without_alpha(mesh):
-    """The scene with nothing cut out, which vertex colours cannot express."""
-    return TexturedMesh(
-        tuple(
-            replace(part, texture=None if part.texture is None else part.texture[..., :3])
-            for part in (replace(part, alpha_cutoff=None) for part in mesh.parts)
-        )
-    )
 
 
 def write_coloured_ply(path, mesh, spacing_m):

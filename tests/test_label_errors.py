@@ -2,13 +2,25 @@
 
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from baselines.groundtruth.label_error import absolute_errors, share_within
 from synfeal.config.experiments import INJECTED
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import pose_error, position_error_m
 from synfeal.labels import OF_SPACE, add_noise, seed_names, with_error
-from tests.property_support import random_table
+from tests.property_support import (
+    directions,
+    few,
+    pose_of,
+    poses,
+    random_table,
+    seeds,
+    table_of,
+    turn,
+)
 
 
 def noise_of(clean, noisy):
@@ -138,3 +150,33 @@ def test_two_sizes_of_a_kind_differ_in_size_alone(kind):
     np.testing.assert_allclose(3 * small[0], large[0], atol=1e-9)
     if kind != "scale":
         np.testing.assert_allclose(4 * small[1], large[1], atol=1e-9)
+
+
+@few
+@given(st.lists(poses, min_size=1, max_size=5), directions, st.floats(0, 5), st.floats(0, 180))
+def test_labels_off_by_a_known_motion_have_that_error(listed, axis, off_m, off_deg):
+    truth = np.array(listed)
+    motion = pose_of(off_m * axis, turn(axis, np.radians(off_deg)))
+    errors = absolute_errors(table_of(truth @ motion), table_of(truth))
+    np.testing.assert_allclose(errors[0], off_m, atol=1e-9)
+    np.testing.assert_allclose(errors[1], off_deg, atol=1e-5)
+    assert share_within(errors, off_m + 1e-6, off_deg + 1e-4) == 1.0
+    assert share_within(errors, off_m - 1e-6, off_deg + 1e-4) == 0.0
+    assert share_within(errors, off_m + 1e-6, off_deg - 1e-4) == 0.0
+
+
+@few
+@given(seeds, st.floats(0.0, 10.0), st.floats(0.0, 180.0), st.lists(poses, min_size=1, max_size=5))
+@example(0, 0.0, 0.0, [np.eye(4)])
+@example(0, 0.0, 180.0, [np.eye(4)])
+def test_noise_moves_and_turns_every_pose_by_its_size(seed, noise_m, noise_deg, clean):
+    table = table_of(clean)
+    noisy = add_noise(table, noise_m, noise_deg, np.random.default_rng(seed))
+    moved_m = np.linalg.norm(noisy.position_m - table.position_m, axis=1)
+    np.testing.assert_allclose(moved_m, noise_m, atol=1e-12)
+    before, after = (Rotation.from_quat(t.quat_wxyz, scalar_first=True) for t in (table, noisy))
+    turned_deg = np.degrees((after * before.inv()).magnitude())
+    np.testing.assert_allclose(turned_deg, noise_deg, atol=1e-5)
+    assert (noisy.quat_wxyz[:, 0] >= 0).all()
+    np.testing.assert_array_equal(noisy.frame, table.frame)
+    np.testing.assert_array_equal(noisy.path, table.path)

@@ -229,20 +229,3 @@ def test_published_changes_the_text_and_the_misprinted_row():
     assert (found["posenet2"].orientation_deg, found["posenet2"].flag) == (0.75, "misprint")
     flags = Counter(c.flag for table in ROWS for c in published_cells(table).values())
     assert flags == {"none": 135, "misprint": 1, "suspect": 4}
-
-
-@pytest.mark.parametrize(
-    ("row", "model", "printed"),
-    [
-        (experiment("table2_ground_truth", labels="sfm"), "poselstm", (0.31, 10.89)),
-        (experiment("table2_ground_truth", labels="rgbd-toro"), "hourglass", (0.39, 14.33)),
-        (experiment("table2_ground_truth", labels="rgbd-g2o"), "posenet2resnet", (0.21, 15.48)),
-        (experiment("table2_ground_truth"), "posenet2", (0.14, 6.70)),
-        (experiment(TABLE4, scene="sanctuary", size="95k"), "posenet", (0.32, 7.16)),
-        (experiment(TABLE4, size="80k"), "posenet2resnet", (0.08, 8.02)),
-        (experiment("table5_from_scratch", size="80k", init="scratch"), "posenet2", (0.03, 4.50)),
-    ],
-)
-def test_published_spot_values(row, model, printed):
-    found = published_cells(row.table)[key_of(row, model)]
-    assert (found.position_m, found.orientation_deg) == printed

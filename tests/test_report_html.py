@@ -106,15 +106,6 @@ def test_a_score_changes_the_table_and_the_switch_has_both(root):
     assert "7.77 m" in text_of(written(root))
 
 
-def test_bold_is_the_best_of_a_scene(finished):
-    rows = table_of(TABLE4, finished).findall(".//tbody/tr")
-    own = [len(row.findall("td/div[@class='labels']/b")) for row in rows]
-    paper = [len(row.findall("td/div[@class='paper']/b")) for row in rows]
-    assert own == [0, 0, 0, 10] * 2  # errors fall with the size
-    assert paper[:4] == [0, 0, 1, 9]  # PoseNet2ResNet's orientation is best at 40k
-    assert [row.get("class") for row in rows] == ["first", None, None, None] * 2
-
-
 def test_changes_have_a_sign_and_a_run_without_a_score_sorts_last(root):
     rows = [row for row in shipped_design() if row.table == TABLE5]
     better = rows[0].model_copy(update={"init": "scratch"})

@@ -88,22 +88,6 @@ def test_headings_sort_up_down_and_back(page, tmp_path):
     assert (left, taken) == ("none", "ascending")
 
 
-def test_sorting_follows_the_switch_and_puts_text_in_order(page, tmp_path):
-    probe = """
-      const name = "table3_inconsistencies";
-      heading(name, 2).querySelector("button").click();
-      const labels = column(name, 2).map(parseFloat);
-      choose("true");
-      const real = column(name, 2).map(parseFloat);
-      heading("table2_ground_truth", 1).querySelector("button").click();
-      return [labels, real, column("table2_ground_truth", 1)];
-    """
-    labels, real, sources = asked(page, tmp_path, probe)
-    assert labels == sorted(labels)
-    assert real == sorted(real) != labels
-    assert sources == ["KinectFusion", "RGB-D SLAM w/ g2o", "RGB-D SLAM w/ TORO", "SfM", "Synfeal"]
-
-
 def test_the_scene_is_drawn_and_paths_can_be_hidden(page, tmp_path):
     probe = """
       const box = document.querySelector(".trajectory"), found = [];

@@ -7,7 +7,7 @@ from baselines.groundtruth.posegraph.optimise import optimise_lm
 from baselines.groundtruth.rgbd import dense, frames, rgbd_graph
 from baselines.groundtruth.rgbd.dense import depth_agreement
 from baselines.groundtruth.rgbd.frames import read_frame
-from baselines.groundtruth.rgbd.tracks import FeatureOdometry, loop_candidates
+from baselines.groundtruth.rgbd.tracks import loop_candidates
 from synfeal.config.models import CameraConfig, KinectFusionConfig, RgbdConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse, pose_error, pose_matrix, relative
@@ -91,27 +91,6 @@ def test_what_is_unmeasurable_or_too_far_away_keeps_a_weak_edge(paths, tmp_path)
     np.testing.assert_array_equal(graph.edges[2].i_from_j, graph.edges[1].i_from_j)
     with_limit = rgbd_graph(paths[0][:2], paths[1][:2], CAMERA, RgbdConfig(max_depth_m=0.5))[0]
     assert with_limit.edges[0].information[0, 0] < 1e3
-
-
-def test_features_find_a_large_turn(tmp_path):
-    """Twelve degrees between two frames, more than direct odometry bears."""
-    truth = straight_path(2, step_m=0.1, turn_deg=12.0)
-    color_paths, depth_paths = write_frames(tmp_path, truth)
-    odometry = FeatureOdometry(CAMERA)
-    features = [
-        odometry.features(
-            np.asarray(Image.open(color).convert("L")),
-            np.asarray(Image.open(depth)).astype(np.float32) / 1000,
-        )
-        for color, depth in zip(color_paths, depth_paths, strict=True)
-    ]
-    found = odometry.motion(*features)
-    assert found is not None
-    poses = truth.world_from_cam
-    error_m, error_rad = pose_error(found[0], relative(poses[0], poses[1]))
-    assert error_m < 0.03
-    assert np.degrees(error_rad) < 1.0
-    assert found[1] >= 12
 
 
 def test_depth_agreement_tells_right_from_wrong_motions():
@@ -247,18 +226,10 @@ def test_without_depth_nothing_is_known_but_the_first_pose(method, tmp_path):
 
 @METHODS
 @pytest.mark.parametrize("kind", [0, 1], ids=["colour", "depth"])
-@pytest.mark.parametrize("damage", ["cut", "overwritten", "empty"])
-def test_a_damaged_image_is_named(method, kind, damage, tmp_path):
+def test_a_damaged_image_is_named(method, kind, tmp_path):
     paths = write_room(tmp_path, [pose_at([-1.0, 0, 1.4])] * 3)
     bad = paths[kind][1]
-    whole = bad.read_bytes()
-    bad.write_bytes(
-        {
-            "cut": whole[: len(whole) // 2],
-            "overwritten": whole[:60] + bytes(200) + whole[260:],
-            "empty": b"",
-        }[damage]
-    )
+    bad.write_bytes(bad.read_bytes()[:60] + bytes(200))
     with pytest.raises(InputError, match=f"{bad.name}: cannot be read as an image") as caught:
         method(paths)
     assert "\n" not in str(caught.value)

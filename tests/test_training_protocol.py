@@ -79,44 +79,11 @@ def test_seeds_draw_paths_and_leave_out_labels():
     assert len({seed, *others}) == len(others) + 1
 
 
-def test_parts_share_images_and_keep_their_labels(splits):
-    whole = read_split(splits[0])
-    part = whole.part(whole.path % 2 == 1)
-    assert part.images is whole.images
-    inner = part.part(part.path == 3)
-    rows = torch.arange(30, 40)  # ten frames a path
-    found = inner.batch(torch.arange(10))
-    assert torch.equal(found.images, whole.images[rows])
-    assert torch.equal(found.position_m, whole.position_m[rows])
-    assert torch.equal(found.quat_wxyz, whole.quat_wxyz[rows])
-    assert set(inner.path) == {3}
-
-
 def test_the_corrected_protocol_never_opens_the_test_set(splits, tmp_path):
     absent = (tmp_path / "absent.npy", tmp_path / "absent.csv")
     train(splits[0], tmp_path, samples=32, test=absent)
     with pytest.raises(InputError, match="absent"):
         train(splits[0], tmp_path, samples=32, test=absent, training=PUBLISHED)
-
-
-def test_held_out_paths_are_not_learned_from(splits, monkeypatch):
-    """Their images may be anything."""
-    frames = read_split(splits[0])
-    mask = held_out_paths(frames.path, 0.4, 1)
-    states = []
-    for grey in (0, 255):
-        images = frames.images.clone()
-        images[torch.from_numpy(mask)] = grey
-        changed = type(frames)(images, *(getattr(frames, n) for n in FIELDS))
-        torch.manual_seed(0)
-        localizer = build_localizer("posenet2", NETWORK, HYPER)
-        statistics = statistics_of(frames)
-        fit(localizer, changed.part(~mask), statistics, Schedule(96, 16, 1e-3, 0.0), 0)
-        states.append(localizer.state_dict())
-    assert all(torch.equal(states[0][k], states[1][k]) for k in states[0])
-
-
-FIELDS = ("position_m", "quat_wxyz", "path", "rows")
 
 
 @pytest.mark.parametrize("training", [TRAINING, PUBLISHED], ids=lambda t: t.protocol)

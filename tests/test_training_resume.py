@@ -26,16 +26,8 @@ def splits(tmp_path_factory):
 
 def run(splits, folder, augment, protocol="corrected", seed=1):
     training = TRAINING.model_copy(update={"protocol": protocol})
-    return train(
-        splits[0],
-        folder,
-        samples=SAMPLES,
-        seed=seed,
-        hyper=DROPOUT,
-        training=training,
-        test=splits[1],
-        augment=augment,
-    )
+    given = {"samples": SAMPLES, "hyper": DROPOUT, "training": training, "test": splits[1]}
+    return train(splits[0], folder, seed=seed, augment=augment, **given)
 
 
 @pytest.fixture(scope="module")
@@ -118,30 +110,27 @@ def changed(content):
 
 
 @pytest.mark.parametrize(
-    "damage",
-    [changed, lambda content: content[:1000], lambda content: b"", lambda content: b"no" * 999],
-    ids=["a bit", "short", "empty", "another kind"],
+    ("damage", "seed"),
+    [
+        (changed, 1),
+        (lambda content: content[:1000], 1),
+        (lambda content: b"no" * 999, 1),
+        (bytes, 2),
+    ],
+    ids=["a bit", "short", "another kind", "another training run"],
 )
-def test_a_damaged_file_is_ignored(damage, splits, undisturbed, tmp_path, monkeypatch, caplog):
+def test_a_file_that_is_not_its_own_is_ignored(
+    damage, seed, splits, undisturbed, tmp_path, monkeypatch, caplog
+):
     monkeypatch.setattr(resume, "RESUME_EVERY_S", 0.0)
     with pytest.raises(RuntimeError, match="stopped here"):
-        run(splits, tmp_path, Jitter(3, fail))
+        run(splits, tmp_path, Jitter(3, fail), seed=seed)
     file = tmp_path / "resume.pt"
     file.write_bytes(damage(file.read_bytes()))
     whole = Jitter()
     assert_same(run(splits, tmp_path, whole), undisturbed["corrected"])
     assert whole.calls == STEPS
     assert "resume.pt: ignored" in caplog.text
-
-
-def test_the_file_of_another_training_is_ignored(
-    splits, undisturbed, tmp_path, monkeypatch, caplog
-):
-    monkeypatch.setattr(resume, "RESUME_EVERY_S", 0.0)
-    with pytest.raises(RuntimeError, match="stopped here"):
-        run(splits, tmp_path, Jitter(3, fail), seed=2)
-    assert_same(run(splits, tmp_path, Jitter()), undisturbed["corrected"])
-    assert "it is of another training run" in caplog.text
 
 
 def test_a_digest_tells_any_change():

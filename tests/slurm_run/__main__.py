@@ -20,7 +20,7 @@ from pathlib import Path
 
 from synfeal.errors import InputError, exit_status
 from synfeal.files import atomic_path
-from tests.slurm_run.trees import Hashes, damaged, missing, reason_to_differ
+from tests.slurm_run.trees import differing, hashes_of, reason_to_differ
 
 ROOT = Path(__file__).parents[2]
 CLUSTER = ROOT / "setup/slurm_cluster.sh"
@@ -59,12 +59,12 @@ def _compare(work: Path, local: Path | None, out: Path) -> None:
     finally:
         cluster("stop", work / "cluster")
     trees = local or work / "local/smoke", work / "slurm/smoke"
-    text, differing = page(trees, (local_s, slurm_s), crash, work / "cluster")
+    text, off = page(trees, (local_s, slurm_s), crash, work / "cluster")
     with atomic_path(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     print(text)
-    if differing:
-        raise InputError(f"{out}: {len(differing)} files differ or lack; both are in {work}")
+    if off:
+        raise InputError(f"{out}: {len(off)} files differ or lack; both are in {work}")
 
 
 def _snakemake(work: Path, name: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
@@ -157,11 +157,10 @@ NAMES_ITS_RUN = "summary.txt"  # says in which directory its run's tables lie
 
 def differing_files(local: Path, slurm: Path) -> tuple[list[str], list[str]]:
     """Files promised to be the same, apart from times, and those that are not or lack."""
-    expected, found = (Hashes().tree(tree) for tree in (local, slurm))
-    off = {*missing(expected, found), *damaged(expected, found)}
+    expected, found = hashes_of(local), hashes_of(slurm)
     return tuple(
         sorted(n for n in names if not reason_to_differ(n) and n != NAMES_ITS_RUN)
-        for names in (expected, off)
+        for names in (expected, differing(expected, found))
     )
 
 
@@ -180,7 +179,7 @@ def page(
         cluster_dir: with the logs of the controller; of its ``jobcomp/filetxt``, one line of
             ``key=value`` for each end of a job.
     """
-    promised, differing = differing_files(*trees)
+    promised, off = differing_files(*trees)
     tables = {name for name in promised if name.startswith("tables/")}
     took = "made before" if seconds[0] is None else f"{seconds[0]:.0f}"
     text = (cluster_dir / "jobs.txt").read_text(encoding="utf-8")
@@ -194,11 +193,11 @@ def page(
         "| | local, two cores | SLURM, one node |\n|---|---|---|\n"
         f"| seconds | {took} | {seconds[1]:.0f} |\n"
         f"| files that are promised to be the same | {len(promised)} | "
-        f"{len({*promised} - {*differing})} equal |\n"
-        f"| of these, tables | {len(tables)} | {len(tables - {*differing})} equal |",
+        f"{len({*promised} - {*off})} equal |\n"
+        f"| of these, tables | {len(tables)} | {len(tables - {*off})} equal |",
         "Equal is byte by byte, without the columns and rows that say how long something took and"
         " how much memory.",
-        f"Files that differ or lack: {', '.join(differing) or 'none'}.",
+        f"Files that differ or lack: {', '.join(off) or 'none'}.",
         f"SLURM jobs: {len({job for job, _ in ends})}; ends of jobs: "
         + ", ".join(f"{count} {state}" for state, count in sorted(states.items()))
         + ".",
@@ -210,4 +209,4 @@ def page(
         "What the controller wrote:",
         "\n".join(["```", *filter(RECOVERY.search, log), "```"]),
     ]
-    return "\n\n".join(lines) + "\n", differing
+    return "\n\n".join(lines) + "\n", off

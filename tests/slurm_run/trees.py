@@ -44,30 +44,18 @@ def reason_to_differ(name: str) -> str | None:
     return next((why for pattern, why in TIMED.items() if fnmatch.fnmatch(name, pattern)), None)
 
 
-class Hashes:
-    """SHA-256 of files without ``TIMED_PARTS``; one that has not changed is not read again."""
+def hashes_of(root: Path) -> dict[str, str]:
+    """SHA-256, without ``TIMED_PARTS``, of all finished files that stay, by their paths."""
+    return {
+        path.relative_to(root).as_posix(): hashlib.sha256(_compared(path)).hexdigest()
+        for path in sorted(root.rglob("*"))
+        if path.is_file() and _stays(path.relative_to(root))
+    }
 
-    def __init__(self) -> None:
-        self._known: dict[Path, tuple[tuple[int, int], str]] = {}
 
-    def of(self, path: Path) -> str:
-        """Of one file."""
-        stat = path.stat()
-        state = (stat.st_mtime_ns, stat.st_size)
-        if path not in self._known or self._known[path][0] != state:
-            self._known[path] = (state, hashlib.sha256(_compared(path)).hexdigest())
-        return self._known[path][1]
-
-    def tree(self, root: Path) -> dict[str, str]:
-        """Of all finished files below a directory that stay, by their paths there."""
-        paths = (path for path in sorted(root.rglob("*")) if path.is_file())
-        named = ((path.relative_to(root), path) for path in paths)
-        return {
-            name.as_posix(): self.of(path)
-            for name, path in named
-            if not any(fnmatch.fnmatch(part, HIDDEN) for part in name.parts)
-            and not is_passing(name)
-        }
+def _stays(name: Path) -> bool:
+    passing = any(fnmatch.fnmatch(name.as_posix(), pattern) for pattern in PASSING)
+    return not passing and not any(fnmatch.fnmatch(part, HIDDEN) for part in name.parts)
 
 
 def _compared(path: Path) -> bytes:
@@ -78,24 +66,16 @@ def _compared(path: Path) -> bytes:
     return content
 
 
-def is_passing(name: Path) -> bool:
-    """Whether a file, by its path below the results directory, is not there in the end."""
-    return any(fnmatch.fnmatch(name.as_posix(), pattern) for pattern in PASSING)
-
-
-def damaged(expected: dict[str, str], found: dict[str, str]) -> list[str]:
-    """Files under final names that are promised to be those of another tree, and are not."""
+def differing(expected: dict[str, str], found: dict[str, str]) -> list[str]:
+    """Files promised to be those of another tree that are not, or of which one tree lacks one."""
     return sorted(
-        name for name in found if expected.get(name) != found[name] and not reason_to_differ(name)
+        name
+        for name in expected.keys() | found.keys()
+        if expected.get(name) != found.get(name)
+        and (name not in found or not reason_to_differ(name))
     )
 
 
-def missing(expected: dict[str, str], found: dict[str, str]) -> list[str]:
-    """Files of a complete tree that another one lacks."""
-    return sorted(expected.keys() - found.keys())
-
-
 if __name__ == "__main__":  # EXPECTED FOUND: names what differs between two results directories
-    trees = [Hashes().tree(Path(root)) for root in sys.argv[1:3]]
-    differing = damaged(*trees) + missing(*trees)
-    sys.exit("\n".join(["these files differ or lack:", *differing]) if differing else 0)
+    off = differing(*(hashes_of(Path(root)) for root in sys.argv[1:3]))
+    sys.exit("\n".join(["these files differ or lack:", *off]) if off else 0)
