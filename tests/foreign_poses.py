@@ -4,14 +4,11 @@ import numpy as np
 import pycolmap
 from evo.core.trajectory import PoseTrajectory3D
 from evo.tools import file_interface
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.dataset.sevenscenes import Sequence, pose_text, write_splits
 from tests.property_support import random_table
-
-Array = NDArray[np.float64]
 
 PER_SEQUENCE, RATE_HZ = 12, 30.0
 TEST = ("seq-02", "seq-03")

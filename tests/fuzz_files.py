@@ -1,7 +1,5 @@
 """Every kind of file a stage reads: a sound one, its reader, and what the reader promises."""
 
-from __future__ import annotations
-
 import json
 import math
 import shutil

@@ -1,8 +1,6 @@
 """Damaged inputs, made systematically, and what a reader may answer: a value that keeps its
 promise, or one line that names the file."""
 
-from __future__ import annotations
-
 import copy
 import json
 import re

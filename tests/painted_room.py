@@ -4,15 +4,10 @@ Nothing of the simulator is used, so what structure from motion makes of these i
 depend on meshes, scans or renderers.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
-
-Array = NDArray[np.float64]
 
 SIZE_M = np.array([5.0, 6.0, 3.0])
 TEXELS_PER_M = 100
@@ -30,7 +25,7 @@ class PaintedRoom:
             a texture is repeated where the wall is larger.
     """
 
-    textures: tuple[Array, ...]
+    textures: tuple[np.ndarray, ...]
 
     def render(self, world_from_cam, camera):
         """Antialiased colour image (H, W, 3) of a camera without distortion."""

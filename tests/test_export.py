@@ -1,7 +1,5 @@
 """Exports read back by other programs' readers, or by hand: a point lands where it was drawn."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """One contract for all five localizers in all their shapes, and losses with closed forms."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

@@ -3,8 +3,6 @@
 The files are made here, with the libraries that read them.
 """
 
-from __future__ import annotations
-
 import base64
 import sys
 import zlib

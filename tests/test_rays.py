@@ -4,8 +4,6 @@ The band is 1e-6 of the mesh's extent: the caster's answer must be that of the m
 moved by no more than that, which along a ray that meets a surface at an angle is band / cosine.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,7 +8,6 @@ import sys
 import mpmath
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from baselines.training.predict import predict_poses
@@ -124,7 +123,6 @@ MP = mpmath.MPContext()
 MP.dps = 60
 GAPS = [0.0, *(10.0**-k for k in range(12, 2, -1))]
 ANGLES = [*GAPS, 1.0, *(MP.pi - MP.mpf(gap) for gap in GAPS)]
-Array = NDArray[np.float64]
 
 
 def turned(base, axis, angle):

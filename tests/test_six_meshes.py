@@ -1,7 +1,5 @@
 """Meshes of different origin: inspect, the command it prints, validate; nobody helps."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import shlex
