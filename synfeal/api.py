@@ -18,7 +18,7 @@ from synfeal.collection.collect import CollectJob, with_backend
 from synfeal.collection.collect import collect as run_collection
 from synfeal.config.dataset import DatasetConfig
 from synfeal.config.models import CameraConfig, SceneConfig
-from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.sevenscenes import frame_paths, read_split
 from synfeal.mesh import load

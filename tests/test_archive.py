@@ -15,8 +15,8 @@ import pytest
 from baselines.groundtruth.images import link_images
 from baselines.groundtruth.rgbd.frames import frame_generator
 from synfeal.cli import main
-from synfeal.dataset import archive as archive_module
-from synfeal.dataset.archive import ArchivedFile, foreign_members, frame_file, write_archive
+from synfeal.dataset import frame_files as archive_module
+from synfeal.dataset.frame_files import ArchivedFile, foreign_members, frame_file, write_archive
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.render_sequence import write_sequence
 from synfeal.dataset.sevenscenes import frame_paths, read_depth_m, read_pose, read_split

@@ -12,8 +12,8 @@ from synfeal.config.models import CameraConfig, CollectionConfig, RenderConfig, 
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.save import save_glb
+from synfeal.planning.coverage import empty_shares
 from synfeal.planning.plan import plan_split
-from synfeal.planning.seen_surface import empty_shares
 from synfeal.render import open_renderer
 from tests.collected import painted, refused
 

@@ -19,7 +19,7 @@ from synfeal.mesh.triangles import (
     save_collision_mesh,
     simplify,
 )
-from synfeal.planning.start import draw_questions
+from synfeal.planning.space import draw_questions
 from synfeal.report.figures import write_figures
 from synfeal.report.speed_vs_error import speeds_of, write_speed_vs_error
 from synfeal.scenes.collision import (

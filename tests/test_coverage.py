@@ -11,7 +11,7 @@ from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.triangles import Triangles
-from synfeal.planning import seen_surface as seen
+from synfeal.planning import coverage as seen
 from synfeal.planning.coverage import (
     MAX_VOXELS,
     VOXEL_M,
@@ -21,7 +21,7 @@ from synfeal.planning.coverage import (
     voxel_centres,
 )
 from synfeal.planning.path import poses_of
-from synfeal.planning.start import ConnectedSpace
+from synfeal.planning.space import ConnectedSpace
 from tests import empty_room as room
 from tests.property_support import directions, few, fewer, poses, seeds, table_of, vectors
 

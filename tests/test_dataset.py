@@ -14,7 +14,7 @@ from PIL import Image
 from synfeal.config.models import CameraConfig, RenderConfig, SceneConfig
 from synfeal.dataset import sevenscenes
 from synfeal.dataset.finish import write_manifest
-from synfeal.dataset.png import encode_png
+from synfeal.dataset.frame_files import encode_png
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.dataset.preview import write_contact_sheet
 from synfeal.dataset.render_sequence import MOST_WAITING, render_sequence, write_sequence

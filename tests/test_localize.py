@@ -14,8 +14,8 @@ from baselines.training.checkpoint import frame_camera
 from baselines.training.predict import predict, predict_poses
 from synfeal.cli import main
 from synfeal.config.models import CameraConfig
+from synfeal.dataset.frame_files import encode_png
 from synfeal.dataset.packed import pack_frames
-from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.files import write_json
 from synfeal.frames import read_records

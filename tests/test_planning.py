@@ -23,9 +23,9 @@ from synfeal.planning.space import (
     admissible,
     pose_bounds,
     sample_poses,
+    sample_start,
     view_directions,
 )
-from synfeal.planning.start import sample_start
 from tests.empty_room import EMPTY, ROOM, SCENE, caster_of, pose_vectors
 from tests.property_support import few, vectors
 

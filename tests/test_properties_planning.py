@@ -17,11 +17,13 @@ from synfeal.planning.plan import (
     sampling_box_of,
     sampling_boxes_of,
 )
-from synfeal.planning.space import PoseSpace, admissible, has_free_view
-from synfeal.planning.start import (
+from synfeal.planning.space import (
+    PoseSpace,
     Questions,
+    admissible,
     connected_space,
     draw_questions,
+    has_free_view,
     largest_group,
     sample_start,
     seeing_groups,

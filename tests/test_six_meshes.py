@@ -19,8 +19,8 @@ from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.save import save_glb
+from synfeal.planning.coverage import empty_shares
 from synfeal.planning.path import poses_of
-from synfeal.planning.seen_surface import empty_shares
 from synfeal.planning.space import pose_bounds, sample_poses
 from tests.mesh_conversions import write_coloured_ply, write_obj_scene
 from tests.small_room import SIDES, TWO, paint

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.models import CameraConfig
-from synfeal.dataset import png
-from synfeal.dataset.archive import FrameFile, link_or_unpack
+from synfeal.dataset import frame_files
+from synfeal.dataset.frame_files import FrameFile, link_or_unpack
 from synfeal.errors import InputError
 
 
@@ -23,7 +23,7 @@ def read_image(path: FrameFile, camera: CameraConfig, mode: str | None = None) -
     """
     if not path.is_file():
         raise InputError(f"{path}: no such image; collect the data set again")
-    pixels = np.asarray(png.read_image(path, mode))
+    pixels = np.asarray(frame_files.read_image(path, mode))
     if pixels.shape[:2] != (camera.height, camera.width):
         raise InputError(
             f"{path}: is {pixels.shape[1]}x{pixels.shape[0]}, the camera has"

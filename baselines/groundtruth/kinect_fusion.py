@@ -24,7 +24,7 @@ from baselines.groundtruth.projective_icp import pyramid_of, register
 from baselines.groundtruth.rgbd.dense import matched_depths, near
 from baselines.groundtruth.rgbd.frames import RgbdFrame, open3d_depth, read_frame
 from synfeal.config.models import CameraConfig, KinectFusionConfig
-from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.frame_files import FrameFile
 from synfeal.geometry.poses import inverse
 
 Array = NDArray[np.float64]

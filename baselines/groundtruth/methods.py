@@ -26,7 +26,7 @@ from baselines.groundtruth.posegraph.graph import Edge, PoseGraph, read_g2o
 from synfeal.config import Config, Experiment
 from synfeal.config.experiments import INJECTED
 from synfeal.config.models import CameraConfig, GroundTruthConfig, PoseGraphConfig
-from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.sevenscenes import frame_paths
 from synfeal.errors import InputError
 from synfeal.files import write_json

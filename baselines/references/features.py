@@ -22,7 +22,7 @@ from baselines.groundtruth.images import read_image
 from baselines.references.arrays import Stored
 from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.models import CameraConfig, ReferencesConfig
-from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.sevenscenes import frame_paths, read_depth_m
 from synfeal.render.base import Depth
 

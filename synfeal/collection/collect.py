@@ -18,8 +18,8 @@ import yaml
 import synfeal
 from synfeal.config.dataset import DatasetConfig
 from synfeal.config.models import CameraConfig
-from synfeal.dataset.archive import SUFFIX
 from synfeal.dataset.finish import finish, origin_of
+from synfeal.dataset.frame_files import SUFFIX
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.render_pool import Studio, render_sequences
 from synfeal.dataset.render_sequence import Progress, resolved
@@ -31,9 +31,8 @@ from synfeal.mesh.checks import shows_one_colour
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import load_collision_mesh
-from synfeal.planning.coverage import scene_coverage
+from synfeal.planning.coverage import empty_pixels, scene_coverage
 from synfeal.planning.plan import plan_mesh
-from synfeal.planning.seen_surface import empty_pixels
 from synfeal.run_lock import WORK, clean_up, growing, place_of
 from synfeal.scenes.prepare import prepare_mesh, save_cartons
 from synfeal.seeds import generator_of

@@ -9,7 +9,7 @@ from typing import Any
 
 from synfeal.config.dataset import DatasetConfig
 from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
-from synfeal.dataset.archive import frame_file, sequence_at, sequence_names
+from synfeal.dataset.frame_files import frame_file, sequence_at, sequence_names
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.pose_table import read_frames, read_pose_table, write_pose_table
 from synfeal.dataset.preview import write_contact_sheet

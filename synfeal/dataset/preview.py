@@ -11,8 +11,7 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw
 
-from synfeal.dataset.archive import FrameFile
-from synfeal.dataset.png import read_image
+from synfeal.dataset.frame_files import FrameFile, read_image
 from synfeal.dataset.sevenscenes import Split, frame_paths, read_split
 from synfeal.errors import InputError
 from synfeal.files import atomic_path

@@ -18,9 +18,8 @@ from PIL import Image
 from tqdm import tqdm
 
 from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
-from synfeal.dataset.archive import is_archive, write_archive
+from synfeal.dataset.frame_files import encode_png, is_archive, write_archive
 from synfeal.dataset.packed import View, fit_frame, new_packed
-from synfeal.dataset.png import encode_png
 from synfeal.dataset.pose_table import PoseTable, read_frames
 from synfeal.dataset.sevenscenes import depth_mm_of, pose_text
 from synfeal.effects.apply import Frame, varied_frames

@@ -16,8 +16,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.dataset.archive import FrameFile, frame_file, sequence_at, sequence_names
-from synfeal.dataset.png import read_image
+from synfeal.dataset.frame_files import (
+    FrameFile,
+    frame_file,
+    read_image,
+    sequence_at,
+    sequence_names,
+)
 from synfeal.errors import InputError, read_as
 from synfeal.files import atomic_path
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from synfeal.bootstrap import medians
 from synfeal.camera.projection import cell_directions, cell_pixels, pixels_of_normalised
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.dataset.sevenscenes import INVALID_MM
 from synfeal.errors import InputError, read_as

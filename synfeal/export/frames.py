@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.sevenscenes import INVALID_MM, SPLIT_FILES
 from synfeal.errors import InputError
 from synfeal.validation.camera import camera_of_dataset

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from synfeal.dataset.archive import FrameFile, link_or_unpack
+from synfeal.dataset.frame_files import FrameFile, link_or_unpack
 from synfeal.export.frames import ExportSet, Place, read_export_set
 from synfeal.export.learned import export_ace, export_mstransformer, export_nerfstudio
 from synfeal.export.reconstruction import export_colmap, export_hloc, export_tum

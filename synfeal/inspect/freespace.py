@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from scipy.stats import mode
 
 from synfeal.mesh.rays import RayCaster
-from synfeal.planning.start import ConnectedSpace, seeing_groups
+from synfeal.planning.space import ConnectedSpace, seeing_groups
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

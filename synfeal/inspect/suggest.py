@@ -19,8 +19,8 @@ from synfeal.inspect.freespace import (
     step_m_of,
 )
 from synfeal.mesh.rays import RayCaster
+from synfeal.planning.coverage import EmptyPixels, empty_pixels
 from synfeal.planning.plan import plan_split
-from synfeal.planning.seen_surface import EmptyPixels, empty_pixels
 from synfeal.seeds import generator_of
 from synfeal.settings import SCENE
 

@@ -18,8 +18,7 @@ from synfeal.config.models import CollectionConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import interpolate, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
-from synfeal.planning.space import PoseSpace, PoseVectors, farthest_admissible
-from synfeal.planning.start import connected_space
+from synfeal.planning.space import PoseSpace, PoseVectors, connected_space, farthest_admissible
 
 Array = NDArray[np.float64]
 

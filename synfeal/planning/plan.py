@@ -17,8 +17,7 @@ from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, load_collision_mesh
 from synfeal.planning.path import CandidateStream, independent_poses, path_poses, poses_of
 from synfeal.planning.repeat import repeated_poses
-from synfeal.planning.space import PoseSpace
-from synfeal.planning.start import sample_start
+from synfeal.planning.space import PoseSpace, sample_start
 
 Array = NDArray[np.float64]
 

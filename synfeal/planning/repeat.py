@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.pose_table import PoseTable, check_unit, read_pose_table
 from synfeal.dataset.sevenscenes import SPLIT_FILES, frame_paths, read_pose, read_split
 from synfeal.errors import InputError, read_as

@@ -23,7 +23,7 @@ from synfeal.frames import write_numbers
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, merge_vertices, simplify
-from synfeal.planning.start import Questions, draw_questions
+from synfeal.planning.space import Questions, draw_questions
 from synfeal.scenes.speed import seconds_of
 
 SMALLEST = 100
@@ -66,7 +66,7 @@ def collision_mesh(
     # (2, 3) lower and upper corner of the space camera centres are sampled in
     box_m: NDArray[np.float64],
     min_agreement: float,  # least share of decisions that must be those of the full mesh
-    # draws the questions, see :func:`synfeal.planning.start.draw_questions`
+    # draws the questions, see :func:`synfeal.planning.space.draw_questions`
     rng: np.random.Generator,
 ) -> tuple[Triangles, list[Rung]]:
     """The smallest mesh on which a planner decides as on ``mesh``, and how it was chosen.

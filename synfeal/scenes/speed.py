@@ -19,7 +19,7 @@ from synfeal.config.models import (
     RenderConfig,
     SceneConfig,
 )
-from synfeal.dataset.png import encode_png
+from synfeal.dataset.frame_files import encode_png
 from synfeal.dataset.pose_table import PoseTable, read_frames, read_pose_table
 from synfeal.dataset.render_sequence import Effects, drawn, write_sequence
 from synfeal.effects.apply import Frame

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset.archive import FrameFile, foreign_members, is_archive
+from synfeal.dataset.frame_files import FrameFile, foreign_members, is_archive
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError
 from synfeal.validation.listing import (

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from synfeal.dataset.archive import (
+from synfeal.dataset.frame_files import (
+    IMAGE_DAMAGE,
     SUFFIX,
     FrameFile,
     frame_file,
@@ -22,7 +23,6 @@ from synfeal.dataset.archive import (
     sequence_at,
     sequence_names,
 )
-from synfeal.dataset.png import IMAGE_DAMAGE
 from synfeal.errors import InputError, why
 
 COLOR, DEPTH, POSE = "color.png", "depth.png", "pose.txt"

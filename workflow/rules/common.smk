@@ -30,7 +30,7 @@ from synfeal.config.load import check_results
 from synfeal.config.experiments import INJECTED, Init, common_every, split_init
 from synfeal.config.models import MODELS
 from synfeal.config.effects import CLEAN, MIXED
-from synfeal.dataset.archive import SUFFIX
+from synfeal.dataset.frame_files import SUFFIX
 from synfeal.dataset.finish import origin_of
 from synfeal.dataset.sevenscenes import sequences_of
 from synfeal.effects.scene import carton_files

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from baselines.groundtruth.images import read_image
 from synfeal.config.models import CameraConfig, DepthConfig
-from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.frame_files import FrameFile
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
 from synfeal.seeds import generator_of

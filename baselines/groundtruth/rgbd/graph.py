@@ -23,7 +23,7 @@ from baselines.groundtruth.rgbd.tracks import (
     neighbour,
 )
 from synfeal.config.models import CameraConfig, RgbdConfig
-from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.sevenscenes import frame_paths
 from synfeal.files import write_json
 from synfeal.geometry.poses import relative

@@ -29,7 +29,7 @@ from baselines.groundtruth.batches import BatchTrajectory, failed_trajectory, wr
 from baselines.groundtruth.images import link_images
 from baselines.groundtruth.sfm.mapping import camera_poses, map_matches, read_matches, refine_model
 from synfeal.config.models import CameraConfig, SfmConfig
-from synfeal.dataset.archive import FrameFile
+from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.pose_table import read_frames
 from synfeal.dataset.sevenscenes import frame_paths
 from synfeal.files import write_json

@@ -22,7 +22,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from synfeal.dataset.archive import EPOCH, PLAIN_FILE, UNIX
+from synfeal.dataset.frame_files import EPOCH, PLAIN_FILE, UNIX
 from synfeal.dataset.pose_table import HEADER
 from synfeal.errors import InputError
 from synfeal.files import atomic_path

@@ -23,7 +23,7 @@ from pydantic import AfterValidator, BaseModel, TypeAdapter
 from baselines.groundtruth.methods import METHODS, estimation_parameters
 from baselines.training.record import RECORD, read_training_record, training_parameters
 from synfeal.config import MODELS, Config, Run
-from synfeal.dataset.archive import ARCHIVE_DAMAGE
+from synfeal.dataset.frame_files import ARCHIVE_DAMAGE
 from synfeal.errors import InputError, why
 from synfeal.files import atomic_path, write_json
 from synfeal.report.predictions.keep import DESCRIPTOR, PREDICTIONS
