@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import base64
 import copy
-import importlib
 import io
 from collections.abc import Callable
 from functools import partial
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -41,15 +41,6 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 MOST_BYTES = 2**33  # of one decoded view: what says it holds more is damaged
 
 Values = NDArray[Any]
-
-
-def can_decode(extension: str) -> bool:
-    """Whether the library for an extension is installed."""
-    try:
-        importlib.import_module(LIBRARIES[extension])
-    except ImportError:
-        return False
-    return True
 
 
 def decoded(gltf: Gltf, read: Callable[[str], bytes]) -> Gltf:
@@ -85,7 +76,7 @@ class _Decoder:
             BASISU: self._decode_basisu,
         }
         for name, decode in decoders.items():
-            if name in needed and can_decode(name):
+            if name in needed and find_spec(LIBRARIES[name]) is not None:
                 decode()
                 for key in ("extensionsRequired", "extensionsUsed"):  # it is no longer needed
                     header[key] = [other for other in header.get(key, []) if other != name]

@@ -102,8 +102,11 @@ def _read_parts(
                 part = _part(own, geometry, materials, findings)
                 checks.check_indices(part, path)
                 parts.append(_placed(part, file_from_part, world_from_file))
-    kept = [checks.repaired(part, findings) for part in parts]
-    return tuple(part for part in kept if len(part.faces) and _is_seen(part, findings))
+    kept = [part for part in (checks.repaired(part, findings) for part in parts) if len(part.faces)]
+    for part in kept:
+        if not part.is_drawn:
+            findings.note(f"part '{part.name}': nowhere opaque enough to be seen; left out")
+    return tuple(part for part in kept if part.is_drawn)
 
 
 def _read_scene(path: Path, gltf: Gltf | None, findings: Findings) -> Any:
@@ -163,12 +166,6 @@ def _with_material(part: MeshPart, uv: Any, material: BaseMaterial, findings: Fi
         return part
     coordinates = material.transformed(np.asarray(uv, dtype=np.float64)[:, :2])
     return replace(part, uv=coordinates, texture=material.texture)
-
-
-def _is_seen(part: MeshPart, findings: Findings) -> bool:
-    if not part.is_drawn:
-        findings.note(f"part '{part.name}': nowhere opaque enough to be seen; left out")
-    return part.is_drawn
 
 
 class RecordingResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is untyped

@@ -155,33 +155,26 @@ def with_fewer_faces(mesh: TexturedMesh, n_faces: int) -> TexturedMesh:
     Raises:
         ImportError: the package ``meshoptimizer`` is not installed.
     """
-    vertices_m, faces = mesh.merged()
-    kept = _simplified(vertices_m, faces, n_faces)
-    first = np.cumsum([0, *(len(part.vertices_m) for part in mesh.parts)])
-    of_part = np.searchsorted(first, kept[:, 0], side="right") - 1
-    parts = (
-        part.over(kept[of_part == index] - first[index])
-        for index, part in enumerate(mesh.parts)
-        if (of_part == index).any()
-    )
-    return replace(mesh, parts=tuple(parts))
-
-
-def _simplified(
-    vertices_m: NDArray[np.float64], faces: NDArray[np.int64], n_faces: int
-) -> NDArray[np.int64]:
-    """Faces (F, 3) over the same vertices (V, 3), about ``n_faces`` of them."""
     # The other function, which would weigh texture coordinates too, crashes as published: its
     # wrapper (0.2.30a0) does not say which types of numbers the library takes.
     from meshoptimizer import simplify
 
+    vertices_m, faces = mesh.merged()
     places_m, index = weld(vertices_m - vertices_m.mean(axis=0))  # copies are alike to the bit
-    kept = np.empty(faces.size, np.uint32)
+    left = np.empty(faces.size, np.uint32)
     count = simplify(
-        kept,
+        left,
         faces.reshape(-1).astype(np.uint32),
         places_m[index].astype(np.float32),
         target_index_count=3 * n_faces,
         target_error=NO_LIMIT,
     )
-    return kept[:count].reshape(-1, 3).astype(np.int64)
+    kept = left[:count].reshape(-1, 3).astype(np.int64)
+    first = np.cumsum([0, *(len(part.vertices_m) for part in mesh.parts)])
+    of_part = np.searchsorted(first, kept[:, 0], side="right") - 1
+    parts = (
+        part.over(kept[of_part == number] - first[number])
+        for number, part in enumerate(mesh.parts)
+        if (of_part == number).any()
+    )
+    return replace(mesh, parts=tuple(parts))

@@ -40,7 +40,7 @@ class DistortedRenderer(Renderer):
         self._shape = (camera.height, camera.width)
         pinhole = covering_camera(camera)
         self._colour = _colour_matrix(camera, pinhole)
-        self._depth_taps = _taps(_seen_at(camera, pinhole, 0, camera.height), pinhole.width)
+        self._depth_taps = _taps(_seen_at(camera, pinhole, range(camera.height)), pinhole.width)
         self._inner = open_pinhole(pinhole)
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
@@ -68,7 +68,10 @@ def covering_camera(camera: CameraConfig) -> CameraConfig:
     Raises:
         InputError: the view is so wide that the pinhole image would exceed 8192 pixels.
     """
-    edge = _edge_normalised(camera)
+    x, y = np.arange(camera.width + 1.0), np.arange(camera.height + 1.0)
+    sides = [np.column_stack([x, 0.0 * x + edge]) for edge in (0.0, camera.height)]
+    sides += [np.column_stack([0.0 * y + edge, y]) for edge in (0.0, camera.width)]
+    edge = normalised_of_pixels(camera, np.concatenate(sides))
     fx, fy, _, _ = camera.intrinsics
     extent = np.ptp(edge, axis=0) * [fx, fy]
     scale = min(_OVERSAMPLING, (_LONGEST_SIDE_PX - 2 * _MARGIN_PX - 2) / extent.max())
@@ -118,23 +121,11 @@ def _bent(inverse: NDArray[np.floating]) -> NDArray[np.bool_]:
     return bent
 
 
-def _edge_normalised(camera: CameraConfig) -> Array:
-    """Normalised coordinates (n, 2) along the edge of the image."""
-    x, y = np.arange(camera.width + 1.0), np.arange(camera.height + 1.0)
-    sides = [np.column_stack([x, 0.0 * x + edge]) for edge in (0.0, camera.height)]
-    sides += [np.column_stack([0.0 * y + edge, y]) for edge in (0.0, camera.width)]
-    return normalised_of_pixels(camera, np.concatenate(sides))
-
-
 def _seen_at(
-    camera: CameraConfig,
-    pinhole: CameraConfig,
-    start: int,
-    stop: int,
-    offset: tuple[float, float] = (0.0, 0.0),
+    camera: CameraConfig, pinhole: CameraConfig, rows: range, offset: tuple[float, float] = (0, 0)
 ) -> Array:
-    """Where rows ``start`` to ``stop`` of the image lie in the pinhole image: (rows, W, 2)."""
-    column, row = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(start, stop) + 0.5)
+    """Where rows of the image lie in the pinhole image: (rows, W, 2)."""
+    column, row = np.meshgrid(np.arange(camera.width) + 0.5, np.array(rows) + 0.5)
     normalised = normalised_of_pixels(camera, np.stack([column, row], axis=-1) + offset)
     fx, fy, cx, cy = pinhole.intrinsics
     return normalised * [fx, fy] + [cx, cy]
@@ -156,11 +147,10 @@ def _colour_matrix(camera: CameraConfig, pinhole: CameraConfig) -> Any:
     shape = (camera.height, camera.width, per_row)
     index, weight = np.empty(shape, np.int32), np.empty(shape, np.float32)
     for start in range(0, camera.height, _BAND):
-        stop = min(start + _BAND, camera.height)
+        rows = range(start, min(start + _BAND, camera.height))
         for number, point in enumerate(_POINTS):
-            seen = _seen_at(camera, pinhole, start, stop, point)
-            at = np.s_[start:stop, :, 4 * number : 4 * number + 4]
-            index[at], weight[at] = _taps(seen, pinhole.width)
+            at = np.s_[start : rows.stop, :, 4 * number : 4 * number + 4]
+            index[at], weight[at] = _taps(_seen_at(camera, pinhole, rows, point), pinhole.width)
     ends = np.arange(0, index.size + 1, per_row)
     size = (camera.height * camera.width, pinhole.height * pinhole.width)
     values = weight.reshape(-1) / len(_POINTS)

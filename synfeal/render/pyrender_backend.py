@@ -117,33 +117,28 @@ def mean_of_samples(samples: NDArray[np.uint8], factor: int) -> Rgb:
 
 
 def _primitive(part: MeshPart, centre_m: NDArray[np.float64]) -> Any:
-    """One part as vertex buffers around ``centre_m`` and a material."""
-    rgba = None
+    """One part around ``centre_m``; the alpha test is already decided in its texture."""
+    rgba = texture = None
     if part.vertex_rgb is not None:
         rgb = part.vertex_rgb.astype(np.float32) / 255.0
         rgba = np.pad(rgb, ((0, 0), (0, 1)), constant_values=1)
-    return pyrender.Primitive(
-        positions=(part.vertices_m - centre_m).astype(np.float32),
-        indices=part.faces.astype(np.uint32),
-        texcoord_0=None if part.uv is None else part.uv.astype(np.float32),
-        color_0=rgba,
-        material=_material(part),
-    )
-
-
-def _material(part: MeshPart) -> Any:
-    """Base colour and texture; the alpha test is already decided in the texture."""
-    texture = None
     if part.texture is not None:
         pixels = thresholded(part)
         channels = "RGBA" if pixels.shape[2] == 4 else "RGB"
         # Trilinear filtering costs a fifth more and is no closer to the mean of many samples.
         sampler = pyrender.Sampler(minFilter=pyrender.constants.GLTF.LINEAR_MIPMAP_NEAREST)
         texture = pyrender.Texture(sampler=sampler, source=pixels, source_channels=channels)
-    return pyrender.MetallicRoughnessMaterial(
+    material = pyrender.MetallicRoughnessMaterial(
         baseColorTexture=texture,
         baseColorFactor=np.append(part.base_color[:3] / 255.0, 1.0),
         doubleSided=True,
+    )
+    return pyrender.Primitive(
+        positions=(part.vertices_m - centre_m).astype(np.float32),
+        indices=part.faces.astype(np.uint32),
+        texcoord_0=None if part.uv is None else part.uv.astype(np.float32),
+        color_0=rgba,
+        material=material,
     )
 
 
