@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from synfeal.geometry.alignment import umeyama_sim3
+from synfeal.geometry.poses import umeyama_sim3
 from synfeal.geometry.rotations import matrix_from_quat_wxyz
 from tests.property_support import (
     directions,

@@ -6,7 +6,6 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from synfeal.geometry.alignment import umeyama_sim3
 from synfeal.geometry.poses import (
     interpolate,
     inverse,
@@ -15,6 +14,7 @@ from synfeal.geometry.poses import (
     pose_matrix,
     quat_wxyz_of,
     relative,
+    umeyama_sim3,
 )
 from synfeal.geometry.rotations import (
     canonical_quat_wxyz,

@@ -16,8 +16,7 @@ from baselines.references.run import answer_externally, read_answers, run_extern
 from baselines.references.structure import pinhole, triangulate, triangulated
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.errors import InputError
-from synfeal.geometry.alignment import umeyama_sim3
-from synfeal.geometry.poses import pose_error, pose_matrix
+from synfeal.geometry.poses import pose_error, pose_matrix, umeyama_sim3
 from synfeal.labels import add_noise
 from tests.property_support import random_table, table_of
 from tests.room_scene import CAMERA, pose_at

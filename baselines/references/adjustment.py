@@ -10,8 +10,7 @@ from baselines.groundtruth.sfm.mapping import adjustment_of
 from baselines.references.correspondences import Tracks
 from baselines.references.evidence import Evidence
 from baselines.references.structure import on_points, pinhole, triangulate
-from synfeal.geometry.alignment import umeyama_sim3
-from synfeal.geometry.poses import inverse, pose_matrix
+from synfeal.geometry.poses import inverse, pose_matrix, umeyama_sim3
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]

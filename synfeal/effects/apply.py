@@ -109,7 +109,8 @@ def varied_frames(
                 rng = _generator("clutter", own, poses, first)
                 world = renderer.along(poses.position_m[first:last], rng)
             with world as drawer:
-                path = _Path(drawer, camera, own, poses, first, last)
+                light = path_light(own, poses, first)
+                path = _Path(drawer, camera, own, light, poses, first, last)
                 yield from path.frames(max(begin, first), min(end, last), with_depth)
 
 
@@ -120,13 +121,10 @@ class _Path:
     renderer: SceneRenderer
     camera: CameraConfig
     config: EffectsConfig
+    light: LightState | None
     poses: Poses
     first: int
     last: int
-
-    @cached_property
-    def _light(self) -> LightState | None:
-        return path_light(self.config, self.poses, self.first)
 
     @cached_property
     def _world_from_cam(self) -> NDArray[np.float64]:
@@ -146,7 +144,7 @@ class _Path:
 
     def _seen(self, row: int, with_depth: bool) -> tuple[Light, Depth | None]:
         """Light (H, W, 3) that reaches the sensor, and depth where it is needed."""
-        pose, light, depth_m = self._world_from_cam[row], self._light, None
+        pose, light, depth_m = self._world_from_cam[row], self.light, None
         if with_depth or (light is not None and light.amplitude_ev):
             rgb, depth_m = self.renderer.render_rgbd(pose)
         if self.config.motion_blur is not None and self._seconds(row):

@@ -20,8 +20,7 @@ from synfeal.evaluation.formats import read_estimates
 from synfeal.evaluation.frames import Matched, ScoredFrames, match, read_scored_frames
 from synfeal.evaluation.metrics import MEANS, ORIENTATION, POSITION, Metrics, pose_errors, summary
 from synfeal.evaluation.reprojection import dcre, dcre_summary, depth_of_images
-from synfeal.geometry.alignment import umeyama_sim3
-from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.geometry.poses import quat_wxyz_of, umeyama_sim3
 from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.listing import DEPTH
 

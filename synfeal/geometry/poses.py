@@ -1,4 +1,7 @@
-"""Rigid poses as 4x4 matrices; ``world_from_cam`` maps camera coordinates to world coordinates."""
+"""Rigid poses as 4x4 matrices, and the alignment of trajectories.
+
+``world_from_cam`` maps camera coordinates to world coordinates.
+"""
 
 from __future__ import annotations
 
@@ -70,3 +73,38 @@ def pose_error(pose_a: ArrayLike, pose_b: ArrayLike) -> tuple[Array, Array]:
     a, b = np.asarray(pose_a, dtype=np.float64), np.asarray(pose_b, dtype=np.float64)
     position = position_error_m(a[..., :3, 3], b[..., :3, 3])
     return position, rotation_angle_rad(quat_wxyz_of(a), quat_wxyz_of(b))
+
+
+def umeyama_sim3(
+    source: ArrayLike, target: ArrayLike, with_scale: bool = True
+) -> tuple[float, Array, Array]:
+    """Scale, rotation (3, 3) and translation (3,) with ``target = scale * rotation @ source + t``.
+
+    Least squares over point pairs (N, 3), N >= 3 and not collinear (Umeyama, PAMI 1991, eq. 39-42).
+    Without ``with_scale`` the scale is 1.
+
+    Raises:
+        ValueError: fewer than three pairs, or points of either set that are collinear up to
+            rounding (their rotation about the line is free).
+    """
+    source, target = np.asarray(source, np.float64), np.asarray(target, np.float64)
+    if source.shape != target.shape or source.ndim != 2 or len(source) < 3:
+        raise ValueError(
+            f"need equal (N >= 3, 3) point sets, got {source.shape} and {target.shape}"
+        )
+    if _collinear(source) or _collinear(target):
+        raise ValueError("the points are collinear: the rotation about their line is undetermined")
+    source_mean, target_mean = source.mean(0), target.mean(0)
+    source_c, target_c = source - source_mean, target - target_mean
+    u, singular, vt = np.linalg.svd(target_c.T @ source_c / len(source))
+    sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt))])
+    rotation = (u * sign) @ vt
+    scale = float((singular * sign).sum() / (source_c**2).sum(axis=1).mean()) if with_scale else 1.0
+    return scale, rotation, target_mean - scale * rotation @ source_mean
+
+
+def _collinear(points: Array) -> bool:
+    """Whether points (N, 3) lie on a line, or as near to one as their rounding can tell."""
+    spread = np.linalg.svd(points - points.mean(0), compute_uv=False)
+    rounding = 4.0 * np.finfo(float).eps * np.sqrt(len(points)) * np.abs(points).max()
+    return bool(spread[1] <= max(1e-9 * spread[0], rounding))

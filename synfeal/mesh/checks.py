@@ -97,11 +97,8 @@ SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
 
 # Required extensions that change nothing here, or that are read.
 READ = {
-    "EXT_texture_webp",
-    "KHR_lights_punctual",
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
-    "KHR_xmp_json_ld",
+    *("EXT_texture_webp", "KHR_lights_punctual", "KHR_mesh_quantization"),
+    *("KHR_texture_transform", "KHR_xmp_json_ld"),
 }
 TRANSFORM = "with glTF-Transform (npm install --global @gltf-transform/cli):"
 REMEDIES = {
@@ -115,8 +112,15 @@ REMEDIES = {
 }
 
 
-def refuse_kind(path: Path) -> None:
-    """Check by its name that the file is of a kind that can hold a scene with colours."""
+def refuse_file(path: Path) -> None:
+    """Check that there is a file, by its name of a kind that can hold a scene with colours."""
+    if not path.is_file():
+        raise InputError(
+            f"{path}: no such mesh file; check the path (config/scenes/README.md says where the"
+            " paper's meshes are)"
+        )
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: the mesh file is empty; download or export it again")
     suffix = path.suffix.lower()
     if suffix == ".stl":
         raise InputError(
@@ -135,15 +139,15 @@ def refuse_extensions(path: Path, header: Json) -> None:
 
     Compressed forms pass where the file holds the plain form too.
     """
-    for name in header.get("extensionsRequired", []):
-        if name not in READ and not name.startswith("KHR_materials_"):
-            raise _refusal(path, name)
-    if any(
-        "EXT_mesh_gpu_instancing" in node.get("extensions", {}) for node in listed(header, "nodes")
-    ):
-        raise _refusal(path, "EXT_mesh_gpu_instancing")
-    for name in stand_alone(header):
-        raise _refusal(path, name)
+    required = header.get("extensionsRequired", [])
+    unread = [n for n in required if n not in READ and not n.startswith("KHR_materials_")]
+    for node in listed(header, "nodes"):
+        unread += {"EXT_mesh_gpu_instancing"} & {*node.get("extensions", {})}
+    for name in unread or stand_alone(header):
+        remedy = REMEDIES.get(name, "export it without this extension")
+        if name in LIBRARIES:
+            remedy = f"pip install '{EXTRA}', or {remedy}"
+        raise InputError(f"{path}: needs the glTF extension {name}, which is not read; {remedy}")
     for primitive in primitives_of(header):  # positions, triangles, colours, texture coordinates
         attributes = primitive["attributes"]
         read = [attributes[key] for key in attributes if key.startswith(("POS", "TEX", "COL"))]
@@ -153,13 +157,6 @@ def refuse_extensions(path: Path, header: Json) -> None:
                 f"{path}: stores vertices in sparse accessors, which are not read;"
                 " export it again without morph targets or as OBJ"
             )
-
-
-def _refusal(path: Path, name: str) -> InputError:
-    remedy = REMEDIES.get(name, "export it without this extension")
-    if name in LIBRARIES:
-        remedy = f"pip install '{EXTRA}', or {remedy}"
-    return InputError(f"{path}: needs the glTF extension {name}, which is not read; {remedy}")
 
 
 def repaired(part: MeshPart, findings: Findings) -> MeshPart:

@@ -47,7 +47,7 @@ def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> Text
             read, such as Draco.
     """
     path = Path(path)
-    _check_file(path)
+    checks.refuse_file(path)
     findings = Findings(path)
     gltf = read_gltf(path) if path.suffix.lower() in GLTF_SUFFIXES else None
     try:
@@ -60,17 +60,6 @@ def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> Text
     mesh = TexturedMesh(parts, findings.sentences)
     checks.check_mesh(mesh, path)
     return mesh
-
-
-def _check_file(path: Path) -> None:
-    if not path.is_file():
-        raise InputError(
-            f"{path}: no such mesh file; check the path (config/scenes/README.md says where the"
-            " paper's meshes are)"
-        )
-    if path.stat().st_size == 0:
-        raise InputError(f"{path}: the mesh file is empty; download or export it again")
-    checks.refuse_kind(path)
 
 
 def is_y_up(path: Path, up_axis: UpAxis) -> bool:
@@ -115,12 +104,11 @@ def _read_scene(path: Path, gltf: Gltf | None, findings: Findings) -> Any:
     # It prints tracebacks of what the findings name.
     logging.getLogger("trimesh").setLevel(logging.ERROR)
     try:
-        if gltf is None:
-            return trimesh.load_scene(str(path), resolver=resolver, process=False)
-        text = json.dumps(simplified(gltf)).encode()
-        return trimesh.load_scene(
-            io.BytesIO(text), file_type="gltf", resolver=resolver, process=False
-        )
+        source: Any = str(path)
+        if gltf is not None:
+            source = io.BytesIO(json.dumps(simplified(gltf)).encode())
+        kind = None if gltf is None else "gltf"
+        return trimesh.load_scene(source, kind, resolver=resolver, process=False)
     finally:
         report_missing(resolver.missing, findings, gltf)
         for name in dict.fromkeys(resolver.unreadable):

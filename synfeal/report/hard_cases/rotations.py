@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from synfeal.geometry import alignment, poses, rotations
+from synfeal.geometry import poses, rotations
 from synfeal.planning import path
 from synfeal.report.hard_cases import exact
 from synfeal.report.hard_cases.exact import MP, REFUSED, Trial
@@ -176,7 +176,7 @@ def _alignment(source: Array, truth: Any) -> Trial:
     target = source @ PERMUTATION.T / 2 + OFFSET_M
 
     def ours() -> Array:
-        scale, rotation, _ = alignment.umeyama_sim3(source, target)
+        scale, rotation, _ = poses.umeyama_sim3(source, target)
         return np.array([scale, *rotation.ravel()])
 
     return Trial(naive=lambda: _uncentred(source, target), ours=ours, truth=truth)
