@@ -12,7 +12,6 @@ from pydantic import FiniteFloat
 
 from baselines.groundtruth.label_error import (
     Pair,
-    PoseErrors,
     absolute_errors,
     relative_error,
     share_within,
@@ -92,37 +91,27 @@ def label_records(
 ) -> list[dict[str, Any]]:
     """Both rows of a label set and a split, or of both splits together."""
     splits = SPLITS if split == TOTAL else (split,)
-    filled = sum(
-        int(batch["filled"])
-        for s in splits
-        for batch in batch_records(root, scene, size, method, s)
-    )
+    batches = [b for s in splits for b in batch_records(root, scene, size, method, s)]
     folder, records = root / "labels" / scene / size, []
+    truths = [read_pose_table(folder / "synfeal" / f"{s}.csv") for s in splits]
+    frames = sum(map(len, truths))
+    same = {"scene": scene, "size": size, "method": method, "split": split, "frames": frames}
+    same |= {"share_filled": sum(int(batch["filled"]) for batch in batches) / frames}
+    same |= cost_record(root, scene, size, method, splits, frames)
     for state, stem in STATES.items():
-        pairs = [
-            (
-                read_pose_table(folder / method / f"{stem.format(s)}.csv"),
-                read_pose_table(folder / "synfeal" / f"{s}.csv"),
-            )
-            for s in splits
-        ]
-        frames = sum(len(truth) for _, truth in pairs)
-        record: dict[str, Any] = {"scene": scene, "size": size, "method": method}
-        record |= {"split": split, "assistance": state, "frames": frames}
-        record |= error_record(pairs) | {"share_filled": filled / frames}
-        records.append(record | cost_record(root, scene, size, method, splits, frames))
+        labels = [read_pose_table(folder / method / f"{stem.format(s)}.csv") for s in splits]
+        errors = error_record(list(zip(labels, truths, strict=True)))
+        records.append({**same, "assistance": state, **errors})
     return records
 
 
 def error_record(pairs: Sequence[Pair]) -> dict[str, Any]:
     """Errors of the labels of some splits against their true poses, by column."""
     every = [absolute_errors(*pair) for pair in pairs]
-    errors: PoseErrors = (
-        np.concatenate([position_m for position_m, _ in every]),
-        np.concatenate([orientation_deg for _, orientation_deg in every]),
-    )
+    position_m, orientation_deg = (np.concatenate(parts) for parts in zip(*every, strict=True))
     record: dict[str, Any] = {}
-    for measure, values in zip(("position_m", "orientation_deg"), errors, strict=True):
+    errors = {"position_m": position_m, "orientation_deg": orientation_deg}
+    for measure, values in errors.items():
         found = spread(values)
         record |= {f"{measure}_{which}": getattr(found, which) for which in SPREAD}
     for n in RELATIVE_FRAMES:
@@ -130,7 +119,8 @@ def error_record(pairs: Sequence[Pair]) -> dict[str, Any]:
         for name, attribute in DRIFT.items() if error else ():
             value = getattr(error, attribute)
             record[f"relative_{n}_{name}"] = value if np.isfinite(value) else None
-    return record | {"share_within_5cm_5deg": share_within(errors, WITHIN_M, WITHIN_DEG)}
+    within = share_within((position_m, orientation_deg), WITHIN_M, WITHIN_DEG)
+    return record | {"share_within_5cm_5deg": within}
 
 
 def cost_record(

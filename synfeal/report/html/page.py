@@ -37,7 +37,6 @@ from synfeal.report.figures import CAPTIONS
 from synfeal.report.hard_cases import table as hard_cases
 from synfeal.report.html.provenance import cost_sentence, origin_html, read_origin
 from synfeal.report.html.tables import (
-    Claims,
     claims_table,
     read_claims,
     render,
@@ -70,17 +69,13 @@ def data_address(path: Path) -> str:
     """A picture as a ``data:`` address; large PNG files become WebP."""
     content, kind = path.read_bytes(), "svg+xml" if path.suffix == ".svg" else "png"
     if kind == "png" and len(content) > LARGEST_PNG:
-        content, kind = _smaller(content), "webp"
+        with Image.open(path) as image:
+            picture = image.convert("RGB")
+        picture.thumbnail((LARGEST_SIDE_PX, LARGEST_SIDE_PX))
+        buffer = io.BytesIO()
+        picture.save(buffer, "WEBP", quality=85, method=4)
+        content, kind = buffer.getvalue(), "webp"
     return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
-
-
-def _smaller(png: bytes) -> bytes:
-    with Image.open(io.BytesIO(png)) as image:
-        picture = image.convert("RGB")
-    picture.thumbnail((LARGEST_SIDE_PX, LARGEST_SIDE_PX))
-    buffer = io.BytesIO()
-    picture.save(buffer, "WEBP", quality=85, method=4)
-    return buffer.getvalue()
 
 
 CLAIMS, PROVENANCE = "claims.csv", "provenance.json"
@@ -99,7 +94,6 @@ def write_report(design: Design, root: Path, out_html: Path) -> None:
     claims = read_claims(root / CLAIMS) if (root / CLAIMS).exists() else []
     origin = read_origin(root / PROVENANCE) if (root / PROVENANCE).exists() else {}
     figures = figure_files(root / "figures", CAPTIONS)
-    tables = list(_tables(cells, root))
     files = (CLAIMS, PROVENANCE, *(f"tables/{m.NAME}.csv" for m in (meshes, *SIDE_TABLES)))
     page = render(
         "page.html",
@@ -107,20 +101,21 @@ def write_report(design: Design, root: Path, out_html: Path) -> None:
         sentences=[*run_sentences(cells), *([cost_sentence(origin)] if origin else [])],
         counts=verdict_counts(claims) if claims else "",
         claims=claims_table(claims) if claims else "",
-        tables=tables,
+        tables=list(_tables(cells, root)),
         figures=[
             {"name": name, "caption": CAPTIONS.get(name, name), "address": data_address(path)}
             for name, path in figures.items()
         ],
-        rooms=[
-            room_html(scene, root, design)
-            for scene in dict.fromkeys(row.scene for row in design.rows)
-        ],
+        rooms=[room_html(s, root, design) for s in dict.fromkeys(r.scene for r in design.rows)],
         origin=origin_html(origin) if origin else "",
         skipped=[
             *(f"{name} is missing." for name in files if not (root / name).exists()),
             *missing_rows(design.rows),
-            *untested_claims(claims),
+            *(
+                f"{claim['id']} is not testable here: {claim['reason'] or 'no reason given'}"
+                for claim in claims
+                if Verdict.NOT_TESTABLE in (claim["verdict_labels"], claim["verdict_true"])
+            ),
             *(
                 f"Not drawn, for lack of its data in this profile: figure {name}."
                 for name in CAPTIONS
@@ -132,18 +127,14 @@ def write_report(design: Design, root: Path, out_html: Path) -> None:
     write_text(out_html, page)
 
 
-def _tables(cells: Mapping[str, pd.DataFrame], root: Path) -> Iterator[dict[str, str]]:
+def _tables(cells: Mapping[str, pd.DataFrame], root: Path) -> Iterator[dict[str, Any]]:
     """Name, title and HTML of every table; no HTML where its file is missing."""
     for module in (meshes, *SIDE_TABLES):
         path = root / "tables" / f"{module.NAME}.csv"
-        found = module.side_table(read_frame(path, module.SCHEMA)) if path.exists() else None
-        body = side_html(found) if found else ""
+        body = path.exists() and side_html(module.side_table(read_frame(path, module.SCHEMA)))
         yield {"name": module.NAME, "title": table_title(module.NAME), "body": body}
         for name, scores in cells.items() if module is meshes else ():
             yield {"name": name, "title": table_title(name), "body": score_table(name, scores)}
-
-
-RowKey = tuple[str, str, str, str, float, float, str]
 
 
 def missing_rows(rows: Sequence[Experiment]) -> list[str]:
@@ -154,30 +145,19 @@ def missing_rows(rows: Sequence[Experiment]) -> list[str]:
         printed = dict.fromkeys(key[:-1] for key in published_cells(table))
         absent = [_row_name(table, key) for key in printed if key not in own]
         if absent:
-            number = table.split("_")[0].removeprefix("table")
             sentences.append(
-                f"Table {number}: {len(absent)} of the paper's {len(printed)} rows are not in this"
-                f" profile's table of experiments: {'; '.join(absent)}."
+                f"{table_title(table)}: {len(absent)} of the paper's {len(printed)} rows are not in"
+                f" this profile's table of experiments: {'; '.join(absent)}."
             )
     return sentences
 
 
-def untested_claims(claims: Claims) -> list[str]:
-    """Claims that this run cannot test under one of the two scores, and why."""
-    return [
-        f"{claim['id']} is not testable here: {claim['reason'] or 'no reason given'}"
-        for claim in claims
-        if Verdict.NOT_TESTABLE in (claim["verdict_labels"], claim["verdict_true"])
-    ]
-
-
-def _row_name(table: str, key: RowKey) -> str:
+def _row_name(table: str, key: tuple[Any, ...]) -> str:
     block, scene, size, labels, noise_m, noise_deg, _ = key
-    if table == "table2_ground_truth":
-        return f"{scene_title(scene)}, {SOURCES[labels]}"
     if block:
         return f"{BLOCKS[block]} {noise_m:g} m, {noise_deg:g}°"
-    return f"{scene_title(scene)} {size}"
+    which = f", {SOURCES[labels]}" if table.startswith("table2") else f" {size}"
+    return f"{scene_title(scene)}{which}"
 
 
 SPLITS = {"train": ("Cameras, training", (0, 114, 178)), "test": ("Cameras, test", (213, 94, 0))}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +11,7 @@ import pandas as pd
 from markupsafe import Markup
 from pydantic import BaseModel
 
-from synfeal.files import write_json
+from synfeal.files import file_sha256, write_json
 from synfeal.frames import records_of
 from synfeal.provenance import CPU_INFO, processor_name, provenance
 from synfeal.report.columns import Column, SideTable
@@ -58,7 +57,7 @@ def hashes(results: Iterable[Path], root: Path) -> dict[str, str]:
     """SHA-256 of files, and of all files in directories, by path relative to ``root``."""
     paths = [p for path in results for p in (sorted(path.iterdir()) if path.is_dir() else [path])]
     return {
-        path.relative_to(root).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        path.relative_to(root).as_posix(): file_sha256(path)
         for path in paths
         if not path.name.startswith(".")
     }

@@ -58,8 +58,7 @@ def side_html(table: SideTable) -> Markup:
 # The switch's two scores: kind of line, and how names of its columns end.
 STYLES = {"labels": ("labels", ""), "true": ("truth", "_true")}
 SAME = "All labels of this table are true poses, so both scores are the same numbers."
-# Numbers by row, kind of line, heading and place in the cell.
-Values = Mapping[tuple[int, str, str, int], Any]
+Values = Mapping[tuple[int, str, str, int], Any]  # by row, kind of line, heading, place in cell
 
 
 def score_table(name: str, cells: pd.DataFrame) -> Markup:
@@ -77,10 +76,7 @@ def score_table(name: str, cells: pd.DataFrame) -> Markup:
         text=sheet.caption,
         marks=footnotes(sheet),
         remarks=[*([SAME] if one_truth else []), *([CHANGE] if name == FROM_SCRATCH else [])],
-        labels=[
-            Column("Noise in" if name.startswith("table3") else "Scene"),
-            Column(HEADINGS[name]),
-        ],
+        labels=[Column("Noise in" if "table3" in name else "Scene"), Column(HEADINGS[name])],
         titles=titles,
         quantities=[Column(title, form="{}") for _ in titles for title in ("Position", "Orient.")],
         # The first row of those that compete for bold has a rule above.
@@ -96,13 +92,6 @@ def table_title(name: str) -> str:
     """As in ``Table 4`` or ``Label error``."""
     found = re.match(r"table(\d+)", name)
     return f"Table {found[1]}" if found else name.replace("_", " ").capitalize()
-
-
-def interval(low: Any, high: Any) -> str:
-    """The 95 % limits as printed below a score; without an upper one they reach to infinity."""
-    if pd.isna(low):
-        return ""
-    return f"{low:.2f}–{'∞' if pd.isna(high) else f'{high:.2f}'}"
 
 
 def _row(name: str, row: pd.DataFrame, values: Values) -> dict[str, Any]:
@@ -139,8 +128,10 @@ def _score_cell(cell: Any, title: str, start: str, place: int, values: Values) -
     for style, (kind, end) in STYLES.items():
         score = f"{start}{[*UNITS][place]}{end}"
         sort = getattr(cell, score, 0.0)  # truth is the truth
-        ends = [getattr(cell, f"{score}_{which}", float("nan")) for which in ("low", "high")]
-        shown = {"value": value(kind), "change": value(f"{kind} change"), "limits": interval(*ends)}
+        low, high = (getattr(cell, f"{score}_{which}", float("nan")) for which in ("low", "high"))
+        upper = "∞" if pd.isna(high) else f"{high:.2f}"  # too many failed to know it
+        limits = "" if pd.isna(low) else f"{low:.2f}–{upper}"
+        shown = {"value": value(kind), "change": value(f"{kind} change"), "limits": limits}
         scores.append({"style": style, "sort": "" if pd.isna(sort) else sort, **shown})
     return {"scores": scores, "paper": value(PAPER), "paper_change": value("paper change")}
 
