@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
+from typing import Concatenate, ParamSpec
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,9 +36,7 @@ class Canvas:
 
     def plain(self, colour: Colour) -> Pixels:
         """One colour everywhere."""
-        return np.broadcast_to(
-            np.asarray(colour, np.float32), (self.height_px, self.width_px, 3)
-        ).copy()
+        return np.full((self.height_px, self.width_px, 3), colour, np.float32)
 
     def coordinates_m(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Metres from the top-left corner: x as (1, W), y as (H, 1)."""
@@ -68,15 +68,24 @@ class Canvas:
         rows = int(np.ceil(self.height_px / step_y)) + 2
         lattice = self.rng.standard_normal((rows, columns), dtype=np.float32)
         box = (0.5, 0.5, 0.5 + self.width_px / step_x, 0.5 + self.height_px / step_y)
-        smooth = Image.fromarray(lattice).resize(
-            (self.width_px, self.height_px), Image.Resampling.BILINEAR, box=box
-        )
-        return np.asarray(smooth, np.float32) * np.float32(
-            1.4
-        )  # interpolation lowers the deviation
+        size = (self.width_px, self.height_px)
+        smooth = Image.fromarray(lattice).resize(size, Image.Resampling.BILINEAR, box=box)
+        # Interpolation lowers the deviation.
+        return np.asarray(smooth, np.float32) * np.float32(1.4)
 
 
 Painter = Callable[[Canvas], Pixels]
+Settings = ParamSpec("Settings")
+
+
+def painter(paint: Callable[Concatenate[Canvas, Settings], Pixels]) -> Callable[Settings, Painter]:
+    """From what paints a canvas with given settings, what gives a painter with these settings."""
+
+    @wraps(paint)
+    def chosen(*values: Settings.args, **named: Settings.kwargs) -> Painter:
+        return lambda canvas: paint(canvas, *values, **named)
+
+    return chosen
 
 
 class Sketch:
@@ -87,22 +96,22 @@ class Sketch:
         self._image = Image.fromarray(np.round(np.clip(background, 0, 1) * 255).astype(np.uint8))
         self._draw = ImageDraw.Draw(self._image)
 
-    def _at(self, points: NDArray[np.float64]) -> list[tuple[float, float]]:
+    def _at(self, points: ArrayLike) -> list[tuple[float, float]]:
         scaled = np.asarray(points, float) * (self.width_px, self.height_px)
-        return [(float(x), float(y)) for x, y in scaled]
+        return [(x, y) for x, y in scaled.tolist()]
 
-    def polygon(self, points: NDArray[np.float64], colour: Colour) -> None:
+    def polygon(self, points: ArrayLike, colour: Colour) -> None:
         """A filled polygon (N, 2)."""
         self._draw.polygon(self._at(points), fill=_bytes(colour))
 
-    def line(self, points: NDArray[np.float64], colour: Colour, width: float = 0.01) -> None:
+    def line(self, points: ArrayLike, colour: Colour, width: float = 0.01) -> None:
         """A polyline (N, 2); ``width`` relative to the canvas' height."""
         width_px = max(1, round(width * self.height_px))
         self._draw.line(self._at(points), fill=_bytes(colour), width=width_px, joint="curve")
 
     def rectangle(self, x0: float, y0: float, x1: float, y1: float, colour: Colour) -> None:
         """A filled axis-aligned rectangle."""
-        self.polygon(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), colour)
+        self.polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], colour)
 
     def ellipse(self, x: float, y: float, radius_x: float, radius_y: float, colour: Colour) -> None:
         """A filled ellipse, radii relative to width and height."""
@@ -132,9 +141,8 @@ class Sketch:
         return np.asarray(self._image, np.float32) / np.float32(255)
 
 
-def _bytes(colour: Colour) -> tuple[int, int, int]:
-    red, green, blue = (round(255 * min(1.0, max(0.0, float(channel)))) for channel in colour)
-    return red, green, blue
+def _bytes(colour: Colour) -> tuple[int, ...]:
+    return tuple(np.round(255 * np.clip(colour, 0, 1)).astype(int).tolist())
 
 
 def pick(rng: np.random.Generator, palette: tuple[Colour, ...]) -> Colour:
@@ -148,12 +156,9 @@ def shade(colour: Colour, factor: float) -> Colour:
     return red, green, blue
 
 
-def mix(
-    first: Pixels | NDArray[np.float32],
-    second: Pixels | NDArray[np.float32],
-    share: NDArray[np.float32],
-) -> Pixels:
-    """Per pixel ``first·(1 − share) + second·share``; ``share`` is (H, W)."""
+def mix(first: ArrayLike, second: ArrayLike, share: NDArray[np.float32]) -> Pixels:
+    """Per pixel ``first·(1 − share) + second·share`` of images or colours; ``share`` is (H, W)."""
+    first, second = np.asarray(first, np.float32), np.asarray(second, np.float32)
     return np.asarray(first + (second - first) * share[..., None], np.float32)
 
 
@@ -168,12 +173,12 @@ def ramp(canvas: Canvas, first: Colour, second: Colour, angle_rad: float) -> Pix
     width, height = canvas.size_m
     along = np.cos(angle_rad) * (x / width - 0.5) + np.sin(angle_rad) * (y / height - 0.5) + 0.5
     share = np.clip(along, 0, 1).astype(np.float32)
-    return mix(np.asarray(first, np.float32), np.asarray(second, np.float32), share)
+    return mix(first, second, share)
 
 
 def bordered(image: Pixels, share: float, colour: Colour) -> Pixels:
     """The image with a frame that takes ``share`` of the shorter side."""
     margin = max(1, round(share * min(image.shape[:2])))
     for edge in (image[:margin], image[-margin:], image[:, :margin], image[:, -margin:]):
-        edge[:] = np.asarray(colour, np.float32)
+        edge[:] = colour
     return image

@@ -32,7 +32,7 @@ def monitor(make: Maker) -> Item:
     """A flat screen on a foot, 0.5 m high."""
     panel = make.box((0.56, 0.04, 0.34), DARK, 60, "blrtu")
     face = sheet([(-0.28, -0.02, 0.34), (0.28, -0.02, 0.34), (0.28, -0.02, 0), (-0.28, -0.02, 0)])
-    shown = make.sheet(face, materials.screen, 380, glow=0.6)
+    shown = make.sheet(face, materials.screen(), 380, glow=0.6)
     neck = make.box((0.05, 0.04, 0.16), DARK, 40, "fblr")
     foot = make.box((0.24, 0.16, 0.015), DARK, 60, "fblrt")
     return joined(panel.placed(0, 0, 0.14), shown.placed(0, 0, 0.14), neck, foot)
@@ -40,7 +40,7 @@ def monitor(make: Maker) -> Item:
 
 def chair(make: Maker, colour: Colour) -> Item:
     """An office chair, 0.95 m high."""
-    cloth = partial(materials.fabric, colour=colour)
+    cloth = materials.fabric(colour)
     feet = (
         make.box((0.32, 0.05, 0.05), DARK, 40, "fblrt").placed(0.15, 0, 0.03).placed(0, 0, 0, turn)
         for turn in range(0, 360, 72)
@@ -55,14 +55,14 @@ def chair(make: Maker, colour: Colour) -> Item:
 
 def cabinet(make: Maker, size_m: Size, colour: Colour, doors: int = 2, rows: int = 1) -> Item:
     """A closed cupboard with doors, or with rows of drawers."""
-    front = partial(materials.cabinet_front, colour=colour, doors=doors, rows=rows)
+    front = materials.cabinet_front(colour, doors=doors, rows=rows)
     return make.box(size_m, painted(shade(colour, 0.85), 0.08), 150, "flrt", front=front)
 
 
 def bookshelf(make: Maker, size_m: Size, rows: int = 5) -> Item:
     """A bookcase with a back, boards and sides, filled with books."""
     width, depth, height = size_m
-    grain = partial(materials.wood, colour=(0.5, 0.36, 0.22))
+    grain = materials.wood((0.5, 0.36, 0.22))
     levels = np.linspace(0.02, height - 0.025, rows + 1)
     inner = width - 0.06, depth - 0.06, levels[1] - levels[0] - 0.06
     edge = width / 2 - 0.0125
@@ -88,7 +88,7 @@ def cushion(make: Maker, size_m: Size, painter: Painter, px_per_m: float = 130) 
 
 def pew(make: Maker, width_m: float) -> Item:
     """A church bench, 0.9 m high; one sits facing +y."""
-    oak, edge = partial(materials.wood, colour=(0.46, 0.29, 0.16), contrast=0.22), width_m / 2
+    oak, edge = materials.wood((0.46, 0.29, 0.16), contrast=0.22), width_m / 2
     return joined(
         make.box((width_m, 0.38, 0.04), oak, 110).placed(0, 0, 0.42),
         make.box((width_m, 0.035, 0.42), oak, 110).placed(0, -0.2, 0.48),
@@ -122,11 +122,11 @@ MUG_M = [(0.03, 0.1), (0.042, 0.1), (0.04, 0.0)]
 def on_table(make: Maker, width_m: float, depth_m: float) -> Item:
     """Keyboard, sheets of paper, mugs and boxes spread over a table top at z = 0."""
     rng, scale = make.rng, (width_m, depth_m)
-    keys = make.box((0.42, 0.14, 0.02), materials.keyboard, 300, "fblrt")
+    keys = make.box((0.42, 0.14, 0.02), materials.keyboard(), 300, "fblrt")
     things = [keys.placed(rng.uniform(-0.2, 0.2), -depth_m * 0.25, 0.001, rng.uniform(-8, 8))]
     for _ in range(4):
         x, y = rng.uniform((-0.42, -0.35), (0.42, 0.3)) * scale
-        page = make.box((0.21, 0.29, 0.004), materials.page, 320, "t")
+        page = make.box((0.21, 0.29, 0.004), materials.page(), 320, "t")
         things.append(page.placed(x, y, 0.003, rng.uniform(0, 360)))
     for _ in range(3):
         x, y = rng.uniform((-0.45, 0.05), (0.45, 0.4)) * scale
@@ -135,7 +135,7 @@ def on_table(make: Maker, width_m: float, depth_m: float) -> Item:
             things.append(make.turned(MUG_M, painted(colour), 150, 10).placed(x, y, 0.001))
         else:
             size = (rng.uniform(0.12, 0.25), rng.uniform(0.08, 0.16), rng.uniform(0.06, 0.18))
-            carton = make.box(size, partial(materials.label, colour=colour), 300, "fblrt")
+            carton = make.box(size, materials.label(colour), 300, "fblrt")
             things.append(carton.placed(x, y, 0.001, rng.uniform(-30, 30)))
     return joined(things)
 
@@ -146,7 +146,7 @@ def books(make: Maker, width_m: float, depth_m: float, height_m: float) -> Item:
     while x < width_m / 2 - 0.05:
         thick = rng.uniform(0.018, 0.055)
         size = (thick, depth_m * rng.uniform(0.6, 0.95), height_m * rng.uniform(0.6, 0.98))
-        spine = partial(materials.spine, colour=shade(pick(rng, VIVID), rng.uniform(0.4, 1.2)))
+        spine = materials.spine(shade(pick(rng, VIVID), rng.uniform(0.4, 1.2)))
         if rng.random() < 0.9:
             book = make.box(size, painted((0.85, 0.82, 0.74)), 90, "flrt", front=spine)
             at_y = -depth_m / 2 + size[1] / 2 + rng.uniform(0, 0.03)
@@ -162,7 +162,7 @@ def bottles(make: Maker, width_m: float, count: int) -> Item:
         radius, high = rng.uniform(0.025, 0.05), rng.uniform(0.1, 0.24)
         neck = radius * rng.uniform(0.3, 1.0)
         top = [(0.002, high), (neck, high), (neck, 0.75 * high)]
-        label = partial(materials.label, colour=pick(rng, BOTTLES))
+        label = materials.label(pick(rng, BOTTLES))
         bottle = make.turned([*top, (radius, 0.6 * high), (radius, 0)], label, 170, 12)
         things.append(bottle.placed(x, rng.uniform(-0.03, 0.03)))
     return joined(things)
@@ -171,7 +171,7 @@ def bottles(make: Maker, width_m: float, count: int) -> Item:
 def wall_shelf(make: Maker, width_m: float, count: int) -> Item:
     """A board on two brackets with a row of bottles; its back is at y = 0."""
     iron, edge = painted((0.3, 0.3, 0.32)), 0.4 * width_m
-    board = make.box((width_m, 0.22, 0.025), partial(materials.wood, colour=(0.8, 0.7, 0.55)), 120)
+    board = make.box((width_m, 0.22, 0.025), materials.wood((0.8, 0.7, 0.55)), 120)
     brackets = [
         make.box((0.02, 0.18, 0.12), iron, 60, "flru").placed(x, -0.1, -0.12) for x in (-edge, edge)
     ]
@@ -185,7 +185,7 @@ def pinned_page(make: Maker) -> Item:
     down = np.linspace(0, 1, 7)
     y = -0.006 - make.rng.uniform(0.0, 0.05) * down**2
     sides = [np.stack([np.full(7, x), y, -high * down], axis=-1) for x in (-wide / 2, wide / 2)]
-    return make.sheet(np.stack(sides, axis=1), materials.page, 320)
+    return make.sheet(np.stack(sides, axis=1), materials.page(), 320)
 
 
 def coat(make: Maker, colour: Colour) -> Item:
@@ -196,7 +196,7 @@ def coat(make: Maker, colour: Colour) -> Item:
     folds = np.sin(across * rng.uniform(7, 10) + rng.uniform(0, 6) + 1.5 * down)
     y = -0.05 - (0.12 * np.sqrt(down) + 0.03 * folds * down) * (1 - 0.85 * across**4)
     points = np.stack([half * across, y, -0.95 * down - 0.04 * across**2], axis=-1)
-    return make.sheet(points, partial(materials.fabric, colour=colour), 130)
+    return make.sheet(points, materials.fabric(colour), 130)
 
 
 def plant(make: Maker, height_m: float, pot: Colour, leaves: int = 40) -> Item:

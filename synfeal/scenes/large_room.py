@@ -32,20 +32,12 @@ LAMPS_M = tuple((x, y) for x in (1.4, 3.6) for y in (1.2, 3.3, 5.4))
 LAMP_STRENGTHS = (0.9, 0.5, 0.95, 0.8, 0.05, 0.7)  # the fifth is off
 
 WHITE: Colour = (0.9, 0.9, 0.88)
-BEECH: Painter = partial(materials.wood, colour=(0.8, 0.68, 0.5), contrast=0.08)
-OAK: Painter = partial(materials.wood, colour=(0.72, 0.55, 0.36))
-CONCRETE: Painter = partial(materials.plaster, colour=(0.5, 0.5, 0.48), grain=0.06)
-RIBS: Painter = partial(
-    materials.masonry, palette=((0.86, 0.86, 0.84),), block_m=(0.06, 1.0), joint_m=0.012
-)
-HAZARD: Painter = partial(
-    materials.masonry,
-    palette=((0.95, 0.8, 0.1), (0.1, 0.1, 0.1)), block_m=(0.6, 0.1), joint_m=0.001,
-)  # fmt: skip
-DIFFUSER: Painter = partial(
-    materials.masonry, palette=((1.0, 0.98, 0.92),), block_m=(0.3, 0.3), stagger=0, spread=0.02
-)
-BLUE_POSTER: Painter = partial(pictures.poster, ground=(0.1, 0.4, 0.75))
+BEECH = materials.wood((0.8, 0.68, 0.5), contrast=0.08)
+OAK = materials.wood((0.72, 0.55, 0.36))
+CONCRETE = materials.plaster((0.5, 0.5, 0.48), grain=0.06)
+RIBS = materials.masonry(((0.86, 0.86, 0.84),), block_m=(0.06, 1.0), joint_m=0.012)
+HAZARD = materials.masonry(((0.95, 0.8, 0.1), (0.1, 0.1, 0.1)), block_m=(0.6, 0.1), joint_m=0.001)
+DIFFUSER = materials.masonry(((1.0, 0.98, 0.92),), block_m=(0.3, 0.3), stagger=0, spread=0.02)
 
 WALLS = (  # left and right end, colour, and that of the band below
     ((WIDTH_M, 0), (0, 0), (0.9, 0.86, 0.78), (0.75, 0.62, 0.45)),
@@ -55,14 +47,14 @@ WALLS = (  # left and right end, colour, and that of the band below
 )
 BOARDS: tuple[tuple[float, float, float, float, tuple[float, float], Painter], ...] = (
     # x, y, z, yaw in degrees, size: posters on the east wall, boards on the north wall
-    (WIDTH_M, 1.15, 1.75, -90, (0.6, 0.85), pictures.poster),
-    (WIDTH_M, 3.35, 1.8, -90, (0.85, 1.15), pictures.poster),
-    (WIDTH_M, 4.35, 1.75, -90, (0.6, 0.8), pictures.poster),
-    (WIDTH_M, 5.1, 1.9, -90, (0.55, 0.4), pictures.poster),
-    (1.2, LENGTH_M, 1.65, 0, (1.3, 0.95), pictures.noticeboard),
-    (2.45, LENGTH_M, 1.7, 0, (0.7, 1.0), BLUE_POSTER),
-    (0.3, LENGTH_M, 1.8, 0, (0.35, 0.5), pictures.poster),
-    (3.15, LENGTH_M, 2.15, 0, (0.36, 0.36), pictures.poster),
+    (WIDTH_M, 1.15, 1.75, -90, (0.6, 0.85), pictures.poster()),
+    (WIDTH_M, 3.35, 1.8, -90, (0.85, 1.15), pictures.poster()),
+    (WIDTH_M, 4.35, 1.75, -90, (0.6, 0.8), pictures.poster()),
+    (WIDTH_M, 5.1, 1.9, -90, (0.55, 0.4), pictures.poster()),
+    (1.2, LENGTH_M, 1.65, 0, (1.3, 0.95), pictures.noticeboard()),
+    (2.45, LENGTH_M, 1.7, 0, (0.7, 1.0), pictures.poster((0.1, 0.4, 0.75))),
+    (0.3, LENGTH_M, 1.8, 0, (0.35, 0.5), pictures.poster()),
+    (3.15, LENGTH_M, 2.15, 0, (0.36, 0.36), pictures.poster()),
 )
 DESKS_M = (  # x, y, yaw in degrees
     (0.55, 2.3, 90), (0.55, 4.3, 90), (0.55, 5.7, 90),
@@ -119,7 +111,7 @@ def _shell(make: Maker) -> Item:
     wall = partial(materials.wainscot, grain=0.003, stains=0.006)
     return joined(
         *(
-            make.sheet(upright(start, end, 0, z), partial(wall, colour=colour, lower=lower), 125)
+            make.sheet(upright(start, end, 0, z), wall(colour, lower), 125)
             for start, end, colour, lower in WALLS
         ),
         make.sheet(level((0, x), (0, y), 0), _floor, 180),
@@ -129,11 +121,11 @@ def _shell(make: Maker) -> Item:
 
 def _floor(canvas: Canvas) -> Pixels:
     """Grey linoleum, a lane of blue, tape markings and a door mat."""
-    image = materials.plaster(canvas, (0.58, 0.57, 0.54), 0.03, 0.012)
+    image = materials.plaster((0.58, 0.57, 0.54), 0.03, 0.012)(canvas)
     x, y = canvas.coordinates_m()
     y = canvas.size_m[1] - y  # image rows run towards −y
     lane = (x > 3.1) & (y > 2.2)
-    blue = materials.plaster(canvas, (0.28, 0.38, 0.5), 0.03, 0.012)
+    blue = materials.plaster((0.28, 0.38, 0.5), 0.03, 0.012)(canvas)
     image[lane] = blue[lane]
     tape = (np.abs(x - 3.1) < 0.035) & (y > 2.2) | (np.abs(y - 2.2) < 0.035) & (x > 3.1)
     image[tape] = (0.9, 0.75, 0.1)
@@ -149,7 +141,7 @@ def _floor(canvas: Canvas) -> Pixels:
 def _ceiling(canvas: Canvas) -> Pixels:
     """White mineral tiles, all alike; a water stain in one corner."""
     x, y = canvas.coordinates_m()
-    tiles = materials.plaster(canvas, (0.84, 0.84, 0.81), 0.006, 0.004)
+    tiles = materials.plaster((0.84, 0.84, 0.81), 0.006, 0.004)(canvas)
     joint = np.minimum(np.abs((x + 0.3) % 0.6 - 0.3), np.abs((y + 0.3) % 0.6 - 0.3)) < 0.005
     tiles[joint] *= np.float32(0.82)
     ragged = 1 + 0.25 * canvas.noise(0.3, 3)
@@ -160,7 +152,7 @@ def _ceiling(canvas: Canvas) -> Pixels:
 
 def _windows(make: Maker) -> Item:
     """Three equal bays in the west wall: view, sill and radiator."""
-    view, middle = partial(pictures.window_view, blind=0.25), (0.0, 0.0, SILL_M + WINDOW_M[1] / 2)
+    view, middle = pictures.window_view(blind=0.25), (0.0, 0.0, SILL_M + WINDOW_M[1] / 2)
     sill = make.box((WINDOW_M[0] + 0.2, 0.2, 0.04), BEECH, 120).placed(0.1, 0, SILL_M - 0.05, 90)
     outside = make.on_wall(middle, 90, WINDOW_M, view, 230, depth_m=0.05, glow=0.85)
     radiator = make.box((1.2, 0.1, 0.5), RIBS, 100, "flrt").placed(0.08, 0, 0.2, 90)
@@ -170,13 +162,12 @@ def _windows(make: Maker) -> Item:
 
 def _south_wall(make: Maker) -> Item:
     """Door with exit sign, whiteboard, notice and extinguisher."""
-    door = partial(materials.door, colour=(0.15, 0.3, 0.6), window=True)
-    sign = partial(materials.label, colour=(0.1, 0.6, 0.25))
+    door, sign = materials.door((0.15, 0.3, 0.6), window=True), materials.label((0.1, 0.6, 0.25))
     extinguisher = make.turned(EXTINGUISHER_M, painted((0.8, 0.08, 0.06)), 150, 12)
     return joined(
         make.on_wall((1.3, 0, 1.05), 180, (1.0, 2.1), door, 180, 0.04),
-        make.on_wall((3.4, 0, 1.55), 180, (2.2, 1.15), pictures.whiteboard, 280, 0.03),
-        make.on_wall((2.1, 0, 1.25), 180, (0.12, 0.16), materials.page, 250),
+        make.on_wall((3.4, 0, 1.55), 180, (2.2, 1.15), pictures.whiteboard(), 280, 0.03),
+        make.on_wall((2.1, 0, 1.25), 180, (0.12, 0.16), materials.page(), 250),
         make.on_wall((1.3, 0, 2.36), 180, (0.6, 0.22), sign, 300, 0.03, glow=0.6),
         extinguisher.placed(2.12, 0.12, 0.5),
     )
@@ -208,12 +199,9 @@ def _desks(make: Maker) -> Item:
 def _storage(make: Maker) -> Item:
     """Cupboards, a bookcase, cartons, plants: large areas of one colour."""
     cabinet, plant = partial(furniture.cabinet, make), partial(furniture.plant, make)
-    east, brown, light = (
-        WIDTH_M - 0.23,
-        *(partial(materials.label, colour=c) for c in ((0.65, 0.48, 0.3), (0.7, 0.55, 0.36))),
-    )
-    large = make.box((0.5, 0.4, 0.4), brown, 200, "fblrt")
-    small = make.box((0.38, 0.35, 0.3), light, 200, "fblrt")
+    east = WIDTH_M - 0.23
+    large = make.box((0.5, 0.4, 0.4), materials.label((0.65, 0.48, 0.3)), 200, "fblrt")
+    small = make.box((0.38, 0.35, 0.3), materials.label((0.7, 0.55, 0.36)), 200, "fblrt")
     waste = make.turned(BIN_M, painted((0.1, 0.35, 0.3)), 100, 14)
     return joined(
         cabinet((0.9, 0.45, 1.95), (0.82, 0.35, 0.08)).placed(east, 0.5, 0, -90),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 from synfeal.scenes.canvas import (
@@ -11,11 +9,11 @@ from synfeal.scenes.canvas import (
     VIVID,
     Canvas,
     Colour,
-    Painter,
     Pixels,
     Sketch,
     bordered,
     mix,
+    painter,
     pick,
     ramp,
     shade,
@@ -23,23 +21,19 @@ from synfeal.scenes.canvas import (
 )
 
 
-def flat(canvas: Canvas, colour: Colour, wear: float = 0.03) -> Pixels:
+@painter
+def painted(canvas: Canvas, colour: Colour, wear: float = 0.05) -> Pixels:
     """Paint or plastic: one colour with a little wear."""
-    return tinted(colour, np.float32(wear) * canvas.noise(0.08, 3))
+    return tinted(colour, wear * canvas.noise(0.08, 3))
 
 
-def painted(colour: Colour, wear: float = 0.05) -> Painter:
-    """A painter of :func:`flat` in one colour."""
-    return partial(flat, colour=colour, wear=wear)
-
-
+@painter
 def plaster(canvas: Canvas, colour: Colour, stains: float = 0.03, grain: float = 0.012) -> Pixels:
     """A painted wall: almost no texture, broad stains."""
-    relief = np.float32(stains) * canvas.noise(0.9, 5, 0.65)
-    relief += np.float32(grain) * canvas.noise(0.025, 2)
-    return tinted(colour, relief)
+    return tinted(colour, stains * canvas.noise(0.9, 5, 0.65) + grain * canvas.noise(0.025, 2))
 
 
+@painter
 def wainscot(
     canvas: Canvas,
     colour: Colour,
@@ -49,25 +43,26 @@ def wainscot(
     stains: float = 0.03,
 ) -> Pixels:
     """Plaster with a differently painted band of ``height_m`` above the floor and a rail on it."""
-    image = plaster(canvas, colour, stains, grain)
+    image = plaster(colour, stains, grain)(canvas)
     _, y = canvas.coordinates_m()
     above_floor = canvas.size_m[1] - y[:, 0]
     band = above_floor < height_m
-    image[band] = plaster(canvas, lower, 2 * stains, grain)[band]
+    image[band] = plaster(lower, 2 * stains, grain)(canvas)[band]
     image[np.abs(above_floor - height_m) < 0.02] *= np.float32(0.55)
     image[above_floor < 0.09] *= np.float32(0.5)
     return image
 
 
-def wood(canvas: Canvas, colour: Colour, contrast: float = 0.12, upright: bool = False) -> Pixels:
-    """Wood grain along x, or along y if ``upright``."""
-    along, across = 0.8, 0.035
-    cell = (across, along) if upright else (along, across)
+@painter
+def wood(canvas: Canvas, colour: Colour, contrast: float = 0.12) -> Pixels:
+    """Wood grain along x."""
+    cell = (0.8, 0.035)
     rings = np.sin(6 * canvas.noise((cell[0] * 3, cell[1] * 3), 2)).astype(np.float32)
     relief = contrast * (0.5 * rings + 0.6 * canvas.noise(cell, 4, 0.75))
     return tinted(colour, relief.astype(np.float32))
 
 
+@painter
 def masonry(
     canvas: Canvas,
     palette: tuple[Colour, ...],
@@ -90,14 +85,15 @@ def masonry(
     choice = canvas.rng.integers(len(palette), size=(n_rows, n_columns))
     tint = 1 + spread * canvas.rng.standard_normal((n_rows, n_columns))
     blocks = np.asarray(np.asarray(palette)[choice] * tint[..., None], np.float32)
-    image: Pixels = blocks[np.broadcast_to(row, column.shape), column]
-    image *= 1 + 0.05 * canvas.noise(0.06, 4, 0.8)[..., None]
+    image = blocks[np.broadcast_to(row, column.shape), column]
+    image = tinted(image, 0.05 * canvas.noise(0.06, 4, 0.8))
     edge_x = np.abs((shifted + 0.5) % 1 - 0.5) * block_m[0]
     edge_y = np.abs((y / block_m[1] + 0.5) % 1 - 0.5) * block_m[1]
-    image[np.minimum(edge_x, edge_y) < joint_m / 2] = np.asarray(joint, np.float32)
+    image[np.minimum(edge_x, edge_y) < joint_m / 2] = joint
     return image
 
 
+@painter
 def fabric(
     canvas: Canvas, colour: Colour, stripe: Colour | None = None, pitch_m: float = 0.1
 ) -> Pixels:
@@ -111,14 +107,16 @@ def fabric(
     return image
 
 
+@painter
 def marble(canvas: Canvas, colour: Colour, vein: Colour, scale_m: float = 0.35) -> Pixels:
     """Polished stone with turbulent veins."""
     turbulence = canvas.noise(scale_m, 6, 0.65)
     share = np.exp(-9 * np.abs(turbulence)).astype(np.float32)
     share = np.clip(share + 0.12 * canvas.noise(scale_m / 3, 4), 0, 1)
-    return mix(np.asarray(colour, np.float32), np.asarray(vein, np.float32), share)
+    return mix(colour, vein, share)
 
 
+@painter
 def rug(canvas: Canvas, palette: tuple[Colour, ...]) -> Pixels:
     """A woven rug: nested borders around a field of random diamonds."""
     x, y = canvas.coordinates_m()
@@ -131,10 +129,11 @@ def rug(canvas: Canvas, palette: tuple[Colour, ...]) -> Pixels:
     field = np.asarray(palette, np.float32)[table[diamond.astype(np.int64) % 64]]
     image = np.where((ring >= 3)[..., None], field, image)
     zigzag = np.abs((x + 0.5 * y) / 0.06 % 1 - 0.5) < 0.12
-    image[zigzag & (ring == 1)] = np.asarray(palette[-1], np.float32)
-    return np.asarray(image * (1 + 0.08 * canvas.noise(0.015, 2))[..., None], np.float32)
+    image[zigzag & (ring == 1)] = palette[-1]
+    return tinted(image, 0.08 * canvas.noise(0.015, 2))
 
 
+@painter
 def damask(canvas: Canvas, colour: Colour, motif: Colour, pitch_m: float = 0.22) -> Pixels:
     """Wallpaper with a repeated flower-like motif; repetition is the point."""
     x, y = canvas.coordinates_m()
@@ -143,15 +142,16 @@ def damask(canvas: Canvas, colour: Colour, motif: Colour, pitch_m: float = 0.22)
     v = ((y / (0.8 * pitch_m)) % 1 - 0.5) * 2
     radius, angle = np.hypot(u, v), np.arctan2(v, u)
     petal = radius < 0.35 + 0.3 * np.cos(5 * angle)
-    image = plaster(canvas, colour, 0.05)
-    image[petal] = np.asarray(motif, np.float32)
-    return image * (1 + 0.03 * canvas.noise(0.02, 2))[..., None]
+    image = plaster(colour, 0.05)(canvas)
+    image[petal] = motif
+    return tinted(image, 0.03 * canvas.noise(0.02, 2))
 
 
 METAL: Colour = (0.75, 0.76, 0.78)
 PAPER: Colour = (0.93, 0.92, 0.88)
 
 
+@painter
 def screen(canvas: Canvas) -> Pixels:
     """A computer screen: windows, a plot, lines of code."""
     rng = canvas.rng
@@ -167,10 +167,11 @@ def screen(canvas: Canvas) -> Pixels:
     return bordered(sketch.pixels(), 0.05, (0.06, 0.06, 0.07))
 
 
+@painter
 def spine(canvas: Canvas, colour: Colour) -> Pixels:
     """The back of a book: cloth, two bands and a title."""
     rng = canvas.rng
-    sketch = Sketch(plaster(canvas, colour, 0.06, 0.03))
+    sketch = Sketch(plaster(colour, 0.06, 0.03)(canvas))
     bands = shade(pick(rng, VIVID), rng.uniform(0.6, 1.6))
     for y in (rng.uniform(0.06, 0.15), rng.uniform(0.8, 0.92)):
         sketch.rectangle(0, y, 1, y + 0.04, bands)
@@ -179,9 +180,10 @@ def spine(canvas: Canvas, colour: Colour) -> Pixels:
     return sketch.pixels()
 
 
+@painter
 def door(canvas: Canvas, colour: Colour, window: bool = False) -> Pixels:
     """A door leaf with frame, panels, handle and, if wanted, a small window."""
-    sketch = Sketch(plaster(canvas, colour, 0.05, 0.03))
+    sketch = Sketch(plaster(colour, 0.05, 0.03)(canvas))
     dark = shade(colour, 0.7)
     for y0, y1 in ((0.1, 0.45), (0.55, 0.92)):
         sketch.rectangle(0.18, y0, 0.82, y1, dark)
@@ -192,9 +194,10 @@ def door(canvas: Canvas, colour: Colour, window: bool = False) -> Pixels:
     return bordered(sketch.pixels(), 0.07, shade(colour, 0.55))
 
 
+@painter
 def cabinet_front(canvas: Canvas, colour: Colour, doors: int = 2, rows: int = 1) -> Pixels:
     """Doors or drawers side by side, each with a handle and a label."""
-    sketch = Sketch(plaster(canvas, colour, 0.05, 0.03))
+    sketch = Sketch(plaster(colour, 0.05, 0.03)(canvas))
     for column in range(doors):
         for row in range(rows):
             x0, x1 = (column + 0.03) / doors, (column + 0.97) / doors
@@ -207,9 +210,10 @@ def cabinet_front(canvas: Canvas, colour: Colour, doors: int = 2, rows: int = 1)
             sketch.rectangle(middle - wide, y0 + 0.2 / rows, middle + wide, y0 + 0.4 / rows, PAPER)
             box = (middle - 0.9 * wide, y0 + 0.22 / rows, middle + 0.9 * wide, y0 + 0.38 / rows)
             sketch.text_lines(canvas.rng, box, 3, pick(canvas.rng, INK))
-    return sketch.pixels() * (1 + 0.03 * canvas.noise(0.05, 3))[..., None]
+    return tinted(sketch.pixels(), 0.03 * canvas.noise(0.05, 3))
 
 
+@painter
 def keyboard(canvas: Canvas) -> Pixels:
     """Dark keys in five rows."""
     sketch = Sketch(canvas.plain((0.1, 0.1, 0.11)))
@@ -222,6 +226,7 @@ def keyboard(canvas: Canvas) -> Pixels:
     return sketch.pixels()
 
 
+@painter
 def page(canvas: Canvas) -> Pixels:
     """A printed sheet of paper, sometimes with a figure."""
     sketch = Sketch(canvas.plain(PAPER))
@@ -231,15 +236,17 @@ def page(canvas: Canvas) -> Pixels:
     return sketch.pixels()
 
 
+@painter
 def label(canvas: Canvas, colour: Colour) -> Pixels:
     """A carton with a printed label."""
-    sketch = Sketch(plaster(canvas, colour, 0.06, 0.03))
+    sketch = Sketch(plaster(colour, 0.06, 0.03)(canvas))
     sketch.rectangle(0.15, 0.2, 0.85, 0.8, PAPER)
     sketch.text_lines(canvas.rng, (0.2, 0.28, 0.8, 0.75), 3, pick(canvas.rng, INK))
     return sketch.pixels()
 
 
+@painter
 def gilded(canvas: Canvas) -> Pixels:
     """Gold leaf over carved wood."""
-    image = marble(canvas, (0.86, 0.66, 0.24), (0.4, 0.24, 0.06), 0.12)
-    return image * (1 + 0.15 * canvas.noise(0.03, 3))[..., None]
+    image = marble((0.86, 0.66, 0.24), (0.4, 0.24, 0.06), 0.12)(canvas)
+    return tinted(image, 0.15 * canvas.noise(0.03, 3))

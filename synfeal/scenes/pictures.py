@@ -15,9 +15,11 @@ from synfeal.scenes.canvas import (
     Sketch,
     bordered,
     mix,
+    painter,
     pick,
     ramp,
     shade,
+    tinted,
 )
 from synfeal.scenes.materials import plaster
 
@@ -31,6 +33,7 @@ def _blob(rng: np.random.Generator, x: float, y: float, radius: float) -> NDArra
     return np.stack([x + reach * np.cos(angle), y + reach * np.sin(angle)], axis=1)
 
 
+@painter
 def poster(canvas: Canvas, ground: Colour | None = None) -> Pixels:
     """A poster nobody else has: ramp, coloured shapes, rows of type, a white border."""
     rng = canvas.rng
@@ -50,6 +53,7 @@ def poster(canvas: Canvas, ground: Colour | None = None) -> Pixels:
     return bordered(sketch.pixels(), 0.02, (0.93, 0.93, 0.9))
 
 
+@painter
 def painting(
     canvas: Canvas, palette: tuple[Colour, ...] = VIVID, frame: Colour = (0.45, 0.3, 0.1)
 ) -> Pixels:
@@ -59,8 +63,8 @@ def painting(
     y = (np.arange(canvas.height_px, dtype=np.float32) / canvas.height_px)[:, None]
     for level in np.linspace(0.35, 0.85, 4):
         ridge = level + 0.07 * canvas.noise((canvas.size_m[0] / 3, 1e3), 4)
-        strokes = 1 + 0.15 * canvas.noise(0.05, 4, 0.8)
-        hill = np.asarray(pick(rng, palette), np.float32) * strokes[..., None]
+        strokes = 0.15 * canvas.noise(0.05, 4, 0.8)
+        hill = tinted(pick(rng, palette), strokes)
         image = np.where((y > ridge)[..., None], hill, image).astype(np.float32)
     sketch = Sketch(image)
     for _ in range(60):
@@ -69,10 +73,11 @@ def painting(
     return bordered(bordered(sketch.pixels(), 0.07, frame), 0.025, shade(frame, 1.7))
 
 
+@painter
 def whiteboard(canvas: Canvas) -> Pixels:
     """A whiteboard with formulas, diagrams and half-wiped smudges in an aluminium frame."""
     rng = canvas.rng
-    sketch = Sketch(plaster(canvas, (0.93, 0.94, 0.95), 0.03))
+    sketch = Sketch(plaster((0.93, 0.94, 0.95), 0.03)(canvas))
     for _ in range(13):
         x, y = rng.uniform((0.04, 0.06), (0.7, 0.75))
         ink = pick(rng, INK)
@@ -89,10 +94,11 @@ def whiteboard(canvas: Canvas) -> Pixels:
     return bordered(sketch.pixels(), 0.02, (0.6, 0.62, 0.65))
 
 
+@painter
 def noticeboard(canvas: Canvas, ground: Colour = (0.62, 0.45, 0.27)) -> Pixels:
     """Cork with overlapping sheets of paper."""
     rng = canvas.rng
-    sketch = Sketch(plaster(canvas, ground, 0.1, 0.12))
+    sketch = Sketch(plaster(ground, 0.1, 0.12)(canvas))
     for _ in range(22):
         x, y = rng.uniform((0.03, 0.03), (0.85, 0.75))
         width, height = rng.uniform((0.07, 0.12), (0.14, 0.26))
@@ -104,20 +110,21 @@ def noticeboard(canvas: Canvas, ground: Colour = (0.62, 0.45, 0.27)) -> Pixels:
     return bordered(sketch.pixels(), 0.025, (0.35, 0.22, 0.12))
 
 
-def window_view(
-    canvas: Canvas, panes: tuple[int, int] = (2, 2), blind: float = 0.0, skyline: bool = True
-) -> Pixels:
-    """Sky behind glazing bars, with buildings and trees if there is a ``skyline``.
-
-    ``blind`` is the share that is covered by slats from above.
-    """
+@painter
+def window_view(canvas: Canvas, panes: tuple[int, int] = (2, 2), blind: float = 0.0) -> Pixels:
+    """Sky, buildings and trees behind glazing bars; slats cover the share ``blind`` from above."""
     rng = canvas.rng
     sky = ramp(canvas, (0.62, 0.8, 1.0), (0.97, 0.98, 1.0), np.pi / 2)
     clouds = np.clip(canvas.noise((0.7, 0.3), 4), 0, 1)
-    sketch = Sketch(mix(sky, np.ones(3, np.float32), clouds))
-    if skyline:
-        _skyline(sketch, rng)
-    _glazing(sketch, panes, blind)
+    sketch = Sketch(mix(sky, 1, clouds))
+    _skyline(sketch, rng)
+    for y in np.arange(0, blind, 0.03):
+        sketch.rectangle(0, y, 1, y + 0.024, (0.85, 0.82, 0.74))
+    bar: Colour = (0.9, 0.9, 0.9)
+    for x in np.linspace(0, 1, panes[0] + 1):
+        sketch.rectangle(x - 0.02, 0, x + 0.02, 1, bar)
+    for y in np.linspace(0, 1, panes[1] + 1):
+        sketch.rectangle(0, y - 0.02, 1, y + 0.02, bar)
     return sketch.pixels()
 
 
@@ -135,16 +142,7 @@ def _skyline(sketch: Sketch, rng: np.random.Generator) -> None:
         sketch.ellipse(x, y, 0.07, 0.07, shade((0.25, 0.45, 0.18), rng.uniform(0.5, 1.3)))
 
 
-def _glazing(sketch: Sketch, panes: tuple[int, int], blind: float) -> None:
-    for y in np.arange(0, blind, 0.03):
-        sketch.rectangle(0, y, 1, y + 0.024, (0.85, 0.82, 0.74))
-    bar: Colour = (0.9, 0.9, 0.9)
-    for x in np.linspace(0, 1, panes[0] + 1):
-        sketch.rectangle(x - 0.02, 0, x + 0.02, 1, bar)
-    for y in np.linspace(0, 1, panes[1] + 1):
-        sketch.rectangle(0, y - 0.02, 1, y + 0.02, bar)
-
-
+@painter
 def stained_glass(canvas: Canvas, palette: tuple[Colour, ...] = VIVID, cells: int = 160) -> Pixels:
     """Coloured glass cells in lead: a Voronoi diagram with a rose of larger cells in the middle."""
     rng = canvas.rng
@@ -169,22 +167,20 @@ GOLD: Colour = (0.9, 0.72, 0.3)
 SKIN: Colour = (0.85, 0.65, 0.5)
 
 
+@painter
 def mural(canvas: Canvas, ground: Colour, sky: Colour, figures: int = 5) -> Pixels:
     """Saints before a landscape of ``ground`` and ``sky``, framed by a painted border."""
     rng = canvas.rng
     y = (np.arange(canvas.height_px, dtype=np.float32) / canvas.height_px)[:, None]
     horizon = 0.55 + 0.06 * canvas.noise((canvas.size_m[0] / 3, 1e3), 3)
     share = np.clip((y - horizon) * 12 + 0.5, 0, 1).astype(np.float32)
-    clouds = (1 + 0.12 * canvas.noise((0.6, 0.25), 4))[..., None]
-    image = mix(
-        np.asarray(sky, np.float32) * clouds, np.asarray(ground, np.float32) * clouds, share
-    )
-    sketch = Sketch(image)
+    clouds = 0.12 * canvas.noise((0.6, 0.25), 4)
+    sketch = Sketch(mix(tinted(sky, clouds), tinted(ground, clouds), share))
     for x in np.linspace(0.16, 0.84, figures) + rng.uniform(-0.04, 0.04, figures):
         _saint(sketch, rng, x, rng.uniform(0.3, 0.45), canvas)
     _border(sketch, rng, shade(ground, 0.55), canvas)
-    aged = 1 + 0.1 * canvas.noise(0.25, 5, 0.75)
-    return sketch.pixels() * aged[..., None]
+    aged = 0.1 * canvas.noise(0.25, 5, 0.75)
+    return tinted(sketch.pixels(), aged)
 
 
 def _saint(sketch: Sketch, rng: np.random.Generator, x: float, top: float, canvas: Canvas) -> None:
@@ -193,24 +189,21 @@ def _saint(sketch: Sketch, rng: np.random.Generator, x: float, top: float, canva
     wide, foot = 2.2 * head * aspect, rng.uniform(0.86, 0.92)
     sketch.ellipse(x, top, 1.9 * head * aspect, 1.9 * head, GOLD)
     shoulder = top + 2 * head
-    hem_left, hem_right = (x - 1.5 * wide, foot), (x + 1.5 * wide, foot)
-    body = np.array([(x - wide, shoulder), (x + wide, shoulder), hem_right, hem_left])
-    sketch.polygon(body, robe)
+    hem = [(x + 1.5 * wide, foot), (x - 1.5 * wide, foot)]
+    sketch.polygon([(x - wide, shoulder), (x + wide, shoulder), *hem], robe)
     for _ in range(6):
         fold = rng.uniform(-1.2, 1.2) * wide
-        line = np.array([(x + 0.6 * fold, top + 2.5 * head), (x + fold, foot)])
+        line = [(x + 0.6 * fold, top + 2.5 * head), (x + fold, foot)]
         sketch.line(line, shade(robe, rng.uniform(0.5, 1.5)), 0.008)
     mantle = shade(pick(rng, ROBES), 1.2)
     side = rng.choice((-1, 1)) * wide
-    sketch.polygon(
-        np.array([(x + side, shoulder), (x - 0.3 * side, top + 3 * head), (x + 1.4 * side, 0.75)]),
-        mantle,
-    )
+    edge = [(x + side, shoulder), (x - 0.3 * side, top + 3 * head), (x + 1.4 * side, 0.75)]
+    sketch.polygon(edge, mantle)
     hair = shade((0.3, 0.2, 0.1), rng.uniform(0.5, 2.5))
     sketch.ellipse(x, top - 0.15 * head, 1.1 * head * aspect, 1.2 * head, hair)
     sketch.ellipse(x, top + 0.25 * head, 0.8 * head * aspect, 0.95 * head, SKIN)
     staff = x + 1.6 * side
-    sketch.line(np.array([(staff, top), (staff, foot)]), GOLD, 0.008)
+    sketch.line([(staff, top), (staff, foot)], GOLD, 0.008)
 
 
 def _border(sketch: Sketch, rng: np.random.Generator, colour: Colour, canvas: Canvas) -> None:
@@ -226,15 +219,13 @@ def _border(sketch: Sketch, rng: np.random.Generator, colour: Colour, canvas: Ca
             sketch.ellipse(x, y, 0.4 * edge_x, 0.4 * edge_y, GOLD)
 
 
+@painter
 def starry_vault(canvas: Canvas, first: Colour, second: Colour) -> Pixels:
     """A painted vault: from ``first`` to ``second`` along x, golden stars, ribbons, medallions."""
     rng = canvas.rng
     x, _ = canvas.coordinates_m()
-    share = np.broadcast_to(x / canvas.size_m[0], (canvas.height_px, canvas.width_px)).astype(
-        np.float32
-    )
-    image = mix(np.asarray(first, np.float32), np.asarray(second, np.float32), share)
-    sketch = Sketch(image * (1 + 0.12 * canvas.noise(0.7, 5, 0.7))[..., None])
+    blend = mix(first, second, (x / canvas.size_m[0]).astype(np.float32))
+    sketch = Sketch(tinted(blend, 0.12 * canvas.noise(0.7, 5, 0.7)))
     aspect = canvas.width_px / canvas.height_px
     for _ in range(260):
         at_x, at_y = rng.uniform(0.01, 0.99, 2)
@@ -242,7 +233,7 @@ def starry_vault(canvas: Canvas, first: Colour, second: Colour) -> Pixels:
     for at_x in np.linspace(0.12, 0.88, 5):
         for at_y in (0.22, 0.5, 0.78):
             _medallion(sketch, rng, at_x + rng.uniform(-0.02, 0.02), at_y, aspect)
-    return sketch.pixels() * (1 + 0.06 * canvas.noise(0.12, 4, 0.8))[..., None]
+    return tinted(sketch.pixels(), 0.06 * canvas.noise(0.12, 4, 0.8))
 
 
 def _star(sketch: Sketch, x: float, y: float, radius: float, aspect: float) -> None:
@@ -254,18 +245,10 @@ def _star(sketch: Sketch, x: float, y: float, radius: float, aspect: float) -> N
 
 def _medallion(sketch: Sketch, rng: np.random.Generator, x: float, y: float, aspect: float) -> None:
     radius = rng.uniform(0.045, 0.075)
-    for scale, colour in (
-        (1.0, GOLD),
-        (0.85, pick(rng, ROBES)),
-        (0.7, shade(pick(rng, ROBES), 1.4)),
-    ):
+    inner, middle = pick(rng, ROBES), shade(pick(rng, ROBES), 1.4)
+    for scale, colour in ((1.0, GOLD), (0.85, inner), (0.7, middle)):
         sketch.ellipse(x, y, scale * radius / aspect, scale * radius, colour)
     for _ in range(7):
-        dx, dy = rng.uniform(-0.4, 0.4, 2) * radius
-        sketch.ellipse(
-            x + dx / aspect,
-            y + dy,
-            0.18 * radius / aspect,
-            0.2 * radius,
-            shade(pick(rng, ROBES), 1.2),
-        )
+        (dx, dy), wide = rng.uniform(-0.4, 0.4, 2) * radius, 0.18 * radius / aspect
+        colour = shade(pick(rng, ROBES), 1.2)
+        sketch.ellipse(x + dx / aspect, y + dy, wide, 0.2 * radius, colour)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from trimesh.util import append_faces
 
 from synfeal.config.collection import ClutterConfig
 from synfeal.config.load import check_mesh_file
@@ -27,6 +27,7 @@ from synfeal.scenes import build_scene, materials
 from synfeal.scenes.canvas import VIVID, pick
 from synfeal.scenes.collision import Rung, collision_mesh, write_curve
 from synfeal.scenes.patches import Maker
+from synfeal.scenes.scan import cell_corners
 from synfeal.seeds import generator_of
 
 
@@ -44,10 +45,12 @@ def prepare_scene(
     """
     out_dir = out_mesh.parent
     mesh, n_faces = prepare_mesh(name, scene, collision_agreement, seed, out_dir)
-    origin = scene.builder if scene.source == "procedural" else str(scene.path)
-    details = {"source": scene.source, "origin": origin, "collision_faces": n_faces}
-    found = {"findings": list(mesh.findings)}
-    properties = {"scene": name, **mesh_properties(mesh), **details, **found}
+    properties = {
+        **{"scene": name, "source": scene.source, "collision_faces": n_faces},
+        "origin": scene.builder if scene.source == "procedural" else str(scene.path),
+        **mesh_properties(mesh),
+        "findings": list(mesh.findings),
+    }
     write_json(out_dir / "properties.json", properties)
 
 
@@ -71,30 +74,17 @@ def prepare_mesh(
         collision, curve = collision_mesh(mesh, scene, box, collision_agreement, rng)
     places: list[dict[str, Any]] = []
     if scene.clutter is not None:
-        mesh, collision, places = _with_clutter(name, scene.clutter, mesh, collision, box)
+        # None is simplified: paths avoid them.
+        rng = generator_of("clutter", scene.clutter.seed)
+        objects, places = cluttered(mesh, box, scene.clutter, rng, f"scenes.{name}.clutter")
+        meshes = zip(collision, objects.merged(), strict=True)
+        collision = Triangles(*append_faces(*meshes))
+        mesh = TexturedMesh((*mesh.parts, *objects.parts), mesh.findings)
     write_json(out_dir / CLUTTER, places)
     save_collision_mesh(out_dir / "collision.ply", collision)
     write_curve(out_dir / "collision_curve.csv", curve)
     save_glb(out_dir / "mesh.glb", mesh)
     return mesh, len(collision.faces)
-
-
-def _with_clutter(
-    name: str,
-    clutter: ClutterConfig,
-    mesh: TexturedMesh,
-    collision: Triangles,
-    box: NDArray[np.float64],
-) -> tuple[TexturedMesh, Triangles, list[dict[str, Any]]]:
-    """Scene and collision mesh with objects, none simplified: paths avoid them; where they are."""
-    rng = generator_of("clutter", clutter.seed)
-    objects, places = cluttered(mesh, box, clutter, rng, f"scenes.{name}.clutter")
-    vertices, faces = objects.merged()
-    joined = Triangles(
-        np.concatenate([collision.vertices_m, vertices]),
-        np.concatenate([collision.faces, faces + len(collision.vertices_m)]),
-    )
-    return TexturedMesh((*mesh.parts, *objects.parts), mesh.findings), joined, places
 
 
 def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:
@@ -163,13 +153,10 @@ def save_cartons(mesh: Path) -> None:
 def _carton(clutter: ClutterConfig, rng: np.random.Generator) -> TexturedMesh:
     """A carton with labels."""
     wide, deep, high = rng.uniform(*clutter.size_m, 3)
-    painter = partial(materials.label, colour=pick(rng, VIVID))
+    painter = materials.label(pick(rng, VIVID))
     parts = []
     for patch in Maker(rng).box((wide, deep, high), painter, 120).patches:
-        rows, columns = patch.points_m.shape[:2]
-        index = np.arange(rows * columns).reshape(rows, columns)
-        a, b, c, d = (i.ravel() for i in (index[:-1, :-1], index[:-1, 1:], index[1:, :-1],
-                                          index[1:, 1:]))  # fmt: skip
+        a, b, c, d = cell_corners(patch.points_m.shape[:2])
         faces = np.concatenate([np.stack([a, c, d], 1), np.stack([a, d, b], 1)])
         down, right = np.meshgrid(patch.row_shares, patch.column_shares, indexing="ij")
         uv = np.stack([right.ravel(), 1 - down.ravel()], axis=1)

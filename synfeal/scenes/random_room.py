@@ -7,7 +7,6 @@ so that a backbone trained on several of them learns what rooms have in common.
 from __future__ import annotations
 
 import colorsys
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -75,15 +74,15 @@ def _surface(rng: Generator) -> Painter:
     """What covers a wall, a floor or a ceiling."""
     palette, colour, other = _palette(rng, int(rng.integers(1, 5))), _colour(rng), _colour(rng)
     blocks = (rng.uniform(0.1, 0.9), rng.uniform(0.06, 0.3))
-    masonry = partial(materials.masonry, palette=palette, block_m=blocks, joint=_colour(rng))
+    masonry = materials.masonry(palette, block_m=blocks, joint=_colour(rng))
     choices: list[Painter] = [
         masonry,
         masonry,
-        partial(materials.plaster, colour=colour),
-        partial(materials.damask, colour=colour, motif=other, pitch_m=rng.uniform(0.15, 0.5)),
-        partial(materials.wood, colour=colour, contrast=rng.uniform(0.1, 0.3)),
-        partial(materials.marble, colour=colour, vein=other, scale_m=rng.uniform(0.2, 0.8)),
-        partial(materials.wainscot, colour=colour, lower=other, height_m=rng.uniform(0.5, 1.4)),
+        materials.plaster(colour),
+        materials.damask(colour, motif=other, pitch_m=rng.uniform(0.15, 0.5)),
+        materials.wood(colour, contrast=rng.uniform(0.1, 0.3)),
+        materials.marble(colour, vein=other, scale_m=rng.uniform(0.2, 0.8)),
+        materials.wainscot(colour, lower=other, height_m=rng.uniform(0.5, 1.4)),
     ]
     return choices[int(rng.integers(len(choices)))]
 
@@ -125,16 +124,16 @@ def _along(make: Maker, wall: Wall, high_m: float) -> list[Item]:
 
 def _picture(rng: Generator) -> Painter:
     choices: list[Painter] = [
-        partial(pictures.painting, palette=_palette(rng, 4), frame=_colour(rng)),
-        pictures.poster,
-        pictures.whiteboard,
-        partial(pictures.noticeboard, ground=_colour(rng)),
-        partial(pictures.window_view, panes=(int(rng.integers(1, 4)), int(rng.integers(1, 4)))),
-        partial(pictures.stained_glass, palette=_palette(rng, 5), cells=60),
-        partial(pictures.mural, ground=_colour(rng), sky=_colour(rng), figures=3),
-        partial(materials.door, colour=_colour(rng), window=bool(rng.random() < 0.5)),
-        materials.screen,
-        partial(materials.rug, palette=_palette(rng, 4)),
+        pictures.painting(_palette(rng, 4), frame=_colour(rng)),
+        pictures.poster(),
+        pictures.whiteboard(),
+        pictures.noticeboard(_colour(rng)),
+        pictures.window_view(panes=(int(rng.integers(1, 4)), int(rng.integers(1, 4)))),
+        pictures.stained_glass(_palette(rng, 5), cells=60),
+        pictures.mural(_colour(rng), sky=_colour(rng), figures=3),
+        materials.door(_colour(rng), window=bool(rng.random() < 0.5)),
+        materials.screen(),
+        materials.rug(_palette(rng, 4)),
     ]
     return choices[int(rng.integers(len(choices)))]
 
@@ -143,7 +142,7 @@ def _standing(make: Maker, wide_m: float) -> tuple[Item, float, float]:
     """Something with its back to a wall, its depth and its height."""
     rng = make.rng
     deep, tall = rng.uniform(0.3, 0.6), rng.uniform(0.5, 2.1)
-    cloth = partial(materials.fabric, colour=_colour(rng), stripe=_colour(rng))
+    cloth = materials.fabric(_colour(rng), stripe=_colour(rng))
     doors, rows = int(rng.integers(1, 4)), int(rng.integers(1, 4))
     match int(rng.integers(4)):
         case 0:
@@ -165,7 +164,7 @@ def _free_standing(make: Maker, size: Size) -> Item:
         x, y = rng.uniform((1.1, 1.1), (size[0] - 1.1, size[1] - 1.1))
         yaw, tall = rng.uniform(0, 360), rng.uniform(0.4, 0.78)
         wide, deep = rng.uniform(0.7, 1.5), rng.uniform(0.6, 0.9)
-        top = partial(materials.wood, colour=_colour(rng), contrast=0.18)
+        top = materials.wood(_colour(rng), contrast=0.18)
         table = furniture.table(make, (wide, deep, tall), top, _colour(rng))
         stuff = furniture.on_table(make, wide, deep).placed(0, 0, tall)
         seats = (
@@ -177,7 +176,7 @@ def _free_standing(make: Maker, size: Size) -> Item:
         things.append(joined(table, stuff, seats).placed(x, y, 0, yaw))
     half = rng.uniform(0.6, 1.2, 2)
     x, y = rng.uniform((1.2, 1.2), (size[0] - 1.2, size[1] - 1.2))
-    rug = partial(materials.rug, palette=_palette(rng, 4))
+    rug = materials.rug(_palette(rng, 4))
     spread = level((x - half[0], x + half[0]), (y - half[1], y + half[1]), 0.012)
     things.append(make.sheet(spread, rug, PX_PER_M))
     post = make.box((0.2, 0.2, size[2]), _surface(rng), PX_PER_M, "fblr")

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from synfeal.scenes import furniture, materials, pictures
-from synfeal.scenes.canvas import Canvas, Colour, Painter, Pixels
+from synfeal.scenes.canvas import Canvas, Colour, Pixels
 from synfeal.scenes.lighting import Lamp, Lighting, Sun, ambient_corners
 from synfeal.scenes.materials import painted
 from synfeal.scenes.patches import Item, Maker, Points, joined, level, upright
@@ -30,30 +30,19 @@ WINDOW_M = (1.0, 1.4)
 COLUMN_X_M = 1.8
 CHANDELIER_M = (0.0, -0.3, 2.85)
 
-WEST: Painter = partial(
-    materials.wainscot, colour=(0.45, 0.58, 0.5), lower=(0.3, 0.32, 0.36), grain=0.03
+WEST = materials.wainscot((0.45, 0.58, 0.5), lower=(0.3, 0.32, 0.36), grain=0.03)
+EAST = materials.wainscot((0.78, 0.5, 0.32), lower=(0.42, 0.2, 0.16), grain=0.03)
+ALTAR = pictures.mural((0.5, 0.36, 0.2), sky=(0.75, 0.6, 0.3), figures=6)
+ASHLAR = materials.masonry(
+    ((0.62, 0.56, 0.48), (0.55, 0.5, 0.45), (0.66, 0.62, 0.55)), block_m=(0.5, 0.26)
 )
-EAST: Painter = partial(
-    materials.wainscot, colour=(0.78, 0.5, 0.32), lower=(0.42, 0.2, 0.16), grain=0.03
-)
-ALTAR: Painter = partial(pictures.mural, ground=(0.5, 0.36, 0.2), sky=(0.75, 0.6, 0.3), figures=6)
-ASHLAR: Painter = partial(
-    materials.masonry,
-    palette=((0.62, 0.56, 0.48), (0.55, 0.5, 0.45), (0.66, 0.62, 0.55)), block_m=(0.5, 0.26),
-)  # fmt: skip
-VAULT: Painter = partial(pictures.starry_vault, first=(0.62, 0.3, 0.22), second=(0.14, 0.24, 0.55))
-STONE: Painter = partial(materials.marble, colour=(0.74, 0.7, 0.62), vein=(0.5, 0.44, 0.38))
-ROSE: Painter = partial(materials.marble, colour=(0.6, 0.33, 0.28), vein=(0.8, 0.65, 0.55))
-GREEN_MARBLE: Painter = partial(materials.marble, colour=(0.3, 0.42, 0.36), vein=(0.75, 0.78, 0.7))
-BLUE_MARBLE: Painter = partial(materials.marble, colour=(0.28, 0.3, 0.4), vein=(0.7, 0.7, 0.75))
-CLOTH: Painter = partial(materials.fabric, colour=(0.9, 0.88, 0.8), stripe=(0.75, 0.6, 0.2))
-FRIEZE: Painter = partial(
-    materials.masonry,
-    palette=pictures.ROBES,
-    block_m=(0.25, 0.11),
-    joint=pictures.GOLD,
-    joint_m=0.02,
-)
+VAULT = pictures.starry_vault((0.62, 0.3, 0.22), second=(0.14, 0.24, 0.55))
+STONE = materials.marble((0.74, 0.7, 0.62), vein=(0.5, 0.44, 0.38))
+ROSE = materials.marble((0.6, 0.33, 0.28), vein=(0.8, 0.65, 0.55))
+GREEN_MARBLE = materials.marble((0.3, 0.42, 0.36), vein=(0.75, 0.78, 0.7))
+BLUE_MARBLE = materials.marble((0.28, 0.3, 0.4), vein=(0.7, 0.7, 0.75))
+CLOTH = materials.fabric((0.9, 0.88, 0.8), stripe=(0.75, 0.6, 0.2))
+FRIEZE = materials.masonry(pictures.ROBES, block_m=(0.25, 0.11), joint=pictures.GOLD, joint_m=0.02)
 
 # Profiles of what is turned: radius and height, metres.
 SHAFT = (
@@ -161,14 +150,14 @@ def _end_wall(y_m: float) -> Points:
 def _floor(canvas: Canvas) -> Pixels:
     """Chequered marble with a red runner and two tomb slabs."""
     x, y = canvas.coordinates_m()
-    light = materials.marble(canvas, (0.74, 0.7, 0.62), (0.5, 0.45, 0.4))
-    dark = materials.marble(canvas, (0.3, 0.2, 0.18), (0.6, 0.5, 0.45))
+    light = materials.marble((0.74, 0.7, 0.62), (0.5, 0.45, 0.4))(canvas)
+    dark = materials.marble((0.3, 0.2, 0.18), (0.6, 0.5, 0.45))(canvas)
     check = (np.floor(x / 0.5) + np.floor(y / 0.5)) % 2
     image = np.where((check > 0)[..., None], light, dark)
     joint = np.minimum(np.abs((x + 0.25) % 0.5 - 0.25), np.abs((y + 0.25) % 0.5 - 0.25)) < 0.005
     image[joint] *= np.float32(0.5)
     runner = np.abs(x[0] - HALF_X_M) < 0.28
-    red = materials.rug(canvas, ((0.55, 0.08, 0.1), (0.75, 0.55, 0.2), (0.45, 0.05, 0.08)))
+    red = materials.rug(((0.55, 0.08, 0.1), (0.75, 0.55, 0.2), (0.45, 0.05, 0.08)))(canvas)
     image[:, runner] = red[:, runner]
     for slab_x, slab_y in ((0.75, 6.2), (4.8, 3.4)):
         slab = (np.abs(x - slab_x) < 0.4) & (np.abs(y - slab_y) < 0.8)
@@ -178,7 +167,7 @@ def _floor(canvas: Canvas) -> Pixels:
 
 def _mural(make: Maker, mural: Mural) -> Item:
     centre_m, yaw_deg, size_m, px_per_m, rim_m, ground, sky, figures = mural
-    saints = partial(pictures.mural, ground=ground, sky=sky, figures=figures)
+    saints = pictures.mural(ground, sky=sky, figures=figures)
     return make.on_wall(centre_m, yaw_deg, size_m, saints, px_per_m, rim_m)
 
 
@@ -203,7 +192,7 @@ def _window(make: Maker) -> Item:
     beam = partial(make.box, (width, 0.1, 0.14), STONE, 120, "ftu")
     side, low = width / 2 + 0.07, -height / 2 - 0.14
     return joined(
-        make.on_wall((0, 0, 0), 0, WINDOW_M, pictures.stained_glass, 260, 0.03, glow=0.85),
+        make.on_wall((0, 0, 0), 0, WINDOW_M, pictures.stained_glass(), 260, 0.03, glow=0.85),
         (jamb().placed(x, -0.05, low) for x in (-side, side)),
         (beam().placed(0, -0.05, z) for z in (low, height / 2)),
     )
@@ -213,7 +202,7 @@ def _portal_wall(make: Maker) -> Item:
     """Portal, rose window, confessional and font at the far end."""
     y = -HALF_Y_M
     jamb = partial(make.box, (0.22, 0.14, 2.3), ROSE, 140, "flrt")
-    leaf = partial(materials.door, colour=(0.38, 0.23, 0.12))
+    leaf = materials.door((0.38, 0.23, 0.12))
     booth = furniture.cabinet(make, (1.1, 0.6, 2.05), (0.45, 0.24, 0.12), 3)
     return joined(
         *(jamb().placed(x, y + 0.07, 0, 180) for x in (-0.95, 0.95)),
@@ -221,7 +210,7 @@ def _portal_wall(make: Maker) -> Item:
         *(make.on_wall((x, y, 1.15), 180, (0.84, 2.3), leaf, 180, 0.05) for x in (-0.42, 0.42)),
         booth.placed(-1.95, y + 0.31, 0, 180),
         make.turned(BASIN, STONE, 150, 18).placed(1.7, y + 0.5),
-        make.on_wall((1.95, y, 1.6), 180, (0.8, 0.9), pictures.noticeboard, 250),
+        make.on_wall((1.95, y, 1.6), 180, (0.8, 0.9), pictures.noticeboard(), 250),
         _rose_window(make, y + 0.03, 3.15, 0.55),
     )
 
@@ -236,22 +225,22 @@ def _rose_window(make: Maker, y_m: float, z_m: float, radius_m: float) -> Item:
     """A round window: a polar grid, so that the glass cells spread from its middle."""
     circle, centre = -_circle(25)[:, [0, 2, 1]], np.array([0, y_m, z_m])
     points = centre + np.linspace(radius_m, 0.01, 6)[:, None, None] * circle
-    glass = partial(pictures.stained_glass, cells=90)
+    glass = pictures.stained_glass(cells=90)
     rim = make.tube(centre + radius_m * circle + (0, 0.02, 0), 0.05, STONE, 120)
     return joined(make.sheet(points, glass, 200, glow=0.85), rim)
 
 
 def _altar(make: Maker) -> Item:
     """Steps, table, candles and a gilded altar piece with painted panels."""
-    slender = partial(make.turned, SLENDER, materials.gilded, 130, 12)
+    slender = partial(make.turned, SLENDER, materials.gilded(), 130, 12)
     candle = partial(make.turned, CANDLE, painted((0.95, 0.92, 0.8)), 80, 8)
     flowers = partial(furniture.plant, make, 0.45, (0.75, 0.6, 0.25), 30)
     return joined(
         make.box((3.4, 1.2, 0.14), ROSE, 140, "flrt").placed(0, 3.65),
         make.box((2.6, 0.9, 0.14), STONE, 140, "flrt").placed(0, 3.8, 0.14),
         make.box((1.5, 0.5, 0.75), CLOTH, 160, "flrt").placed(0, 3.65, 0.28),
-        make.box((3.1, 0.12, 2.75), materials.gilded, 130, "flrt").placed(0, 4.18, 0.28),
-        make.box((3.3, 0.22, 0.16), materials.gilded, 140).placed(0, 4.1, 2.85),
+        make.box((3.1, 0.12, 2.75), materials.gilded(), 130, "flrt").placed(0, 4.18, 0.28),
+        make.box((3.3, 0.22, 0.16), materials.gilded(), 140).placed(0, 4.1, 2.85),
         (slender().placed(x, 4.0) for x in (-1.5, -0.6, 0.6, 1.5)),
         (candle().placed(x, 3.75, 1.03) for x in (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)),
         (flowers().placed(x, 3.3, 0.14) for x in (-1.25, 1.2)),
@@ -285,7 +274,7 @@ def _statues(make: Maker) -> Item:
     """Robed figures on pedestals, two beside the altar and one at the east wall."""
     things = []
     for x, y, colour in STATUES:
-        robe = partial(materials.fabric, colour=colour, stripe=pictures.GOLD, pitch_m=0.25)
+        robe = materials.fabric(colour, stripe=pictures.GOLD, pitch_m=0.25)
         things.append(make.turned(FIGURE, robe, 170, 16).placed(x, y, 0.8))
         things.append(make.box((0.42, 0.42, 0.8), STONE, 140, "fblrt").placed(x, y))
     return joined(things)

@@ -95,15 +95,19 @@ def jittered(
     return moved[..., :3].reshape(-1, 3), moved[..., 3:].reshape(-1, 2)
 
 
+def cell_corners(shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """Vertices (4, N) of the cells of a grid: top left, top right, bottom left, bottom right."""
+    index = np.arange(shape[0] * shape[1]).reshape(shape)
+    corners = (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:])
+    return np.stack([corner.ravel() for corner in corners])
+
+
 def grid_faces(rng: np.random.Generator, points: Points) -> NDArray[np.int64]:
     """Triangles (F, 3) of a grid, counter-clockwise from its front, without those of no area.
 
     Every cell is cut along one of its diagonals at random.
     """
-    rows, columns = points.shape[:2]
-    index = np.arange(rows * columns).reshape(rows, columns)
-    corners = (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:])
-    a, b, c, d = (part.ravel() for part in corners)
+    a, b, c, d = cell_corners(points.shape[:2])
     falling = rng.random(len(a)) < 0.5  # the diagonal runs from a to d, else from b to c
     first = np.stack([a, c, np.where(falling, d, b)], axis=1)
     second = np.stack([b, np.where(falling, a, c), d], axis=1)
