@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from synfeal.scenes import furniture, materials, pictures
-from synfeal.scenes.canvas import Canvas, Colour, Painter, Pixels, mix
+from synfeal.scenes.canvas import Canvas, Colour, Pixels, mix
 from synfeal.scenes.lighting import Lamp, Lighting, Sun, ambient_corners
 from synfeal.scenes.materials import painted
 from synfeal.scenes.patches import Item, Maker, joined, level, upright
@@ -45,16 +45,15 @@ WALLS = (  # left and right end, colour, and that of the band below
     ((WIDTH_M, LENGTH_M), (WIDTH_M, 0), WHITE, (0.7, 0.7, 0.66)),
     ((0, 0), (0, LENGTH_M), (0.86, 0.87, 0.9), (0.5, 0.56, 0.68)),
 )
-BOARDS: tuple[tuple[float, float, float, float, tuple[float, float], Painter], ...] = (
-    # x, y, z, yaw in degrees, size: posters on the east wall, boards on the north wall
-    (WIDTH_M, 1.15, 1.75, -90, (0.6, 0.85), pictures.poster()),
-    (WIDTH_M, 3.35, 1.8, -90, (0.85, 1.15), pictures.poster()),
-    (WIDTH_M, 4.35, 1.75, -90, (0.6, 0.8), pictures.poster()),
-    (WIDTH_M, 5.1, 1.9, -90, (0.55, 0.4), pictures.poster()),
-    (1.2, LENGTH_M, 1.65, 0, (1.3, 0.95), pictures.noticeboard()),
-    (2.45, LENGTH_M, 1.7, 0, (0.7, 1.0), pictures.poster((0.1, 0.4, 0.75))),
-    (0.3, LENGTH_M, 1.8, 0, (0.35, 0.5), pictures.poster()),
-    (3.15, LENGTH_M, 2.15, 0, (0.36, 0.36), pictures.poster()),
+BOARDS = (  # where, yaw in degrees, size: posters on the east wall, boards on the north wall
+    ((WIDTH_M, 1.15, 1.75), -90, (0.6, 0.85), pictures.poster()),
+    ((WIDTH_M, 3.35, 1.8), -90, (0.85, 1.15), pictures.poster()),
+    ((WIDTH_M, 4.35, 1.75), -90, (0.6, 0.8), pictures.poster()),
+    ((WIDTH_M, 5.1, 1.9), -90, (0.55, 0.4), pictures.poster()),
+    ((1.2, LENGTH_M, 1.65), 0, (1.3, 0.95), pictures.noticeboard()),
+    ((2.45, LENGTH_M, 1.7), 0, (0.7, 1.0), pictures.poster((0.1, 0.4, 0.75))),
+    ((0.3, LENGTH_M, 1.8), 0, (0.35, 0.5), pictures.poster()),
+    ((3.15, LENGTH_M, 2.15), 0, (0.36, 0.36), pictures.poster()),
 )
 DESKS_M = (  # x, y, yaw in degrees
     (0.55, 2.3, 90), (0.55, 4.3, 90), (0.55, 5.7, 90),
@@ -75,7 +74,8 @@ def ingredients(seed: int) -> tuple[np.random.Generator, Item, Lighting, Scanner
     """What it is scanned from; nothing that has a volume sticks out of the room."""
     rng = generator_of("scene", "large_room", seed)
     make = Maker(rng)
-    flat = [part(make) for part in (_shell, _windows, _south_wall, _boards)]
+    boards = (make.on_wall(*board, 320) for board in BOARDS)
+    flat = joined(_shell(make), _windows(make), _south_wall(make), boards)
     parts = (_desks, _storage, _lamps, _fittings, _small_things)
     inside = joined(part(make) for part in parts).clipped(INNER_LOWER_M, INNER_UPPER_M)
     scanner = Scanner(CELL_M, stations(LOWER_M, UPPER_M, (2, 3, 1)), LOWER_M, UPPER_M)
@@ -97,10 +97,8 @@ def _lighting() -> Lighting:
     ambient = ambient_corners(
         (0.46, 0.44, 0.47), (0.4, 0.5, 0.57), (0.6, 0.46, 0.35), (0.4, 0.47, 0.38), top=1.15
     )
-    half = WINDOW_M[0] / 2
-    openings = tuple(
-        ((0.0, y - half, SILL_M), (0.0, y + half, SILL_M + WINDOW_M[1])) for y in WINDOWS_Y_M[1:]
-    )
+    half, top = WINDOW_M[0] / 2, SILL_M + WINDOW_M[1]
+    openings = tuple(((0.0, y - half, SILL_M), (0.0, y + half, top)) for y in WINDOWS_Y_M[1:])
     sun = Sun((0.75, -0.42, -0.62), (2.0, 1.6, 1.0), openings)
     return Lighting(LOWER_M, UPPER_M, ambient, [*daylight, *ceiling], sun)
 
@@ -173,11 +171,6 @@ def _south_wall(make: Maker) -> Item:
     )
 
 
-def _boards(make: Maker) -> Item:
-    """Posters between the cabinets and above the desks, notice board and more posters."""
-    return joined(make.on_wall((x, y, z), yaw, size, p, 320) for x, y, z, yaw, size, p in BOARDS)
-
-
 def _desks(make: Maker) -> Item:
     """Equal desks with two equal screens and a chair each, and an island with one."""
     rng, screen = make.rng, furniture.monitor(make)
@@ -189,11 +182,10 @@ def _desks(make: Maker) -> Item:
         stuff = furniture.on_table(make, 1.2, 0.6).placed(0, 0, 0.74)
         seat = chair.placed(rng.uniform(-0.3, 0.3), -0.6, 0, 180 + rng.uniform(-50, 50))
         things.append(joined(desk, stuff, seat).placed(x, y, 0, yaw))
-    island = furniture.table(make, (0.9, 1.9, 0.74), OAK)
+    table = furniture.table(make, (0.9, 1.9, 0.74), OAK)
     stuff = furniture.on_table(make, 0.8, 1.7).placed(0, 0, 0.74)
-    return joined(
-        things, joined(island, stuff, screen.placed(0.1, 0.6, 0.74, 25)).placed(2.55, 3.5)
-    )
+    island = joined(table, stuff, screen.placed(0.1, 0.6, 0.74, 25))
+    return joined(things, island.placed(2.55, 3.5))
 
 
 def _storage(make: Maker) -> Item:
@@ -248,15 +240,13 @@ def _fittings(make: Maker) -> Item:
 
 def _small_things(make: Maker) -> Item:
     """Shelves with bottles, pinned sheets of paper, coats, files on cupboards, more plants."""
-    files, plant, coat = (
-        partial(f, make) for f in (furniture.books, furniture.plant, furniture.coat)
-    )
+    files, plant = partial(furniture.books, make), partial(furniture.plant, make)
     return joined(
         *(furniture.pinned_page(make).placed(x, y, z, yaw) for x, y, z, yaw in PAGES_M),
         furniture.wall_shelf(make, 1.2, 11).placed(WIDTH_M, 4.85, 1.42, -90),
         furniture.wall_shelf(make, 0.9, 8).placed(1.9, LENGTH_M, 1.25),
-        coat((0.2, 0.22, 0.28)).placed(0.68, 0.0, 1.65, 180),
-        coat((0.92, 0.92, 0.9)).placed(2.35, 0.0, 1.6, 180),
+        furniture.coat(make, (0.2, 0.22, 0.28)).placed(0.68, 0.0, 1.65, 180),
+        furniture.coat(make, (0.92, 0.92, 0.9)).placed(2.35, 0.0, 1.6, 180),
         files(0.9, 0.25, 0.3).placed(WIDTH_M - 0.2, 2.05, 1.2, -90),
         files(0.5, 0.25, 0.32).placed(0.35, 0.25, 1.85, 180),
         files(0.8, 0.28, 0.3).placed(2.55, 4.3, 0.74, 180),

@@ -36,9 +36,8 @@ class Wall(NamedTuple):
     def place(self, item: Item, at_m: float, off_m: float, z_m: float = 0.0) -> Item:
         """An item ``at_m`` along the wall, ``off_m`` in front of it, its front to the room."""
         (x, y), (ax, ay) = self.start_m, self.along
-        return item.placed(
-            x + at_m * ax + off_m * ay, y + at_m * ay - off_m * ax, z_m, self.yaw_deg
-        )
+        x, y = x + at_m * ax + off_m * ay, y + at_m * ay - off_m * ax
+        return item.placed(x, y, z_m, self.yaw_deg)
 
 
 def ingredients(seed: int) -> tuple[Generator, Item, Lighting, Scanner]:
@@ -76,9 +75,7 @@ def _surface(rng: Generator) -> Painter:
     blocks = (rng.uniform(0.1, 0.9), rng.uniform(0.06, 0.3))
     masonry = materials.masonry(palette, block_m=blocks, joint=_colour(rng))
     choices: list[Painter] = [
-        masonry,
-        masonry,
-        materials.plaster(colour),
+        *(masonry, masonry, materials.plaster(colour)),
         materials.damask(colour, motif=other, pitch_m=rng.uniform(0.15, 0.5)),
         materials.wood(colour, contrast=rng.uniform(0.1, 0.3)),
         materials.marble(colour, vein=other, scale_m=rng.uniform(0.2, 0.8)),
@@ -114,9 +111,8 @@ def _along(make: Maker, wall: Wall, high_m: float) -> list[Item]:
         if room_m > 0.5 and rng.random() < 0.85:
             hung = rng.uniform(0.4, min(room_m, 1.4))
             z = tall + 0.15 + rng.uniform(hung / 2, room_m - hung / 2)
-            painter, glow = _picture(rng), 0.0
-            if rng.random() < 0.2:
-                glow = rng.uniform(0.4, 0.9)
+            painter = _picture(rng)
+            glow = rng.uniform(0.4, 0.9) if rng.random() < 0.2 else 0.0
             hanging = make.on_wall((0, 0, 0), 0, (wide, hung), painter, 150, 0.03, glow)
             things.append(wall.place(hanging, middle, 0.0, z))
         at += wide + rng.uniform(*GAP_M)
@@ -167,12 +163,11 @@ def _free_standing(make: Maker, size: Size) -> Item:
         top = materials.wood(_colour(rng), contrast=0.18)
         table = furniture.table(make, (wide, deep, tall), top, _colour(rng))
         stuff = furniture.on_table(make, wide, deep).placed(0, 0, tall)
-        seats = (
-            furniture.chair(make, _colour(rng)).placed(
-                rng.uniform(-0.9, 0.9), rng.uniform(-0.9, 0.9), 0, rng.uniform(0, 360)
-            )
-            for _ in range(int(rng.integers(0, 3)))
-        )
+        seats = []
+        for _ in range(int(rng.integers(0, 3))):
+            seat = furniture.chair(make, _colour(rng))
+            at_x, at_y, turn = rng.uniform((-0.9, -0.9, 0), (0.9, 0.9, 360))
+            seats.append(seat.placed(at_x, at_y, 0, turn))
         things.append(joined(table, stuff, seats).placed(x, y, 0, yaw))
     half = rng.uniform(0.6, 1.2, 2)
     x, y = rng.uniform((1.2, 1.2), (size[0] - 1.2, size[1] - 1.2))
@@ -190,14 +185,10 @@ def _lighting(rng: Generator, size: Size) -> Lighting:
         warm = rng.uniform(0.75, 1.25)
         return (share * warm, share, share * (2.0 - warm))
 
-    lamps = [
-        Lamp(
-            (*rng.uniform((0.5, 0.5), (size[0] - 0.5, size[1] - 0.5)), size[2] - 0.1),
-            (0, 0, -1),
-            scaled(rng.uniform(0.4, 1.4)),
-        )
-        for _ in range(int(rng.integers(2, 6)))
-    ]
+    lamps = []
+    for _ in range(int(rng.integers(2, 6))):
+        x, y = rng.uniform((0.5, 0.5), (size[0] - 0.5, size[1] - 0.5))
+        lamps.append(Lamp((x, y, size[2] - 0.1), (0, 0, -1), scaled(rng.uniform(0.4, 1.4))))
     a, b, c, d = (scaled(rng.uniform(0.2, 0.55)) for _ in range(4))
     ambient = ambient_corners(a, b, c, d, top=rng.uniform(0.8, 1.3))
     return Lighting((0.0, 0.0, 0.0), size, ambient, lamps, None)

@@ -61,12 +61,9 @@ BASIN = (
 )  # fmt: skip
 CANDLE = ((0.006, 0.36), (0.02, 0.32), (0.02, 0.0))
 
-# Murals: centre, yaw in degrees, width and height, texels per metre, rim, ground, sky, figures.
-Mural = tuple[
-    tuple[float, float, float], float, tuple[float, float], float, float, Colour, Colour, int
-]
-FRESCOES: tuple[Mural, ...] = tuple(
-    ((x, y, 1.77), yaw, (2.1, 1.4), 270, 0.02, ground, sky, 5)
+# Where a mural is, which way it faces, its size, what is on it, texels per metre and rim.
+FRESCOES = tuple(
+    ((x, y, 1.77), yaw, (2.1, 1.4), pictures.mural(ground, sky), 270, 0.02)
     for x, y, yaw, ground, sky in (
         (HALF_X_M, BAYS_Y_M[0], -90, (0.3, 0.42, 0.2), (0.55, 0.7, 0.85)),
         (HALF_X_M, BAYS_Y_M[1], -90, (0.55, 0.25, 0.15), (0.9, 0.75, 0.45)),
@@ -74,11 +71,14 @@ FRESCOES: tuple[Mural, ...] = tuple(
         (-HALF_X_M, BAYS_Y_M[2], 90, (0.45, 0.38, 0.15), (0.35, 0.5, 0.75)),
     )
 )
-PANELS: tuple[Mural, ...] = (
-    ((-1.05, 4.12, 1.75), 0, (0.75, 1.7), 300, 0.03, (0.5, 0.15, 0.15), (0.8, 0.6, 0.3), 1),
-    ((0.0, 4.12, 1.95), 0, (1.05, 1.9), 300, 0.03, (0.1, 0.2, 0.45), (0.55, 0.75, 0.95), 3),
-    ((1.05, 4.12, 1.75), 0, (0.75, 1.7), 300, 0.03, (0.15, 0.35, 0.2), (0.9, 0.8, 0.5), 1),
-    ((0.0, 4.12, 3.3), 0, (0.9, 0.55), 300, 0.03, (0.7, 0.5, 0.2), (0.95, 0.85, 0.5), 1),
+PANELS = tuple(
+    ((x, 4.12, z), 0, size, pictures.mural(ground, sky, figures), 300, 0.03)
+    for x, z, size, ground, sky, figures in (
+        (-1.05, 1.75, (0.75, 1.7), (0.5, 0.15, 0.15), (0.8, 0.6, 0.3), 1),
+        (0.0, 1.95, (1.05, 1.9), (0.1, 0.2, 0.45), (0.55, 0.75, 0.95), 3),
+        (1.05, 1.75, (0.75, 1.7), (0.15, 0.35, 0.2), (0.9, 0.8, 0.5), 1),
+        (0.0, 3.3, (0.9, 0.55), (0.7, 0.5, 0.2), (0.95, 0.85, 0.5), 1),
+    )
 )
 STATUES: tuple[tuple[float, float, Colour], ...] = (  # x, y and robe
     (-2.3, 3.4, (0.2, 0.3, 0.65)), (2.3, 3.4, (0.65, 0.15, 0.15)), (2.45, -1.4, (0.8, 0.78, 0.7)),
@@ -95,14 +95,11 @@ def ingredients(seed: int) -> tuple[np.random.Generator, Item, Lighting, Scanner
 
 
 def _lighting() -> Lighting:
-    west = -HALF_X_M
+    west, windows = -HALF_X_M, BAYS_Y_M[:2]
     lamps = [
         *(Lamp((side, 3.1, 1.9), (0, 0, -1), (0.35, 0.24, 0.1)) for side in (-0.9, 0.9)),
         Lamp((0, 1.6, 2.6), (0, 0.94, -0.34), (1.5, 1.15, 0.65)),
-        *(
-            Lamp((west + 0.15, bay, 1.9), (1, 0, 0), (0.9, 1.05, 1.2), "daylight")
-            for bay in BAYS_Y_M[:2]
-        ),
+        *(Lamp((west + 0.15, y, 1.9), (1, 0, 0), (0.9, 1.05, 1.2), "daylight") for y in windows),
         Lamp((0, -HALF_Y_M + 0.15, 3.1), (0, 0.95, -0.31), (0.6, 0.7, 1.1), "daylight"),
         Lamp(CHANDELIER_M, (0, 0, 1), (0.32, 0.26, 0.17)),
         Lamp(CHANDELIER_M, (0, 0, -1), (0.72, 0.6, 0.4)),
@@ -110,10 +107,9 @@ def _lighting() -> Lighting:
     ambient = ambient_corners(
         (0.36, 0.48, 0.66), (0.55, 0.47, 0.32), (0.55, 0.42, 0.42), (0.68, 0.48, 0.26), top=1.25
     )
-    openings = tuple(((west, bay - 0.5, 1.05), (west, bay + 0.5, 2.45)) for bay in BAYS_Y_M[:2])
-    return Lighting(
-        LOWER_M, UPPER_M, ambient, lamps, Sun((0.8, 0.3, -0.42), (1.8, 1.4, 0.8), openings)
-    )
+    openings = tuple(((west, y - 0.5, 1.05), (west, y + 0.5, 2.45)) for y in windows)
+    sun = Sun((0.8, 0.3, -0.42), (1.8, 1.4, 0.8), openings)
+    return Lighting(LOWER_M, UPPER_M, ambient, lamps, sun)
 
 
 def _arc(inset_m: float = 0.0, n: int = 41) -> Points:
@@ -142,9 +138,8 @@ def _end_wall(y_m: float) -> Points:
     """A wall under the vault: its rows are bent like the vault, so that no gap is left."""
     profile = _arc() if y_m > 0 else _arc()[::-1]
     share = np.linspace(1, 0, 31)[:, None]
-    points = np.empty((len(share), len(profile), 3))
-    points[..., 0], points[..., 1], points[..., 2] = profile[:, 0], y_m, share * profile[:, 1]
-    return points
+    columns = np.broadcast_arrays(profile[:, 0], y_m, share * profile[:, 1])
+    return np.stack(columns, axis=-1)
 
 
 def _floor(canvas: Canvas) -> Pixels:
@@ -165,23 +160,14 @@ def _floor(canvas: Canvas) -> Pixels:
     return image
 
 
-def _mural(make: Maker, mural: Mural) -> Item:
-    centre_m, yaw_deg, size_m, px_per_m, rim_m, ground, sky, figures = mural
-    saints = pictures.mural(ground, sky=sky, figures=figures)
-    return make.on_wall(centre_m, yaw_deg, size_m, saints, px_per_m, rim_m)
-
-
 def _side_walls(make: Maker) -> Item:
     """Six bays between pilasters: two windows and four frescoes."""
     pilaster = partial(make.box, (0.3, 0.12, SPRING_M), STONE, 120, "flr")
     return joined(
-        (_mural(make, fresco) for fresco in FRESCOES),
+        (make.on_wall(*fresco) for fresco in FRESCOES),
         (_window(make).placed(-HALF_X_M, y, 1.75, 90) for y in BAYS_Y_M[:2]),
-        (
-            pilaster().placed(x - np.sign(x) * 0.06, y, 0, yaw)
-            for x, yaw in ((-HALF_X_M, 90), (HALF_X_M, -90))
-            for y in RIBS_Y_M
-        ),
+        (pilaster().placed(0.06 - HALF_X_M, y, 0, 90) for y in RIBS_Y_M),
+        (pilaster().placed(HALF_X_M - 0.06, y, 0, -90) for y in RIBS_Y_M),
     )
 
 
@@ -218,7 +204,7 @@ def _portal_wall(make: Maker) -> Item:
 def _circle(n: int) -> Points:
     """Points (n, 3) of the unit circle about z, the last the first."""
     angle = np.linspace(0, 2 * np.pi, n)
-    return np.stack([np.cos(angle), np.sin(angle), np.zeros(n)], axis=-1)
+    return np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
 
 
 def _rose_window(make: Maker, y_m: float, z_m: float, radius_m: float) -> Item:
@@ -244,7 +230,7 @@ def _altar(make: Maker) -> Item:
         (slender().placed(x, 4.0) for x in (-1.5, -0.6, 0.6, 1.5)),
         (candle().placed(x, 3.75, 1.03) for x in (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)),
         (flowers().placed(x, 3.3, 0.14) for x in (-1.25, 1.2)),
-        (_mural(make, panel) for panel in PANELS),
+        (make.on_wall(*panel) for panel in PANELS),
     )
 
 
@@ -257,11 +243,8 @@ def _pews(make: Maker) -> Item:
 def _columns(make: Maker) -> Item:
     """Four free columns of different stone under two beams, and ribs across the vault."""
     sides, beam = (-COLUMN_X_M, COLUMN_X_M), (2 * HALF_Y_M, 0.24, 0.22)
-    stones = zip(
-        (STONE, ROSE, GREEN_MARBLE, BLUE_MARBLE),
-        ((x, y) for x in sides for y in COLUMNS_Y_M),
-        strict=True,
-    )
+    places = [(x, y) for x in sides for y in COLUMNS_Y_M]
+    stones = zip((STONE, ROSE, GREEN_MARBLE, BLUE_MARBLE), places, strict=True)
     ribs = (np.insert(_arc(inset_m=0.09), 1, y, axis=1) for y in RIBS_Y_M)
     return joined(
         (make.turned(SHAFT, stone, 170, 18).placed(*place) for stone, place in stones),
