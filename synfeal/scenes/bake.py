@@ -40,10 +40,7 @@ def scanned_mesh(
     surface = surface_of(rng, item.patches, scanner.cell_m)
     log.info("%d patches, %d faces", len(item.patches), len(surface.faces))
     tones = surface.per_patch(baked(surface, *_reflecting(surface, item.patches), lighting))
-    pictures = [
-        _lit(patch, grid, tone)
-        for patch, grid, tone in zip(item.patches, surface.grids, tones, strict=True)
-    ]
+    pictures = list(map(_lit, item.patches, surface.grids, tones))
     points, shares = _moved(rng, surface, scanned(rng, surface, scanner))
     seen = seen_faces(points, surface.faces, scanner.stations_m)
     log.info("%.1f %% of the faces are seen by a station", 100 * seen.mean())
@@ -62,14 +59,11 @@ def light_shares(
     nearest = np.array([_nearest_group(patch, lighting) for patch in item.patches])
     group_of = np.repeat(nearest, [grid.n_points for grid in surface.grids])
     own_glow = {group: glow * (group_of == group) for group in GROUPS}
-    light = {
-        group: received(surface, albedo, own_glow[group], lighting.of_group(group))
-        for group in GROUPS
-    }
-    exposure = exposure_of(np.asarray(sum(light.values())))
+    light = [received(surface, albedo, own_glow[g], lighting.of_group(g)) for g in GROUPS]
+    exposure = exposure_of(np.asarray(sum(light)))
     shown = [
-        light[group] * (exposure * (1 - glow))[:, None] + own_glow[group][:, None]
-        for group in GROUPS
+        each * (exposure * (1 - glow))[:, None] + own_glow[group][:, None]
+        for group, each in zip(GROUPS, light, strict=True)
     ]
     *others, _ = np.round(255 * np.stack(shown) / np.maximum(sum(shown), 1e-9)).astype(np.uint8)
     points, _ = _moved(rng, surface, scanned(rng, surface, scanner))
@@ -93,21 +87,18 @@ def _moved(
 ) -> tuple[Points, list[NDArray[np.float64]]]:
     """Unevenly placed vertices (V, 3), and where they lie on the picture of each patch (V', 2)."""
     pieces = zip(surface.grids, surface.per_patch(points_m), strict=True)
-    moved = [jittered(rng, grid, piece) for grid, piece in pieces]
-    return np.concatenate([points for points, _ in moved]), [shares for _, shares in moved]
+    points, shares = zip(*(jittered(rng, grid, piece) for grid, piece in pieces), strict=True)
+    return np.concatenate(points), list(shares)
 
 
 def _reflecting(
     surface: Surface, patches: Sequence[Patch]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Linear albedo (V, 3) and glow (V,) at the vertices."""
-    albedo = [
-        albedo_of(patch, grid).reshape(-1, 3)
-        for patch, grid in zip(patches, surface.grids, strict=True)
-    ]
-    sizes = [grid.n_points for grid in surface.grids]
-    glow = np.repeat(np.array([patch.glow for patch in patches], np.float32), sizes)
-    return np.concatenate(albedo), glow
+    pairs = list(zip(patches, surface.grids, strict=True))
+    albedo = np.concatenate([albedo_of(patch, grid).reshape(-1, 3) for patch, grid in pairs])
+    glow = np.concatenate([np.full(grid.n_points, p.glow, np.float32) for p, grid in pairs])
+    return albedo, glow
 
 
 def _lit(patch: Patch, grid: Grid, tone: NDArray[np.float32]) -> NDArray[np.uint8]:

@@ -15,6 +15,7 @@ from synfeal.scenes.scan import Surface
 
 Vectors = NDArray[np.float32]
 LIFT_M = 0.015  # rays start this far in front of their surface
+REACH_M = 1.5  # how far away something still darkens the ambient light
 N_SKY_RAYS = 40
 N_BOUNCES = 3
 CHUNK = 1 << 14
@@ -57,7 +58,6 @@ class Lighting:
     ambient: NDArray[np.float32]
     lamps: Sequence[Lamp]  # local sources
     sun: Sun | None  # sunlight through openings, if any
-    reach_m: float = 1.5  # how far away something still darkens the ambient light
 
     def ambient_at(self, points: Vectors) -> Vectors:
         """Ambient light (N, 3) at points (N, 3)."""
@@ -108,7 +108,7 @@ def received(
     caster = RayCaster(surface.points_m, surface.faces)
     normals = surface.normals.astype(np.float32)
     origins = surface.inner_m.astype(np.float32) + np.float32(LIFT_M) * normals
-    openness, hits = _gather_rays(caster, origins, normals, lighting.reach_m)
+    openness, hits = _gather_rays(caster, origins, normals)
     first = lighting.ambient_at(origins + normals) * openness[:, None]
     for lamp in lighting.lamps:
         first += _lamp_light(lamp, origins, normals, caster)
@@ -122,17 +122,17 @@ def received(
 
 
 def _gather_rays(
-    caster: RayCaster, origins: Vectors, normals: Vectors, reach_m: float
+    caster: RayCaster, origins: Vectors, normals: Vectors
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Openness (N,) and the faces (N, K) hit by cosine-distributed rays, −1 where there is none.
 
-    Openness is the mean free length of the rays up to ``reach_m``, floored at one fifth.
+    Openness is the mean free length of the rays up to ``REACH_M``, floored at one fifth.
     """
     total = np.zeros(len(origins), np.float32)
     hits = np.empty((len(origins), N_SKY_RAYS), np.int32)
     for index, direction in enumerate(_sky_directions(normals)):
         free, hits[:, index] = caster.first_hits(origins, direction)
-        total += np.minimum(free / reach_m, 1).astype(np.float32)
+        total += np.minimum(free / REACH_M, 1).astype(np.float32)
     return np.asarray(0.2 + 0.8 * total / N_SKY_RAYS, np.float32), hits
 
 
@@ -153,10 +153,8 @@ def _sky_directions(normals: Vectors) -> list[Vectors]:
 def _gathered(radiance: Vectors, hits: NDArray[np.int32]) -> Vectors:
     """Mean radiance (N, 3) of the faces each point's rays hit; the outside is dark."""
     padded = np.concatenate([radiance, np.zeros((1, 3), np.float32)])  # where −1 points to
-    means = [
-        padded[hits[start : start + CHUNK]].mean(axis=1) for start in range(0, len(hits), CHUNK)
-    ]
-    return np.concatenate(means)
+    chunks = (hits[start : start + CHUNK] for start in range(0, len(hits), CHUNK))
+    return np.concatenate([padded[chunk].mean(axis=1) for chunk in chunks])
 
 
 def _lamp_light(lamp: Lamp, origins: Vectors, normals: Vectors, caster: RayCaster) -> Vectors:

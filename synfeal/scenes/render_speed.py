@@ -44,7 +44,8 @@ SCHEMA = {
 
 log = logging.getLogger("synfeal")
 Poses = NDArray[np.float64]
-Floats = NDArray[np.float64]
+# What P views should show: colours (P, H, W, 3) in 0 to 255, and depth (P, H, W), metres.
+Truth = tuple[NDArray[np.float32], Depth]
 
 
 @dataclass(frozen=True)
@@ -58,14 +59,6 @@ class Variant:
     def opened(self, camera: CameraConfig) -> Renderer:
         """A renderer through ``camera``."""
         return open_renderer(self.mesh, camera, self.render)
-
-
-@dataclass(frozen=True)
-class Truth:
-    """What P views should show: colours (P, H, W, 3) in 0 to 255, and depth (P, H, W), metres."""
-
-    rgb: NDArray[np.float32]
-    depth_m: Depth
 
 
 def write_render_speed(
@@ -118,13 +111,13 @@ def measure_speed(
 
 def other_settings(chosen: Variant, with_slow: bool) -> list[Variant]:
     """The full mesh with all backends that work here and numbers of samples but the chosen."""
-    settings = [
-        RenderConfig(backend=name, supersampling=samples)
+    names = [
+        name
         for name in choose.BACKENDS
-        for samples in SUPERSAMPLING[name]
-        if choose.why_not(name) is None
-        and (with_slow or name in ("opengl", "pyrender", chosen.render.backend))
+        if (with_slow or name in ("opengl", "pyrender", chosen.render.backend))
+        and choose.why_not(name) is None
     ]
+    settings = [RenderConfig(backend=n, supersampling=k) for n in names for k in SUPERSAMPLING[n]]
     return [Variant(chosen.mesh, render) for render in settings if render != chosen.render]
 
 
@@ -178,29 +171,20 @@ def truth_of(chosen: Variant, camera: CameraConfig, poses: Poses) -> Truth:
     """Colours by 64 samples of the chosen backend, and depth by rays against the full mesh."""
     mesh = chosen.mesh
     plain = chosen.render.model_copy(update={"supersampling": 1})
-    rgb = np.stack(
-        list(reference_images(lambda large: open_renderer(mesh, large, plain), camera, poses))
-    )
+    views = reference_images(lambda large: open_renderer(mesh, large, plain), camera, poses)
+    # Depth needs no texture but those that cut something out.
+    bare = [p if p.alpha_cutoff is not None else replace(p, texture=None) for p in mesh.parts]
     rays = RenderConfig(backend="raycast", supersampling=1)
-    with open_renderer(_without_paint(mesh), camera, rays) as renderer:
+    with open_renderer(replace(mesh, parts=tuple(bare)), camera, rays) as renderer:
         depth_m = np.stack([renderer.render_rgbd(pose)[1] for pose in poses])
-    return Truth(rgb, depth_m)
-
-
-def _without_paint(mesh: TexturedMesh) -> TexturedMesh:
-    """The mesh without the textures that cut nothing out: depth does not need them."""
-    parts = (
-        part if part.alpha_cutoff is not None else replace(part, texture=None)
-        for part in mesh.parts
-    )
-    return replace(mesh, parts=tuple(parts))
+    return np.stack(list(views)), depth_m
 
 
 def errors_of(renderer: Renderer, poses: Poses, truth: Truth) -> dict[str, float]:
     """How far the views of a renderer are from the truth; it has drawn each once afterwards."""
     views = [renderer.render_rgbd(pose) for pose in poses]
     rgb, depth_m = (np.stack(images) for images in zip(*views, strict=True))
-    return colour_errors(rgb, truth.rgb) | depth_errors(depth_m, truth.depth_m)
+    return colour_errors(rgb, truth[0]) | depth_errors(depth_m, truth[1])
 
 
 def colour_errors(rgb: Rgb, expected: NDArray[np.float32]) -> dict[str, float]:
@@ -223,7 +207,7 @@ def depth_errors(depth_m: Depth, expected_m: Depth) -> dict[str, float]:
     }
 
 
-def seconds_in_turns(renderers: Sequence[Renderer], poses: Poses) -> Floats:
+def seconds_in_turns(renderers: Sequence[Renderer], poses: Poses) -> NDArray[np.float64]:
     """Times (rounds * P, R) of R renderers, which draw each colour image in turns."""
     return np.array(
         [

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.ndimage import map_coordinates
 from scipy.sparse import coo_array, csr_array
+from trimesh.geometry import faces_to_edges
+from trimesh.grouping import group_rows
 from trimesh.triangles import cross
 
 from synfeal.mesh.rays import RayCaster
@@ -28,8 +30,8 @@ class Grid:
     points_m: Points  # (R, C, 3) metres
     normals: Points  # (R, C, 3) unit, towards the front
     inner_m: Points  # (R, C, 3) the points, those on the rim a little off the neighbouring patch
-    rows: Shares  # (R,) and (C,) where they lie on the picture, from 0 (top, left) to 1
-    columns: Shares  # (R,) and (C,) where they lie on the picture, from 0 (top, left) to 1
+    rows: Shares  # (R,) where they lie on the picture, from 0 (top) to 1
+    columns: Shares  # (C,) where they lie on the picture, from 0 (left) to 1
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -139,10 +141,8 @@ class Surface:
     def per_patch(self, values: NDArray[Real]) -> list[NDArray[Real]]:
         """Values (V, K) of all vertices as grids (R, C, K), one for each patch."""
         sizes = [grid.n_points for grid in self.grids]
-        pieces = np.split(values, np.cumsum(sizes)[:-1])
-        return [
-            piece.reshape(*grid.shape, -1) for piece, grid in zip(pieces, self.grids, strict=True)
-        ]
+        pieces = zip(np.split(values, np.cumsum(sizes)[:-1]), self.grids, strict=True)
+        return [piece.reshape(*grid.shape, -1) for piece, grid in pieces]
 
 
 def surface_of(rng: np.random.Generator, patches: Sequence[Patch], cell_m: float) -> Surface:
@@ -152,14 +152,13 @@ def surface_of(rng: np.random.Generator, patches: Sequence[Patch], cell_m: float
     first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     faces = [grid_faces(rng, g.points_m) + i for g, i in zip(grids, first, strict=True)]
     edges = [_grid_edges(grid.shape) + i for grid, i in zip(grids, first, strict=True)]
+    points, normals, inner = (
+        np.concatenate([getattr(grid, name).reshape(-1, 3) for grid in grids])
+        for name in ("points_m", "normals", "inner_m")
+    )
+    n_faces = tuple(map(len, faces))
     return Surface(
-        grids,
-        np.concatenate([grid.points_m.reshape(-1, 3) for grid in grids]),
-        np.concatenate([grid.normals.reshape(-1, 3) for grid in grids]),
-        np.concatenate([grid.inner_m.reshape(-1, 3) for grid in grids]),
-        np.concatenate(faces),
-        np.concatenate(edges),
-        tuple(map(len, faces)),
+        grids, points, normals, inner, np.concatenate(faces), np.concatenate(edges), n_faces
     )
 
 
@@ -191,11 +190,8 @@ def stations(
     lower_m: tuple[float, ...], upper_m: tuple[float, ...], shape: tuple[int, ...]
 ) -> Points:
     """A lattice (S, 3) of stations with ``shape`` of them along x, y and z, away from the walls."""
-    axes = [
-        low + (np.arange(count) + 0.5) / count * (high - low)
-        for low, high, count in zip(lower_m, upper_m, shape, strict=True)
-    ]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    share = (np.array(list(np.ndindex(*shape))) + 0.5) / shape
+    return np.asarray(lower_m + share * np.subtract(upper_m, lower_m))
 
 
 def scanned(rng: np.random.Generator, surface: Surface, scanner: Scanner) -> Points:
@@ -221,15 +217,10 @@ def rounded(points: Points, edges: Faces, faces: Faces) -> Points:
     degree = np.asarray(neighbours.sum(axis=1)).reshape(-1, 1)
     mean = (neighbours @ points) / np.maximum(degree, 1)
     share = np.where(degree > 0, ROUNDING, 0.0)
-    share[_rim(faces)] = 0
+    sides = faces_to_edges(faces)
+    rim = sides[group_rows(np.sort(sides, axis=1), require_count=1)]  # of one face only
+    share[rim[rim[:, 0] != rim[:, 1]]] = 0
     return np.asarray(points + share * (mean - points), np.float64)
-
-
-def _rim(faces: Faces) -> Faces:
-    """Vertices on an edge that only one face has."""
-    sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    unique, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
-    return np.unique(unique[(count == 1) & (unique[:, 0] != unique[:, 1])])
 
 
 def displacement(rng: np.random.Generator, points_m: Points) -> Points:
