@@ -104,9 +104,9 @@ def _reflecting(
 def _lit(patch: Patch, grid: Grid, tone: NDArray[np.float32]) -> NDArray[np.uint8]:
     """The picture (H, W, 3) under the light at the vertices, which is interpolated."""
     height_px, width_px = patch.picture.shape[:2]
-    rows = np.interp((np.arange(height_px) + 0.5) / height_px, grid.rows, np.arange(len(tone)))
-    columns = np.interp(
-        (np.arange(width_px) + 0.5) / width_px, grid.columns, np.arange(tone.shape[1])
+    rows, columns = (
+        np.interp((np.arange(px) + 0.5) / px, shares, np.arange(len(shares)))
+        for px, shares in ((height_px, grid.rows), (width_px, grid.columns))
     )
     factor = bilinear(tone, rows, columns) * (1 - patch.glow) + patch.glow
     return np.round(np.minimum(patch.picture * factor, 255)).astype(np.uint8)
@@ -138,7 +138,7 @@ def _textured(
 ATLAS_PX = 4096
 GUTTER_PX = 8  # repeated rim around each picture; what mipmaps and filters may reach into
 
-Size = tuple[int, int]
+Size = tuple[int, ...]
 Pixels = NDArray[np.uint8]
 
 
@@ -176,11 +176,11 @@ def _rounded_up(side_px: int) -> int:
 
 def laid_out(pictures: Sequence[Pixels]) -> tuple[list[tuple[int, int, int]], list[Pixels]]:
     """Pictures (H, W, 3) in atlases: where each one begins, within its gutter, and the textures."""
-    sizes = [(p.shape[0] + 2 * GUTTER_PX, p.shape[1] + 2 * GUTTER_PX) for p in pictures]
-    places, atlases = pack(sizes)
+    rim = ((GUTTER_PX, GUTTER_PX), (GUTTER_PX, GUTTER_PX), (0, 0))
+    padded = [np.pad(picture, rim, mode="edge") for picture in pictures]
+    places, atlases = pack([picture.shape[:2] for picture in padded])
     textures = [np.full((*size, 3), 128, np.uint8) for size in atlases]
-    for picture, (atlas, row, column) in zip(pictures, places, strict=True):
-        padded = np.pad(picture, ((GUTTER_PX,) * 2, (GUTTER_PX,) * 2, (0, 0)), mode="edge")
-        height, width = padded.shape[:2]
-        textures[atlas][row : row + height, column : column + width] = padded
+    for picture, (atlas, row, column) in zip(padded, places, strict=True):
+        height, width = picture.shape[:2]
+        textures[atlas][row : row + height, column : column + width] = picture
     return [(atlas, row + GUTTER_PX, column + GUTTER_PX) for atlas, row, column in places], textures

@@ -41,15 +41,13 @@ def monitor(make: Maker) -> Item:
 def chair(make: Maker, colour: Colour) -> Item:
     """An office chair, 0.95 m high."""
     cloth = materials.fabric(colour)
-    feet = (
-        make.box((0.32, 0.05, 0.05), DARK, 40, "fblrt").placed(0.15, 0, 0.03).placed(0, 0, 0, turn)
-        for turn in range(0, 360, 72)
-    )
+    foot = partial(make.box, (0.32, 0.05, 0.05), DARK, 40, "fblrt")
+    turns = range(0, 360, 72)
     return joined(
         make.box((0.48, 0.46, 0.08), cloth, 120).placed(0, 0, 0.42),
         make.box((0.44, 0.06, 0.45), cloth, 120).placed(0, 0.24, 0.52),
         make.turned([(0.03, 0.42), (0.03, 0.06)], DARK, 60, 8),
-        feet,
+        (foot().placed(0.15, 0, 0.03).placed(0, 0, 0, turn) for turn in turns),
     )
 
 
@@ -81,21 +79,17 @@ def cushion(make: Maker, size_m: Size, painter: Painter, px_per_m: float = 130) 
     x, y = np.meshgrid(grid, -grid)
     dome = (1 - x**4) * (1 - y**4)
     points = np.stack([x * width / 2, y * depth / 2, height * (0.25 + 0.75 * dome**0.5)], axis=-1)
-    points[[0, -1], :, 2] = 0
-    points[:, [0, -1], 2] = 0
+    points[[0, -1], :, 2] = points[:, [0, -1], 2] = 0
     return make.sheet(points + make.rng.uniform(-0.004, 0.004, points.shape), painter, px_per_m)
 
 
 def pew(make: Maker, width_m: float) -> Item:
     """A church bench, 0.9 m high; one sits facing +y."""
-    oak, edge = materials.wood((0.46, 0.29, 0.16), contrast=0.22), width_m / 2
+    oak, edge = materials.wood((0.46, 0.29, 0.16), contrast=0.22), width_m / 2 + 0.025
     return joined(
         make.box((width_m, 0.38, 0.04), oak, 110).placed(0, 0, 0.42),
         make.box((width_m, 0.035, 0.42), oak, 110).placed(0, -0.2, 0.48),
-        (
-            make.box((0.05, 0.46, 0.92), oak, 110).placed(x, 0)
-            for x in (-edge - 0.025, edge + 0.025)
-        ),
+        (make.box((0.05, 0.46, 0.92), oak, 110).placed(x, 0) for x in (-edge, edge)),
     )
 
 
@@ -172,9 +166,8 @@ def wall_shelf(make: Maker, width_m: float, count: int) -> Item:
     """A board on two brackets with a row of bottles; its back is at y = 0."""
     iron, edge = painted((0.3, 0.3, 0.32)), 0.4 * width_m
     board = make.box((width_m, 0.22, 0.025), materials.wood((0.8, 0.7, 0.55)), 120)
-    brackets = [
-        make.box((0.02, 0.18, 0.12), iron, 60, "flru").placed(x, -0.1, -0.12) for x in (-edge, edge)
-    ]
+    bracket = partial(make.box, (0.02, 0.18, 0.12), iron, 60, "flru")
+    brackets = [bracket().placed(x, -0.1, -0.12) for x in (-edge, edge)]
     row = bottles(make, width_m - 0.14, count).placed(0, -0.11, 0.026)
     return joined(board.placed(0, -0.11), brackets, row)
 

@@ -102,8 +102,7 @@ def fabric(
     if stripe is not None:
         x, _ = canvas.coordinates_m()
         inside = (x[0] / pitch_m) % 1 < 0.3
-        ratio = np.asarray(stripe, np.float32) / np.asarray(colour, np.float32)
-        image[:, inside] *= ratio.astype(np.float32)
+        image[:, inside] *= np.divide(stripe, colour, dtype=np.float32)
     return image
 
 
@@ -220,9 +219,8 @@ def keyboard(canvas: Canvas) -> Pixels:
     for row in range(5):
         for column in range(16):
             x, y = (column + 0.12) / 16, (row + 0.12) / 5
-            sketch.rectangle(
-                x, y, x + 0.048, y + 0.15, shade((0.28, 0.28, 0.3), canvas.rng.uniform(0.8, 1.2))
-            )
+            key = shade((0.28, 0.28, 0.3), canvas.rng.uniform(0.8, 1.2))
+            sketch.rectangle(x, y, x + 0.048, y + 0.15, key)
     return sketch.pixels()
 
 

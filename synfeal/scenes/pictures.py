@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from synfeal.scenes.canvas import (
@@ -26,13 +25,6 @@ from synfeal.scenes.materials import plaster
 FACADES: tuple[Colour, ...] = ((0.7, 0.5, 0.4), (0.75, 0.72, 0.65), (0.5, 0.55, 0.6))
 
 
-def _blob(rng: np.random.Generator, x: float, y: float, radius: float) -> NDArray[np.float64]:
-    n = int(rng.integers(3, 9))
-    angle = np.sort(rng.uniform(0, 2 * np.pi, n))
-    reach = radius * rng.uniform(0.5, 1.0, n)
-    return np.stack([x + reach * np.cos(angle), y + reach * np.sin(angle)], axis=1)
-
-
 @painter
 def poster(canvas: Canvas, ground: Colour | None = None) -> Pixels:
     """A poster nobody else has: ramp, coloured shapes, rows of type, a white border."""
@@ -46,7 +38,11 @@ def poster(canvas: Canvas, ground: Colour | None = None) -> Pixels:
             radius = rng.uniform(0.03, 0.15)
             sketch.ellipse(x, y, radius, radius * canvas.width_px / canvas.height_px, colour)
         else:
-            sketch.polygon(_blob(rng, x, y, rng.uniform(0.08, 0.25)), colour)
+            radius, n = rng.uniform(0.08, 0.25), int(rng.integers(3, 9))
+            angle = np.sort(rng.uniform(0, 2 * np.pi, n))
+            reach = radius * rng.uniform(0.5, 1.0, n)
+            blob = x + reach * np.cos(angle), y + reach * np.sin(angle)
+            sketch.polygon(np.stack(blob, axis=1), colour)
     sketch.rectangle(0.08, 0.74, 0.92, 0.95, (0.95, 0.95, 0.92))
     sketch.text_lines(rng, (0.1, 0.76, 0.9, 0.82), 1, pick(rng, INK))
     sketch.text_lines(rng, (0.1, 0.84, 0.9, 0.94), 4, (0.2, 0.2, 0.2))
@@ -87,10 +83,9 @@ def whiteboard(canvas: Canvas) -> Pixels:
         else:
             nodes = rng.uniform((x, y), (x + 0.25, y + 0.22), (6, 2))
             sketch.line(nodes, ink, 0.008)
+            high = 0.012 * canvas.width_px / canvas.height_px
             for node_x, node_y in nodes:
-                sketch.ellipse(
-                    node_x, node_y, 0.012, 0.012 * canvas.width_px / canvas.height_px, ink
-                )
+                sketch.ellipse(node_x, node_y, 0.012, high, ink)
     return bordered(sketch.pixels(), 0.02, (0.6, 0.62, 0.65))
 
 
@@ -104,9 +99,8 @@ def noticeboard(canvas: Canvas, ground: Colour = (0.62, 0.45, 0.27)) -> Pixels:
         width, height = rng.uniform((0.07, 0.12), (0.14, 0.26))
         paper = shade(pick(rng, VIVID), 1.3) if rng.random() < 0.35 else (0.93, 0.92, 0.88)
         sketch.rectangle(x, y, x + width, y + height, paper)
-        sketch.text_lines(
-            rng, (x + 0.01, y + 0.02, x + width - 0.01, y + height - 0.02), 6, pick(rng, INK)
-        )
+        box = (x + 0.01, y + 0.02, x + width - 0.01, y + height - 0.02)
+        sketch.text_lines(rng, box, 6, pick(rng, INK))
     return bordered(sketch.pixels(), 0.025, (0.35, 0.22, 0.12))
 
 
@@ -151,11 +145,9 @@ def stained_glass(canvas: Canvas, palette: tuple[Colour, ...] = VIVID, cells: in
     grid = np.stack(np.broadcast_arrays(x, y), axis=-1)
     distance, nearest = cKDTree(seeds).query(grid, k=2)
     brightness = rng.uniform(0.8, 1.5, (cells, 1))
-    colours = np.clip(
-        np.asarray(palette)[rng.integers(len(palette), size=cells)] * brightness, 0, 1
-    )
-    image: Pixels = colours[nearest[..., 0]].astype(np.float32)
-    image[distance[..., 1] - distance[..., 0] < 0.012] = np.float32(0.05)
+    colours = np.asarray(palette)[rng.integers(len(palette), size=cells)] * brightness
+    image: Pixels = np.clip(colours, 0, 1)[nearest[..., 0]].astype(np.float32)
+    image[distance[..., 1] - distance[..., 0] < 0.012] = 0.05
     return image
 
 
@@ -207,10 +199,14 @@ def _saint(sketch: Sketch, rng: np.random.Generator, x: float, top: float, canva
 
 
 def _border(sketch: Sketch, rng: np.random.Generator, colour: Colour, canvas: Canvas) -> None:
-    edge_y = 0.1 / canvas.size_m[1]
-    edge_x = 0.1 / canvas.size_m[0]
-    for box in ((0, 0, 1, edge_y), (0, 1 - edge_y, 1, 1), (0, 0, edge_x, 1), (1 - edge_x, 0, 1, 1)):
-        sketch.rectangle(box[0], box[1], box[2], box[3], colour)
+    edge_x, edge_y = (0.1 / side for side in canvas.size_m)
+    for x0, y0, x1, y1 in (
+        (0, 0, 1, edge_y),
+        (0, 1 - edge_y, 1, 1),
+        (0, 0, edge_x, 1),
+        (1 - edge_x, 0, 1, 1),
+    ):
+        sketch.rectangle(x0, y0, x1, y1, colour)
     for x in np.arange(edge_x, 1 - edge_x, 1.5 * edge_x):
         for y in (edge_y / 2, 1 - edge_y / 2):
             sketch.ellipse(x, y, 0.4 * edge_x, 0.4 * edge_y, shade(pick(rng, ROBES), 1.3))
@@ -227,20 +223,16 @@ def starry_vault(canvas: Canvas, first: Colour, second: Colour) -> Pixels:
     blend = mix(first, second, (x / canvas.size_m[0]).astype(np.float32))
     sketch = Sketch(tinted(blend, 0.12 * canvas.noise(0.7, 5, 0.7)))
     aspect = canvas.width_px / canvas.height_px
+    angle = np.arange(10) * np.pi / 5
     for _ in range(260):
         at_x, at_y = rng.uniform(0.01, 0.99, 2)
-        _star(sketch, at_x, at_y, rng.uniform(0.006, 0.014), aspect)
+        reach = rng.uniform(0.006, 0.014) * np.where(np.arange(10) % 2, 0.4, 1.0)
+        star = at_x + reach * np.cos(angle) / aspect, at_y + reach * np.sin(angle)
+        sketch.polygon(np.stack(star, axis=1), GOLD)
     for at_x in np.linspace(0.12, 0.88, 5):
         for at_y in (0.22, 0.5, 0.78):
             _medallion(sketch, rng, at_x + rng.uniform(-0.02, 0.02), at_y, aspect)
     return tinted(sketch.pixels(), 0.06 * canvas.noise(0.12, 4, 0.8))
-
-
-def _star(sketch: Sketch, x: float, y: float, radius: float, aspect: float) -> None:
-    angle = np.arange(10) * np.pi / 5
-    reach = radius * np.where(np.arange(10) % 2, 0.4, 1.0)
-    points = np.stack([x + reach * np.cos(angle) / aspect, y + reach * np.sin(angle)], axis=1)
-    sketch.polygon(points, GOLD)
 
 
 def _medallion(sketch: Sketch, rng: np.random.Generator, x: float, y: float, aspect: float) -> None:

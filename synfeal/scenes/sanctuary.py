@@ -235,9 +235,8 @@ def _altar(make: Maker) -> Item:
 
 
 def _pews(make: Maker) -> Item:
-    """Six rows."""
-    places = [(x, y) for y in np.linspace(-2.9, 1.6, 6) for x in (-0.98, 0.98)]
-    return joined(furniture.pew(make, 1.15).placed(x, y) for x, y in places)
+    rows = np.linspace(-2.9, 1.6, 6)
+    return joined(furniture.pew(make, 1.15).placed(x, y) for y in rows for x in (-0.98, 0.98))
 
 
 def _columns(make: Maker) -> Item:

@@ -52,17 +52,18 @@ def refined(patch: Patch, cell_m: float) -> Grid:
     row_at = _divided(patch.points_m, cell_m)
     column_at = _divided(patch.points_m.swapaxes(0, 1), cell_m)
     points = bilinear(patch.points_m, row_at, column_at)
+    normals = np.cross(np.gradient(points, axis=0), np.gradient(points, axis=1))
+    length = np.linalg.norm(normals, axis=-1, keepdims=True)
     return Grid(
         points,
-        _unit_normals(points),
-        bilinear(points, _off_rim(len(row_at)), _off_rim(len(column_at))),
+        # The tip of a cone has no normal; light from above is as good a guess as any.
+        np.where(length > 1e-12, normals / np.maximum(length, 1e-12), (0.0, 0.0, 1.0)),
+        bilinear(
+            points, *(np.clip(np.arange(float(n)), RIM, n - 1 - RIM) for n in points.shape[:2])
+        ),
         np.interp(row_at, np.arange(len(patch.points_m)), patch.row_shares),
         np.interp(column_at, np.arange(patch.points_m.shape[1]), patch.column_shares),
     )
-
-
-def _off_rim(count: int) -> Shares:
-    return np.clip(np.arange(count), RIM, count - 1 - RIM)
 
 
 def _divided(points: Points, cell_m: float) -> Shares:
@@ -73,13 +74,6 @@ def _divided(points: Points, cell_m: float) -> Shares:
     return np.concatenate([*inner, [float(len(parts))]])
 
 
-def _unit_normals(points: Points) -> Points:
-    normals = np.cross(np.gradient(points, axis=0), np.gradient(points, axis=1))
-    length = np.linalg.norm(normals, axis=-1, keepdims=True)
-    # The tip of a cone has no normal; light from above is as good a guess as any.
-    return np.where(length > 1e-12, normals / np.maximum(length, 1e-12), (0.0, 0.0, 1.0))
-
-
 def jittered(
     rng: np.random.Generator, grid: Grid, points_m: Points
 ) -> tuple[Points, NDArray[np.float64]]:
@@ -88,8 +82,7 @@ def jittered(
     The picture stays in place. Rims stay even, so that neighbours still meet.
     """
     offsets = rng.uniform(-JITTER, JITTER, (2, *grid.shape))
-    offsets[:, [0, -1]] = 0
-    offsets[:, :, [0, -1]] = 0
+    offsets[:, [0, -1]] = offsets[:, :, [0, -1]] = 0
     shares = np.stack(np.meshgrid(grid.rows, grid.columns, indexing="ij"), axis=-1)
     both = np.concatenate([points_m.reshape(*grid.shape, 3), shares], axis=-1)
     along_rows, along_columns = np.gradient(both, axis=0), np.gradient(both, axis=1)
@@ -115,8 +108,7 @@ def grid_faces(rng: np.random.Generator, points: Points) -> NDArray[np.int64]:
     second = np.stack([b, np.where(falling, a, c), d], axis=1)
     faces = np.concatenate([first, second]).astype(np.int64)
     doubled = cross(points.reshape(-1, 3)[faces])
-    solid: NDArray[np.int64] = faces[np.linalg.norm(doubled, axis=1) > 1e-10]
-    return solid
+    return np.asarray(faces[np.linalg.norm(doubled, axis=1) > 1e-10])
 
 
 def albedo_of(patch: Patch, grid: Grid) -> NDArray[np.float32]:
