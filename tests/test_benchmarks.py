@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from benchmarks.__main__ import SWEEPS
 from benchmarks.page import mark_front
 from benchmarks.sweep import read_sweep, runs_of
+from tests import ROOT
 from tests.coloured_frames import write_split
 
 pytestmark = pytest.mark.slow
-REPOSITORY = Path(__file__).parent.parent
 RATE = "localizers.posenet2.learning_rate"
 SWEEP = {
     "title": "Rates",
@@ -50,7 +50,7 @@ def run(sweep, folder, *options):
     command = [sys.executable, "-m", "benchmarks", file, "--results", folder]
     return subprocess.run(
         [*command, "--out", folder / "rates", *options],
-        cwd=REPOSITORY, capture_output=True, text=True,
+        cwd=ROOT, capture_output=True, text=True,
     )  # fmt: skip
 
 

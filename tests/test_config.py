@@ -11,9 +11,9 @@ from synfeal.config import Design, Run, load_config, parse_config, read_design, 
 from synfeal.config.docs import main
 from synfeal.config.load import merge, read_yaml
 from synfeal.errors import InputError
+from tests import CONFIG
 from tests.report_results import design_of, experiment
 
-CONFIG = Path(__file__).parent.parent / "config"
 PROFILES = {
     "mini": ("config.yaml",),
     "smoke": ("config.yaml", "smoke.yaml"),
@@ -36,26 +36,13 @@ def profile(name):
     return load_config(*(CONFIG / file for file in PROFILES[name]))
 
 
-@pytest.mark.parametrize("key", ["scale", "training", "scenes/sanctuary/source"])
-def test_a_missing_key_is_named_without_printing_the_whole_file(raw, key):
-    *parents, last = key.split("/")
-    inner = raw
-    for parent in parents:
-        inner = inner[parent]
-    del inner[last]
-    with pytest.raises(InputError) as refusal:
+def test_a_missing_key_and_what_a_section_needs_and_allows_is_said(raw):
+    del raw["scenes"]["sanctuary"]["source"]
+    with pytest.raises(InputError, match=r"^my\.yaml: scenes\.sanctuary\.source: missing"):
         parse_config(raw, "my.yaml")
-    assert str(refusal.value) == f"my.yaml: {key.replace('/', '.')}: missing; it has no default"
-
-
-def test_what_a_section_needs_and_allows_is_said(raw):
+    raw["scenes"]["sanctuary"]["source"] = "procedural"
     del raw["localizers"]["hourglass"]
     with pytest.raises(InputError, match=r"my\.yaml: localizers: hourglass missing"):
-        parse_config(raw, "my.yaml")
-    raw["scenes"]["angles"] = {**raw["scenes"]["sanctuary"], "colour": 1}
-    with pytest.raises(
-        InputError, match="allowed here: angles, builder, clutter, further_boxes, min_view"
-    ):
         parse_config(raw, "my.yaml")
 
 
@@ -100,9 +87,8 @@ def test_a_run_is_repeated_as_often_as_any_of_its_tables_asks():
         ("20k", "synfeal", "pretrained"): 2,  # what Table 5 compares with, in no row of its own
     }
     first = rows[0]
-    assert design.runs_of(first, "posenet")[0] == Run(
-        "large_room", "6k", "synfeal", "pretrained", "posenet", 0
-    )
+    run = Run("large_room", "6k", "synfeal", "pretrained", "posenet", 0)
+    assert design.runs_of(first, "posenet")[0] == run
     assert len(design.table_runs("table4_size")) == 3 * 5
     assert set(design_of([first]).runs) < set(design.runs)
 
@@ -147,12 +133,8 @@ def test_the_design_is_the_papers(name):
     # of Table 7 that see fewer images
     assert len(runs) == len({run.directory for run in runs}) == (25 + 6 + 4) * 5
     assert "large_room/6k/noise-p0.1-r5/pretrained/posenet/seed0" in {r.directory for r in runs}
-    noise = {
-        (row.noise_m, row.noise_deg)
-        for row in experiments
-        if row.block == "both" and row.labels == "noise"
-    }
-    assert noise == {(0.1, 5.0), (0.2, 10.0), (0.3, 20.0)}
+    both = [row for row in experiments if row.block == "both" and row.labels == "noise"]
+    assert {(r.noise_m, r.noise_deg) for r in both} == {(0.1, 5.0), (0.2, 10.0), (0.3, 20.0)}
 
 
 def test_sizes_scale_with_the_profile():
