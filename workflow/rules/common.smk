@@ -22,11 +22,9 @@ from baselines.references.registry import (
     has_structure,
     in_group,
 )
-from baselines.training.record import training_mb
-from baselines.training.record import training_parameters
+from baselines.training.record import training_mb, training_parameters
 from synfeal.config import Run, check_mesh_files, parse_config, read_design
-from synfeal.config.load import read_yaml
-from synfeal.config.load import check_results
+from synfeal.config.load import check_results, read_yaml
 from synfeal.config.experiments import INJECTED, Init, common_every, split_init
 from synfeal.config.models import MODELS
 from synfeal.config.effects import CLEAN, MIXED
@@ -164,16 +162,20 @@ def plans_with_frames(scene, camera, kind):
     return under("plans/{scene}/{split}.{kind}", scene=scene, split=splits, kind=kind)
 
 
+def batches(scene, size, split):
+    count = CONFIG.n_frames(scene, size, split)
+    return batches_of(count, CONFIG.groundtruth.batch_frames)
+
+
 def batch_of(wildcards):
-    count = CONFIG.n_frames(wildcards.scene, wildcards.size, wildcards.split)
-    return batches_of(count, CONFIG.groundtruth.batch_frames)[int(wildcards.batch)]
+    every = batches(wildcards.scene, wildcards.size, wildcards.split)
+    return every[int(wildcards.batch)]
 
 
 def batch_files(wildcards, split):
-    count = CONFIG.n_frames(wildcards.scene, wildcards.size, split)
-    batches = batches_of(count, CONFIG.groundtruth.batch_frames)
-    stem = f"{ROOT}/groundtruth/{wildcards.scene}/{wildcards.size}/{wildcards.reconstructed}"
-    return [f"{stem}/{split}/batch-{b.index:03d}.csv" for b in batches]
+    scene, size, method = wildcards.scene, wildcards.size, wildcards.reconstructed
+    stem = f"{ROOT}/groundtruth/{scene}/{size}/{method}/{split}"
+    return [f"{stem}/batch-{b.index:03d}.csv" for b in batches(scene, size, split)]
 
 
 def batch_sequences(wildcards):
@@ -447,9 +449,7 @@ def batch_facts():
             for scene, size, method in DESIGN.estimated
             for stage in stages_of(method)
             for split in SPLITS
-            for b in batches_of(
-                CONFIG.n_frames(scene, size, split), CONFIG.groundtruth.batch_frames
-            )
+            for b in batches(scene, size, split)
         }
     )
 

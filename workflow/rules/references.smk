@@ -86,7 +86,7 @@ use rule call as image_references with:
         seed=lambda w: seed_of(CONFIG.seed, "references", w.scene, w.size, w.labels),
 
 
-use rule call as structure_references with:
+use rule image_references as structure_references with:
     input:
         **evidence_for(in_group("structure"), **STRUCTURE),
     output:
@@ -94,10 +94,8 @@ use rule call as structure_references with:
     resources:
         mem_mb=grown(3000),
     params:
-        function="baselines.references.run:answer_group",
         group="structure",
         camera=dump(CONFIG.groundtruth_camera),
-        seed=lambda w: seed_of(CONFIG.seed, "references", w.scene, w.size, w.labels),
 
 
 # In jobs of their own, as these take longer and are asked of fewer label sets.
@@ -107,10 +105,7 @@ use rule structure_references as adjusted_references with:
     output:
         references=reference_files(REFERENCE, in_group("adjusted")),
     params:
-        function="baselines.references.run:answer_group",
         group="adjusted",
-        camera=dump(CONFIG.groundtruth_camera),
-        seed=lambda w: seed_of(CONFIG.seed, "references", w.scene, w.size, w.labels),
 
 
 use rule call as views with:
@@ -131,7 +126,7 @@ use rule call as views with:
         side=(CONFIG.network_camera.width, CONFIG.network_camera.height),
 
 
-use rule call as coordinate_references with:
+use rule structure_references as coordinate_references with:
     input:
         **evidence_for(
             in_group("coordinates"),
@@ -140,12 +135,8 @@ use rule call as coordinate_references with:
         ),
     output:
         references=reference_files(REFERENCE, in_group("coordinates")),
-    resources:
-        mem_mb=grown(3000),
     params:
-        function="baselines.references.run:answer_group",
         group="coordinates",
-        camera=dump(CONFIG.groundtruth_camera),
         samples_seen=CONFIG.references.coordinate_samples,
         # One seed for all label sets: what is drawn does not depend on them.
         seed=lambda w: seed_of(CONFIG.seed, "scene coordinates", w.scene, w.size),

@@ -17,7 +17,7 @@ use rule call as light_shares with:
         seed=lambda w: scene_seed(w.scene),
 
 
-use rule call as render_varied with:
+use rule render_packed as render_varied with:
     input:
         extras=lambda w: varied_extras([w.effects]),
         mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
@@ -25,19 +25,13 @@ use rule call as render_varied with:
     output:
         frames=temp(f"{VARIED}/shards/{{effects}}/{{split}}.npy"),
         record=temp(f"{VARIED}/shards/{{effects}}/{{split}}.json"),
-    resources:
-        mem_mb=grown(3000),
     params:
-        function="synfeal.dataset.render_sequence:render_packed",
-        camera=dump(CONFIG.network_camera),
         start=0,
         stop=lambda w: robust_frames(w.split),
-        input_px=CONFIG.network.input_px,
-        view=CONFIG.network.view,
         render=varied_render,
 
 
-use rule call as pack_varied with:
+use rule pack as pack_varied with:
     input:
         plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/{{split}}.csv",
         shards=[f"{VARIED}/shards/{{effects}}/{{split}}.npy"],
@@ -45,13 +39,8 @@ use rule call as pack_varied with:
     output:
         frames=f"{VARIED}/frames/{{effects}}/{{split}}.npy",
         record=f"{VARIED}/frames/{{effects}}/{{split}}.json",
-    resources:
-        mem_mb=grown(2000),
     params:
-        function="synfeal.dataset.packed:write_packed",
-        camera=dump(CONFIG.network_camera),
         render=varied_render,
-        view=CONFIG.network.view,
 
 
 use rule call as train_varied with:
