@@ -17,7 +17,7 @@ from baselines.references.correspondences import (
 )
 from baselines.references.descriptors import Vlad, dense_sift, residuals, thumbnails
 from baselines.references.evidence import Evidence
-from baselines.references.features import Features, find_features
+from baselines.references.features import Features, write_features
 from baselines.references.registry import in_group
 from baselines.references.retrieval import METRES_PER_RADIAN, nearest_rows
 from baselines.references.run import answer_and_score
@@ -120,10 +120,10 @@ def room(tmp_path_factory):
     folder = tmp_path_factory.mktemp("room")
     splits = {}
     for split, poses in (("train", TRAIN), ("test", TEST)):
-        color, depth = write_room(folder / split, poses)
-        found = find_features(color, depth if split == "train" else None, CAMERA, CFG)
-        found.write(folder / f"{split}.npz")
-        splits[split] = Features.read(folder / f"{split}.npz")
+        write_room(folder / split, poses)
+        found = folder / f"{split}.npz"
+        write_features([folder / split], split, len(poses), CAMERA, CFG, found)
+        splits[split] = Features.read(found)
         write_pose_table(folder / "labels" / f"{split}.csv", table_of(poses))
     evidence = evidence_of(folder / "labels", folder / "labels")
     near = np.tile(np.arange(len(TRAIN)), (len(TEST), 1))

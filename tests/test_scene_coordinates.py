@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from baselines.references.evidence import Evidence
-from baselines.references.features import Views, cell_pixels, read_frames
+from baselines.references.features import Views, cell_pixels, write_views
 from baselines.references.scene_coordinates import (
     CoordinateNetwork,
     by_coordinates,
@@ -75,16 +75,16 @@ def test_lifted_cells_are_the_points_of_the_wall():
 def test_frames_are_reduced_and_cells_have_the_depth_behind_their_middle(tmp_path):
     """Cell (2, 3) is centred on pixel (8, 12) of 32 x 24, on (60.0, 40.0) + half a cell of 160."""
     poses = [pose_at([-1.0, 0.0, 1.3]), pose_at([-0.5, 0.2, 1.2], 20)]
-    views = read_frames(*write_room(tmp_path, poses), CAMERA, 32, 24)
+    write_room(tmp_path / "seq-01", poses)
+    write_views([tmp_path / "seq-01"], "train", 2, CAMERA, (32, 24), tmp_path / "views.npz")
+    views = Views.read(tmp_path / "views.npz")
     for frame, pose in enumerate(poses):
         depth_m, point_m = cast(pose, FURNISHED)
         assert views.depth_m[frame, 2, 3] == pytest.approx(depth_m[42, 62], abs=6e-4)
         blocks = colour_of(point_m, FURNISHED).reshape(24, 5, 32, 5, 3).astype(float)
         np.testing.assert_allclose(views.images[frame], blocks.mean((1, 3)), atol=1)
-    with pytest.raises(InputError, match="no such image"):
-        read_frames([tmp_path / "none.png"], None, CAMERA, 32, 24)
-    views.write(tmp_path / "views.npz")
-    np.testing.assert_array_equal(Views.read(tmp_path / "views.npz").point_m, views.point_m)
+    with pytest.raises(InputError, match="seq-02: cannot be read as a sequence"):
+        write_views([tmp_path / "seq-02"], "train", 2, CAMERA, (32, 24), tmp_path / "none.npz")
 
 
 def test_exact_coordinates_give_the_pose_and_useless_ones_none():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Self
 
@@ -57,6 +57,20 @@ class Stored:
             InputError: the file cannot be read.
         """
         return cls(**read_arrays(path, [field.name for field in fields(cls)]))  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class ByFrame(Stored):
+    """What belongs to frames, one frame after the other."""
+
+    start: NDArray[np.int64]  # (N + 1,) where that of each frame begins; the last is its number
+
+    def __len__(self) -> int:
+        return len(self.start) - 1
+
+    def of(self, frame: int) -> slice:
+        """What belongs to a frame."""
+        return slice(int(self.start[frame]), int(self.start[frame + 1]))
 
 
 THUMBNAIL, VLAD = "thumbnail", "vlad"

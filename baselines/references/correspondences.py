@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from tqdm import tqdm
 
-from baselines.references.arrays import VLAD, Stored, most_alike, read_described
+from baselines.references.arrays import VLAD, ByFrame, Stored, most_alike, read_described
 from baselines.references.features import Features
 
 Rows = NDArray[np.int64]
@@ -22,11 +22,9 @@ RATIO = 0.8
 
 
 @dataclass(frozen=True)
-class Correspondences(Stored):
-    """Matches of the test frames, one frame after the other."""
+class Correspondences(ByFrame):
+    """C matches of the test frames, one frame after the other."""
 
-    # (N + 1,) where the matches of each test frame begin; the last is their number C
-    start: NDArray[np.int64]
     slope: NDArray[np.float64]  # (C, 2) of the test feature's ray
     # (C,) index of the training feature among those of all training frames
     feature: NDArray[np.int64]
@@ -34,13 +32,6 @@ class Correspondences(Stored):
     # (C, 3) where that frame's depth says it lies, in its camera's coordinates; not finite where
     # there is no depth
     point_m: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.start) - 1
-
-    def of(self, frame: int) -> slice:
-        """The matches of a test frame."""
-        return slice(int(self.start[frame]), int(self.start[frame + 1]))
 
 
 def match_test_frames(

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from baselines.groundtruth.images import read_image
-from baselines.references.arrays import Stored
+from baselines.references.arrays import ByFrame, Stored
 from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.models import CameraConfig, ReferencesConfig
 from synfeal.dataset.frame_files import FrameFile
@@ -31,22 +31,13 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Features(Stored):
-    """Features of the frames of a split, one frame after the other."""
+class Features(ByFrame):
+    """K features of the frames of a split, one frame after the other."""
 
-    # (N + 1,) where the features of each frame begin; the last is their number K
-    start: NDArray[np.int64]
     slope: Array  # (K, 2) x / z and y / z of the rays they lie on, lens distortion removed
     # (K,) along the optical axis, inf where there is none; of no use for test frames
     depth_m: Array
     descriptor: NDArray[np.uint8]  # (K, 128) uint8
-
-    def __len__(self) -> int:
-        return len(self.start) - 1
-
-    def of(self, frame: int) -> slice:
-        """The features of a frame."""
-        return slice(int(self.start[frame]), int(self.start[frame + 1]))
 
     @property
     def frame(self) -> NDArray[np.int64]:
@@ -91,24 +82,11 @@ def write_features(
     Raises:
         InputError: a sequence or an image cannot be read.
     """
-    files = files_of_split(sequences, split, n_frames)
-    find_features(*files, camera, references).write(out_features)
-
-
-def find_features(
-    color_paths: Sequence[FrameFile],
-    depth_paths: Sequence[FrameFile] | None,
-    camera: CameraConfig,
-    cfg: ReferencesConfig,
-) -> Features:
-    """Features of frames, with their depth where there are depth images.
-
-    Raises:
-        InputError: an image cannot be read or is not of the camera's size.
-    """
-    paths = tqdm(color_paths, "features", unit="frame", mininterval=5)
+    color, depth = files_of_split(sequences, split, n_frames)
+    paths = tqdm(color, "features", unit="frame", mininterval=5)
     greys = (read_image(path, camera, "L") for path in paths)
-    return features_of(greys, map(read_depth_m, depth_paths) if depth_paths else None, camera, cfg)
+    depths_m = map(read_depth_m, depth) if depth else None
+    features_of(greys, depths_m, camera, references).write(out_features)
 
 
 def features_of(
@@ -181,32 +159,17 @@ def write_views(
     Raises:
         InputError: a sequence or an image cannot be read.
     """
-    files = files_of_split(sequences, split, n_frames)
-    read_frames(*files, camera, *side).write(out_views)
-
-
-def read_frames(
-    color_paths: Sequence[FrameFile],
-    depth_paths: Sequence[FrameFile] | None,
-    camera: CameraConfig,
-    width: int,
-    height: int,
-) -> Views:
-    """Frames of ``camera`` reduced to ``width`` x ``height``, with depth where there are images.
-
-    Raises:
-        InputError: an image cannot be read or is not of the camera's size.
-    """
-    pixel = cell_pixels(camera, width, height)
+    color, depth = files_of_split(sequences, split, n_frames)
+    pixel = cell_pixels(camera, *side)
     column, row = np.moveaxis(pixel.astype(int), -1, 0)
-    images = np.empty((len(color_paths), height, width, 3), np.uint8)
-    depth_m = np.full((len(color_paths), *column.shape), np.inf, np.float32)
-    for index, color in enumerate(tqdm(color_paths, "views", unit="frame", mininterval=5)):
-        full = read_image(color, camera, "RGB")
-        images[index] = cv2.resize(full, (width, height), interpolation=cv2.INTER_AREA)
-        if depth_paths is not None:
-            depth_m[index] = read_depth_m(depth_paths[index])[row, column]
-    return Views(images, normalised_of_pixels(camera, pixel), depth_m)
+    images = np.empty((len(color), side[1], side[0], 3), np.uint8)
+    depth_m = np.full((len(color), *column.shape), np.inf, np.float32)
+    for index, path in enumerate(tqdm(color, "views", unit="frame", mininterval=5)):
+        full = read_image(path, camera, "RGB")
+        images[index] = cv2.resize(full, side, interpolation=cv2.INTER_AREA)
+        if depth is not None:
+            depth_m[index] = read_depth_m(depth[index])[row, column]
+    Views(images, normalised_of_pixels(camera, pixel), depth_m).write(out_views)
 
 
 def cell_pixels(camera: CameraConfig, width: int, height: int) -> Array:

@@ -25,34 +25,24 @@ class Reference:
     # estimated from them. ``adjusted`` and ``coordinates`` do, too, for label sets of the paper
     # alone, the latter for those of :func:`worst`: they take longer.
     group: Group
-    # place of its function, ``module:name``, from :class:`~baselines.references.evidence.Evidence`
-    # to poses (N, 4, 4) of the test frames, NaN where it finds none. By place, so that a table of
-    # titles loads no estimator.
+    # place of its function in this package, ``module:name``, from the ``Evidence`` to poses
+    # (N, 4, 4) of the test frames, NaN where it finds none. A table of titles loads no estimator.
     answer: str
 
 
-_PACKAGE = "baselines.references"
 REFERENCES: dict[str, Reference] = {
-    "nearest-thumbnail": Reference(
-        "Nearest image, thumbnails", "images", f"{_PACKAGE}.retrieval:by_thumbnail"
-    ),
-    "nearest-vlad": Reference(
-        "Nearest image, DenseVLAD", "images", f"{_PACKAGE}.retrieval:by_vlad"
-    ),
-    "nearest-pose": Reference(
-        "Nearest training pose (oracle)", "images", f"{_PACKAGE}.retrieval:nearest_pose"
-    ),
-    "structure-depth": Reference(
-        "Structure, points from depth", "structure", f"{_PACKAGE}.structure:on_depth"
-    ),
+    "nearest-thumbnail": Reference("Nearest image, thumbnails", "images", "retrieval:by_thumbnail"),
+    "nearest-vlad": Reference("Nearest image, DenseVLAD", "images", "retrieval:by_vlad"),
+    "nearest-pose": Reference("Nearest training pose (oracle)", "images", "retrieval:nearest_pose"),
+    "structure-depth": Reference("Structure, points from depth", "structure", "structure:on_depth"),
     "structure-rays": Reference(
-        "Structure, points triangulated", "structure", f"{_PACKAGE}.structure:triangulated"
+        "Structure, points triangulated", "structure", "structure:triangulated"
     ),
     "structure-adjusted": Reference(
-        "Structure, bundle-adjusted", "adjusted", f"{_PACKAGE}.adjustment:adjusted"
+        "Structure, bundle-adjusted", "adjusted", "adjustment:adjusted"
     ),
     "scene-coordinates": Reference(
-        "Scene coordinates", "coordinates", f"{_PACKAGE}.scene_coordinates:by_coordinates"
+        "Scene coordinates", "coordinates", "scene_coordinates:by_coordinates"
     ),
 }
 PAPERS = ("table2_ground_truth", "table3_inconsistencies")
@@ -91,12 +81,9 @@ def worst(rows: Iterable[Experiment]) -> set[str]:
     """The simulator's label set, and the one with the largest noise of each block of Table 3."""
     rows = list(rows)
     blocks = {row.block for row in rows if row.block}
-    noisy = [max((r for r in rows if r.block == b), key=_noise) for b in blocks]
+    by_noise = sorted(rows, key=lambda row: (row.noise_m, row.noise_deg), reverse=True)
+    noisy = [next(row for row in by_noise if row.block == block) for block in blocks]
     return {SIMULATOR} | {row.label_id for row in noisy}
-
-
-def _noise(row: Experiment) -> tuple[float, float]:
-    return row.noise_m, row.noise_deg
 
 
 def titles_of(external: Externals) -> dict[str, str]:

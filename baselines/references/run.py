@@ -61,7 +61,7 @@ def answer_and_score(
     for name in names:
         facts: Facts = {}
         with timed(facts, "answer_s"):
-            answer = resolve_name(REFERENCES[name].answer)
+            answer = resolve_name(f"baselines.references.{REFERENCES[name].answer}")
             poses = pose_table(evidence.test_frames, answer(evidence))
         known = {**info, "reference": name}
         score_answers(poses, evidence.files, out_dir / name, known, facts)

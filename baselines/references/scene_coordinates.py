@@ -181,9 +181,5 @@ def poses_of(views: Views, points: Array, evidence: Evidence) -> Array:
     camera = pinhole(evidence.camera)
     pixel = views.slope.reshape(-1, 2) * camera.params[:2]
     error_px = MAX_ERROR_OF_WIDTH * camera.width
-    poses = np.full((len(views), 4, 4), np.nan)
-    for frame, point_m in enumerate(points.reshape(len(views), -1, 3)):
-        pose = absolute_pose(pixel, point_m, camera, evidence.seed, error_px)
-        if pose is not None:
-            poses[frame] = pose
-    return poses
+    seen = points.reshape(len(views), -1, 3)
+    return np.array([absolute_pose(pixel, p, camera, evidence.seed, error_px) for p in seen])

@@ -53,14 +53,9 @@ def localize(matches: Correspondences, point_m: Array, seen_by: CameraConfig, se
     """
     camera = pinhole(seen_by)
     known = np.asarray(np.isfinite(point_m).all(axis=1))
-    poses = np.full((len(matches), 4, 4), np.nan)
-    for frame in range(len(matches)):
-        usable = np.flatnonzero(known[matches.of(frame)]) + matches.start[frame]
-        pixel = matches.slope[usable] * camera.params[:2]
-        pose = absolute_pose(pixel, point_m[usable], camera, seed)
-        if pose is not None:
-            poses[frame] = pose
-    return poses
+    rows = [np.flatnonzero(known[own]) + own.start for own in map(matches.of, range(len(matches)))]
+    pixel = matches.slope * camera.params[:2]
+    return np.array([absolute_pose(pixel[own], point_m[own], camera, seed) for own in rows])
 
 
 def absolute_pose(
@@ -69,10 +64,11 @@ def absolute_pose(
     camera: pycolmap.Camera,
     seed: int,
     max_error_px: float = MAX_ERROR_PX,
-) -> Array | None:
-    """``world_from_cam`` (4, 4) from points (n, 3) and where they are seen (n, 2), or None."""
+) -> Array:
+    """``world_from_cam`` (4, 4) from points (n, 3) and where they are seen (n, 2), or NaN."""
+    nothing = np.full((4, 4), np.nan)
     if len(pixel) < MIN_INLIERS:
-        return None
+        return nothing
     options = pycolmap.AbsolutePoseEstimationOptions()
     options.ransac.max_error = max_error_px
     options.ransac.confidence = CONFIDENCE
@@ -80,7 +76,7 @@ def absolute_pose(
     options.ransac.random_seed = seed % 2**31
     found = pycolmap.estimate_and_refine_absolute_pose(pixel, point_m, camera, options)
     if found is None or found["num_inliers"] < MIN_INLIERS:
-        return None
+        return nothing
     cam_from_world = found["cam_from_world"].matrix()
     return inverse(pose_matrix(cam_from_world[:, :3], cam_from_world[:, 3]))
 
@@ -122,7 +118,7 @@ def triangulate(tracks: Tracks, world_from_cam: Array) -> Array:
     """
     pose = world_from_cam[tracks.frame]
     centre = pose[:, :3, 3]
-    ray = np.einsum("mij,mj->mi", pose[:, :3, :3], _homogeneous(tracks.slope))
+    ray = np.einsum("mij,mj->mi", pose[:, :3, :3], np.insert(tracks.slope, 2, 1, axis=1))
     ray /= np.linalg.norm(ray, axis=1, keepdims=True)
     across = np.eye(3) - ray[:, :, None] * ray[:, None, :]
     weight = np.ones(len(ray))
@@ -152,7 +148,3 @@ def _meet(tracks: Tracks, centre: Array, across: Array) -> Array:
     point_m = np.linalg.solve(left, right[..., None])[..., 0].astype(np.float64)
     point_m[parallel] = np.nan
     return point_m
-
-
-def _homogeneous(slope: Array) -> Array:
-    return np.column_stack([slope, np.ones(len(slope))])

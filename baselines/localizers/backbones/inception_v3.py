@@ -9,7 +9,7 @@ have one.
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -24,124 +24,87 @@ class Conv(NamedTuple):
 
     name: str
     n_out: int
-    kernel: int | tuple[int, int]
-    stride: int = 1
+    kernel: tuple[int, int]
+    stride: int
 
 
 class Branch(NamedTuple):
     """Steps one after the other; the convolutions of one step stand side by side."""
 
-    steps: tuple[tuple[Conv, ...], ...]
-    pool: Literal["average", "maximum"] | None = None
+    pool: str  # ``average``, ``maximum`` or none
+    steps: list[list[Conv]]
 
 
-def _chain(*convs: Conv) -> Branch:
-    return Branch(tuple((conv,) for conv in convs))
-
-
-def _pooled(n_out: int) -> Branch:
-    return Branch(((Conv("branch_pool", n_out, 1),),), "average")
-
-
-HALVED = Branch((), "maximum")
-
-
-def _block_35(pool: int) -> tuple[Branch, ...]:
-    """Figure 5: 5x5 beside two 3x3."""
-    return (
-        _chain(Conv("branch1x1", 64, 1)),
-        _chain(Conv("branch5x5_1", 48, 1), Conv("branch5x5_2", 64, 5)),
-        _chain(
-            Conv("branch3x3dbl_1", 64, 1),
-            Conv("branch3x3dbl_2", 96, 3),
-            Conv("branch3x3dbl_3", 96, 3),
-        ),
-        _pooled(pool),
-    )
-
-
-def _block_17(n: int) -> tuple[Branch, ...]:
-    """Figure 6: 7x7 as 1x7 and 7x1."""
-    row, column = (1, 7), (7, 1)
-    return (
-        _chain(Conv("branch1x1", 192, 1)),
-        _chain(
-            Conv("branch7x7_1", n, 1),
-            Conv("branch7x7_2", n, row),
-            Conv("branch7x7_3", 192, column),
-        ),
-        _chain(
-            Conv("branch7x7dbl_1", n, 1),
-            Conv("branch7x7dbl_2", n, column),
-            Conv("branch7x7dbl_3", n, row),
-            Conv("branch7x7dbl_4", n, column),
-            Conv("branch7x7dbl_5", 192, row),
-        ),
-        _pooled(192),
-    )
-
-
-def _fork(name: str) -> tuple[Conv, Conv]:
-    return Conv(f"{name}a", 384, (1, 3)), Conv(f"{name}b", 384, (3, 1))
-
-
+# A line is a branch; commas separate its steps. A convolution is its name, channels, rows x columns
+# of its kernel, and /2 where it halves the resolution; those joined by & read the same maps.
+# Figure 5: 5x5 beside two 3x3.
+BLOCK_35 = """
+    branch1x1 64 1x1
+    branch5x5_1 48 1x1, branch5x5_2 64 5x5
+    branch3x3dbl_1 64 1x1, branch3x3dbl_2 96 3x3, branch3x3dbl_3 96 3x3
+    average, branch_pool {n} 1x1"""
+# Figure 6: 7x7 as 1x7 and 7x1.
+BLOCK_17 = """
+    branch1x1 192 1x1
+    branch7x7_1 {n} 1x1, branch7x7_2 {n} 1x7, branch7x7_3 192 7x1
+    branch7x7dbl_1 {n} 1x1, branch7x7dbl_2 {n} 7x1, branch7x7dbl_3 {n} 1x7, \
+        branch7x7dbl_4 {n} 7x1, branch7x7dbl_5 192 1x7
+    average, branch_pool 192 1x1"""
 # Figure 7: 3x3 as 1x3 beside 3x1.
-BLOCK_8 = (
-    _chain(Conv("branch1x1", 320, 1)),
-    Branch(((Conv("branch3x3_1", 384, 1),), _fork("branch3x3_2"))),
-    Branch(
-        (
-            (Conv("branch3x3dbl_1", 448, 1),),
-            (Conv("branch3x3dbl_2", 384, 3),),
-            _fork("branch3x3dbl_3"),
-        )
-    ),
-    _pooled(192),
-)
-
+BLOCK_8 = """
+    branch1x1 320 1x1
+    branch3x3_1 384 1x1, branch3x3_2a 384 1x3 & branch3x3_2b 384 3x1
+    branch3x3dbl_1 448 1x1, branch3x3dbl_2 384 3x3, \
+        branch3x3dbl_3a 384 1x3 & branch3x3dbl_3b 384 3x1
+    average, branch_pool 192 1x1"""
 # Figure 10: half the resolution, by convolutions and by pooling.
-REDUCTION_17 = (
-    _chain(Conv("branch3x3", 384, 3, 2)),
-    _chain(
-        Conv("branch3x3dbl_1", 64, 1),
-        Conv("branch3x3dbl_2", 96, 3),
-        Conv("branch3x3dbl_3", 96, 3, 2),
-    ),
-    HALVED,
-)
-REDUCTION_8 = (
-    _chain(Conv("branch3x3_1", 192, 1), Conv("branch3x3_2", 320, 3, 2)),
-    _chain(
-        Conv("branch7x7x3_1", 192, 1),
-        Conv("branch7x7x3_2", 192, (1, 7)),
-        Conv("branch7x7x3_3", 192, (7, 1)),
-        Conv("branch7x7x3_4", 192, 3, 2),
-    ),
-    HALVED,
-)
+REDUCTION_17 = """
+    branch3x3 384 3x3/2
+    branch3x3dbl_1 64 1x1, branch3x3dbl_2 96 3x3, branch3x3dbl_3 96 3x3/2
+    maximum"""
+REDUCTION_8 = """
+    branch3x3_1 192 1x1, branch3x3_2 320 3x3/2
+    branch7x7x3_1 192 1x1, branch7x7x3_2 192 1x7, branch7x7x3_3 192 7x1, branch7x7x3_4 192 3x3/2
+    maximum"""
 
-BLOCKS: dict[str, tuple[Branch, ...]] = {
-    "Mixed_5b": _block_35(32),
-    "Mixed_5c": _block_35(64),
-    "Mixed_5d": _block_35(64),
+BLOCKS = {
+    "Mixed_5b": BLOCK_35.format(n=32),
+    "Mixed_5c": BLOCK_35.format(n=64),
+    "Mixed_5d": BLOCK_35.format(n=64),
     "Mixed_6a": REDUCTION_17,
-    "Mixed_6b": _block_17(128),
-    "Mixed_6c": _block_17(160),
-    "Mixed_6d": _block_17(160),
-    "Mixed_6e": _block_17(192),
+    "Mixed_6b": BLOCK_17.format(n=128),
+    "Mixed_6c": BLOCK_17.format(n=160),
+    "Mixed_6d": BLOCK_17.format(n=160),
+    "Mixed_6e": BLOCK_17.format(n=192),
     "Mixed_7a": REDUCTION_8,
     "Mixed_7b": BLOCK_8,
     "Mixed_7c": BLOCK_8,
 }
 
 
+def branches_of(block: str) -> list[Branch]:
+    """The branches of a block that is written as above."""
+    branches = []
+    for line in block.strip().splitlines():
+        steps = [[step.split() for step in part.split("&")] for part in line.split(",")]
+        pool = steps.pop(0)[0][0] if len(steps[0][0]) == 1 else ""
+        branches.append(Branch(pool, [[_conv(*cells) for cells in step] for step in steps]))
+    return branches
+
+
+def _conv(name: str, n_out: str, kernel: str) -> Conv:
+    size, _, stride = kernel.partition("/")
+    rows, columns = map(int, size.split("x"))
+    return Conv(name, int(n_out), (rows, columns), int(stride or 1))
+
+
 class Mixed(nn.Module):
     """Parallel branches, concatenated along the channels."""
 
-    def __init__(self, n_in: int, branches: tuple[Branch, ...], width: float) -> None:
+    def __init__(self, n_in: int, block: str, width: float) -> None:
         super().__init__()
-        self.branches = branches
-        self.n_out = sum(self._add(branch, n_in, width) for branch in branches)
+        self.branches = branches_of(block)
+        self.n_out = sum(self._add(branch, n_in, width) for branch in self.branches)
 
     def _add(self, branch: Branch, n: int, width: float) -> int:
         """Make a branch's convolutions; the number of channels it puts out."""
@@ -187,8 +150,8 @@ class InceptionV3(InceptionBackbone):
         self.Conv2d_4a_3x3 = ConvBn(three, n, 3, padded=False)
         self.pool = nn.MaxPool2d(3, 2)
         n_out: dict[str, int] = {}
-        for name, branches in BLOCKS.items():
-            block = Mixed(n, branches, width)
+        for name, written in BLOCKS.items():
+            block = Mixed(n, written, width)
             self.add_module(name, block)
             n = n_out[name] = block.n_out
         self.n_aux = (n_out["Mixed_5d"], n_out["Mixed_6e"])
