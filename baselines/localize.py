@@ -155,7 +155,12 @@ def find_pictures(named: Iterable[Path]) -> list[Path]:
     Raises:
         InputError: something named is not there, or a directory holds no picture.
     """
-    return [path for name in named for path in (_in(name) if name.is_dir() else [_file(name)])]
+    found: list[Path] = []
+    for path in named:
+        if not (path.is_dir() or path.is_file()):
+            raise InputError(f"{path}: there is no such picture or directory")
+        found += _in(path) if path.is_dir() else [path]
+    return found
 
 
 def read_picture(path: Path, input_px: int, view: View = "square") -> NDArray[np.uint8]:
@@ -169,9 +174,16 @@ def read_picture(path: Path, input_px: int, view: View = "square") -> NDArray[np
     """
     try:
         with Image.open(path, formats=("PNG", "JPEG")) as image:
-            problem = _problem(image)
-            if not problem:
-                return fit_frame(_rgb(ImageOps.exif_transpose(image)), input_px, view)
+            if image.mode not in MODES:
+                problem = f"holds pixels of mode {image.mode}, such as depth, not 8-bit colours"
+            elif max(image.size) > MAX_ASPECT * min(image.size):
+                size = f"{image.width} x {image.height}"
+                problem = f"is {size} pixels, too long for a square to be cut out"
+            else:
+                upright = ImageOps.exif_transpose(image)
+                if "transparency" in upright.info:  # a palette's: Pillow knows this way only
+                    upright = upright.convert("RGBA")
+                return fit_frame(upright.convert("RGB"), input_px, view)
     except Exception as error:  # a damaged file is refused in every way there is
         problem = f"cannot be read as a PNG or JPEG picture ({why(error)})"
     raise InputError(f"{path}: {problem}; leave it out or repair it")
@@ -193,24 +205,3 @@ def _in(directory: Path) -> list[Path]:
 def _is_picture(name: str) -> bool:
     hidden_or_depth = name.startswith(".") or name.endswith(".depth.png")
     return name.endswith(SUFFIXES) and not hidden_or_depth
-
-
-def _file(path: Path) -> Path:
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such picture or directory")
-    return path
-
-
-def _problem(image: Image.Image) -> str:
-    """What keeps a picture from being used; empty if nothing."""
-    if image.mode not in MODES:
-        return f"holds pixels of mode {image.mode}, such as depth, not 8-bit colours"
-    if max(image.size) > MAX_ASPECT * min(image.size):
-        return f"is {image.width} x {image.height} pixels, too long for a square to be cut out"
-    return ""
-
-
-def _rgb(image: Image.Image) -> Image.Image:
-    if "transparency" in image.info:  # a palette's: Pillow converts it by this way only
-        image = image.convert("RGBA")
-    return image.convert("RGB")

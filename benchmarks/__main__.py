@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.page import write_page
-from benchmarks.runner import run_missing
-from benchmarks.sweep import read_sweep, runs_of
+from benchmarks.sweep import read_sweep, run_missing, runs_of
 from synfeal.errors import exit_status
 
 SWEEPS = Path(__file__).with_name("sweeps")

@@ -52,8 +52,7 @@ def batches_of(n_frames: int, batch_frames: int) -> list[Batch]:
     ]
 
 
-COLUMNS = ("frame", "registered", "tx", "ty", "tz", "qw", "qx", "qy", "qz")
-HEADER = ",".join(COLUMNS)
+HEADER = "frame,registered,tx,ty,tz,qw,qx,qy,qz"
 
 
 @dataclass(frozen=True)

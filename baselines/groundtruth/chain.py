@@ -40,33 +40,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BatchRecord:
-    """What happened to one batch; errors are those of its last pose against the true one.
+    """What happened to one batch; errors are those of its last pose against the true one."""
 
-    Attributes:
-    index: position of the batch in its split.
-        start: first frame.
-        stop: one past the last frame.
-        registered: frames whose pose the method found.
-        filled: frames whose label was interpolated or held.
-        lost: the method found no motion at all.
-        assisted: the last pose was replaced by the true one.
-        error_before_m: position error before assistance (of a lost batch: of standing still).
-        error_before_deg: orientation error before assistance.
-        error_after_m: position error the next batch starts with.
-        error_after_deg: orientation error the next batch starts with.
-    """
-
-    index: int
-    start: int
-    stop: int
-    registered: int
-    filled: int
-    lost: bool
-    assisted: bool
-    error_before_m: float
-    error_before_deg: float
-    error_after_m: float
-    error_after_deg: float
+    index: int  # position of the batch in its split
+    start: int  # first frame
+    stop: int  # one past the last frame
+    registered: int  # frames whose pose the method found
+    filled: int  # frames whose label was interpolated or held
+    lost: bool  # the method found no motion at all
+    assisted: bool  # the last pose was replaced by the true one
+    error_before_m: float  # position error before assistance (of a lost batch: of standing still)
+    error_before_deg: float  # orientation error before assistance
+    error_after_m: float  # position error the next batch starts with
+    error_after_deg: float  # orientation error the next batch starts with
 
 
 def summary_of(records: Sequence[BatchRecord]) -> dict[str, Any]:
@@ -100,11 +86,8 @@ def chain_batches(
     labels = true_world_from_cam.copy()
     records = []
     for batch, trajectory in zip(batches, trajectories, strict=True):
-        span = slice(batch.start, batch.stop)
-        poses, record = _place(
-            batch, trajectory, labels[batch.start], true_world_from_cam[batch.stop - 1], cfg
-        )
-        labels[span] = poses
+        ends = labels[batch.start], true_world_from_cam[batch.stop - 1]
+        labels[batch.start : batch.stop], record = _place(batch, trajectory, *ends, cfg)
         records.append(record)
     return truth.with_poses(labels), records
 

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from baselines.groundtruth.batches import BatchTrajectory
 from baselines.groundtruth.projective_icp import pyramid_of, register
-from baselines.groundtruth.rgbd.dense import matched_depths, near
-from baselines.groundtruth.rgbd.frames import RgbdFrame, open3d_depth, read_frame
+from baselines.groundtruth.rgbd.dense import matched_depths
+from baselines.groundtruth.rgbd.frames import RgbdFrame, near, open3d_depth, read_frame
 from synfeal.config.models import CameraConfig, KinectFusionConfig
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.geometry.poses import inverse

@@ -15,9 +15,10 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from baselines.groundtruth.rgbd.dense import points_of
+from baselines.groundtruth.rgbd.dense import normals_of, points_of
+from baselines.groundtruth.rgbd.frames import near
 from synfeal.config.models import CameraConfig
-from synfeal.geometry.poses import pose_error, pose_matrix
+from synfeal.geometry.poses import pose_matrix
 
 Array = NDArray[np.float64]
 Depth = NDArray[np.float32]
@@ -34,8 +35,6 @@ _REST_M, _REST_DEG = 1e-4, 0.005
 _SINGULAR = 1e-9
 # Smoothing of depth before normals are taken: pixels, deviations in metres and pixels.
 _SMOOTHING = (5, 0.03, 2.0)
-# The largest step of depth, relative to it, between neighbours of one surface.
-_MAX_STEP = 0.1
 
 
 class Surface(NamedTuple):
@@ -54,15 +53,9 @@ def pyramid_of(depth_m: Depth, camera: CameraConfig) -> list[Surface]:
 
 
 def _surface(depth_m: Depth, smooth_m: Depth, camera: CameraConfig, stride: int) -> Surface:
-    """One level; normals from the neighbours to all sides, where those are on one surface."""
+    """One level; normals are those of the smoothed depth."""
     normals = np.full((*depth_m.shape, 3), np.nan)
-    point = points_of(smooth_m, camera, stride)
-    down, right = point[2:, 1:-1] - point[:-2, 1:-1], point[1:-1, 2:] - point[1:-1, :-2]
-    with np.errstate(invalid="ignore"):
-        normal = np.cross(right, down)
-        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-        step = np.maximum(np.abs(down[..., 2]), np.abs(right[..., 2])) / point[1:-1, 1:-1, 2]
-        normals[1:-1, 1:-1] = np.where((step <= _MAX_STEP)[..., None], normal, np.nan)
+    normals[1:-1, 1:-1] = normals_of(points_of(smooth_m, camera, stride))
     return Surface(points_of(depth_m, camera, stride), normals)
 
 
@@ -92,8 +85,7 @@ def register(
             step = np.linalg.solve(system, right)
             moved = pose_matrix(Rotation.from_rotvec(step[:3]).as_matrix(), step[3:])
             motion = moved @ motion
-            moved_m, moved_rad = pose_error(moved, np.eye(4))
-            if moved_m <= _REST_M and np.degrees(moved_rad) <= _REST_DEG:
+            if near(moved, np.eye(4), _REST_M, _REST_DEG):
                 break
     return motion, constraint
 

@@ -121,11 +121,8 @@ class Vlad:
 
     def describe(self, frames: Frames) -> Vectors:
         """Unit vectors (N, D) of frames (N, S, S, 3)."""
-        return np.concatenate([self._describe(part) for part in parts_of(frames)])
-
-    def _describe(self, frames: Frames) -> Vectors:
-        sums = residuals(dense_sift(frames).numpy(), self.words)
-        return unit((sums - self.mean) @ self.axes)
+        sums = (residuals(dense_sift(part).numpy(), self.words) for part in parts_of(frames))
+        return np.concatenate([unit((part - self.mean) @ self.axes) for part in sums])
 
 
 def residuals(sifts: Vectors, words: Tensor) -> Vectors:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,20 +16,14 @@ CHUNK = 500
 METRES_PER_RADIAN = 1.0
 
 
-def by_thumbnail(evidence: Evidence) -> NDArray[np.float64]:
-    """The label of the training image with the nearest 8 x 8 thumbnail."""
-    return nearest_label(evidence, THUMBNAIL)
-
-
-def by_vlad(evidence: Evidence) -> NDArray[np.float64]:
-    """The label of the training image with the nearest DenseVLAD vector."""
-    return nearest_label(evidence, VLAD)
-
-
 def nearest_label(evidence: Evidence, descriptor: str) -> NDArray[np.float64]:
     """Labels (N, 4, 4) of the training images nearest to the test images."""
     train, test = evidence.descriptors[descriptor]
     return evidence.train.world_from_cam[most_alike(train, test, 1)[:, 0]]
+
+
+by_thumbnail = partial(nearest_label, descriptor=THUMBNAIL)
+by_vlad = partial(nearest_label, descriptor=VLAD)
 
 
 def nearest_pose(evidence: Evidence) -> NDArray[np.float64]:

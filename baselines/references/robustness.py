@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 from tqdm import tqdm
 
@@ -37,6 +36,17 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+NEAREST = {"nearest-thumbnail": THUMBNAIL, "nearest-vlad": VLAD}
+STRUCTURE = "structure-depth"
+MEASURES = ("position_m", "orientation_deg")
+SCHEMA = {
+    **dict.fromkeys(("trained_on", "method", "effects"), TEXT),
+    **{f"{measure}{end}": MAYBE for measure in MEASURES for end in ("", "_low", "_high")},
+    "n_test": COUNT,
+}
+Files = Mapping[str, Path]
+
+
 def write_varied(
     effects: str,  # what the descriptors call all test frames that are drawn like these
     # ``mesh``, ``plan`` of the test frames, ``labels``, ``features`` with depth and ``descriptors``
@@ -55,53 +65,22 @@ def write_varied(
     Raises:
         InputError: a file cannot be read.
     """
-    plan, rows = read_pose_table(files["plan"]), sampled(n_test, sample)
-    test = varied_features(files["mesh"], plan, rows, camera, render, references)
+    plan = read_pose_table(files["plan"])
+    rows = np.linspace(0, n_test - 1, min(n_test, sample)).astype(np.int64)
+    with open_scene(files["mesh"], camera, render) as renderer:
+        places = tqdm(rows.tolist(), "drawing", unit="frame", mininterval=5)
+        poses = (plan.between(row, row + 1) for row in places)
+        added = effects_of(camera, render)  # of each frame as a part of its path
+        views = (next(drawn(renderer, pose, False, added))[0] for pose in poses)
+        greys = (np.asarray(Image.fromarray(rgb).convert("L")) for rgb in views)
+        test = features_of(greys, None, camera, references)
     train = read_pose_table(files["labels"])
     known = read_described(files["descriptors"], len(train), int(rows[-1]) + 1, effects)
     of_train, of_all = known[VLAD]
     nearest = most_alike(of_train, of_all[rows], references.retrieved)
     matches = match_test_frames(Features.read(files["features"]), test, nearest)
-    poses = localize(matches, lifted(matches, train), camera, seed)
-    write_pose_table(out_predictions, pose_table(plan.at(rows), poses))
-
-
-def sampled(count: int, most: int) -> NDArray[np.int64]:
-    """Rows spread evenly over ``count`` frames, no more than ``most``."""
-    return np.linspace(0, count - 1, min(count, most)).astype(np.int64)
-
-
-def varied_features(
-    mesh: Path,
-    plan: PoseTable,
-    rows: NDArray[np.int64],
-    camera: CameraConfig,
-    render: RenderConfig,
-    cfg: ReferencesConfig,
-) -> Features:
-    """Features of frames drawn with effects, each as a part of its path; without depth.
-
-    Raises:
-        InputError: the mesh cannot be read.
-    """
-    effects = effects_of(camera, render)
-    with open_scene(mesh, camera, render) as renderer:
-        places = tqdm(rows.tolist(), "drawing", unit="frame", mininterval=5)
-        poses = (plan.between(row, row + 1) for row in places)
-        views = (next(drawn(renderer, pose, False, effects))[0] for pose in poses)
-        greys = (np.asarray(Image.fromarray(rgb).convert("L")) for rgb in views)
-        return features_of(greys, None, camera, cfg)
-
-
-NEAREST = {"nearest-thumbnail": THUMBNAIL, "nearest-vlad": VLAD}
-STRUCTURE = "structure-depth"
-MEASURES = ("position_m", "orientation_deg")
-SCHEMA = {
-    **dict.fromkeys(("trained_on", "method", "effects"), TEXT),
-    **{f"{measure}{end}": MAYBE for measure in MEASURES for end in ("", "_low", "_high")},
-    "n_test": COUNT,
-}
-Files = Mapping[str, Path]
+    answers = localize(matches, lifted(matches, train), camera, seed)
+    write_pose_table(out_predictions, pose_table(plan.at(rows), answers))
 
 
 @memory_errors()

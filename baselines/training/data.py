@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from synfeal.dataset.packed import read_packed
-from synfeal.dataset.pose_table import PoseTable, read_pose_table
+from synfeal.dataset.pose_table import read_pose_table
 from synfeal.errors import InputError
 from synfeal.seeds import generator_of
 
@@ -117,7 +117,8 @@ def read_labelled_frames(
     if len(table) == 0:
         raise InputError(f"{labels}: has no rows; nothing to learn from")
     images = read_images(frames, len(table), input_px, device)
-    position_m, quat_wxyz = _poses(table, device)
+    position_m = torch.as_tensor(table.position_m, dtype=torch.float32, device=device)
+    quat_wxyz = torch.as_tensor(table.quat_wxyz, dtype=torch.float32, device=device)
     rows = torch.arange(len(table), device=device)
     return LabelledFrames(images, position_m, quat_wxyz, table.path, rows)
 
@@ -138,12 +139,6 @@ def image_statistics(images: Tensor) -> ImageStatistics:
     return ImageStatistics(mean.float().view(shape), deviation.float().view(shape))
 
 
-def _poses(table: PoseTable, device: torch.device) -> tuple[Tensor, Tensor]:
-    position_m = torch.as_tensor(table.position_m, dtype=torch.float32, device=device)
-    quat_wxyz = torch.as_tensor(table.quat_wxyz, dtype=torch.float32, device=device)
-    return position_m, quat_wxyz
-
-
 class BatchOrder:
     """Batches of frame indices: one epoch after another, cut without regard to epochs.
 
@@ -158,15 +153,13 @@ class BatchOrder:
     def next_batch(self) -> Tensor:
         """Indices (batch_size,) of the next batch."""
         while len(self._pending) < self._batch_size:
-            self._pending = torch.cat([self._pending, self._epoch()])
+            epoch = torch.arange(self._n_frames)
+            if self._shuffled:
+                epoch = torch.randperm(self._n_frames, generator=self._generator)
+            self._pending = torch.cat([self._pending, epoch])
         batch = self._pending[: self._batch_size]
         self._pending = self._pending[self._batch_size :]
         return batch
-
-    def _epoch(self) -> Tensor:
-        if self._shuffled:
-            return torch.randperm(self._n_frames, generator=self._generator)
-        return torch.arange(self._n_frames)
 
     def state_dict(self) -> dict[str, Any]:
         """Where the order stands."""

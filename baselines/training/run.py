@@ -120,7 +120,12 @@ def _material(
     device = open_device(job.training.device)
     data = read_labelled_frames(frames, labels, job.network.input_px, device)
     learned, held_out = _split(job, data, test)
-    localizer = _initial(job, weights, learned)
+    torch.manual_seed(job.seed)  # of the generator that dropout draws from, too
+    localizer = build_localizer(job.name, job.network, job.hyper)
+    if weights is not None:
+        load_backbone_weights(localizer.backbone, weights)
+    localizer.place_on(device)
+    localizer.set_pose_prior(learned.position_m.mean(0))
     log.info("%s: %d frames, %d samples, on %s", job.name, len(learned), job.samples_seen, device)
     return Material(localizer, image_statistics(data.images), learned, held_out)
 
@@ -143,20 +148,6 @@ def _fit(
         augment=augment,
         resume=resume,
     )
-
-
-def _initial(job: Job, weights: Path | None, learned: LabelledFrames) -> Localizer:
-    """The localizer that training starts from, on the device of the frames it learns from.
-
-    Seeds the generator that dropout draws from too.
-    """
-    torch.manual_seed(job.seed)
-    localizer = build_localizer(job.name, job.network, job.hyper)
-    if weights is not None:
-        load_backbone_weights(localizer.backbone, weights)
-    localizer.place_on(learned.images.device)
-    localizer.set_pose_prior(learned.position_m.mean(0))
-    return localizer
 
 
 def _split(

@@ -119,13 +119,9 @@ def held_out_errors(
         PosePrediction(position_m, quat_wxyz), frames.position_m, frames.quat_wxyz
     )
     distance_m = torch.linalg.vector_norm(position_m - frames.position_m, dim=1)
-    angle_rad = _angles(nn.functional.normalize(quat_wxyz, dim=1), frames.quat_wxyz)
+    chord = quat_chords(nn.functional.normalize(quat_wxyz, dim=1), frames.quat_wxyz)
+    angle_rad = 4 * torch.asin((chord / 2).clamp(max=1.0))
     return HeldOutErrors(float(loss), _median(distance_m), math.degrees(_median(angle_rad)))
-
-
-def _angles(a_wxyz: Tensor, b_wxyz: Tensor) -> Tensor:
-    """Angles (N,) in radians between rotations as unit quaternions (N, 4)."""
-    return 4 * torch.asin((quat_chords(a_wxyz, b_wxyz) / 2).clamp(max=1.0))
 
 
 def _median(values: Tensor) -> float:

@@ -1,14 +1,21 @@
-"""What benchmarks measure: a module each, loaded when asked for, as some libraries do not mix."""
+"""What benchmarks measure, by name; a module is loaded when asked for: not all libraries mix."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
-from typing import Any, NamedTuple
+from pkgutil import resolve_name
+from typing import Any, NamedTuple, get_type_hints
 
 from synfeal.config.models import Strict
 
-MEASURES = ("effects", "kinect_fusion", "rgbd", "sfm", "training")
+# Place of the function, ``module:name``, that measures a case, whose type its annotation is.
+MEASURES = {
+    "effects": "effects:run",
+    "kinect_fusion": "labels:run_kinect_fusion",
+    "rgbd": "labels:run_rgbd",
+    "sfm": "labels:run_sfm",
+    "training": "training:run",
+}
 
 
 class Measure(NamedTuple):
@@ -19,6 +26,6 @@ class Measure(NamedTuple):
 
 
 def open_measure(name: str) -> Measure:
-    """``Case`` and ``run`` of the module of this name."""
-    module = import_module(f"benchmarks.measures.{name}")
-    return Measure(module.Case, module.run)
+    """The measure of this name."""
+    run = resolve_name(f"benchmarks.measures.{MEASURES[name]}")
+    return Measure(get_type_hints(run)["case"], run)

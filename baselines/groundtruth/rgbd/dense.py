@@ -8,9 +8,8 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from baselines.groundtruth.rgbd.frames import RgbdFrame, align
+from baselines.groundtruth.rgbd.frames import RgbdFrame, align, near
 from synfeal.config.models import CameraConfig, RgbdConfig
-from synfeal.geometry.poses import pose_error
 
 Array = NDArray[np.float64]
 Depth = NDArray[np.float32]
@@ -18,7 +17,7 @@ Depth = NDArray[np.float32]
 # Every how many pixels, in both directions, depth images are compared.
 _STRIDE = 4
 # Side of the blocks whose medians give normals, so that noise and rounding hardly tilt them, and
-# the largest relative step of depth between blocks of one surface.
+# the largest relative step of depth between neighbours of one surface.
 _BLOCK, _MAX_STEP = 8, 0.1
 
 
@@ -79,6 +78,19 @@ def points_of(depth_m: Depth, camera: CameraConfig, stride: int, first: float = 
         return np.stack([(column - cx) / fx * z, (row - cy) / fy * z, z], axis=-1)
 
 
+def normals_of(point_m: Array) -> Array:
+    """Normals (h - 2, w - 2, 3) of points (h, w, 3), from the neighbours to all sides.
+
+    They are nan where those neighbours are not on one surface.
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        down, right = point_m[2:, 1:-1] - point_m[:-2, 1:-1], point_m[1:-1, 2:] - point_m[1:-1, :-2]
+        normal = np.cross(right, down)
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+        step = np.maximum(np.abs(down[..., 2]), np.abs(right[..., 2])) / point_m[1:-1, 1:-1, 2]
+        return np.where((step <= _MAX_STEP)[..., None], normal, np.nan)
+
+
 def constraint(depth_m: Depth, camera: CameraConfig) -> float:
     """How well the surfaces in view constrain a motion: 0 where one motion leaves them in place.
 
@@ -91,13 +103,8 @@ def constraint(depth_m: Depth, camera: CameraConfig) -> float:
     blocks = depth_m[: height * _BLOCK, : width * _BLOCK].reshape(height, _BLOCK, width, _BLOCK)
     median_m = np.median(blocks.transpose(0, 2, 1, 3).reshape(height, width, -1), axis=-1)
     point = points_of(median_m.astype(np.float32), camera, _BLOCK, _BLOCK / 2)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        down, right = point[2:, 1:-1] - point[:-2, 1:-1], point[1:-1, 2:] - point[1:-1, :-2]
-        step = np.maximum(np.abs(down[..., 2]), np.abs(right[..., 2])) / point[1:-1, 1:-1, 2]
-        normal = np.cross(right, down)
-        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    smooth = np.isfinite(normal).all(axis=-1) & (step <= _MAX_STEP)
-    smooth &= np.isfinite(point[1:-1, 1:-1, 2])
+    normal = normals_of(point)
+    smooth = np.isfinite(normal).all(axis=-1) & np.isfinite(point[1:-1, 1:-1, 2])
     if smooth.sum() < 6:
         return 0.0
     normal, point = normal[smooth], point[1:-1, 1:-1][smooth]
@@ -114,8 +121,6 @@ _METHODS = {
 # Passes of Open3D's own loop: steps per scale, coarse to fine, and the depth difference beyond
 # which a point counts by its distance, not its square, as in the stages of ``surface``.
 _PASSES = (((5, 3, 2), 0.05), ((5,), 0.002))
-# The result may not leave its starting point by more.
-MAX_CHANGE_M, MAX_CHANGE_DEG = 0.25, 10.0
 # Motions are compared by the depth that agrees within this share of the accepted residual.
 _CLOSE = 0.2
 # A motion that agrees less is no longer sure: other starting points are tried.
@@ -130,12 +135,6 @@ class Motion:
 
     i_from_j: Array  # (4, 4)
     agreement: float  # share of the points of j whose depth agrees closely with image i
-
-
-def near(a: Array, b: Array, max_m: float = MAX_CHANGE_M, max_deg: float = MAX_CHANGE_DEG) -> bool:
-    """Whether a refined motion (4, 4) stays near its starting point (4, 4)."""
-    change_m, change_rad = pose_error(a, b)
-    return bool(change_m <= max_m and np.degrees(change_rad) <= max_deg)
 
 
 def register(
@@ -169,7 +168,7 @@ def register(
     except RuntimeError:  # a singular system: nothing in view constrains the motion
         return None
     found = np.asarray(i_from_j.numpy(), dtype=np.float64)
-    return found if np.isfinite(found).all() and near(start, found) else None
+    return found if np.isfinite(found).all() else None
 
 
 @dataclass(frozen=True)
@@ -193,15 +192,12 @@ class DenseOdometry:
 
     def refine(self, i: RgbdFrame, j: RgbdFrame, start: Array) -> Motion | None:
         """Refined and accepted motion ``i_from_j`` from a starting point (4, 4), or None."""
-        found = self._moved(i, j, start)
+        if self.cfg.method == "point-to-plane":
+            found = align(i.surfaces, j.surfaces, start, 2 * self.cfg.max_rmse_m)
+        else:
+            found = register(i.rgbd, j.rgbd, start, self.camera, self.cfg, self.cfg.method)
         if found is None or not near(start, found) or not self.overlap(i, j, found):
             return None
         close_m = _CLOSE * self.cfg.max_rmse_m
         share, _ = depth_agreement(i.depth_m, j.depth_m, found, self.camera, close_m)
         return Motion(found, share)
-
-    def _moved(self, i: RgbdFrame, j: RgbdFrame, start: Array) -> Array | None:
-        """Refined motion (4, 4) that nothing has checked, or None."""
-        if self.cfg.method == "point-to-plane":
-            return align(i.surfaces, j.surfaces, start, 2 * self.cfg.max_rmse_m)
-        return register(i.rgbd, j.rgbd, start, self.camera, self.cfg, self.cfg.method)

@@ -42,6 +42,8 @@ STAGES = (
     Stage(1, 20, 0.05, 0.0002, 0.01),
     Stage(1, 20, 0.002, 0.00005, 0.002),
 )
+# A refined motion may not leave its starting point by more.
+MAX_CHANGE_M, MAX_CHANGE_DEG = 0.25, 10.0
 # Open3D's own smoothing of depth before it takes normals: pixels, deviations in metres and pixels.
 _SMOOTHING = (5, 5.0, 10.0)
 
@@ -59,12 +61,10 @@ class Surface:
 Surfaces = dict[int, Surface]
 
 
-def surfaces_of(depth_m: NDArray[np.float32], camera: CameraConfig) -> Surfaces:
-    """A depth image (H, W), not finite where nothing was measured, as all stages take it."""
-    measured = np.where(np.isfinite(depth_m), depth_m, np.float32(np.nan))
-    matrix = camera.intrinsics.matrix(centre_shift_px=-0.5)
-    strides = {stage.stride for stage in STAGES}
-    return {stride: _surface(measured, matrix, stride) for stride in strides}
+def near(a: Array, b: Array, max_m: float = MAX_CHANGE_M, max_deg: float = MAX_CHANGE_DEG) -> bool:
+    """Whether a motion (4, 4), by default a refined one, stays near another, its starting point."""
+    change_m, change_rad = pose_error(a, b)
+    return bool(change_m <= max_m and np.degrees(change_rad) <= max_deg)
 
 
 def _surface(depth_m: NDArray[np.float32], matrix: Array, stride: int) -> Surface:
@@ -119,8 +119,7 @@ def _descend(
             stage.huber_m,
         ).transformation
         target_from_source = step @ target_from_source
-        moved_m, moved_rad = pose_error(step.numpy(), np.eye(4))
-        if moved_m <= stage.rest_m and np.degrees(moved_rad) <= stage.rest_deg:
+        if near(step.numpy(), np.eye(4), stage.rest_m, stage.rest_deg):
             break
     return target_from_source
 
@@ -144,36 +143,31 @@ class RgbdFrame:
 
     @cached_property
     def surfaces(self) -> Surfaces:
-        """What the depth shows, as the registration takes it."""
-        return surfaces_of(self.depth_m, self.camera)
+        """What the depth shows, as all stages of the registration take it."""
+        measured = np.where(np.isfinite(self.depth_m), self.depth_m, np.float32(np.nan))
+        matrix = self.camera.intrinsics.matrix(centre_shift_px=-0.5)
+        strides = {stage.stride for stage in STAGES}
+        return {stride: _surface(measured, matrix, stride) for stride in strides}
 
 
 def read_frame(
     color_path: FrameFile, depth_path: FrameFile, camera: CameraConfig, cfg: DepthConfig, seed: int
 ) -> RgbdFrame:
-    """Read a frame.
+    """Read a frame; depth is as the sensor of the configuration measures it.
 
     Raises:
         InputError: an image cannot be read, has another size than the camera, or the depth is not
             16-bit.
     """
-    color = read_image(color_path, camera, "RGB")
-    depth_m = read_depth(depth_path, camera, cfg, seed)
-    return RgbdFrame(color, depth_m, camera)
-
-
-def read_depth(
-    path: FrameFile, camera: CameraConfig, cfg: DepthConfig, seed: int
-) -> NDArray[np.float32]:
-    """Depth (H, W) in metres as the sensor of the configuration measures it, inf where nothing."""
-    depth_mm = read_image(path, camera)
+    color, depth_mm = read_image(color_path, camera, "RGB"), read_image(depth_path, camera)
     if depth_mm.ndim != 2 or depth_mm.dtype not in (np.uint16, np.int32):
-        raise InputError(f"{path}: is not a 16-bit depth image; collect the data set again")
+        raise InputError(f"{depth_path}: is not a 16-bit depth image; collect the data set again")
     invalid = (depth_mm == _INVALID_MM[0]) | (depth_mm == _INVALID_MM[1])
     depth_m = np.where(invalid, np.float32(np.inf), depth_mm.astype(np.float32) / np.float32(1000))
     if cfg.sensor == "kinect":
-        depth_m = kinect_depth(depth_m, frame_generator(seed, path))
-    return np.where(depth_m > cfg.max_depth_m, np.float32(np.inf), depth_m)
+        depth_m = kinect_depth(depth_m, frame_generator(seed, depth_path))
+    depth_m = np.where(depth_m > cfg.max_depth_m, np.float32(np.inf), depth_m)
+    return RgbdFrame(color, depth_m, camera)
 
 
 def open3d_depth(depth_m: NDArray[np.float32]) -> o3d.t.geometry.Image:

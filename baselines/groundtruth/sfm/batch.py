@@ -44,11 +44,14 @@ def extract_features(images: Path, database: Path, camera: CameraConfig, cfg: Sf
     extraction = pycolmap.FeatureExtractionOptions(num_threads=1, use_gpu=False)
     extraction.sift.max_num_features = cfg.max_features
     extraction.sift.peak_threshold = cfg.peak_threshold
+    reader = pycolmap.ImageReaderOptions()
+    reader.camera_model = "FULL_OPENCV" if any(camera.distortion) else "PINHOLE"
+    reader.camera_params = ",".join(map(repr, colmap_parameters(camera)))
     pycolmap.extract_features(
         database,
         images,
         camera_mode=pycolmap.CameraMode.SINGLE,
-        reader_options=_reader_options(camera),
+        reader_options=reader,
         extraction_options=extraction,
         device=pycolmap.Device.cpu,
     )
@@ -71,14 +74,6 @@ def colmap_parameters(camera: CameraConfig) -> list[float]:
     """Parameters of COLMAP's PINHOLE or, where there is distortion, FULL_OPENCV."""
     pinhole = list(camera.intrinsics)
     return [*pinhole, *camera.distortion, 0.0, 0.0, 0.0] if any(camera.distortion) else pinhole
-
-
-def _reader_options(camera: CameraConfig) -> pycolmap.ImageReaderOptions:
-    """The camera model and its parameters."""
-    reader = pycolmap.ImageReaderOptions()
-    reader.camera_model = "FULL_OPENCV" if any(camera.distortion) else "PINHOLE"
-    reader.camera_params = ",".join(map(repr, colmap_parameters(camera)))
-    return reader
 
 
 # The published code's rule for the scale: the first 44 frames, none nearer than 5 cm to the first.

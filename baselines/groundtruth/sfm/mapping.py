@@ -211,7 +211,10 @@ def refine_model(model: pycolmap.Reconstruction) -> None:
         if not errors_px or np.median(errors_px) > _USUAL_SHARE * limit_px:
             return
         pycolmap.ObservationManager(model).filter_all_points3D(limit_px, _MIN_TRI_ANGLE_DEG)
-        _adjust(model)
+        config, options = adjustment_of(model, _STEPS)
+        config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+        options.ceres.solver_options.function_tolerance = _TOLERANCE
+        pycolmap.create_default_bundle_adjuster(options, config, model).solve()
 
 
 def adjustment_of(
@@ -231,10 +234,3 @@ def adjustment_of(
     options.ceres.solver_options.num_threads = 1
     options.ceres.solver_options.max_num_iterations = steps
     return config, options
-
-
-def _adjust(model: pycolmap.Reconstruction) -> None:
-    config, options = adjustment_of(model, _STEPS)
-    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
-    options.ceres.solver_options.function_tolerance = _TOLERANCE
-    pycolmap.create_default_bundle_adjuster(options, config, model).solve()
