@@ -69,7 +69,7 @@ PROFILES = {
     name: ROOT / f"workflow/profiles/{name}/profile.yaml" for name in ("slurm", "kubernetes")
 }
 WORKFLOW = "".join(path.read_text() for path in sorted((ROOT / "workflow/rules").glob("*.smk")))
-RULES = frozenset(re.findall(r"^(?:rule|use rule call as) (\w+)", WORKFLOW, re.MULTILINE))
+RULES = frozenset(re.findall(r"^(?:rule|use rule \w+ as) (\w+)", WORKFLOW, re.MULTILINE))
 
 
 def profile(name):

@@ -12,7 +12,22 @@ rule call:
         "../scripts/call.py"
 
 
-use rule call as scene with:
+use rule call as call_2gb with:
+    resources:
+        mem_mb=grown(2000),
+
+
+use rule call as call_3gb with:
+    resources:
+        mem_mb=grown(3000),
+
+
+use rule call as call_4gb with:
+    resources:
+        mem_mb=grown(4000),
+
+
+use rule call_4gb as scene with:
     input:
         mesh=lambda w: CONFIG.scenes[w.scene].path or [],
     output:
@@ -21,8 +36,6 @@ use rule call as scene with:
         curve=f"{ROOT}/scenes/{{scene}}/collision_curve.csv",
         clutter=f"{ROOT}/scenes/{{scene}}/clutter.json",
         properties=f"{ROOT}/scenes/{{scene}}/properties.json",
-    resources:
-        mem_mb=grown(4000),
     params:
         function="synfeal.scenes.prepare:prepare_scene",
         name=lambda w: w.scene,
@@ -32,14 +45,12 @@ use rule call as scene with:
         seed=CONFIG.seed,
 
 
-use rule call as plan with:
+use rule call_2gb as plan with:
     input:
         collision=rules.scene.output.collision,
         repeat=CONFIG.collection.repeat or [],
     output:
         plan=f"{ROOT}/plans/{{scene}}/{{split}}.csv",
-    resources:
-        mem_mb=grown(2000),
     params:
         function="synfeal.planning.plan:write_plan",
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
@@ -73,15 +84,13 @@ use rule call as cell_depth with:
         camera=dump(CONFIG.network_camera),
 
 
-use rule call as render with:
+use rule call_3gb as render with:
     input:
         mesh=rules.scene.output.mesh,
         plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w).split}.csv",
         extras=lambda w: beside_mesh(w.scene, CONFIG.render.effects),
     output:
         frames=sequence_output(f"{ROOT}/datasets/{{scene}}/{{camera}}/{{sequence}}"),
-    resources:
-        mem_mb=grown(3000),
     params:
         function="synfeal.dataset.render_sequence:render_sequence",
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
@@ -101,14 +110,12 @@ use rule call as cartons with:
         function="synfeal.scenes.prepare:save_cartons",
 
 
-use rule call as render_speed with:
+use rule call_3gb as render_speed with:
     input:
         mesh=rules.scene.output.mesh,
         plan=f"{ROOT}/plans/{{scene}}/test.csv",
     output:
         speed=f"{ROOT}/scenes/{{scene}}/render_speed.csv",
-    resources:
-        mem_mb=grown(3000),
     params:
         function="synfeal.scenes.render_speed:write_render_speed",
         network_camera=dump(CONFIG.network_camera),
@@ -117,15 +124,13 @@ use rule call as render_speed with:
         render=dump(CONFIG.render),
 
 
-use rule call as collection_speed with:
+use rule call_3gb as collection_speed with:
     input:
         mesh=rules.scene.output.mesh,
         collision=rules.scene.output.collision,
         repeat=CONFIG.collection.repeat or [],
     output:
         speed=f"{ROOT}/scenes/{{scene}}/collection_speed.json",
-    resources:
-        mem_mb=grown(3000),
     params:
         function="synfeal.scenes.speed:write_collection_speed",
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
@@ -136,7 +141,7 @@ use rule call as collection_speed with:
 
 
 # What the localizers see goes from the renderer straight into an array, not through image files.
-use rule call as render_packed with:
+use rule call_3gb as render_packed with:
     input:
         mesh=rules.scene.output.mesh,
         plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w, 'network').split}.csv",
@@ -144,8 +149,6 @@ use rule call as render_packed with:
     output:
         frames=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.npy"),
         record=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.json"),
-    resources:
-        mem_mb=grown(3000),
     params:
         function="synfeal.dataset.render_sequence:render_packed",
         camera=dump(CONFIG.network_camera),
@@ -156,7 +159,7 @@ use rule call as render_packed with:
         render=dump(CONFIG.render),
 
 
-use rule call as pack with:
+use rule call_2gb as pack with:
     input:
         plan=rules.plan.output.plan,
         shards=lambda w: packed_shards(w.scene, w.split, "npy"),
@@ -164,8 +167,6 @@ use rule call as pack with:
     output:
         frames=f"{ROOT}/frames/{{scene}}/{{split}}.npy",
         record=f"{ROOT}/frames/{{scene}}/{{split}}.json",
-    resources:
-        mem_mb=grown(2000),
     params:
         function="synfeal.dataset.packed:write_packed",
         camera=dump(CONFIG.network_camera),

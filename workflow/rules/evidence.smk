@@ -77,11 +77,9 @@ use rule call as speed_vs_error with:
         scenes=SCENES,
 
 
-use rule call as hard_cases with:
+use rule call_2gb as hard_cases with:
     output:
         csv=f"{ROOT}/tables/hard_cases.csv",
-    resources:
-        mem_mb=grown(2000),
     params:
         function="synfeal.report.hard_cases.table:write_hard_cases",
 
@@ -105,7 +103,7 @@ use rule call as document with:
         function="synfeal.report.document:write_document",
 
 
-use rule call as figures with:
+use rule call_2gb as figures with:
     input:
         tables=under(
             "tables/{table}.csv",
@@ -131,8 +129,6 @@ use rule call as figures with:
             category="Figures",
             labels={"figure": "{figure}"},
         ),
-    resources:
-        mem_mb=grown(2000),
     params:
         function="synfeal.report.figures.registry:write_figures",
         design=dump(DESIGN),
@@ -217,7 +213,7 @@ use rule call as provenance with:
         config_hash=config_hash(CONFIG),
 
 
-use rule call as report with:
+use rule call_4gb as report with:
     input:
         provenance=rules.provenance.output.json,
         results=RESULTS,
@@ -231,8 +227,6 @@ use rule call as report with:
         labels=under("labels/{set}/{split}.csv", set=POSE_SETS, split=SPLITS),
     output:
         html=f"{ROOT}/report.html",
-    resources:
-        mem_mb=grown(4000),
     params:
         function="synfeal.report.html.page:write_report",
         design=dump(DESIGN),

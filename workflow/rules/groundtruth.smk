@@ -26,7 +26,7 @@ use rule call as erroneous_labels with:
         ),
 
 
-use rule call as sfm with:
+use rule call_4gb as sfm with:
     input:
         **unless_restored(
             [f"{STEM}/sfm/{BATCH}.json"],
@@ -36,8 +36,6 @@ use rule call as sfm with:
     output:
         trajectory=f"{STEM}/sfm/{BATCH}.csv",
         facts=f"{STEM}/sfm/{BATCH}.json",
-    resources:
-        mem_mb=grown(4000),
     params:
         function="baselines.groundtruth.sfm.batch:write_sfm",
         start=lambda w: batch_of(w).start,
@@ -47,14 +45,12 @@ use rule call as sfm with:
         seed=lambda w: seed_of(CONFIG.seed, "sfm", w.scene, w.size, w.split, w.batch),
 
 
-use rule call as rgbd with:
+use rule call_4gb as rgbd with:
     input:
         **unless_restored([f"{STEM}/rgbd/{BATCH}.json"], sequences=batch_sequences),
     output:
         graph=f"{STEM}/rgbd/{BATCH}.g2o",
         facts=f"{STEM}/rgbd/{BATCH}.json",
-    resources:
-        mem_mb=grown(4000),
     params:
         function="baselines.groundtruth.rgbd.graph:write_rgbd",
         start=lambda w: batch_of(w).start,
@@ -64,7 +60,7 @@ use rule call as rgbd with:
         seed=lambda w: seed_of(CONFIG.seed, "depth-sensor", w.scene),
 
 
-use rule call as estimate with:
+use rule call_4gb as estimate with:
     input:
         **unless_restored(
             [f"{STEM}/{{frame_method}}/{BATCH}.json"], sequences=batch_sequences
@@ -76,8 +72,6 @@ use rule call as estimate with:
         f"{ROOT}/logs/{{frame_method}}/{BATCH_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/{{frame_method}}/{BATCH_LOG}.tsv"
-    resources:
-        mem_mb=grown(4000),
     params:
         function="baselines.groundtruth.methods:write_estimate",
         start=lambda w: batch_of(w).start,
@@ -89,7 +83,7 @@ use rule call as estimate with:
         seed=lambda w: seed_of(CONFIG.seed, "depth-sensor", w.scene),
 
 
-use rule call as posegraph with:
+use rule call_2gb as posegraph with:
     input:
         **unless_restored(
             [f"{STEM}/{{graph_method}}/{BATCH}.json"], graph=f"{STEM}/rgbd/{BATCH}.g2o"
@@ -101,8 +95,6 @@ use rule call as posegraph with:
         f"{ROOT}/logs/{{graph_method}}/{BATCH_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/{{graph_method}}/{BATCH_LOG}.tsv"
-    resources:
-        mem_mb=grown(2000),
     params:
         function="baselines.groundtruth.methods:write_solved",
         posegraph=dump(CONFIG.groundtruth.posegraph),

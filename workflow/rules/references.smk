@@ -6,21 +6,19 @@ REFERENCE_LOG = "{scene}/{size}/{labels}"
 STRUCTURE = {n: f"{FOUND}/{n}.npz" for n in ("correspondences", "tracks")}
 
 
-use rule call as descriptors with:
+use rule call_3gb as descriptors with:
     input:
         train=f"{ROOT}/frames/{{scene}}/train.npy",
         test=f"{ROOT}/frames/{{scene}}/test.npy",
     output:
         descriptors=f"{ROOT}/references/{{scene}}/descriptors.npz",
-    resources:
-        mem_mb=grown(3000),
     params:
         function="baselines.references.descriptors:write_descriptors",
         learned_from=lambda w: smallest_train(w.scene),
         seed=lambda w: seed_of(CONFIG.seed, "descriptors", w.scene),
 
 
-use rule call as features with:
+use rule call_3gb as features with:
     input:
         sequences=lambda w: sequence_dirs(
             w.scene,
@@ -34,8 +32,6 @@ use rule call as features with:
         f"{ROOT}/logs/features/{{scene}}/{{size}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/features/{{scene}}/{{size}}/{{split}}.tsv"
-    resources:
-        mem_mb=grown(3000),
     params:
         function="baselines.references.features:write_features",
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
@@ -43,33 +39,29 @@ use rule call as features with:
         references=dump(CONFIG.references, exclude={"coordinate_samples"}),
 
 
-use rule call as correspondences with:
+use rule call_3gb as correspondences with:
     input:
         descriptors=rules.descriptors.output.descriptors,
         train=f"{FOUND}/features-train.npz",
         test=f"{FOUND}/features-test.npz",
     output:
         matches=f"{FOUND}/correspondences.npz",
-    resources:
-        mem_mb=grown(3000),
     params:
         function="baselines.references.correspondences:write_matches",
         retrieved=CONFIG.references.retrieved,
 
 
-use rule call as tracks with:
+use rule call_3gb as tracks with:
     input:
         descriptors=rules.descriptors.output.descriptors,
         train=f"{FOUND}/features-train.npz",
     output:
         tracks=f"{FOUND}/tracks.npz",
-    resources:
-        mem_mb=grown(3000),
     params:
         function="baselines.references.correspondences:write_tracks",
 
 
-use rule call as image_references with:
+use rule call_2gb as image_references with:
     input:
         **evidence_for(
             in_group("images"),
@@ -77,8 +69,6 @@ use rule call as image_references with:
         ),
     output:
         references=reference_files(REFERENCE, in_group("images")),
-    resources:
-        mem_mb=grown(2000),
     params:
         function="baselines.references.run:answer_group",
         group="images",
@@ -108,7 +98,7 @@ use rule structure_references as adjusted_references with:
         group="adjusted",
 
 
-use rule call as views with:
+use rule call_2gb as views with:
     input:
         sequences=rules.features.input.sequences,
     output:
@@ -117,8 +107,6 @@ use rule call as views with:
         f"{ROOT}/logs/views/{{scene}}/{{size}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/views/{{scene}}/{{size}}/{{split}}.tsv"
-    resources:
-        mem_mb=grown(2000),
     params:
         function="baselines.references.features:write_views",
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
@@ -142,7 +130,7 @@ use rule structure_references as coordinate_references with:
         seed=lambda w: seed_of(CONFIG.seed, "scene coordinates", w.scene, w.size),
 
 
-use rule call as external_reference with:
+use rule call_4gb as external_reference with:
     input:
         **evidence_for(
             ["{external}"],
@@ -152,8 +140,6 @@ use rule call as external_reference with:
         ),
     output:
         references=reference_files(REFERENCE, ["{external}"]),
-    resources:
-        mem_mb=grown(4000),
     params:
         function="baselines.references.run:answer_externally",
         method=lambda w: dump(EXTERNAL[w.external], exclude={"title", "labels"}),

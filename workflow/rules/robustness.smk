@@ -4,13 +4,11 @@ VARIED = f"{ROOT}/robustness"
 
 
 # How much of its light comes from where: for light states, of stand-ins alone.
-use rule call as light_shares with:
+use rule call_4gb as light_shares with:
     output:
         shares=expand(
             f"{ROOT}/scenes/{{{{scene}}}}/light_{{group}}.glb", group=LIGHT_GROUPS
         ),
-    resources:
-        mem_mb=grown(4000),
     params:
         function="synfeal.scenes:save_light_shares",
         builder=lambda w: CONFIG.scenes[w.scene].builder,
@@ -69,7 +67,7 @@ use rule call as train_varied with:
 
 
 # Vectors of the ideal and of the varied frames: what the map of each training set is searched by.
-use rule call as varied_descriptors with:
+use rule call_3gb as varied_descriptors with:
     input:
         **varied_tests(
             f"{ROOT}/frames/{ROBUSTNESS.scene}/test.npy",
@@ -80,8 +78,6 @@ use rule call as varied_descriptors with:
         descriptors=f"{VARIED}/descriptors/{{trained_on}}.npz",
     wildcard_constraints:
         trained_on=f"{CLEAN}|{MIXED}",
-    resources:
-        mem_mb=grown(3000),
     params:
         function="baselines.references.descriptors:write_descriptors",
         counts={
@@ -93,7 +89,7 @@ use rule call as varied_descriptors with:
 
 
 # A sample of the test frames, large enough for features, against the map of the ideal frames.
-use rule call as varied_structure with:
+use rule call_3gb as varied_structure with:
     input:
         extras=lambda w: varied_extras([w.effects]),
         mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
@@ -103,8 +99,6 @@ use rule call as varied_structure with:
         labels=f"{ROOT}/labels/{ROBUST_SET}/train.csv",
     output:
         predictions=f"{VARIED}/structure/{{effects}}.csv",
-    resources:
-        mem_mb=grown(3000),
     params:
         function="baselines.references.robustness:write_varied",
         n_test=robust_frames("test"),
@@ -115,15 +109,13 @@ use rule call as varied_structure with:
         seed=seed_of(CONFIG.seed, "references", *ROBUST_SET.split("/")),
 
 
-use rule call as effects_speed with:
+use rule call_3gb as effects_speed with:
     input:
         extras=varied_extras(VARIATIONS),
         mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
         plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/test.csv",
     output:
         csv=f"{ROOT}/scenes/{ROBUSTNESS.scene}/effects_speed.csv",
-    resources:
-        mem_mb=grown(3000),
     params:
         function="synfeal.scenes.speed:write_effects_speed",
         camera=dump(CONFIG.network_camera),
@@ -131,7 +123,7 @@ use rule call as effects_speed with:
         effects={name: dump(VARIATIONS[name]) for name in ROBUST_EFFECTS},
 
 
-use rule call as robustness with:
+use rule call_2gb as robustness with:
     input:
         clean=[f"{ROOT}/runs/{robust_run(m).directory}/model.pt" for m in MODELS],
         mixed=expand(f"{VARIED}/runs/{{model}}/model.pt", model=MODELS),
@@ -144,8 +136,6 @@ use rule call as robustness with:
         labels=expand(f"{ROOT}/labels/{ROBUST_SET}/{{split}}.csv", split=SPLITS),
     output:
         **table_files("robustness", "table"),
-    resources:
-        mem_mb=grown(2000),
     params:
         function="synfeal.report.robustness:write_robustness_table",
         effects=ROBUST_EFFECTS,
