@@ -35,11 +35,6 @@ class PoseRegressor(OutputLayer):
         with torch.autocast(device, enabled=False) if mixed else nullcontext():
             return PosePrediction(self.position(features.float()), self.quat(features.float()))
 
-    @torch.no_grad()
-    def set_mean_position(self, position_m: Tensor) -> None:
-        """Predict around ``position_m`` (3,) instead of around the origin of the world."""
-        self.position.bias.copy_(position_m)
-
 
 class PooledFeature(nn.Sequential):
     """Global average pooling, a fully connected layer of 2048 units times the width, ReLU."""
@@ -85,6 +80,7 @@ class Localizer(nn.Module):
         """Move to a device, channels last in memory as the frames are."""
         self.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
 
+    @torch.no_grad()
     def set_pose_prior(self, mean_position_m: Tensor) -> None:
         """Let every regressor start at the mean training position (3,).
 
@@ -92,7 +88,7 @@ class Localizer(nn.Module):
         """
         for module in self.modules():
             if isinstance(module, PoseRegressor):
-                module.set_mean_position(mean_position_m)
+                module.position.bias.copy_(mean_position_m)
 
 
 def beta_loss(name: str, hyper: LocalizerConfig) -> BetaLoss:

@@ -137,17 +137,15 @@ def _solve(model: pycolmap.Reconstruction, labels: Array, loss_px: float) -> Non
     options.ceres.loss_function_scale = loss_px
     priors = pycolmap.PosePriorBundleAdjustmentOptions()
     priors.alignment_ransac.random_seed = 1
-    ids = model.reg_image_ids()
-    positions = [_prior(image_id, labels[image_id - 1, :3, 3]) for image_id in ids]
-    pycolmap.create_pose_prior_bundle_adjuster(options, priors, config, positions, model).solve()
-
-
-def _prior(image_id: int, position_m: Array) -> pycolmap.PosePrior:
     camera = pycolmap.sensor_t(pycolmap.SensorType.CAMERA, 1)
-    return pycolmap.PosePrior(
-        pose_prior_id=image_id,
-        corr_data_id=pycolmap.data_t(camera, image_id),
-        position=position_m,
-        position_covariance=PRIOR_M**2 * np.eye(3),
-        coordinate_system=pycolmap.PosePriorCoordinateSystem.CARTESIAN,
-    )
+    positions = [
+        pycolmap.PosePrior(
+            pose_prior_id=image_id,
+            corr_data_id=pycolmap.data_t(camera, image_id),
+            position=labels[image_id - 1, :3, 3],
+            position_covariance=PRIOR_M**2 * np.eye(3),
+            coordinate_system=pycolmap.PosePriorCoordinateSystem.CARTESIAN,
+        )
+        for image_id in model.reg_image_ids()
+    ]
+    pycolmap.create_pose_prior_bundle_adjuster(options, priors, config, positions, model).solve()

@@ -58,19 +58,6 @@ class ModelDescription(Strict):
     camera: FrameCamera | None = Field(None, description="of the training frames, where known")
 
 
-def parse_description(value: Any, path: Path) -> ModelDescription:
-    """The description that a checkpoint ``path`` holds.
-
-    Raises:
-        InputError: it lacks one, or holds another.
-    """
-    try:
-        return ModelDescription.model_validate(value)
-    except ValidationError as error:
-        reason = describe(error)
-        raise InputError(f"{path}: its description cannot be used ({reason})") from None
-
-
 def frame_camera(frames: Path) -> FrameCamera | None:
     """The camera of packed frames by the record beside them; None where there is no record.
 
@@ -135,7 +122,11 @@ def read_checkpoint(path: Path, device: torch.device) -> TrainedLocalizer:
             f"{path}: does not say which localizer it is (written before checkpoints did);"
             " train it again"
         )
-    description = parse_description(content["description"], path)
+    try:
+        description = ModelDescription.model_validate(content["description"])
+    except ValidationError as error:
+        reason = describe(error)
+        raise InputError(f"{path}: its description cannot be used ({reason})") from None
     try:
         network = build_localizer(description.localizer, description.network, description.hyper)
         network.place_on(device)

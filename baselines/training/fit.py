@@ -156,14 +156,8 @@ def fit(
             run.step()
             resume.save_if_due(parts, now=stopped())
     if run.progress.diverged:
-        _spoil(localizer)
+        for parameter in localizer.parameters():
+            parameter.detach().fill_(torch.nan)
     else:
         selection.restore()
     return run.progress.rows
-
-
-@torch.no_grad()
-def _spoil(localizer: Localizer) -> None:
-    """Leave nothing that could be taken for a result."""
-    for parameter in localizer.parameters():
-        parameter.fill_(torch.nan)

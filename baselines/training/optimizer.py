@@ -178,11 +178,6 @@ def _muon(network: nn.Module, schedule: Schedule) -> Optimisation:
     return Optimisation((muon, _rise_and_fall(muon, schedule)), _adamw_pair(rest, schedule))
 
 
-def _adamw(network: nn.Module, schedule: Schedule) -> Optimisation:
-    """AdamW (Loshchilov and Hutter, ICLR 2019) for all, its rate rises and falls."""
-    return Optimisation(_adamw_pair(list(network.parameters()), schedule))
-
-
 def _halving(network: nn.Module, schedule: Schedule) -> Optimisation:
     """Adam, every parameter pulled to 0, and half the rate after equal shares of the run."""
     optimizer = torch.optim.Adam(
@@ -197,7 +192,8 @@ def _halving(network: nn.Module, schedule: Schedule) -> Optimisation:
 
 OPTIMISERS: dict[OptimiserName, Callable[[nn.Module, Schedule], Optimisation]] = {
     "muon": _muon,
-    "adamw": _adamw,
+    # AdamW (Loshchilov and Hutter, ICLR 2019) for all, its rate rises and falls.
+    "adamw": lambda network, schedule: Optimisation(_adamw_pair([*network.parameters()], schedule)),
     "halving": _halving,
 }
 

@@ -129,7 +129,10 @@ def read_g2o(path: Path) -> PoseGraph:
         if kind == _VERTEX:
             vertices[int(values[0])] = _pose(values[1:])
         else:
-            edges.append(_edge(values))
+            upper = np.zeros((6, 6))
+            upper[_UPPER] = values[9:]
+            information = upper + np.triu(upper, 1).T
+            edges.append(Edge(int(values[0]), int(values[1]), _pose(values[2:9]), information))
     return _graph(vertices, edges, path)
 
 
@@ -157,14 +160,6 @@ def _numbers(cells: Sequence[str], count: int, where: str) -> Array:
     if len(values) != count or not np.isfinite(values).all():
         raise InputError(f"{where}: needs {count} finite numbers, found {len(values)}")
     return values
-
-
-def _edge(values: Array) -> Edge:
-    """An edge from the numbers of its record."""
-    upper = np.zeros((6, 6))
-    upper[_UPPER] = values[9:]
-    information = upper + np.triu(upper, 1).T
-    return Edge(int(values[0]), int(values[1]), _pose(values[2:9]), information)
 
 
 def _pose(values: Array) -> Array:

@@ -92,36 +92,19 @@ def align(i: Surfaces, j: Surfaces, start: Array, max_difference_m: float) -> Ar
     i_from_j = o3d.core.Tensor.from_numpy(np.ascontiguousarray(start))
     try:
         for stage in STAGES:
-            surfaces = i[stage.stride], j[stage.stride]
-            i_from_j = _descend(stage, *surfaces, i_from_j, max_difference_m)
+            target, source = i[stage.stride], j[stage.stride]
+            for _ in range(stage.max_steps):
+                step = o3d.t.pipelines.odometry.compute_odometry_result_point_to_plane(
+                    *(source.points, target.points, target.normals, target.intrinsics),
+                    *(i_from_j, max_difference_m, stage.huber_m),
+                ).transformation
+                i_from_j = step @ i_from_j
+                if near(step.numpy(), np.eye(4), stage.rest_m, stage.rest_deg):
+                    break
     except RuntimeError:  # a singular system: nothing in view constrains the motion
         return None
     found = np.asarray(i_from_j.numpy(), dtype=np.float64)
     return found if np.isfinite(found).all() else None
-
-
-def _descend(
-    stage: Stage,
-    target: Surface,
-    source: Surface,
-    target_from_source: o3d.core.Tensor,
-    max_difference_m: float,
-) -> o3d.core.Tensor:
-    """A motion (4, 4) after the steps of one stage."""
-    for _ in range(stage.max_steps):
-        step = o3d.t.pipelines.odometry.compute_odometry_result_point_to_plane(
-            source.points,
-            target.points,
-            target.normals,
-            target.intrinsics,
-            target_from_source,
-            max_difference_m,
-            stage.huber_m,
-        ).transformation
-        target_from_source = step @ target_from_source
-        if near(step.numpy(), np.eye(4), stage.rest_m, stage.rest_deg):
-            break
-    return target_from_source
 
 
 # Depth images hold millimetres; 0 and 65535 mean that nothing was hit.

@@ -135,14 +135,8 @@ def neighbour(i: View, j: View, previous: Array) -> tuple[Array, bool]:
         best = i.dense.refine(i.frame, j.frame, start)
     if best is not None and best.agreement >= SURE_AGREEMENT:
         return best.i_from_j, True
-    return _with_features(i, j, previous, best)
-
-
-def _with_features(i: View, j: View, previous: Array, best: Motion | None) -> tuple[Array, bool]:
-    """The better of a motion found so far and of the one that features start."""
-    start = i.from_features(j, _MIN_INLIERS)
-    if start is None:
-        start = previous
+    by_features = i.from_features(j, _MIN_INLIERS)
+    start = previous if by_features is None else by_features
     found = i.dense.refine(i.frame, j.frame, start)
     candidates = [motion for motion in (best, found) if motion is not None]
     if not candidates:

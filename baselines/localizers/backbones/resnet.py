@@ -61,7 +61,9 @@ class ResNet34(nn.Module):
         self.layer4 = _stage(three, four, 3, 2)
         self.n_stages = (one, two, three, four)
         self.n_out = four
-        self.apply(_initialise)
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d):  # He initialisation, as in the paper
+                nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
 
     def forward(self, images: Tensor) -> ResNetMaps:
         """Feature maps of normalised images (B, 3, H, W)."""
@@ -75,9 +77,3 @@ def _stage(n_in: int, n_out: int, blocks: int, stride: int) -> nn.Sequential:
     """Basic blocks of which the first changes the resolution and the channels."""
     first = BasicBlock(n_in, n_out, stride)
     return nn.Sequential(first, *(BasicBlock(n_out, n_out, 1) for _ in range(blocks - 1)))
-
-
-def _initialise(module: nn.Module) -> None:
-    """He initialisation, as in the paper."""
-    if isinstance(module, nn.Conv2d):
-        nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")

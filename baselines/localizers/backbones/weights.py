@@ -8,7 +8,7 @@ from pathlib import Path
 
 import safetensors.torch
 import torch
-from torch import Tensor, nn
+from torch import nn
 
 from baselines.localizers.backbones.googlenet import GoogLeNet, InceptionBackbone
 from baselines.localizers.backbones.inception_v3 import InceptionV3
@@ -60,7 +60,10 @@ def load_backbone_weights(backbone: nn.Module, path: Path) -> None:
         InputError: the file cannot be read as a state dict, or belongs to another shape of network.
     """
     try:
-        state = _read_state(path)
+        if path.suffix == ".safetensors":
+            state = safetensors.torch.load_file(path)
+        else:
+            state = torch.load(path, map_location="cpu", weights_only=True)
         state = {k: v for k, v in state.items() if not k.startswith(CLASSIFIERS)}
     except Exception as error:  # torch.load raises whatever the broken file provokes
         problem = why(error) if isinstance(error, OSError) else "torch did not save it, or as code"
@@ -73,13 +76,6 @@ def load_backbone_weights(backbone: nn.Module, path: Path) -> None:
             f"{path}: does not fit {type(backbone).__name__} of this network.width ({unfit}); "
             "train the backbone again, or set the width it was trained with"
         ) from None
-
-
-def _read_state(path: Path) -> dict[str, Tensor]:
-    if path.suffix == ".safetensors":
-        return safetensors.torch.load_file(path)
-    state: dict[str, Tensor] = torch.load(path, map_location="cpu", weights_only=True)
-    return state
 
 
 def _download(url: str, path: Path) -> None:
