@@ -165,21 +165,25 @@ def arrays(mesh):
 def test_what_is_closed_has_a_volume_with_a_sign():
     vertices, faces = arrays(trimesh.creation.box((2.0, 3.0, 4.0)))
     outward = mesh_topology(vertices + 1e3, faces)
-    assert (outward.components, outward.boundary_edges, outward.non_manifold_edges) == (1, 0, 0)
-    assert outward.watertight
-    assert outward.hole_lengths_m == ()
-    assert outward.enclosed_volume_m3 == pytest.approx(24.0)
-    assert mesh_topology(vertices, faces[:, ::-1]).enclosed_volume_m3 == pytest.approx(-24.0)
+    assert (outward["components"], outward["boundary_edges"], outward["non_manifold_edges"]) == (
+        1,
+        0,
+        0,
+    )
+    assert outward["watertight"]
+    assert outward["hole_lengths_m"] == []
+    assert outward["enclosed_volume_m3"] == pytest.approx(24.0)
+    assert mesh_topology(vertices, faces[:, ::-1])["enclosed_volume_m3"] == pytest.approx(-24.0)
     vertices, faces = arrays(trimesh.creation.box())
     faces[3] = faces[3, ::-1]
     topology = mesh_topology(vertices, faces)
-    assert topology.watertight
-    assert topology.enclosed_volume_m3 is None
+    assert topology["watertight"]
+    assert topology["enclosed_volume_m3"] is None
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]])
     topology = mesh_topology(vertices, np.array([[0, 1, 2], [0, 1, 3], [1, 0, 4]]))
-    assert topology.non_manifold_edges == 1
-    assert topology.boundary_edges == 6
-    assert topology.enclosed_volume_m3 is None
+    assert topology["non_manifold_edges"] == 1
+    assert topology["boundary_edges"] == 6
+    assert topology["enclosed_volume_m3"] is None
 
 
 def test_holes_are_measured_along_their_rims_as_by_counting():
@@ -187,11 +191,13 @@ def test_holes_are_measured_along_their_rims_as_by_counting():
     vertices, faces = arrays(box)
     normals = np.asarray(box.face_normals)
     tube = mesh_topology(vertices, faces[np.abs(normals[:, 2]) < 0.5])
-    assert tube.hole_lengths_m == pytest.approx([10.0, 10.0])
+    assert tube["hole_lengths_m"] == pytest.approx([10.0, 10.0])
     lid_and_side = (normals[:, 2] > 0.5) | (normals[:, 0] > 0.5)
     cut = mesh_topology(vertices, faces[~lid_and_side])
-    assert cut.hole_lengths_m == pytest.approx([10.0 + 14.0 - 2 * 3.0])  # their common edge is gone
-    assert not cut.watertight
+    assert cut["hole_lengths_m"] == pytest.approx(
+        [10.0 + 14.0 - 2 * 3.0]
+    )  # their common edge is gone
+    assert not cut["watertight"]
     rng = np.random.default_rng(5)
     pieces = [trimesh.creation.icosphere(2).apply_translation([4.0 * i, 0, 0]) for i in range(3)]
     vertices, faces = arrays(trimesh.util.concatenate(pieces))
@@ -200,7 +206,7 @@ def test_holes_are_measured_along_their_rims_as_by_counting():
     rim = [edge for edge, count in edges.items() if count == 1]
     length = sum(float(np.linalg.norm(np.subtract(*vertices[list(edge)]))) for edge in rim)
     topology = mesh_topology(vertices, faces)
-    assert topology.components == 3
-    assert topology.boundary_edges == len(rim) > 0
-    assert sum(topology.hole_lengths_m) == pytest.approx(length)
-    assert list(topology.hole_lengths_m) == sorted(topology.hole_lengths_m, reverse=True)
+    assert topology["components"] == 3
+    assert topology["boundary_edges"] == len(rim) > 0
+    assert sum(topology["hole_lengths_m"]) == pytest.approx(length)
+    assert list(topology["hole_lengths_m"]) == sorted(topology["hole_lengths_m"], reverse=True)

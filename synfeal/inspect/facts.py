@@ -41,8 +41,8 @@ def facts_of(found: Inspection) -> dict[str, Any]:
     detail, collect, box = detail_of(mesh), None, None
     area_m2, surface = detail["area_m2"], found.surface
     floors_m2 = floor_areas_m2(surface.normal, surface.position_m, sum(area_m2.values()))
-    topology = asdict(mesh_topology(*merge_vertices(*mesh.merged())))
-    lengths = list(topology.pop("hole_lengths_m"))
+    topology = mesh_topology(*merge_vertices(*mesh.merged()))
+    lengths = topology.pop("hole_lengths_m")
     if suggestion is not None:  # the command, and what planning it once showed
         box = dict(zip("xyz", suggestion.box_m.T.tolist(), strict=True))
         command = suggestion.command(f"{slug_of(title)}-frames")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -43,45 +42,34 @@ Vertices = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
-@dataclass(frozen=True)
-class Topology:
-    """What edges say about a mesh whose seam copies are merged."""
-
-    components: int  # pieces of triangles joined at vertices
-    boundary_edges: int  # edges of exactly one triangle
-    non_manifold_edges: int  # edges of more than two triangles
-    # length of the rim of each hole, longest first; a hole is a set of boundary edges joined at
-    # vertices, so holes that touch count as one
-    hole_lengths_m: tuple[float, ...]
-    watertight: bool  # whether every edge belongs to exactly two triangles
-    # the signed volume inside, negative where triangles face inwards, as the walls of a room do;
-    # None unless the mesh is watertight and neighbours face one side
-    enclosed_volume_m3: float | None
-
-
-def mesh_topology(vertices_m: Vertices, faces: Indices) -> Topology:
-    """Topology of triangles (F, 3) over vertices (V, 3) in metres, with seam copies merged.
+def mesh_topology(vertices_m: Vertices, faces: Indices) -> dict[str, Any]:
+    """What edges say about triangles (F, 3) over vertices (V, 3) in metres, seam copies merged.
 
     Copies of a vertex along a texture seam would show as a hole: merge them first, with
-    :func:`synfeal.mesh.triangles.merge_vertices`.
+    :func:`synfeal.mesh.triangles.merge_vertices`. ``enclosed_volume_m3`` is signed, negative where
+    triangles face inwards, as the walls of a room do; None unless the mesh is watertight and
+    neighbours face one side.
     """
     directed = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     edges, n_faces = _counted(np.sort(directed, axis=1), len(vertices_m))
-    boundary = edges[n_faces == 1]
+    rim = edges[n_faces == 1]
+    length_m = np.linalg.norm(vertices_m[rim[:, 0]] - vertices_m[rim[:, 1]], axis=1)
+    holes_m = np.bincount(_group(rim)[1], weights=length_m)
     watertight = len(edges) > 0 and bool((n_faces == 2).all())
-    consistent = watertight and bool((_counted(directed, len(vertices_m))[1] == 1).all())
     volume_m3 = None
-    if consistent:  # the sum over the tetrahedra between each triangle and one point
+    if watertight and (_counted(directed, len(vertices_m))[1] == 1).all():
+        # The sum over the tetrahedra between each triangle and one point.
         a, b, c = np.moveaxis(vertices_m[faces] - vertices_m.mean(axis=0), 1, 0)
         volume_m3 = float(np.sum(a * np.cross(b, c)) / 6.0)
-    return Topology(
-        components=_group(edges)[0],
-        boundary_edges=len(boundary),
-        non_manifold_edges=int((n_faces > 2).sum()),
-        hole_lengths_m=_hole_lengths_m(vertices_m, boundary),
-        watertight=watertight,
-        enclosed_volume_m3=volume_m3,
-    )
+    return {
+        "components": _group(edges)[0],  # pieces of triangles joined at vertices
+        "boundary_edges": len(rim),  # of exactly one triangle
+        "non_manifold_edges": int((n_faces > 2).sum()),  # of more than two
+        # Of the rim of each hole, longest first; holes that touch count as one.
+        "hole_lengths_m": np.sort(holes_m)[::-1].tolist(),
+        "watertight": watertight,  # every edge belongs to exactly two triangles
+        "enclosed_volume_m3": volume_m3,
+    }
 
 
 def _counted(pairs: Indices, n_vertices: int) -> tuple[Indices, Indices]:
@@ -98,11 +86,3 @@ def _group(edges: Indices) -> tuple[int, Indices]:
     graph = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(used),) * 2)
     count, group = connected_components(graph, directed=False)
     return int(count), group[ends[:, 0]].astype(np.int64)
-
-
-def _hole_lengths_m(vertices_m: Vertices, boundary: Indices) -> tuple[float, ...]:
-    if not len(boundary):
-        return ()
-    length = np.linalg.norm(vertices_m[boundary[:, 0]] - vertices_m[boundary[:, 1]], axis=1)
-    total = np.bincount(_group(boundary)[1], weights=length)
-    return tuple(np.sort(total)[::-1].tolist())
