@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from synfeal.config import check_mesh_files, load_config
+from synfeal.config import load_config
 from synfeal.config.load import read_yaml
-from synfeal.config.models import SceneConfig
 from synfeal.errors import InputError
 from synfeal.mesh.checks import check_sampling_box, repaired
 from synfeal.mesh.load import load_mesh
@@ -34,20 +33,6 @@ def test_sampling_box_must_fit_the_mesh(scale, shift, message):
     with pytest.raises(InputError, match=message) as caught:
         check_sampling_box(box, bounds, "scenes.room")
     assert "unit_m" in str(caught.value)
-
-
-def test_the_first_missing_mesh_is_named(tmp_path):
-    (tmp_path / "here.glb").write_bytes(b"anything")
-    scenes = {
-        "stand_in": SceneConfig(source="procedural", builder="sanctuary"),
-        "present": SceneConfig(source="mesh", path=tmp_path / "here.glb"),
-    }
-    check_mesh_files(scenes)
-    scenes["absent"] = SceneConfig(source="mesh", path=tmp_path / "gone.glb")
-    with pytest.raises(InputError) as caught:
-        check_mesh_files(scenes)
-    message = str(caught.value)
-    assert all(w in message for w in ("scenes.absent.path", "gone.glb", "config/scenes/README.md"))
 
 
 @pytest.mark.parametrize("scene", ["large_room", "sanctuary"])

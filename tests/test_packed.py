@@ -14,29 +14,17 @@ from baselines.training.data import image_statistics, read_images
 from synfeal.config.models import RenderConfig
 from synfeal.dataset.packed import (
     fit_frame,
-    join_packed,
     new_packed,
     pack_frames,
-    read_packed,
     write_packed,
 )
 from synfeal.dataset.pose_table import write_pose_table
 from synfeal.dataset.render_sequence import render_packed, render_sequence
 from synfeal.mesh.save import save_glb
 from synfeal.render.choose import BACKENDS
-from tests.test_dataset import CAMERA, ROOM, poses_of, write_frames
+from tests.test_dataset import CAMERA, ROOM, poses_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-
-
-def test_packed_frames_keep_their_order(tmp_path):
-    write_frames(tmp_path / "seq-01", [1, 2, 3])
-    write_frames(tmp_path / "seq-02", [4, 5])
-    pack_frames([tmp_path / "seq-01", tmp_path / "seq-02"], 16, tmp_path / "train.npy")
-    frames = np.load(tmp_path / "train.npy", mmap_mode="r")
-    assert (frames.shape, frames.dtype) == ((5, 16, 16, 3), np.uint8)
-    assert frames[:, 8, 8, 0].tolist() == [1, 2, 3, 4, 5]
-    assert not list(tmp_path.glob(".*"))
 
 
 @pytest.mark.parametrize("size", [(128, 96), (96, 128), (80, 60), (101, 77)])
@@ -103,13 +91,3 @@ def test_a_large_set_is_mapped_and_holds_the_same_images(frames, monkeypatch):
     images[5] = 0  # of this process alone
     assert frames.read_bytes() == before
     assert torch.equal(read_images(frames, N, PX, CPU)[:4], read[:4])
-
-
-def test_joined_frames_are_those_of_numpy_to_the_byte(frames, tmp_path):
-    content = read_packed(frames)
-    for name, part in (("a", content[:7]), ("b", content[7:])):
-        np.save(tmp_path / f"{name}.npy", part)
-    joined = tmp_path / "joined.npy"
-    join_packed([tmp_path / "a.npy", tmp_path / "b.npy"], joined)
-    assert joined.read_bytes() == frames.read_bytes()
-    np.testing.assert_array_equal(np.load(joined), content)

@@ -12,10 +12,7 @@ from synfeal.config.models import Angles, Box, CollectionConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
-from synfeal.planning.path import (
-    path_poses,
-    poses_of,
-)
+from synfeal.planning.path import path_poses, poses_of
 from synfeal.planning.plan import box_array, plan_split
 from synfeal.planning.repeat import read_poses, repeated_poses
 from synfeal.planning.space import (

@@ -192,20 +192,6 @@ def test_nodes_that_are_upside_down_find_their_way(name):
     assert position_m.max() < 1e-4
 
 
-@pytest.mark.parametrize("name", OPTIMISERS)
-def test_information_over_twelve_orders_of_magnitude_stays_finite(name):
-    truth, graph = walk_graph(0.0)
-    rng = np.random.default_rng(2)
-    scale = 10.0 ** rng.uniform(-6, 6, len(graph.edges))
-    edges = tuple(
-        Edge(e.i, e.j, e.i_from_j, s * np.eye(6)) for e, s in zip(graph.edges, scale, strict=True)
-    )
-    start = truth @ np.array([small_motion(rng, 0.01, 0.0) for _ in truth])
-    start[0] = np.eye(4)
-    noisy = PoseGraph(start, edges)
-    assert chi2(noisy, OPTIMISERS[name](noisy)) < 1e-3 * chi2(noisy, start)  # and no NaN
-
-
 @few
 @given(seeds, st.integers(2, 6), poses_near)
 def test_residuals_vanish_at_the_truth_and_see_no_common_motion(seed, count, world):

@@ -11,12 +11,7 @@ from synfeal.config.models import CollectionConfig, SceneConfig
 from synfeal.errors import InputError
 from synfeal.mesh.triangles import load_collision_mesh, save_collision_mesh
 from synfeal.planning.coverage import plan_coverage, scene_coverage
-from synfeal.planning.plan import (
-    plan_mesh,
-    plan_split,
-    sampling_box_of,
-    sampling_boxes_of,
-)
+from synfeal.planning.plan import plan_mesh, plan_split, sampling_box_of, sampling_boxes_of
 from synfeal.planning.space import (
     PoseSpace,
     Questions,

@@ -3,7 +3,6 @@
 import xml.etree.ElementTree as ET
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from baselines.references.descriptors import write_descriptors
@@ -14,14 +13,12 @@ from synfeal.config.effects import CLEAN, MIXED
 from synfeal.config.models import ExternalConfig
 from synfeal.dataset.packed import new_packed
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
-from synfeal.errors import InputError
 from synfeal.files import write_json
 from synfeal.frames import read_frame, write_frame
 from synfeal.report import robustness
 from synfeal.report.columns import side_sheet
 from synfeal.report.figures.error_by_method import references_by_noise
 from synfeal.report.html.tables import side_html
-from synfeal.report.layouts import label_title
 from synfeal.report.references import (
     crossing_finding,
     read_references,
@@ -125,15 +122,6 @@ def test_the_finding_counts_the_localizers_that_are_closer(table):
     failed.loc[failed.method == "structure-depth", "orientation_deg_true"] = None
     assert "2 in position and 5 in orientation at 0.1 m and 5°" in crossing_finding(failed)
     assert crossing_finding(table[table.noise_m == 0]) == ""
-
-
-def test_label_sets_are_called_by_their_noise_and_a_bad_table_is_refused(tmp_path):
-    assert label_title("bend-p0.075-r0") == "bend 0.075 m, 0°"
-    assert label_title("sfm") == "SfM"
-    path = tmp_path / "references.csv"
-    pd.DataFrame({"scene": ["a"]}).to_csv(path)
-    with pytest.raises(InputError, match=r"references.csv: column .* missing"):
-        read_references(path)
 
 
 PX = 32

@@ -17,7 +17,6 @@ from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render import choose, opengl_part
-from synfeal.render import opengl_backend as opengl
 from synfeal.render.opengl_backend import OpenglRenderer, clip_from_cam, shared_context
 from synfeal.render.opengl_part import FACES_PER_CHUNK, chunks_of, visible_runs
 from tests.small_room import (
@@ -214,34 +213,3 @@ def test_textures_and_images_beyond_the_devices_limit(monkeypatch):
     monkeypatch.setitem(shared_context().info, "GL_MAX_TEXTURE_SIZE", 128)
     with pytest.raises(InputError, match=r"camera: 64x48 pixels at 3 .* lower render\.supersamp"):
         OpenglRenderer(soup(10), camera_of(), RenderConfig(supersampling=3))
-
-
-@needs_opengl
-def test_closing_frees_the_device(monkeypatch):
-    """Every object the renderer asked the context for is released by its end."""
-    context = shared_context()
-    with context:
-        context.gc()  # what other tests left
-    made, freed = [], []
-
-    class Recorder:
-        def __getattr__(self, name):
-            value = getattr(context, name)
-            if name in ("buffer", "texture", "program", "vertex_array", "renderbuffer") or (
-                "framebuffer" in name or name == "depth_renderbuffer"
-            ):
-                return lambda *args, **kwargs: made.append(name) or value(*args, **kwargs)
-            return (lambda: freed.append(value())) if name == "gc" else value
-
-        def __enter__(self):
-            return context.__enter__()
-
-        def __exit__(self, *error):
-            return context.__exit__(*error)
-
-    monkeypatch.setattr(opengl, "shared_context", Recorder)
-    with OpenglRenderer(soup(50), CAMERA) as renderer:
-        renderer.render_rgbd(LOOK_ALONG_X)
-    assert len(made) > 15
-    attached = 2 * made.count("simple_framebuffer")  # buffers that it makes by itself
-    assert freed == [len(made) + attached]

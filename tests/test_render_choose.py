@@ -14,14 +14,7 @@ from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render import choose, open_renderer
 from synfeal.render.base import pieces
-from tests.small_room import (
-    BACKENDS,
-    LOOK_ALONG_X,
-    PYOPENGL_WARNS,
-    camera_of,
-    colored,
-    facing_quad,
-)
+from tests.small_room import BACKENDS, LOOK_ALONG_X, PYOPENGL_WARNS, camera_of, colored, facing_quad
 
 pytestmark = pytest.mark.filterwarnings(PYOPENGL_WARNS)
 

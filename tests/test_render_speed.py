@@ -89,28 +89,6 @@ def test_every_working_backend_is_measured_and_one_variant_is_chosen(lines):
             assert counts == ([] if slow and camera is LARGE else list(speed.SUPERSAMPLING[name]))
 
 
-def test_less_detail_is_further_off(lines):
-    for camera in (SMALL, LARGE):
-        used, *others = [line for line in lines if line.width == camera.width]
-        textures = [line for line in others if line.texture_scale < 1.0]
-        assert [line.texture_scale for line in textures] == [0.5, 0.25]
-        assert textures[1].mean_abs_error > textures[0].mean_abs_error
-        assert textures[1].mean_abs_error > used.mean_abs_error
-        assert textures[1].depth_error_mm == used.depth_error_mm
-        fewer = [line for line in others if line.faces < used.faces]
-        assert len(fewer) == (2 if SIMPLIFIES else 0)
-        for line, share in zip(fewer, (0.5, 0.25), strict=False):
-            assert line.faces == pytest.approx(share * used.faces, rel=0.1)
-
-
-def test_without_the_simplifier_the_rest_is_measured_and_it_says_so(monkeypatch, caplog):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    mesh = room()
-    found = speed.less_detailed(speed.Variant(mesh, RenderConfig()))
-    assert [variant.texture_scale for variant in found] == [0.5, 0.25]
-    assert "pip install meshoptimizer" in caplog.text
-
-
 def test_speeds_are_told_in_turns_with_the_chosen(monkeypatch):
     """A machine that grows slower while it measures changes no ratio."""
 

@@ -17,7 +17,7 @@ from synfeal.report.figures.error_by_design import (
     published_values,
 )
 from synfeal.report.figures.speed_vs_error import pareto_front
-from synfeal.report.figures.style import METHOD_STYLES, MODEL_STYLES, PUBLISHED, SPLIT_STYLES
+from synfeal.report.figures.style import PUBLISHED
 from synfeal.report.layouts import TITLES
 from tests.report_results import ROWS, design_of
 
@@ -201,10 +201,3 @@ def test_speed_vs_error_joins_the_front_rings_the_choice_and_fills_the_best():
         np.testing.assert_array_equal(drawn[name].get_xydata(), [[speed, error]])
     hollow = {name for name, line in drawn.items() if line.get_markerfacecolor() == "none"}
     assert hollow == {"Hourglass"}
-
-
-@pytest.mark.parametrize("styles", [MODEL_STYLES, METHOD_STYLES, SPLIT_STYLES])
-def test_styles_differ_without_their_colours(styles):
-    for key in ("color", "marker", "linestyle"):
-        values = [str(style[key]) for style in styles.values() if key in style]
-        assert len(set(values)) == len(values)

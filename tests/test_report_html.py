@@ -15,12 +15,7 @@ from synfeal.errors import InputError
 from synfeal.files import read_json, write_json
 from synfeal.report.cells import read_cells
 from synfeal.report.html import page
-from synfeal.report.html.page import (
-    LARGEST_SIDE_PX,
-    data_address,
-    figure_files,
-    missing_rows,
-)
+from synfeal.report.html.page import LARGEST_SIDE_PX, data_address, figure_files, missing_rows
 from synfeal.report.html.tables import claims_table, read_claims, score_table
 from tests.report_page import large_room_design, page_results
 from tests.report_results import (

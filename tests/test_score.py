@@ -84,15 +84,6 @@ def test_on_the_common_test_set_each_frame_is_compared_with_its_own_true_pose(tm
         score_run(*others, {})
 
 
-def test_the_baseline_predicts_the_mean_training_position(score):
-    test = random_table(N, 3)
-    train = random_table(60, 4)
-    distances = np.sort(np.sqrt(((test.position_m - train.position_m.mean(0)) ** 2).sum(1)))
-    metrics, _ = score(test, test, test, train)
-    assert metrics["baseline_position_m_true"] == pytest.approx(distances[19:21].mean())
-    assert metrics["n_train"] == 60
-
-
 def test_the_mean_pose_and_the_true_poses_are_scored_against_the_labels_too(score):
     """Cameras turned by -20, 0 and 20 degrees about one axis have no rotation for their mean."""
     turns = np.radians([-20.0, 0.0, 20.0] * 5)

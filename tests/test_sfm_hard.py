@@ -154,19 +154,6 @@ def test_a_missing_image_and_one_of_another_size_are_named(tmp_path):
         sfm_batch(paths, told, poses, CFG, 0)
 
 
-def test_a_model_that_explains_enough_is_taken_at_once_else_four_starts_are_compared(tmp_path):
-    poses = sideways(4)
-    paths = write(tmp_path, poses)
-    by_share = {
-        share: sfm_batch(paths, CAMERA, poses, CFG.model_copy(update={"min_explained": share}), 0)[
-            1
-        ]
-        for share in (0.0, 1.0)
-    }
-    assert (by_share[0.0]["starts"], by_share[1.0]["starts"]) == (1, 4)
-    assert by_share[1.0]["explained"] >= by_share[0.0]["explained"] > 0.5
-
-
 def test_labels_are_the_same_bytes_whatever_threads_are_allowed(tmp_path):
     poses = sideways(5, turn_deg=2.0)
     np.save(tmp_path / "poses.npy", poses)

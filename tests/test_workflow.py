@@ -77,13 +77,6 @@ def test_the_stretch_profile_labels_with_every_method_and_trains_nothing(tmp_pat
     assert jobs["figures"] == 1
 
 
-def test_labels_of_the_papers_profile_come_from_34_batches_and_no_training(tmp_path):
-    jobs = planned_jobs(tmp_path, "--configfile", "config/paper.yaml", "--", "labels")
-    assert jobs["sfm"] == jobs["rgbd"] == 24 + 10  # 6,000 and 2,500 frames in batches of 250
-    assert jobs["posegraph"] == 2 * 34
-    assert not {"train", "score", "pretrain", "figures"} & set(jobs)
-
-
 def test_changing_one_noise_level_adds_only_that_rows_jobs(tmp_path):
     changed = tmp_path / "experiments.csv"
     shutil.copy(ROOT / "config/experiments.csv", changed)
