@@ -23,8 +23,8 @@ DESIGN = "table,block,scene,size,labels,noise_m,noise_deg,init\n"
 GOOD = "table4_size,,large_room,6k,synfeal,0,0,pretrained"
 
 
-def edge(i, j, w=1, n=21):
-    return f"EDGE_SE3:QUAT {i} {j} 0 0 0 0 0 0 {w}" + n * " 1" + "\n"
+def edge(i, j, w=1):
+    return f"EDGE_SE3:QUAT {i} {j} 0 0 0 0 0 0 {w}" + 21 * " 1" + "\n"
 
 
 def design(line):
