@@ -18,7 +18,7 @@ import yaml
 import synfeal
 from synfeal.config.dataset import DatasetConfig
 from synfeal.config.models import CameraConfig
-from synfeal.dataset.finish import finish, origin_of
+from synfeal.dataset.finish import MANIFEST, finish_dataset, origin_of
 from synfeal.dataset.frame_files import SUFFIX
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.render_pool import Studio, render_sequences
@@ -134,9 +134,16 @@ def collect(job: CollectJob, workers: int = 1) -> None:
         _prepare(job, scene)
         plans = _plan(job, scene, part)
         _render(job, plans, scene / "mesh.glb", part, workers)
-        config, origin = job.config, origin_of(job.config, job.scene)
-        camera, mesh = config.network_camera, scene / "mesh.glb"
-        finish(part, job.counts, config.shard_frames, camera, mesh, origin, job.packed_px)
+        finish_dataset(
+            scene / "mesh.glb",
+            [part / f"{split}.csv" for split in plans],
+            job.config.network_camera,
+            job.counts,
+            job.config.shard_frames,
+            origin_of(job.config, job.scene),
+            part / MANIFEST,
+            packed_px=job.packed_px,
+        )
 
 
 def _prepare(job: CollectJob, scene: Path) -> None:

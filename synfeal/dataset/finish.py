@@ -25,54 +25,34 @@ CLUTTER = "clutter.json"  # beside the mesh: which objects stand about in it, an
 
 
 def finish_dataset(
-    mesh: Path,
-    plans: Sequence[Path],
-    camera: CameraConfig,
-    counts: Mapping[Split, int],
-    shard_frames: int,
-    origin: Mapping[str, Any],
-    out_manifest: Path,
-    coverage: Sequence[Path] = (),
+    mesh: Path,  # ``mesh.glb`` of the scene; the manifest names its hash
+    plans: Sequence[Path],  # of the splits that have frames, in the order of ``counts``
+    camera: CameraConfig,  # the camera of the frames
+    counts: Mapping[Split, int],  # frames of each split
+    shard_frames: int,  # frames of a sequence
+    origin: Mapping[str, Any],  # where they come from, see :func:`origin_of`
+    out_manifest: Path,  # beside the sequences
+    coverage: Sequence[Path] = (),  # what each plan covers, if that is to be written
+    packed_px: int | None = None,  # side of packed frames that are written too, pixels, if any
 ) -> None:
-    """:func:`finish` sequences, after what is known of their plans was put beside them.
+    """Write what is made of all frames together beside the sequences of a data set.
 
-    ``plans`` are those of the splits that have frames, in the order of ``counts``; ``coverage`` is
-    what each of them covers, if that is known; ``out_manifest`` lies beside the sequences.
+    Poses with the names of the images, their coverage, split files, contact sheet, manifest.
     """
     directory = out_manifest.parent
     splits: list[Split] = [split for split, count in counts.items() if count]
-    for split, plan in zip(splits, plans, strict=True):
-        write_pose_table(directory / f"{split}.csv", read_frames(plan, 0, counts[split]))
-    if coverage:
-        covered = {s: read_json(path) for s, path in zip(splits, coverage, strict=True)}
-        write_json(directory / "coverage.json", covered)
-    finish(directory, counts, shard_frames, camera, mesh, origin)
-
-
-def finish(
-    directory: Path,  # where the sequences lie
-    counts: Mapping[Split, int],  # frames of each split
-    shard_frames: int,  # frames of a sequence
-    camera: CameraConfig,  # the camera of the frames
-    mesh: Path,  # ``mesh.glb`` of the scene; the manifest names its hash
-    origin: Mapping[str, Any],  # where they come from, see :func:`origin_of`
-    packed_px: int | None = None,  # side of packed frames that are written too, pixels, if any
-) -> None:
-    """Write split files, contact sheet and manifest beside the sequences of a data set.
-
-    Its tables of poses name the images from then on.
-    """
     sequences = sequences_of(counts["train"], counts["test"], shard_frames)
     paths = {s: sequence_at(directory / s.name) for s in sequences}
     write_splits(directory, sequences)
-    for split in dict.fromkeys(sequence.split for sequence in sequences):
-        table = directory / f"{split}.csv"
-        images = [image for s in sequences if s.split == split for image in s.images]
-        write_pose_table(table, read_pose_table(table), images)
-    if packed_px is not None:
-        for split in {sequence.split for sequence in sequences}:
-            chosen = [path for s, path in paths.items() if s.split == split]
-            pack_frames(chosen, packed_px, directory / f"{split}.npy")
+    for split, plan in zip(splits, plans, strict=True):
+        own = [s for s in sequences if s.split == split]
+        images = [image for s in own for image in s.images]
+        write_pose_table(directory / f"{split}.csv", read_frames(plan, 0, counts[split]), images)
+        if packed_px is not None:
+            pack_frames([paths[s] for s in own], packed_px, directory / f"{split}.npy")
+    if coverage:
+        covered = {s: read_json(path) for s, path in zip(splits, coverage, strict=True)}
+        write_json(directory / "coverage.json", covered)
     write_contact_sheet(frame_paths(list(paths.values()), "color.png"), directory / "preview.png")
     about = {"mesh_sha256": file_sha256(mesh), **origin, **_write_effects(directory, origin, mesh)}
     clutter = mesh.with_name(CLUTTER)

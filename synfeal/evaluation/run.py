@@ -66,8 +66,7 @@ class Evaluation:
 def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
     """Score poses."""
     frames = read_scored_frames(dataset, settings.split)
-    estimates, matched, convention = _read(poses, frames, settings, settings.convention)
-    predicted = _of_frames(estimates, matched, convention)
+    estimates, matched, convention, predicted = _read(poses, frames, settings, settings.convention)
     yardsticks = {DATASET: frames.world_from_cam}
     if settings.labels:
         yardsticks[LABELS] = _labels(settings.labels, frames, settings)
@@ -90,29 +89,25 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
 
 def _read(
     path: Path, frames: ScoredFrames, settings: Settings, convention: str | None
-) -> tuple[Estimates, Matched, Convention]:
-    """Estimates, which frame each is of, and as what they are taken."""
+) -> tuple[Estimates, Matched, Convention, Array]:
+    """Estimates, which frame each is of, as what they are taken, and poses (N, 4, 4) of the frames.
+
+    These are not a number where there is none.
+    """
     estimates = read_estimates(path)
     matched = match(frames, estimates, path, settings.rate_hz)
-    if convention:
-        return estimates, matched, CONVENTIONS[convention]
-    if settings.align == "none":
-        there = matched.row >= 0
+    there = matched.row >= 0
+    if not convention and settings.align == "none":
         checked_convention(path, estimates, matched.row[there], frames.world_from_cam[there])
-    return estimates, matched, estimates.convention
-
-
-def _of_frames(estimates: Estimates, matched: Matched, convention: Convention) -> Array:
-    """Poses (N, 4, 4) of the frames, not a number where there is none."""
-    poses = estimates.world_from_cam(convention)[matched.row]
-    poses[matched.row < 0] = np.nan
-    return poses
+    taken = CONVENTIONS[convention] if convention else estimates.convention
+    poses = estimates.world_from_cam(taken)[matched.row]
+    poses[~there] = np.nan
+    return estimates, matched, taken, poses
 
 
 def _labels(path: Path, frames: ScoredFrames, settings: Settings) -> Array:
     """Poses (N, 4, 4) of a second yardstick, which must have every frame."""
-    estimates, matched, convention = _read(path, frames, settings, None)
-    poses = _of_frames(estimates, matched, convention)
+    *_, poses = _read(path, frames, settings, None)
     lost = np.flatnonzero(~np.isfinite(poses).all(axis=(1, 2)))
     if len(lost):
         raise InputError(

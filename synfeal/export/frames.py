@@ -98,7 +98,12 @@ def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
         ExportFrame(frame, poses[frame], split_of.get(frame.sequence))
         for frame in frames_of(sequences)
     )
-    _check_size(frames[0].color, camera.config)
+    height, width = read_color(frames[0].color).shape[:2]
+    if (width, height) != (camera.config.width, camera.config.height):
+        raise InputError(
+            f"{frames[0].color}: is {width} x {height}, the camera is {camera.config.width} x"
+            f" {camera.config.height}; give the camera of these images with --camera"
+        )
     has_depth = DEPTH in kinds_of(sequences)
     return ExportSet(dataset, camera.config, frames, has_depth, bool(splits))
 
@@ -110,15 +115,6 @@ def need_splits(data: ExportSet) -> None:
             raise InputError(
                 f"{data.path / name}: lists no frame; this format needs {split} frames"
             )
-
-
-def _check_size(path: FrameFile, camera: CameraConfig) -> None:
-    height, width = read_color(path).shape[:2]
-    if (width, height) != (camera.width, camera.height):
-        raise InputError(
-            f"{path}: is {width} x {height}, the camera is {camera.width} x {camera.height};"
-            " give the camera of these images with --camera"
-        )
 
 
 def frame_name(frame: ExportFrame) -> str:

@@ -161,8 +161,13 @@ def plan_coverage(
     """
     caster = RayCaster(*mesh)
     boxes_m = np.reshape(boxes_m, (-1, 2, 3))
+    sampled = [
+        PoseSpace(caster, pose_bounds(box_m, scene.angles), 0.0, np.random.default_rng(0))
+        for box_m in boxes_m
+    ]
     try:
-        space = ConnectedSpace(caster, np.concatenate([_hubs(caster, b, scene) for b in boxes_m]))
+        hubs_m = [connected_space(space, MAX_TRIES).hubs_m for space in sampled]
+        space = ConnectedSpace(caster, np.concatenate(hubs_m))
     except InputError:  # poses that are repeated may lie where none can be sampled
         space = ConnectedSpace(caster, plan.position_m[shown_frames(len(plan))])
     counts = seen_surface(mesh, caster, space.hubs_m, plan, camera)
@@ -181,12 +186,6 @@ def plan_coverage(
         "empty_pixels": asdict(empty_pixels(caster, plan, camera)),
         "definitions": DEFINITIONS,
     }
-
-
-def _hubs(caster: RayCaster, box_m: Array, scene: SceneConfig) -> Array:
-    """Places (H, 3) of the largest free space in a box."""
-    bounds, rng = pose_bounds(box_m, scene.angles), np.random.default_rng(0)
-    return connected_space(PoseSpace(caster, bounds, 0.0, rng), MAX_TRIES).hubs_m
 
 
 def scene_coverage(
