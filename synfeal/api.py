@@ -39,12 +39,9 @@ AnyPath = str | Path
 
 
 def load_mesh(path: AnyPath, up_axis: str = "auto", unit_m: float = 1.0) -> TexturedMesh:
-    """A textured mesh in the world frame: z up, metres.
+    """A textured mesh in the world frame, z up, metres, from a .glb, .gltf, .obj or .ply file.
 
-    Args:
-        path: .glb, .gltf, .obj or .ply.
-        up_axis: ``auto``, ``y`` or ``z``: what is up in the file.
-        unit_m: metres per unit of the file.
+    ``up_axis`` is what is up in the file: ``auto``, ``y`` or ``z``; ``unit_m`` metres per unit.
     """
     scene = SceneConfig.model_validate(
         {"source": "mesh", "path": path, "up_axis": up_axis, "unit_m": unit_m}
@@ -92,23 +89,14 @@ def plan(mesh: AnyPath, frames: int, **options: Any) -> PoseTable:
 
 def collect(
     mesh: AnyPath,
-    out: AnyPath,
-    frames: int,
+    out: AnyPath,  # directory to create
+    frames: int,  # of the training split
     *,
-    workers: int = 1,
-    packed: int | None = None,
+    workers: int = 1,  # processes that render
+    packed: int | None = None,  # side of packed frames that are written too, pixels
     **options: Any,
 ) -> Dataset:
-    """Make a data set, or go on with one that was interrupted; what ``synfeal collect`` does.
-
-    Args:
-        mesh: .glb, .gltf, .obj or .ply.
-        out: directory to create.
-        frames: training frames.
-        workers: processes that render.
-        packed: side of packed frames that are written too, pixels.
-        options: see the top of this module.
-    """
+    """Make a data set, or go on with one that was interrupted; what ``synfeal collect`` does."""
     config = _config(mesh, frames, options, Path(out))
     with options_named():
         run_collection(CollectJob(with_backend(config), packed, Path(out)), workers)
@@ -173,10 +161,7 @@ def validate(path: AnyPath, camera: AnyPath | None = None, every_pair: bool = Fa
 def evaluate(path: AnyPath, poses: AnyPath, **settings: Any) -> Evaluation:
     """How good poses are, in the field's measures; what ``synfeal evaluate`` does.
 
-    Args:
-        path: a data set.
-        poses: in any of the formats that the command reads.
-        settings: of :class:`synfeal.evaluation.run.Settings`.
+    ``settings`` are those of :class:`synfeal.evaluation.run.Settings`.
     """
     from synfeal.evaluation.run import Settings
     from synfeal.evaluation.run import evaluate as score

@@ -58,18 +58,11 @@ def over_seeds(samples: Sequence[Array], weights: Array) -> Array:
 
 
 def medians(errors: Array, path: Counts, counts: Counts) -> Array:
-    """Median of errors for each resample of their paths.
+    """Medians (B,) of errors (N,) for each resample of their paths.
 
-    An even number of frames gives the mean of the middle two. An infinite error is a failure and
-    counts as the worst; so does one that is not a number.
-
-    Args:
-        errors: (N,) of the frames.
-        path: (N,) place of each frame's path in a row of ``counts``.
-        counts: (B, P) how often each path is taken.
-
-    Returns:
-        (B,) medians.
+    ``path`` (N,) is the place of each frame's path in a row of ``counts`` (B, P), how often each
+    path is taken. An even number of frames gives the mean of the middle two. An infinite error is a
+    failure and counts as the worst; so does one that is not a number.
     """
     errors = np.where(np.isnan(errors), np.inf, errors)
     order = np.argsort(errors)

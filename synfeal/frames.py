@@ -50,17 +50,10 @@ Schema = Mapping[str, Kind]
 
 
 def read_frame(path: Path, schema: Schema, remedy: str = REMEDY, sep: str = ",") -> pd.DataFrame:
-    """The columns of a schema from a file, which may have others.
+    """The columns of a schema, in its order, from a file, which may have others.
 
-    Args:
-        path: the file.
-        schema: kinds by column, in the order of the result.
-        remedy: what to do where it cannot be used.
-        sep: what separates cells.
-
-    Raises:
-        InputError: the file is missing or no CSV, lacks a column, has a row of another length, or
-            a cell does not hold what its column does.
+    ``remedy`` is what to do where it cannot be used: the file is missing or no CSV, lacks a column,
+    has a row of another length, or a cell does not hold what its column does.
     """
     import pandas as pd
 

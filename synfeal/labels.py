@@ -58,10 +58,7 @@ def add_noise(
 def displaced(table: PoseTable, shift_m: Array, rotvec_rad: Array) -> PoseTable:
     """Poses moved and then turned in the world; where all of a part is zero it stays as it is.
 
-    Args:
-        table: the poses.
-        shift_m: displacements (N, 3) in the world.
-        rotvec_rad: rotation vectors (N, 3) in the world.
+    By displacements (N, 3) and rotation vectors (N, 3), both in the world.
     """
     position_m, quat_wxyz = table.position_m.copy(), table.quat_wxyz.copy()
     if shift_m.any():

@@ -55,12 +55,10 @@ FURTHER_BOXES = f"scenes.{SCENE}.further_boxes"
 
 
 def dataset_config(options: Mapping[str, Any], out: Path | None = None) -> DatasetConfig:
-    """The settings of a collection.
+    """The settings of a collection, by the names of ``KEYS``; None stands for the default.
 
-    Args:
-        options: values by the names of ``KEYS``; None stands for the default. ``box`` is a list of
-            boxes, each x0, x1, y0, y1, z0, z1, metres.
-        out: the data set, which gives the profile its name.
+    ``box`` is a list of boxes, each x0, x1, y0, y1, z0, z1, metres; ``out`` is the data set, which
+    gives the profile its name.
     """
     check_mesh_file(Path(options["mesh"]), "--mesh")
     values = _nested(options)

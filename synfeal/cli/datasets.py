@@ -13,8 +13,7 @@ from synfeal.errors import InputError
 
 if TYPE_CHECKING:
     from baselines.localize import Localized
-    from baselines.training.checkpoint import FrameCamera, ModelDescription
-    from synfeal.dataset.packed import View
+    from baselines.training.checkpoint import ModelDescription
 
 FORMATS = ("ace", "colmap", "hloc", "mstransformer", "nerfstudio", "tum")
 CONVENTIONS = tuple(
@@ -175,18 +174,13 @@ def model_text(description: ModelDescription) -> str:
     px, camera = description.network.input_px, description.camera
     if camera is None:
         view = "the field of view of its training frames is not known"
+    elif description.network.view == "square":
+        view = f"the short side must see {camera.short_side_fov_deg:.1f} degrees"
     else:
-        lens = ", through the same distorting lens" if any(camera.distortion) else ""
-        view = f"{_seen(camera, description.network.view)}{lens}"
-    return f"{description.localizer}, pictures shrunk to {px} x {px} pixels; {view}"
-
-
-def _seen(camera: FrameCamera, view: View) -> str:
-    """What of the world a picture must show."""
-    if view == "square":
-        return f"the short side must see {camera.short_side_fov_deg:.1f} degrees"
-    across, down = camera.fov_deg
-    return f"they must see {across:.1f} x {down:.1f} degrees, as the training frames do"
+        across, down = camera.fov_deg
+        view = f"they must see {across:.1f} x {down:.1f} degrees, as the training frames do"
+    lens = ", through the same distorting lens" if camera and any(camera.distortion) else ""
+    return f"{description.localizer}, pictures shrunk to {px} x {px} pixels; {view}{lens}"
 
 
 def poses_text(done: Localized) -> str:

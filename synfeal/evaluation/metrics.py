@@ -106,13 +106,9 @@ def cumulative(errors: Array) -> tuple[Array, Array]:
 def summary(errors: Mapping[str, Array], path: NDArray[np.int64]) -> Metrics:
     """Median, mean and recalls, each with its limits under ``_low`` and ``_high``.
 
-    Args:
-        errors: (N,) by name; ``position_m`` and ``orientation_deg`` with the same ending (``""``,
-            ``_true``) go together.
-        path: (N,) what is drawn in the bootstrap: index of each frame's path.
-
-    Returns:
-        None where a value is not finite.
+    None where a value is not finite. ``errors`` are (N,) by name; ``position_m`` and
+    ``orientation_deg`` with the same ending (``""``, ``_true``) go together. ``path`` (N,) is what
+    the bootstrap draws: the index of each frame's path.
     """
     place, counts = draws(path)
     found = {name: medians(values, place, counts) for name, values in errors.items()}
