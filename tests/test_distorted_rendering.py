@@ -14,6 +14,7 @@ from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render import open_renderer
 from synfeal.render.distorted import DistortedRenderer, covering_camera
+from tests.collected import painted
 from tests.painted_room import random_texture
 
 AHEAD = pose_matrix(rotation_from_rpy([0.0, 0.0, 0.0]), [0.0, 0.0, 0.0])
@@ -27,11 +28,8 @@ each_lens = pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
 
 
 def camera_of(lens, width=160, height=120):
-    focal = 0.75 * width
-    values = {"fx": focal, "fy": 0.99 * focal, "cx": 0.52 * width, "cy": 0.49 * height}
-    return CameraConfig.model_validate(
-        {"width": width, "height": height, "distortion": lens, **values}
-    )
+    values = {"fx": 0.75 * width, "fy": 0.7425 * width, "cx": 0.52 * width, "cy": 0.49 * height}
+    return CameraConfig(width=width, height=height, distortion=lens, **values)
 
 
 def expected_pixels(points_cam, camera):
@@ -62,15 +60,13 @@ class Analytic:
 
     def render_rgbd(self, world_from_cam):
         normalised = normalised_of_pixels(self.camera, pixel_centres(self.camera))
-        return np.zeros((*normalised.shape[:2], 3), np.uint8), self.depth(normalised).astype(
-            np.float32
-        )
+        black = np.zeros((*normalised.shape[:2], 3), np.uint8)
+        return black, self.depth(normalised).astype(np.float32)
 
 
 def noise_colour(normalised):
-    return map_coordinates(
-        NOISE, [normalised[..., 1] * 240, normalised[..., 0] * 240], order=1, mode="wrap"
-    )
+    row_column = np.moveaxis(240 * normalised[..., ::-1], -1, 0)
+    return map_coordinates(NOISE, row_column, order=1, mode="wrap")
 
 
 NOISE = random_texture(np.random.default_rng(0))
@@ -146,17 +142,14 @@ def test_depth_is_never_between_two_surfaces(lens):
 
 @each_lens
 def test_a_closed_room_fills_the_image(lens):
-    box = trimesh.creation.box((4.0, 4.0, 4.0))
-    rgb = np.full((8, 3), 200, np.uint8)
-    room = MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces), vertex_rgb=rgb)
-    with open_renderer(TexturedMesh((room,)), camera_of(lens)) as renderer:
+    camera = camera_of(lens)
+    room = painted(trimesh.creation.box((4.0, 4.0, 4.0)), (200, 200, 200))
+    with open_renderer(room, camera) as renderer:
         seen, depth = renderer.render_rgbd(AHEAD)
         np.testing.assert_array_equal(renderer.render(AHEAD), seen)
     assert (seen.shape, seen.dtype) == ((120, 160, 3), np.uint8)
     assert (np.abs(seen.astype(int) - 200) <= 1).all()
-    ahead = (
-        np.abs(normalised_of_pixels(camera_of(lens), pixel_centres(camera_of(lens)))).max(-1) < 0.95
-    )
+    ahead = np.abs(normalised_of_pixels(camera, pixel_centres(camera))).max(-1) < 0.95
     np.testing.assert_allclose(depth[ahead], 2.0, atol=1e-3)  # the wall that faces the camera
 
 

@@ -8,7 +8,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from baselines.training.score import score_run
-from synfeal.config import Design, Experiment
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import write_pose_table
 from synfeal.errors import InputError
@@ -23,9 +22,11 @@ from synfeal.evaluation.reprojection import (
     write_cell_depth,
 )
 from synfeal.frames import read_frame
+from synfeal.geometry.poses import pose_matrix
 from synfeal.mesh.rays import RayCaster
 from synfeal.report.recall import COLUMNS, SCHEMA, recall_table, write_recall_table
 from tests.property_support import table_of
+from tests.report_results import design_of, experiment
 
 CAMERA = CameraConfig(width=128, height=96, horizontal_fov_deg=60.0)
 LENS = CAMERA.model_copy(update={"distortion": (0.1, -0.05, 0.001, -0.002, 0.01)})
@@ -48,11 +49,9 @@ FRAMES = (
 
 
 def test_recalls_of_known_frames_and_their_limits():
-    errors = {
-        "position_m": np.array([frame[0] for frame in FRAMES]),
-        "orientation_deg": np.array([frame[1] for frame in FRAMES]),
-    }
-    expected = np.array([frame[2].split() for frame in FRAMES]).astype(int)
+    position_m, orientation_deg, bounds = zip(*FRAMES, strict=True)
+    errors = {"position_m": np.array(position_m), "orientation_deg": np.array(orientation_deg)}
+    expected = np.array([line.split() for line in bounds]).astype(int)
     for column, bound in enumerate(BOUNDS):
         np.testing.assert_array_equal(within(errors, bound), expected[:, column])
     found = summary(errors, np.arange(len(FRAMES)))
@@ -74,11 +73,8 @@ def test_recalls_of_known_frames_and_their_limits():
 
 def random_poses(count, spread_m, angle_deg, seed):
     rng = np.random.default_rng(seed)
-    poses = np.tile(np.eye(4), (count, 1, 1))
     turn = Rotation.from_rotvec(np.radians(angle_deg) * rng.normal(size=(count, 3)))
-    poses[:, :3, :3] = turn.as_matrix()
-    poses[:, :3, 3] = spread_m * rng.normal(size=(count, 3))
-    return poses
+    return pose_matrix(turn.as_matrix(), spread_m * rng.normal(size=(count, 3)))
 
 
 def by_opencv(predicted, reference, depth_m, camera):
@@ -112,9 +108,8 @@ def test_dcre_is_that_of_opencv(camera, error_m, error_deg):
     depth_m = rng.uniform(0.5, 6.0, (12, CELLS[0] * CELLS[1]))
     depth_m[rng.random(depth_m.shape) < 0.2] = np.inf
     found = dcre(table_of(predicted), table_of(reference), depth_m, camera)
-    expected = [
-        by_opencv(*each, camera) for each in zip(predicted, reference, depth_m, strict=True)
-    ]
+    frames = zip(predicted, reference, depth_m, strict=True)
+    expected = [by_opencv(*frame, camera) for frame in frames]
     # Far outside of the image a lens may fold over: there both saturate, at slightly other points.
     tolerance = 1e-9 if camera is CAMERA else 2e-2
     np.testing.assert_allclose(found, expected, atol=tolerance)
@@ -150,22 +145,15 @@ def test_dcre_summary_leaves_out_frames_that_show_nothing():
 def test_a_run_is_scored_by_the_same_module_and_becomes_a_row(tmp_path):
     truth = random_poses(40, 1.0, 180.0, seed=5)
     predicted = table_of(truth @ random_poses(40, 0.1, 3.0, seed=6))
-    row = Experiment(
-        table="table4_size", block="", scene="large_room", size="6k", labels="synfeal",
-        noise_m=0, noise_deg=0, init="pretrained",
-    )  # fmt: skip
-    design = Design(rows=(row,), repetitions={"default": 1})
+    design = design_of([experiment("table4_size")])
     write_pose_table(tmp_path / "truth.csv", table_of(truth))
     write_cell_depth(tmp_path / "depth.npy", np.full((40, CELLS[0] * CELLS[1]), 2.0))
     for run in design.runs:
         folder = tmp_path / "runs" / run.directory
         write_pose_table(folder / "predictions.csv", predicted)
-        score_run(
-            *(folder / "predictions.csv", *[tmp_path / "truth.csv"] * 3),
-            *(folder / "errors.csv", folder / "metrics.json"),
-            {},
-            (tmp_path / "depth.npy", CAMERA),
-        )
+        files = (folder / "predictions.csv", *[tmp_path / "truth.csv"] * 3)
+        outputs = (folder / "errors.csv", folder / "metrics.json")
+        score_run(*files, *outputs, {}, (tmp_path / "depth.npy", CAMERA))
     metrics = json.loads((folder / "metrics.json").read_text())
     errors = pose_errors(predicted, table_of(truth))
     assert metrics["recall_10cm_5deg_true"] == within(errors, Bound(0.10, 5)).mean() > 0

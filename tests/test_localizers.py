@@ -2,7 +2,6 @@
 
 import re
 import sys
-from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
@@ -22,8 +21,8 @@ from baselines.localizers.registry import (
 )
 from synfeal.config.models import MODELS, LocalizerConfig, NetworkConfig
 from synfeal.errors import InputError
+from tests import ROOT
 
-ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "localizers.md"
 NETWORK = NetworkConfig(input_px=32, width=0.125)
 HYPER = LocalizerConfig(learning_rate=3e-3, dropout=0.0, beta=1.0, s_orientation=-1.0)
@@ -52,11 +51,7 @@ class Case(NamedTuple):
 
 CASES = {
     **{name: Case(name) for name in MODELS},
-    **{
-        f"{name}-inception_v3": Case(name, INCEPTION_V3)
-        for name in MODELS
-        if name not in RESNET_LOCALIZERS
-    },
+    **{f"{n}-inception_v3": Case(n, INCEPTION_V3) for n in MODELS if n not in RESNET_LOCALIZERS},
     "hourglass-concatenation": Case("hourglass", hyper=CONCATENATION),
 }
 
