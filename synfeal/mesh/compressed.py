@@ -38,6 +38,8 @@ LIBRARIES |= {DRACO: "DracoPy", BASISU: "opengl_basisu"}
 FLOAT32, UINT32 = 5126, 5125
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", UINT32: "<u4", FLOAT32: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+INDICES = {"TRIANGLES": "buffer", "INDICES": "sequence"}  # meshoptimizer's names
+FILTERS = {"OCTAHEDRAL": "oct", "QUATERNION": "quat", "EXPONENTIAL": "exp"}
 MOST_BYTES = 2**33  # of one decoded view: what says it holds more is damaged
 
 Values = NDArray[Any]
@@ -198,21 +200,13 @@ def decode_meshopt(data: bytes, stored: Json) -> bytes:
     if not 0 <= count * stride <= MOST_BYTES:
         raise ValueError(f"a view of {count} x {stride} bytes")
     if mode != "ATTRIBUTES":
-        decode = {
-            "TRIANGLES": meshopt.decode_index_buffer,
-            "INDICES": meshopt.decode_index_sequence,
-        }[mode]
+        decode = getattr(meshopt, f"decode_index_{INDICES[mode]}")
         index = np.asarray(decode(count, 4, data))  # of two bytes it would put two into one number
         return index.astype(f"<u{stride}").tobytes()
     content = meshopt.decode_vertex_buffer(count, stride, data, dtype=np.dtype((np.void, stride)))
-    filters = {
-        "OCTAHEDRAL": meshopt.decode_filter_oct,
-        "QUATERNION": meshopt.decode_filter_quat,
-        "EXPONENTIAL": meshopt.decode_filter_exp,
-    }
     name = stored.get("filter", "NONE")
     if name != "NONE":
-        content = filters[name](content, count, stride)
+        content = getattr(meshopt, f"decode_filter_{FILTERS[name]}")(content, count, stride)
     return bytes(content.tobytes())
 
 

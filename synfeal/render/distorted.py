@@ -83,16 +83,9 @@ def covering_camera(camera: CameraConfig) -> CameraConfig:
     focal = np.array([fx, fy]) * scale
     low = np.floor(edge.min(axis=0) * focal) - _MARGIN_PX
     width, height = np.ceil(edge.max(axis=0) * focal - low) + _MARGIN_PX
-    return CameraConfig(
-        width=max(16, int(width)),
-        height=max(16, int(height)),
-        fx=focal[0],
-        fy=focal[1],
-        cx=-low[0],
-        cy=-low[1],
-        near_m=camera.near_m,
-        far_m=camera.far_m,
-    )
+    lens = dict(zip(("fx", "fy", "cx", "cy"), (*focal, *-low), strict=True))
+    size = {"width": max(16, int(width)), "height": max(16, int(height))}
+    return camera.model_copy(update={**lens, **size, "distortion": (0.0,) * 5})
 
 
 def resampled_depth(

@@ -6,7 +6,7 @@ the other backends, so the images are the same up to rounding; depth is exact.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from synfeal.mesh.model import TexturedMesh
 from synfeal.render.base import DEFAULTS, Depth, Renderer, Rgb
 from synfeal.render.raycast_triangles import Floats, Points, TexturedTriangles, View
 
+Look = Callable[[View, Floats], NDArray[Any]]
 RAYS_AT_ONCE = 1 << 15  # 30 MB
 
 
@@ -29,7 +30,6 @@ class RaycastRenderer(Renderer):
         """Prepare triangles and textures."""
         self._triangles = TexturedTriangles(mesh)
         self._camera = camera
-        self._intrinsics = camera.intrinsics
         steps = (np.arange(render.supersampling) + 0.5) / render.supersampling
         self._samples_px: Floats = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         self._background = np.array(render.background_rgb, np.float32)
@@ -37,41 +37,33 @@ class RaycastRenderer(Renderer):
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         """Colours (H, W, 3) seen from a pose (4, 4)."""
-        view = self._view(world_from_cam, self._sample_size)
-        return self._image(self._colours, view, world_from_cam, self._samples_px)
+        return self._image(self._colours, world_from_cam, self._samples_px, self._sample_size)
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
         """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
         rgb = self.render(world_from_cam)
-        view = self._view(world_from_cam, 0.0)  # whether the very centre is cut out
-        return rgb, self._image(self._depth, view, world_from_cam, np.full((1, 2), 0.5))
+        # Whether the very centre is cut out.
+        return rgb, self._image(self._depth, world_from_cam, np.full((1, 2), 0.5), 0.0)
 
     def close(self) -> None:
         """Drop triangles and textures."""
         del self._triangles
 
-    def _view(self, pose: Floats, sample_size: float) -> View:
-        fx, fy, _, _ = self._intrinsics
-        per_sample = sample_size * pose[:3, :2].T / np.array([[fx], [fy]])
-        origin_m = pose[:3, 3] - self._triangles.centre_m
-        return View(origin_m, per_sample, self._camera.near_m, self._camera.far_m)
-
-    def _image(
-        self,
-        look: Callable[[View, Floats], NDArray[Any]],
-        view: View,
-        pose: Floats,
-        samples_px: Floats,
-    ) -> NDArray[Any]:
+    def _image(self, look: Look, pose: Floats, samples_px: Floats, step_px: float) -> NDArray[Any]:
         """What ``look`` sees along the rays through ``samples_px`` (S, 2) of each pixel.
 
         Rays are (S * P, 3): in the world, of unit length along the optical axis, the first sample
         of all pixels before the second.
         """
         width, height = self._camera.width, self._camera.height
-        fx, fy, cx, cy = self._intrinsics
-        tiles = []
-        for corners_px in _tiles(width, height, RAYS_AT_ONCE // len(samples_px)):
+        fx, fy, cx, cy = self._camera.intrinsics
+        per_sample = step_px * pose[:3, :2].T / np.array([[fx], [fy]])
+        origin_m = pose[:3, 3] - self._triangles.centre_m
+        view = View(origin_m, per_sample, self._camera.near_m, self._camera.far_m)
+        tiles, count = [], RAYS_AT_ONCE // len(samples_px)
+        for start in range(0, width * height, count):
+            index = np.arange(start, min(start + count, width * height))
+            corners_px = np.stack([index % width, index // width], axis=1)
             x, y = (corners_px + samples_px[:, None]).reshape(-1, 2).T[:, :, None]
             rays = (x - cx) / fx * pose[:3, 0] + (y - cy) / fy * pose[:3, 1] + pose[:3, 2]
             tiles.append(look(view, rays))
@@ -95,10 +87,3 @@ class RaycastRenderer(Renderer):
         rgb[hit] = self._triangles.rgb(view, points)
         samples = rgb.reshape(len(self._samples_px), -1, 3)
         return np.asarray(np.round(samples.mean(axis=0)), np.uint8)
-
-
-def _tiles(width: int, height: int, count: int) -> Iterator[Floats]:
-    """Corners (P, 2) of the pixels of an image, row by row, at most ``count`` at once."""
-    for start in range(0, width * height, count):
-        index = np.arange(start, min(start + count, width * height))
-        yield np.stack([index % width, index // width], axis=1).astype(np.float64)
