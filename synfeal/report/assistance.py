@@ -13,7 +13,7 @@ from baselines.groundtruth.chain import BatchRecord
 from baselines.groundtruth.methods import METHODS
 from synfeal.config import Design
 from synfeal.frames import COUNT, MAYBE, MAYBE_COUNT, TEXT, frame_of, write_frame
-from synfeal.report.columns import Column, SideTable, write_side_latex
+from synfeal.report.columns import Column, SideTable, write_side
 from synfeal.report.layouts import SOURCES, data_set_titles
 from synfeal.report.results import read_result, shaped
 
@@ -83,7 +83,7 @@ def write_assistance_table(design: Design, root: Path, out_csv: Path, out_tex: P
     ]
     table = frame_of(records, SCHEMA)
     write_frame(out_csv, table)
-    write_side_latex(out_tex, side_table(table))
+    write_side(out_tex, side_table(table))
 
 
 def assistance_record(

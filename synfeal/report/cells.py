@@ -17,24 +17,8 @@ import pandas as pd
 from synfeal.config import MODELS, Design, Experiment
 from synfeal.config.experiments import FROM_SCRATCH
 from synfeal.config.learning import KEYS
-from synfeal.frames import (
-    COUNT,
-    EXTRA,
-    MAYBE,
-    NUMBER,
-    TEXT,
-    Schema,
-    frame_of,
-    read_frame,
-)
-from synfeal.report.stats import (
-    BASELINES,
-    FLOORS,
-    MEASURES,
-    combine,
-    percent_change,
-    read_metrics,
-)
+from synfeal.frames import COUNT, EXTRA, MAYBE, NUMBER, TEXT, Schema, frame_of, read_frame
+from synfeal.report.stats import BASELINES, FLOORS, MEASURES, combine, percent_change, read_metrics
 
 FOLDER = Path(__file__).parent / "published"
 Key = tuple[str, str, str, str, float, float, str, str]

@@ -123,7 +123,7 @@ def method_columns(titles: Mapping[str, str], on_paper: bool = True) -> list[Col
     ]
 
 
-def write_side_latex(path: Path, table: SideTable) -> None:
+def write_side(path: Path, table: SideTable) -> None:
     """Write a side table as LaTeX."""
     write_latex(path, side_sheet(table))
 

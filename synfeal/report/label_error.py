@@ -22,7 +22,7 @@ from synfeal.config import Design
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.frames import COUNT, MAYBE, NUMBER, TEXT, frame_of, write_frame
 from synfeal.report.assistance import SPLITS, TOTAL, batch_records, of_both_splits
-from synfeal.report.columns import Column, SideTable, write_side_latex
+from synfeal.report.columns import Column, SideTable, write_side
 from synfeal.report.results import read_result
 
 NAME = "label_error"
@@ -83,7 +83,7 @@ def write_label_error_table(design: Design, root: Path, out_csv: Path, out_tex: 
     ]
     table = frame_of(records, SCHEMA)
     write_frame(out_csv, table)
-    write_side_latex(out_tex, side_table(table))
+    write_side(out_tex, side_table(table))
 
 
 def label_records(

@@ -20,7 +20,7 @@ from synfeal.frames import (
     write_frame,
 )
 from synfeal.report.cells import FOLDER
-from synfeal.report.columns import Column, SideTable, write_side_latex
+from synfeal.report.columns import Column, SideTable, write_side
 from synfeal.report.layouts import scene_title
 from synfeal.report.results import read_result
 
@@ -47,7 +47,7 @@ def write_meshes_table(scenes: Sequence[str], root: Path, out_csv: Path, out_tex
     """Write Table 1 from the properties of the scenes' meshes: a row per scene, ``SCHEMA``."""
     meshes = read_meshes(scenes, root)
     write_frame(out_csv, meshes)
-    write_side_latex(out_tex, side_table(meshes))
+    write_side(out_tex, side_table(meshes))
 
 
 @dataclass(frozen=True)

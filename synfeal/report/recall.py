@@ -16,7 +16,7 @@ from synfeal.config import MODELS, Design, Run
 from synfeal.evaluation.metrics import BOUNDS, MEANS, ORIENTATION, POSITION
 from synfeal.evaluation.reprojection import DCRE_BOUNDS
 from synfeal.frames import COUNT, MAYBE, TEXT, frame_of, write_frame
-from synfeal.report.columns import Column, SideTable, write_side_latex
+from synfeal.report.columns import Column, SideTable, write_side
 from synfeal.report.layouts import TITLES, data_set_titles, label_title
 from synfeal.report.results import read_result, shaped
 from synfeal.report.stats import REMEDY
@@ -65,7 +65,7 @@ def write_recall_table(design: Design, root: Path, out_csv: Path, out_tex: Path)
     """
     table = recall_table(design, root)
     write_frame(out_csv, table)
-    write_side_latex(out_tex, side_table(table))
+    write_side(out_tex, side_table(table))
 
 
 def recall_table(design: Design, root: Path) -> pd.DataFrame:

@@ -11,13 +11,7 @@ import numpy as np
 import pandas as pd
 
 from baselines.groundtruth.methods import SIMULATOR
-from baselines.references.registry import (
-    REFERENCES,
-    Externals,
-    answered_by,
-    data_sets,
-    titles_of,
-)
+from baselines.references.registry import REFERENCES, Externals, answered_by, data_sets, titles_of
 from synfeal.config import MODELS, Design
 from synfeal.evaluation.metrics import BOUNDS
 from synfeal.frames import (
@@ -33,13 +27,7 @@ from synfeal.frames import (
     write_frame,
 )
 from synfeal.report.cells import LIMITS
-from synfeal.report.columns import (
-    Column,
-    SideTable,
-    by_method,
-    method_columns,
-    write_side_latex,
-)
+from synfeal.report.columns import Column, SideTable, by_method, method_columns, write_side
 from synfeal.report.layouts import SOURCES, TITLES, data_set_titles, label_title, scene_title
 from synfeal.report.results import read_result
 from synfeal.report.stats import MEASURES, REMEDY, combine, read_metrics
@@ -75,7 +63,7 @@ def write_references_table(
     """
     table = references_table(design, external, root)
     write_frame(out_csv, table)
-    write_side_latex(out_tex, side_table(table))
+    write_side(out_tex, side_table(table))
 
 
 def references_table(design: Design, external: Externals, root: Path) -> pd.DataFrame:

@@ -14,13 +14,7 @@ from baselines.references.robustness import SCHEMA, STRUCTURE, robustness_table
 from synfeal.config.effects import CLEAN, MIXED
 from synfeal.config.models import MODELS
 from synfeal.frames import read_frame, write_frame
-from synfeal.report.columns import (
-    Column,
-    SideTable,
-    by_method,
-    method_columns,
-    write_side_latex,
-)
+from synfeal.report.columns import Column, SideTable, by_method, method_columns, write_side
 from synfeal.report.layouts import TITLES
 
 NAME = "robustness"
@@ -70,7 +64,7 @@ def write_robustness_table(
     vectors = dict(zip(models, descriptors, strict=True))
     table = robustness_table(models, vectors, answers, tests, labels[0].parent, device)
     write_frame(out_csv, table)
-    write_side_latex(out_tex, side_table(table))
+    write_side(out_tex, side_table(table))
 
 
 def read_robustness(path: Path) -> pd.DataFrame:
