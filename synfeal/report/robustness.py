@@ -42,19 +42,10 @@ def write_robustness_table(
 ) -> None:
     """Measure and write the table.
 
-    Args:
-        clean: checkpoints of all localizers, trained on ideal frames.
-        mixed: the same, trained on frames with effects mixed in.
-        descriptors: of the frames of both training sets.
-        structure: answers of structure-based poses for the ideal frames and each of ``effects``;
-            none where there are no frames with depth.
-        test: packed test frames.
-        varied: the same with each of ``effects``.
-        labels: true poses of both splits, in one folder.
-        effects: names of what the test frames are varied by.
-        device: where to predict.
-        out_csv: the table.
-        out_tex: its LaTeX.
+    ``clean`` and ``mixed`` are checkpoints of all localizers, trained on ideal frames and with
+    effects mixed in; ``descriptors`` are of the frames of both training sets. ``structure`` are
+    answers of structure-based poses for the ideal frames and each of ``effects``, none where frames
+    have no depth; ``varied`` are the ``test`` frames with each; ``labels`` lie in one folder.
     """
     models = {
         name: dict(zip(MODELS, m, strict=True)) for name, m in ((CLEAN, clean), (MIXED, mixed))

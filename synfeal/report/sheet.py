@@ -42,7 +42,9 @@ class Value(NamedTuple):
     text: str
     bold: bool = False
     tone: str = ""  # ``better``, ``worse`` or none
-    note: str = ""  # footnote of the cell, on its first value
+    note: str = ""  # footnote; on paper that of the first value stands for the cell
+    limits: str = ""  # 95 % limits, on the page alone
+    sort: object = ""  # what the page sorts by; empty comes last
 
 
 class Line(NamedTuple):
@@ -50,7 +52,7 @@ class Line(NamedTuple):
 
     block: str
     row: Hashable
-    kind: str  # lines of kind ``PAPER`` are grey
+    kind: str  # lines whose kind begins with ``PAPER`` are grey
     cells: Sequence[Sequence[Value]]  # label, what errors are against, and every column
 
 
@@ -171,14 +173,16 @@ def _latex_value(value: Value, kind: str) -> str:
 
 def _markdown_value(value: Value, kind: str) -> str:
     # Each number is emphasised by itself: renderers disagree on emphasis inside emphasis.
-    emphasis = ("*" if kind == PAPER else "") + ("**" if value.bold else "")
+    emphasis = ("*" if kind.startswith(PAPER) else "") + ("**" if value.bold else "")
     return f"{emphasis}{value.text}{emphasis}" if value.text else ""
 
 
 _LATEX = _Format(
     _latex_value,
     lambda mark: rf"$^{{{mark}}}$",
-    lambda text, kind: rf"\textcolor{{gray}}{{{text}}}" if kind == PAPER and text else text,
+    lambda text, kind: (
+        rf"\textcolor{{gray}}{{{text}}}" if kind.startswith(PAPER) and text else text
+    ),
 )
 _MARKDOWN = _Format(_markdown_value, lambda mark: f" ({mark})")
 

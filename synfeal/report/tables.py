@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from synfeal.config import Design
@@ -62,7 +63,9 @@ def sheet_of(name: str, cells: pd.DataFrame) -> Sheet:
     printed: dict[tuple[int, str, str], list[Value]] = defaultdict(list)
     values = printed_values(name, cells).sort_values("place", kind="stable")
     for v in rows_of(values[(values.text != FAILED) | (values.place == 0)]):  # said once
-        printed[v.row, v.kind, v.column].append(Value(v.text, v.bold, v.tone, v.note))
+        sort = "" if pd.isna(v.sort) else v.sort
+        value = Value(v.text, v.bold, v.tone, v.note, v.limits, sort)
+        printed[v.row, v.kind, v.column].append(value)
     in_print = published_labels(name, cells)
     rows = cells.assign(title=blocks_of(cells)).drop_duplicates("row")
     blocks = rows.groupby("title", sort=False).ngroup()
@@ -70,16 +73,25 @@ def sheet_of(name: str, cells: pd.DataFrame) -> Sheet:
     for row in rows_of(rows.iloc[blocks.argsort(kind="stable")]):
         # Where labels are the truth, both scores are one line.
         for kind in (k for k in against if not (one_truth and k.startswith("truth"))):
-            label = Value(row_label(name, row) if kind == "labels" else "")
-            if kind == PAPER:
+            label = Value("")
+            if kind == "labels":
+                label = Value(row_label(name, row), sort=_order(name, row))
+            elif kind == PAPER:
                 label = Value(in_print.get(row.row, ""), note=row.published_row_note)
             numbers = [printed[row.row, kind, heading] for heading in headings[2:]]
             if any(numbers):
                 texts = [[label], [Value(against[kind])], *numbers]
-                lines.append(Line(row.title, row.row, kind.removesuffix(" change"), texts))
+                lines.append(Line(row.title, row.row, kind, texts))
     remarks = (REMARK, UNTRAINED, PUBLISHED, *([CHANGE] if name == FROM_SCRATCH else []))
     caption = f"{CAPTIONS[name]} {_where(cells)} Best scores in bold."
     return Sheet(name, caption, headings, lines, remarks)
+
+
+def _order(name: str, row: Any) -> object:
+    """What the page sorts a row by: its noise, label or number of frames."""
+    if row.block:
+        return f"{1000 * row.noise_m + row.noise_deg:g}"
+    return row_label(name, row) if name == "table2_ground_truth" else row.n_train
 
 
 def blocks_of(cells: pd.DataFrame) -> pd.Series:
@@ -93,8 +105,8 @@ def printed_values(name: str, cells: pd.DataFrame) -> pd.DataFrame:
 
     Returns:
         Columns ``row`` (as in the cells), ``kind`` (of ``AGAINST``), ``column`` (a heading),
-        ``place`` (0 position, 1 orientation), ``text``, ``tone``, ``note`` and ``bold``: whether it
-        is the lowest of its kind, column and block, as printed.
+        ``place`` (0 position, 1 orientation), and those of a :class:`Value`; ``bold`` is the
+        lowest of its kind, column and block, as printed.
     """
     parts, first = [], cells.groupby("row", sort=False).head(1)
     for place, (measure, unit) in enumerate(UNITS.items()):
@@ -103,8 +115,9 @@ def printed_values(name: str, cells: pd.DataFrame) -> pd.DataFrame:
             parts.append(_scores(cells, kind, place, score, unit))
             for start, column in REFERENCES.items():  # the same for every localizer of a row
                 if f"{start}_{score}" in first:
-                    texts = [_plain(value, unit) for value in first[f"{start}_{score}"]]
-                    parts.append(_part(first, kind, place, texts, column=column))
+                    numbers = first[f"{start}_{score}"]
+                    texts = [_plain(value, unit) for value in numbers]
+                    parts.append(_part(first, kind, place, texts, column=column, sort=numbers))
             if name == FROM_SCRATCH:
                 parts.append(_changes(cells, f"{kind} change", place, CHANGES[score]))
         parts.append(_published(cells, place, measure, unit))
@@ -132,7 +145,8 @@ def _part(
     cells: pd.DataFrame, kind: str, place: int, texts: list[str], **more: Any
 ) -> pd.DataFrame:
     """Values of some cells; ``more``: columns of :func:`printed_values`, and ``number``."""
-    usual = {"column": cells.model.map(TITLES), "number": float("nan"), "tone": "", "note": ""}
+    usual = {"column": cells.model.map(TITLES), "number": np.nan, "sort": np.nan}
+    usual |= dict.fromkeys(("tone", "note", "limits"), "")
     found = pd.DataFrame({"row": cells.row, "kind": kind, "place": place, "text": texts})
     return found.assign(**{**usual, **more})
 
@@ -149,9 +163,14 @@ def _scores(cells: pd.DataFrame, kind: str, place: int, score: str, unit: str) -
         else ""
         for cell in rows_of(cells)
     ]
-    return _part(
-        cells, kind, place, texts, number=cells[score].map(partial(round, ndigits=2)), note=notes
-    )
+    ends = zip(cells[f"{score}_low"], cells[f"{score}_high"], strict=True)
+    limits = [  # where too many failed, they reach to infinity
+        "" if pd.isna(low) else f"{low:.2f}–{'∞' if pd.isna(high) else f'{high:.2f}'}"
+        for low, high in ends
+    ]
+    number = cells[score].map(partial(round, ndigits=2))
+    more = {"number": number, "note": notes, "limits": limits, "sort": cells[score]}
+    return _part(cells, kind, place, texts, **more)
 
 
 def _published(cells: pd.DataFrame, place: int, measure: str, unit: str) -> pd.DataFrame:

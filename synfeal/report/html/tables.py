@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from itertools import groupby, product
 from pathlib import Path
 from typing import Any
 
@@ -13,22 +14,13 @@ from markupsafe import Markup
 
 from synfeal.config.experiments import FROM_SCRATCH
 from synfeal.errors import InputError
-from synfeal.frames import TEXT, read_frame, records_of, rows_of
+from synfeal.frames import TEXT, read_frame, records_of
 from synfeal.report.claims.model import Verdict
 from synfeal.report.claims.table import COLUMNS
 from synfeal.report.columns import SCORES, Column, SideTable, cells_of
-from synfeal.report.layouts import (
-    CHANGE,
-    HEADINGS,
-    REFERENCES,
-    TITLES,
-    UNITS,
-    published_labels,
-    row_label,
-    scene_title,
-)
-from synfeal.report.sheet import PAPER, footnotes
-from synfeal.report.tables import printed_values, sheet_of
+from synfeal.report.layouts import CHANGE
+from synfeal.report.sheet import PAPER, Line, Value, footnotes
+from synfeal.report.tables import sheet_of
 
 ENVIRONMENT = Environment(
     loader=PackageLoader("synfeal.report.html"),
@@ -55,20 +47,23 @@ def side_html(table: SideTable) -> Markup:
     return render("side_table.html", table=table, title=title, rows=rows, switched=switched)
 
 
-# The switch's two scores: kind of line, and how names of its columns end.
-STYLES = {"labels": ("labels", ""), "true": ("truth", "_true")}
+# The switch's two scores: kinds of lines. Where labels are the truth, there is one for both.
+STYLES = {"labels": "labels", "true": "truth"}
 SAME = "All labels of this table are true poses, so both scores are the same numbers."
-Values = Mapping[tuple[int, str, str, int], Any]  # by row, kind of line, heading, place in cell
 
 
 def score_table(name: str, cells: pd.DataFrame) -> Markup:
     """One of tables 2 to 7, from what :func:`synfeal.report.cells.read_cells` read for it."""
     sheet = sheet_of(name, cells)
-    printed = rows_of(printed_values(name, cells))
-    values = {(v.row, v.kind, v.column, v.place): v for v in printed}
-    labels = published_labels(name, cells)
-    one_truth = (cells.labels == "synfeal").all()
-    titles = [*TITLES.values(), *REFERENCES.values()]
+    one_truth = not any(line.kind == "truth" for line in sheet.lines)
+    label = Column(sheet.headings[0])
+    block = Column("Noise in" if "table3" in name else "Scene")
+    titles = sheet.headings[2:]
+    rows: list[dict[str, Any]] = []
+    for (title, _), lines in groupby(sheet.lines, key=lambda line: (line.block, line.row)):
+        # The first row of those that compete for bold has a rule above.
+        first = not rows or title != rows[-1]["block"]
+        rows.append({"block": title, "first": first, **_row([*lines])})
     return render(
         "score_table.html",
         name=name,
@@ -76,64 +71,39 @@ def score_table(name: str, cells: pd.DataFrame) -> Markup:
         text=sheet.caption,
         marks=footnotes(sheet),
         remarks=[*([SAME] if one_truth else []), *([CHANGE] if name == FROM_SCRATCH else [])],
-        labels=[Column("Noise in" if "table3" in name else "Scene"), Column(HEADINGS[name])],
+        labels=[block, label] if any(row["block"] for row in rows) else [label],
         titles=titles,
         quantities=[Column(title, form="{}") for _ in titles for title in ("Position", "Orient.")],
-        # The first row of those that compete for bold has a rule above.
-        rows=[
-            {"first": place == 0, "paper": labels.get(number), **_row(name, row, values)}
-            for _, group in cells.groupby(["block", "scene"], sort=False)
-            for place, (number, row) in enumerate(group.groupby("row", sort=False))
-        ],
+        rows=rows,
     )
+
+
+def _row(lines: Sequence[Line]) -> dict[str, Any]:
+    """The lines of a row: its label, the paper's, and by number both scores and the paper's."""
+    kinds = {line.kind: line.cells for line in lines}
+
+    def value(kind: str, column: int, place: int) -> Value | None:
+        cells = kinds.get(kind) or kinds.get(kind.replace("truth", "labels"))
+        values = cells[column] if cells else []
+        return values[min(place, len(values) - 1)] if values else None
+
+    numbers = [
+        {
+            "scores": {
+                style: (value(kind, *at), value(f"{kind} change", *at))
+                for style, kind in STYLES.items()
+            },
+            "paper": [value(PAPER, *at), value("paper change", *at)],
+        }
+        for at in product(range(2, len(lines[0].cells)), (0, 1))
+    ]
+    return {"label": value("labels", 0, 0), "paper": value(PAPER, 0, 0), "cells": numbers}
 
 
 def table_title(name: str) -> str:
     """As in ``Table 4`` or ``Label error``."""
     found = re.match(r"table(\d+)", name)
     return f"Table {found[1]}" if found else name.replace("_", " ").capitalize()
-
-
-def _row(name: str, row: pd.DataFrame, values: Values) -> dict[str, Any]:
-    """A row of five localizers: scene or block, what tells it from its neighbours, its cells."""
-    models = rows_of(row)
-    lead, label = models[0], row_label(name, models[0])
-    key: object = lead.n_train
-    if lead.block:
-        key = f"{1000 * lead.noise_m + lead.noise_deg:g}"
-    elif name == "table2_ground_truth":
-        key = label
-    numbers = [(TITLES[cell.model], cell, "") for cell in models]
-    numbers += [(title, lead, f"{start}_") for start, title in REFERENCES.items()]
-    return {
-        "block": lead.block or scene_title(lead.scene),
-        "label": label,
-        "key": key,
-        "note": lead.published_row_note,
-        "cells": [
-            _score_cell(cell, title, start, place, values)
-            for title, cell, start in numbers
-            for place in range(len(UNITS))
-        ],
-    }
-
-
-def _score_cell(cell: Any, title: str, start: str, place: int, values: Values) -> dict[str, Any]:
-    """Both scores of a localizer, or of an answer without training, and the paper's below."""
-
-    def value(kind: str) -> Any:
-        return values.get((cell.row, kind, title, place))
-
-    scores = []
-    for style, (kind, end) in STYLES.items():
-        score = f"{start}{[*UNITS][place]}{end}"
-        sort = getattr(cell, score, 0.0)  # truth is the truth
-        low, high = (getattr(cell, f"{score}_{which}", float("nan")) for which in ("low", "high"))
-        upper = "∞" if pd.isna(high) else f"{high:.2f}"  # too many failed to know it
-        limits = "" if pd.isna(low) else f"{low:.2f}–{upper}"
-        shown = {"value": value(kind), "change": value(f"{kind} change"), "limits": limits}
-        scores.append({"style": style, "sort": "" if pd.isna(sort) else sort, **shown})
-    return {"scores": scores, "paper": value(PAPER), "paper_change": value("paper change")}
 
 
 # A sign, a border and the words themselves tell verdicts apart without colour.
