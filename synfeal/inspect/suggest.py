@@ -118,16 +118,12 @@ def _best_rectangle(worth: NDArray[np.float64]) -> tuple[float, tuple[int, int],
     sums = np.vstack([np.zeros(worth.shape[1]), np.cumsum(worth, axis=0)])
     pairs = np.array(_pairs(worth.shape[0]))
     strips = sums[pairs[:, 1] + 1] - sums[pairs[:, 0]]
-    run, start = np.full(len(pairs), -np.inf), np.zeros(len(pairs), np.int64)
-    best: tuple[float, tuple[int, int], tuple[int, int]] = (-np.inf, (0, 0), (0, 0))
-    for y in range(worth.shape[1]):
-        start = np.where(run > 0, start, y)
-        run = np.maximum(run, 0.0) + strips[:, y]
-        pair = int(run.argmax())
-        if run[pair] > best[0]:
-            x0, x1 = (int(index) for index in pairs[pair])
-            best = (float(run[pair]), (x0, int(start[pair])), (x1, y))
-    return best
+    until = np.cumsum(np.pad(strips, ((0, 0), (1, 0))), axis=1)
+    gains = until[:, 1:] - np.minimum.accumulate(until[:, :-1], axis=1)
+    y1, pair = (int(index) for index in np.unravel_index(gains.T.argmax(), gains.T.shape))
+    (x0, x1), before = pairs[pair].tolist(), until[pair, : y1 + 1]
+    y0 = int(np.flatnonzero(before == before.min())[-1])  # of several the shortest run
+    return float(gains[pair, y1]), (x0, y0), (x1, y1)
 
 
 def _pairs(count: int) -> list[tuple[int, int]]:

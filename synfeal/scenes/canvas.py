@@ -52,15 +52,12 @@ class Canvas:
         ``cell_m`` is the size of the coarsest cells (along x and y if a pair); the cells of each
         octave are half as large as those of the one before.
         """
-        cell_x, cell_y = cell_m if isinstance(cell_m, tuple) else (cell_m, cell_m)
+        cells_m = cell_m if isinstance(cell_m, tuple) else (cell_m, cell_m)
         total = np.zeros((self.height_px, self.width_px), np.float32)
-        power = 0.0
         for octave in range(octaves):
-            step_x = max(1.0, cell_x * self.px_per_m / 2**octave)
-            step_y = max(1.0, cell_y * self.px_per_m / 2**octave)
-            weight = persistence**octave
-            total += weight * self._lattice_noise(step_x, step_y)
-            power += weight**2
+            step_x, step_y = (max(1.0, cell * self.px_per_m / 2**octave) for cell in cells_m)
+            total += persistence**octave * self._lattice_noise(step_x, step_y)
+        power = sum((persistence**octave) ** 2 for octave in range(octaves))
         return total / np.float32(np.sqrt(power))
 
     def _lattice_noise(self, step_x: float, step_y: float) -> NDArray[np.float32]:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +26,13 @@ from synfeal.validation.listing import (
 )
 
 Poses = dict[Frame, NDArray[np.float64]]
+
+EVERY = 4  # rows and columns that are looked at for what is blank
+SAME = 2  # grey levels
+ONE_COLOUR = 0.95  # of a frame's pixels
+# Share of the frames: a camera may come close to a plain wall, and rooms without a ceiling have
+# empty frames, of which collect says how many.
+MOST = {"of one colour": 0.05, "more than half empty": 0.25}
 
 
 def kinds_of(sequences: Iterable[SequenceListing]) -> tuple[str, ...]:
@@ -71,7 +77,8 @@ def check_images(
     size = (camera.width, camera.height) if camera else None
     readers: dict[str, Callable[[FrameFile], Pixels]] = {COLOR: read_color, DEPTH: read_depth_mm}
     failures: list[str] = []
-    content, n_images = Content(), 0
+    blank: dict[str, list[Frame]] = {what: [] for what in MOST}
+    n_frames = n_images = 0
     for sequence in sequences:
         for frame in sequence.frames:
             images: dict[str, Pixels] = {}
@@ -98,16 +105,46 @@ def check_images(
                             " millimetres"
                         )
             if COLOR in images:
-                content.add(frame, images[COLOR], images.get(DEPTH) if camera else None)
+                n_frames += 1
+                if _is_of_one_colour(images[COLOR]):
+                    blank["of one colour"].append(frame)
+                if _is_mostly_empty(images[COLOR], images.get(DEPTH) if camera else None):
+                    blank["more than half empty"].append(frame)
             on_frame()
     text = f"{n_images} images decoded" + (f", {size[0]} x {size[1]}" if size else "")
-    return [Check("images", text, tuple(failures)), content.check()]
+    return [Check("images", text, tuple(failures)), _content(n_frames, blank)]
 
 
 def _median_m(depth_mm: Pixels) -> float:
     """Of the depths that are known, infinite where there are none."""
     known = depth_mm[(depth_mm > 0) & (depth_mm < 65535)]
     return float(np.median(known)) / 1000.0 if known.size else math.inf
+
+
+def _content(n_frames: int, blank: Mapping[str, list[Frame]]) -> Check:
+    """Whether too many frames were blank."""
+    failures, said = [], []
+    for what, frames in blank.items():
+        said.append(f"{len(frames)} {what} (bound {MOST[what]:.0%})")
+        if len(frames) > MOST[what] * n_frames:
+            failures.append(
+                f"{frames[0].path(COLOR)}: is {what}, as are {len(frames)} of {n_frames} frames;"
+                " look at preview.png, and at synfeal inspect of the mesh"
+            )
+    return Check("content", f"of {n_frames} frames {', '.join(said)}", tuple(failures))
+
+
+def _is_of_one_colour(rgb: Pixels) -> bool:
+    rgb = rgb[::EVERY, ::EVERY]
+    usual = np.median(rgb.reshape(-1, 3), axis=0)
+    return bool(np.mean((np.abs(rgb - usual) <= SAME).all(axis=2)) >= ONE_COLOUR)
+
+
+def _is_mostly_empty(rgb: Pixels, depth_mm: Pixels | None) -> bool:
+    """Without its depth what is black counts as empty."""
+    black = (rgb[::EVERY, ::EVERY] == 0).all(axis=2)
+    empty = black if depth_mm is None else (depth_mm == 0) | (depth_mm == 65535)
+    return bool(np.mean(empty) > 0.5)
 
 
 def read_poses(sequences: Iterable[SequenceListing]) -> tuple[Poses, tuple[str, ...]]:
@@ -122,47 +159,3 @@ def read_poses(sequences: Iterable[SequenceListing]) -> tuple[Poses, tuple[str, 
             except InputError as error:
                 failures.append(str(error))
     return poses, tuple(failures)
-
-
-EVERY = 4  # rows and columns that are looked at
-SAME = 2  # grey levels
-ONE_COLOUR = 0.95  # of a frame's pixels
-MOSTLY = 0.5
-MOST_OF_ONE_COLOUR = 0.05  # of the frames: a camera may come close to a plain wall
-MOST_EMPTY = 0.25  # of the frames: rooms without a ceiling have such, and collect says how many
-
-
-@dataclass
-class Content:
-    """Frames that show nothing, or mostly nothing, as they are read."""
-
-    n_frames: int = 0
-    of_one_colour: list[Frame] = field(default_factory=list)
-    mostly_empty: list[Frame] = field(default_factory=list)
-
-    def add(self, frame: Frame, rgb: NDArray[np.uint8], depth_mm: Pixels | None) -> None:
-        """Look at a frame; without its depth what is black counts as empty."""
-        self.n_frames += 1
-        rgb = rgb[::EVERY, ::EVERY]
-        usual = np.median(rgb.reshape(-1, 3), axis=0)
-        if np.mean((np.abs(rgb - usual) <= SAME).all(axis=2)) >= ONE_COLOUR:
-            self.of_one_colour.append(frame)
-        black = (rgb == 0).all(axis=2)
-        empty = black if depth_mm is None else (depth_mm == 0) | (depth_mm == 65535)
-        if np.mean(empty) > MOSTLY:
-            self.mostly_empty.append(frame)
-
-    def check(self) -> Check:
-        """Whether too many frames were blank."""
-        failures, said = [], []
-        for frames, what, bound in (
-            (self.of_one_colour, "of one colour", MOST_OF_ONE_COLOUR),
-            (self.mostly_empty, "more than half empty", MOST_EMPTY),
-        ):
-            said.append(f"{len(frames)} {what} (bound {bound:.0%})")
-            if len(frames) > bound * self.n_frames:
-                failures.append(
-                    f"{frames[0].path(COLOR)}: is {what}, as are {len(frames)} of {self.n_frames}"
-                    " frames; look at preview.png, and at synfeal inspect of the mesh"
-                )
-        return Check("content", f"of {self.n_frames} frames {', '.join(said)}", tuple(failures))
