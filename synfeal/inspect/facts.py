@@ -64,11 +64,8 @@ def facts_of(found: Inspection) -> dict[str, Any]:
         "free_space": {
             "definition": DEFINITION,
             "box_m": found.box_m.tolist(),
-            "share": space.share,
             "volume_m3": space.share * float(np.prod(np.ptp(found.box_m, axis=0))),
-            "enclosure": space.enclosure,
-            "floor_m": space.floor_m,
-            "elsewhere": space.elsewhere,
+            **{key: getattr(space, key) for key in ("share", "enclosure", "floor_m", "elsewhere")},
         },
         "back_faces_share": back_face_share(mesh, found.caster, space),
         "suggested_sampling_box": box,

@@ -32,7 +32,14 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
         InputError: there is no data set, or ``camera_file`` cannot be read.
     """
     sequences = list_sequences(dataset)
-    camera, camera_failures = _camera(dataset, camera_file)
+    camera: KnownCamera | None = None
+    camera_failures: tuple[str, ...] = ()
+    try:
+        camera = camera_of_dataset(dataset, camera_file)
+    except InputError as error:  # a manifest that is damaged is a finding, a wrong option is not
+        if camera_file is not None:
+            raise
+        camera_failures = (str(error),)
     splits, split_failures = read_splits(dataset, sequences)
     n_frames = len(frames_of(sequences))
     size = None if camera is None or camera.assumed else camera.config
@@ -52,16 +59,6 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
     if camera is None:
         return [*checks, Check("camera", "unknown", camera_failures)]
     return checks + _geometry(sequences, poses, camera, every_pair)
-
-
-def _camera(dataset: Path, camera_file: Path | None) -> tuple[KnownCamera | None, tuple[str, ...]]:
-    """A manifest that is damaged is a finding, an option that is wrong is not."""
-    try:
-        return camera_of_dataset(dataset, camera_file), ()
-    except InputError as error:
-        if camera_file is not None:
-            raise
-        return None, (str(error),)
 
 
 def _geometry(
