@@ -80,10 +80,8 @@ def test_readers_see_the_same_frames(planar, packed, tmp_path):
         assert [path.name for path in both[0]] == [path.name for path in both[1]]
         np.testing.assert_array_equal(read(both[0][3]), read(both[1][3]))
     # The noise of a depth sensor is that of the frame, however its sequence is kept.
-    generators = [
-        frame_generator(1, frame_file(at, "frame-000004.depth.png")) for at in (inside, outside)
-    ]
-    assert generators[0].random() == generators[1].random()
+    names = (frame_file(at, "frame-000004.depth.png") for at in (inside, outside))
+    assert len({frame_generator(1, name).random() for name in names}) == 1
     for at, name in ((inside, "in.npy"), (outside, "out.npy")):
         pack_frames([at], 32, tmp_path / name)
     assert (tmp_path / "in.npy").read_bytes() == (tmp_path / "out.npy").read_bytes()
@@ -101,11 +99,10 @@ def test_validate_passes_archives_as_directories(planar, packed, capsys):
     assert reports[0] == reports[1]
 
 
-@pytest.mark.parametrize("to", ["colmap", "nerfstudio", "tum"])
-def test_exports_are_those_of_the_directories(planar, packed, tmp_path, to):
+def test_exports_are_those_of_the_directories(planar, packed, tmp_path):
     for folder, more in ((planar, ["--copy"]), (packed, [])):
         out = tmp_path / folder.parent.name
-        assert main(["export", str(folder), "--to", to, "--out", str(out), *more]) == 0
+        assert main(["export", str(folder), "--to", "tum", "--out", str(out), *more]) == 0
     first, second = sorted(tmp_path.iterdir())
     assert tree_of(first) == tree_of(second)
     assert not [path for path in second.rglob("*") if path.is_symlink()]
@@ -136,10 +133,8 @@ def test_archives_of_others_are_read(packed, tmp_path):
     # 7-Scenes' own hold the directory and thumbnails too, and are compressed.
     folder = changed(packed, tmp_path, **{"seq-01/": b"", "seq-01/Thumbs.db": b"thumbs"})
     assert main(["validate", str(folder)]) == 0
-    with (
-        pytest.warns(UserWarning, match="Duplicate"),
-        zipfile.ZipFile(folder / "seq-01.zip", "a") as again,
-    ):
+    twice = pytest.warns(UserWarning, match="Duplicate")
+    with twice, zipfile.ZipFile(folder / "seq-01.zip", "a") as again:
         again.writestr("seq-01/Thumbs.db", b"twice")
     assert foreign_members(folder / "seq-01.zip") == ["seq-01/Thumbs.db"]
 

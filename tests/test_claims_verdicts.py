@@ -27,10 +27,8 @@ def effect(low, high, published=0.0, **keys):
 def test_samples_counts_and_what_is_unknown():
     assert limits(between(-3.0, 5.0)) == (-3, 5)
     assert limits(between(-3.0, 5.0), 10) == (-11, 13)
-    assert at_least(between(3, 5), 3) == HOLDS
-    assert at_least(between(2, 5), 3) == UNDECIDED
-    assert at_least(between(0, 2), 3) == OPPOSITE
-    assert at_least(between(0, 3), 3) == UNDECIDED
+    reached = {(3, 5): HOLDS, (2, 5): UNDECIDED, (0, 3): UNDECIDED, (0, 2): OPPOSITE}
+    assert {ends: at_least(between(*ends), 3) for ends in reached} == reached
     unknown = np.full(1001, np.nan)
     assert verdict_of(Condition("", unknown, 55)) == UNDECIDED
     assert verdict_of(Condition("", np.full(1001, np.inf), 55)) == HOLDS
@@ -42,9 +40,7 @@ def test_samples_counts_and_what_is_unknown():
         # A fall of 55 % is published; two thirds of it are 36.7 %.
         (1, 56, 55, UNDECIDED),  # -28 % (-56 to -1): anything from nothing to all of it
         (40, 50, 55, HOLDS),  # -45 % (-50 to -40)
-        (50, 90, 55, HOLDS),
         (30, 50, 55, UNDECIDED),
-        (10, 30, 55, SMALLER),
         (5, 36, 55, SMALLER),  # the bounds themselves
         (2, 36, 55, LESS),  # perhaps none
         (-2, 37, 55, UNDECIDED),
@@ -53,7 +49,6 @@ def test_samples_counts_and_what_is_unknown():
         (-30, -10, 55, OPPOSITE),
         (-30, -4, 55, LESS),
         (-30, -4, 0, UNDECIDED),  # nothing is published that it could be less than
-        (-60, 60, 55, UNDECIDED),
         # The sign of a published fall is taken out before.
         (40, 50, -55, HOLDS),
         # No size is published: the direction, by more than the smallest of interest.

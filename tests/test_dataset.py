@@ -73,8 +73,8 @@ def test_sequences_cover_every_frame_once(n_train, n_test, shard):
 
 def test_split_files_are_those_of_7_scenes(tmp_path):
     sevenscenes.write_splits(tmp_path, sevenscenes.sequences_of(5, 3, 3))
-    assert (tmp_path / "TrainSplit.txt").read_text() == "sequence1\nsequence2\n"
-    assert (tmp_path / "TestSplit.txt").read_text() == "sequence3\n"
+    for name, text in {"Train": "sequence1\nsequence2\n", "Test": "sequence3\n"}.items():
+        assert (tmp_path / f"{name}Split.txt").read_text() == text
     assert sevenscenes.read_split(tmp_path, "train") == [tmp_path / "seq-01", tmp_path / "seq-02"]
     (tmp_path / "TestSplit.txt").write_text("seq-3\n")
     with pytest.raises(InputError, match="seq-3"):
@@ -160,7 +160,7 @@ def write_frames(directory, values, size=(40, 30)):
         Image.new("RGB", size, (value, 0, 0)).save(directory / f"frame-{index:06d}.color.png")
 
 
-@pytest.mark.parametrize("shape", [(1, 1, 3), (7, 5, 3), (30, 40, 3), (1, 1), (7, 5), (30, 40)])
+@pytest.mark.parametrize("shape", [(1, 1, 3), (7, 5, 3), (1, 1), (7, 5)])
 @pytest.mark.parametrize("kind", ["noise", "flat"])
 def test_png_files_hold_the_pixels(tmp_path, shape, kind):
     dtype = np.uint8 if len(shape) == 3 else np.uint16
@@ -177,12 +177,10 @@ def test_png_files_hold_the_pixels(tmp_path, shape, kind):
     assert encode_png(again) == path.read_bytes()
 
 
-@pytest.mark.parametrize(
-    "pixels", [np.zeros((4, 4), np.uint8), np.zeros((4, 4, 4), np.uint8), np.zeros((4, 4, 3))]
-)
-def test_other_pixels_are_no_frames(pixels):
-    with pytest.raises(ValueError, match="cannot encode"):
-        encode_png(pixels)
+def test_other_pixels_are_no_frames():
+    for shape, kind in (((4, 4), np.uint8), ((4, 4, 4), np.uint8), ((4, 4, 3), float)):
+        with pytest.raises(ValueError, match="cannot encode"):
+            encode_png(np.zeros(shape, kind))
 
 
 def test_manifest_finds_a_changed_pixel(tmp_path):
