@@ -54,7 +54,7 @@ def asked(page, tmp_path, probe):
 
 def test_one_switch_changes_every_table(page, tmp_path):
     probe = """
-      const read = () => [shown(table("table2_ground_truth").tBodies[0].rows[0].cells[2]),
+      const read = () => [shown(table("table2_ground_truth").tBodies[0].rows[0].cells[1]),
         shown(table("claims-table").tBodies[0].rows[0].cells[4]), document.body.innerText.length];
       const before = read(); choose("true"); const after = read(); choose("labels");
       return [before, after, read()];
@@ -68,16 +68,16 @@ def test_one_switch_changes_every_table(page, tmp_path):
 
 def test_headings_sort_up_down_and_back(page, tmp_path):
     probe = """
-      const name = "table4_size", place = heading(name, 2), button = place.querySelector("button");
-      const states = [[column(name, 2), place.ariaSort]];
+      const name = "table4_size", place = heading(name, 1), button = place.querySelector("button");
+      const states = [[column(name, 1), place.ariaSort]];
       button.focus();
       const focused = document.activeElement === button && button.tabIndex === 0;
       for (let i = 0; i < 3; i++) {
         button.click();
-        states.push([column(name, 2), place.ariaSort]);
+        states.push([column(name, 1), place.ariaSort]);
       }
-      button.click(); heading(name, 3).querySelector("button").click();
-      return [focused, states, place.ariaSort, heading(name, 3).ariaSort];
+      button.click(); heading(name, 2).querySelector("button").click();
+      return [focused, states, place.ariaSort, heading(name, 2).ariaSort];
     """
     focused, states, left, taken = asked(page, tmp_path, probe)
     values = [f"{300**0.5 / n**0.5:.2f} m" for n in (300, 1000, 2000, 4000)]
