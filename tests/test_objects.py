@@ -100,9 +100,9 @@ def test_built_in_objects_are_cartons(tmp_path):
     crowd = crowd_of(mesh, RenderConfig(effects=EffectsConfig.model_validate({"clutter": {}})))
     assert crowd is not None
     path = np.array([[-1.0, 0, 0], [1, 0, 0]])
-    parts, places = crowd.along(path, np.random.default_rng(0))
-    assert [place["name"] for place in places] == [f"carton_{n}" for n in range(8)]
-    feet_m = {p.name: p.vertices_m[:, 2].min() for p in parts}
+    found = crowd.along(path, np.random.default_rng(0))
+    assert [place["name"] for _, place in found] == [f"carton_{n}" for n in range(8)]
+    feet_m = {p.name: p.vertices_m[:, 2].min() for parts, _ in found for p in parts}
     lowest = [feet_m[f"object-{number}"] for number in (0, 7)]
     assert lowest == pytest.approx([-1.5, -1.5], abs=0.003)  # on the floor
 

@@ -39,6 +39,13 @@ COLMAP_MODELS = {
     "FULL_OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
 }
 
+UNKNOWN = (
+    "is no calibration file: OpenCV's or ROS's end in .yaml, .yml or .json, COLMAP's is cameras.txt"
+)
+BINARY = (
+    "COLMAP's binary format is not read; convert the folder it is in: colmap model_converter"
+    " --input_path IN --output_path OUT --output_type TXT, and take OUT/cameras.txt"
+)
 Distortion = tuple[float, float, float, float, float]
 
 
@@ -109,35 +116,22 @@ def read_calibration(path: Path) -> Calibration:
         InputError: the file is missing, is of another format, or holds no camera that can be used;
             the message names file and field.
     """
-    readers = {".yaml": _from_yaml, ".yml": _from_yaml, ".txt": _from_colmap}
-    readers[".json"] = lambda text: _from_mapping(json.loads(text))
+    suffix = path.suffix.lower()
     try:
-        if path.suffix.lower() not in readers:
-            raise ValueError(_unknown(path))
-        return readers[path.suffix.lower()](path.read_text(encoding="utf-8"))
+        if suffix not in (".yaml", ".yml", ".json", ".txt"):
+            raise ValueError(BINARY if suffix == ".bin" else UNKNOWN)
+        text = path.read_text(encoding="utf-8")
+        if suffix == ".txt":
+            return _from_colmap(text)
+        if suffix == ".json":
+            return _from_mapping(json.loads(text))
+        if text.startswith("%YAML:"):  # OpenCV's header, which YAML has no name for
+            text = text.partition("\n")[2]
+        return _from_mapping(yaml.load(text, _Loader))  # noqa: S506 (a SafeLoader)
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError, JSONDecodeError) as error:
         raise InputError(f"{path}: cannot be read as a calibration ({why(error)})") from None
     except ValueError as error:
         raise InputError(f"{path}: {why(error)}") from None
-
-
-def _unknown(path: Path) -> str:
-    if path.suffix.lower() == ".bin":
-        return (
-            "COLMAP's binary format is not read; convert the folder it is in: colmap"
-            " model_converter --input_path IN --output_path OUT --output_type TXT, and take"
-            " OUT/cameras.txt"
-        )
-    return (
-        "is no calibration file: OpenCV's or ROS's end in .yaml, .yml or .json, COLMAP's is"
-        " cameras.txt"
-    )
-
-
-def _from_yaml(text: str) -> Calibration:
-    if text.startswith("%YAML:"):  # OpenCV's header, which YAML has no name for
-        text = text.partition("\n")[2]
-    return _from_mapping(yaml.load(text, _Loader))  # noqa: S506 (a SafeLoader)
 
 
 def _from_mapping(values: Any) -> Calibration:

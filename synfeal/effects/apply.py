@@ -232,7 +232,7 @@ def objects_table(config: EffectsConfig, poses: Poses, crowd: Crowd) -> pd.DataF
         if path_effects(config, poses, first).clutter is None:
             continue
         rng = _generator("clutter", config, poses, first)
-        for place in crowd.along(poses.position_m[first:last], rng)[1]:
+        for _, place in crowd.along(poses.position_m[first:last], rng):
             corners = dict(zip(PLACE, [*place["position_m"], *place["size_m"]], strict=True))
             about = {"name": place["name"], **corners, "yaw_deg": place["yaw_deg"]}
             rows.append({"path": poses.path[first], **about})

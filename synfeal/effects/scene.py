@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +20,8 @@ from synfeal.config.models import CameraConfig, RenderConfig
 from synfeal.effects.light import GROUPS, Light
 from synfeal.errors import InputError
 from synfeal.mesh.load import load_mesh
-from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.mesh.standing import refuse_larger, standing
+from synfeal.mesh.model import TexturedMesh
+from synfeal.mesh.standing import Standing, refuse_larger, standing
 from synfeal.render import open_renderer
 from synfeal.render.base import Depth, Renderer, Rgb
 
@@ -50,23 +49,17 @@ class Crowd:
         vertices, faces = self.mesh.merged()
         return np.asarray(vertices[faces])
 
-    def along(
-        self, path_m: Array, rng: np.random.Generator
-    ) -> tuple[list[MeshPart], list[dict[str, Any]]]:
-        """What stands along a path of camera centres (P, 3), and where; none touches another."""
+    def along(self, path_m: Array, rng: np.random.Generator) -> list[Standing]:
+        """What stands along a path of camera centres (P, 3); none touches another."""
         bounds_m = np.array([path_m.min(axis=0), path_m.max(axis=0)])
         bounds_m[:, :2] += np.array([[-REACH_M], [REACH_M]])
         widest_m = max(float(np.ptp(kind.bounds_m, axis=0).max()) for _, kind in self.kinds)
-        near = self._near(bounds_m[:, :2] + np.array([[-widest_m], [widest_m]]))
-        found = standing(self.kinds, self.count, near, bounds_m, rng, TRIES, path_m)
-        placed = [each for each in found if each is not None]
-        return [part for parts, _ in placed for part in parts], [place for _, place in placed]
-
-    def _near(self, bounds_m: Array) -> Array:
-        """Triangles (N, 3, 3) that reach into bounds (2, 2) in x and y."""
+        lower, upper = bounds_m[:, :2] + np.array([[-widest_m], [widest_m]])
         flat = self._corners[:, :, :2]
-        inside = (flat.min(axis=1) <= bounds_m[1]) & (flat.max(axis=1) >= bounds_m[0])
-        return np.asarray(self._corners[inside.all(axis=1)])
+        near = (flat.min(axis=1) <= upper) & (flat.max(axis=1) >= lower)
+        corners = self._corners[near.all(axis=1)]
+        found = standing(self.kinds, self.count, corners, bounds_m, rng, TRIES, path_m)
+        return [each for each in found if each is not None]
 
 
 def crowd_of(mesh: Path, render: RenderConfig) -> Crowd | None:
@@ -122,7 +115,7 @@ class SceneRenderer(Renderer):
     def along(self, path_m: Array, rng: np.random.Generator) -> SceneRenderer:
         """A renderer of the scene with what stands along a path (P, 3)."""
         assert self._crowd is not None, "opened without `clutter`"
-        parts, _ = self._crowd.along(path_m, rng)
+        parts = (part for parts, _ in self._crowd.along(path_m, rng) for part in parts)
         both = TexturedMesh((*self._crowd.mesh.parts, *parts))
         return SceneRenderer(both, self._camera, self._render)
 

@@ -173,7 +173,13 @@ def repaired(part: MeshPart, findings: Findings) -> MeshPart:
     _, place = np.unique(part.vertices_m, axis=0, return_inverse=True)
     doubled = len(faces) - len(_first_of_each(place.reshape(-1)[faces]))
     _count(findings, part, doubled, "coincident", "kept: their vertices or texture differ")
-    part = _finite_uv(replace(part, faces=faces), findings)
+    part = replace(part, faces=faces)
+    if part.uv is not None and not np.isfinite(part.uv).all():
+        bad = np.logical_not(np.all(np.isfinite(part.uv), axis=1, keepdims=True))
+        findings.warn(
+            f"part '{part.name}': {bad.sum()} texture coordinates that are NaN or infinite set to 0"
+        )
+        part = replace(part, uv=np.where(bad, 0.0, part.uv))
     unused = len(part.vertices_m) - len(np.unique(faces))  # they would stretch its bounds
     if not unused:
         return part
@@ -204,15 +210,3 @@ def _first_of_each(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """Indices of the faces, in order, whose three vertices no earlier face has."""
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
     return np.sort(first)
-
-
-def _finite_uv(part: MeshPart, findings: Findings) -> MeshPart:
-    if part.uv is None:
-        return part
-    bad = np.logical_not(np.all(np.isfinite(part.uv), axis=1, keepdims=True))
-    if not bad.any():
-        return part
-    findings.warn(
-        f"part '{part.name}': {bad.sum()} texture coordinates that are NaN or infinite set to 0"
-    )
-    return replace(part, uv=np.where(bad, 0.0, part.uv))

@@ -45,7 +45,15 @@ def read_gltf(path: Path) -> Gltf:
     content = path.read_bytes()
     if path.suffix.lower() == ".gltf":
         return Gltf(_parse_json(path, content))
-    _check_glb_head(path, content)
+    if content[:4] != GLB_MAGIC or len(content) < 20:
+        raise InputError(f"{path}: cannot be read as a mesh (not a GLB file, whatever its name)")
+    version, size = struct.unpack_from("<II", content, 4)
+    if version != 2:
+        raise InputError(f"{path}: is glTF {version}; convert it to glTF 2.0")
+    if len(content) < size:
+        raise InputError(
+            f"{path}: ends after {len(content)} of {size} bytes; download or export it again"
+        )
     chunks: dict[bytes, bytes] = {}
     start = 12
     while start + 8 <= len(content):
@@ -55,18 +63,6 @@ def read_gltf(path: Path) -> Gltf:
     if JSON_CHUNK not in chunks:
         raise InputError(f"{path}: the GLB holds no JSON; export it again")
     return Gltf(_parse_json(path, chunks[JSON_CHUNK]), chunks.get(BIN_CHUNK, b""))
-
-
-def _check_glb_head(path: Path, content: bytes) -> None:
-    if content[:4] != GLB_MAGIC or len(content) < 20:
-        raise InputError(f"{path}: cannot be read as a mesh (not a GLB file, whatever its name)")
-    version, length = struct.unpack_from("<II", content, 4)
-    if version != 2:
-        raise InputError(f"{path}: is glTF {version}; convert it to glTF 2.0")
-    if len(content) < length:
-        raise InputError(
-            f"{path}: ends after {len(content)} of {length} bytes; download or export it again"
-        )
 
 
 def _parse_json(path: Path, text: bytes) -> Json:

@@ -133,10 +133,7 @@ class DevicePart:
         return self._context.vertex_array(program, attributes, self._index)
 
     def draw(self, triangles: Any, clip_from_mesh: NDArray[np.float64]) -> None:
-        """Draw ``colour``, or as ``depth`` distances along the optical axis in metres.
-
-        Into the framebuffer in use.
-        """
+        """Draw ``colour``, or ``depth`` along the optical axis, into the framebuffer in use."""
         by_columns = clip_from_mesh.astype(np.float32).tobytes(order="F")
         triangles.program["clip_from_mesh"].write(by_columns)
         if self._texture is not None:
