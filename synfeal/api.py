@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.collection.collect import CollectJob, with_backend
-from synfeal.collection.collect import collect as run_collection
+from synfeal.collection import CollectJob, with_backend
+from synfeal.collection import collect as run_collection
 from synfeal.config.dataset import DatasetConfig
 from synfeal.config.models import CameraConfig, SceneConfig
 from synfeal.dataset.frame_files import FrameFile

@@ -58,21 +58,14 @@ def only_command(directory: Path, lock: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
-def unfinished(root: Path) -> Iterator[Path]:
-    """Files and directories below ``root`` under the names of what is not finished."""
-    for folder, directories, files in os.walk(root):
-        found = [name for name in (*directories, *files) if TEMPORARY.fullmatch(name)]
-        yield from (Path(folder, name) for name in found)
-        directories[:] = [name for name in directories if name not in found]
-
-
 def remove_unfinished(root: Path) -> None:
-    """Remove them."""
-    for path in list(unfinished(root)):
-        if path.is_dir():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            path.unlink(missing_ok=True)
+    """Remove files and directories below ``root`` under the names of what is not finished."""
+    for folder, directories, files in os.walk(root):
+        for path in (Path(folder, n) for n in (*directories, *files) if TEMPORARY.fullmatch(n)):
+            if path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
 
 
 def _end_future(root: Path) -> None:

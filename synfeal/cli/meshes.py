@@ -84,8 +84,8 @@ def collect(arguments: argparse.Namespace) -> None:
     Run again after an interruption, it goes on where it stopped.
     """
     config = dataset_config(options_among(arguments, KEYS), arguments.out)
-    from synfeal.collection.collect import CollectJob, configuration_text, with_backend
-    from synfeal.collection.collect import collect as run_collection
+    from synfeal.collection import CollectJob, configuration_text, with_backend
+    from synfeal.collection import collect as run_collection
 
     job = CollectJob(with_backend(config), arguments.packed, arguments.out)
     if arguments.print_config:

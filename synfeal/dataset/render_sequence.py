@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,29 +28,18 @@ from synfeal.render.base import Depth, Rgb
 from synfeal.render.choose import fastest_working
 
 
-class Progress:
-    """Frames done of all that are to be rendered; everything goes to standard error."""
+class Progress(tqdm):  # type: ignore[type-arg]
+    """Frames done of all that are to be rendered: a bar on a terminal, one line a sequence else."""
 
     def __init__(self, n_frames: int, name: str, n_done: int = 0) -> None:
-        self._on_terminal = sys.stderr.isatty()
-        self._bar = tqdm(total=n_frames, initial=n_done, unit="frame", desc=name, disable=None)
-
-    def update(self, n_frames: int = 1) -> None:
-        """Some more frames are done."""
-        self._bar.update(n_frames)
+        super().__init__(total=n_frames, initial=n_done, unit="frame", desc=name, disable=None)
 
     def part_done(self, name: str, n_frames: int, seconds: float) -> None:
-        """One sequence is done; says so where there is no bar."""
-        if not self._on_terminal:
+        """One sequence is done."""
+        if self.disable:
             rate = n_frames / seconds if seconds else float("inf")
             line = f"{name}, {n_frames} frames in {seconds:.1f} s, {rate:.1f}/s"
             print(line, file=sys.stderr, flush=True)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()
 
 
 Effects = tuple[CameraConfig, EffectsConfig]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -128,11 +128,11 @@ def _paths(
     spaces: Sequence[PoseSpace], turns: _Turns, collection: CollectionConfig, n_frames: int
 ) -> list[Array]:
     """Poses (n, 4, 4) of paths that have at least ``n_frames`` between them, space after space."""
-    walks = [_Walk(space, collection) for space in spaces]
+    walks = [_walk(space, collection) for space in spaces]
     paths: list[Array] = []
     while turns.total < n_frames:
         index = turns.next(0)
-        paths.append(walks[index].next_path())
+        paths.append(next(walks[index]))
         turns.made[index] += len(paths[-1])
     return paths
 
@@ -157,28 +157,21 @@ class _Turns:
         return index
 
 
-class _Walk:
-    """Connected paths through one box: where one ends the next begins."""
-
-    def __init__(self, space: PoseSpace, collection: CollectionConfig) -> None:
-        self._space, self._collection = space, collection
-        self._at = sample_start(space, collection.max_tries)  # itself no frame
-        self._stream = CandidateStream(space, collection.candidates)
-
-    def next_path(self) -> Array:
-        """Poses (n, 4, 4) of the next path; where no target is admissible, says what to relax."""
-        asked = self._collection
-        target = self._stream.next_target(self._at, asked.min_path_m, asked.max_tries)
+def _walk(space: PoseSpace, collection: CollectionConfig) -> Iterator[Array]:
+    """Poses (n, 4, 4) of connected paths through one box: where one ends the next begins."""
+    at = sample_start(space, collection.max_tries)  # itself no frame
+    stream = CandidateStream(space, collection.candidates)
+    while True:
+        target = stream.next_target(at, collection.min_path_m, collection.max_tries)
         if target is None:
-            where = ", ".join(f"{value:.2f}" for value in self._at[:3])
+            where = ", ".join(f"{value:.2f}" for value in at[:3])
             raise InputError(
-                f"plan: no admissible target from ({where}) in {asked.max_tries} rounds of"
-                f" {asked.candidates} candidates; lower min_path_m ({asked.min_path_m} m) or"
-                f" min_view_distance_m ({self._space.min_view_distance_m} m), or widen sampling_box"
+                f"plan: no admissible target from ({where}) in {collection.max_tries} rounds of"
+                f" {collection.candidates} candidates; lower min_path_m ({collection.min_path_m} m)"
+                f" or min_view_distance_m ({space.min_view_distance_m} m), or widen sampling_box"
             )
-        path = path_poses(self._at, target, asked.frame_spacing_m, asked.interpolation)
-        self._at = target
-        return path
+        yield path_poses(at, target, collection.frame_spacing_m, collection.interpolation)
+        at = target
 
 
 def _table(paths: list[Array], n_frames: int) -> PoseTable:

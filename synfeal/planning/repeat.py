@@ -47,7 +47,7 @@ def repeated_poses(
 def read_poses(source: Path, split: str) -> PoseTable:
     """Poses ``world_from_cam`` of a split (``train`` or ``test``), numbered from 0.
 
-    ``source`` is a data set of :mod:`synfeal.collection.collect`, a 7-Scenes data set, a directory
+    ``source`` is a data set of :mod:`synfeal.collection`, a 7-Scenes data set, a directory
     of its frames (``frame-XXXXXX.pose.txt``), a pose table (``.csv``) or a trajectory in the
     format of the TUM benchmark (``.txt``). The last three hold one list of poses, which is the
     training split. Each sequence and each trajectory is one path, where no table says otherwise.
