@@ -8,16 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from synfeal.geometry.poses import umeyama_sim3
 from synfeal.geometry.rotations import matrix_from_quat_wxyz
-from tests.property_support import (
-    directions,
-    few,
-    positions,
-    quats,
-    rotation_of,
-    seeds,
-    turn,
-    vectors,
-)
+from tests import property_support as drawn
 
 AXIS = np.array([2.0, -3.0, 6.0]) / 7.0
 
@@ -26,7 +17,9 @@ def test_umeyama_agrees_with_scipy_on_noisy_and_on_planar_points():
     rng = np.random.default_rng(1)
     for flat in (1.0, 0.0):
         source = rng.normal(size=(30, 3)) * [1, 1, flat]
-        target = source @ matrix_from_quat_wxyz(turn(AXIS, 1.3)).T + 0.05 * rng.normal(size=(30, 3))
+        target = source @ matrix_from_quat_wxyz(drawn.turn(AXIS, 1.3)).T + 0.05 * rng.normal(
+            size=(30, 3)
+        )
         _, rotation, _ = umeyama_sim3(source, target)
         centred = source - source.mean(0), target - target.mean(0)
         expected = Rotation.align_vectors(centred[1], centred[0])[0].as_matrix()
@@ -65,23 +58,23 @@ def test_umeyama_refuses_other_shapes_and_what_leaves_the_rotation_free(source, 
         umeyama_sim3(source, target)
 
 
-@few
-@given(seeds, st.integers(3, 12), quats, positions, st.floats(0.1, 10.0))
+@drawn.few
+@given(drawn.seeds, st.integers(3, 12), drawn.quats, drawn.positions, st.floats(0.1, 10.0))
 def test_umeyama_finds_the_similarity_and_its_inverse(seed, count, quat, offset, scale):
     source = np.random.default_rng(seed).uniform(-1, 1, (count, 3))
     assume(np.linalg.svd(source - source.mean(0), compute_uv=False)[1] > 0.1)
-    target = scale * source @ rotation_of(quat).T + offset
+    target = scale * source @ drawn.rotation_of(quat).T + offset
     found = umeyama_sim3(source, target)
     np.testing.assert_allclose(found[0], scale, rtol=1e-9)
-    np.testing.assert_allclose(found[1], rotation_of(quat), atol=1e-9)
+    np.testing.assert_allclose(found[1], drawn.rotation_of(quat), atol=1e-9)
     np.testing.assert_allclose(found[2], offset, atol=1e-9)
     back = umeyama_sim3(target, source)
     np.testing.assert_allclose(back[0], 1 / scale, rtol=1e-9)
-    np.testing.assert_allclose(back[1], rotation_of(quat).T, atol=1e-9)
+    np.testing.assert_allclose(back[1], drawn.rotation_of(quat).T, atol=1e-9)
 
 
-@few
-@given(seeds, directions, st.floats(1e-4, 1e-2), vectors(1e-2))
+@drawn.few
+@given(drawn.seeds, drawn.directions, st.floats(1e-4, 1e-2), drawn.vectors(1e-2))
 def test_umeyama_leaves_no_better_similarity_beside_its_own(seed, axis, angle, step):
     rng = np.random.default_rng(seed)
     source, target = rng.normal(size=(2, 8, 3))
@@ -92,6 +85,6 @@ def test_umeyama_leaves_no_better_similarity_beside_its_own(seed, axis, angle, s
 
     least = loss(scale, rotation, offset)
     np.testing.assert_allclose(np.linalg.det(rotation), 1.0, rtol=1e-12)
-    assert loss(scale, rotation_of(turn(axis, angle)) @ rotation, offset) > least
+    assert loss(scale, drawn.rotation_of(drawn.turn(axis, angle)) @ rotation, offset) > least
     assert loss(scale * (1 + angle), rotation, offset) > least
     assert loss(scale, rotation, offset + step) >= least

@@ -3,18 +3,12 @@
 import json
 import logging
 
-import numpy as np
 import pytest
 import trimesh
 
 from synfeal.cli import main
-from synfeal.config.models import CameraConfig, CollectionConfig, RenderConfig, SceneConfig
-from synfeal.mesh.load import load_mesh
-from synfeal.mesh.rays import RayCaster
+from synfeal.config.models import CameraConfig
 from synfeal.mesh.save import save_glb
-from synfeal.planning.coverage import empty_shares
-from synfeal.planning.plan import plan_split
-from synfeal.render import open_renderer
 from tests.collected import painted, refused
 
 CAMERA = CameraConfig(width=64, height=48)
@@ -87,19 +81,3 @@ def test_collect_always_says_how_many_pixels_are_empty(mesh, warns, tmp_path, ca
     assert (share > 0.1) == warns
     assert f"empty pixels: {share:.1%}" in capsys.readouterr().out
     assert any("will be empty" in line for line in caplog.messages) == warns
-
-
-def test_what_is_predicted_empty_is_what_is_rendered_empty(tmp_path):
-    """Depth is infinite where nothing was hit: another code than the one that predicts."""
-    mesh = load_mesh(save(tmp_path / "room.glb", open_room()))
-    caster = RayCaster(*mesh.merged())
-    scene = SceneConfig.model_validate({"source": "mesh", "path": "room.glb"})
-    spaced = CollectionConfig(frame_spacing_m=0.5)
-    rng = np.random.default_rng(0)
-    plan = plan_split(caster, mesh.bounds_m, scene, spaced, 20, rng)
-    predicted = empty_shares(caster, plan.world_from_cam, CAMERA)
-    with open_renderer(mesh, CAMERA, RenderConfig(backend="raycast")) as renderer:
-        rendered = [np.isinf(renderer.render_rgbd(pose)[1]).mean() for pose in plan.world_from_cam]
-    assert np.ptp(rendered) > 0.2
-    np.testing.assert_allclose(predicted, rendered, atol=0.05)
-    assert predicted.mean() == pytest.approx(np.mean(rendered), abs=0.01)

@@ -13,34 +13,26 @@ from synfeal.report import stats
 from synfeal.report.columns import side_sheet
 from synfeal.report.hard_cases import estimates, exact, scenes
 from synfeal.report.hard_cases import table as hard_table
-from synfeal.report.hard_cases.table import (
-    CASES,
-    SCHEMA,
-    row_of,
-    rows_of,
-    side_table,
-    write_hard_cases,
-)
 from synfeal.report.html.tables import side_html
 from synfeal.report.sheet import sheet_latex
 from tests.report_results import write_rows
 
-ALL = {(family.name, name): family for family in CASES for name in family.cases}
-FAMILIES = list(dict.fromkeys(family.name for family in CASES))
+ALL = {(family.name, name): family for family in hard_table.CASES for name in family.cases}
+FAMILIES = list(dict.fromkeys(family.name for family in hard_table.CASES))
 
 
 @pytest.fixture(scope="module", autouse=True)
 def all_rows():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(exact, "N_TIMINGS", 1)
-        yield rows_of(CASES)
+        yield hard_table.rows_of(hard_table.CASES)
 
 
 def test_every_case_keeps_its_bound_and_pages_mark_what_exceeds_it(all_rows, tmp_path):
     assert [(row["case"], row["our_error"]) for row in all_rows if not row["ok"]] == []
     assert len(ALL) == len(all_rows) >= 45
-    write_rows(tmp_path / "table.csv", SCHEMA, all_rows)
-    table = side_table(read_frame(tmp_path / "table.csv", SCHEMA))
+    write_rows(tmp_path / "table.csv", hard_table.SCHEMA, all_rows)
+    table = hard_table.side_table(read_frame(tmp_path / "table.csv", hard_table.SCHEMA))
     lines = ET.fromstring(side_html(table)).findall(".//tbody/tr")
     for row, line in zip(all_rows, lines, strict=True):
         assert ("✗" in "".join(line[2].itertext())) == (row["naive_error"] > row["bound"])
@@ -61,7 +53,7 @@ def test_each_family_shows_what_goes_wrong(family, all_rows):
 
 def test_a_broken_function_is_not_ok(monkeypatch):
     monkeypatch.setattr(stats, "share_limits", estimates.wald)
-    assert row_of(ALL["shares", "0 of 20"], "0 of 20")["ok"] == 0
+    assert hard_table.row_of(ALL["shares", "0 of 20"], "0 of 20")["ok"] == 0
 
 
 @pytest.mark.parametrize(
@@ -111,13 +103,13 @@ def test_truths_agree_with_scipy_and_closed_forms():
 
 
 def test_the_table_has_the_same_errors_every_time(tmp_path, monkeypatch):
-    some = [f for f in CASES if f.name in ("orientation error", "depth", "shares")]
+    some = [f for f in hard_table.CASES if f.name in ("orientation error", "depth", "shares")]
     monkeypatch.setattr(hard_table, "CASES", some)
     texts = []
     for name in ("once.csv", "twice.csv"):
-        write_hard_cases(tmp_path / name)
+        hard_table.write_hard_cases(tmp_path / name)
         lines = (tmp_path / name).read_text().splitlines()
-        assert lines[0] == ",".join(SCHEMA)
+        assert lines[0] == ",".join(hard_table.SCHEMA)
         texts.append([line.rsplit(",", 2)[0] for line in lines])
     assert texts[0] == texts[1]
     assert len(texts[0]) == sum(len(family.cases) for family in some) + 1

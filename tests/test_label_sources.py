@@ -3,16 +3,10 @@
 import numpy as np
 import pytest
 
+from baselines.groundtruth import methods
 from baselines.groundtruth.batches import batches_of, read_trajectory, write_trajectory
 from baselines.groundtruth.chain import chain_batches, summary_of
 from baselines.groundtruth.label_error import absolute_errors
-from baselines.groundtruth.methods import (
-    METHODS,
-    estimate_batch,
-    frame_methods,
-    graph_methods,
-    solve_graph,
-)
 from baselines.groundtruth.rgbd import rgbd_graph
 from baselines.groundtruth.sfm import sfm_batch
 from synfeal.config.models import GroundTruthConfig
@@ -40,13 +34,13 @@ def graphs(paths):
 def estimated(source, batch, paths):
     """A batch by a method that works on images."""
     color, depth = (files[batch.start : batch.stop] for files in paths)
-    if source in frame_methods():
-        return estimate_batch(source, color, depth, CAMERA, CFG, 0)[0]
+    if source in methods.frame_methods():
+        return methods.estimate_batch(source, color, depth, CAMERA, CFG, 0)[0]
     truth = TRUTH.world_from_cam[batch.start : batch.stop]
     return sfm_batch(color, CAMERA, truth, CFG.sfm, 0)[0]
 
 
-@pytest.fixture(scope="module", params=["synfeal", "noise", *METHODS])
+@pytest.fixture(scope="module", params=["synfeal", "noise", *methods.METHODS])
 def labels(request, paths, graphs, tmp_path_factory):
     """Labels of one source; the estimated ones pass through their files as in a run."""
     folder, source = tmp_path_factory.mktemp("batches"), request.param
@@ -54,8 +48,8 @@ def labels(request, paths, graphs, tmp_path_factory):
         return TRUTH
     if source == "noise":
         return add_noise(TRUTH, 0.1, 5.0, np.random.default_rng(0))
-    if source in graph_methods():
-        estimates = [solve_graph(source, graph, CFG.posegraph)[0] for graph in graphs]
+    if source in methods.graph_methods():
+        estimates = [methods.solve_graph(source, graph, CFG.posegraph)[0] for graph in graphs]
     else:
         estimates = [estimated(source, batch, paths) for batch in BATCHES]
     for batch, estimate in zip(BATCHES, estimates, strict=True):
