@@ -12,8 +12,8 @@ from synfeal.dataset.pose_table import write_pose_table
 from synfeal.errors import InputError
 from synfeal.frames import read_records
 from synfeal.report.claims import untrained
-from synfeal.report.claims.model import Verdict, published_claims
 from synfeal.report.claims.table import JUDGES, claims_markdown, write_claims
+from synfeal.report.claims.verdicts import Verdict, published_claims
 from tests import claims_results as made
 from tests.claims_results import AXES, assisted, collected_at, curves, first_paths, put
 from tests.report_results import design_of, experiment, fill_assistance

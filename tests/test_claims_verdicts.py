@@ -6,8 +6,17 @@ import numpy as np
 import pytest
 
 from synfeal.bootstrap import limits
-from synfeal.report.claims.model import ERRORS, PERCENT, Verdict, limits_text, values_text
-from synfeal.report.claims.verdicts import Condition, all_of, at_least, verdict_of
+from synfeal.report.claims.verdicts import (
+    ERRORS,
+    PERCENT,
+    Condition,
+    Verdict,
+    all_of,
+    at_least,
+    limits_text,
+    values_text,
+    verdict_of,
+)
 
 HOLDS, SMALLER, MIXED, NO_EFFECT, LESS, OPPOSITE, UNDECIDED, *_ = Verdict
 

@@ -4,17 +4,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from synfeal.report.cost.estimate import (
+from synfeal.report.cost.jobs import COLUMNS
+from synfeal.report.cost.laws import (
     CPU,
     GPU,
+    LAW,
     Machine,
+    fit_seconds,
     job_costs,
     stage_costs,
     summed,
     wall_seconds,
 )
-from synfeal.report.cost.jobs import COLUMNS
-from synfeal.report.cost.laws import LAW, fit_seconds
 from synfeal.report.cost.networks import training_work
 from synfeal.report.cost.runs import last_look_s
 from tests.planned_runs import planned

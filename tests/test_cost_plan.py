@@ -8,9 +8,20 @@ import pytest
 
 from baselines.training.device import open_device
 from synfeal.cli import main
-from synfeal.report.cost import estimate, steps
+from synfeal.report.cost import steps
 from synfeal.report.cost.jobs import job_of
-from synfeal.report.cost.laws import fit_laws, matched, seconds_of
+from synfeal.report.cost.laws import (
+    ALONE,
+    OWN,
+    Machine,
+    compare_cost,
+    fit_laws,
+    job_costs,
+    matched,
+    seconds_of,
+    summed,
+    table_costs,
+)
 from synfeal.report.cost.networks import training_work
 from synfeal.report.cost.runs import last_look_s, read_measured, read_runs, write_measured
 from tests import ROOT
@@ -116,14 +127,14 @@ def test_processor_time_is_completed_and_one_file_keeps_the_measurements(tmp_pat
 def test_tables_add_up_to_the_run():
     jobs, needed = run_jobs("smoke"), planned("smoke")[1].needed
     laws = pd.concat([a_law(name, fixed_s=1.0) for name in jobs.law.unique()])
-    machine = estimate.Machine(1, 0, 1.0)
-    costs = estimate.job_costs(jobs, laws, machine)
-    rows = pd.DataFrame(estimate.table_costs(costs, needed, machine))
-    own, alone = rows[rows.part == estimate.OWN], rows[rows.part == estimate.ALONE]
+    machine = Machine(1, 0, 1.0)
+    costs = job_costs(jobs, laws, machine)
+    rows = pd.DataFrame(table_costs(costs, needed, machine))
+    own, alone = rows[rows.part == OWN], rows[rows.part == ALONE]
     assert own.jobs.sum() == len(jobs)
     assert own.cpu_mid.sum() == pytest.approx(len(jobs))
     assert alone.set_index("name").jobs.to_dict() == {t: len(keys) for t, keys in needed.items()}
-    assert estimate.summed(costs, machine)["wall_mid"] == pytest.approx(len(jobs))
+    assert summed(costs, machine)["wall_mid"] == pytest.approx(len(jobs))
     # By itself a table needs the training runs of its own rows, and from the meshes on.
     keys = needed["table4_size"]
     trained = {name.rsplit("/", 2)[0] for stage, name in keys if stage == "train"}
@@ -157,7 +168,7 @@ def test_steps_that_are_timed_tell_what_a_small_run_does_not():
     for seed in range(4):
         factor = np.exp(np.random.default_rng(seed).normal(0, 0.15, len(jobs)))
         run = jobs[["stage", "job"]].assign(cpu_s=seconds_of(jobs, laws) * factor, peak_mb=np.nan)
-        total = estimate.compare_cost(fit_laws(matched(jobs, run), rates), mini).iloc[-1]
+        total = compare_cost(fit_laws(matched(jobs, run), rates), mini).iloc[-1]
         assert total.stage == "total"
         assert 1 / 1.5 < total.factor < 1.5
 

@@ -14,7 +14,7 @@ from synfeal.report.figures import (
     CAPTIONS,
     FIGURES,
     Results,
-    cumulative_error,
+    error_by_method,
     label_sets,
     scenes,
     write_figures,
@@ -178,7 +178,7 @@ def test_frames_are_spread_evenly(count):
 
 
 def test_cumulative_error_shows_the_largest_size_whatever_the_order_of_the_rows(results):
-    position, orientation, both = cumulative_error.draw(results).axes
+    position, orientation, both = error_by_method.draw_cumulative_error(results).axes
     assert position.get_title() == "Large Room, 20k\n12 training, 6 test frames"
     for axes, errors in (
         *((position, (0.1, 0.2, 0.4)), (orientation, (10, 20, 30))),

@@ -12,7 +12,7 @@ from synfeal.cli.options import command, option
 from synfeal.errors import InputError
 
 if TYPE_CHECKING:
-    from synfeal.report.cost.estimate import Machine
+    from synfeal.report.cost.laws import Machine
 
 SNAKEFILE = Path("Snakefile")
 PLUGINS = Path("workflow/plugins")
@@ -77,7 +77,7 @@ def plan(arguments: argparse.Namespace) -> None:
 
 def _machines(arguments: argparse.Namespace) -> list[Machine]:
     """What to plan for: as many numbers of GPUs as of cores, or one for all."""
-    from synfeal.report.cost.estimate import Machine
+    from synfeal.report.cost.laws import Machine
 
     cores, gpus = arguments.cores or [os.cpu_count() or 1], arguments.gpus
     for flag, values, least in (("--cores", cores, 1), ("--gpus", gpus, 0)):

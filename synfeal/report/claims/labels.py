@@ -12,15 +12,16 @@ import numpy as np
 from synfeal.bootstrap import Array, difference, limits, mean_of, relative_change
 from synfeal.config import MODELS
 from synfeal.report.claims.evidence import QUANTITIES, Cell, Evidence
-from synfeal.report.claims.model import (
+from synfeal.report.claims.verdicts import (
     PERCENT,
     Claim,
+    Condition,
     Outcome,
     Verdict,
+    all_of,
     limits_text,
     values_text,
 )
-from synfeal.report.claims.verdicts import Condition, all_of
 from synfeal.report.layouts import SOURCES, TITLES
 from synfeal.report.stats import kendall_tau, sign_test
 

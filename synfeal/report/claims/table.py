@@ -15,7 +15,7 @@ from synfeal.config import MODELS, Design
 from synfeal.frames import write_frame
 from synfeal.report.claims import labels, training, untrained
 from synfeal.report.claims.evidence import COMMON, Cell, Evidence, evidence_of
-from synfeal.report.claims.model import Claim, Missing, Outcome, Verdict, published_claims
+from synfeal.report.claims.verdicts import Claim, Missing, Outcome, Verdict, published_claims
 
 JUDGES: Mapping[str, Callable[[Claim, Evidence], Outcome]] = {
     "C1": labels.lowest_of_all,

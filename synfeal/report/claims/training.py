@@ -17,8 +17,17 @@ from synfeal.config import MODELS
 from synfeal.config.experiments import SHARES
 from synfeal.report.claims.evidence import QUANTITIES, Cell, Evidence
 from synfeal.report.claims.labels import changes, effects, every_localizer
-from synfeal.report.claims.model import ERRORS, Claim, Outcome, Verdict, limits_text, values_text
-from synfeal.report.claims.verdicts import Condition, all_of, at_least
+from synfeal.report.claims.verdicts import (
+    ERRORS,
+    Claim,
+    Condition,
+    Outcome,
+    Verdict,
+    all_of,
+    at_least,
+    limits_text,
+    values_text,
+)
 from synfeal.report.layouts import STARTS, TITLES
 from synfeal.report.stats import kendall_tau
 
@@ -119,9 +128,9 @@ def longer(claim: Claim, evidence: Evidence) -> Outcome:
 
 def _log_ratio(evidence: Evidence, model: str) -> Array:
     """Logarithm (1 + RESAMPLES,) of images from scratch over images with transfer learning."""
-    new, old = (
+    old, new = (
         np.log(evidence.errors(*(Cell(model, init=f"{start}{end}") for end in LENGTHS)))
-        for start in ("scratch", "pretrained")
+        for start in STARTS
     )
     return images_ratio(new.mean(axis=1), old.mean(axis=1))
 

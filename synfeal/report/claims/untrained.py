@@ -9,8 +9,7 @@ from pydantic import BaseModel, Field
 
 from synfeal.report.assistance import PUBLISHED_ASSISTED, assistance_record
 from synfeal.report.claims.evidence import Evidence
-from synfeal.report.claims.model import Claim, Missing, Outcome, Verdict
-from synfeal.report.claims.verdicts import compared
+from synfeal.report.claims.verdicts import Claim, Missing, Outcome, Verdict, compared
 from synfeal.report.layouts import SOURCES, scene_title
 from synfeal.report.meshes import read_mesh_facts
 from synfeal.report.results import read_result

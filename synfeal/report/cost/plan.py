@@ -10,19 +10,19 @@ import pandas as pd
 
 from synfeal.frames import write_frame
 from synfeal.report.cost.dry_run import planned_jobs
-from synfeal.report.cost.estimate import (
+from synfeal.report.cost.jobs import jobs_of
+from synfeal.report.cost.laws import (
     ALONE,
     OWN,
     RUN,
     Machine,
     compare_cost,
+    fit_laws,
     job_costs,
     stage_costs,
     summed,
     table_costs,
 )
-from synfeal.report.cost.jobs import jobs_of
-from synfeal.report.cost.laws import fit_laws
 from synfeal.report.cost.runs import profile_path, read_profile, read_runs
 from synfeal.report.cost.steps import timed_rates
 
@@ -36,7 +36,7 @@ class Plan:
 
     profile: str  # its name
     machine: Machine  # what it is planned for
-    # A row for each stage, for each table, and last for the run; see ``estimate.py``.
+    # A row for each stage, for each table, and last for the run; see ``laws.py``.
     costs: pd.DataFrame
     origin: str  # what the laws were fitted to
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from synfeal.report.cost.estimate import ALONE, LAUNCH_S, OWN, RUN, STAGE
+from synfeal.report.cost.laws import ALONE, LAUNCH_S, OWN, RUN, STAGE
 from synfeal.report.cost.plan import Comparisons, Plan
 from synfeal.report.sheet import text_table
 

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from synfeal.config import Design
 from synfeal.files import atomic_path
 from synfeal.report.figures import (
-    cumulative_error,
     error_by_design,
     error_by_method,
     label_sets,
@@ -88,7 +87,7 @@ FIGURES: dict[str, Entry] = {
         "frames with effects mixed in; dotted lines are their errors on ideal frames.",
     ),
     "cumulative_error": Entry(
-        cumulative_error.draw,
+        error_by_method.draw_cumulative_error,
         "Share of the test frames that each localizer places with at most a given error against "
         "the true poses, in position, in orientation and in both (as many degrees as centimetres), "
         "at the largest size of each scene; the grey line is the median.",

@@ -32,7 +32,7 @@ from synfeal.report import (
     speed_vs_error,
 )
 from synfeal.report.cells import key_of, published_cells, read_cells
-from synfeal.report.claims.model import Verdict
+from synfeal.report.claims.verdicts import Verdict
 from synfeal.report.figures import CAPTIONS
 from synfeal.report.hard_cases import table as hard_cases
 from synfeal.report.html.provenance import cost_sentence, origin_html, read_origin

@@ -15,8 +15,8 @@ from markupsafe import Markup
 from synfeal.config.experiments import FROM_SCRATCH
 from synfeal.errors import InputError
 from synfeal.frames import TEXT, read_frame, records_of
-from synfeal.report.claims.model import Verdict
 from synfeal.report.claims.table import COLUMNS
+from synfeal.report.claims.verdicts import Verdict
 from synfeal.report.columns import SCORES, Column, SideTable, cells_of
 from synfeal.report.layouts import CHANGE
 from synfeal.report.sheet import PAPER, Line, Value, footnotes
