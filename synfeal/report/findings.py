@@ -52,7 +52,13 @@ def mean_factor(found: pd.DataFrame, change: str, measure: str, source: str) -> 
 def sentences(root: Path) -> list[str]:
     """What there is to say: each group of changes in one sentence, and how the claims fared."""
     groups = effects(root).groupby("group", sort=False)
-    return [*(_group_sentence(found) for _, found in groups), _claims_sentence(root)]
+    claims = read_frame(root / "claims.csv", {"verdict_true": TEXT}, "publish again")
+    verdicts = claims.verdict_true.value_counts(sort=False)
+    counts = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.items())
+    return [
+        *(_group_sentence(found) for _, found in groups),
+        f"Verdicts on {verdicts.sum()} claims, by the true poses: {counts}.",
+    ]
 
 
 def _changes(root: Path) -> Iterator[pd.DataFrame]:
@@ -104,13 +110,6 @@ def _factors(
             parts.append(part.assign(measure=measure, source=source))
     found = pd.concat(parts).assign(group=names[0], change=names[1], spoken=spoken)
     return found.dropna(subset="factor")[list(COLUMNS)]
-
-
-def _claims_sentence(root: Path) -> str:
-    claims = read_frame(root / "claims.csv", {"verdict_true": TEXT}, "publish again")
-    verdicts = claims.verdict_true.value_counts(sort=False)
-    parts = [f"{count} {verdict}" for verdict, count in verdicts.items()]
-    return f"Verdicts on {verdicts.sum()} claims, by the true poses: {', '.join(parts)}."
 
 
 def _group_sentence(found: pd.DataFrame) -> str:

@@ -13,6 +13,7 @@ import math
 import re
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ import pandas as pd
 
 from synfeal.config import MODELS
 from synfeal.errors import InputError
-from synfeal.files import atomic_path
+from synfeal.files import write_text
 from synfeal.frames import (
     COUNT,
     NUMBER,
@@ -204,21 +205,18 @@ def _difficulty(folder: Path, name: str) -> dict[str, str]:
 
 def stale(check: bool) -> list[Path]:
     """Pages, and the figure, that did not show the published results; written unless checking."""
-    found = effects(PUBLISHED / headline())
-    changed = []
+    writers: dict[Path, Callable[[], None]] = {}
     for page in PAGES:
         old = page.read_text(encoding="utf-8")
         new = rewritten(old, part_of)
         if new != old:
-            changed.append(page)
-            if not check:
-                with atomic_path(page) as temporary:
-                    temporary.write_text(new, encoding="utf-8")
+            writers[page] = partial(write_text, page, new)
+    found = effects(PUBLISHED / headline())
     if not is_drawn_from(FIGURE, found):
-        changed.append(FIGURE)
-        if not check:
-            write_findings_figure(found, FIGURE)
-    return changed
+        writers[FIGURE] = partial(write_findings_figure, found, FIGURE)
+    for write in () if check else writers.values():
+        write()
+    return list(writers)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

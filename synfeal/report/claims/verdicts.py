@@ -170,7 +170,12 @@ def all_of(conditions: Sequence[Condition], each: Sequence[Condition] = ()) -> t
         verdict = Verdict.MIXED if Verdict.HOLDS in (*parts, *single) else _together(refuted)
     else:
         verdict = Verdict.HOLDS if {*parts} == {Verdict.HOLDS} else Verdict.UNDECIDED
-    return verdict, _parts_text(conditions, parts) + _singles_text(each, single)
+    against = "".join(
+        f"; single ones {part}: {', '.join(names)}"
+        for part, names in _by_part(each, single)
+        if part in REFUTED
+    )
+    return verdict, _parts_text(conditions, parts) + against
 
 
 def _together(refuted: set[Verdict]) -> Verdict:
@@ -202,12 +207,6 @@ def _parts_text(conditions: Sequence[Condition], parts: Sequence[Verdict]) -> st
         counts = Counter(parts).most_common()
         return f"of {len(parts)} conditions " + ", ".join(f"{n} {part}" for part, n in counts)
     return "; ".join(f"{part}: {', '.join(names)}" for part, names in _by_part(conditions, parts))
-
-
-def _singles_text(each: Sequence[Condition], parts: Sequence[Verdict]) -> str:
-    """Those of single localizers that are decided against the claim."""
-    against = [(part, names) for part, names in _by_part(each, parts) if part in REFUTED]
-    return "".join(f"; single ones {part}: {', '.join(names)}" for part, names in against)
 
 
 def _by_part(
