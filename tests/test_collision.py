@@ -20,7 +20,7 @@ from synfeal.mesh.triangles import (
     simplify,
 )
 from synfeal.planning.space import draw_questions
-from synfeal.report.figures import write_figures
+from synfeal.report.figures.registry import write_figures
 from synfeal.report.speed_vs_error import speeds_of, write_speed_vs_error
 from synfeal.scenes.collision import (
     Rung,

@@ -6,7 +6,7 @@ import pytest
 
 from synfeal.config import MODELS
 from synfeal.evaluation.metrics import cumulative
-from synfeal.report.figures import Results, speed_vs_error
+from synfeal.report.figures import speed_vs_error
 from synfeal.report.figures.error_by_design import (
     ASIDE,
     LEVEL,
@@ -16,6 +16,7 @@ from synfeal.report.figures.error_by_design import (
     by_size,
     published_values,
 )
+from synfeal.report.figures.sources import Results
 from synfeal.report.figures.speed_vs_error import pareto_front
 from synfeal.report.figures.style import PUBLISHED
 from synfeal.report.layouts import TITLES

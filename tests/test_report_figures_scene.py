@@ -10,17 +10,11 @@ from matplotlib.figure import Figure
 
 from synfeal.errors import InputError
 from synfeal.mesh.triangles import Triangles
-from synfeal.report.figures import (
-    CAPTIONS,
-    FIGURES,
-    Results,
-    error_by_method,
-    label_sets,
-    scenes,
-    write_figures,
-)
+from synfeal.report.figures import error_by_method, label_sets, scenes
 from synfeal.report.figures.label_sets import read_labelled_set
+from synfeal.report.figures.registry import CAPTIONS, FIGURES, write_figures
 from synfeal.report.figures.scenes import floor_m, plan_of
+from synfeal.report.figures.sources import Results
 from synfeal.report.figures.style import METHOD_STYLES, RC
 from synfeal.report.layouts import SOURCES
 from synfeal.report.references import SCHEMA as REFERENCE

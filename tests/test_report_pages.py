@@ -12,7 +12,7 @@ from synfeal.frames import TEXT, read_frame, write_frame
 from synfeal.report.assistance import write_assistance_table
 from synfeal.report.cells import FOLDER, read_cells
 from synfeal.report.document import CLAIM_COLUMNS, write_document, write_report_document
-from synfeal.report.figures import CAPTIONS
+from synfeal.report.figures.registry import CAPTIONS
 from synfeal.report.sheet import (
     PAPER,
     Line,

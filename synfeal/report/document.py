@@ -8,7 +8,7 @@ from pathlib import Path
 from synfeal.files import write_text
 from synfeal.frames import TEXT, read_frame, records_of
 from synfeal.report.columns import side_sheet
-from synfeal.report.figures import CAPTIONS
+from synfeal.report.figures.registry import CAPTIONS
 from synfeal.report.hard_cases import table as hard_cases
 from synfeal.report.results import read_text
 from synfeal.report.sheet import HEADER, PACKAGES, escape, sheet_latex

@@ -18,11 +18,8 @@ from synfeal.config.experiments import SHARES, split_init
 from synfeal.dataset.sevenscenes import sequences_of
 from synfeal.report.cost.networks import Work, pretext_work, training_work
 
-# Stages under one law cost the same per unit.
 TRAINING = "training"
-LAW_OF_UNIT = {"Msamples": "rendering", "TFLOP": TRAINING}
 COLUMNS = ("stage", "job", "law", "unit", "other", "size", "disk_bytes", "held_bytes")
-NUMBERS = COLUMNS[4:]
 
 # Bytes on disk, of the published small run (docs/cost.md): of a pose in a table, a scored frame, a
 # frame's descriptors, matches and observations; per pixel of an image; of a procedural scene.
@@ -110,13 +107,16 @@ def jobs_of(profile: Profile, keys: Iterable[Key]) -> pd.DataFrame:
     order = {stage: place for place, stage in enumerate(STAGES)}
     made.sort(key=lambda job: order.get(job["stage"], len(order)))
     jobs = pd.DataFrame.from_records(made, columns=list(COLUMNS))
-    return jobs.astype(dict.fromkeys(NUMBERS, float)).fillna({"disk_bytes": 0.0, "held_bytes": 0.0})
+    return jobs.astype(dict.fromkeys(COLUMNS[4:], float)).fillna(
+        {"disk_bytes": 0.0, "held_bytes": 0.0}
+    )
 
 
 def job_of(profile: Profile, stage: str, name: str) -> dict[str, Any] | None:
     """The job of this name; None if the profile has no such scene, size, sequence or network."""
     kind = STAGES.get(stage, Stage())
-    law = LAW_OF_UNIT.get(kind.unit, stage)
+    # Stages under one law cost the same per unit.
+    law = {"Msamples": "rendering", "TFLOP": TRAINING}.get(kind.unit, stage)
     job: dict[str, Any] = {"stage": stage, "job": name, "law": law, "unit": kind.unit}
     if kind.parts is None:
         return job
@@ -142,8 +142,8 @@ def _of_frames(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
         "Msamples": pixels * config.render.supersampling**2 / 1e6,
         "MB": 3 * frames * config.network.input_px**2 / 1e6,
     }
-    job = {"size": sizes[kind.unit], "disk_bytes": kind.disk * frames}
-    job["held_bytes"] = pixels * kind.held_per_px
+    job = {"size": sizes[kind.unit], "held_bytes": pixels * kind.held_per_px}
+    job["disk_bytes"] = kind.disk * frames
     if kind.unit == "Msamples":
         job["other"] = float(frames)
     if kind.unit == "MB":  # packed frames
@@ -208,18 +208,13 @@ def _learning(
 ) -> dict[str, float]:
     layer_steps, tflop = work.size(samples, batch, predicted)
     held = 3.0 * frames * config.network.input_px**2 + work.held_bytes(batch)
-    disk = work.parameter_bytes
-    return {"other": layer_steps, "size": tflop, "disk_bytes": disk, "held_bytes": held}
+    job = {"other": layer_steps, "size": tflop, "held_bytes": held}
+    return job | {"disk_bytes": work.parameter_bytes}
 
 
 def _features(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
     held = _frames(profile, part, kind) * profile.config.references.max_features * FEATURE
     return _of_frames(profile, part, kind) | {"held_bytes": held}
-
-
-def _coordinates(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
-    disk = _of_frames(profile, part, kind._replace(unit="frames"))["disk_bytes"]
-    return {"size": profile.config.references.coordinate_samples, "disk_bytes": disk}
 
 
 def _varied(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
@@ -247,7 +242,10 @@ OWN_SIZES: dict[str, Callable[[Profile, Part, Stage], dict[str, float]]] = {
     "pretrain": _pretrain,
     **dict.fromkeys(("train", "train_varied"), _train),
     "features": _features,
-    "coordinate_references": _coordinates,
+    "coordinate_references": lambda profile, part, kind: {
+        "size": profile.config.references.coordinate_samples,
+        "disk_bytes": kind.disk * _frames(profile, part, kind),
+    },
     **dict.fromkeys(("render_varied", "pack_varied"), _varied),
     **dict.fromkeys(("varied_descriptors", "varied_structure"), _varied_tests),
     "render_speed": lambda profile, *_: {"size": profile.config.render_speed.sizes},

@@ -62,12 +62,16 @@ def _count(build: Callable[[], nn.Module], input_px: int) -> Work:
     from torch.utils.flop_counter import FlopCounterMode
 
     outputs: list[int] = []
+
+    def note(_: nn.Module, __: Any, out: Any) -> None:  # a recurrent layer: its sequence first
+        outputs.append(int((out[0] if isinstance(out, tuple) else out).numel()))
+
     with torch.device("meta"):
         network = build().eval()
         image = torch.empty(1, 3, input_px, input_px)
     for layer in network.modules():
         if list(layer.parameters(recurse=False)) and not list(layer.children()):
-            layer.register_forward_hook(lambda _, __, out: outputs.append(_elements(out)))
+            layer.register_forward_hook(note)
     with FlopCounterMode(display=False) as counter, torch.no_grad():
         network(image)
     parameters = sum(p.numel() for p in network.parameters())
@@ -77,8 +81,3 @@ def _count(build: Callable[[], nn.Module], input_px: int) -> Work:
         float(FLOAT_BYTES * parameters),
         float(FLOAT_BYTES * sum(outputs)),
     )
-
-
-def _elements(out: Any) -> int:
-    """Values that a layer puts out; a recurrent layer gives a tuple, its sequence first."""
-    return int((out[0] if isinstance(out, tuple) else out).numel())

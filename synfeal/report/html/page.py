@@ -33,7 +33,7 @@ from synfeal.report import (
 )
 from synfeal.report.cells import key_of, published_cells, read_cells
 from synfeal.report.claims.verdicts import Verdict
-from synfeal.report.figures import CAPTIONS
+from synfeal.report.figures.registry import CAPTIONS
 from synfeal.report.hard_cases import table as hard_cases
 from synfeal.report.html.provenance import cost_sentence, origin_html, read_origin
 from synfeal.report.html.tables import (
