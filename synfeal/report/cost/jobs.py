@@ -6,6 +6,7 @@ named like the file below ``<root>/benchmarks`` that its measurement is written 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -19,7 +20,8 @@ from synfeal.dataset.sevenscenes import sequences_of
 from synfeal.report.cost.networks import Work, pretext_work, training_work
 
 TRAINING = "training"
-COLUMNS = ("stage", "job", "law", "unit", "other", "size", "disk_bytes", "held_bytes")
+NUMBERS = {"other": math.nan, "size": math.nan, "disk_bytes": 0.0, "held_bytes": 0.0}
+COLUMNS = ("stage", "job", "law", "unit", *NUMBERS)
 
 # Bytes on disk, of the published small run (docs/cost.md): of a pose in a table, a scored frame, a
 # frame's descriptors, matches and observations; per pixel of an image; of a procedural scene.
@@ -103,13 +105,10 @@ def jobs_of(profile: Profile, keys: Iterable[Key]) -> pd.DataFrame:
     of a training run), NaN where there is none; ``disk_bytes`` left behind; ``held_bytes`` of data
     in memory at once.
     """
-    made = [job for key in keys if (job := job_of(profile, *key)) is not None]
+    made = [NUMBERS | job for key in keys if (job := job_of(profile, *key)) is not None]
     order = {stage: place for place, stage in enumerate(STAGES)}
     made.sort(key=lambda job: order.get(job["stage"], len(order)))
-    jobs = pd.DataFrame.from_records(made, columns=list(COLUMNS))
-    return jobs.astype(dict.fromkeys(COLUMNS[4:], float)).fillna(
-        {"disk_bytes": 0.0, "held_bytes": 0.0}
-    )
+    return pd.DataFrame(made, columns=list(COLUMNS)).astype(dict.fromkeys(NUMBERS, float))
 
 
 def job_of(profile: Profile, stage: str, name: str) -> dict[str, Any] | None:
