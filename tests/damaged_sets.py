@@ -11,7 +11,7 @@ from synfeal.config.models import CameraConfig
 from synfeal.dataset.finish import write_manifest
 from synfeal.dataset.pose_table import write_pose_table
 from synfeal.dataset.sevenscenes import Sequence, write_splits
-from tests.planar_scene import straight_path, write_frames
+from tests.room_scene import straight_path, write_planes
 
 CAMERA = CameraConfig(width=96, height=72, horizontal_fov_deg=60.0)
 
@@ -26,7 +26,7 @@ def write_planar_set(folder, camera=CAMERA, counts=(24, 8)):
         directory = folder / sequence.name
         directory.mkdir(parents=True, exist_ok=True)
         truth = straight_path(len(sequence), step_m, turn_deg)
-        write_frames(directory, truth, camera)
+        write_planes(directory, truth, camera)
         for number, pose in enumerate(truth.world_from_cam):
             write_pose(directory / f"frame-{number:06d}.pose.txt", pose)
         write_pose_table(folder / f"{sequence.split}.csv", truth)

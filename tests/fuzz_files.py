@@ -42,8 +42,8 @@ from synfeal.validation.run import validate
 from tests import mesh_samples as meshes
 from tests.coloured_frames import save, untrained
 from tests.damaged_sets import write_planar_set
-from tests.planar_scene import straight_path
 from tests.report_results import CONFIG, design_of, fill_assistance
+from tests.room_scene import straight_path
 from tests.test_calibration import OLD_OPENCV
 
 CAMERA = CameraConfig(width=24, height=18)

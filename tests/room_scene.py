@@ -10,8 +10,9 @@ from PIL import Image
 from scipy.ndimage import map_coordinates
 
 from synfeal.config.models import CameraConfig
+from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import pose_matrix
-from synfeal.geometry.rotations import rotation_from_rpy
+from synfeal.geometry.rotations import quat_wxyz_from_matrix, rotation_from_rpy
 
 CAMERA = CameraConfig(width=160, height=120, horizontal_fov_deg=60.0)
 # Texture: random values every so many metres.
@@ -39,6 +40,20 @@ FURNISHED = Room(
         ((1.0, -1.7, 1.6), (1.8, -1.0, 2.3)),
     )
 )
+
+
+# A wall and a floor, which cameras of :func:`straight_path` see.
+PLANES = Room((((-9.0, -9.0, -1.2), (3.0, 9.0, 9.0)),))
+
+
+def straight_path(n_frames, step_m, turn_deg):
+    """Frames along world y, looking along world x, turning a little about the vertical."""
+    centre = np.arange(n_frames) - (n_frames - 1) / 2
+    yaw = np.radians(turn_deg) * centre
+    rotation = rotation_from_rpy(np.column_stack([0 * yaw, 0 * yaw + 0.15, yaw]))
+    position = np.column_stack([0.1 * step_m * centre, step_m * centre, 0.02 * centre])
+    index = np.arange(n_frames)
+    return PoseTable(index, 0 * index, position, quat_wxyz_from_matrix(rotation))
 
 
 def pose_at(position_m, yaw_deg=0.0, pitch_deg=12.0):
@@ -83,15 +98,22 @@ def colour_of(point, room):
     return np.repeat(np.round(grey).astype(np.uint8)[..., None], 3, axis=2)
 
 
-def write_room(folder, poses, room=FURNISHED, camera=CAMERA):
+def write_room(folder, poses, room=FURNISHED, camera=CAMERA, supersampling=1):
     """Write colour and depth images; returns their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     color_paths, depth_paths = [], []
+    fx, fy, cx, cy = (supersampling * value for value in camera.intrinsics)
+    size = {"width": supersampling * camera.width, "height": supersampling * camera.height}
+    finer = CameraConfig(**size, fx=fx, fy=fy, cx=cx, cy=cy)
     for frame, pose in enumerate(poses):
-        depth_m, point = cast(pose, room, camera)
         color_paths.append(folder / f"frame-{frame:06d}.color.png")
         depth_paths.append(folder / f"frame-{frame:06d}.depth.png")
-        Image.fromarray(colour_of(point, room)).save(color_paths[-1])
-        depth_mm = np.round(1000 * depth_m).astype(np.uint16)
+        image = Image.fromarray(colour_of(cast(pose, room, finer)[1], room))
+        image.reduce(supersampling).save(color_paths[-1])
+        depth_mm = np.round(1000 * cast(pose, room, camera)[0]).astype(np.uint16)
         Image.fromarray(depth_mm).save(depth_paths[-1])
     return color_paths, depth_paths
+
+
+def write_planes(folder, truth, camera=CAMERA):
+    return write_room(folder, truth.world_from_cam, PLANES, camera, supersampling=2)

@@ -29,7 +29,7 @@ from tests.fuzzing import (
     replaced,
     text_damages,
 )
-from tests.planar_scene import straight_path
+from tests.room_scene import straight_path
 
 pytestmark = pytest.mark.slow
 EXTERNAL = "../examples/external.yaml"  # no profile has a localizer of somebody else's

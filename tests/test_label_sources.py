@@ -11,7 +11,7 @@ from baselines.groundtruth.rgbd import rgbd_graph
 from baselines.groundtruth.sfm import sfm_batch
 from synfeal.config.models import GroundTruthConfig
 from synfeal.labels import add_noise
-from tests.planar_scene import CAMERA, straight_path, write_frames
+from tests.room_scene import CAMERA, straight_path, write_planes
 
 CFG = GroundTruthConfig(batch_frames=6, sfm={"max_features": 400}, rgbd={"keyframe_every": 3})
 TRUTH = straight_path(10, step_m=0.06, turn_deg=1.5)
@@ -20,7 +20,7 @@ BATCHES = batches_of(len(TRUTH), CFG.batch_frames)
 
 @pytest.fixture(scope="module")
 def paths(tmp_path_factory):
-    return write_frames(tmp_path_factory.mktemp("planes"), TRUTH)
+    return write_planes(tmp_path_factory.mktemp("planes"), TRUTH)
 
 
 @pytest.fixture(scope="module")

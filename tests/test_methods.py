@@ -17,7 +17,7 @@ from synfeal.config.models import CameraConfig, GroundTruthConfig, PoseGraphConf
 from synfeal.geometry.poses import pose_matrix
 from synfeal.report.figures.style import METHOD_STYLES
 from synfeal.report.layouts import SOURCES
-from tests.planar_scene import straight_path
+from tests.room_scene import straight_path
 
 PAGE = Path(__file__).parent.parent / "docs" / "groundtruth.md"
 CAMERA, CFG = CameraConfig(), GroundTruthConfig(batch_frames=10)
