@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from PIL import Image
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import gaussian_filter, map_coordinates
 
 from synfeal.config.models import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
@@ -80,6 +80,36 @@ def cast(world_from_cam, room, camera=CAMERA):
     return depth, origin + depth[..., None] * direction
 
 
+def finer(camera, factor):
+    """The camera with as many times the pixels along each side."""
+    fx, fy, cx, cy = (factor * value for value in camera.intrinsics)
+    size = {"width": factor * camera.width, "height": factor * camera.height}
+    return CameraConfig(**size, fx=fx, fy=fy, cx=cx, cy=cy)
+
+
+def random_texture(rng):
+    """Random grey values (700, 700) with detail at several scales, at 1 cm a texel."""
+    image = np.zeros((700, 700))
+    for sigma, weight in ((1.5, 25.0), (4.0, 30.0), (12.0, 30.0)):
+        noise = gaussian_filter(rng.standard_normal(image.shape), sigma, mode="wrap")
+        image += weight * noise / noise.std()
+    return np.clip(128.0 + image, 0, 255)
+
+
+def painted(textures, world_from_cam, size_m=(5.0, 6.0, 3.0), camera=CAMERA):
+    """Antialiased image of a room with a texture on each of its six sides, repeated."""
+    _, point = cast(world_from_cam, Room((((0.0, 0.0, 0.0), size_m),)), finer(camera, 2))
+    off_m = np.abs(point[..., None] - np.transpose([np.zeros(3), size_m]))
+    side = off_m.reshape(*point.shape[:2], 6).argmin(axis=-1)
+    grey = np.zeros(side.shape)
+    for number, texture in enumerate(textures):
+        seen = side == number
+        along = [100 * point[seen, k] for k in range(3) if k != number // 2]
+        grey[seen] = map_coordinates(texture, along, order=1, mode="grid-wrap")
+    coarse = grey.reshape(camera.height, 2, camera.width, 2).mean(axis=(1, 3))
+    return Image.fromarray(np.round(coarse).astype(np.uint8)).convert("RGB")
+
+
 def _slabs(origin, direction, lower, upper):
     """Depth at which rays enter and leave a box."""
     with np.errstate(divide="ignore"):
@@ -102,13 +132,10 @@ def write_room(folder, poses, room=FURNISHED, camera=CAMERA, supersampling=1):
     """Write colour and depth images; returns their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     color_paths, depth_paths = [], []
-    fx, fy, cx, cy = (supersampling * value for value in camera.intrinsics)
-    size = {"width": supersampling * camera.width, "height": supersampling * camera.height}
-    finer = CameraConfig(**size, fx=fx, fy=fy, cx=cx, cy=cy)
     for frame, pose in enumerate(poses):
         color_paths.append(folder / f"frame-{frame:06d}.color.png")
         depth_paths.append(folder / f"frame-{frame:06d}.depth.png")
-        image = Image.fromarray(colour_of(cast(pose, room, finer)[1], room))
+        image = Image.fromarray(colour_of(cast(pose, room, finer(camera, supersampling))[1], room))
         image.reduce(supersampling).save(color_paths[-1])
         depth_mm = np.round(1000 * cast(pose, room, camera)[0]).astype(np.uint16)
         Image.fromarray(depth_mm).save(depth_paths[-1])

@@ -15,7 +15,7 @@ from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render import open_renderer
 from synfeal.render.distorted import DistortedRenderer, covering_camera
 from tests.collected import painted
-from tests.painted_room import random_texture
+from tests.room_scene import random_texture
 
 AHEAD = pose_matrix(rotation_from_rpy([0.0, 0.0, 0.0]), [0.0, 0.0, 0.0])
 LENSES = {

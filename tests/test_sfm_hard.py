@@ -1,6 +1,6 @@
 """Batches that structure from motion finds hard: each ends with a stated result, in bounded time.
 
-Frames are ray-cast in closed form (``tests/painted_room.py``).
+Frames are ray-cast in closed form (``tests/room_scene.py``).
 """
 
 import itertools
@@ -18,11 +18,12 @@ from synfeal.config.models import CameraConfig, SfmConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error, pose_matrix, relative
 from synfeal.geometry.rotations import rotation_from_rpy
-from tests.painted_room import PaintedRoom, painted_room, random_texture
+from tests.room_scene import painted, random_texture
 
 CAMERA = CameraConfig(width=160, height=120, horizontal_fov_deg=70.0)
 CFG = SfmConfig(max_features=300, peak_threshold=0.002, overlap=3)
-ROOM = painted_room(np.random.default_rng(0))
+RNG = np.random.default_rng(0)
+ROOM = [random_texture(RNG) for _ in range(6)]
 
 
 def poses_at(position_m, yaw_deg):
@@ -43,7 +44,7 @@ def write(folder, poses, room=ROOM, camera=CAMERA):
     """Images of a room from poses."""
     paths = [folder / f"frame-{k:06d}.color.png" for k in range(len(poses))]
     for path, pose in zip(paths, poses, strict=True):
-        Image.fromarray(room.render(pose, camera)).save(path)
+        painted(room, pose, camera=camera).save(path)
     return paths
 
 
@@ -58,7 +59,7 @@ def errors(trajectory, poses):
     return position_m, np.degrees(orientation_rad)
 
 
-ALIKE = PaintedRoom((random_texture(np.random.default_rng(1)),) * 6)  # walls, not neighbours
+ALIKE = [random_texture(np.random.default_rng(1))] * 6  # walls, not neighbours
 STEPS = np.arange(8)[:, None]
 FOUND = {
     "a room rich in texture": (sideways(7, turn_deg=2.0), ROOM, 0.01, 0.2),
@@ -135,7 +136,7 @@ def test_a_turn_of_90_degrees_in_5_frames_loses_one_side_and_the_other_is_right(
 
 def test_a_pattern_that_repeats_within_a_view_misleads_and_the_mapper_starts_again(tmp_path):
     tile = random_texture(np.random.default_rng(1))[:100, :100]
-    room = PaintedRoom((np.tile(tile, (7, 7)),) * 6)
+    room = [np.tile(tile, (7, 7))] * 6
     poses = sideways(7, turn_deg=2.0)
     trajectory, facts = estimate(tmp_path, poses, room)
     assert np.isfinite(trajectory.first_from_cam).all()
