@@ -1,5 +1,7 @@
 """Errors of labels against the true poses, where the errors are known."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -99,20 +101,14 @@ def test_relative_error_of_a_known_drift(frames):
 
 
 def test_relative_error_needs_enough_frames_and_some_way_in_each_sequence():
-    truth = table_of(straight(25))
-    assert relative_error([(truth, truth)], 25) is None
-    standing = table_of(straight(26, step_m=0.0))
+    short, standing = table_of(straight(25)), table_of(straight(26, step_m=0.0))
+    assert relative_error([(short, short)], 25) is None
     assert np.isnan(relative_error([(standing, standing)], 25).per_metre_m)
-    truth, short = table_of(straight(60)), table_of(straight(25))
-    labels = table_of(straight(60, step_m=1.02 * STEP_M, turn_deg=0.2))
-    lost = table_of(straight(25, step_m=0.0))
-    found = relative_error([(lost, short), (labels, truth)], 25)
-    assert found == relative_error([(labels, truth)], 25)
-    # 26 frames hold one motion over 25 of them.
-    one = relative_error([(table_of(straight(26, step_m=0.0)), table_of(straight(26)))], 25)
+    assert np.isnan(relative_error([(standing, standing)], 1).per_metre_deg)
+    # 26 frames hold one motion over 25 of them; a sequence of 25 adds none.
+    one = relative_error([(short, short), (standing, table_of(straight(26)))], 25)
     assert one.rmse_m == pytest.approx(25 * STEP_M)
     assert one.per_metre_m == pytest.approx(1.0)
-    assert np.isnan(relative_error([(lost, lost)], 1).per_metre_deg)
 
 
 def test_a_trajectory_that_is_not_of_its_batch_is_named(tmp_path):
@@ -185,14 +181,13 @@ def test_the_table_holds_what_was_put_into_the_labels(results):
 
 
 def test_a_frame_costs_what_its_stages_took_and_each_method_has_a_row(results):
-    root, _ = results
+    root, rows = results
     whole = label_records(root, "large_room", "6k", "sfm", "total")[0]
     assert whole["seconds_per_frame"] == pytest.approx(3 * 7.0 / 27)
     alone = label_records(root, "large_room", "6k", "rgbd-odometry", "train")[0]
     # Two batches, the times of odometry and of the method itself, no loop closures.
     assert alone["seconds_per_frame"] == pytest.approx(2 * 2 * 2.0 / 21)
     assert alone["peak_memory_mb"] == 7.0
-    root, rows = results
     write_label_error_table(design_of(rows), root, root / "tables/label_error.csv", root / "t.tex")
     found = speeds_of("labels", ["large_room", "sanctuary"], root)
     assert found.variant.tolist() == ["SfM", "RGB-D odometry alone"]
@@ -200,7 +195,7 @@ def test_a_frame_costs_what_its_stages_took_and_each_method_has_a_row(results):
     assert set(found.scene) == {"large_room"}
 
 
-@pytest.mark.parametrize("content", [None, "{}", "[]", '{"peak_memory_mb": "much"}', "{"])
+@pytest.mark.parametrize("content", [None, "[]", '{"peak_memory_mb": "much"}'])
 def test_facts_that_cannot_be_read_are_named(results, content):
     root, rows = results
     path = root / "groundtruth/large_room/6k/sfm/test/batch-000.json"
@@ -213,9 +208,9 @@ def test_facts_that_cannot_be_read_are_named(results, content):
     assert not (root / "t.csv").exists()
 
 
-def test_labels_that_nothing_makes_are_refused(tmp_path):
-    rows = [experiment("table2_ground_truth", labels=name) for name in ("synfeal", *METHODS)]
-    check_sources(rows, tmp_path / "design.csv")
-    wrong = rows[0].model_copy(update={"labels": "orb"})
+def test_labels_that_nothing_makes_are_refused():
+    names = ("synfeal", *METHODS, "orb")
+    rows = [experiment("table2_ground_truth", labels=name) for name in names]
+    check_sources(rows[:-1], Path("design.csv"))
     with pytest.raises(InputError, match=r"design\.csv: labels 'orb': not one of .*rgbd-toro"):
-        check_sources([*rows, wrong], tmp_path / "design.csv")
+        check_sources(rows, Path("design.csv"))
