@@ -6,9 +6,9 @@ from evo.core.trajectory import PoseTrajectory3D
 from evo.tools import file_interface
 from scipy.spatial.transform import Rotation
 
-from synfeal.dataset.pose_table import PoseTable, write_pose_table
+from synfeal.dataset.pose_table import write_pose_table
 from synfeal.dataset.sevenscenes import Sequence, pose_text, write_splits
-from tests.property_support import random_table
+from tests.property_support import random_table, table_of
 
 PER_SEQUENCE, RATE_HZ = 12, 30.0
 TEST = ("seq-02", "seq-03")
@@ -62,12 +62,10 @@ def write_colmap(folder, poses, binary):
     model = pycolmap.Reconstruction()
     camera = pycolmap.Camera.create_from_model_name(1, "PINHOLE", 500.0, 640, 480)
     model.add_camera_with_trivial_rig(camera)
-    for image_id, ((sequence, number), pose) in enumerate(
-        zip(frame_names(), poses, strict=True), start=1
-    ):
-        image = pycolmap.Image(
-            name=f"{sequence}/frame-{number:06d}.color.png", camera_id=1, image_id=image_id
-        )
+    frames = zip(frame_names(), poses, strict=True)
+    for image_id, ((sequence, number), pose) in enumerate(frames, start=1):
+        name = f"{sequence}/frame-{number:06d}.color.png"
+        image = pycolmap.Image(name=name, camera_id=1, image_id=image_id)
         cam_from_world = pycolmap.Rigid3d(np.linalg.inv(pose)[:3])
         model.add_image_with_trivial_frame(image, cam_from_world)
     (model.write_binary if binary else model.write_text)(folder)
@@ -82,24 +80,21 @@ def _inverse_lines(poses):
     return [" ".join(map(repr, row)) for row in rows.tolist()]
 
 
+def _write_lines(path, poses, name, end=""):
+    """A line for each test frame: the name of its image, its pose, and what follows."""
+    lines = zip(frame_names(), _inverse_lines(poses), strict=True)
+    path.write_text("".join(f"{name.format(*frame)} {line}{end}\n" for frame, line in lines))
+    return path
+
+
 def write_ace(path, poses):
     """ACE's rule (``test_ace.py``): image name, pose, rotation and position error, inliers."""
-    lines = [
-        f"{sequence}-frame-{number:06d}.color.png {line} 1.25 0.5 731"
-        for (sequence, number), line in zip(frame_names(), _inverse_lines(poses), strict=True)
-    ]
-    path.write_text("".join(f"{line}\n" for line in lines))
-    return path
+    return _write_lines(path, poses, "{}-frame-{:06d}.color.png", " 1.25 0.5 731")
 
 
 def write_hloc(path, poses):
     """hloc's rule (``localize_sfm.main`` with ``prepend_camera_name``)."""
-    lines = [
-        f"{sequence}/frame-{number:06d}.color.png {line}"
-        for (sequence, number), line in zip(frame_names(), _inverse_lines(poses), strict=True)
-    ]
-    path.write_text("".join(f"{line}\n" for line in lines))
-    return path
+    return _write_lines(path, poses, "{}/frame-{:06d}.color.png")
 
 
 def write_tree(folder, poses):
@@ -110,9 +105,7 @@ def write_tree(folder, poses):
 
 
 def write_table(path, poses):
-    frame = np.arange(len(poses))
-    quat = Rotation.from_matrix(poses[:, :3, :3]).as_quat(canonical=True, scalar_first=True)
-    write_pose_table(path, PoseTable(frame, frame, poses[:, :3, 3], quat))
+    write_pose_table(path, table_of(poses, path=np.arange(len(poses))))
     return path
 
 
@@ -129,8 +122,8 @@ def write_localized(path, poses):
 
 
 WRITERS = {
-    "7-Scenes": lambda p, poses: write_tree(p, poses),
-    "TUM": lambda p, poses: write_tum(p, poses),
+    "7-Scenes": write_tree,
+    "TUM": write_tum,
     "COLMAP text": lambda p, poses: write_colmap(p, poses, binary=False),
     "COLMAP binary": lambda p, poses: write_colmap(p, poses, binary=True),
     "hloc": write_hloc,
