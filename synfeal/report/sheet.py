@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -44,7 +44,7 @@ class Value(NamedTuple):
     tone: str = ""  # ``better``, ``worse`` or none
     note: str = ""  # footnote; on paper that of the first value stands for the cell
     limits: str = ""  # 95 % limits, on the page alone
-    sort: object = ""  # what the page sorts by; empty comes last
+    sort: Any = ""  # what the page sorts by; empty comes last
 
 
 class Line(NamedTuple):

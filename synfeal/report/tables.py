@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from synfeal.config import Design
@@ -56,32 +54,30 @@ def write_table(table: str, design: Design, root: Path, out_csv: Path, out_tex: 
 
 def sheet_of(name: str, cells: pd.DataFrame) -> Sheet:
     """Lay out one of tables 2 to 7, from what :func:`synfeal.report.cells.read_cells` read."""
-    one_truth = bool((cells.labels == "synfeal").all())
+    one_truth = bool((cells.labels == "synfeal").all())  # then both scores are one line
     against = AGAINST | ({"labels": "labels = truth"} if one_truth else {})
-    references = [*REFERENCES.values()][: 1 if one_truth else 2]
-    headings = (HEADINGS[name], "Error against", *TITLES.values(), *references)
-    printed: dict[tuple[int, str, str], list[Value]] = defaultdict(list)
-    values = printed_values(name, cells).sort_values("place", kind="stable")
-    for v in rows_of(values[(values.text != FAILED) | (values.place == 0)]):  # said once
-        sort = "" if pd.isna(v.sort) else v.sort
-        value = Value(v.text, v.bold, v.tone, v.note, v.limits, sort)
-        printed[v.row, v.kind, v.column].append(value)
+    kinds = [k for k in against if not (one_truth and k.startswith("truth"))]
+    kinds = [k for k in kinds if name == FROM_SCRATCH or not k.endswith("change")]
+    references = dict([*REFERENCES.items()][: 1 if one_truth else 2])
     in_print = published_labels(name, cells)
-    rows = cells.assign(title=blocks_of(cells)).drop_duplicates("row")
-    blocks = rows.groupby("title", sort=False).ngroup()
+    titled = cells.assign(title=blocks_of(cells))
     lines = []
-    for row in rows_of(rows.iloc[blocks.argsort(kind="stable")]):
-        # Where labels are the truth, both scores are one line.
-        for kind in (k for k in against if not (one_truth and k.startswith("truth"))):
-            label = Value("")
-            if kind == "labels":
-                label = Value(row_label(name, row), sort=_order(name, row))
-            elif kind == PAPER:
-                label = Value(in_print.get(row.row, ""), note=row.published_row_note)
-            numbers = [printed[row.row, kind, heading] for heading in headings[2:]]
-            if any(numbers):
-                texts = [[label], [Value(against[kind])], *numbers]
-                lines.append(Line(row.title, row.row, kind, texts))
+    for title, block in titled.groupby("title", sort=False):
+        keys = [(cell, kind) for cell in rows_of(block) for kind in kinds]
+        numbers = {(cell.row, kind, cell.model): _numbers(kind, cell) for cell, kind in keys}
+        _mark_best(numbers)
+        for lead in rows_of(block.drop_duplicates("row")):
+            labels = {
+                "labels": Value(row_label(name, lead), sort=_order(name, lead)),
+                PAPER: Value(in_print.get(lead.row, ""), note=lead.published_row_note),
+            }
+            for kind in kinds:
+                found = [numbers.get((lead.row, kind, model), []) for model in TITLES]
+                found += [_reference(start, kind, lead) for start in references]
+                if any(found):
+                    texts = [[labels.get(kind, Value(""))], [Value(against[kind])]]
+                    lines.append(Line(str(title), lead.row, kind, [*texts, *found]))
+    headings = (HEADINGS[name], "Error against", *TITLES.values(), *references.values())
     remarks = (REMARK, UNTRAINED, PUBLISHED, *([CHANGE] if name == FROM_SCRATCH else []))
     caption = f"{CAPTIONS[name]} {_where(cells)} Best scores in bold."
     return Sheet(name, caption, headings, lines, remarks)
@@ -100,102 +96,74 @@ def blocks_of(cells: pd.DataFrame) -> pd.Series:
     return (cells.block.map(BLOCKS) + " " + scenes).str.strip()
 
 
-def printed_values(name: str, cells: pd.DataFrame) -> pd.DataFrame:
-    """Every number of a table as it is printed, in both scores.
-
-    Returns:
-        Columns ``row`` (as in the cells), ``kind`` (of ``AGAINST``), ``column`` (a heading),
-        ``place`` (0 position, 1 orientation), and those of a :class:`Value`; ``bold`` is the
-        lowest of its kind, column and block, as printed.
-    """
-    parts, first = [], cells.groupby("row", sort=False).head(1)
-    for place, (measure, unit) in enumerate(UNITS.items()):
-        for kind, end in KIND_OF.items():
-            score = f"{measure}{end}"
-            parts.append(_scores(cells, kind, place, score, unit))
-            for start, column in REFERENCES.items():  # the same for every localizer of a row
-                if f"{start}_{score}" in first:
-                    numbers = first[f"{start}_{score}"]
-                    texts = [_plain(value, unit) for value in numbers]
-                    parts.append(_part(first, kind, place, texts, column=column, sort=numbers))
-            if name == FROM_SCRATCH:
-                parts.append(_changes(cells, f"{kind} change", place, CHANGES[score]))
-        parts.append(_published(cells, place, measure, unit))
-        if name == FROM_SCRATCH:
-            parts.append(_changes(cells, "paper change", place, f"published_{CHANGES[measure]}"))
-    in_print = cells[cells.published_position_m.notna()]
-    texts = [_plain(value, " m") for value in in_print.position_rms_m]
-    parts.append(_part(in_print, "unit", 0, texts))
-    values = pd.concat(parts, ignore_index=True)
-    blocks = values.row.map(blocks_of(cells).groupby(cells.row).first())
-    return _with_bold(values, [blocks, values.kind, values["column"], values.place])
+def _numbers(kind: str, cell: Any) -> list[Value]:
+    """Position and orientation of a localizer on a line; none where the paper has no such cell."""
+    source, _, change = kind.partition(" ")
+    if source in ("unit", PAPER) and pd.isna(cell.published_position_m):
+        return []
+    if kind == "unit":
+        return [Value(_plain(cell.position_rms_m, " m"))]
+    if change:
+        start = "published_" if source == PAPER else ""
+        names = [CHANGES[f"{measure}{KIND_OF.get(source, '')}"] for measure in UNITS]
+        return [_change(getattr(cell, f"{start}{name}")) for name in names]
+    if kind == PAPER:
+        # A misprinted orientation is shown, and never the best.
+        misprint = {"orientation_deg"} if cell.published_flag == "misprint" else set()
+        values = {m: getattr(cell, f"published_{m}") for m in UNITS}
+        note = cell.published_cell_note
+        return [
+            Value(f"{value:.2f}{UNITS[m]}", note=note, sort="" if m in misprint else value)
+            for m, value in values.items()
+        ]
+    scores = [_score(cell, f"{m}{KIND_OF[kind]}", unit) for m, unit in UNITS.items()]
+    return scores[:1] if scores[0].text == FAILED else scores  # said once
 
 
-def _with_bold(values: pd.DataFrame, keys: Sequence[pd.Series]) -> pd.DataFrame:
-    """Values whose ``number`` becomes ``bold``: the lowest of those with the same ``keys``.
-
-    Ties as printed are all bold; where fewer than two have a number there is nothing to compare.
-    """
-    numbers = values.number.groupby(list(keys))
-    bold = (values.number == numbers.transform("min")) & (numbers.transform("count") > 1)
-    return values.drop(columns="number").assign(bold=bold)
-
-
-def _part(
-    cells: pd.DataFrame, kind: str, place: int, texts: list[str], **more: Any
-) -> pd.DataFrame:
-    """Values of some cells; ``more``: columns of :func:`printed_values`, and ``number``."""
-    usual = {"column": cells.model.map(TITLES), "number": np.nan, "sort": np.nan}
-    usual |= dict.fromkeys(("tone", "note", "limits"), "")
-    found = pd.DataFrame({"row": cells.row, "kind": kind, "place": place, "text": texts})
-    return found.assign(**{**usual, **more})
-
-
-def _scores(cells: pd.DataFrame, kind: str, place: int, score: str, unit: str) -> pd.DataFrame:
-    texts = [
-        FAILED if pd.isna(value) else f"{value:.2f}{'' if pd.isna(sd) else f' ± {sd:.2f}'}{unit}"
-        for value, sd in zip(cells[score], cells[f"{score}_sd"], strict=True)
-    ]
-    notes = [
+def _score(cell: Any, score: str, unit: str) -> Value:
+    value, sd, low, high = (getattr(cell, f"{score}{end}") for end in ("", "_sd", "_low", "_high"))
+    text = f"{value:.2f}{'' if pd.isna(sd) else f' ± {sd:.2f}'}{unit}"
+    note = (
         f"{cell.failed} of {cell.n_test * cell.n_seeds} predictions failed, {cell.n_finished} of"
         f" {cell.n_seeds} runs have a score."
-        if cell.failed
-        else ""
-        for cell in rows_of(cells)
-    ]
-    ends = zip(cells[f"{score}_low"], cells[f"{score}_high"], strict=True)
-    limits = [  # where too many failed, they reach to infinity
-        "" if pd.isna(low) else f"{low:.2f}–{'∞' if pd.isna(high) else f'{high:.2f}'}"
-        for low, high in ends
-    ]
-    number = cells[score].map(partial(round, ndigits=2))
-    more = {"number": number, "note": notes, "limits": limits, "sort": cells[score]}
-    return _part(cells, kind, place, texts, **more)
+    )
+    upper = "∞" if pd.isna(high) else f"{high:.2f}"  # too many failed to know it
+    return Value(
+        FAILED if pd.isna(value) else text,
+        note=note if cell.failed else "",
+        limits="" if pd.isna(low) else f"{low:.2f}–{upper}",
+        sort="" if pd.isna(value) else value,
+    )
 
 
-def _published(cells: pd.DataFrame, place: int, measure: str, unit: str) -> pd.DataFrame:
-    found = cells[cells.published_position_m.notna()]
-    values = found[f"published_{measure}"]
-    # A misprinted orientation is shown, and never the best.
-    competes = (found.published_flag != "misprint") | (place == 0)
-    texts = [f"{value:.2f}{unit}" for value in values]
-    note = found.published_cell_note
-    return _part(found, PAPER, place, texts, number=values.where(competes), note=note)
+def _change(value: Any) -> Value:
+    if pd.isna(value):
+        return Value("no change known")
+    return Value(f"{value:+.1f}%", tone="worse" if round(value, 1) > 0 else "better")
 
 
-def _changes(cells: pd.DataFrame, kind: str, place: int, change: str) -> pd.DataFrame:
-    found = cells[cells.published_position_m.notna()] if kind == "paper change" else cells
-    values = found[change]
-    texts = ["no change known" if pd.isna(value) else f"{value:+.1f}%" for value in values]
-    tones = [
-        "" if pd.isna(value) else "worse" if round(value, 1) > 0 else "better" for value in values
-    ]
-    return _part(found, kind, place, texts, tone=tones)
+def _reference(start: str, kind: str, cell: Any) -> list[Value]:
+    """An answer without training, the same for every localizer of a row."""
+    scores = {f"{start}_{m}{KIND_OF[kind]}": u for m, u in UNITS.items() if kind in KIND_OF}
+    values = [(getattr(cell, score), u) for score, u in scores.items() if hasattr(cell, score)]
+    return [Value(_plain(v, unit), sort="" if pd.isna(v) else v) for v, unit in values]
 
 
 def _plain(value: float, unit: str) -> str:
-    """A number that does not compete for bold."""
     return "–" if pd.isna(value) else f"{value:.2f}{unit}"
+
+
+def _mark_best(numbers: Mapping[tuple[int, str, str], list[Value]]) -> None:
+    """Make the lowest of a block bold, by kind and localizer; ties as printed are all lowest."""
+    rivals = defaultdict(list)
+    for (_, kind, model), values in numbers.items():
+        for place, value in enumerate(values):
+            if value.sort != "":
+                rivals[kind, model, place].append((round(value.sort, 2), values))
+    for (_, _, place), found in rivals.items():
+        lowest = min(number for number, _ in found)
+        for number, values in found if len(found) > 1 else ():
+            values[place] = values[place]._replace(bold=number == lowest)
 
 
 def _where(cells: pd.DataFrame) -> str:
