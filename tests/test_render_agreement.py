@@ -213,3 +213,18 @@ def test_textures_and_images_beyond_the_devices_limit(monkeypatch):
     monkeypatch.setitem(shared_context().info, "GL_MAX_TEXTURE_SIZE", 128)
     with pytest.raises(InputError, match=r"camera: 64x48 pixels at 3 .* lower render\.supersamp"):
         OpenglRenderer(soup(10), camera_of(), RenderConfig(supersampling=3))
+
+
+@needs_opengl
+def test_closing_frees_the_device(monkeypatch):
+    """All that a renderer asked for is released by its end, by moderngl's own count."""
+    context, freed = shared_context(), []
+    with context:
+        context.gc()  # what other tests left
+    release = type(context).gc
+    monkeypatch.setattr(type(context), "gc", lambda held: freed.append(release(held)))
+    with OpenglRenderer(soup(50), CAMERA) as renderer:
+        renderer.render_rgbd(LOOK_ALONG_X)
+    # Two parts with 3 buffers, 2 programs and 2 vertex arrays each, one of them with a texture; a
+    # program and a vertex array for means; 3 framebuffers with 2 images each.
+    assert freed == [2 * 7 + 1 + 2 + 3 * 3]
