@@ -9,7 +9,7 @@ import numpy as np
 from synfeal.scenes import materials
 from synfeal.scenes.canvas import VIVID, Colour, Painter, pick, shade
 from synfeal.scenes.materials import painted
-from synfeal.scenes.patches import Item, Maker, joined, sheet
+from synfeal.scenes.patches import Item, Maker, joined, upright
 
 Size = tuple[float, float, float]  # metres along x, y and z
 METAL: Colour = (0.55, 0.56, 0.58)
@@ -31,7 +31,7 @@ def table(make: Maker, size_m: Size, top: Painter, leg: Colour = METAL) -> Item:
 def monitor(make: Maker) -> Item:
     """A flat screen on a foot, 0.5 m high."""
     panel = make.box((0.56, 0.04, 0.34), DARK, 60, "blrtu")
-    face = sheet([(-0.28, -0.02, 0.34), (0.28, -0.02, 0.34), (0.28, -0.02, 0), (-0.28, -0.02, 0)])
+    face = upright((-0.28, -0.02), (0.28, -0.02), 0, 0.34)
     shown = make.sheet(face, materials.screen(), 380, glow=0.6)
     neck = make.box((0.05, 0.04, 0.16), DARK, 40, "fblr")
     foot = make.box((0.24, 0.16, 0.015), DARK, 60, "fblrt")

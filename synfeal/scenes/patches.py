@@ -88,20 +88,12 @@ def joined(*things: Item | Iterable[Item]) -> Item:
     return Item(tuple(patch for item in items for patch in item.patches))
 
 
-def sheet(corners_m: ArrayLike) -> Points:
-    """A grid over four corners (4, 3): top left, top right, bottom right, bottom left.
-
-    Left and right are as seen from its front.
-    """
-    top_left, top_right, bottom_right, bottom_left = np.asarray(corners_m, np.float64)
-    return np.array([[top_left, top_right], [bottom_left, bottom_right]])
-
-
 def upright(
     start_xy: tuple[float, float], end_xy: tuple[float, float], low_m: float, high_m: float
 ) -> Points:
     """A vertical sheet; from its front, ``start_xy`` is on the left and ``end_xy`` on the right."""
-    return sheet([(*start_xy, high_m), (*end_xy, high_m), (*end_xy, low_m), (*start_xy, low_m)])
+    rows = [[(*start_xy, z), (*end_xy, z)] for z in (high_m, low_m)]
+    return np.array(rows, np.float64)
 
 
 def level(
@@ -109,8 +101,7 @@ def level(
 ) -> Points:
     """A horizontal sheet that faces up (a floor) or down (a ceiling)."""
     x0, x1 = x_m[::-1] if face_down else x_m
-    y0, y1 = y_m
-    return sheet([(x0, y1, z_m), (x1, y1, z_m), (x1, y0, z_m), (x0, y0, z_m)])
+    return np.array([[(x0, y, z_m), (x1, y, z_m)] for y in y_m[::-1]], np.float64)
 
 
 @dataclass(frozen=True)

@@ -74,11 +74,11 @@ def prepare_mesh(
         collision, curve = collision_mesh(mesh, scene, box, collision_agreement, rng)
     places: list[dict[str, Any]] = []
     if scene.clutter is not None:
-        # None is simplified: paths avoid them.
         rng = generator_of("clutter", scene.clutter.seed)
         objects, places = cluttered(mesh, box, scene.clutter, rng, f"scenes.{name}.clutter")
-        meshes = zip(collision, objects.merged(), strict=True)
-        collision = Triangles(*append_faces(*meshes))
+        # Paths avoid the objects as they are: none of them is simplified.
+        vertices, faces = zip(collision, objects.merged(), strict=True)
+        collision = Triangles(*append_faces(vertices, faces))
         mesh = TexturedMesh((*mesh.parts, *objects.parts), mesh.findings)
     write_json(out_dir / CLUTTER, places)
     save_collision_mesh(out_dir / "collision.ply", collision)

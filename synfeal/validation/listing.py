@@ -23,7 +23,7 @@ from synfeal.dataset.frame_files import (
     sequence_at,
     sequence_names,
 )
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError, read_as, why
 
 COLOR, DEPTH, POSE = "color.png", "depth.png", "pose.txt"
 _FRAME = re.compile(r"frame-(\d{6,})\.(color\.png|depth\.png|pose\.txt)")
@@ -85,10 +85,8 @@ def frames_of(sequences: Iterable[SequenceListing]) -> list[Frame]:
 
 
 def _list(path: Path) -> SequenceListing:
-    try:
+    with read_as(path, "a sequence", OSError):
         found = [match for name in sequence_names(path) if (match := _FRAME.fullmatch(name))]
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read as a sequence ({why(error)})") from None
     kinds = (COLOR, DEPTH, POSE)
     return SequenceListing(path, {k: {int(m[1]) for m in found if m[2] == k} for k in kinds})
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from synfeal.dataset.finish import MANIFEST, sequence_sha256
 from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError, read_as, why
 from synfeal.files import read_json
 from synfeal.validation.listing import Check, SequenceListing
 
@@ -76,10 +76,8 @@ def read_manifest(dataset: Path) -> dict[str, Any]:
         InputError: it cannot be read as a JSON object.
     """
     path = dataset / MANIFEST
-    try:
+    with read_as(path, "a manifest"):
         manifest = read_json(path)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as a manifest ({why(error)})") from None
     if not isinstance(manifest, dict):
         raise InputError(f"{path}: cannot be read as a manifest (no JSON object)")
     return manifest
