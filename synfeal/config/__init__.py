@@ -3,16 +3,3 @@
 from synfeal.config.experiments import Design, Experiment, Run, read_design, read_experiments
 from synfeal.config.load import check_mesh_files, load_config, parse_config
 from synfeal.config.models import MODELS, Config
-
-__all__ = [
-    "MODELS",
-    "Config",
-    "Design",
-    "Experiment",
-    "Run",
-    "check_mesh_files",
-    "load_config",
-    "parse_config",
-    "read_design",
-    "read_experiments",
-]

@@ -100,9 +100,7 @@ class Angles(Strict):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if not -90 < self.pitch_deg[0] < self.pitch_deg[1] < 90:
-            raise ValueError(
-                "pitch_deg: must lie within -90 and 90, where yaw and roll are distinct"
-            )
+            raise ValueError("pitch_deg: must be within -90 and 90, where yaw and roll differ")
         return self
 
 
@@ -154,9 +152,7 @@ class SceneConfig(Strict):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.source == "procedural" and self.builder is None:
-            raise ValueError(
-                "builder: a procedural scene needs one of large_room, sanctuary, random_room"
-            )
+            raise ValueError("builder: procedural scenes need large_room, sanctuary or random_room")
         if self.source == "mesh" and self.path is None:
             raise ValueError("path: a scene with `source: mesh` needs the path of its mesh file")
         if self.further_boxes and self.sampling_box is None:

@@ -115,9 +115,7 @@ class RenderConfig(Strict):
         "auto", description="`auto`: the fastest that works here"
     )
     supersampling: int = Field(2, ge=1, le=4, description="samples per pixel along each axis")
-    background_rgb: tuple[Channel, Channel, Channel] = Field(
-        (0, 0, 0), description="where nothing is hit"
-    )
+    background_rgb: tuple[Channel, Channel, Channel] = Field((0, 0, 0), description="where empty")
     effects: EffectsConfig | None = Field(None, description="added to frames (docs/variation.md)")
 
 

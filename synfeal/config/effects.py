@@ -92,9 +92,7 @@ class EffectsConfig(Strict):
     exposure: ExposureConfig | None = Field(None, description="fixed or automatic")
     noise: NoiseConfig | None = Field(None, description="shot and read noise")
     white_balance_k: Kelvin | None = Field(None, description="taken for white, in light of 6500 K")
-    jpeg_quality: Annotated[int, Field(ge=1, le=95)] | None = Field(
-        None, description="libjpeg's scale"
-    )
+    jpeg_quality: Annotated[int, Field(ge=1, le=95)] | None = Field(None, description="of libjpeg")
     clutter: PathObjectsConfig | None = Field(None, description="other objects along each path")
 
     @model_validator(mode="after")

@@ -19,7 +19,6 @@ from synfeal.config.collection import (
     NonNegative,
     Positive,
     SceneConfig,
-    SizeConfig,
     Slug,
     Strict,
     part,
@@ -135,9 +134,7 @@ class Config(DatasetConfig):
     datasets: tuple[Slug, ...] | None = Field(
         None, description="scenes of the target `datasets`; null: those of the design"
     )
-    groundtruth_camera: CameraConfig = part(
-        CameraConfig, "of frames that labels are estimated from"
-    )
+    groundtruth_camera: CameraConfig = part(CameraConfig, "of frames labels are estimated from")
     render_speed: RenderSpeedConfig = part(RenderSpeedConfig, "what rendering is measured on")
     groundtruth: GroundTruthConfig = part(GroundTruthConfig, "labels (docs/groundtruth.md)")
     references: ReferencesConfig = part(ReferencesConfig, "other methods (docs/references.md)")

@@ -199,9 +199,8 @@ def encode_png(pixels: Pixels) -> bytes:
     if not is_rgb and not (pixels.ndim == 2 and pixels.dtype == np.uint16):
         raise ValueError(f"cannot encode pixels {pixels.shape} {pixels.dtype} as PNG")
     height, width = pixels.shape[:2]
-    header = struct.pack(
-        ">IIBBBBB", width, height, 8 * pixels.itemsize, RGB if is_rgb else GREY, 0, 0, 0
-    )
+    colours = RGB if is_rgb else GREY
+    header = struct.pack(">IIBBBBB", width, height, 8 * pixels.itemsize, colours, 0, 0, 0)
     data = deflate.zlib_compress(_filtered(pixels), LEVEL)
     chunks = _chunk(b"IHDR", header), _chunk(b"IDAT", data), _chunk(b"IEND", b"")
     return SIGNATURE + b"".join(chunks)

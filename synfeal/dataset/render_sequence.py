@@ -66,9 +66,8 @@ def render_sequence(
         open_scene(mesh, camera, render) as renderer,
         Progress(len(poses), out_frames.name) as progress,
     ):
-        write_sequence(
-            renderer, poses, out_frames, with_depth, progress.update, effects_of(camera, render)
-        )
+        effects = effects_of(camera, render)
+        write_sequence(renderer, poses, out_frames, with_depth, progress.update, effects)
     progress.part_done(out_frames.name, len(poses), time.perf_counter() - began)
 
 

@@ -60,11 +60,6 @@ def scores_table(found: Evaluation) -> pd.DataFrame:
     ).astype({"value": float, "low": float, "high": float})
 
 
-def errors_table(found: Evaluation) -> pd.DataFrame:
-    """One row per frame: its name and its errors, ``inf`` where there is no pose."""
-    return pd.DataFrame({"frame": found.frames.names, **found.errors})
-
-
 def report_text(poses: Path, settings: Settings, found: Evaluation) -> str:
     """Findings, then the table."""
     lines = [*_findings(poses, settings, found), ""]
@@ -154,7 +149,8 @@ def figure_of(title: str, found: Evaluation) -> Figure:
 
 def write_files(out: Sequence[Path], title: str, found: Evaluation) -> None:
     """Write scores (.csv), errors (.csv) and the figure (.png)."""
-    for path, table in zip(out, (scores_table(found), errors_table(found)), strict=False):
+    errors = pd.DataFrame({"frame": found.frames.names, **found.errors})  # inf: no pose
+    for path, table in zip(out, (scores_table(found), errors), strict=False):
         with atomic_path(path) as temporary:
             table.to_csv(temporary, index=False, lineterminator="\n")
     with atomic_path(out[2]) as temporary:
