@@ -26,9 +26,9 @@ from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.triangles import merge_vertices
 from synfeal.planning.plan import plan_mesh
 from synfeal.planning.repeat import read_poses
+from synfeal.provenance import generator_of
 from synfeal.render import open_renderer
 from synfeal.render.base import Depth, Rgb
-from synfeal.seeds import generator_of
 from synfeal.settings import SCENE, dataset_config, options_named, render_configs
 from synfeal.validation.camera import camera_of_dataset
 

@@ -33,9 +33,9 @@ from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.planning.coverage import empty_pixels, scene_coverage
 from synfeal.planning.plan import plan_mesh
+from synfeal.provenance import generator_of
 from synfeal.run_lock import WORK, clean_up, growing, place_of
 from synfeal.scenes.prepare import prepare_mesh, save_cartons
-from synfeal.seeds import generator_of
 
 WARN_ABOVE = 0.1  # of all pixels: more than windows let through
 REFUSE_ABOVE = 0.95  # of all pixels: nobody wants a data set of the background

@@ -28,7 +28,7 @@ from synfeal.frames import (
     write_frame,
 )
 from synfeal.job import call
-from synfeal.seeds import generator_of, seed_of
+from synfeal.provenance import generator_of, seed_of
 from tests.fuzzing import JARGON
 from tests.property_support import random_table
 

@@ -14,7 +14,7 @@ from torch import Tensor
 from synfeal.dataset.packed import read_packed
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.errors import InputError
-from synfeal.seeds import generator_of
+from synfeal.provenance import generator_of
 
 # A larger set is not read on a processor: it stays on the disk, mapped into memory.
 MOST_READ_BYTES = 2**31

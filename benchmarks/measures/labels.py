@@ -19,7 +19,7 @@ from synfeal.config.models import CameraConfig, GroundTruthConfig, Strict
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error, relative
-from synfeal.seeds import seed_of
+from synfeal.provenance import seed_of
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig, Str
 from synfeal.dataset.packed import read_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.evaluation.metrics import pose_errors
-from synfeal.seeds import seed_of
+from synfeal.provenance import seed_of
 
 PROTOCOL = TypeAdapter(Protocol)
 

@@ -32,11 +32,7 @@ FILE: dict[str, Any] = {"type": Path, "metavar": "FILE"}
     option("--roll", "bounds of the camera's roll, degrees (-29.8 29.8)", **RANGE),
     option("--pitch", "bounds of its pitch; positive looks down (-29.8 29.8)", **RANGE),
     option("--yaw", "bounds of its heading; 0 is world x, 90 is y (0 360)", **RANGE),
-    option(
-        "--min-view-distance",
-        "least free view at the end of a path, metres (1.2)",
-        type=float,
-    ),
+    option("--min-view-distance", "least free view at the end of a path, metres (1.2)", type=float),
     option("--min-path", "metres; shorter paths are drawn again (1.5)", type=float),
     option("--mode", "where cameras go (path)", choices=MODES),
     option(

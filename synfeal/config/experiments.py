@@ -14,7 +14,7 @@ from synfeal.config.load import describe
 from synfeal.config.models import MODELS, Config
 from synfeal.errors import InputError
 from synfeal.frames import read_records
-from synfeal.seeds import seed_of
+from synfeal.provenance import seed_of
 
 Start = Literal["pretrained", "scratch"]
 Init = Literal[

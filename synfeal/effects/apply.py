@@ -31,8 +31,8 @@ from synfeal.effects.light import (
 )
 from synfeal.effects.scene import Crowd, SceneRenderer
 from synfeal.geometry.poses import interpolate
+from synfeal.provenance import generator_of
 from synfeal.render.base import Depth, Rgb
-from synfeal.seeds import generator_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -19,7 +19,7 @@ from synfeal.bootstrap import Counts, limits, medians, path_counts
 from synfeal.dataset.pose_table import UNIT_TOLERANCE, PoseTable
 from synfeal.geometry.poses import position_error_m
 from synfeal.geometry.rotations import rotation_angle_rad
-from synfeal.seeds import generator_of
+from synfeal.provenance import generator_of
 
 Array = NDArray[np.float64]
 Metrics = dict[str, float | None]

@@ -18,7 +18,7 @@ from synfeal.mesh.load import is_y_up, load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.planning.plan import sampling_box_of
-from synfeal.seeds import generator_of
+from synfeal.provenance import generator_of
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from synfeal.inspect.freespace import (
 from synfeal.mesh.rays import RayCaster
 from synfeal.planning.coverage import EmptyPixels, empty_pixels
 from synfeal.planning.plan import plan_split
-from synfeal.seeds import generator_of
+from synfeal.provenance import generator_of
 from synfeal.settings import SCENE
 
 Array = NDArray[np.float64]

@@ -18,23 +18,24 @@ from synfeal.config.models import Angles, SceneConfig
 from synfeal.errors import InputError
 from synfeal.mesh.rays import RayCaster
 
+Array = NDArray[np.float64]
 # A pose as the paper writes it: (x, y, z, roll, pitch, yaw), metres and radians.
-PoseVectors = NDArray[np.float64]
+PoseVectors = Array
 
 
-def pose_bounds(box_m: NDArray[np.float64], angles: Angles) -> NDArray[np.float64]:
+def pose_bounds(box_m: Array, angles: Angles) -> Array:
     """Least and greatest value (2, 6) of each element of a pose vector; ``box_m`` is (2, 3)."""
     intervals = (angles.roll_deg, angles.pitch_deg, angles.yaw_deg)
     angle_bounds = np.deg2rad(np.array(intervals, dtype=np.float64).T)
     return np.hstack([np.asarray(box_m, dtype=np.float64), angle_bounds])
 
 
-def sample_poses(bounds: NDArray[np.float64], count: int, rng: np.random.Generator) -> PoseVectors:
+def sample_poses(bounds: Array, count: int, rng: np.random.Generator) -> PoseVectors:
     """Pose vectors (count, 6), every element uniform and independent (Eq. 1)."""
     return rng.uniform(bounds[0], bounds[1], (count, 6))
 
 
-def view_directions(poses: PoseVectors) -> NDArray[np.float64]:
+def view_directions(poses: PoseVectors) -> Array:
     """Unit vectors (N, 3) along the optical axes of pose vectors (N, 6), in the world.
 
     The third column of :func:`synfeal.geometry.rotations.rotation_from_rpy`; roll turns about it.
@@ -58,7 +59,7 @@ def has_free_view(
 
 
 def admissible(
-    caster: RayCaster, start: NDArray[np.float64], poses: PoseVectors, min_view_distance_m: float
+    caster: RayCaster, start: Array, poses: PoseVectors, min_view_distance_m: float
 ) -> NDArray[np.bool_]:
     """Which candidates (N, 6) a free line from ``start`` reaches and have a free view, (N,).
 
@@ -72,7 +73,7 @@ def admissible(
 
 def farthest_admissible(
     caster: RayCaster,  # rays against the collision mesh
-    start: NDArray[np.float64],  # where the path starts, (6,)
+    start: Array,  # where the path starts, (6,)
     rounds: PoseVectors,  # (R, k, 6) rounds of candidates
     has_view: NDArray[np.bool_],  # (R, k) which have a free view, see :func:`has_free_view`
     min_path_m: float,  # least length of a path
@@ -97,17 +98,13 @@ class PoseSpace:
     """The poses of one sampling box in a mesh."""
 
     caster: RayCaster  # rays against the mesh
-    bounds: NDArray[np.float64]  # (2, 6) least and greatest value of each element of a pose vector
+    bounds: Array  # (2, 6) least and greatest value of each element of a pose vector
     min_view_distance_m: float  # least free view, the paper's ``d``
     rng: np.random.Generator  # where samples come from; each takes the next numbers
 
     @classmethod
     def of_scene(
-        cls,
-        caster: RayCaster,
-        box_m: NDArray[np.float64],
-        scene: SceneConfig,
-        rng: np.random.Generator,
+        cls, caster: RayCaster, box_m: Array, scene: SceneConfig, rng: np.random.Generator
     ) -> Self:
         """Of a box (2, 3), with the angles and the view distance of a scene."""
         return cls(caster, pose_bounds(box_m, scene.angles), scene.min_view_distance_m, rng)
@@ -124,15 +121,14 @@ class PoseSpace:
 N_POSES = 64
 
 
-def sample_start(space: PoseSpace, max_tries: int) -> NDArray[np.float64]:
+def sample_start(space: PoseSpace, max_tries: int) -> Array:
     """A pose vector (6,) with a free view in the largest free part of a space.
 
     The paper does not say where the camera starts. Inside a cupboard it would stay there, since
     every path must be free of collisions. Normals cannot tell inside from outside in a scan, but
     visibility can: the start is one of the largest group of poses that see each other.
     """
-    start: NDArray[np.float64] = largest_group(space, max_tries, N_POSES)[0]
-    return start
+    return np.asarray(largest_group(space, max_tries, N_POSES)[0])
 
 
 def largest_group(space: PoseSpace, max_tries: int, n_poses: int) -> PoseVectors:
@@ -160,7 +156,7 @@ def largest_group(space: PoseSpace, max_tries: int, n_poses: int) -> PoseVectors
     return largest
 
 
-def seeing_groups(caster: RayCaster, places_m: NDArray[np.float64]) -> NDArray[np.int64]:
+def seeing_groups(caster: RayCaster, places_m: Array) -> NDArray[np.int64]:
     """Number (N,) of the group of each place (N, 3); free lines of sight connect a group."""
     i, j = np.triu_indices(len(places_m), k=1)
     free = caster.sees(places_m[i], places_m[j]) if len(i) else np.empty(0, np.bool_)
@@ -176,9 +172,9 @@ class ConnectedSpace:
     """The largest free space of a scene, as what can be seen from places in it."""
 
     caster: RayCaster  # rays against the mesh
-    hubs_m: NDArray[np.float64]  # (H, 3) places connected to each other by free lines of sight
+    hubs_m: Array  # (H, 3) places connected to each other by free lines of sight
 
-    def contains(self, points_m: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def contains(self, points_m: Array) -> NDArray[np.bool_]:
         """Whether a free line joins each point (N, 3) to one of the hubs, (N,)."""
         found = np.zeros(len(points_m), dtype=np.bool_)
         for hub in self.hubs_m:
@@ -222,7 +218,7 @@ class Questions:
 def draw_questions(
     caster: RayCaster,  # rays against the undecimated mesh
     scene: SceneConfig,  # angle bounds and least view distance
-    box_m: NDArray[np.float64],  # (2, 3) lower and upper corner of the space that is sampled
+    box_m: Array,  # (2, 3) lower and upper corner of the space that is sampled
     rng: np.random.Generator,  # the only source of randomness
     # number of questions; all are independent of each other but for the first pose
     count: int = N_QUESTIONS,

@@ -12,13 +12,13 @@ from functools import partial
 
 import numpy as np
 
+from synfeal.provenance import generator_of
 from synfeal.scenes import furniture, materials, pictures
 from synfeal.scenes.canvas import Canvas, Colour, Pixels, mix
 from synfeal.scenes.lighting import Lamp, Lighting, Sun, ambient_corners
 from synfeal.scenes.materials import painted
 from synfeal.scenes.patches import Item, Maker, joined, level, upright
 from synfeal.scenes.scan import Scanner, stations
-from synfeal.seeds import generator_of
 
 WIDTH_M, LENGTH_M = 5.0, 6.6
 HEIGHT_M = 89.4 / (WIDTH_M * LENGTH_M)  # the volume the paper prints

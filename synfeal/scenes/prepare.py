@@ -23,12 +23,12 @@ from synfeal.mesh.save import save_glb
 from synfeal.mesh.standing import refuse_larger, standing
 from synfeal.mesh.triangles import Triangles, merge_vertices, save_collision_mesh
 from synfeal.planning.plan import sampling_box_of
+from synfeal.provenance import generator_of
 from synfeal.scenes import build_scene, materials
 from synfeal.scenes.canvas import VIVID, pick
 from synfeal.scenes.collision import Rung, collision_mesh, write_curve
 from synfeal.scenes.patches import Maker
 from synfeal.scenes.scan import cell_corners
-from synfeal.seeds import generator_of
 
 
 def prepare_scene(

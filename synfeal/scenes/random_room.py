@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from synfeal.provenance import generator_of
 from synfeal.scenes import furniture, materials, pictures
 from synfeal.scenes.canvas import Colour, Painter
 from synfeal.scenes.lighting import Lamp, Lighting, ambient_corners
 from synfeal.scenes.patches import Item, Maker, joined, level, upright
 from synfeal.scenes.scan import Scanner, stations
-from synfeal.seeds import generator_of
 
 Generator = np.random.Generator
 Size = tuple[float, float, float]

@@ -10,13 +10,13 @@ from functools import partial
 
 import numpy as np
 
+from synfeal.provenance import generator_of
 from synfeal.scenes import furniture, materials, pictures
 from synfeal.scenes.canvas import Canvas, Colour, Pixels
 from synfeal.scenes.lighting import Lamp, Lighting, Sun, ambient_corners
 from synfeal.scenes.materials import painted
 from synfeal.scenes.patches import Item, Maker, Points, joined, level, upright
 from synfeal.scenes.scan import Scanner, stations
-from synfeal.seeds import generator_of
 
 HALF_X_M, HALF_Y_M = 2.75, 4.25
 CROWN_M = 183.18 / (4 * HALF_X_M * HALF_Y_M)  # the volume the paper prints

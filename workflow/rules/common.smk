@@ -38,7 +38,7 @@ from synfeal.labels import seed_names
 from synfeal.provenance import config_hash
 from synfeal.report.predictions.restore import restored_files
 from synfeal.run_lock import begin_run
-from synfeal.seeds import seed_of
+from synfeal.provenance import seed_of
 
 try:
     for path in workflow.configfiles:

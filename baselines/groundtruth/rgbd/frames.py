@@ -20,7 +20,7 @@ from synfeal.config.models import CameraConfig, DepthConfig
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
-from synfeal.seeds import generator_of
+from synfeal.provenance import generator_of
 
 Array = NDArray[np.float64]
 

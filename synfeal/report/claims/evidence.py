@@ -35,10 +35,10 @@ from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import pose_errors
 from synfeal.labels import constant_pose
+from synfeal.provenance import generator_of
 from synfeal.report.claims.verdicts import Missing
 from synfeal.report.layouts import TITLES
 from synfeal.report.stats import COLUMNS, COMMON_COLUMNS, MEASURES, REMEDY, read_errors
-from synfeal.seeds import generator_of
 
 # A localizer has learnt where its whole interval lies below this share of the mean pose's error.
 LEARNT = 0.75

@@ -11,8 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from synfeal.bootstrap import CONFIDENCE, Counts, mean_of, medians, path_counts
+from synfeal.provenance import generator_of
 from synfeal.report.stats import MEASURES
-from synfeal.seeds import generator_of
 
 Array = NDArray[np.float64]
 Verdict = Literal["better", "worse", "no difference seen"]

@@ -22,6 +22,7 @@ from synfeal.files import write_text
 from synfeal.frames import read_frame
 from synfeal.inspect.surface import SurfacePoints, viewer_js, viewer_mesh
 from synfeal.mesh.load import load_mesh
+from synfeal.provenance import generator_of
 from synfeal.report import (
     assistance,
     label_error,
@@ -47,7 +48,6 @@ from synfeal.report.html.tables import (
 )
 from synfeal.report.layouts import BLOCKS, SOURCES, scene_title
 from synfeal.report.summary import run_sentences
-from synfeal.seeds import generator_of
 
 LARGEST_SVG = 1_000_000  # bytes; clouds of points are smaller as a picture
 LARGEST_PNG = 250_000
