@@ -100,7 +100,7 @@ class Angles(Strict):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if not -90 < self.pitch_deg[0] < self.pitch_deg[1] < 90:
-            raise ValueError("pitch_deg: must be within -90 and 90, where yaw and roll differ")
+            raise ValueError("pitch_deg: must lie within -90 and 90, where yaw and roll differ")
         return self
 
 
