@@ -52,13 +52,7 @@ def localize(
     """Write the pose of each picture as CSV (columns of ``HEADER``), in the order named.
 
     Poses are ``world_from_cam`` in the world of the training labels. A pose that is not finite is
-    written as ``nan``.
-
-    Args:
-        model: checkpoint of a trained localizer.
-        named: pictures, and directories of pictures.
-        out: file to write; it appears when all pictures are done.
-        device: where to run.
+    written as ``nan``. A directory stands for its pictures; ``out`` appears when all are done.
 
     Raises:
         InputError: the model or a picture cannot be used, or ``out`` cannot be written.

@@ -24,14 +24,7 @@ LEGEND_INCHES = 7.0  # of four columns of settings
 
 
 def write_page(out: Path, name: str, sweep: Sweep, rows: pd.DataFrame) -> None:
-    """Write ``out.md`` and, where the sweep asks for one, the picture ``out.png``.
-
-    Args:
-        out: path without ending.
-        name: of the sweep on the command line.
-        sweep: the benchmark.
-        rows: all runs; see ``run_missing``.
-    """
+    """Write ``out.md`` and, where the sweep asks for one, the picture ``out.png``."""
     if sweep.picture is not None:
         draw(out.with_suffix(".png"), sweep, sweep.picture, rows)
     environment = Environment(
@@ -120,12 +113,7 @@ def _draw_panel(
 def mark_front(panel: Axes, means: pd.DataFrame, x: str, y: str, chosen: Mapping[str, str]) -> None:
     """Join what nothing beats in both columns, cover what is beaten with grey, ring the choice.
 
-    Args:
-        panel: where to draw.
-        means: a row for each combination of settings.
-        x: column of costs.
-        y: column of errors.
-        chosen: axes and the values in use, as text.
+    ``chosen`` are axes and the values in use, as text.
     """
     front = pareto_front(means[x], means[y])
     best = means[front].sort_values(x)

@@ -180,13 +180,9 @@ def read_table(path: Path, keys: Sequence[str]) -> pd.DataFrame:
 
 
 def run_missing(measure: str, runs: Sequence[Run], table: Path, jobs: int) -> pd.DataFrame:
-    """The rows of these runs, in their order, after those that the table lacks were measured.
+    """The rows of all runs of a sweep, in their order, after those that lack were measured.
 
-    Args:
-        measure: one of ``MEASURES``.
-        runs: all of one sweep.
-        table: CSV; rows are added one by one, so stopping loses only the runs under way.
-        jobs: runs side by side.
+    Rows are added to the table one by one, so stopping loses only the runs under way.
 
     Raises:
         InputError: a row of the table was made with other settings, or a run cannot be made.

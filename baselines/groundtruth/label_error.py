@@ -62,13 +62,7 @@ def relative_error(sequences: Sequence[Pair], frames: int) -> RelativeError | No
     """Error of the motion from each frame to the one ``frames`` further on in its sequence.
 
     With labels P and true poses Q it is that of ``inverse(inverse(Q_i) Q_j) inverse(P_i) P_j``.
-
-    Args:
-        sequences: labels and true poses of each sequence.
-        frames: distance of the two frames, 1 or more.
-
-    Returns:
-        None when no sequence has more frames than that.
+    None when no sequence has more frames than that.
     """
     long = [pair for pair in sequences if len(pair[1]) > frames]
     if not long:

@@ -62,16 +62,10 @@ def _surface(depth_m: Depth, smooth_m: Depth, camera: CameraConfig, stride: int)
 def register(
     shown: list[Surface], seen: list[Surface], camera: CameraConfig
 ) -> tuple[Array, float]:
-    """Motion ``shown_from_seen`` (4, 4) from a start without motion, and how sure it is.
+    """Motion ``shown_from_seen`` (4, 4) of a frame to the surface expected, both by level.
 
-    Args:
-        shown: the surface as it is expected, by level.
-        seen: the frame, by level.
-        camera: of both.
-
-    Returns:
-        The motion, and how well the matched surfaces constrain it: 0 where some motion leaves them
-        in place, and then the motion means nothing.
+    It starts without motion. Beside it is how well the matched surfaces constrain it: 0 where some
+    motion leaves them in place, and then the motion means nothing.
     """
     motion = np.eye(4)
     for (stride, steps), target, source in zip(LEVELS, shown, seen, strict=True):

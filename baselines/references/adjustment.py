@@ -56,12 +56,8 @@ def placed_on(poses: Array, labels: Array) -> Array:
 def adjust(tracks: Tracks, world_from_cam: Array, point_m: Array, camera: pycolmap.Camera) -> Array:
     """Poses (N, 4, 4) that, with points moved along, fit the images best.
 
-    Args:
-        tracks: observations.
-        world_from_cam: (N, 4, 4) poses to start from; those of frames that see none of the points
-            used stay where they are.
-        point_m: (T, 3) points to start from; NaN for those that are not used.
-        camera: of the frames, without distortion; not moved.
+    Poses and points (T, 3) are where it starts; points that are not used are NaN, and the poses of
+    frames that see none of the others stay. The camera, without distortion, is not moved.
     """
     usable = np.asarray(np.isfinite(point_m).all(axis=1))
     chosen = longest(tracks, usable, len(world_from_cam))

@@ -47,13 +47,7 @@ def answer_group(
 def answer_and_score(
     evidence: Evidence, names: Sequence[str], out_dir: Path, info: Mapping[str, Any]
 ) -> None:
-    """Answer for a data set by some methods, and score them.
-
-    Args:
-        evidence: the data set.
-        names: keys of ``REFERENCES``.
-        out_dir: directory with one folder per method.
-        info: further keys of the metrics.
+    """Answer by some of ``REFERENCES``, each in a folder of ``out_dir``, and score them.
 
     Raises:
         InputError: something the methods need cannot be read.
@@ -76,12 +70,8 @@ def score_answers(
 ) -> None:
     """Write ``predictions.csv``, ``errors.csv``, ``metrics.json`` and ``facts.json`` of a method.
 
-    Args:
-        answers: poses of the test frames; NaN where there is none.
-        files: labels and true poses, as in :class:`Evidence`.
-        folder: where to write.
-        info: further keys of the metrics.
-        facts: what the answers took.
+    Answers are poses of the test frames, NaN where there is none; ``info`` are further keys of the
+    metrics, and ``facts`` what the answers took.
     """
     write_pose_table(folder / "predictions.csv", answers)
     score_run(
@@ -129,14 +119,10 @@ def answer_externally(
 def run_external(
     command: str, files: Mapping[str, Path], named: Mapping[str, str], folder: Path
 ) -> Path:
-    """Run a command that writes a table of poses; where that lies.
+    """Run a command that writes ``answers.csv`` to a folder; where that lies.
 
-    Args:
-        command: words as a shell splits them, with placeholders.
-        files: ``train_frames``, ``test_frames`` and ``train`` of the data set, ``test`` for the
-            number of its test frames alone.
-        named: ``scene``, ``size`` and ``labels``, which fill placeholders too.
-        folder: where ``answers.csv`` is written.
+    Its placeholders are ``named``, training frames and labels, test frames and their number, and
+    ``out``.
 
     Raises:
         InputError: the command has an unknown placeholder, fails, or writes nothing.
@@ -172,9 +158,7 @@ def run_external(
 def read_answers(path: Path, frames: PoseTable) -> PoseTable:
     """Answers for some test frames, in any order; NaN for frames that are not in the file.
 
-    Args:
-        path: CSV with at least the columns ``frame,tx,ty,tz,qw,qx,qy,qz``: ``world_from_cam``.
-        frames: which test frames there are.
+    It is CSV with at least the columns ``frame,tx,ty,tz,qw,qx,qy,qz``: ``world_from_cam``.
 
     Raises:
         InputError: the file cannot be read, lacks a column, holds anything but numbers, or names a

@@ -44,12 +44,8 @@ def lifted(matches: Correspondences, train: PoseTable) -> Array:
 def localize(matches: Correspondences, point_m: Array, seen_by: CameraConfig, seed: int) -> Array:
     """Poses (N, 4, 4) of the test frames, NaN where none is found.
 
-    Args:
-        matches: of the test frames with the training frames.
-        point_m: (C, 3) where the training feature of each match lies in the world; not finite where
-            that is not known.
-        seen_by: camera of the test frames.
-        seed: of RANSAC.
+    ``point_m`` (C, 3) is where the training feature of each match lies in the world; not finite
+    where that is not known.
     """
     camera = pinhole(seen_by)
     known = np.asarray(np.isfinite(point_m).all(axis=1))
@@ -109,12 +105,8 @@ def on_points(evidence: Evidence, point_m: Array) -> Array:
 def triangulate(tracks: Tracks, world_from_cam: Array) -> Array:
     """Points (T, 3) nearest to the rays of their tracks; NaN behind a camera or at no angle.
 
-    Least squares of the distances to the rays, reweighted by the angle under which the point is
-    missed; a single wrong match then loses its say.
-
-    Args:
-        tracks: T tracks.
-        world_from_cam: (N, 4, 4) poses of the frames.
+    Least squares of the distances to the rays from the frames' poses (N, 4, 4), reweighted by the
+    angle under which the point is missed; a single wrong match then loses its say.
     """
     pose = world_from_cam[tracks.frame]
     centre = pose[:, :3, 3]

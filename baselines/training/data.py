@@ -172,15 +172,10 @@ class BatchOrder:
 
 
 def held_out_paths(path: NDArray[np.int64], share: float, seed: int) -> NDArray[np.bool_]:
-    """Which frames (N,) are held out: those of a share of the paths, drawn by seed.
+    """Which frames (N,) are held out: those of a share of the paths (N,), drawn by seed.
 
     Whole paths, because neighbouring frames of a path are nearly the same image. At least one path
     where there are two or more and ``share`` is not 0; never all.
-
-    Args:
-        path: (N,) index of each frame's straight path.
-        share: of the paths, 0 to 1.
-        seed: of the draw.
     """
     paths = np.unique(path)
     count = min(max(round(share * len(paths)), 1), len(paths) - 1) if share > 0 else 0

@@ -44,17 +44,11 @@ class Muon(torch.optim.Optimizer):
     (out, in * kh * kw), and kernels of one shape go through the iteration together: a narrow
     network has many small ones. A step has the size ``lr * sqrt(max(1, out / in))``, whatever the
     gradient's; weight decay is decoupled.
-
-    Args:
-        params: weights with two dimensions or more, or groups of them.
-        lr: learning rate.
-        momentum: share of the former steps that is kept.
-        weight_decay: decoupled.
     """
 
     def __init__(
         self,
-        params: Iterable[Tensor] | Iterable[dict[str, Any]],
+        params: Iterable[Tensor] | Iterable[dict[str, Any]],  # of two dimensions or more
         lr: float = 1e-2,
         momentum: float = 0.95,
         weight_decay: float = 0.0,

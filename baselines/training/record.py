@@ -28,12 +28,9 @@ PARAMETERS_MB_PER_PX = 0.05
 
 
 def training_mb(n_frames: int, network: NetworkConfig, batch_size: int) -> int:
-    """Most memory that training any localizer takes, in MB.
+    """Most memory in MB that training any localizer takes, training and test frames included.
 
-    Args:
-        n_frames: training and test frames, which are held as they are, packed.
-        network: size of an image, and width, by which layers grow and parameters quadratically.
-        batch_size: images of a step.
+    They are held as they are, packed; layers grow with the width, parameters with its square.
     """
     layers = LAYERS_MB_PER_PX * batch_size * network.width
     parameters = PARAMETERS_MB_PER_PX * network.width**2
@@ -66,13 +63,7 @@ def training_parameters(config: Config, run: Run) -> dict[str, Any]:
 def write_training_record(
     path: Path, parameters: Mapping[str, Any], inputs: Mapping[str, Path]
 ) -> None:
-    """Write what a run was trained from.
-
-    Args:
-        path: ``training.json`` beside the predictions.
-        parameters: from :func:`training_parameters`.
-        inputs: files by what they are; packed frames are told by the hash in their own record.
-    """
+    """Write what a run was trained from; packed frames are told by the hash in their own record."""
     hashes = {name: _sha256(file) for name, file in inputs.items()}
     origin = provenance(parameters["seed"], "")
     kept = {key: origin[key] for key in ("commit", "packages", "platform")}
@@ -106,9 +97,7 @@ def read_training_record(path: Path) -> dict[str, Any]:
 def check_same_labels(run: Path, test_labels: Path) -> None:
     """Refuse to score predictions by other labels than they were made for.
 
-    Args:
-        run: directory of a run; one without a record is passed over.
-        test_labels: labels of the test set as they are now.
+    A directory of a run without a record is passed over.
 
     Raises:
         InputError: the labels have changed since the run was trained.

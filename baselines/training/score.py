@@ -105,10 +105,7 @@ def score_run(
 def score_common(predictions: Path, truth: Path, out: Path) -> None:
     """Write the errors on the common test set, against the true poses.
 
-    Args:
-        predictions: pose table of some frames of that set; may hold ``nan``.
-        truth: the true poses of the scene's largest test set.
-        out: CSV to write, columns ``frame``, ``position_m`` and ``orientation_deg``.
+    Predictions, which may hold ``nan``, are of some of its frames.
 
     Raises:
         InputError: a file cannot be read, or the truth lacks frames of the predictions.

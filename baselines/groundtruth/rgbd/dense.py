@@ -65,11 +65,7 @@ def matched_depths(
 def points_of(depth_m: Depth, camera: CameraConfig, stride: int, first: float = 0.5) -> Array:
     """Points (h, w, 3) in camera coordinates, not finite where there is no depth.
 
-    Args:
-        depth_m: (h, w), every ``stride``-th row and column of an image.
-        camera: camera of the full image.
-        stride: in pixels.
-        first: position in the full image of the first row and column given.
+    ``depth_m`` is every ``stride``-th row and column of the camera's image, the first at ``first``.
     """
     fx, fy, cx, cy = camera.intrinsics
     row, column = np.indices(depth_m.shape) * stride + first

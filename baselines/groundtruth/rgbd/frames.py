@@ -83,11 +83,7 @@ def _surface(depth_m: NDArray[np.float32], matrix: Array, stride: int) -> Surfac
 def align(i: Surfaces, j: Surfaces, start: Array, max_difference_m: float) -> Array | None:
     """Motion ``i_from_j`` (4, 4) near a starting point (4, 4), or None where there is none.
 
-    Args:
-        i: the surfaces whose planes count.
-        j: those whose points are moved.
-        start: of the search.
-        max_difference_m: points whose depth differs by more do not count.
+    Points of j move towards the planes of i; where depth differs by more they do not count.
     """
     i_from_j = o3d.core.Tensor.from_numpy(np.ascontiguousarray(start))
     try:

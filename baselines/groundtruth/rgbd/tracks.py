@@ -122,10 +122,7 @@ class View:
 def neighbour(i: View, j: View, previous: Array) -> tuple[Array, bool]:
     """Motion ``i_from_j`` (4, 4) between neighbours and whether it was accepted.
 
-    Args:
-        i: the frame before.
-        j: the frame.
-        previous: motion (4, 4) of the pair before.
+    ``previous`` is the motion (4, 4) of the pair before.
     """
     if not (i.constrained and j.constrained):
         return _by_features(i, j, previous)
@@ -156,12 +153,9 @@ def _by_features(i: View, j: View, previous: Array) -> tuple[Array, bool]:
 
 
 def closure(i: View, j: View, predicted: Array | None) -> Array | None:
-    """Motion ``i_from_j`` (4, 4) between keyframes, or None.
+    """Motion ``i_from_j`` (4, 4) between keyframes, i the earlier one, or None.
 
-    Args:
-        i: the earlier one.
-        j: the later one.
-        predicted: motion (4, 4) by odometry, None where it was interrupted between them.
+    ``predicted`` is the motion by odometry, None where that was interrupted between them.
     """
     if not (i.constrained and j.constrained):
         found = i.from_features(j, _MIN_LOOP_INLIERS)
@@ -192,12 +186,9 @@ def most_telling(
 ) -> list[tuple[int, int]]:
     """Of each later keyframe the ``per_keyframe`` earliest partners that overlap it.
 
-    The further apart in time, the more drift a closure takes away.
-
-    Args:
-        candidates: pairs (i, j), i < j, ordered by i.
-        overlap: share of image j that image i shows; 0 where the pair is not worth trying.
-        per_keyframe: most pairs to keep.
+    The further apart in time, the more drift a closure takes away. Candidates are pairs (i, j),
+    i < j, ordered by i; ``overlap`` is the share of image j that image i shows, 0 where the pair is
+    not worth trying.
     """
     chosen: dict[int, int] = {}
     kept = []

@@ -42,12 +42,7 @@ class ResNetMaps(NamedTuple):
 
 
 class ResNet34(nn.Module):
-    """ResNet-34 without its classifier.
-
-    Attributes:
-        n_stages: channels of the four stages (64, 128, 256, 512 at width 1).
-        n_out: channels of the last one.
-    """
+    """ResNet-34 without its classifier."""
 
     def __init__(self, width: float = 1.0) -> None:
         super().__init__()
@@ -59,8 +54,8 @@ class ResNet34(nn.Module):
         self.layer2 = _stage(one, two, 4, 2)
         self.layer3 = _stage(two, three, 6, 2)
         self.layer4 = _stage(three, four, 3, 2)
-        self.n_stages = (one, two, three, four)
-        self.n_out = four
+        self.n_stages = (one, two, three, four)  # channels
+        self.n_out = four  # channels of the last stage
         for module in self.modules():
             if isinstance(module, nn.Conv2d):  # He initialisation, as in the paper
                 nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
