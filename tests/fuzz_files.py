@@ -14,8 +14,13 @@ import numpy as np
 import torch
 from PIL import Image
 
-from baselines.groundtruth.batches import BatchTrajectory, read_trajectory, write_trajectory
-from baselines.groundtruth.images import link_images, read_image
+from baselines.groundtruth.batches import (
+    BatchTrajectory,
+    link_images,
+    read_image,
+    read_trajectory,
+    write_trajectory,
+)
 from baselines.groundtruth.methods import check_sources
 from baselines.groundtruth.posegraph import graph as posegraph
 from baselines.localizers.backbones.weights import load_backbone_weights

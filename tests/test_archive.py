@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.groundtruth.images import link_images
+from baselines.groundtruth.batches import link_images
 from baselines.groundtruth.rgbd.frames import frame_generator
 from synfeal.cli import main
 from synfeal.dataset import frame_files as archive_module

@@ -6,8 +6,8 @@ import numpy as np
 import pycolmap
 import pytest
 
+from baselines.groundtruth.batches import link_images
 from baselines.groundtruth.chain import fill_gaps
-from baselines.groundtruth.images import link_images
 from baselines.groundtruth.sfm.batch import extract_features, match_features, metric_trajectory
 from baselines.groundtruth.sfm.mapping import camera_poses, map_matches, read_matches, refine_model
 from synfeal.geometry.poses import pose_error, relative

@@ -1,4 +1,4 @@
-"""The batches of section 4.1: how a split is cut, and what a method estimates for each.
+"""The batches of section 4.1: how a split is cut, their images, and what a method estimates.
 
 A trajectory is stored as CSV with columns ``frame,registered,tx,ty,tz,qw,qx,qy,qz``; frames count
 from 0 inside the batch, positions are in metres and rotations unit quaternions of
@@ -7,12 +7,17 @@ from 0 inside the batch, positions are in metres and rotations unit quaternions 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.config.models import CameraConfig
+from synfeal.dataset import frame_files
+from synfeal.dataset.frame_files import FrameFile, link_or_unpack
 from synfeal.dataset.pose_table import check_unit, whole_numbers
 from synfeal.errors import InputError
 from synfeal.frames import read_numbers, write_numbers
@@ -100,3 +105,34 @@ def read_trajectory(path: Path) -> BatchTrajectory:
         raise InputError(f"{path}: frames must count from 0, registered be 0 or 1; estimate again")
     check_unit(values[:, 5:9], path, np.arange(len(values)) + 2)
     return BatchTrajectory(pose_from_quat(values[:, 2:5], values[:, 5:9]), values[:, 1] == 1)
+
+
+def read_image(path: FrameFile, camera: CameraConfig, mode: str | None = None) -> NDArray[Any]:
+    """An image of the camera's size as an array, converted to ``mode`` if one is given.
+
+    Raises:
+        InputError: it is missing, cannot be read, or has another size.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such image; collect the data set again")
+    pixels = np.asarray(frame_files.read_image(path, mode))
+    if pixels.shape[:2] != (camera.height, camera.width):
+        raise InputError(
+            f"{path}: is {pixels.shape[1]}x{pixels.shape[0]}, the camera has"
+            f" {camera.width}x{camera.height}; collect the data set again"
+        )
+    return pixels
+
+
+def link_images(color_paths: Sequence[FrameFile], camera: CameraConfig, images: Path) -> None:
+    """A new directory ``images`` in which the order of the names is the order of the frames.
+
+    COLMAP leaves out an image that it cannot read, which would look like a frame without texture.
+
+    Raises:
+        InputError: as :func:`read_image`.
+    """
+    images.mkdir()
+    for frame, path in enumerate(color_paths):
+        read_image(path, camera)
+        link_or_unpack(path, images / f"{frame:06d}{path.suffix}")

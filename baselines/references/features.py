@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from baselines.groundtruth.images import read_image
+from baselines.groundtruth.batches import read_image
 from baselines.references.arrays import ByFrame, Stored
 from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.models import CameraConfig, ReferencesConfig

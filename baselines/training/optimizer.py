@@ -175,10 +175,7 @@ def _muon(network: nn.Module, schedule: Schedule) -> Optimisation:
 def _halving(network: nn.Module, schedule: Schedule) -> Optimisation:
     """Adam, every parameter pulled to 0, and half the rate after equal shares of the run."""
     optimizer = torch.optim.Adam(
-        network.parameters(),
-        schedule.learning_rate,
-        weight_decay=schedule.weight_decay,
-        fused=True,
+        network.parameters(), schedule.learning_rate, weight_decay=schedule.weight_decay, fused=True
     )
     step = max(1, round(schedule.halve_every * schedule.steps))
     return Optimisation((optimizer, StepLR(optimizer, step, gamma=0.5)))

@@ -34,11 +34,7 @@ class RandomRotation:
     """
 
     def __init__(
-        self,
-        intrinsics: Intrinsics,
-        input_px: int,
-        augmentation: AugmentationConfig,
-        seed: int,
+        self, intrinsics: Intrinsics, input_px: int, augmentation: AugmentationConfig, seed: int
     ) -> None:
         tilt, roll = math.radians(augmentation.tilt_deg), math.radians(augmentation.roll_deg)
         self._largest_rad = torch.tensor([tilt, tilt, roll])

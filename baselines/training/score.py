@@ -13,12 +13,7 @@ from numpy.typing import NDArray
 
 from baselines.training.record import check_same_labels
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset.pose_table import (
-    HEADER,
-    PoseTable,
-    read_pose_table,
-    whole_numbers,
-)
+from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table, whole_numbers
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import finite, pose_errors, summary
 from synfeal.evaluation.reprojection import dcre, dcre_summary, read_cell_depth

@@ -84,13 +84,16 @@ use rule call as cell_depth with:
         camera=dump(CONFIG.network_camera),
 
 
+SEQUENCE = f"{ROOT}/datasets/{{scene}}/{{camera}}/{{sequence}}{ARCHIVE}"
+
+
 use rule call_3gb as render with:
     input:
         mesh=rules.scene.output.mesh,
         plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w).split}.csv",
         extras=lambda w: beside_mesh(w.scene, CONFIG.render.effects),
     output:
-        frames=sequence_output(f"{ROOT}/datasets/{{scene}}/{{camera}}/{{sequence}}"),
+        frames=SEQUENCE if ARCHIVE else directory(SEQUENCE),
     params:
         function="synfeal.dataset.render_sequence:render_sequence",
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
@@ -181,7 +184,11 @@ use rule call as dataset with:
         plans=lambda w: plans_with_frames(w.scene, w.camera, "csv"),
         coverage=lambda w: plans_with_frames(w.scene, w.camera, "coverage.json"),
         extras=lambda w: beside_mesh(w.scene, CONFIG.render.effects),
-        clutter=lambda w: clutter_of(w.scene),
+        clutter=lambda w: (
+            [f"{ROOT}/scenes/{w.scene}/clutter.json"]
+            if CONFIG.scenes[w.scene].clutter
+            else []
+        ),
     output:
         manifest=f"{ROOT}/datasets/{{scene}}/{{camera}}/manifest.json",
         train=f"{ROOT}/datasets/{{scene}}/{{camera}}/TrainSplit.txt",

@@ -139,11 +139,6 @@ def packed_shards(scene, split, kind):
     )
 
 
-def sequence_output(stem):
-    """A sequence as its render job declares it: a directory, or one file."""
-    return f"{stem}{ARCHIVE}" if ARCHIVE else directory(stem)
-
-
 def sequence_dirs(scene, camera, split=None, stop=None):
     """A data set's sequences, directories or archives, of one split, with frames below ``stop``."""
     return [
@@ -343,12 +338,6 @@ def beside_mesh(scene, effects):
     ]
 
 
-def clutter_of(scene):
-    """What was placed in a scene, where its configuration asks for that."""
-    cluttered = CONFIG.scenes[scene].clutter is not None
-    return [f"{ROOT}/scenes/{scene}/clutter.json"] if cluttered else []
-
-
 def cartons_of(scene):
     """The built-in objects of a scene."""
     return [
@@ -357,16 +346,8 @@ def cartons_of(scene):
     ]
 
 
-def has_path(scene):
-    return scene in CONFIG.scenes and CONFIG.scenes[scene].source == "mesh"
-
-
-def scene_seed(scene):
-    own = CONFIG.scenes[scene].seed
-    return CONFIG.seed if own is None else own
-
-
-VARIATIONS = ROBUSTNESS.rendered(CONFIG.collection, has_path(ROBUSTNESS.scene))
+HAS_MESH = {name for name, scene in CONFIG.scenes.items() if scene.source == "mesh"}
+VARIATIONS = ROBUSTNESS.rendered(CONFIG.collection, ROBUSTNESS.scene in HAS_MESH)
 ROBUST_EFFECTS = [name for name in VARIATIONS if name != MIXED]
 ROBUST_STRUCTURE = has_structure(EXPERIMENTS, ROBUSTNESS.scene, ROBUSTNESS.size)
 
@@ -381,13 +362,6 @@ def robust_frames(split):
     return CONFIG.n_frames(ROBUSTNESS.scene, ROBUSTNESS.size, split)
 
 
-def varied_training_frames(wildcards):
-    """What a training set of the robustness table looks like."""
-    if wildcards.trained_on == MIXED:
-        return f"{ROOT}/robustness/frames/{MIXED}/train.npy"
-    return f"{ROOT}/frames/{ROBUSTNESS.scene}/train.npy"
-
-
 def varied_render(wildcards):
     effects = VARIATIONS.get(wildcards.effects, CONFIG.render.effects)
     return dump(CONFIG.render.model_copy(update={"effects": effects}))
@@ -400,14 +374,6 @@ def varied_extras(names):
         beside_mesh(ROBUSTNESS.scene, VARIATIONS.get(name, usual)) for name in names
     ]
     return sorted({file for extras in files for file in extras})
-
-
-def varied_tests(clean, varied):
-    """Test frames by the name of their effects, as inputs of a rule."""
-    return {
-        CLEAN: clean,
-        **{name: varied.format(effects=name) for name in ROBUST_EFFECTS},
-    }
 
 
 def robustness_made():

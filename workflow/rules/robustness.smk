@@ -12,7 +12,11 @@ use rule call_4gb as light_shares with:
     params:
         function="synfeal.scenes:save_light_shares",
         builder=lambda w: CONFIG.scenes[w.scene].builder,
-        seed=lambda w: scene_seed(w.scene),
+        seed=lambda w: (
+            CONFIG.seed
+            if CONFIG.scenes[w.scene].seed is None
+            else CONFIG.scenes[w.scene].seed
+        ),
 
 
 use rule render_packed as render_varied with:
@@ -69,11 +73,15 @@ use rule call as train_varied with:
 # Vectors of the ideal and of the varied frames: what the map of each training set is searched by.
 use rule call_3gb as varied_descriptors with:
     input:
-        **varied_tests(
-            f"{ROOT}/frames/{ROBUSTNESS.scene}/test.npy",
-            f"{VARIED}/frames/{{effects}}/test.npy",
-        ),
-        train=varied_training_frames,
+        **{
+            CLEAN: f"{ROOT}/frames/{ROBUSTNESS.scene}/test.npy",
+            **{n: f"{VARIED}/frames/{n}/test.npy" for n in ROBUST_EFFECTS},
+            "train": lambda w: (
+                f"{VARIED}/frames/{MIXED}/train.npy"
+                if w.trained_on == MIXED
+                else f"{ROOT}/frames/{ROBUSTNESS.scene}/train.npy"
+            ),
+        },
     output:
         descriptors=f"{VARIED}/descriptors/{{trained_on}}.npz",
     wildcard_constraints:

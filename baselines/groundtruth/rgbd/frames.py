@@ -15,7 +15,7 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from baselines.groundtruth.images import read_image
+from baselines.groundtruth.batches import read_image
 from synfeal.config.models import CameraConfig, DepthConfig
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.errors import InputError

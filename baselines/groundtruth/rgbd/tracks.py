@@ -51,10 +51,7 @@ class FeatureOdometry:
         fx, fy, cx, cy = camera.intrinsics
         self._focal_px, self._centre_px = np.array([fx, fy]), np.array([cx, cy])
         self._camera = pycolmap.Camera(
-            model="PINHOLE",
-            width=camera.width,
-            height=camera.height,
-            params=[fx, fy, cx, cy],
+            model="PINHOLE", width=camera.width, height=camera.height, params=[fx, fy, cx, cy]
         )
         self._estimation = pycolmap.AbsolutePoseEstimationOptions()
         self._estimation.ransac.max_error = _MAX_ERROR_PX

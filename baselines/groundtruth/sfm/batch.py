@@ -25,8 +25,12 @@ import pycolmap
 from numpy.typing import NDArray
 
 from baselines.costs import Facts, timed
-from baselines.groundtruth.batches import BatchTrajectory, failed_trajectory, write_trajectory
-from baselines.groundtruth.images import link_images
+from baselines.groundtruth.batches import (
+    BatchTrajectory,
+    failed_trajectory,
+    link_images,
+    write_trajectory,
+)
 from baselines.groundtruth.sfm.mapping import camera_poses, map_matches, read_matches, refine_model
 from synfeal.config.models import CameraConfig, SfmConfig
 from synfeal.dataset.frame_files import FrameFile
