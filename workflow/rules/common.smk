@@ -71,6 +71,7 @@ POSE_SETS = sorted({*TRUE_SETS, *ESTIMATED_SETS})
 MAPPED_SETS = [f"{s}/{z}" for s, z in SIZES if has_structure(EXPERIMENTS, s, z)]
 TABLE_NAMES = ["table1_meshes", *DESIGN.tables]
 DRAWN_TABLES = ("table3_inconsistencies", "table4_size", "table7_images_shown")
+DRAWN = [table for table in TABLE_NAMES if table in DRAWN_TABLES]
 RECONSTRUCTED = tuple(METHODS)
 EXTERNAL = CONFIG.references.external
 ROBUSTNESS = CONFIG.robustness
@@ -262,7 +263,7 @@ def table_files(name, caption=None):
     }
 
 
-def files_of_trainings(pattern):
+def table4_files(pattern):
     """A file of each training run (``{run}``) of Table 4; of restored runs those that were kept."""
     runs = runs_of("table4_size")
     made = [run for run in runs if f"{ROOT}/runs/{run}/predictions.csv" not in RESTORED]
@@ -396,7 +397,7 @@ def robustness_tables(kind="csv"):
 
 def drawn_robustness():
     """What figures and speeds read of it, where anything is drawn of training runs."""
-    if not (robustness_made() and set(TABLE_NAMES) & set(DRAWN_TABLES)):
+    if not (robustness_made() and DRAWN):
         return []
     speed = f"{ROOT}/scenes/{ROBUSTNESS.scene}/effects_speed.csv"
     return [speed, *robustness_tables()]
@@ -404,7 +405,7 @@ def drawn_robustness():
 
 def label_figures():
     """The figures of a design that draws nothing of training runs."""
-    return [] if set(TABLE_NAMES) & set(DRAWN_TABLES) else [f"{ROOT}/figures"]
+    return [] if DRAWN else [f"{ROOT}/figures"]
 
 
 def batch_facts():

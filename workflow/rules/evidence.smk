@@ -63,13 +63,10 @@ use rule call as speed_vs_error with:
         curves=under("scenes/{scene}/collision_curve.csv", scene=SCENES),
         rendering=under("scenes/{scene}/render_speed.csv", scene=SCENES),
         labels=rules.label_error.output.csv,
-        trainings=under(
-            "tables/{table}.csv",
-            table=[t for t in TABLE_NAMES if t == "table4_size"],
-        ),
-        histories=files_of_trainings("runs/{run}/history.csv"),
+        trainings=under("tables/{t}.csv", t={"table4_size"} & {*TABLE_NAMES}),
+        histories=table4_files("runs/{run}/history.csv"),
         effects=drawn_robustness(),
-        measured=files_of_trainings("benchmarks/train/{run}.tsv"),
+        measured=table4_files("benchmarks/train/{run}.tsv"),
     output:
         csv=f"{ROOT}/tables/speed_vs_error.csv",
     params:
@@ -87,10 +84,7 @@ use rule call_2gb as hard_cases with:
 use rule call as document with:
     input:
         tables=[
-            *under(
-                "tables/{table}.tex",
-                table=[*TABLE_NAMES, "references", "recall"],
-            ),
+            *under("tables/{t}.tex", t=[*TABLE_NAMES, "references", "recall"]),
             *robustness_tables("tex"),
         ],
     output:
@@ -105,15 +99,8 @@ use rule call as document with:
 
 use rule call_2gb as figures with:
     input:
-        tables=under(
-            "tables/{table}.csv",
-            table=[t for t in TABLE_NAMES if t in DRAWN_TABLES],
-        ),
-        references=(
-            [f"{ROOT}/tables/references.csv"]
-            if set(TABLE_NAMES) & set(DRAWN_TABLES)
-            else []
-        ),
+        tables=under("tables/{table}.csv", table=DRAWN),
+        references=rules.references_table.output.csv if DRAWN else [],
         robustness=drawn_robustness(),
         speed=rules.speed_vs_error.output.csv,
         labels=under("labels/{set}/{split}.csv", set=POSE_SETS, split=SPLITS),
@@ -219,11 +206,7 @@ use rule call_4gb as report with:
         results=RESULTS,
         metrics=METRICS,
         meshes=under("scenes/{scene}/mesh.glb", scene=SCENES),
-        plans=under(
-            "plans/{scene}/{split}.csv",
-            scene=SCENES,
-            split=SPLITS,
-        ),
+        plans=under("plans/{scene}/{split}.csv", scene=SCENES, split=SPLITS),
         labels=under("labels/{set}/{split}.csv", set=POSE_SETS, split=SPLITS),
     output:
         html=f"{ROOT}/report.html",
