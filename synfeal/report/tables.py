@@ -60,9 +60,11 @@ def sheet_of(name: str, cells: pd.DataFrame) -> Sheet:
     kinds = [k for k in kinds if name == FROM_SCRATCH or not k.endswith("change")]
     references = dict([*REFERENCES.items()][: 1 if one_truth else 2])
     in_print = published_labels(name, cells)
-    titled = cells.assign(title=blocks_of(cells))
+    # Blocks: noise of Table 3, and the scene where there are several.
+    scenes = cells.scene.map(scene_title) if cells.scene.nunique() > 1 else ""
+    titles = (cells.block.map(BLOCKS) + " " + scenes).str.strip()
     lines = []
-    for title, block in titled.groupby("title", sort=False):
+    for title, block in cells.groupby(titles, sort=False):
         keys = [(cell, kind) for cell in rows_of(block) for kind in kinds]
         numbers = {(cell.row, kind, cell.model): _numbers(kind, cell) for cell, kind in keys}
         _mark_best(numbers)
@@ -90,12 +92,6 @@ def _order(name: str, row: Any) -> object:
     return row_label(name, row) if name == "table2_ground_truth" else row.n_train
 
 
-def blocks_of(cells: pd.DataFrame) -> pd.Series:
-    """Titles of the block of each cell: noise of Table 3, and the scene where there are several."""
-    scenes = cells.scene.map(scene_title) if cells.scene.nunique() > 1 else ""
-    return (cells.block.map(BLOCKS) + " " + scenes).str.strip()
-
-
 def _numbers(kind: str, cell: Any) -> list[Value]:
     """Position and orientation of a localizer on a line; none where the paper has no such cell."""
     source, _, change = kind.partition(" ")
@@ -108,14 +104,9 @@ def _numbers(kind: str, cell: Any) -> list[Value]:
         names = [CHANGES[f"{measure}{KIND_OF.get(source, '')}"] for measure in UNITS]
         return [_change(getattr(cell, f"{start}{name}")) for name in names]
     if kind == PAPER:
-        # A misprinted orientation is shown, and never the best.
-        misprint = {"orientation_deg"} if cell.published_flag == "misprint" else set()
-        values = {m: getattr(cell, f"published_{m}") for m in UNITS}
-        note = cell.published_cell_note
-        return [
-            Value(f"{value:.2f}{UNITS[m]}", note=note, sort="" if m in misprint else value)
-            for m, value in values.items()
-        ]
+        m, deg, note = (getattr(cell, f"published_{n}") for n in (*UNITS, "cell_note"))
+        rival = "" if cell.published_flag == "misprint" else deg  # shown, and never the best
+        return [Value(f"{m:.2f} m", note=note, sort=m), Value(f"{deg:.2f}°", note=note, sort=rival)]
     scores = [_score(cell, f"{m}{KIND_OF[kind]}", unit) for m, unit in UNITS.items()]
     return scores[:1] if scores[0].text == FAILED else scores  # said once
 
