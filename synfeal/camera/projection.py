@@ -6,11 +6,8 @@ import math
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from synfeal.camera.distortion import distort, undistort
-
-Array = NDArray[np.float64]
+from synfeal.camera.distortion import Array, distort, undistort
 
 
 class Intrinsics(NamedTuple):

@@ -6,16 +6,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from synfeal.geometry.rotations import (
+    Array,
     matrix_from_quat_wxyz,
     quat_wxyz_from_matrix,
     rotation_angle_rad,
     slerp_quat_wxyz,
 )
-
-Array = NDArray[np.float64]
 
 
 def pose_matrix(rotation: ArrayLike, position_m: ArrayLike) -> Array:

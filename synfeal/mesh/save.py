@@ -16,11 +16,9 @@ from trimesh.visual.material import PBRMaterial
 
 from synfeal.errors import InputError
 from synfeal.files import atomic_path
+from synfeal.mesh.load import WORLD_FROM_Y_UP
 from synfeal.mesh.materials import SRGB_ATTRIBUTE, linear_from_srgb
 from synfeal.mesh.model import MeshPart, TexturedMesh
-
-# glTF is y-up: what is (x, y, z) in the world is stored as (x, z, -y).
-GLTF_FROM_WORLD: NDArray[np.float64] = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
 
 FLOAT32_BITS = 24  # of the mantissa
 
@@ -56,7 +54,7 @@ def save_glb(path: Path, mesh: TexturedMesh) -> None:
         scene.add_geometry(
             _geometry(part, vertices, materials.of(part)),
             geom_name=f"{index:04d}:{part.name}",
-            transform=trimesh.transformations.translation_matrix(GLTF_FROM_WORLD @ origin_m),
+            transform=trimesh.transformations.translation_matrix(WORLD_FROM_Y_UP.T @ origin_m),
         )
     with atomic_path(path) as temporary:
         exported = scene.export(file_type="glb", tree_postprocessor=materials.set_exact_factors)
@@ -113,7 +111,7 @@ def _geometry(
     """One part with ``vertices`` (V, 3) in world axes as trimesh geometry in glTF axes."""
     uv = np.zeros((len(vertices), 2)) if part.uv is None else part.uv
     geometry = trimesh.Trimesh(
-        vertices=vertices @ GLTF_FROM_WORLD.T,
+        vertices=vertices @ WORLD_FROM_Y_UP,
         faces=part.faces,
         visual=TextureVisuals(uv=uv, material=material),
         process=False,
