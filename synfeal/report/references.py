@@ -42,16 +42,13 @@ SCHEMA = {
     **dict.fromkeys(("n_train", "n_test", "n_seeds"), COUNT),
     **{"failed": MAYBE_COUNT, "seconds_per_frame": MAYBE},
 }
-TIME = "Time per frame"
+TIME = "Time per frame, one core"
 LINES = ["data_set", "labels", "against"]
 CAPTION = (
     "Reference methods beside the localizers, all from the labels of the data set: median errors,"
     " and the share of the test frames within 5 cm and 5 degrees."
 )
-REMARK = (
-    "Answers that failed count as infinite errors. The best localizer is the best by position."
-    " Times: of one processor core, without what is done once for all label sets; median over them."
-)
+REMARK = "Answers that failed count as infinite errors. The best localizer is so by position."
 
 
 def write_references_table(

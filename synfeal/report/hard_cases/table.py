@@ -168,17 +168,14 @@ COLUMNS = (
     Column("Ours", "our_error", text="our_text", small="ours", bad="our_bad"),
     Column("Bound", "bound", text="bound_text"),
     Column("Truth", "reference", on_paper=False),
-    Column("First, µs", "naive_seconds", text="naive_time", on_paper=False),
-    Column("Ours, µs", "our_seconds", text="our_time", on_paper=False),
+    Column("First, µs a call", "naive_seconds", text="naive_time", on_paper=False),
+    Column("Ours, µs a call", "our_seconds", text="our_time", on_paper=False),
 )
 CAPTION = (
     "Errors against exact answers: of the formula somebody would write first, and of the function"
     " this project uses. ✗ marks errors above the bound that ours promises."
 )
-REMARK = (
-    "None: no answer, or no number; cases without one right answer are to be refused. Times are"
-    " those of one call, medians, and differ between runs."
-)
+REMARK = "None: no answer, or no number; cases without one right answer are to be refused."
 
 
 def side_table(table: pd.DataFrame) -> SideTable:
