@@ -106,6 +106,7 @@ def test_other_test_paths_and_a_missing_plan_are_said_and_not_paired(pair):
     assert set(comparison.runs.test_frames) == {"differ"}
     assert (comparison.runs.low < 0).all()
     assert (comparison.runs.high > 0).all()
+    assert set(comparison.runs.verdict) == {"no difference seen"}
     assert "in 2 the test frames differ" in remarks_of(comparison)[1]
     (pair[0] / "plans/room/test.csv").unlink()
     assert not (comparison.runs.test_frames == "same").any()
