@@ -177,6 +177,7 @@ def test_what_cannot_be_judged_says_why_and_the_rest_is_judged(results, tmp_path
     untested = [claim for claim, row in rows.items() if row["verdict_labels"] == UNTESTED]
     assert untested == ["C1", "C2", "C3", "C4", "C7", "C11", "C12"]
     assert rows["C7"]["reason"] == "this profile has no row large_room 80k synfeal pretrained"
+    assert rows["C7"]["evidence"] == rows["C7"]["measured_labels"] == ""
     other = experiment("table4_size", scene="workshop")
     found = made.Results(tmp_path / "workshop", design=(other,)).rows().values()
     assert all(row["verdict_true"] == UNTESTED and row["reason"] for row in found)
@@ -186,6 +187,7 @@ def test_what_cannot_be_judged_says_why_and_the_rest_is_judged(results, tmp_path
     rows = made.papers_results(tmp_path / "short", n_paths=9).rows()
     assert verdicts(rows["C1"]) == (UNDECIDED, UNDECIDED)
     assert rows["C1"]["reason"].startswith("a test set has 9 paths, fewer than 10")
+    assert rows["C16"]["verdict_labels"] == HOLDS  # no localizer, no paths
 
 
 ERRORS = "runs/large_room/6k/sfm/pretrained/posenet2/seed0/errors.csv"
