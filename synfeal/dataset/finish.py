@@ -15,6 +15,7 @@ from synfeal.dataset.pose_table import read_frames, read_pose_table, write_pose_
 from synfeal.dataset.preview import write_contact_sheet
 from synfeal.dataset.sevenscenes import Sequence as Shard
 from synfeal.dataset.sevenscenes import Split, frame_paths, sequences_of, write_splits
+from synfeal.effects.apply import effects_table, objects_table
 from synfeal.effects.scene import crowd_of
 from synfeal.files import file_sha256, read_json, write_json
 from synfeal.frames import write_frame
@@ -69,8 +70,6 @@ def _write_effects(directory: Path, origin: Mapping[str, Any], mesh: Path) -> di
     settings = origin["render"].get("effects")
     if settings is None:
         return {}
-    from synfeal.effects.apply import effects_table, objects_table  # pandas takes time to load
-
     effects, hashes = EffectsConfig(**settings), {}
     crowd = crowd_of(mesh, RenderConfig(effects=effects))
     for plan in sorted(directory / f"{split}.csv" for split in ("test", "train")):
