@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError, read_as, why
 from synfeal.files import read_json
 
 ADAPTER_OF = cache(TypeAdapter)  # of a model or type
@@ -19,12 +19,8 @@ ADAPTER_OF = cache(TypeAdapter)  # of a model or type
 
 def read_text(path: Path) -> str:
     """The text of a result file."""
-    try:
+    with read_as(path, "text", remedy="; make it again"):
         return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise InputError(f"{path}: missing; make the results first") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read ({why(error)}); make it again") from None
 
 
 def read_result(path: Path, needed: Iterable[str], remedy: str, shape: Any = None) -> Any:
@@ -34,10 +30,8 @@ def read_result(path: Path, needed: Iterable[str], remedy: str, shape: Any = Non
         InputError: the file is missing, is not JSON, is no mapping, lacks a key of ``needed`` or
             of the shape, or one is of another type; ``remedy`` says what to do.
     """
-    try:
+    with read_as(path, "JSON", remedy=f"; {remedy}"):
         value = read_json(path)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as JSON ({why(error)}); {remedy}") from None
     if not isinstance(value, dict):
         raise InputError(f"{path}: must hold a mapping of keys; {remedy}")
     absent = [key for key in needed if key not in value]

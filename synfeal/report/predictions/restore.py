@@ -24,7 +24,7 @@ from baselines.groundtruth.methods import METHODS, estimation_parameters
 from baselines.training.record import RECORD, read_training_record, training_parameters
 from synfeal.config import MODELS, Config, Run
 from synfeal.dataset.frame_files import ARCHIVE_DAMAGE
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError, read_as, why
 from synfeal.files import atomic_path, write_json
 from synfeal.report.predictions.keep import DESCRIPTOR, PREDICTIONS
 from synfeal.report.results import read_result, unequal_leaves
@@ -100,14 +100,10 @@ def read_resources(package: Path) -> list[Resource]:
     Raises:
         InputError: it cannot be read, or names a file outside of where it is unpacked.
     """
-    try:
+    with read_as(package, "what synfeal keep writes", *DAMAGE):
         with zipfile.ZipFile(package) as opened:
             described = json.loads(opened.read(DESCRIPTOR))["resources"]
         return TypeAdapter(list[Resource]).validate_python(described)
-    except DAMAGE as error:
-        raise InputError(
-            f"{package}: cannot be read as what synfeal keep writes ({why(error)})"
-        ) from None
 
 
 def read_contents(package: Path, resources: list[Resource]) -> Iterator[tuple[Resource, bytes]]:
