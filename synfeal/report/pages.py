@@ -20,7 +20,7 @@ from typing import Any
 import pandas as pd
 
 from synfeal.config import MODELS
-from synfeal.errors import InputError
+from synfeal.errors import InputError, exit_status
 from synfeal.files import write_text
 from synfeal.frames import (
     COUNT,
@@ -224,14 +224,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true", help="exit 1 if anything would change")
     check = parser.parse_args(argv).check
-    try:
-        changed = stale(check)
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    changed: list[Path] = []
+    status = exit_status(lambda: changed.extend(stale(check)), "run it again")
     for path in changed:
         print(f"{path}: {'run python -m synfeal.report.pages' if check else 'written anew'}")
-    return int(check and bool(changed))
+    return status or int(check and bool(changed))
 
 
 if __name__ == "__main__":

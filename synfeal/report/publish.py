@@ -14,7 +14,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from synfeal.errors import InputError
+from synfeal.errors import InputError, exit_status
 from synfeal.files import atomic_directory
 from synfeal.report.html.provenance import hashes
 from synfeal.report.results import read_result, read_text
@@ -38,7 +38,10 @@ def publish(root: Path, target: Path, pages: Iterable[Path]) -> None:
         InputError: the run is not finished, its files are not those of its provenance, or a page
             shows a figure that it has not.
     """
-    paths = [*_tables(root), *_records(root), *_shown_figures(root, target, pages)]
+    tables = sorted(p for p in (root / "tables").glob("*.*") if p.suffix in (".csv", ".tex"))
+    if not tables:
+        raise InputError(f"{root}/tables: holds no tables; make the results first")
+    paths = [*tables, *_records(root), *_shown_figures(root, target, pages)]
     _check_provenance(root, paths)
     shutil.rmtree(target, ignore_errors=True)
     with atomic_directory(target) as directory:
@@ -46,13 +49,6 @@ def publish(root: Path, target: Path, pages: Iterable[Path]) -> None:
             copy = directory / path.relative_to(root)
             copy.parent.mkdir(exist_ok=True)
             shutil.copyfile(path, copy)
-
-
-def _tables(root: Path) -> list[Path]:
-    tables = sorted(p for p in (root / "tables").glob("*.*") if p.suffix in (".csv", ".tex"))
-    if not tables:
-        raise InputError(f"{root}/tables: holds no tables; make the results first")
-    return tables
 
 
 def _records(root: Path) -> list[Path]:
@@ -91,13 +87,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--profile", default="mini", help="the run: results/PROFILE (mini)")
     profile = parser.parse_args(argv).profile
     pages = [Path("README.md"), *sorted(Path("docs").glob("*.md"))]
-    try:
-        publish(RESULTS / profile, PUBLISHED / profile, pages)
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    print(f"{PUBLISHED / profile}: published; git diff shows what changed")
-    return 0
+    status = exit_status(
+        lambda: publish(RESULTS / profile, PUBLISHED / profile, pages), "publish again"
+    )
+    if not status:
+        print(f"{PUBLISHED / profile}: published; git diff shows what changed")
+    return status
 
 
 if __name__ == "__main__":

@@ -133,16 +133,11 @@ def _row(claim: Claim, evidence: Evidence) -> dict[str, str]:
         row[f"interval_{score}"] = outcome.interval
         row[f"verdict_{score}"] = outcome.verdict
         row[f"test_paths_{score}"] = str(min(by_score[score].test_paths.values(), default=""))
-    row["reason"] = _joined({score: outcome.reason for score, outcome in outcomes.items()})
+    reasons = {outcome.reason: score for score, outcome in outcomes.items()}
+    named = "; ".join(f"{score}: {reason}" for reason, score in reasons.items())
+    row["reason"] = named if len(reasons) > 1 else next(iter(reasons))
     row["evidence"] = ";".join(dict.fromkeys(f for view in by_score.values() for f in view.used))
     return row
-
-
-def _joined(reasons: Mapping[str, str]) -> str:
-    """One reason where both scores have the same, else both by name."""
-    if len(set(reasons.values())) == 1:
-        return next(iter(reasons.values()))
-    return "; ".join(f"{score}: {reason}" for score, reason in reasons.items())
 
 
 def _short(row: Row) -> list[str]:

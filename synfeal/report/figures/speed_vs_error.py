@@ -24,7 +24,6 @@ from synfeal.report.figures.style import (
     MODEL_STYLES,
     ORANGE,
     PURPLE,
-    SCENE_STYLES,
     VERMILION,
     Style,
     add_legend,
@@ -69,7 +68,7 @@ def collision_figure(rows: pd.DataFrame) -> Figure:
     """Meshes for collisions, one line per scene."""
     figure = Figure(figsize=SIZE, layout="constrained")
     axes = figure.subplots()
-    for (_, scene), style in zip(rows.groupby("scene", sort=False), cycle(SCENE_STYLES)):
+    for (_, scene), style in zip(rows.groupby("scene", sort=False), cycle(MODEL_STYLES.values())):
         _draw_meshes(axes, scene, style)
     _finish(axes, "Face counts of the collision mesh", linear_below=0.01)
     axes.set_xlabel("million rays per second")

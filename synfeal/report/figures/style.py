@@ -45,7 +45,6 @@ SPLIT_STYLES: dict[str, Style] = {
     "train": {"color": ORANGE, "marker": "o"},
     "test": {"color": BLUE, "marker": "^"},  # the darker one: drawn on top, and fewer
 }
-SCENE_STYLES: tuple[Style, ...] = tuple(MODEL_STYLES.values())
 # What localizers are read against: greys, told apart by markers and dashes.
 _REFERENCE_MARKS = (
     ("0.60", "x", (0, (1, 1))),

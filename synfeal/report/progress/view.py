@@ -136,7 +136,12 @@ class RunView:
             return
         if self._scores.complete(row):
             self._open_rows = [other for other in self._open_rows if other != row]
-            self._print_row(row)
+            table = _columns(self._console.width)
+            if not self._headed:
+                table.add_row(*HEADING, style="bold")
+                self._headed = True
+            table.add_row(*self._scores.cells(row))
+            self._console.print(table)
         elif row not in self._open_rows:
             self._open_rows.append(row)
 
@@ -195,14 +200,6 @@ class RunView:
         bar = ProgressBar(1, self._time_left.share(), BAR_CELLS)
         line.add_row(bar, Text(self.line(), no_wrap=True))
         return Group(table, line)
-
-    def _print_row(self, row: str) -> None:
-        table = _columns(self._console.width)
-        if not self._headed:
-            table.add_row(*HEADING, style="bold")
-            self._headed = True
-        table.add_row(*self._scores.cells(row))
-        self._console.print(table)
 
 
 def _columns(width: int) -> Table:
