@@ -17,8 +17,6 @@ from synfeal.files import atomic_path
 Vectors = NDArray[np.float32]
 Described = dict[str, tuple[Vectors, Vectors]]
 
-Arrays = dict[str, NDArray[Any]]
-
 
 def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write arrays as an uncompressed ``.npz``."""
@@ -26,7 +24,7 @@ def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
         np.savez(temporary, allow_pickle=False, **arrays)
 
 
-def read_arrays(path: Path, names: Iterable[str]) -> Arrays:
+def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
     """The arrays of these names.
 
     Raises:

@@ -18,8 +18,8 @@ from synfeal.dataset.pose_table import PoseTable, read_pose_table
 class Evidence:
     """A data set as the reference methods see it.
 
-    Methods answer from ``train`` and from what is computed of images and depth. ``test_truth`` is
-    for the oracle, whose use of it is the point.
+    Methods answer from ``train`` and from what is computed of images and depth. The file of
+    ``test_truth`` is for the oracle, whose use of it is the point.
     """
 
     # by name: labels (``train``, ``test``), true poses (``train_truth``, ``test_truth``), and what
@@ -38,16 +38,6 @@ class Evidence:
     def test_frames(self) -> PoseTable:
         """Which test frames there are; its poses are what methods are asked for."""
         return read_pose_table(self.files["test"])
-
-    @property
-    def train_truth(self) -> PoseTable:
-        """True poses of the training frames."""
-        return read_pose_table(self.files["train_truth"])
-
-    @property
-    def test_truth(self) -> PoseTable:
-        """True poses of the test frames."""
-        return read_pose_table(self.files["test_truth"])
 
     @cached_property
     def descriptors(self) -> Described:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from baselines.references.arrays import THUMBNAIL, VLAD, most_alike
 from baselines.references.evidence import Evidence
-from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.pose_table import PoseTable, read_pose_table
 
 CHUNK = 500
 # How many metres a radian counts: about the depth at which a room moves as far in the image.
@@ -31,7 +31,8 @@ def nearest_pose(evidence: Evidence) -> NDArray[np.float64]:
 
     An oracle: the best that copying a training pose can do.
     """
-    rows = nearest_rows(evidence.train_truth, evidence.test_truth)
+    truth = (read_pose_table(evidence.files[f"{split}_truth"]) for split in ("train", "test"))
+    rows = nearest_rows(*truth)
     return evidence.train.world_from_cam[rows]
 
 

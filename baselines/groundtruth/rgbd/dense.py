@@ -151,12 +151,7 @@ def register(
     try:
         for steps, huber_m in _PASSES:
             i_from_j = odometry.rgbd_odometry_multi_scale(
-                j,
-                i,
-                matrix,
-                i_from_j,
-                1.0,
-                cfg.max_depth_m,
+                *(j, i, matrix, i_from_j, 1.0, cfg.max_depth_m),
                 [odometry.OdometryConvergenceCriteria(count) for count in steps],
                 _METHODS[method],
                 odometry.OdometryLossParams(2 * cfg.max_rmse_m, huber_m),
