@@ -18,10 +18,8 @@ from synfeal.report.findings import (
     HERE,
     PAPER,
     effects,
-    is_drawn_from,
     mean_factor,
     sentences,
-    write_findings_figure,
 )
 from synfeal.report.pages import PAGES, PARTS, headline, main, part_of, rewritten
 from synfeal.report.publish import FINISHED, PUBLISHED, publish
@@ -154,14 +152,6 @@ def test_sentences_follow_the_results(root):
     assert len(said) == 5
     assert "the position error changes by +200 % (+120 %)" in said[2]
     assert said[2].endswith("and −50 %.")
-
-
-def test_a_figure_knows_what_it_was_drawn_from(tmp_path):
-    found = effects(MINI)
-    png = tmp_path / "figure.png"
-    write_findings_figure(found, png)
-    assert is_drawn_from(png, found)
-    assert not is_drawn_from(png, found.assign(factor=found.factor * 1.01))
 
 
 REPOSITORY = Path(__file__).parent.parent

@@ -112,9 +112,6 @@ def planned_runs(results, *config):
     ("override", "words"),
     [
         ("scael=0.1", ["scael", "unknown key", "scale"]),
-        ("scale=2", ["scale", "less than or equal to 1"]),
-        ("results=README.md", ["results: README.md", "not a directory"]),
-        ("experiments=nowhere.csv", ["nowhere.csv", "cannot be read"]),
         ("experiments={wrong_labels}", ["labels 'orb'", "rgbd-toro"]),
     ],
 )
