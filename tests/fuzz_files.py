@@ -30,10 +30,10 @@ from baselines.training.score import score_run
 from synfeal.camera.calibration import read_calibration
 from synfeal.config import Config, load_config, read_experiments
 from synfeal.config.models import CameraConfig, LocalizerConfig, NetworkConfig, RenderConfig
-from synfeal.dataset.packed import join_packed, pack_frames, read_packed
+from synfeal.dataset.packed import pack_frames, read_packed
 from synfeal.dataset.packed import write_packed as write_joined
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
-from synfeal.dataset.sevenscenes import pose_text, read_depth_m, read_pose, read_split
+from synfeal.dataset.sevenscenes import pose_text, read_pose, read_split
 from synfeal.files import write_json
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.save import save_glb
@@ -69,7 +69,6 @@ class Kind:
     n_flips: int = 12  # bytes changed at random, in the head of the file and again anywhere
 
     def make(self, folder):
-        """A sound file in a folder."""
         path = folder / self.file
         path.parent.mkdir(parents=True, exist_ok=True)
         self.write(path)
@@ -109,15 +108,12 @@ def is_pose_table(table):
 
 
 write_color, write_depth = image((18, 24, 3), 256), image((18, 24), 4000, np.uint16)
+write_table = partial(write_pose_table, table=POSES)
 repeated = partial(read_poses, split="train")
 write_data_set = partial(write_planar_set, camera=CAMERA, counts=(2, 2))
 write_packed = partial(np.save, arr=noise((N, 8, 8, 3), 256))
 LINEAR = torch.nn.Linear(3, 2)
 is_finite = partial(json.dumps, allow_nan=False)  # raises where a number is not
-
-
-def write_table(path):
-    write_pose_table(path, POSES)
 
 
 def write_graph(path):
@@ -160,9 +156,9 @@ WRITE_POSE = text(pose_text(POSES.world_from_cam[0]))
 COLMAP = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS\n1 OPENCV 640 480 500 500 320 240 0.1 0 0 0\n"
 
 
-def is_camera(calibration):
-    values = (calibration.fx, calibration.fy, *calibration.distortion)
-    return calibration.fx > 0 and calibration.fy > 0 and all(map(math.isfinite, values))
+def is_camera(found):
+    values = (found.fx, found.fy, *found.distortion)
+    return found.fx > 0 < found.fy and all(map(math.isfinite, values))
 
 
 def is_statistics(found):
@@ -189,7 +185,7 @@ def read_design(path):
 
 
 def is_design(rows):
-    """Whether every run and label set has a directory of its own below the results."""
+    """Whether every run and label set has a directory of its own."""
     for parts in (Path(run.directory).parts for run in design_of(rows).runs):
         assert len(parts) == 6
         assert all(part.strip(".") and "\0" not in part for part in parts)
@@ -202,14 +198,12 @@ COLOR, DEPTH, POSE = (f"frame-000000.{end}" for end in ("color.png", "depth.png"
 # fmt: off
 KINDS = (
     Kind("pose table", "train.csv", write_table, read_pose_table, is_pose_table, ","),
-    Kind("poses to repeat", "train.csv", write_table, repeated, is_pose_table, ","),
     Kind("TUM trajectory", "poses.txt", text(TUM), repeated, is_pose_table, " "),
     Kind("batch trajectory", "b.csv",
          lambda p: write_trajectory(p, BatchTrajectory(POSES.world_from_cam, np.ones(N, bool))),
          read_trajectory, lambda t: is_rigid(t.first_from_cam), ","),
     Kind("pose graph", "batch.g2o", write_graph, posegraph.read_g2o, is_graph, " "),
     Kind("pose", POSE, WRITE_POSE, read_pose, lambda p: bool(np.isfinite(p).all()), "\t"),
-    Kind("pose to repeat", POSE, WRITE_POSE, lambda p: repeated(p.parent), is_pose_table, "\t"),
     Kind("split", "TrainSplit.txt", text("sequence1\nsequence2\n"),
          lambda p: read_split(p.parent, "train"), form="e"),
     Kind("colour image", COLOR, write_color, read_color, lambda rgb: rgb.ndim == 3),
@@ -219,10 +213,7 @@ KINDS = (
     Kind("colour image, odometry", COLOR, write_color, lambda p: read_image(p, CAMERA, "RGB"),
          lambda rgb: rgb.shape == (18, 24, 3)),
     Kind("depth image", DEPTH, write_depth, read_depth_mm, lambda mm: mm.dtype == np.uint16),
-    Kind("depth image, metres", DEPTH, write_depth, read_depth_m, lambda m: bool((m >= 0).all())),
     Kind("packed frames", "train.npy", write_packed, read_packed, is_packed, n_flips=60),
-    Kind("packed frames, joined", "train.npy", write_packed,
-         lambda p: join_packed([p], p.with_name("all.npy"))),
     Kind("packed frames, training", "train.npy", write_packed, lambda p: read_images(p, N, 8, CPU)),
     Kind("record of packed frames", "seq-01.json", write_record, elsewhere(recorded),
          is_finite, "json"),

@@ -57,10 +57,7 @@ def damages(data, others, seed, n_flips=40):
     changed = {
         **{f"cut at {n} of {len(data)}": data[:n] for n in sorted(cuts) if 0 <= n < len(data)},
         **{f"swapped with {name}": content for name, content in others.items() if content != data},
-        "twice": data + data,
         "zeros": bytes(len(data)),
-        "zeros inside": data[:middle] + bytes(64) + data[middle + 64 :],
-        "latin-1": b"caf\xe9\n" + data,
         "latin-1 inside": data[:middle] + b"\xe9\xff" + data[middle:],
         "byte order mark": b"\xef\xbb\xbf" + data,
         "UTF-16": b"\xff\xfe" + data.decode("latin-1").encode("utf-16-le"),
@@ -80,14 +77,9 @@ def text_damages(data, separator):
     middle = len(lines) // 2
     changed = {
         "CRLF": [line + "\r" for line in lines],
-        "blank lines": [line + "\n" for line in lines],
-        "one line": [" ".join(lines)],
-        "backwards": lines[::-1],
         "without its first line": lines[1:],
         "without a line": lines[:middle] + lines[middle + 1 :],
-        "without its last line": lines[:-1],
         "first line only": lines[:1],
-        "a line twice": [*lines[: middle + 1], *lines[middle:]],
         "a line of noise": [*lines, "\x1b[31m" + "x" * 100_000],
         "quotes": [*lines, '"open quote'],
         "NUL": [*lines, "\0"],

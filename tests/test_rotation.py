@@ -41,11 +41,12 @@ def frame_camera(camera):
     return FrameCamera(**size, **camera.intrinsics._asdict())
 
 
-def rotation(seed=0, tilt_deg=8.0, roll_deg=15.0):
+def rotation(seed=0, side_px=PX):
     """For packed frames of ``CAMERA``."""
     intrinsics = packed_intrinsics(frame_camera(CAMERA), NETWORK)
-    augmentation = AugmentationConfig(tilt_deg=tilt_deg, roll_deg=roll_deg)
-    return RandomRotation(intrinsics, PX, augmentation, seed)
+    return RandomRotation(
+        intrinsics, side_px, AugmentationConfig(tilt_deg=8.0, roll_deg=15.0), seed
+    )
 
 
 def packed_views(poses):
@@ -103,12 +104,7 @@ def test_rotations_of_vectors_are_scipys(angle_rad):
 def test_draws_fill_the_box_and_repeat_with_the_seed():
     identity = torch.tensor([[1.0, 0.0, 0.0, 0.0]]).expand(4000, 4)
     images = torch.zeros(4000, 3, 1, 1).expand(4000, 3, 1, 1)
-    small = RandomRotation(
-        packed_intrinsics(frame_camera(CAMERA), NETWORK),
-        1,
-        AugmentationConfig(tilt_deg=8.0, roll_deg=15.0),
-        0,
-    )
+    small = rotation(side_px=1)
     start = small.state_dict()
     _, labels = small(images, identity)
     degrees = np.degrees(Rotation.from_quat(labels, scalar_first=True).as_rotvec())

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import trimesh
 
 from synfeal.errors import InputError
 from synfeal.mesh.rays import RayCaster
@@ -102,20 +103,14 @@ def test_vertices_faces_and_fineness_of_textures_are_the_papers(name):
         assert part.texture.std() > 20
         assert (part.texture == 255).all(axis=-1).mean() < 0.12  # not burnt out
         size = part.texture.shape[1::-1]
-        area_m2 = triangle_areas(part.vertices_m[part.faces])
-        texels = triangle_areas(np.pad(part.uv * size, ((0, 0), (0, 1)))[part.faces])
+        area_m2 = trimesh.triangles.area(part.vertices_m[part.faces])
+        texels = trimesh.triangles.area(np.pad(part.uv * size, ((0, 0), (0, 1)))[part.faces])
         densities.append(np.sqrt(texels / np.maximum(area_m2, 1e-12)))
         areas.append(area_m2)
     density, area = np.concatenate(densities), np.concatenate(areas)
     order = np.argsort(density)
     median = density[order][np.searchsorted(np.cumsum(area[order]), area.sum() / 2)]
     assert median > 250  # a pixel at 640 px and 0.5 m covers 0.9 mm
-
-
-def triangle_areas(corners):
-    """Areas (F,) of triangles (F, 3, 3)."""
-    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.linalg.norm(sides, axis=1) / 2
 
 
 @every_scene

@@ -159,19 +159,15 @@ def verdicts(folder, capsys):
     ("options", "offset_m"),
     [
         (["--mode", "random"], 0.0),
-        (["--spacing", "1"], 0.0),
-        (["--mode", "random", "--fov", "100"], 0.0),
         (["--spacing", "0.1"], FAR_M),
     ],
-    ids=["random", "1 m apart", "wide", "far from the origin"],
+    ids=["random", "far from the origin"],
 )
 def test_a_faultless_set_passes(options, offset_m, tmp_path, capsys):
     size = ["--test-frames", "4", "--width", "96", "--height", "72"]
     found = verdicts(collected(tmp_path, offset_m, *size, *options), capsys)
     assert not [line for line in found.values() if " FAILED " in line]
     assert " ok " in found["depth"]
-    assert " ok " in found["tables"]
-    assert " ok " in found["camera"]
 
 
 @pytest.fixture(scope="module")
