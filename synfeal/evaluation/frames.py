@@ -80,16 +80,10 @@ def _paths(dataset: Path, split: str, frames: Sequence[Frame]) -> NDArray[np.int
     return np.unique(stems, return_inverse=True)[1].astype(np.int64)
 
 
-@dataclass(frozen=True)
-class Matched:
-    """Which estimate belongs to which frame."""
-
-    row: NDArray[np.int64]  # (N,) of each frame, the estimate's row, -1 where there is none
-    foreign: int  # estimates of frames that are not scored
-
-
-def match(frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float) -> Matched:
-    """Find the estimate of each frame by name, by index or by time.
+def match(
+    frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float
+) -> NDArray[np.int64]:
+    """Row (N,) of the estimate of each frame, by name, by index or by time; -1 where there is none.
 
     Raises:
         InputError: a name says no frame, or not of which sequence; a frame has two estimates; none
@@ -98,24 +92,22 @@ def match(frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float
     keys = _keys(frames, estimates, path, rate_hz)
     index = {(f.sequence.stem, f.number): i for i, f in enumerate(frames.frames)}
     row = np.full(len(index), -1, dtype=np.int64)
-    foreign = 0
     for estimate, key in enumerate(keys):
         frame = index.get(key)
         if frame is None:
-            foreign += 1
-        elif row[frame] >= 0:
+            continue
+        if row[frame] >= 0:
             first, second = estimates.places[row[frame]], estimates.places[estimate]
             raise InputError(
                 f"{path}: {frames.names[frame]} has two poses, {first} and {second}; leave one"
             )
-        else:
-            row[frame] = estimate
+        row[frame] = estimate
     if (row < 0).all():
         raise InputError(
             f"{path}: none of its {len(keys)} poses is of a frame of the {frames.split} split"
             f" ({frames.names[0]}, ...); is it of this data set, and of this --split?"
         )
-    return Matched(row, foreign)
+    return row
 
 
 def _keys(frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float) -> list[Key]:

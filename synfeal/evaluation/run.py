@@ -17,7 +17,7 @@ from synfeal.dataset.pose_table import PoseTable
 from synfeal.errors import InputError, why
 from synfeal.evaluation.estimates import CONVENTIONS, Convention, Estimates, checked_convention
 from synfeal.evaluation.formats import read_estimates
-from synfeal.evaluation.frames import Matched, ScoredFrames, match, read_scored_frames
+from synfeal.evaluation.frames import ScoredFrames, match, read_scored_frames
 from synfeal.evaluation.metrics import MEANS, ORIENTATION, POSITION, Metrics, pose_errors, summary
 from synfeal.evaluation.reprojection import dcre, dcre_summary, depth_of_images
 from synfeal.geometry.poses import quat_wxyz_of, umeyama_sim3
@@ -49,7 +49,7 @@ class Evaluation:
     frames: ScoredFrames  # what was scored
     estimates: Estimates  # what was read
     convention: Convention  # as which its poses were taken
-    matched: Matched  # which estimate is of which frame
+    row: NDArray[np.int64]  # (N,) which estimate is of each frame, -1 where none is
     rotations: NDArray[np.bool_]  # (N,) frames whose estimate is a rotation
     # (N,) of all frames by name, infinite where there is no pose: ``position_m``,
     # ``orientation_deg``, ``dcre``, and the same ending in ``_labels``
@@ -66,7 +66,7 @@ class Evaluation:
 def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
     """Score poses."""
     frames = read_scored_frames(dataset, settings.split)
-    estimates, matched, convention, predicted = _read(poses, frames, settings, settings.convention)
+    estimates, row, convention, predicted = _read(poses, frames, settings, settings.convention)
     yardsticks = {DATASET: frames.world_from_cam}
     if settings.labels:
         yardsticks[LABELS] = _labels(settings.labels, frames, settings)
@@ -84,25 +84,25 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
     if not rotations.any():
         raise InputError(f"{poses}: none of its poses is a rotation and a position")
     metrics = _metrics(errors, yardsticks, frames)
-    return Evaluation(frames, estimates, convention, matched, rotations, errors, metrics, scales)
+    return Evaluation(frames, estimates, convention, row, rotations, errors, metrics, scales)
 
 
 def _read(
     path: Path, frames: ScoredFrames, settings: Settings, convention: str | None
-) -> tuple[Estimates, Matched, Convention, Array]:
+) -> tuple[Estimates, NDArray[np.int64], Convention, Array]:
     """Estimates, which frame each is of, as what they are taken, and poses (N, 4, 4) of the frames.
 
     These are not a number where there is none.
     """
     estimates = read_estimates(path)
-    matched = match(frames, estimates, path, settings.rate_hz)
-    there = matched.row >= 0
+    row = match(frames, estimates, path, settings.rate_hz)
+    there = row >= 0
     if not convention and settings.align == "none":
-        checked_convention(path, estimates, matched.row[there], frames.world_from_cam[there])
+        checked_convention(path, estimates, row[there], frames.world_from_cam[there])
     taken = CONVENTIONS[convention] if convention else estimates.convention
-    poses = estimates.world_from_cam(taken)[matched.row]
+    poses = estimates.world_from_cam(taken)[row]
     poses[~there] = np.nan
-    return estimates, matched, taken, poses
+    return estimates, row, taken, poses
 
 
 def _labels(path: Path, frames: ScoredFrames, settings: Settings) -> Array:

@@ -76,7 +76,7 @@ def report_text(poses: Path, settings: Settings, found: Evaluation) -> str:
 
 
 def _findings(poses: Path, settings: Settings, found: Evaluation) -> list[str]:
-    n_frames, there = len(found.frames.frames), found.matched.row >= 0
+    n_frames, there = len(found.frames.frames), found.row >= 0
     lines = [
         f"{poses}: {found.estimates.kind}, {len(found.estimates.names)} poses, taken as"
         f" {found.convention.direction} with quaternions {found.convention.order}",
@@ -85,8 +85,8 @@ def _findings(poses: Path, settings: Settings, found: Evaluation) -> list[str]:
     names = np.array(found.frames.names)
     lines += _some("without a pose, which counts as a failure", names[~there])
     lines += _some("no rotation, which counts likewise", names[there & ~found.rotations])
-    if found.matched.foreign:
-        lines.append(f"{found.matched.foreign} poses of other frames are left out")
+    if foreign := len(found.estimates.names) - int(there.sum()):
+        lines.append(f"{foreign} poses of other frames are left out")
     if settings.align != "none":
         scale = f", scale {found.scales['']:.6g}" if settings.align == "sim3" else ""
         lines.append(f"aligned as a whole first ({settings.align}){scale}")
