@@ -139,7 +139,8 @@ CHANGES = [
     ([curves(1.0), assisted(g2o=15, kinect=1), collected_at(4.0, 4.5)],
      {"C13": ([NO_EFFECT], " | +0 % images"), "C4": ([OPPOSITE],), "C15": ([OPPOSITE],),
       "C14": ([MIXED], "4.0 to 4.5")}),
-    ([curves(0.8)], {"C13": ([OPPOSITE], " | -20 % images")}),
+    ([curves(0.8), put({"scene": "sanctuary", "size": "6k"}, MODELS, 0.4, 20.0)],
+     {"C13": ([OPPOSITE], " | -20 % images"), "C9": ([OPPOSITE],)}),
     ([curves(1.6, falls=-0.1)], {"C13": ([UNDECIDED],)}),
 ]
 # fmt: on

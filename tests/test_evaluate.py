@@ -147,6 +147,8 @@ BAD_LINES = {
     "ACE, a column short": (ACE, cut(5, 10), "line 6 has 10 columns, those above 11"),
     "word for a number": (HLOC, each(lambda x: x[:-3] + "abc"), "is not a number"),
     "decimal commas": (ACE, each(lambda x: re.sub(r"(?<=\d)\.(?=\d)", ",", x)), "is not a number"),
+    "empty": (HLOC, lambda _: [], "holds no poses"),
+    "no rotation": (HLOC, each(lambda x: f"{x.split()[0]} 0 0 0 0 1 2 3"), "is a rotation and"),
     "no frame in a name": (HLOC, with_line(2, "cat.jpg 1 0 0 0 1 2 3"), "names no frame"),
     "no sequence": (HLOC, each(lambda x: x.partition("/")[2]), "does not say of which sequence"),
     "twice": (HLOC, lambda x: [*x, x[4]], "seq-02/frame-000004 has two poses, line 5 and line 25"),
