@@ -158,7 +158,6 @@ def test_every_problem_is_named(greenhouse):
     assert len(greenhouse.findings) == 8
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 def test_saved_and_read_again_it_looks_the_same(greenhouse, tmp_path):
     save_glb(tmp_path / "mesh.glb", greenhouse)
     again = load_mesh(tmp_path / "mesh.glb")

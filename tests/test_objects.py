@@ -45,7 +45,6 @@ def test_a_triangle_meets_a_box_where_a_point_is_in_both():
     assert 50 < found.sum() < 200
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 def test_objects_touch_neither_each_other_nor_the_room_nor_a_path(tmp_path):
     mesh, layout = save_room(tmp_path / "room.glb"), tmp_path / "clutter.yaml"
     layout.write_text(yaml.safe_dump({"count": 12, "size_m": [0.3, 0.9]}))
@@ -60,7 +59,6 @@ def test_objects_touch_neither_each_other_nor_the_room_nor_a_path(tmp_path):
     assert not any(within(along(poses), *box).any() for box in boxes)
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
 def test_every_path_has_objects_of_its_own_out_of_the_cameras_way(tmp_path):
     mesh, settings = save_room(tmp_path / "room.glb"), tmp_path / "effects.yaml"
     post = save_post(tmp_path / "post.glb", (0.3, 0.3, 2.5))  # as high as cameras are

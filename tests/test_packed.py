@@ -24,8 +24,6 @@ from synfeal.mesh.save import save_glb
 from synfeal.render.choose import BACKENDS
 from tests.test_dataset import CAMERA, ROOM, poses_of
 
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-
 
 @pytest.mark.parametrize("size", [(128, 96), (96, 128), (80, 60), (101, 77)])
 def test_frames_are_resized_and_cropped_about_the_centre(size):

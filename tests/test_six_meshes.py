@@ -25,8 +25,6 @@ from synfeal.planning.space import pose_bounds, sample_poses
 from tests.mesh_conversions import write_coloured_ply, write_obj_scene
 from tests.small_room import SIDES, TWO, paint
 
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-
 Corners = tuple[float, float, float]
 TILE_M = 2.5
 

@@ -128,8 +128,6 @@ def test_without_a_manifest_a_calibration_stands_in_or_geometry_is_not_judged(
     assert any(line.startswith("camera: ") for line in errors(capsys))
 
 
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:OpenGL.*")
-
 PAINT_TEXELS = (2.0, 8.0, 24.0)
 BOX_M = np.array([0.4, 4.6, 0.4, 3.6, 0.8, 2.0])
 FAR_M = np.array([432_100.0, -87_654.0, 321.0])  # as map coordinates
