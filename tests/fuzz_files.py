@@ -14,13 +14,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from baselines.groundtruth.batches import (
-    BatchTrajectory,
-    link_images,
-    read_image,
-    read_trajectory,
-    write_trajectory,
-)
+from baselines.groundtruth import batches
 from baselines.groundtruth.methods import check_sources
 from baselines.groundtruth.posegraph import graph as posegraph
 from baselines.localizers.backbones.weights import load_backbone_weights
@@ -200,8 +194,8 @@ KINDS = (
     Kind("pose table", "train.csv", write_table, read_pose_table, is_pose_table, ","),
     Kind("TUM trajectory", "poses.txt", text(TUM), repeated, is_pose_table, " "),
     Kind("batch trajectory", "b.csv",
-         lambda p: write_trajectory(p, BatchTrajectory(POSES.world_from_cam, np.ones(N, bool))),
-         read_trajectory, lambda t: is_rigid(t.first_from_cam), ","),
+         lambda p: batches.write_trajectory(p, batches.BatchTrajectory(POSES.world_from_cam, np.ones(N, bool))),
+         batches.read_trajectory, lambda t: is_rigid(t.first_from_cam), ","),
     Kind("pose graph", "batch.g2o", write_graph, posegraph.read_g2o, is_graph, " "),
     Kind("pose", POSE, WRITE_POSE, read_pose, lambda p: bool(np.isfinite(p).all()), "\t"),
     Kind("split", "TrainSplit.txt", text("sequence1\nsequence2\n"),
@@ -209,8 +203,8 @@ KINDS = (
     Kind("colour image", COLOR, write_color, read_color, lambda rgb: rgb.ndim == 3),
     Kind("colour image, packed", COLOR, write_color, elsewhere(packed), is_packed),
     Kind("colour image, SfM", COLOR, write_color,
-         elsewhere(lambda p, out: link_images([p], CAMERA, out / "images"))),
-    Kind("colour image, odometry", COLOR, write_color, lambda p: read_image(p, CAMERA, "RGB"),
+         elsewhere(lambda p, out: batches.link_images([p], CAMERA, out / "images"))),
+    Kind("colour image, odometry", COLOR, write_color, lambda p: batches.read_image(p, CAMERA, "RGB"),
          lambda rgb: rgb.shape == (18, 24, 3)),
     Kind("depth image", DEPTH, write_depth, read_depth_mm, lambda mm: mm.dtype == np.uint16),
     Kind("packed frames", "train.npy", write_packed, read_packed, is_packed, n_flips=60),
