@@ -106,6 +106,7 @@ write_table = partial(write_pose_table, table=POSES)
 repeated = partial(read_poses, split="train")
 write_data_set = partial(write_planar_set, camera=CAMERA, counts=(2, 2))
 write_packed = partial(np.save, arr=noise((N, 8, 8, 3), 256))
+FOUND = batches.BatchTrajectory(POSES.world_from_cam, np.ones(N, bool))
 LINEAR = torch.nn.Linear(3, 2)
 is_finite = partial(json.dumps, allow_nan=False)  # raises where a number is not
 
@@ -194,8 +195,8 @@ KINDS = (
     Kind("pose table", "train.csv", write_table, read_pose_table, is_pose_table, ","),
     Kind("TUM trajectory", "poses.txt", text(TUM), repeated, is_pose_table, " "),
     Kind("batch trajectory", "b.csv",
-         lambda p: batches.write_trajectory(p, batches.BatchTrajectory(POSES.world_from_cam, np.ones(N, bool))),
-         batches.read_trajectory, lambda t: is_rigid(t.first_from_cam), ","),
+         lambda p: batches.write_trajectory(p, FOUND), batches.read_trajectory,
+         lambda t: is_rigid(t.first_from_cam), ","),
     Kind("pose graph", "batch.g2o", write_graph, posegraph.read_g2o, is_graph, " "),
     Kind("pose", POSE, WRITE_POSE, read_pose, lambda p: bool(np.isfinite(p).all()), "\t"),
     Kind("split", "TrainSplit.txt", text("sequence1\nsequence2\n"),
@@ -204,8 +205,8 @@ KINDS = (
     Kind("colour image, packed", COLOR, write_color, elsewhere(packed), is_packed),
     Kind("colour image, SfM", COLOR, write_color,
          elsewhere(lambda p, out: batches.link_images([p], CAMERA, out / "images"))),
-    Kind("colour image, odometry", COLOR, write_color, lambda p: batches.read_image(p, CAMERA, "RGB"),
-         lambda rgb: rgb.shape == (18, 24, 3)),
+    Kind("colour image, odometry", COLOR, write_color,
+         lambda p: batches.read_image(p, CAMERA, "RGB"), lambda rgb: rgb.shape == (18, 24, 3)),
     Kind("depth image", DEPTH, write_depth, read_depth_mm, lambda mm: mm.dtype == np.uint16),
     Kind("packed frames", "train.npy", write_packed, read_packed, is_packed, n_flips=60),
     Kind("packed frames, training", "train.npy", write_packed, lambda p: read_images(p, N, 8, CPU)),
