@@ -39,7 +39,7 @@ def problem_with(arguments, names, capfd):
     errors = [line for line in lines if "error: " in line]
     if jargon := JARGON.search("\n".join(lines)):
         return f"says {jargon.group()!r}: {lines[:3]}"
-    if status == 2 and "usage: " in lines[0] and len(errors) == 1:
+    if status == 2 and len(lines) == 1 and lines[0].endswith("--help"):
         return None  # no number where one is needed
     if arguments[0] == "validate" and status == 1 and len(errors) == len(lines):
         return None  # a line for each check that fails

@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from baselines.groundtruth.methods import METHODS
+from baselines.groundtruth.methods import METHODS, SIMULATOR
 from synfeal.config.experiments import FROM_SCRATCH, split_init
 
 TITLES = {
@@ -94,7 +94,7 @@ def row_label(name: str, cell: Any) -> str:
         return f"{_level(cell.noise_m)} m, {cell.noise_deg:g}°"
     if name == "table6_label_errors":
         size = f"{_level(cell.noise_m)} m, {cell.noise_deg:g}°"
-        return f"{ERRORS[cell.labels]}, {size}" if cell.labels in ERRORS else "none"
+        return "none" if cell.labels == SIMULATOR else f"{ERRORS[cell.labels]}, {size}"
     if name == "table7_images_shown":
         start, part = split_init(cell.init)
         return STARTS[start] + PARTS[part]
