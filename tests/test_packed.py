@@ -12,12 +12,7 @@ from PIL import Image
 from baselines.training import data
 from baselines.training.data import image_statistics, read_images
 from synfeal.config.models import RenderConfig
-from synfeal.dataset.packed import (
-    fit_frame,
-    new_packed,
-    pack_frames,
-    write_packed,
-)
+from synfeal.dataset.packed import fit_frame, new_packed, pack_frames, write_packed
 from synfeal.dataset.pose_table import write_pose_table
 from synfeal.dataset.render_sequence import render_packed, render_sequence
 from synfeal.mesh.save import save_glb

@@ -14,13 +14,7 @@ import pytest
 
 from synfeal.errors import InputError
 from synfeal.report import pages
-from synfeal.report.findings import (
-    HERE,
-    PAPER,
-    effects,
-    mean_factor,
-    sentences,
-)
+from synfeal.report.findings import HERE, PAPER, effects, mean_factor, sentences
 from synfeal.report.pages import PAGES, PARTS, headline, main, part_of, rewritten
 from synfeal.report.publish import FINISHED, PUBLISHED, publish
 from synfeal.report.publish import main as publish_main

@@ -22,15 +22,7 @@ import pandas as pd
 from synfeal.config import MODELS
 from synfeal.errors import InputError, exit_status
 from synfeal.files import write_text
-from synfeal.frames import (
-    COUNT,
-    NUMBER,
-    TEXT,
-    read_frame,
-    read_records,
-    records_of,
-    rows_of,
-)
+from synfeal.frames import COUNT, NUMBER, TEXT, read_frame, read_records, records_of, rows_of
 from synfeal.report.assistance import SCHEMA as ASSISTANCE
 from synfeal.report.assistance import TOTAL
 from synfeal.report.claims.table import claims_markdown

@@ -20,15 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from synfeal.bootstrap import (
-    Array,
-    Counts,
-    limits,
-    medians,
-    over_seeds,
-    path_counts,
-    seed_weights,
-)
+from synfeal.bootstrap import Array, Counts, limits, medians, over_seeds, path_counts, seed_weights
 from synfeal.config import Design, Run
 from synfeal.config.experiments import common_every
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
