@@ -66,11 +66,11 @@ test-isolated: $(SLURM_INSTALLED)  ## the smoke profile here, and with every job
 	  --default-storage-prefix $(abspath results/store) --configfile config/smoke.yaml -- all
 	$(BIN)/python -m tests.slurm_run.trees results/smoke results/store/results/smoke
 
-coverage: $(QUALITY)  ## which lines the test suite runs
+coverage: $(QUALITY)  ## which lines the test suite runs (results/benchmarks/coverage.md)
 	$(BIN)/coverage erase
 	$(BIN)/coverage run -m pytest
 	$(BIN)/coverage combine --quiet
-	$(BIN)/coverage report --skip-covered
+	$(BIN)/coverage report --skip-covered --format markdown > results/benchmarks/coverage.md
 
 mutate: $(QUALITY)  ## which deliberate defects the tests notice
 	$(BIN)/mutmut run --max-children $(CORES)
