@@ -35,10 +35,9 @@ from synfeal.effects.scene import carton_files
 from synfeal.effects.light import GROUPS as LIGHT_GROUPS
 from synfeal.errors import InputError
 from synfeal.labels import seed_names
-from synfeal.provenance import config_hash
+from synfeal.provenance import config_hash, seed_of
 from synfeal.report.predictions.restore import restored_files
 from synfeal.run_lock import begin_run
-from synfeal.provenance import seed_of
 
 try:
     for path in workflow.configfiles:
