@@ -67,7 +67,6 @@ METRICS = [f"{ROOT}/runs/{run}/metrics.json" for run in RUNS]
 TRUE_SETS = [f"{scene}/{size}/synfeal" for scene, size in SIZES]
 ESTIMATED_SETS = ["/".join(names) for names in DESIGN.estimated]
 POSE_SETS = sorted({*TRUE_SETS, *ESTIMATED_SETS})
-MAPPED_SETS = [f"{s}/{z}" for s, z in SIZES if has_structure(EXPERIMENTS, s, z)]
 TABLE_NAMES = ["table1_meshes", *DESIGN.tables]
 DRAWN_TABLES = ("table3_inconsistencies", "table4_size", "table7_images_shown")
 DRAWN = [table for table in TABLE_NAMES if table in DRAWN_TABLES]
