@@ -9,11 +9,15 @@ INSTALLED := $(VENV)/installed
 SLURM_INSTALLED := $(VENV)/installed-slurm
 QUALITY := $(VENV)/quality
 RUN := $(BIN)/synfeal run --cores $(CORES)
+# `make real`: what is scanned, where its results go, and other labels of it (docs/real.md).
+SEVEN_SCENES ?=
+REAL_RESULTS ?= results/real
+SFM_LABELS ?=
 # A file of tests to a worker: their fixtures are made once, and a worker has one thread.
 PYTEST := OMP_NUM_THREADS=1 $(BIN)/pytest --numprocesses $(CORES) --dist loadfile
 export PYTHONHASHSEED := 0
 
-.PHONY: help reproduce smoke start publish archive plan test test-all test-slurm test-isolated coverage mutate check format lock clean
+.PHONY: help reproduce smoke real start publish archive plan test test-all test-slurm test-isolated coverage mutate check format lock clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -25,13 +29,17 @@ reproduce: $(INSTALLED)  ## install everything, then make every table (results/m
 smoke: $(INSTALLED)  ## every rule and every model at toy size (results/smoke)
 	$(RUN) --profile smoke
 
+real: $(INSTALLED)  ## from a scan to real photographs: SEVEN_SCENES=path of a 7-Scenes scene (docs/real.md)
+	PATH=$(abspath $(BIN)):$$PATH $(BIN)/snakemake --snakefile workflow/real/Snakefile --cores $(CORES) \
+	  --config sequence=$(SEVEN_SCENES) results=$(REAL_RESULTS) "sfm_labels=$(SFM_LABELS)"
+
 start: $(INSTALLED)  ## train the backbones anew that pretrained runs start from (docs/start.md)
 	$(RUN) --profile start -- start
 	$(BIN)/python -m baselines.localizers.backbones.shipped results/start
 
 publish: $(INSTALLED)  ## track what PROFILE's run made (results/published), and the pages' numbers from it
-	$(BIN)/python -m synfeal.report.publish --profile $(PROFILE)
-	$(BIN)/python -m synfeal.report.pages
+	$(BIN)/python -m reproduction.report.publish --profile $(PROFILE)
+	$(BIN)/python -m reproduction.report.pages
 
 archive: $(INSTALLED)  ## PROFILE's tables, figures, report.html and predictions in one file, for a release
 	mkdir -p build
@@ -56,15 +64,15 @@ test-all: check  ## the same with what is slow, as continuous integration runs i
 
 test-slurm: $(SLURM_INSTALLED)  ## the smoke profile here and through a SLURM cluster of one node, which is killed
 	setup/slurm_cluster.sh install
-	$(BIN)/python -m tests.slurm_run --work results/slurm_test $(if $(LOCAL),--local $(LOCAL))
-	$(BIN)/pytest tests/test_containers.py tests/test_slurm_run.py
+	$(BIN)/python -m tests.support.slurm_run --work results/slurm_test $(if $(LOCAL),--local $(LOCAL))
+	$(BIN)/pytest tests/workflow/test_containers.py tests/workflow/test_slurm_run.py
 
 test-isolated: $(SLURM_INSTALLED)  ## the smoke profile here, and with every job alone in an empty folder (docs/clusters.md)
 	command -v rsync || apt-get install --yes --no-install-recommends rsync
 	$(BIN)/snakemake --cores $(CORES) --configfile config/smoke.yaml -- all
 	PATH=$(abspath $(BIN)):$$PATH $(BIN)/snakemake --profile workflow/profiles/isolated \
 	  --default-storage-prefix $(abspath results/store) --configfile config/smoke.yaml -- all
-	$(BIN)/python -m tests.slurm_run.trees results/smoke results/store/results/smoke
+	$(BIN)/python -m tests.support.slurm_run.trees results/smoke results/store/results/smoke
 
 coverage: $(QUALITY)  ## which lines the test suite runs (results/benchmarks/coverage.md)
 	$(BIN)/coverage erase
@@ -82,11 +90,11 @@ check: $(INSTALLED)  ## static checks alone: format, lint, types, workflow
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m synfeal.config.docs --check
+	$(BIN)/python -m reproduction.design.docs --check
 	$(BIN)/snakemake --lint
 
 format: $(INSTALLED)  ## format the code in place
-	$(BIN)/python -m synfeal.config.docs
+	$(BIN)/python -m reproduction.design.docs
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile workflow
@@ -100,12 +108,12 @@ lock: $(INSTALLED)  ## write the versions installed now to the lock files
 clean:  ## remove results of the smoke profile and caches
 	rm -rf results/smoke .pytest_cache .mypy_cache .ruff_cache
 
-$(INSTALLED): $(LOCK) pyproject.toml setup/system_packages.sh
+$(INSTALLED): $(LOCK) pyproject.toml baselines/pyproject.toml reproduction/pyproject.toml setup/system_packages.sh
 	setup/system_packages.sh $(PYTHON)
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --requirement $(LOCK)
 	setup/meshoptimizer.sh $(BIN)/python
-	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable . --editable ./baselines
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable . --editable ./baselines --editable ./reproduction
 	touch $@
 
 $(QUALITY): $(INSTALLED)

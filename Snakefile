@@ -16,7 +16,11 @@ include: "workflow/rules/groundtruth.smk"
 include: "workflow/rules/training.smk"
 include: "workflow/rules/references.smk"
 include: "workflow/rules/evidence.smk"
-include: "workflow/rules/robustness.smk"
+
+
+if robustness_asked():
+
+    include: "workflow/rules/robustness.smk"
 
 
 name_logs(workflow.rules)
@@ -84,13 +88,10 @@ rule rescored:
             "tables/{table}.csv",
             table=[
                 *TABLE_NAMES,
-                *(
-                    "recall",
-                    "assistance",
-                    "label_error",
-                    "speed_vs_error",
-                    "hard_cases",
-                ),
+                "recall",
+                *LABEL_TABLES,
+                "speed_vs_error",
+                "hard_cases",
             ],
         ),
         under("{file}", file=["tables/all_tables.tex", "claims.csv", "summary.md"]),

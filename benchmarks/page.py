@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from benchmarks.sweep import Picture, Sweep
-from synfeal.files import atomic_path
-from synfeal.report.figures.speed_vs_error import pareto_front
-from synfeal.report.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, RC, SKY, VERMILION
+from reproduction.figures.speed_vs_error import pareto_front
+from reproduction.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, RC, SKY, VERMILION
+from synfeal.records.files import atomic_path
 
 COLORS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 MARKERS = "os^DvP"

@@ -22,10 +22,11 @@ from pydantic import Field, ValidationError, model_validator
 from tqdm import tqdm
 
 from benchmarks.measures import MEASURES, open_measure
-from synfeal.config.load import describe, load_config, merge, read_yaml
-from synfeal.config.models import Strict
+from reproduction.config.load import load_config
+from synfeal.config.collection import Strict
+from synfeal.config.load import describe, merge, read_yaml
 from synfeal.errors import InputError
-from synfeal.frames import write_frame
+from synfeal.records.tables import write_frame
 
 Value = str | int | float | bool | None
 Changes = dict[str, Value]

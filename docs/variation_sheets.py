@@ -7,17 +7,18 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from synfeal.config import load_config
+from reproduction.config.load import load_config
+from reproduction.rooms import large_room
+from reproduction.rooms.bake import light_shares
+from synfeal.collection.prepare import cluttered, save_cartons
 from synfeal.config.collection import ClutterConfig
-from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig
+from synfeal.config.effects import EffectsConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.dataset.render_sequence import drawn
 from synfeal.effects.scene import SceneRenderer, open_scene
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
-from synfeal.scenes import large_room
-from synfeal.scenes.bake import light_shares
-from synfeal.scenes.prepare import cluttered, save_cartons
 
 CAMERA, RENDER = CameraConfig(width=320, height=240), RenderConfig(backend="opengl")
 SHOWN = (3, 10, 30, 47)  # paths of the test set, their second frame

@@ -1,8 +1,8 @@
-"""Synfeal from Python: what the commands do, as a handful of functions.
+"""Python interface to the commands of Synfeal.
 
 Keywords ``**options`` are the options of ``synfeal collect`` with underscores (``spacing=0.1``,
-``yaw=(0, 90)``, ``box=[(x0, x1, y0, y1, z0, z1)]``), with the same bounds and defaults; what is
-wrong with one is an :class:`synfeal.errors.InputError` that names it.
+``yaw=(0, 90)``, ``box=[(x0, x1, y0, y1, z0, z1)]``), with the same bounds and defaults. An
+invalid option raises an :class:`synfeal.errors.InputError` that names it.
 """
 
 from __future__ import annotations
@@ -14,22 +14,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.collection import CollectJob, with_backend
-from synfeal.collection import collect as run_collection
-from synfeal.config.dataset import DatasetConfig
-from synfeal.config.models import CameraConfig, SceneConfig
+from synfeal.collection.run import CollectJob, with_backend
+from synfeal.collection.run import collect as run_collection
+from synfeal.config.collection import SceneConfig
+from synfeal.config.dataset import CameraConfig, DatasetConfig
+from synfeal.config.options import SCENE, dataset_config, options_named, render_configs
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.pose_table import PoseTable
-from synfeal.dataset.sevenscenes import frame_paths, read_split
+from synfeal.dataset.sequence_listing import COLOR
+from synfeal.dataset.split_frames import read_split_frames
 from synfeal.mesh import load
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.triangles import merge_vertices
 from synfeal.planning.plan import plan_mesh
 from synfeal.planning.repeat import read_poses
-from synfeal.provenance import generator_of
+from synfeal.records.provenance import generator_of
 from synfeal.render import open_renderer
 from synfeal.render.base import Depth, Rgb
-from synfeal.settings import SCENE, dataset_config, options_named, render_configs
 from synfeal.validation.camera import camera_of_dataset
 
 if TYPE_CHECKING:
@@ -39,9 +40,12 @@ AnyPath = str | Path
 
 
 def load_mesh(path: AnyPath, up_axis: str = "auto", unit_m: float = 1.0) -> TexturedMesh:
-    """A textured mesh in the world frame, z up, metres, from a .glb, .gltf, .obj or .ply file.
+    """Load a textured mesh into the world frame: z up, metres.
 
-    ``up_axis`` is what is up in the file: ``auto``, ``y`` or ``z``; ``unit_m`` metres per unit.
+    Args:
+        path: A .glb, .gltf, .obj or .ply file.
+        up_axis: Up axis of the file: ``auto``, ``y`` or ``z``.
+        unit_m: Metres per unit of the file.
     """
     scene = SceneConfig.model_validate(
         {"source": "mesh", "path": path, "up_axis": up_axis, "unit_m": unit_m}
@@ -50,7 +54,7 @@ def load_mesh(path: AnyPath, up_axis: str = "auto", unit_m: float = 1.0) -> Text
 
 
 class Renderer:
-    """Unlit images of a mesh; a context manager.
+    """Renderer of unlit images of a mesh; a context manager.
 
     Keywords: ``camera``, ``width``, ``height``, ``fov``, ``backend``, ``supersampling``,
     ``background``.
@@ -62,11 +66,16 @@ class Renderer:
         self.camera: CameraConfig = camera
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
-        """Colours (H, W, 3), uint8, seen from a pose (4, 4)."""
+        """Return colours (H, W, 3), uint8, seen from a camera pose (4, 4)."""
         return self._opened.render(world_from_cam)
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
-        """Colours, and depth (H, W): metres along the optical axis, inf for nothing."""
+        """Render colours and depth from a camera pose (4, 4).
+
+        Returns:
+            Colours (H, W, 3), uint8, and depth (H, W) in metres along the optical axis, infinite
+            where no surface is seen.
+        """
         return self._opened.render_rgbd(world_from_cam)
 
     def __enter__(self) -> Renderer:
@@ -77,7 +86,7 @@ class Renderer:
 
 
 def plan(mesh: AnyPath, frames: int, **options: Any) -> PoseTable:
-    """The poses of the training frames that :func:`collect` would make of the same options."""
+    """Return the training poses that :func:`collect` would use with the same options."""
     config = _config(mesh, frames, options)
     scene = config.scenes[SCENE]
     loaded = load_mesh(mesh, scene.up_axis, scene.unit_m)
@@ -89,14 +98,23 @@ def plan(mesh: AnyPath, frames: int, **options: Any) -> PoseTable:
 
 def collect(
     mesh: AnyPath,
-    out: AnyPath,  # directory to create
-    frames: int,  # of the training split
+    out: AnyPath,
+    frames: int,
     *,
-    workers: int = 1,  # processes that render
-    packed: int | None = None,  # side of packed frames that are written too, pixels
+    workers: int = 1,
+    packed: int | None = None,
     **options: Any,
 ) -> Dataset:
-    """Make a data set, or go on with one that was interrupted; what ``synfeal collect`` does."""
+    """Collect a data set, or resume an interrupted one, as ``synfeal collect`` does.
+
+    Args:
+        mesh: Mesh file.
+        out: Directory of the data set.
+        frames: Number of training frames.
+        workers: Number of rendering processes.
+        packed: Side in pixels of packed frames to write as well; None for none.
+        options: Options of ``synfeal collect``.
+    """
     config = _config(mesh, frames, options, Path(out))
     with options_named():
         run_collection(CollectJob(with_backend(config), packed, Path(out)), workers)
@@ -121,7 +139,7 @@ class Split:
 
     @property
     def world_from_cam(self) -> NDArray[np.float64]:
-        """Poses (N, 4, 4)."""
+        """Return camera poses (N, 4, 4)."""
         return self.poses.world_from_cam
 
 
@@ -130,28 +148,29 @@ class Dataset:
     """A data set in the format of 7-Scenes."""
 
     path: Path
-    camera: CameraConfig  # intrinsics; of 7-Scenes where nothing says
-    train: Split  # its splits
-    test: Split  # its splits
+    camera: CameraConfig  # that of 7-Scenes if the data set does not record one
+    train: Split
+    test: Split
 
 
 def open_dataset(path: AnyPath) -> Dataset:
-    """Poses, images and camera of a data set; images are read when they are asked for."""
+    """Open a data set: read its poses and camera, and list its images without reading them."""
     path = Path(path)
     splits = {split: _split(path, split) for split in ("train", "test")}
     return Dataset(path, camera_of_dataset(path, None).config, splits["train"], splits["test"])
 
 
 def _split(path: Path, split: str) -> Split:
-    sequences = read_split(path, split)
-    if not sequences:
+    listed = read_split_frames(path, split)
+    if not listed.frames:
         nothing = np.empty(0, np.int64)
         return Split(PoseTable(nothing, nothing, np.empty((0, 3)), np.empty((0, 4))), [])
-    return Split(read_poses(path, split), list(frame_paths(sequences, "color.png")))
+    poses = read_poses(path, split) if listed.poses is None else listed.poses
+    return Split(poses, listed.files(COLOR))
 
 
 def validate(path: AnyPath, camera: AnyPath | None = None, every_pair: bool = False) -> list[str]:
-    """What is wrong with a data set, a sentence each; an empty list if nothing is."""
+    """Check a data set and return one line for each failed check, with its first failure."""
     from synfeal.validation.run import error_lines
     from synfeal.validation.run import validate as run_checks
 
@@ -159,9 +178,12 @@ def validate(path: AnyPath, camera: AnyPath | None = None, every_pair: bool = Fa
 
 
 def evaluate(path: AnyPath, poses: AnyPath, **settings: Any) -> Evaluation:
-    """How good poses are, in the field's measures; what ``synfeal evaluate`` does.
+    """Score poses against a data set, as ``synfeal evaluate`` does.
 
-    ``settings`` are those of :class:`synfeal.evaluation.run.Settings`.
+    Args:
+        path: Data set.
+        poses: File of the poses to score.
+        settings: Fields of :class:`synfeal.evaluation.run.Settings`.
     """
     from synfeal.evaluation.run import Settings
     from synfeal.evaluation.run import evaluate as score

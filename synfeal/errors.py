@@ -1,4 +1,4 @@
-"""The one exception that is meant for people, and what entry points make of it."""
+"""The exception for errors that a user can fix, and its handling by entry points."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ UNFIT = "its parts do not fit together"
 
 
 class InputError(Exception):
-    """Something a person gave us cannot be used.
+    """Input from a user that cannot be used.
 
     The message is one line that names the file and the field and says what to do. Entry points
     print it without a traceback and exit with status 1; every other exception is a defect and keeps
@@ -61,25 +61,28 @@ def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
 
 @contextmanager
 def read_as(path: object, what: str, *damage: type[Exception], remedy: str = "") -> Iterator[None]:
-    """Say in one line that a file could not be read in the block.
+    """Turn read errors raised in the block into one line about the file.
 
-    ``what`` it is no good as ("a pose"), and ``damage`` what then is raised: else ``OSError`` and
-    ``ValueError``; ``remedy`` is what to do ("; make it again").
+    Args:
+        path: File named in the message.
+        what: Expected content, with its article ("a pose").
+        damage: Exceptions to turn; ``OSError`` and ``ValueError`` if none are given.
+        remedy: End of the message ("; make it again").
 
     Raises:
-        InputError: in place of any of these.
+        InputError: The block raised one of ``damage``.
     """
     kinds = damage or (OSError, ValueError)
     try:
         yield
     except kinds as error:
-        raise InputError(f"{path}: cannot be read as {what} ({why(error)}){remedy}") from None
+        raise InputError(f"{path}: cannot be read as {what} ({why(error)}){remedy}") from error
 
 
 def why(error: BaseException) -> str:
-    """Why something could not be read, for the brackets of a message.
+    """Return the reason for a read error, in words that fit in the brackets of a message.
 
-    Without the names of classes, addresses and codecs in which Python says it.
+    Names of Python classes, memory addresses and codecs are left out.
     """
     inner = getattr(error, "reason", None)  # of a download
     if isinstance(inner, OSError):

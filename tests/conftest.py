@@ -23,7 +23,7 @@ def _denormal_numbers():
 @pytest.fixture(scope="session")
 def mesh(tmp_path_factory):
     """A closed room of 6 x 5 x 3 m, as GLB."""
-    from tests.collected import save_room
+    from tests.support.collected import save_room
 
     return save_room(tmp_path_factory.mktemp("mesh") / "room.glb")
 
@@ -31,7 +31,7 @@ def mesh(tmp_path_factory):
 @pytest.fixture(scope="session")
 def calm(mesh, tmp_path_factory):
     """A collected data set nothing happened to."""
-    from tests.collected import collect
+    from tests.support.collected import collect
 
     out = tmp_path_factory.mktemp("calm") / "set"
     assert collect(mesh, out, "--depth") == 0
@@ -41,7 +41,7 @@ def calm(mesh, tmp_path_factory):
 @pytest.fixture(scope="session")
 def planar(tmp_path_factory):
     """A data set of two planes, in closed form."""
-    from tests.damaged_sets import write_planar_set
+    from tests.support.damaged_sets import write_planar_set
 
     folder = tmp_path_factory.mktemp("planar") / "set"
     write_planar_set(folder)
@@ -57,6 +57,6 @@ def damaged(planar, tmp_path):
 @pytest.fixture(scope="session")
 def results(tmp_path_factory):
     """Results of the shipped design, complete, with known scores."""
-    from tests.report_results import complete_results
+    from tests.support.report_results import complete_results
 
     return complete_results(tmp_path_factory.mktemp("results") / "mini")

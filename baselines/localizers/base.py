@@ -7,9 +7,9 @@ from contextlib import nullcontext
 import torch
 from torch import Tensor, nn
 
+from baselines.config.learning import LocalizerConfig
 from baselines.localizers.backbones import scaled_channels
 from baselines.localizers.losses import BetaLoss, LearnedWeightLoss, PoseLoss, PosePrediction
-from synfeal.config.models import LocalizerConfig
 from synfeal.errors import InputError
 
 # Width of the localisation feature of PoseNet and its successors.

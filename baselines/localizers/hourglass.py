@@ -19,11 +19,11 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
+from baselines.config.learning import LocalizerConfig, NetworkConfig
 from baselines.localizers.backbones import scaled_channels
 from baselines.localizers.backbones.resnet import ResNet34
 from baselines.localizers.base import Localizer, PoseRegressor, beta_loss
 from baselines.localizers.losses import PosePrediction
-from synfeal.config.models import LocalizerConfig, NetworkConfig
 
 
 class UpBlock(nn.Module):

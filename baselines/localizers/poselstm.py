@@ -22,11 +22,11 @@ import math
 import torch
 from torch import Tensor, nn
 
+from baselines.config.learning import LocalizerConfig, NetworkConfig
 from baselines.localizers.backbones import scaled_channels
 from baselines.localizers.backbones.weights import build_inception
 from baselines.localizers.base import Localizer, PoseRegressor, beta_loss
 from baselines.localizers.losses import PosePrediction
-from synfeal.config.models import LocalizerConfig, NetworkConfig
 
 ROWS, COLUMNS, HIDDEN = 32, 64, 128
 

@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from torch import Tensor, nn
 
+from baselines.config.learning import LocalizerConfig, NetworkConfig
 from baselines.localizers.backbones import scaled_channels
 from baselines.localizers.backbones.weights import build_inception
 from baselines.localizers.base import Localizer, PooledRegressor, PoseRegressor, beta_loss
 from baselines.localizers.losses import PosePrediction
-from synfeal.config.models import LocalizerConfig, NetworkConfig
 
 
 class AuxiliaryRegressor(nn.Sequential):

@@ -19,11 +19,11 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from baselines.config.learning import LocalizerConfig, NetworkConfig
 from baselines.localizers.backbones.resnet import ResNet34
 from baselines.localizers.backbones.weights import build_inception
 from baselines.localizers.base import Localizer, PooledRegressor, learned_loss
 from baselines.localizers.losses import PosePrediction
-from synfeal.config.models import LocalizerConfig, NetworkConfig
 
 
 class PoseNet2(Localizer):

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Literal
 
-from synfeal.config.learning import NetworkConfig
-from synfeal.config.models import LocalizerConfig
+from baselines.config.learning import LocalizerConfig, NetworkConfig
 
 if TYPE_CHECKING:
     from baselines.localizers.base import Localizer

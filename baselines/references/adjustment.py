@@ -6,7 +6,7 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
-from baselines.groundtruth.sfm.mapping import adjustment_of
+from baselines.labels.sfm.mapping import adjustment_of
 from baselines.references.correspondences import Tracks
 from baselines.references.evidence import Evidence
 from baselines.references.structure import on_points, pinhole, triangulate
@@ -34,22 +34,26 @@ def adjusted(evidence: Evidence) -> Array:
     """
     labels, tracks = evidence.train.world_from_cam, evidence.tracks
     found = adjust(tracks, labels, triangulate(tracks, labels), pinhole(evidence.camera))
-    return on_points(evidence, triangulate(tracks, placed_on(found, labels)))
+    return on_points(
+        evidence, triangulate(tracks, placed_on(found, labels, evidence.train.usable_rows))
+    )
 
 
-def placed_on(poses: Array, labels: Array) -> Array:
+def placed_on(poses: Array, labels: Array, usable: Rows | None = None) -> Array:
     """Poses (N, 4, 4) moved, turned and scaled as one so that their centres fit those of labels.
 
     Frames whose centres stay far off, three times the median, have no say: estimated labels can be
-    wrong by metres where a batch was lost.
+    wrong by metres where a batch was lost. Nor have frames besides the ``usable`` rows, if given.
     """
     centre, wanted = poses[:, :3, 3], labels[:, :3, 3]
-    position_m, rotation, kept = centre, np.eye(3), np.ones(len(poses), dtype=bool)
+    every = np.arange(len(poses))
+    known = np.isin(every, every if usable is None else usable)
+    position_m, rotation, kept = centre, np.eye(3), known
     for _ in range(FITS):
         scale, rotation, offset = umeyama_sim3(centre[kept], wanted[kept])
         position_m = scale * centre @ rotation.T + offset
         off_m = np.linalg.norm(position_m - wanted, axis=1)
-        kept = off_m <= 3 * np.median(off_m)
+        kept = known & (off_m <= 3 * np.median(off_m[known]))
     return pose_matrix(rotation @ poses[:, :3, :3], position_m)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.errors import InputError, why
-from synfeal.files import atomic_path
+from synfeal.records.files import atomic_path
 
 Vectors = NDArray[np.float32]
 Described = dict[str, tuple[Vectors, Vectors]]

@@ -53,7 +53,7 @@ def match_test_frames(
 
 
 def mutual_matches(
-    own: NDArray[np.float32], other: NDArray[np.float32]
+    own: NDArray[np.float32], other: NDArray[np.float32], ratio: float = RATIO
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Indices of unit descriptors (a, D) and (b, D) that are each other's nearest, ratio-tested."""
     if len(own) == 0 or len(other) < 2:
@@ -63,7 +63,7 @@ def mutual_matches(
     nearest, back = alike.argmax(axis=1), alike.argmax(axis=0)
     best = alike[row, nearest]
     alike[row, nearest] = -np.inf
-    good = 2 - 2 * best < RATIO**2 * (2 - 2 * alike.max(axis=1))
+    good = 2 - 2 * best < ratio**2 * (2 - 2 * alike.max(axis=1))
     good &= back[nearest] == row
     rows = np.flatnonzero(good)
     return rows, nearest[rows]
@@ -105,6 +105,17 @@ class Tracks(Stored):
     def count(self) -> int:
         """Number of points T."""
         return int(self.track.max(initial=-1)) + 1
+
+    def seen_by(self, frames: Rows) -> Tracks:
+        """The same points without the observations of other frames than these.
+
+        A point that fewer than two of them see shows no feature any more.
+        """
+        kept = np.isin(self.frame, frames)
+        views = np.bincount(self.track[kept], minlength=self.count)
+        shown = np.where(self.of_feature >= 0, views[self.of_feature], 0) >= 2
+        of_feature = np.where(shown, self.of_feature, -1)
+        return Tracks(self.frame[kept], self.slope[kept], self.track[kept], of_feature)
 
 
 def write_tracks(descriptors: Path, train: Path, out_tracks: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from baselines.references.arrays import Described, read_described
 from baselines.references.correspondences import Correspondences, Tracks
 from baselines.references.features import Views
-from synfeal.config.models import CameraConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 
 
@@ -52,8 +52,8 @@ class Evidence:
 
     @cached_property
     def tracks(self) -> Tracks:
-        """Features of the training images that show the same point."""
-        return Tracks.read(self.files["tracks"])
+        """Features of the training images with usable labels that show the same point."""
+        return Tracks.read(self.files["tracks"]).seen_by(self.train.usable_rows)
 
     @cached_property
     def views(self) -> tuple[Views, Views]:

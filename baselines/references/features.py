@@ -18,12 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from baselines.groundtruth.batches import read_image
+from baselines.config.references import ReferencesConfig
+from baselines.labels.batches import read_image
 from baselines.references.arrays import ByFrame, Stored
 from synfeal.camera.projection import normalised_of_pixels
-from synfeal.config.models import CameraConfig, ReferencesConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import FrameFile
-from synfeal.dataset.sevenscenes import frame_paths, read_depth_m
+from synfeal.dataset.sevenscenes import frames_between, read_depth_m
 from synfeal.render.base import Depth
 
 log = logging.getLogger(__name__)
@@ -51,9 +52,14 @@ class Features(ByFrame):
 
     def roots(self, frame: int) -> NDArray[np.float32]:
         """RootSIFT descriptors (k, 128) of a frame (Arandjelović and Zisserman, CVPR 2012)."""
-        descriptor = self.descriptor[self.of(frame)].astype(np.float32)
-        roots = np.sqrt(descriptor / np.maximum(descriptor.sum(axis=1, keepdims=True), 1))
-        return np.asarray(roots, dtype=np.float32)
+        return roots_of(self.descriptor[self.of(frame)])
+
+
+def roots_of(descriptor: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """RootSIFT descriptors (k, 128) of SIFT descriptors (k, 128)."""
+    values = descriptor.astype(np.float32)
+    roots = np.sqrt(values / np.maximum(values.sum(axis=1, keepdims=True), 1))
+    return np.asarray(roots, dtype=np.float32)
 
 
 def files_of_split(
@@ -64,9 +70,10 @@ def files_of_split(
     Raises:
         InputError: a sequence cannot be read or has no such file.
     """
-    color = frame_paths(sequences, "color.png")[:n_frames]
-    depth = frame_paths(sequences, "depth.png")[:n_frames] if split == "train" else None
-    return color, depth
+    color = frames_between(sequences, "color.png", 0, n_frames)
+    if split != "train":
+        return color, None
+    return color, frames_between(sequences, "depth.png", 0, n_frames)
 
 
 def write_features(

@@ -19,7 +19,8 @@ METRES_PER_RADIAN = 1.0
 def nearest_label(evidence: Evidence, descriptor: str) -> NDArray[np.float64]:
     """Labels (N, 4, 4) of the training images nearest to the test images."""
     train, test = evidence.descriptors[descriptor]
-    return evidence.train.world_from_cam[most_alike(train, test, 1)[:, 0]]
+    usable = evidence.train.usable_rows
+    return evidence.train.world_from_cam[usable[most_alike(train[usable], test, 1)[:, 0]]]
 
 
 by_thumbnail = partial(nearest_label, descriptor=THUMBNAIL)

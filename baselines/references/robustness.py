@@ -14,6 +14,7 @@ import numpy as np
 from PIL import Image
 from tqdm import tqdm
 
+from baselines.config.references import ReferencesConfig
 from baselines.references.arrays import THUMBNAIL, VLAD, most_alike, read_described
 from baselines.references.correspondences import match_test_frames
 from baselines.references.features import Features, features_of
@@ -24,13 +25,13 @@ from baselines.training.data import read_images
 from baselines.training.device import memory_errors, open_device
 from baselines.training.predict import predict
 from baselines.training.score import read_predictions
+from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.config.effects import CLEAN
-from synfeal.config.models import CameraConfig, ReferencesConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.render_sequence import drawn, effects_of
 from synfeal.effects.scene import open_scene
 from synfeal.evaluation.metrics import pose_errors, summary
-from synfeal.frames import COUNT, MAYBE, TEXT, frame_of
+from synfeal.records.tables import COUNT, MAYBE, TEXT, frame_of
 
 if TYPE_CHECKING:
     import pandas as pd

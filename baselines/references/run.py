@@ -19,15 +19,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from baselines.costs import Facts, timed
+from baselines.config.references import Group
 from baselines.references.evidence import Evidence
-from baselines.references.registry import REFERENCES, Group, in_group
+from baselines.references.registry import REFERENCES, in_group
 from baselines.training.score import score_run
-from synfeal.config.models import CameraConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import COLUMNS, PoseTable, read_pose_table, write_pose_table
 from synfeal.errors import InputError, why
-from synfeal.files import write_json
 from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.records.files import write_json
+from synfeal.records.timing import Facts, timed
 
 
 def answer_group(

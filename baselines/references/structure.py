@@ -8,13 +8,15 @@ the rays of many frames; either way the map carries the errors of the labels it 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
 from baselines.references.correspondences import Correspondences, Tracks
 from baselines.references.evidence import Evidence
-from synfeal.config.models import CameraConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import inverse, pose_matrix
 
@@ -34,11 +36,15 @@ def on_depth(evidence: Evidence) -> Array:
 
 
 def lifted(matches: Correspondences, train: PoseTable) -> Array:
-    """Where (C, 3) the depth of the training frames says matches lie in the world."""
+    """Where (C, 3) the depth of the training frames says matches lie in the world.
+
+    NaN where that frame has no depth, or a label that was only filled in.
+    """
     world_from_cam = train.world_from_cam[matches.train]
     with np.errstate(invalid="ignore"):  # no depth
         turned = np.einsum("cij,cj->ci", world_from_cam[:, :3, :3], matches.point_m)
-    return np.asarray(turned + world_from_cam[:, :3, 3])
+    unusable = np.isin(matches.train, train.usable_rows, invert=True)
+    return np.where(unusable[:, None], np.nan, turned + world_from_cam[:, :3, 3])
 
 
 def localize(matches: Correspondences, point_m: Array, seen_by: CameraConfig, seed: int) -> Array:
@@ -62,9 +68,38 @@ def absolute_pose(
     max_error_px: float = MAX_ERROR_PX,
 ) -> Array:
     """``world_from_cam`` (4, 4) from points (n, 3) and where they are seen (n, 2), or NaN."""
-    nothing = np.full((4, 4), np.nan)
+    found = supported_pose(pixel, point_m, camera, seed, max_error_px)
+    return np.full((4, 4), np.nan) if found is None else found.world_from_cam
+
+
+class SupportedPose(NamedTuple):
+    """A pose and the matches that agree with it."""
+
+    world_from_cam: Array  # (4, 4)
+    inlier: NDArray[np.bool_]  # (n,) of the matches
+
+
+def supported_pose(
+    pixel: Array,
+    point_m: Array,
+    camera: pycolmap.Camera,
+    seed: int,
+    max_error_px: float = MAX_ERROR_PX,
+) -> SupportedPose | None:
+    """Estimate a pose by P3P in LO-RANSAC, refined on its inliers.
+
+    Args:
+        pixel: Where points are seen (n, 2), from the principal point.
+        point_m: Points (n, 3) in the world.
+        camera: Camera without distortion.
+        seed: Of the samples.
+        max_error_px: Largest reprojection error of an inlier.
+
+    Returns:
+        The pose; None where fewer than ``MIN_INLIERS`` matches agree on one.
+    """
     if len(pixel) < MIN_INLIERS:
-        return nothing
+        return None
     options = pycolmap.AbsolutePoseEstimationOptions()
     options.ransac.max_error = max_error_px
     options.ransac.confidence = CONFIDENCE
@@ -72,9 +107,34 @@ def absolute_pose(
     options.ransac.random_seed = seed % 2**31
     found = pycolmap.estimate_and_refine_absolute_pose(pixel, point_m, camera, options)
     if found is None or found["num_inliers"] < MIN_INLIERS:
-        return nothing
+        return None
     cam_from_world = found["cam_from_world"].matrix()
-    return inverse(pose_matrix(cam_from_world[:, :3], cam_from_world[:, 3]))
+    pose = inverse(pose_matrix(cam_from_world[:, :3], cam_from_world[:, 3]))
+    return SupportedPose(pose, np.asarray(found["inlier_mask"], dtype=bool))
+
+
+def refined_focal_px(
+    pixel: Array, point_m: Array, world_from_cam: Array, camera: pycolmap.Camera
+) -> float:
+    """Refine a pose together with the focal length.
+
+    Args:
+        pixel: Where points are seen (n, 2), from the principal point.
+        point_m: Points (n, 3) in the world; some may be wrong matches.
+        world_from_cam: Pose (4, 4) to start from.
+        camera: Camera without distortion, whose focal length along x is where that starts.
+
+    Returns:
+        The focal length in pixels at which the points are missed least; NaN where it is not found.
+    """
+    size = {"width": camera.width, "height": camera.height}
+    free = pycolmap.Camera(model="SIMPLE_PINHOLE", params=[camera.params[0], 0.0, 0.0], **size)
+    options = pycolmap.AbsolutePoseRefinementOptions()
+    options.refine_focal_length = True
+    start = pycolmap.Rigid3d(inverse(world_from_cam)[:3])
+    everyone = np.ones(len(pixel), dtype=bool)
+    found = pycolmap.refine_absolute_pose(start, pixel, point_m, everyone, free, options)
+    return float("nan") if found is None else float(free.params[0])
 
 
 def pinhole(camera: CameraConfig) -> pycolmap.Camera:
@@ -135,7 +195,7 @@ def _meet(tracks: Tracks, centre: Array, across: Array) -> Array:
     np.add.at(left, tracks.track, across)
     np.add.at(right, tracks.track, np.einsum("mij,mj->mi", across, centre))
     flat = np.linalg.eigvalsh(left)
-    parallel = flat[:, 0] < 1e-4 * flat[:, 2]  # rays within about a degree
+    parallel = flat[:, 0] <= 1e-4 * flat[:, 2]  # rays within about a degree, or none
     left[parallel] = np.eye(3)
     point_m = np.linalg.solve(left, right[..., None])[..., 0].astype(np.float64)
     point_m[parallel] = np.nan

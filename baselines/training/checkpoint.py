@@ -10,15 +10,15 @@ from typing import Any
 import torch
 from pydantic import Field, ValidationError
 
+from baselines.config.learning import LocalizerConfig, ModelName, NetworkConfig
 from baselines.localizers.base import Localizer
 from baselines.localizers.registry import build_localizer
 from baselines.training.data import ImageStatistics
 from baselines.training.resume import serialised
 from synfeal.config.collection import Count, Finite, Positive, Strict
 from synfeal.config.load import describe
-from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig
 from synfeal.errors import InputError, why
-from synfeal.files import atomic_path, read_json
+from synfeal.records.files import atomic_path, read_json
 
 
 class FrameCamera(Strict):
@@ -49,13 +49,27 @@ class FrameCamera(Strict):
         return across if self.width < self.height else down
 
 
+Row = tuple[Finite, Finite, Finite, Finite]
+Point = tuple[Finite, Finite, Finite]
+
+
 class ModelDescription(Strict):
     """What stands in a checkpoint beside its weights."""
+
+    unless_none = ("sequence_from_world", "bounds_m")
 
     localizer: ModelName = Field(description="name of the localizer")
     network: NetworkConfig = Field(description="shape it was built with")
     hyper: LocalizerConfig = Field(description="hyper-parameters it was built with")
     camera: FrameCamera | None = Field(None, description="of the training frames, where known")
+    sequence_from_world: tuple[Row, Row, Row, Row] | None = Field(
+        None,
+        description="from the world of the training labels to that of the sequence which the place"
+        " was scanned from, where they differ",
+    )
+    bounds_m: tuple[Point, Point] | None = Field(
+        None, description="corners of the box that the training positions lie in"
+    )
 
 
 def frame_camera(frames: Path) -> FrameCamera | None:

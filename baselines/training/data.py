@@ -14,7 +14,7 @@ from torch import Tensor
 from synfeal.dataset.packed import read_packed
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.errors import InputError
-from synfeal.provenance import generator_of
+from synfeal.records.provenance import generator_of
 
 # A larger set is not read on a processor: it stays on the disk, mapped into memory.
 MOST_READ_BYTES = 2**31
@@ -31,7 +31,7 @@ class ImageStatistics:
 
     def normalise(self, images: Tensor) -> Tensor:
         """Float images (B, 3, H, W) of uint8 ones; the memory layout is kept."""
-        return (images.float() - self.mean).div_(self.deviation)
+        return images.to(torch.float32, copy=True).sub_(self.mean).div_(self.deviation)
 
 
 class Batch(NamedTuple):
@@ -110,17 +110,23 @@ def read_labelled_frames(
 ) -> LabelledFrames:
     """Every labelled frame with its pose; ``frames`` may hold more, for larger sets.
 
+    Frames whose labels were filled in, because no method registered them, are left out.
+
     Raises:
         InputError: one of the files cannot be used, or there are no labels.
     """
     table = read_pose_table(labels)
     if len(table) == 0:
         raise InputError(f"{labels}: has no rows; nothing to learn from")
+    usable = table.usable_rows
+    if len(usable) == 0:
+        raise InputError(f"{labels}: no frame is registered; nothing to learn from")
     images = read_images(frames, len(table), input_px, device)
-    position_m = torch.as_tensor(table.position_m, dtype=torch.float32, device=device)
-    quat_wxyz = torch.as_tensor(table.quat_wxyz, dtype=torch.float32, device=device)
-    rows = torch.arange(len(table), device=device)
-    return LabelledFrames(images, position_m, quat_wxyz, table.path, rows)
+    rows = torch.as_tensor(usable, device=device)
+    known = table.at(usable)
+    position_m = torch.as_tensor(known.position_m, dtype=torch.float32, device=device)
+    quat_wxyz = torch.as_tensor(known.quat_wxyz, dtype=torch.float32, device=device)
+    return LabelledFrames(images, position_m, quat_wxyz, known.path, rows)
 
 
 def image_statistics(images: Tensor) -> ImageStatistics:

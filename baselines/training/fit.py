@@ -9,13 +9,14 @@ from typing import Protocol as Interface
 import torch
 from torch import Tensor
 
+from baselines.config.learning import ModelName
 from baselines.localizers.base import Localizer
+from baselines.training.averaging import WeightAverage
 from baselines.training.data import BatchOrder, ImageStatistics, LabelledFrames
 from baselines.training.device import Precision, autocast
 from baselines.training.optimizer import Optimisation, OptimiserName, Schedule, optimisation_of
 from baselines.training.resume import RandomState, Restorable, ResumeFile, stop_signals
-from baselines.training.selection import HistoryRow, Progress, Selection
-from synfeal.config.models import ModelName
+from baselines.training.selection import HistoryRow, Progress, Selection, SelectionKind
 
 
 class Protocol(NamedTuple):
@@ -25,8 +26,9 @@ class Protocol(NamedTuple):
     # after the other, as they were collected
     order: Literal["shuffled", "collected"]
     # whose errors decide which weights are kept: those on ``validation`` paths held out of the
-    # training set, those on the ``test`` set; ``last`` keeps the last weights
-    selection: Literal["validation", "test", "last"]
+    # training set, those on the ``test`` set. ``last`` keeps the last weights. ``averaged`` keeps
+    # the mean of those of the last part of the run, and only looks at ``validation`` paths.
+    selection: SelectionKind
     # ``norm``: Euclidean distances, ``q`` and ``-q`` are one rotation. ``mse``: mean squared
     # differences of coordinates, predicted quaternions normalised first.
     distance: Literal["norm", "mse"]
@@ -45,6 +47,9 @@ PROTOCOLS: dict[Literal["corrected", "published"], Protocol] = {
     "corrected": Protocol("shuffled", "validation", "norm", "muon", "rotated"),
     "published": Protocol("collected", "test", "mse", "halving", "plain"),
 }
+# For photographs: ``corrected``, but the weights are averaged. Held-out renderings look like those
+# learned from, and do not tell which weights suit photographs.
+PHOTOGRAPHS = PROTOCOLS["corrected"]._replace(selection="averaged")
 
 # After which share of a training run the rate is halved: step over epochs in the authors' read-me.
 HALVE_EVERY: dict[ModelName, float] = {
@@ -58,6 +63,13 @@ HALVE_EVERY: dict[ModelName, float] = {
 
 LAST_WEIGHTS = PROTOCOLS["corrected"]._replace(selection="last")
 NOT_KEPT = ResumeFile(None, "")
+
+
+class Randomisation(Restorable, Interface):
+    """Changes how images look before they are normalised; its state is its generator's."""
+
+    def __call__(self, images: Tensor, /) -> Tensor:
+        """Float grey levels (B, 3, H, W) of images (B, 3, H, W) uint8."""
 
 
 class Augmentation(Restorable, Interface):
@@ -80,7 +92,9 @@ class Fitting:
     selection: Selection  # which weights are kept
     evaluations: frozenset[int]  # steps after which these are chosen among
     precision: Precision  # of the network; losses and weights are float32
+    randomise: Randomisation | None  # applied to each batch of images
     augment: Augmentation | None  # applied to each batch of normalised images
+    average: WeightAverage | None  # of the weights
 
     @property
     def parts(self) -> dict[str, Restorable]:
@@ -93,12 +107,19 @@ class Fitting:
             "selection": self.selection,
             "random": RandomState(self.frames.images.device),
         }
-        return parts if self.augment is None else parts | {"augment": self.augment}
+        further: dict[str, Restorable | None] = {
+            "randomise": self.randomise,
+            "augment": self.augment,
+            "average": self.average,
+        }
+        return parts | {name: part for name, part in further.items() if part is not None}
 
     def step(self) -> None:
         """Learn from the next batch, and look how good the weights are where that is due."""
         device = self.frames.images.device
         images, position_m, quat_wxyz = self.frames.batch(self.order.next_batch().to(device))
+        if self.randomise is not None:
+            images = self.randomise(images)
         normalised = self.statistics.normalise(images)
         if self.augment is not None:
             normalised, quat_wxyz = self.augment(normalised, quat_wxyz)
@@ -108,12 +129,15 @@ class Fitting:
         rate = self.optimisation.learning_rate
         self.optimisation.step(loss)
         self.progress.add(loss)
+        if self.average is not None:
+            self.average.after(self.progress.done)
         due = self.progress.done in self.evaluations
         self.progress.end_step(rate, self.selection.evaluate() if due else None)
 
 
 def fit(
-    # see :class:`Fitting`, as for ``frames``, ``statistics``, ``precision`` and ``augment``
+    # see :class:`Fitting`, as for ``frames``, ``statistics``, ``precision``, ``randomise`` and
+    # ``augment``
     localizer: Localizer,
     frames: LabelledFrames,  # to learn from
     statistics: ImageStatistics,  # of the images
@@ -125,6 +149,7 @@ def fit(
     held_out: LabelledFrames | None = None,
     patience: int | None = None,  # evaluations without a new best after which training stops
     precision: Precision = "float32",  # of the network
+    randomise: Randomisation | None = None,  # of how images look
     augment: Augmentation | None = None,  # of the images
     # where the state is kept; a run that finds its own there goes on with it
     resume: ResumeFile = NOT_KEPT,
@@ -145,7 +170,9 @@ def fit(
         selection,
         selection.due_after(schedule.steps, schedule.samples_seen),
         precision,
+        randomise,
         augment,
+        WeightAverage(localizer, schedule.steps) if protocol.selection == "averaged" else None,
     )
     localizer.criterion.distance = protocol.distance
     parts = run.parts
@@ -158,6 +185,9 @@ def fit(
     if run.progress.diverged:
         for parameter in localizer.parameters():
             parameter.detach().fill_(torch.nan)
+    elif run.average is not None:
+        run.average.apply()
+        run.progress.end(selection.evaluate() if held_out is not None else None)
     else:
         selection.restore()
     return run.progress.rows

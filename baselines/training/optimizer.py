@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 import torch
@@ -10,26 +10,21 @@ from torch import Tensor, nn
 from torch.optim.lr_scheduler import LambdaLR, LRScheduler, StepLR
 
 from baselines.localizers.base import OutputLayer
+from baselines.training.polar import inverse_square_root, quintics_for
+from baselines.training.untraced import Adam, AdamW, Untraced
 
-# Coefficients of the quintic iteration, chosen by its authors to lift small singular values fast;
-# it takes them to between 0.7 and 1.2 rather than to 1.
-QUINTIC = (3.4445, -4.7750, 2.0315)
-ITERATIONS = 5
-
-
-def orthogonalised(matrices: Tensor, iterations: int = ITERATIONS) -> Tensor:
-    """Roughly ``U V^T`` of each matrix ``U S V^T`` (K, M, N): a Newton-Schulz iteration."""
-    a, b, c = QUINTIC
-    upright = matrices.shape[1] > matrices.shape[2]
-    x = matrices.mT if upright else matrices
-    x = x / (x.norm(dim=(1, 2), keepdim=True) + 1e-7)  # no singular value above 1
-    for _ in range(iterations):
-        gram = x @ x.mT
-        x = torch.baddbmm(x, torch.baddbmm(gram, gram, gram, beta=b, alpha=c), x, beta=a)
-    return x.mT if upright else x
+# Singular values above this share of the largest come near 1,
+# smaller ones are lifted in proportion.
+# With three quintics and 0.01 PoseNet2 trains in 4 % less time and ends 5 % further off in position
+# (6,000 images, four seeds).
+LOWEST = 0.005
+ITERATIONS = 4
+# Gram matrices are filled up with zeros to the next multiple of this side, of half and of a quarter
+# of it where they are smaller, so that few stacks hold them all.
+SIDE = 32
 
 
-class Muon(torch.optim.Optimizer):
+class Muon(Untraced):
     """Nesterov momentum, orthogonalised, so that all directions of a kernel learn alike.
 
     @misc{jordan2024muon,
@@ -41,9 +36,10 @@ class Muon(torch.optim.Optimizer):
     }
 
     ``torch.optim.Muon`` takes matrices alone and one at a time. Here convolutions are matrices
-    (out, in * kh * kw), and kernels of one shape go through the iteration together: a narrow
-    network has many small ones. A step has the size ``lr * sqrt(max(1, out / in))``, whatever the
-    gradient's; weight decay is decoupled.
+    (out, in * kh * kw), and of all matrices whose shorter sides are about equal the Gram matrices
+    are iterated upon together (:mod:`baselines.training.polar`): a narrow network has many small
+    kernels. A step has the size ``lr * sqrt(max(1, out / in))``, whatever the gradient's; weight
+    decay is decoupled.
     """
 
     def __init__(
@@ -55,31 +51,25 @@ class Muon(torch.optim.Optimizer):
     ) -> None:
         super().__init__(params, {"lr": lr, "momentum": momentum, "weight_decay": weight_decay})
 
+        self._stacks: dict[int, tuple[Any, list[_Stack]]] = {}
+
     @torch.no_grad()
     def step(self, closure: Callable[[], float] | None = None) -> None:  # type: ignore[override]
         """One step for every parameter that has a gradient."""
-        for group in self.param_groups:
-            by_shape: dict[tuple[int, int], list[Tensor]] = {}
-            for p in group["params"]:
-                if p.grad is not None:
-                    by_shape.setdefault((p.shape[0], p[0].numel()), []).append(p)
-            for shape, parameters in by_shape.items():
-                self._step_alike(parameters, shape, group)
+        for index, group in enumerate(self.param_groups):
+            parameters = [p for p in group["params"] if p.grad is not None]
+            if not parameters:
+                continue
+            ahead = self._ahead(parameters, group["momentum"])
+            for stack in self._stacks_of(index, parameters):
+                stack.step(ahead, group["lr"], group["weight_decay"])
 
-    def _step_alike(
-        self, parameters: list[Tensor], shape: tuple[int, int], group: dict[str, Any]
-    ) -> None:
-        """One step for parameters that are matrices of one shape."""
-        momentum = group["momentum"]
+    def _ahead(self, parameters: list[Tensor], momentum: float) -> Sequence[Tensor]:
+        """Update the momenta; where Nesterov's step of each parameter goes."""
         gradients = [p.grad for p in parameters if p.grad is not None]
         buffers = [self._buffer(p) for p in parameters]
         torch._foreach_lerp_(buffers, gradients, 1 - momentum)
-        ahead = torch._foreach_lerp(gradients, buffers, momentum)
-        steps = orthogonalised(torch.stack([step.reshape(shape) for step in ahead]))
-        scale = max(1.0, shape[0] / shape[1]) ** 0.5
-        torch._foreach_mul_(parameters, 1 - group["lr"] * group["weight_decay"])
-        for p, step in zip(parameters, steps, strict=True):
-            p.add_(step.view(p.shape), alpha=-group["lr"] * scale)
+        return torch._foreach_lerp(gradients, buffers, momentum)
 
     def _buffer(self, parameter: Tensor) -> Tensor:
         state = self.state[parameter]
@@ -87,6 +77,86 @@ class Muon(torch.optim.Optimizer):
             state["momentum"] = torch.zeros_like(parameter)
         buffer: Tensor = state["momentum"]
         return buffer
+
+    def _stacks_of(self, index: int, parameters: list[Tensor]) -> list[_Stack]:
+        """A group's parameters in stacks; made anew if others have gradients, or they moved."""
+        places = [p.data_ptr() for p in parameters]
+        if index not in self._stacks or self._stacks[index][0] != places:
+            by_side: dict[int, list[int]] = {}
+            for position, p in enumerate(parameters):
+                by_side.setdefault(_side(min(len(p), p[0].numel())), []).append(position)
+            stacks = [_Stack(side, parameters, which) for side, which in by_side.items()]
+            self._stacks[index] = places, stacks
+        return self._stacks[index][1]
+
+
+class _Member(NamedTuple):
+    """A parameter of a stack."""
+
+    position: int  # among the parameters with gradients
+    matrix: Tensor  # view of the parameter (out, in * kh * kw)
+    permuted: bool  # whether the columns stand in the order of channels-last memory
+    upright: bool  # whether there are more rows than columns
+    gram: Tensor  # view of its Gram matrix, of the shorter side
+    longer: float  # by which steps are longer than the rate
+
+
+class _Stack:
+    """Parameters whose Gram matrices have one side, once they are filled up with zeros."""
+
+    def __init__(self, side: int, parameters: list[Tensor], positions: list[int]) -> None:
+        self._grams = parameters[positions[0]].new_zeros(len(positions), side, side)
+        self._members = [
+            _member(position, parameters[position], gram)
+            for position, gram in zip(positions, self._grams, strict=True)
+        ]
+
+    def step(self, ahead: Sequence[Tensor], rate: float, weight_decay: float) -> None:
+        """Step along the orthogonal factors of the parameters' entries in ``ahead``."""
+        steps = [self._as_matrix(ahead[member.position], member) for member in self._members]
+        for member, step in zip(self._members, steps, strict=True):
+            left, right = (step.mT, step) if member.upright else (step, step.mT)
+            torch.mm(left, right, out=member.gram)
+        roots = inverse_square_root(self._grams, quintics_for(LOWEST, ITERATIONS))
+        kept = 1 - rate * weight_decay
+        for member, step, root in zip(self._members, steps, roots, strict=True):
+            shorter = len(member.gram)
+            inner = root[:shorter, :shorter]
+            left, right = (step, inner) if member.upright else (inner, step)
+            member.matrix.addmm_(left, right, beta=kept, alpha=-rate * member.longer)
+
+    @staticmethod
+    def _as_matrix(step: Tensor, member: _Member) -> Tensor:
+        """The step of a parameter, laid out as the member's matrix is."""
+        if member.permuted:
+            step = step.permute(0, 2, 3, 1)
+        return step.reshape(member.matrix.shape)
+
+
+def _member(position: int, parameter: Tensor, gram: Tensor) -> _Member:
+    """View a parameter as a matrix whose columns stand in the order in which they lie in memory.
+
+    So it is not copied. Orthogonalisation does not mind: to exchange columns before it or after it
+    is the same.
+    """
+    kernel = parameter.detach()
+    permuted = kernel.ndim == 4 and kernel.is_contiguous(memory_format=torch.channels_last)
+    if permuted:
+        kernel = kernel.permute(0, 2, 3, 1)
+    matrix = kernel.view(len(kernel), -1)
+    rows, columns = matrix.shape
+    shorter = min(rows, columns)
+    inner = gram[:shorter, :shorter]
+    longer = max(1.0, rows / columns) ** 0.5
+    return _Member(position, matrix, permuted, rows > columns, inner, longer)
+
+
+def _side(shorter: int) -> int:
+    """Side to which a Gram matrix is filled up."""
+    for side in (SIDE // 4, SIDE // 2):
+        if shorter <= side:
+            return side
+    return -(-shorter // SIDE) * SIDE
 
 
 OptimiserName = Literal["muon", "adamw", "halving"]
@@ -174,7 +244,7 @@ def _muon(network: nn.Module, schedule: Schedule) -> Optimisation:
 
 def _halving(network: nn.Module, schedule: Schedule) -> Optimisation:
     """Adam, every parameter pulled to 0, and half the rate after equal shares of the run."""
-    optimizer = torch.optim.Adam(
+    optimizer = Adam(
         network.parameters(), schedule.learning_rate, weight_decay=schedule.weight_decay, fused=True
     )
     step = max(1, round(schedule.halve_every * schedule.steps))
@@ -198,7 +268,7 @@ def _adamw_pair(
         {"params": [p for p in parameters if p.ndim <= 1], "weight_decay": 0.0},
     ]
     # A shorter memory of squared gradients than the default: it must fit into a few hundred steps.
-    optimizer = torch.optim.AdamW(groups, schedule.learning_rate, betas=(0.9, 0.99), fused=True)
+    optimizer = AdamW(groups, schedule.learning_rate, betas=(0.9, 0.99), fused=True)
     return optimizer, _rise_and_fall(optimizer, schedule)
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
+from baselines.config.learning import NetworkConfig, PretrainingConfig
 from baselines.localizers.backbones.shipped import shipped_weights_path
 from baselines.localizers.backbones.weights import (
     Backbone,
@@ -32,7 +33,6 @@ from baselines.training.fit import LAST_WEIGHTS, fit
 from baselines.training.optimizer import Schedule
 from baselines.training.resume import ResumeFile, digest
 from baselines.training.rotation import random_rotation
-from synfeal.config.models import NetworkConfig, PretrainingConfig
 
 log = logging.getLogger(__name__)
 

@@ -9,14 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-from synfeal.config import Config, Run
-from synfeal.config.learning import NetworkConfig
-from synfeal.config.models import ModelName
+from baselines.config.learning import NetworkConfig
 from synfeal.errors import InputError, why
-from synfeal.files import file_sha256, read_json, write_json
-from synfeal.provenance import provenance
+from synfeal.records.files import file_sha256, read_json, write_json
+from synfeal.records.provenance import provenance
 
 # The program and its libraries.
 PROGRAM_MB = 1000.0
@@ -39,25 +37,6 @@ def training_mb(n_frames: int, network: NetworkConfig, batch_size: int) -> int:
 
 
 RECORD = "training.json"
-
-
-def training_parameters(config: Config, run: Run) -> dict[str, Any]:
-    """The part of a configuration that a training run depends on, ready for JSON.
-
-    Which poses it learns from is not in it: the hashes of the label files say that.
-    """
-    hyper = config.training.model_dump(mode="json", exclude={"samples_seen", "repetitions"})
-    parameters = {
-        "localizer": config.localizers[cast(ModelName, run.model)].model_dump(mode="json"),
-        "network": config.network.model_dump(mode="json"),
-        "training": hyper,
-        "samples_seen": round(run.share * config.training.samples_seen[run.size]),
-        "camera": config.network_camera.model_dump(mode="json"),
-        "seed": run.seed(config.seed),
-    }
-    if run.start == "pretrained":
-        parameters["pretraining"] = config.pretraining.model_dump(mode="json")
-    return parameters
 
 
 def write_training_record(

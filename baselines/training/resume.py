@@ -17,11 +17,13 @@ import torch
 from torch import Tensor
 
 from synfeal.errors import why
-from synfeal.files import atomic_path
+from synfeal.records.files import UNFINISHED, atomic_path
 
 log = logging.getLogger(__name__)
 
 RESUME_EVERY_S = 60.0
+# Raised when a step is computed otherwise: a run must not begin with one kind and end with another.
+STEP_VERSION = 2
 DIGEST_BYTES = 32
 # Handlers that stay: whoever ignores a signal wants it ignored.
 UNTOUCHED = (signal.SIG_IGN, None)
@@ -45,7 +47,7 @@ class ResumeFile:
     """
 
     def __init__(self, path: Path | None, fingerprint: str) -> None:
-        self._path, self._fingerprint = path, fingerprint
+        self._path, self._fingerprint = path, f"{fingerprint}-{STEP_VERSION}"
         self._saved = time.monotonic()
 
     def load(self, parts: Mapping[str, Restorable]) -> None:
@@ -72,7 +74,8 @@ class ResumeFile:
         """The training is finished: remove the file, and what a kill left of its making."""
         if self._path is not None:
             self._path.unlink(missing_ok=True)
-            for left in self._path.parent.glob(f".{self._path.stem}-*{self._path.suffix}"):
+            unfinished = f"{UNFINISHED}-*-{self._path.stem}-*{self._path.suffix}"
+            for left in self._path.parent.glob(unfinished):
                 left.unlink()
 
     def _read(self) -> dict[str, Any] | None:

@@ -16,9 +16,9 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
+from baselines.config.learning import AugmentationConfig, NetworkConfig
 from baselines.training.checkpoint import FrameCamera, frame_camera
 from synfeal.camera.projection import Intrinsics
-from synfeal.config.models import AugmentationConfig, NetworkConfig
 from synfeal.dataset.packed import crop_of
 from synfeal.errors import InputError
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import logging
+import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 
+from baselines.config.learning import LocalizerConfig, ModelName, NetworkConfig, TrainingConfig
 from baselines.localizers.backbones.weights import load_backbone_weights
 from baselines.localizers.base import Localizer
 from baselines.localizers.registry import build_localizer
@@ -20,14 +24,21 @@ from baselines.training.data import (
     read_labelled_frames,
 )
 from baselines.training.device import memory_errors, open_device, precision_on
-from baselines.training.fit import HALVE_EVERY, PROTOCOLS, Augmentation, Protocol, fit
+from baselines.training.fit import (
+    HALVE_EVERY,
+    NOT_KEPT,
+    PROTOCOLS,
+    Augmentation,
+    Protocol,
+    fit,
+)
 from baselines.training.optimizer import Schedule
+from baselines.training.photometric import PhotometricRandomisation
 from baselines.training.predict import predict_poses
 from baselines.training.record import write_training_record
 from baselines.training.resume import ResumeFile, digest
 from baselines.training.rotation import random_rotation
 from baselines.training.selection import HistoryRow, write_history
-from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig, TrainingConfig
 
 log = logging.getLogger(__name__)
 
@@ -91,10 +102,15 @@ def train_localizer(
     weights: Path | None = None,  # state dict the backbone starts from; without, from scratch
     test: FramesAndLabels = None,  # read only where weights are chosen by the test set
     augment: Augmentation | None = None,  # in place of the rotations that ``training`` asks for
-) -> None:
+    # (4, 4) from the world of ``labels`` to that of the sequence scanned, where they differ
+    sequence_from_world: NDArray[np.float64] | None = None,
+) -> list[HistoryRow]:
     """Train a localizer and write its checkpoint and its history (columns of ``HistoryRow``).
 
     Beside the checkpoint lies ``resume.pt`` until the run is finished.
+
+    Returns:
+        The history.
 
     Raises:
         InputError: one of the files cannot be used.
@@ -106,11 +122,56 @@ def train_localizer(
     identity = digest(*job, augment and augment.state_dict(), *material.fingerprints())
     resume = ResumeFile(out_model.with_name("resume.pt"), identity)
     rows = _fit(job, material, augment, resume)
-    known = {"localizer": job.name, "network": job.network, "hyper": job.hyper}
-    description = ModelDescription(**known, camera=frame_camera(frames))
+    description = ModelDescription(
+        localizer=job.name,
+        network=job.network,
+        hyper=job.hyper,
+        camera=frame_camera(frames),
+        sequence_from_world=_rows_of(sequence_from_world),
+        bounds_m=_bounds_m(job, material),
+    )
     save_checkpoint(out_model, material.localizer, material.statistics, description)
     write_history(out_history, rows)
     resume.remove()
+    return rows
+
+
+TIMED_STEPS = 8
+
+
+def step_seconds(job: Job, frames: Path, labels: Path, weights: Path | None) -> float:
+    """How long one step of a training run takes here; nothing is written.
+
+    Args:
+        job: The run; how many images it shows does not matter.
+        frames: Packed frames.
+        labels: Pose table.
+        weights: What the backbone starts from.
+
+    Returns:
+        Seconds, the mean of a few steps after two that are not timed.
+    """
+    material = _material(job, frames, labels, weights, test=None)._replace(held_out=None)
+    augment = random_rotation(frames, job.network, job.training.augmentation, job.seed)
+    batch = job.training.batch_size
+    _fit(job._replace(samples_seen=2 * batch), material, augment, NOT_KEPT)
+    began = time.perf_counter()
+    _fit(job._replace(samples_seen=TIMED_STEPS * batch), material, augment, NOT_KEPT)
+    return (time.perf_counter() - began) / TIMED_STEPS
+
+
+def _rows_of(matrix: NDArray[np.float64] | None) -> Any:
+    """A matrix as the description of a model holds it."""
+    return None if matrix is None else tuple(tuple(row) for row in matrix.tolist())
+
+
+def _bounds_m(job: Job, material: Material) -> Any:
+    """The corners of the box that the positions of the training set lie in."""
+    parts = [material.learned]
+    if material.held_out is not None and job.protocol.selection != "test":
+        parts.append(material.held_out)
+    position_m = torch.cat([part.position_m for part in parts])
+    return tuple(position_m.amin(0).tolist()), tuple(position_m.amax(0).tolist())
 
 
 def _material(
@@ -135,7 +196,10 @@ def _fit(
 ) -> list[HistoryRow]:
     """Train the network in place; the history."""
     localizer, statistics, learned, held_out = material
-    if held_out is None:
+    if job.protocol.selection == "averaged":
+        aside = 0 if held_out is None else len(held_out)
+        log.info("the last weights are averaged; %d frames are held out", aside)
+    elif held_out is None:
         log.info("no frames are held out: the last weights are kept")
     else:
         log.info("weights are chosen on %d frames (%s)", len(held_out), job.protocol.selection)
@@ -145,9 +209,16 @@ def _fit(
         held_out=held_out,
         patience=job.training.patience,
         precision=precision_on(learned.images.device, job.training.precision),
+        randomise=_randomisation(job),
         augment=augment,
         resume=resume,
     )
+
+
+def _randomisation(job: Job) -> PhotometricRandomisation | None:
+    """How images are made to look, where that is asked for."""
+    config = job.training.randomisation
+    return None if config is None else PhotometricRandomisation(config, job.seed)
 
 
 def _split(
@@ -158,7 +229,8 @@ def _split(
         if test is None:
             raise ValueError("this protocol chooses weights by the test set, which is not given")
         return data, read_labelled_frames(*test, data.images.shape[-1], data.images.device)
-    share = job.training.validation_share if job.protocol.selection == "validation" else 0.0
+    aside = job.protocol.selection in ("validation", "averaged")
+    share = job.training.validation_share if aside else 0.0
     mask = held_out_paths(data.path, share, job.seed)
     return (data.part(~mask), data.part(mask)) if mask.any() else (data, None)
 
@@ -170,7 +242,7 @@ def train_and_predict(
     test_frames: Path,  # packed frames of the test set
     # their poses, of which only the frames are read, but by a published protocol
     test_labels: Path,
-    run: dict[str, Any],  # see :func:`baselines.training.record.training_parameters`
+    run: dict[str, Any],  # see :func:`reproduction.design.runs.training_parameters`
     out_model: Path,  # checkpoint
     out_history: Path,  # losses
     out_record: Path,  # what the run was trained from

@@ -11,15 +11,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from baselines.labels.injected import constant_pose
 from baselines.training.record import check_same_labels
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table, whole_numbers
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import finite, pose_errors, summary
 from synfeal.evaluation.reprojection import dcre, dcre_summary, read_cell_depth
-from synfeal.files import write_json
-from synfeal.frames import read_numbers, write_frame
-from synfeal.labels import constant_pose
+from synfeal.records.files import write_json
+from synfeal.records.tables import read_numbers, write_frame
 
 Array = NDArray[np.float64]
 
@@ -36,12 +36,12 @@ def write_scores(
     wildcards: dict[str, str],
     out_errors: Path,
     out_metrics: Path,
-    out_common: Path,
+    out_common_errors: Path,
 ) -> None:
     """Score a training run: :func:`score_run` and :func:`score_common`."""
     files = predictions, labels, truth, train_labels, out_errors, out_metrics
     score_run(*files, wildcards, (depth, camera))
-    score_common(common, common_truth, out_common)
+    score_common(common, common_truth, out_common_errors)
 
 
 def score_run(

@@ -16,7 +16,7 @@ from baselines.localizers.base import Localizer
 from baselines.localizers.losses import PosePrediction, quat_chords
 from baselines.training.data import ImageStatistics, LabelledFrames
 from baselines.training.device import Precision, autocast
-from synfeal.frames import write_frame
+from synfeal.records.tables import write_frame
 
 log = logging.getLogger(__name__)
 
@@ -29,6 +29,9 @@ PREDICTIONS_PER_SAMPLE = 3
 BATCH = 100
 
 
+SelectionKind = Literal["validation", "test", "last", "averaged"]
+
+
 class HeldOutErrors(NamedTuple):
     """Loss of the main predictions, and median errors."""
 
@@ -36,7 +39,7 @@ class HeldOutErrors(NamedTuple):
     position_m: float
     orientation_deg: float
 
-    def score(self, selection: Literal["validation", "test"]) -> float:
+    def score(self, selection: SelectionKind) -> float:
         """What the kept weights have least of.
 
         ``test``: the loss, as the paper's authors do. ``validation``: the product of the two median
@@ -52,7 +55,7 @@ class Selection:
 
     def __init__(
         self,
-        kind: Literal["validation", "test", "last"],
+        kind: SelectionKind,
         localizer: Localizer,
         statistics: ImageStatistics,
         held_out: LabelledFrames | None,
@@ -72,13 +75,16 @@ class Selection:
         return frozenset(-(-steps * k // count) for k in range(1, count + 1))
 
     def evaluate(self) -> HeldOutErrors:
-        """Errors on the held-out frames now; keeps the weights if there were no better ones."""
+        """Errors on the held-out frames now; keeps the weights if there were no better ones.
+
+        With ``averaged`` no weights are kept.
+        """
         assert self._kind != "last"
         assert self._held_out is not None
         errors = held_out_errors(self._localizer, self._held_out, self._statistics, self._precision)
         score = errors.score(self._kind)
         self._since_best += 1
-        if score < self._score:  # never true of NaN
+        if self._kind != "averaged" and score < self._score:  # never true of NaN
             self._score, self._since_best = score, 0
             self._best = {k: v.detach().clone() for k, v in self._localizer.state_dict().items()}
         return errors
@@ -193,14 +199,28 @@ class Progress:
         self._said = now
         steps_per_s = (self.done - self._done_before) / max(now - self._start, 1e-9)
         log.info(
-            "%d of %d samples, loss %.4f, learning rate %.1e, %.0f samples/s, %.0f s left",
+            "%d of %d samples, loss %.4f%s, learning rate %.1e, %.0f samples/s, %.0f s left",
             row.samples_seen,
             self._steps * self._batch_size,
             row.loss,
+            self._held_out_text(),
             row.learning_rate,
             steps_per_s * self._batch_size,
             (self._steps - self.done) / steps_per_s,
         )
+
+    def _held_out_text(self) -> str:
+        """The errors on held-out frames when they were last looked at."""
+        looked_at = [row for row in self.rows if row.held_out_position_m is not None]
+        if not looked_at:
+            return ""
+        last = looked_at[-1]
+        return f", held out {last.held_out_position_m:.3f} m/{last.held_out_orientation_deg:.1f}°"
+
+    def end(self, errors: HeldOutErrors | None) -> None:
+        """Note the errors of the weights that are kept, where these are not the last ones."""
+        if errors is not None and self.rows:
+            self.rows[-1] = HistoryRow(*self.rows[-1][:3], *errors)
 
     def state_dict(self) -> dict[str, Any]:
         """The history so far."""
@@ -212,6 +232,17 @@ class Progress:
         self.rows = [HistoryRow(*row) for row in state["rows"]]
         self.done = self._done_before = state["done"]
         self._losses = [loss.to(self._device) for loss in state["losses"]]
+
+
+def kept_errors(rows: list[HistoryRow]) -> HeldOutErrors | None:
+    """Errors on held-out frames at the end of a run that kept no earlier weights.
+
+    None where nothing was held out.
+    """
+    _, _, _, loss, position_m, orientation_deg = rows[-1]
+    if loss is None or position_m is None or orientation_deg is None:
+        return None
+    return HeldOutErrors(loss, position_m, orientation_deg)
 
 
 def write_history(path: Path, rows: list[HistoryRow]) -> None:

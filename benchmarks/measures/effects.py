@@ -6,10 +6,11 @@ from pathlib import Path
 
 from pydantic import Field
 
-from synfeal.config.effects import CLEAN
-from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig, Strict
+from reproduction.speed.collection import seconds_of_effects
+from synfeal.config.collection import Strict
+from synfeal.config.dataset import CameraConfig, RenderConfig
+from synfeal.config.effects import CLEAN, EffectsConfig
 from synfeal.dataset.pose_table import read_frames
-from synfeal.scenes.speed import seconds_of_effects
 
 
 class Case(Strict):

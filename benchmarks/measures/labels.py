@@ -10,16 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from baselines.groundtruth.chain import fill_gaps
-from baselines.groundtruth.kinect_fusion import kinect_fusion_batch
-from baselines.groundtruth.posegraph.optimise import optimise
-from baselines.groundtruth.rgbd import rgbd_graph
-from baselines.groundtruth.sfm import sfm_batch
-from synfeal.config.models import CameraConfig, GroundTruthConfig, Strict
+from baselines.config.labels import GroundTruthConfig
+from baselines.labels.chain import fill_gaps
+from baselines.labels.kinect_fusion import kinect_fusion_batch
+from baselines.labels.posegraph.optimise import optimise
+from baselines.labels.rgbd import rgbd_graph
+from baselines.labels.sfm import sfm_batch
+from synfeal.config.collection import Strict
+from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error, relative
-from synfeal.provenance import seed_of
+from synfeal.records.provenance import seed_of
 
 Array = NDArray[np.float64]
 

@@ -11,17 +11,18 @@ import numpy as np
 import torch
 from pydantic import Field, TypeAdapter, model_validator
 
+from baselines.config.learning import LocalizerConfig, ModelName, NetworkConfig, TrainingConfig
 from baselines.localizers.registry import backbone_of
 from baselines.training.checkpoint import read_checkpoint
 from baselines.training.data import read_images
 from baselines.training.fit import PROTOCOLS, Protocol
 from baselines.training.predict import BATCH, predict_ms, predict_poses
 from baselines.training.run import Job, train_localizer
-from synfeal.config.models import LocalizerConfig, ModelName, NetworkConfig, Strict, TrainingConfig
+from synfeal.config.collection import Strict
 from synfeal.dataset.packed import read_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.evaluation.metrics import pose_errors
-from synfeal.provenance import seed_of
+from synfeal.records.provenance import seed_of
 
 PROTOCOL = TypeAdapter(Protocol)
 

@@ -1,5 +1,7 @@
 """A camera as a calibration tool found it: files of OpenCV (YAML, JSON), ROS and COLMAP (text).
 
+The JSON that ``synfeal scan`` writes beside a mesh is one too, and the manifest of a data set.
+
 OpenCV and ROS put the centre of the first pixel at (0, 0); :class:`Calibration` and COLMAP at
 (0.5, 0.5).
 """
@@ -17,7 +19,7 @@ from typing import Any
 import yaml
 
 from synfeal.errors import InputError, why
-from synfeal.files import PlainLoader
+from synfeal.records.files import PlainLoader
 
 # Names under which the same thing is found; the first is the one that messages give.
 MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "mtx")
@@ -124,14 +126,37 @@ def read_calibration(path: Path) -> Calibration:
         if suffix == ".txt":
             return _from_colmap(text)
         if suffix == ".json":
-            return _from_mapping(json.loads(text))
+            values = json.loads(text)
+            return _from_record(values) or _from_mapping(values)
         if text.startswith("%YAML:"):  # OpenCV's header, which YAML has no name for
             text = text.partition("\n")[2]
         return _from_mapping(yaml.load(text, _Loader))  # noqa: S506 (a SafeLoader)
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError, JSONDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a calibration ({why(error)})") from None
+        raise InputError(f"{path}: cannot be read as a calibration ({why(error)})") from error
     except ValueError as error:
-        raise InputError(f"{path}: {why(error)}") from None
+        raise InputError(f"{path}: {why(error)}") from error
+
+
+def _from_record(values: Any) -> Calibration | None:
+    """The camera in a record of our own, None in other files.
+
+    That of the photographs in the JSON of a scan, that of the frames in a manifest.
+    """
+    camera = values.get("camera") if isinstance(values, Mapping) else None
+    if not isinstance(camera, Mapping):
+        return None
+    camera = camera.get("color", camera)
+    if not isinstance(camera, Mapping) or "fx" not in camera:
+        return None
+    fx, fy, cx, cy = (_numbers(camera, (name,), (1,))[0] for name in ("fx", "fy", "cx", "cy"))
+    return Calibration(
+        *_size(camera, ("width", "height")),
+        fx=fx,
+        fy=fy,
+        cx=cx,
+        cy=cy,
+        distortion=_five("distortion", _numbers(camera, ("distortion",), (5,))),
+    )
 
 
 def _from_mapping(values: Any) -> Calibration:
@@ -177,8 +202,8 @@ def _numbers(values: Mapping[str, Any], names: Sequence[str], counts: Sequence[i
         held = held.get("data")
     try:
         numbers = list(_flattened(held))
-    except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name}: must hold numbers, found {_shortened(held)}") from None
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{name}: must hold numbers, found {_shortened(held)}") from error
     if len(numbers) not in counts:
         allowed = " or ".join(map(str, counts))
         raise ValueError(f"{name}: must hold {allowed} numbers, found {len(numbers)}")

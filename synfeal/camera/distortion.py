@@ -30,7 +30,7 @@ _TOLERANCE = 1e-12
 
 
 def distort(point: Array, coefficients: Coefficients) -> Array:
-    """Where a lens shows points (..., 2) that a pinhole shows at ``point``."""
+    """Distort points (..., 2): map their pinhole positions to those seen through the lens."""
     return _map(point, coefficients)[0]
 
 

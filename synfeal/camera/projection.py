@@ -35,7 +35,7 @@ class Intrinsics(NamedTuple):
 
 
 class Camera(Protocol):
-    """What this package asks of a camera, whatever configures it."""
+    """Interface of a camera: image size, intrinsics and lens distortion."""
 
     @property
     def width(self) -> int:
@@ -64,7 +64,7 @@ def normalised_of_pixels(camera: Camera, pixel: Array) -> Array:
 
 
 def pixels_of_normalised(camera: Camera, normalised: Array) -> Array:
-    """The inverse of :func:`normalised_of_pixels`."""
+    """Return pixels (..., 2), column and row, of normalised image coordinates (..., 2)."""
     fx, fy, cx, cy = camera.intrinsics
     return distort(normalised, camera.distortion) * [fx, fy] + [cx, cy]
 

@@ -6,11 +6,12 @@ import argparse
 import logging
 import sys
 from collections.abc import Sequence
+from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
 from synfeal import __version__
-from synfeal.cli import datasets, meshes, runs
-from synfeal.cli.options import numbers_apart
+from synfeal.cli import datasets, meshes
+from synfeal.cli.options import Command, numbers_apart
 from synfeal.errors import exit_status
 
 
@@ -25,21 +26,34 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(2, f"error: {message}; see {self.prog} --help\n")
 
 
-COMMANDS = (
-    *(meshes.collect, meshes.inspect),
-    *(datasets.preview, datasets.validate, datasets.export, datasets.evaluate),
-    datasets.localize,
-    *(runs.plan, runs.run, runs.compare, runs.keep, runs.restore),
+OWN_COMMANDS: tuple[Command, ...] = (
+    meshes.scan,
+    meshes.collect,
+    meshes.inspect,
+    datasets.preview,
+    datasets.validate,
+    datasets.export,
+    datasets.evaluate,
 )
+# Installed packages that work on data sets add theirs here: an entry point names a module whose
+# ``COMMANDS`` are a tuple of :class:`synfeal.cli.options.Command`.
+ENTRY_POINTS = "synfeal.commands"
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """The parser of the ``synfeal`` command."""
+def all_commands() -> tuple[Command, ...]:
+    """List the simulator's own commands, then those of the packages installed beside it."""
+    found = sorted(entry_points(group=ENTRY_POINTS), key=lambda entry: entry.name)
+    added = [command for entry in found for command in entry.load().COMMANDS]
+    return (*OWN_COMMANDS, *added)
+
+
+def build_parser(commands: Sequence[Command]) -> argparse.ArgumentParser:
+    """Build the parser of the ``synfeal`` command."""
     parser = OneLineParser(prog="synfeal", description=__doc__)
     parser.add_argument("--version", action="version", version=f"synfeal {__version__}")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for command in COMMANDS:
-        added = commands.add_parser(
+    subparsers = parser.add_subparsers(required=True, metavar="COMMAND")
+    for command in commands:
+        added = subparsers.add_parser(
             command.name,
             help=command.summary,
             description=command.description,
@@ -54,9 +68,10 @@ def build_parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point: 0, 1 for what a person can fix, 2 for wrong usage, 130 after Ctrl-C."""
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
-    every = tuple(option for command in COMMANDS for option in command.options)
+    commands = all_commands()
+    every = tuple(option for command in commands for option in command.options)
     given = sys.argv[1:] if argv is None else argv
-    arguments, unknown = build_parser().parse_known_args(list(numbers_apart(given, every)))
+    arguments, unknown = build_parser(commands).parse_known_args(list(numbers_apart(given, every)))
     if unknown:  # said by the command's own parser
         arguments.usage.error(f"unrecognized arguments: {' '.join(unknown)}")
     return exit_status(lambda: arguments.action(arguments), "nothing was kept")

@@ -1,19 +1,13 @@
-"""Commands about frames: ``synfeal preview``, validate, export, evaluate and localize."""
+"""Commands about frames: ``synfeal preview``, validate, export and evaluate."""
 
 from __future__ import annotations
 
 import argparse
-import logging
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from synfeal.cli.options import command, option
 from synfeal.errors import InputError
-
-if TYPE_CHECKING:
-    from baselines.localize import Localized
-    from baselines.training.checkpoint import ModelDescription
 
 FORMATS = ("ace", "colmap", "hloc", "mstransformer", "nerfstudio", "tum")
 CONVENTIONS = tuple(
@@ -24,8 +18,6 @@ CONVENTIONS = tuple(
 FILES = ("scores.csv", "errors.csv", "errors.png")
 DATASET = option("dataset", "directory of seq-01 or seq-01.zip", type=Path, metavar="DATASET")
 CAMERA = option("--camera", "calibration file (manifest.json)", type=Path, metavar="FILE")
-
-log = logging.getLogger("synfeal")
 
 
 @command(
@@ -126,7 +118,7 @@ def evaluate(arguments: argparse.Namespace) -> None:
     """Scores poses of any common format against a data set: errors, recalls, reprojection error."""
     from synfeal.evaluation import run
     from synfeal.evaluation.text import report_text, write_files
-    from synfeal.files import refuse_foreign
+    from synfeal.records.files import refuse_foreign
 
     out: Path | None = arguments.out
     if out:
@@ -139,54 +131,3 @@ def evaluate(arguments: argparse.Namespace) -> None:
         title = f"{arguments.poses} on {arguments.dataset}"
         write_files([out / name for name in FILES], title, found)
         print(f"\n{out}: {', '.join(FILES)}")
-
-
-@command(
-    "poses of your own pictures by a trained model",
-    "synfeal localize results/mini/runs/.../model.pt photos/ --out poses.csv",
-    option("model", "model.pt of a training run in this place", type=Path, metavar="MODEL"),
-    option(
-        "images",
-        "PNG or JPEG of any size, or a directory of them; they must have the field of view of the"
-        " training frames, which is printed",
-        type=Path,
-        nargs="+",
-        metavar="IMAGE",
-    ),
-    option("--out", "file to write (poses.csv)", type=Path, default=Path("poses.csv")),
-    option("--device", "where to run (auto)", choices=("auto", "cpu", "cuda"), default="auto"),
-)
-def localize(arguments: argparse.Namespace) -> None:
-    """Estimates where pictures were taken, with a model trained in that place."""
-    from baselines.localize import localize as estimate
-
-    out: Path = arguments.out
-    done = estimate(arguments.model, arguments.images, out, arguments.device)
-    if done.n_failed:
-        message = "%d of %d poses are not finite: the training of %s diverged"
-        log.warning(message, done.n_failed, done.n_images, arguments.model)
-    print(f"{arguments.model}: {model_text(done.description)}")
-    print(f"{out}: {poses_text(done)}")
-
-
-def model_text(description: ModelDescription) -> str:
-    """Which localizer it is, and which pictures it can read."""
-    px, camera = description.network.input_px, description.camera
-    if camera is None:
-        view = "the field of view of its training frames is not known"
-    elif description.network.view == "square":
-        view = f"the short side must see {camera.short_side_fov_deg:.1f} degrees"
-    else:
-        across, down = camera.fov_deg
-        view = f"they must see {across:.1f} x {down:.1f} degrees, as the training frames do"
-    lens = ", through the same distorting lens" if camera and any(camera.distortion) else ""
-    return f"{description.localizer}, pictures shrunk to {px} x {px} pixels; {view}{lens}"
-
-
-def poses_text(done: Localized) -> str:
-    """How many poses, and what they took."""
-    alone_ms = done.read_ms + done.network_ms
-    parts = f"median: read {done.read_ms:.2f}, network {done.network_ms:.2f}"
-    rate = f"{done.images_per_s:.0f} pictures/s in batches, on {done.device}"
-    poses = "1 pose" if done.n_images == 1 else f"{done.n_images} poses"
-    return f"{poses}; {alone_ms:.2f} ms for one picture ({parts}), {rate}"

@@ -1,21 +1,51 @@
-"""``synfeal collect`` and ``synfeal inspect``: what is made of a mesh, and the first look at it."""
+"""``synfeal scan``, ``collect`` and ``inspect``: a mesh, what is made of it, and a first look."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from synfeal.cli.options import MESH_OPTIONS, command, option, options_among
-from synfeal.config.models import CollectionConfig, RenderConfig
-from synfeal.files import read_json
-from synfeal.settings import KEYS, dataset_config, options_named, scene_config
+from synfeal.config.collection import CollectionConfig
+from synfeal.config.dataset import RenderConfig
+from synfeal.config.options import KEYS, dataset_config, options_named, scene_config
+from synfeal.errors import InputError
+from synfeal.records.files import read_json
+
+# Of synfeal.scan.camera, which --help need not load.
+PRESETS = ("7scenes", "tum-fr1", "tum-fr2", "tum-fr3")
+DIRECTIONS = ("world_from_cam", "cam_from_world")
+MARGIN_M, MARGIN_DEG = 0.2, 10.0  # of --like
+
+if TYPE_CHECKING:
+    from synfeal.config.dataset import CameraConfig
+    from synfeal.planning.like import Like
 
 BACKENDS = get_args(RenderConfig.model_fields["backend"].annotation)
+DETAILS = get_args(RenderConfig.model_fields["detail"].annotation)
 MODES = get_args(CollectionConfig.model_fields["mode"].annotation)
 RANGE: dict[str, Any] = {"type": float, "nargs": 2, "metavar": ("FROM", "TO")}
 FILE: dict[str, Any] = {"type": Path, "metavar": "FILE"}
+
+# Calibrations of posed photographs with depth; `synfeal map` takes the same.
+RGBD_OPTIONS = (
+    option("--preset", "known calibrations of colour and depth", choices=PRESETS),
+    option("--color-camera", "calibration of the photographs (docs/cameras.md)", **FILE),
+    option("--depth-camera", "calibration of the depth images (that of colour)", **FILE),
+    option("--color-focal", "focal length in place of a file, pixels", type=float, metavar="PX"),
+    option("--depth-focal", "the same for depth", type=float, metavar="PX"),
+    option(
+        "--depth-from-color",
+        "from the colour camera to the depth camera: rotation vector, degrees, and translation,"
+        " metres (none)",
+        type=float,
+        nargs=6,
+        metavar=("RX", "RY", "RZ", "X", "Y", "Z"),
+    ),
+    option("--depth-scale", "what depth of 1 m is stored as (1000; TUM 5000)", type=float),
+)
 
 
 @command(
@@ -33,6 +63,12 @@ FILE: dict[str, Any] = {"type": Path, "metavar": "FILE"}
     option("--pitch", "bounds of its pitch; positive looks down (-29.8 29.8)", **RANGE),
     option("--yaw", "bounds of its heading; 0 is world x, 90 is y (0 360)", **RANGE),
     option("--min-view-distance", "least free view at the end of a path, metres (1.2)", type=float),
+    option(
+        "--min-seen",
+        "least share of a view that meets the mesh (0; 0.7 with --like)",
+        type=float,
+    ),
+    option("--min-clearance", "least distance of cameras from surfaces, metres (0)", type=float),
     option("--min-path", "metres; shorter paths are drawn again (1.5)", type=float),
     option("--mode", "where cameras go (path)", choices=MODES),
     option(
@@ -40,12 +76,30 @@ FILE: dict[str, Any] = {"type": Path, "metavar": "FILE"}
         "mode repeat: data set, 7-Scenes frames, pose table (.csv) or TUM trajectory",
         **FILE,
     ),
+    option(
+        "--like",
+        "posed photographs: camera, box and angles as theirs, independent poses (docs/scanning.md)",
+        type=Path,
+        metavar="SEQUENCE",
+    ),
+    option(
+        "--like-frames",
+        "of --like: first frame and one past the last (all)",
+        type=int,
+        nargs=2,
+        metavar=("START", "STOP"),
+    ),
+    option("--margin", "of --like: added to the box, metres (0.2)", type=float),
+    option("--angle-margin", "of --like: added to the angles, degrees (10)", type=float),
     option("--camera", "calibration: OpenCV or ROS .yaml or .json, COLMAP cameras.txt", **FILE),
     option("--width", "image width, pixels (640, or that of --camera)", type=int),
     option("--height", "image height, pixels (480, or that of --camera)", type=int),
     option("--fov", "horizontal field of view, degrees (60)", type=float),
     option("--backend", "renderer (auto)", choices=BACKENDS),
     option("--supersampling", "N x N samples per pixel, 1 - 4 (2)", type=int, metavar="N"),
+    option(
+        "--detail", "full: draw all of the mesh, whatever the resolution (auto)", choices=DETAILS
+    ),
     option(
         "--background",
         "colour where nothing is hit, 0 - 255 each (0 0 0)",
@@ -79,9 +133,18 @@ def collect(arguments: argparse.Namespace) -> None:
 
     Run again after an interruption, it goes on where it stopped.
     """
-    config = dataset_config(options_among(arguments, KEYS), arguments.out)
-    from synfeal.collection import CollectJob, configuration_text, with_backend
-    from synfeal.collection import collect as run_collection
+    options = options_among(arguments, KEYS)
+    camera = None
+    if arguments.like is not None:
+        options, camera = _like_options(arguments, options)
+    for name in ("like_frames", "margin", "angle_margin"):
+        if arguments.like is None and getattr(arguments, name) is not None:
+            raise InputError(f"--{name.replace('_', '-')}: goes with --like SEQUENCE")
+    config = dataset_config(options, arguments.out)
+    if camera is not None:
+        config = config.model_copy(update={"network_camera": camera})
+    from synfeal.collection.run import CollectJob, configuration_text, with_backend
+    from synfeal.collection.run import collect as run_collection
 
     job = CollectJob(with_backend(config), arguments.packed, arguments.out)
     if arguments.print_config:
@@ -91,6 +154,65 @@ def collect(arguments: argparse.Namespace) -> None:
         run_collection(job, arguments.workers)
     print(f"{job.out}: {job.counts['train']} training and {job.counts['test']} test frames")
     print(coverage_text(read_json(job.out / "coverage.json")["train"]))
+
+
+def _like_options(
+    arguments: argparse.Namespace, options: dict[str, Any]
+) -> tuple[dict[str, Any], CameraConfig | None]:
+    """Options with those of ``--like`` where nothing is given, and its camera if it is to be used.
+
+    Says what is taken.
+    """
+    from synfeal.planning.like import MIN_SEEN, MIN_VIEW_DISTANCE_M, like_trajectory, resized
+
+    frames = arguments.like_frames
+    if frames is not None and not 0 <= frames[0] < frames[1]:
+        raise InputError(f"--like-frames: {frames[0]} to {frames[1]} holds no frame")
+    like = like_trajectory(
+        mesh=arguments.mesh,
+        sequence=arguments.like,
+        frames=None if frames is None else slice(*frames),
+        margin_m=MARGIN_M if arguments.margin is None else arguments.margin,
+        margin_deg=MARGIN_DEG if arguments.angle_margin is None else arguments.angle_margin,
+    )
+    taken = {
+        "box": [like.box],
+        "roll": like.roll_deg,
+        "pitch": like.pitch_deg,
+        "yaw": like.yaw_deg,
+        "mode": "random",
+        "min_view_distance": MIN_VIEW_DISTANCE_M,
+        "min_seen": MIN_SEEN,
+    }
+    given = {name: value for name, value in options.items() if value is not None}
+    chosen = {**options, **taken, **given}
+    if not arguments.print_config:
+        print(like_text(like, arguments.like))
+    if "camera" in given or "fov" in given:
+        return chosen, None
+    if like.camera is None:
+        raise InputError(
+            f"--like: {arguments.like}: nothing says what its camera is; give --camera FILE"
+        )
+    # The sides are those of the camera now, which has its own.
+    return chosen, resized(like.camera, chosen.pop("width"), chosen.pop("height"))
+
+
+def like_text(like: Like, sequence: Path) -> str:
+    """What is taken from a trajectory, margins included."""
+    x0, x1, y0, y1, z0, z1 = like.box
+    angles = ", ".join(
+        f"{name} {low:.0f} to {high:.0f}"
+        for name, (low, high) in (
+            ("roll", like.roll_deg),
+            ("pitch", like.pitch_deg),
+            ("yaw", like.yaw_deg),
+        )
+    )
+    return (
+        f"like {sequence}, {like.n_frames} frames: box {x0:.2f} {x1:.2f} {y0:.2f} {y1:.2f}"
+        f" {z0:.2f} {z1:.2f} m, {angles} degrees"
+    )
 
 
 def coverage_text(coverage: Mapping[str, Any]) -> str:
@@ -130,3 +252,102 @@ def inspect(arguments: argparse.Namespace) -> None:
         text = inspect_mesh(scene, out, arguments.unit_m is not None)
     print(f"{out}: inspect.html, inspect.png and inspect.json\n")
     print(text)
+
+
+@command(
+    "a coloured mesh from posed photographs with depth",
+    "synfeal scan redkitchen/seq-01 --preset 7scenes --out scan.glb",
+    option(
+        "sequence",
+        "7-Scenes frames, folder of seq-01, ..., or TUM RGB-D sequence",
+        type=Path,
+        metavar="SEQUENCE",
+    ),
+    option("--out", "GLB to write; .json and .png beside it", type=Path, required=True),
+    *RGBD_OPTIONS,
+    option("--poses-are", "direction of the poses (world_from_cam)", choices=DIRECTIONS),
+    option(
+        "--frames",
+        "first frame and one past the last (all)",
+        type=int,
+        nargs=2,
+        metavar=("START", "STOP"),
+    ),
+    option("--stride", "fuse every N-th frame (2)", type=int, default=2, metavar="N"),
+    option("--voxel", "edge of a voxel, metres (0.01)", type=float, default=0.01),
+    option("--max-depth", "leave out depth beyond, metres (4)", type=float, default=4.0),
+    option(
+        "--min-piece", "drop loose pieces below, square metres (0.02)", type=float, default=0.02
+    ),
+    option(
+        "--gravity",
+        "which way things fall in the world of the poses (found from the scene)",
+        type=float,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+    ),
+    option("--keep-axes", "leave the world of the poses as it is", action="store_true"),
+    option(
+        "--keep-calibration",
+        "use the calibration of the photographs as given, not as they agree best",
+        action="store_true",
+    ),
+)
+def scan(arguments: argparse.Namespace) -> None:
+    """Fuses posed RGB-D frames into one mesh that stands upright, z up, in metres.
+
+    Writes a picture of it beside photographs from the same poses, and how its world lies in that of
+    the sequence.
+    """
+    if arguments.gravity and arguments.keep_axes:
+        raise InputError("--keep-axes: contradicts --gravity; leave one of the two out")
+    from synfeal.scan.camera import CameraOptions
+    from synfeal.scan.run import ScanJob
+    from synfeal.scan.run import scan as make_scan
+
+    start, stop = arguments.frames or (0, None)
+    offset = arguments.depth_from_color
+    job = ScanJob(
+        sequence=arguments.sequence,
+        out=arguments.out,
+        cameras=CameraOptions(
+            preset=arguments.preset,
+            color_camera=arguments.color_camera,
+            depth_camera=arguments.depth_camera,
+            color_focal_px=arguments.color_focal,
+            depth_focal_px=arguments.depth_focal,
+            depth_from_color=None if offset is None else tuple(offset),
+            depth_units_per_m=arguments.depth_scale,
+        ),
+        start=start,
+        stop=stop,
+        stride=arguments.stride,
+        voxel_m=arguments.voxel,
+        max_depth_m=arguments.max_depth,
+        min_piece_m2=arguments.min_piece,
+        poses_are=arguments.poses_are or "world_from_cam",
+        gravity=tuple(arguments.gravity)
+        if arguments.gravity
+        else ("keep" if arguments.keep_axes else "find"),
+        keep_calibration=arguments.keep_calibration,
+    )
+    made = make_scan(job)
+    print(scan_text(job.out, made.record))
+
+
+def scan_text(out: Path, record: Mapping[str, Any]) -> str:
+    """What was made of how many frames, and how near it comes to photographs."""
+    color, photographs = record["camera"]["color"], record["photographs"]
+    agreement, disagreement = record["depth_agreement"], record["color_disagreement"]
+    depth = "not compared" if agreement is None else f"{agreement:.0%} agree"
+    between = "photographs between the fused ones" if photographs["held_out"] else "photographs"
+    return (
+        f"{out}: {record['faces']:,} triangles from {record['frames']['fused']} frames\n"
+        f"depth and poses: {depth}, best at a focal length of {record['depth_best_focal_px']:.0f}"
+        f" px ({record['camera']['depth']['fx']:.0f} px used)\n"
+        f"photographs: disagree by {disagreement['given']:.3f} as given, {disagreement['best']:.3f}"
+        f" at the best; used {color['fx']:.1f} px, centre ({color['cx']:.1f}, {color['cy']:.1f})\n"
+        f"renderings: {photographs['difference']:.1f} grey levels from {photographs['compared']}"
+        f" {between}, {photographs['covered']:.1%} of their pixels covered;"
+        f" see {out.with_suffix('.png')}"
+    )

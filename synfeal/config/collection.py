@@ -125,7 +125,7 @@ class ClutterConfig(Strict):
 class SceneConfig(Strict):
     """One scene: where its mesh comes from and where the camera may go."""
 
-    unless_none = ("clutter",)
+    unless_none = ("clutter", "min_seen")
 
     source: Literal["procedural", "mesh"] = Field(description="a stand-in, or a file")
     builder: Literal["large_room", "sanctuary", "random_room"] | None = Field(
@@ -145,6 +145,14 @@ class SceneConfig(Strict):
     angles: Angles = part(Angles, "bounds of the camera's angles")
     min_view_distance_m: NonNegative = Field(
         1.2, description="least free distance ahead of a target pose (the paper's d)"
+    )
+    min_seen: Fraction | None = Field(
+        None,
+        description="least share of the view, 50 x 40 degrees, of a pose that meets the mesh: scans"
+        " end where nobody looked",
+    )
+    min_clearance_m: NonNegative = Field(
+        0.0, description="least distance of every camera from any surface; 0: the paper asks none"
     )
     clutter: ClutterConfig | None = Field(None, description="objects that stand about")
     sizes: dict[SizeName, SizeConfig] = part(dict, "data sets by the paper's names")

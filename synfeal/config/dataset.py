@@ -101,7 +101,7 @@ def _calibrated(values: dict[str, Any]) -> dict[str, Any]:
     try:
         calibration = read_calibration(Path(path)).scaled(*sides)
     except (InputError, ValueError) as error:
-        raise ValueError(f"calibration: {error}") from None
+        raise ValueError(f"calibration: {error}") from error
     kept = {name: value for name, value in values.items() if name not in fixed}
     return {**kept, **asdict(calibration), "calibration": None}
 
@@ -115,8 +115,23 @@ class RenderConfig(Strict):
         "auto", description="`auto`: the fastest that works here"
     )
     supersampling: int = Field(2, ge=1, le=4, description="samples per pixel along each axis")
+    detail: Literal["auto", "full"] = Field(
+        "auto",
+        description="of the mesh that colours are drawn of: `auto` leaves out what the camera's"
+        " resolution does not show, `full` nothing; depth is always that of the full mesh",
+    )
     background_rgb: tuple[Channel, Channel, Channel] = Field((0, 0, 0), description="where empty")
     effects: EffectsConfig | None = Field(None, description="added to frames (docs/variation.md)")
+
+    @property
+    def draws_full_mesh(self) -> bool:
+        """Check whether colours are drawn from the full mesh.
+
+        Where light is switched they always are: shares of light are multiplied pixel by pixel, and
+        belong to the mesh they were baked on.
+        """
+        light = self.effects and self.effects.light
+        return self.detail == "full" or bool(light and light.states)
 
 
 class DatasetConfig(Strict):

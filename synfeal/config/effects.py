@@ -114,6 +114,7 @@ class RobustnessConfig(Strict):
     Exposures end where the next frame begins: one setting serves profiles of any frame spacing.
     """
 
+    made: bool = Field(True, description="make the table, where there are effects")
     scene: Slug = Field("large_room", description="of the data set")
     size: SizeName = Field("6k", description="of the data set")
     effects: dict[Slug, EffectsConfig] = part(dict, "rows of the table: effects on the test frames")

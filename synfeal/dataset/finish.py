@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from synfeal.config.dataset import DatasetConfig
-from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
+from synfeal.config.dataset import CameraConfig, DatasetConfig, RenderConfig
+from synfeal.config.effects import EffectsConfig
 from synfeal.dataset.frame_files import frame_file, sequence_at, sequence_names
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.pose_table import read_frames, read_pose_table, write_pose_table
@@ -17,9 +17,9 @@ from synfeal.dataset.sevenscenes import Sequence as Shard
 from synfeal.dataset.sevenscenes import Split, frame_paths, sequences_of, write_splits
 from synfeal.effects.apply import effects_table, objects_table
 from synfeal.effects.scene import crowd_of
-from synfeal.files import file_sha256, read_json, write_json
-from synfeal.frames import write_frame
-from synfeal.provenance import frame_versions
+from synfeal.records.files import file_sha256, read_json, write_json
+from synfeal.records.provenance import frame_versions
+from synfeal.records.tables import write_frame
 
 MANIFEST = "manifest.json"
 CLUTTER = "clutter.json"  # beside the mesh: which objects stand about in it, and where
@@ -35,6 +35,7 @@ def finish_dataset(
     out_manifest: Path,  # beside the sequences
     coverage: Sequence[Path] = (),  # what each plan covers, if that is to be written
     packed_px: int | None = None,  # side of packed frames that are written too, pixels, if any
+    detail: Path | None = None,  # record of the level of detail, if it was chosen
 ) -> None:
     """Write what is made of all frames together beside the sequences of a data set.
 
@@ -56,6 +57,8 @@ def finish_dataset(
         write_json(directory / "coverage.json", covered)
     write_contact_sheet(frame_paths(list(paths.values()), "color.png"), directory / "preview.png")
     about = {"mesh_sha256": file_sha256(mesh), **origin, **_write_effects(directory, origin, mesh)}
+    if detail is not None:
+        about["detail"] = read_json(detail)
     clutter = mesh.with_name(CLUTTER)
     if places := read_json(clutter) if clutter.is_file() else []:
         about["clutter"] = places

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.errors import read_as, why
-from synfeal.files import atomic_path
+from synfeal.records.files import atomic_path
 
 SUFFIX = ".zip"
 MOST_OPEN = 16  # archives; each holds a file descriptor
@@ -77,8 +77,8 @@ class ArchivedFile:
         with reading(self.archive) as opened:
             try:
                 info = opened.getinfo(member)
-            except KeyError:
-                raise FileNotFoundError(f"{self}: missing") from None
+            except KeyError as error:
+                raise FileNotFoundError(f"{self}: missing") from error
             if info.file_size > MOST_BYTES:
                 raise OSError(f"{self}: {info.file_size} bytes are too many for a frame")
             return opened.read(info)
@@ -170,7 +170,7 @@ def reading(archive: Path) -> Iterator[zipfile.ZipFile]:
         status = archive.stat()
         yield _opened(archive, status.st_ino, status.st_size, status.st_mtime_ns)
     except ARCHIVE_DAMAGE as error:
-        raise OSError(f"{archive}: is damaged ({why(error)})") from None
+        raise OSError(f"{archive}: is damaged ({why(error)})") from error
 
 
 @lru_cache(MOST_OPEN)

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.dataset.frame_files import read_image
-from synfeal.dataset.sevenscenes import frame_paths
+from synfeal.dataset.sevenscenes import frames_between
 from synfeal.errors import InputError, read_as
-from synfeal.files import atomic_path, file_sha256, read_json, write_json
-from synfeal.provenance import frame_versions
+from synfeal.records.files import atomic_path, file_sha256, read_json, write_json
+from synfeal.records.provenance import frame_versions
 
 COPIED_BYTES = 2**24  # at a time
 
@@ -43,7 +43,7 @@ def pack_frames(sequences: list[Path], input_px: int, out: Path, view: View = "s
 
     uint8 (N, input_px, input_px, 3); see :func:`fit_frame`.
     """
-    paths = frame_paths(sequences, "color.png")
+    paths = frames_between(sequences, "color.png")
     with new_packed(out, len(paths), input_px) as packed:
         for index, path in enumerate(paths):
             packed[index] = fit_frame(read_image(path, "RGB"), input_px, view)
@@ -127,6 +127,7 @@ def write_packed(
     render: RenderConfig,  # how they were rendered
     view: View,  # what of a frame was packed
     out_frames: Path,
+    detail: Path | None = None,  # what the level of detail was, if it was chosen
 ) -> None:
     """Join parts of packed frames, and write ``.json`` beside them in place of ``.npy``."""
     join_packed(shards, out_frames)
@@ -144,4 +145,6 @@ def write_packed(
         "shards": [_read_shard(path) for path in records],
         "versions": frame_versions(),
     }
+    if detail is not None:
+        record["detail"] = read_json(detail)
     write_json(out_frames.with_suffix(".json"), record)

@@ -1,8 +1,10 @@
 """Tables of poses: plans, label sets and predictions are all one CSV format.
 
 Columns ``frame,path,tx,ty,tz,qw,qx,qy,qz``: frame index in its split, index of the straight path
-the frame belongs to, position in metres and unit quaternion of ``world_from_cam``. Where the frames
-are files, a last column ``image`` names them.
+the frame belongs to, position in metres and unit quaternion of ``world_from_cam``. Labels that were
+estimated from images have a column ``registered`` after these: 1 where the frame's pose was found,
+0 where it was filled in, which is nothing to learn from. Where the frames are files, a last column
+``image`` names them.
 """
 
 from __future__ import annotations
@@ -15,12 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.errors import InputError
-from synfeal.frames import read_numbers, write_numbers
 from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
+from synfeal.records.tables import read_numbers, write_numbers
 
 COLUMNS = ("frame", "path", "tx", "ty", "tz", "qw", "qx", "qy", "qz")
 HEADER = ",".join(COLUMNS)
+REGISTERED = "registered"
 IMAGE = "image"
+# Further columns of poses found in a map: whether one was found, and what speaks for it.
+SUPPORT = ("status", "inliers", "confidence")
 UNIT_TOLERANCE = 1e-2
 
 
@@ -34,6 +39,8 @@ class PoseTable:
     quat_wxyz: NDArray[np.float64]  # (N, 4) unit quaternions of ``world_from_cam``, w >= 0
     # the paths that the frames are of, all of their frames, where these are but a part
     whole: PoseTable | None = None
+    # (N,) whether the pose of a frame was found, where poses are estimates; None: all are known
+    registered: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -49,6 +56,13 @@ class PoseTable:
             self.frame, self.path, world_from_cam[:, :3, 3].copy(), quat_wxyz_of(world_from_cam)
         )
 
+    @property
+    def usable_rows(self) -> NDArray[np.int64]:
+        """Rows (M,) of the frames whose poses are more than filled in: what may be learned from."""
+        if self.registered is None:
+            return np.arange(len(self))
+        return np.flatnonzero(self.registered)
+
     def between(self, start: int, stop: int) -> PoseTable:
         """Frames ``start`` to ``stop`` (exclusive), which must all exist."""
         if not 0 <= start <= stop <= len(self):
@@ -60,7 +74,8 @@ class PoseTable:
     def at(self, rows: slice | NDArray[np.int64], whole: PoseTable | None = None) -> PoseTable:
         """Some of the frames, by row."""
         columns = (self.frame[rows], self.path[rows], self.position_m[rows], self.quat_wxyz[rows])
-        return PoseTable(*columns, whole or self.whole)
+        registered = None if self.registered is None else self.registered[rows]
+        return PoseTable(*columns, whole or self.whole, registered)
 
     def first(self, count: int) -> PoseTable:
         """The first ``count`` frames: smaller data sets are prefixes of larger ones."""
@@ -73,22 +88,43 @@ def write_pose_table(path: Path, table: PoseTable, images: Sequence[str] = ()) -
     ``images`` are names of the frames' images, if they are files.
     """
     arrays = [table.frame, table.path, *table.position_m.T, *table.quat_wxyz.T]
+    header = HEADER
+    if table.registered is not None:
+        arrays.append(table.registered.astype(int))
+        header = f"{header},{REGISTERED}"
     columns = [*(array.tolist() for array in arrays), *([images] if images else [])]
-    header = f"{HEADER},{IMAGE}" if images else HEADER
+    header = f"{header},{IMAGE}" if images else header
     write_numbers(path, header, zip(*columns, strict=True))
 
 
-def read_pose_table(path: Path) -> PoseTable:
+def read_pose_table(path: Path, any_frames: bool = False) -> PoseTable:
     """Read a table written by :func:`write_pose_table`.
+
+    Args:
+        path: the file.
+        any_frames: accept frames in any order and number, where nothing is paired with the rows.
 
     Raises:
         InputError: the file is missing, has another header, or holds anything but finite numbers,
-            whole ones for frame and path, and unit quaternions.
+            whole ones for frame and path, unit quaternions, and 0 or 1 for registered; or the
+            frames are not 0, 1, 2, ...
     """
-    values = read_numbers(path, HEADER, "pose table", passed_over=IMAGE)
+    values = read_numbers(path, HEADER, "pose table", passed_over=IMAGE, optional=REGISTERED)
     frame, straight_path = whole_numbers(values[:, :2], path).T
     check_unit(values[:, 5:9], path, np.arange(len(values)) + 2)
-    return PoseTable(frame, straight_path, values[:, 2:5], values[:, 5:9])
+    off = np.flatnonzero(frame != np.arange(len(frame)))
+    if len(off) and not any_frames:
+        row = int(off[0])
+        raise InputError(
+            f"{path}: line {row + 2} is of frame {frame[row]} where frame {row} must be; a row is"
+            " missing, doubled or out of order: make the table again"
+        )
+    flags = values[:, len(COLUMNS) :]
+    if not np.isin(flags, (0, 1)).all():
+        bad = int(np.argmin(np.isin(flags, (0, 1)).all(axis=1)))
+        raise InputError(f"{path}: row {bad + 2}: {REGISTERED} must be 0 or 1; make it again")
+    registered = flags[:, 0] == 1 if flags.shape[1] else None
+    return PoseTable(frame, straight_path, values[:, 2:5], values[:, 5:9], registered=registered)
 
 
 def read_frames(path: Path, start: int, stop: int) -> PoseTable:

@@ -12,9 +12,11 @@ from pathlib import Path
 from PIL import Image, ImageDraw
 
 from synfeal.dataset.frame_files import FrameFile, read_image
-from synfeal.dataset.sevenscenes import Split, frame_paths, read_split
+from synfeal.dataset.sequence_listing import COLOR
+from synfeal.dataset.sevenscenes import Split
+from synfeal.dataset.split_frames import read_split_frames
 from synfeal.errors import InputError
-from synfeal.files import atomic_path
+from synfeal.records.files import atomic_path
 
 TILE_WIDTH_PX, TITLE_PX = 320, 16
 
@@ -37,7 +39,7 @@ def write_preview(
         raise InputError(f"--out: {out}: a preview is a GIF or MP4; end its name in .gif or .mp4")
     if write is _write_mp4:
         encoder()  # missing, it is to be missed before any frame is read
-    columns = [frame_paths(read_split(dataset, split), "color.png") for dataset in datasets]
+    columns = [read_split_frames(dataset, split).files(COLOR) for dataset in datasets]
     names = [dataset.resolve().name for dataset in datasets]
     pictures = list(_rows([frames[:n_frames] for frames in columns], names))
     if not pictures:

@@ -15,7 +15,7 @@ from multiprocessing.connection import wait as wait_for_end
 from pathlib import Path
 from typing import Any
 
-from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.render_sequence import Progress, effects_of, write_sequence
 from synfeal.effects.scene import SceneRenderer, open_scene
@@ -33,10 +33,11 @@ class Studio:
     camera: CameraConfig
     render: RenderConfig
     with_depth: bool
+    detail: Path | None = None  # what colours are drawn of, if not of ``mesh``
 
     def open(self) -> SceneRenderer:
         """A renderer."""
-        return open_scene(self.mesh, self.camera, self.render)
+        return open_scene(self.mesh, self.camera, self.render, self.detail)
 
     def carry_out(
         self, renderer: SceneRenderer, task: Task, on_frame: Callable[[], object]
@@ -76,11 +77,11 @@ def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: 
             for future in ended:
                 out, poses = running.pop(future)
                 progress.part_done(out.name, len(poses), future.result())
-    except BrokenProcessPool:
+    except BrokenProcessPool as error:
         raise InputError(
             "collect: a worker process was killed, perhaps for lack of memory; what is done is"
             " kept: run the same command again, with fewer --workers"
-        ) from None
+        ) from error
     finally:
         stop.set()
         executor.shutdown(cancel_futures=True)

@@ -16,14 +16,21 @@ from numpy.typing import NDArray
 from PIL import Image
 from tqdm import tqdm
 
-from synfeal.config.models import CameraConfig, EffectsConfig, RenderConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig
+from synfeal.config.effects import EffectsConfig
 from synfeal.dataset.frame_files import encode_png, is_archive, write_archive
 from synfeal.dataset.packed import View, fit_frame, new_packed
 from synfeal.dataset.pose_table import PoseTable, read_frames
 from synfeal.dataset.sevenscenes import depth_mm_of, pose_text
 from synfeal.effects.apply import Frame, varied_frames
 from synfeal.effects.scene import SceneRenderer, open_scene
-from synfeal.files import atomic_directory, refuse_existing, write_json, writing_to
+from synfeal.records.files import (
+    atomic_directory,
+    refuse_existing,
+    unfinished_prefix,
+    write_json,
+    writing_to,
+)
 from synfeal.render.base import Depth, Rgb
 from synfeal.render.choose import fastest_working
 
@@ -55,6 +62,7 @@ def render_sequence(
     with_depth: bool,
     render: RenderConfig,  # backend and effects
     out_frames: Path,  # a directory, or an archive if its name ends in ``.zip``
+    detail: Path | None = None,  # what colours are drawn of, if not of ``mesh``
 ) -> None:
     """Render poses of a table into a new sequence, which appears when it is complete.
 
@@ -63,7 +71,7 @@ def render_sequence(
     began, poses = time.perf_counter(), read_frames(plan, start, stop)
     with (
         writing_to(out_frames, lambda: REMEDY),
-        open_scene(mesh, camera, render) as renderer,
+        open_scene(mesh, camera, render, detail) as renderer,
         Progress(len(poses), out_frames.name) as progress,
     ):
         effects = effects_of(camera, render)
@@ -142,7 +150,8 @@ def _new_sequence(out: Path) -> Iterator[Path]:
         return
     refuse_existing(out)
     out.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{out.stem}-", dir=out.parent) as directory_name:
+    prefix = unfinished_prefix(out.stem)
+    with tempfile.TemporaryDirectory(prefix=prefix, dir=out.parent) as directory_name:
         yield Path(directory_name)
         write_archive(Path(directory_name), out)
 
@@ -164,16 +173,18 @@ def render_packed(
     view: View,
     render: RenderConfig,
     out_frames: Path,
+    detail: Path | None = None,
 ) -> None:
     """Render rows ``start`` to ``stop`` of a plan into one array, as :func:`pack_frames` packs.
 
+    ``detail`` is what is drawn in place of ``mesh``, see :func:`synfeal.effects.scene.open_scene`.
     ``.json`` beside it, in place of ``.npy``, says how many frames it holds and which backend drew
     them.
     """
     chosen, poses = resolved(render), read_frames(plan, start, stop)
     with (
         writing_to(out_frames, lambda: REMEDY),
-        open_scene(mesh, camera, chosen) as renderer,
+        open_scene(mesh, camera, chosen, detail) as renderer,
         new_packed(out_frames, len(poses), input_px) as packed,
         Progress(len(poses), out_frames.stem) as progress,
     ):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable
+from collections.abc import Sequence as Series
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -16,15 +17,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.dataset.frame_files import (
-    FrameFile,
-    frame_file,
-    read_image,
-    sequence_at,
-    sequence_names,
-)
+from synfeal.dataset.frame_files import FrameFile, frame_file, read_image, sequence_at
+from synfeal.dataset.sequence_listing import gap_in, list_sequence
 from synfeal.errors import InputError, read_as
-from synfeal.files import atomic_path
+from synfeal.records.files import atomic_path
 
 INVALID_MM = 65535
 SEQUENCE = re.compile(r"(sequence)?[0-9]{1,9}")
@@ -63,19 +59,61 @@ def read_pose(path: FrameFile) -> NDArray[np.float64]:
 
 
 def frame_paths(sequences: Iterable[Path], kind: str) -> list[FrameFile]:
-    """Files of one kind (``color.png``, ``depth.png``, ``pose.txt``), at least one, in frame order.
+    """Files of one kind of all frames of sequences, in order.
 
-    ``sequences`` are ``seq-01`` or ``seq-01.zip``.
+    For readers that take the rows of another file by position; so frames must be numbered from 0
+    without gaps, and each must have its file.
+
+    Args:
+        sequences: ``seq-01`` or ``seq-01.zip``.
+        kind: ``color.png``, ``depth.png`` or ``pose.txt``.
+
+    Raises:
+        InputError: a sequence has no such file, or lacks that of one frame, which is named.
     """
     paths: list[FrameFile] = []
     for sequence in sequences:
-        with read_as(sequence, "a sequence", OSError):
-            names = sequence_names(sequence)
-        found = [name for name in names if name.startswith("frame-") and name.endswith(f".{kind}")]
-        if not found:
+        listing = list_sequence(sequence)
+        if not listing.numbers[kind]:
             raise InputError(f"{sequence}: holds no frame-XXXXXX.{kind}; render it again")
-        paths += [frame_file(sequence, name) for name in found]
+        paths += listing.files(kind)
+        if gap := gap_in(listing):
+            raise InputError(
+                f"{gap.path(kind)}: missing, with all files of the frame; render it again"
+            )
     return paths
+
+
+def frames_between(
+    sequences: Series[Path], kind: str, start: int = 0, stop: int | None = None
+) -> list[FrameFile]:
+    """Files of one kind of the frames ``start`` to ``stop`` (exclusive) of a split.
+
+    Its frames are counted through its sequences, each of which must be as long as
+    :func:`sequences_of` makes it: one frame less in any of them would shift all that follow.
+
+    Args:
+        sequences: those of the split from its first, ``seq-01`` or ``seq-01.zip``.
+        kind: ``color.png``, ``depth.png`` or ``pose.txt``.
+        start: first frame, counted from 0 in the split.
+        stop: one past the last frame; None for all frames of the sequences.
+
+    Raises:
+        InputError: a frame or its file is missing.
+    """
+    parts = [frame_paths([sequence], kind) for sequence in sequences]
+    most = max(map(len, parts), default=0)
+    for sequence, part in zip(sequences[:-1], parts[:-1], strict=True):
+        if len(part) < most:
+            missing = frame_file(sequence, f"frame-{len(part):06d}.{kind}")
+            raise InputError(f"{missing}: missing, with all files of the frame; render it again")
+    paths = [path for part in parts for path in part]
+    if stop is not None and len(paths) < stop:
+        places = ", ".join(map(str, sequences))
+        raise InputError(
+            f"{places}: hold {len(paths)} frames, {stop} are needed; render them again"
+        )
+    return paths[start:stop]
 
 
 def write_splits(dataset_dir: Path, sequences: Iterable[Sequence]) -> None:
@@ -98,6 +136,9 @@ def read_split(dataset_dir: Path, split: str) -> list[Path]:
     if bad:
         raise InputError(f"{path}: '{bad[0][:40]}' names no sequence; lines look like 'sequence1'")
     numbers = [int(line.removeprefix("sequence")) for line in lines]
+    twice = [line for at, line in enumerate(lines) if numbers[at] in numbers[:at]]
+    if twice:
+        raise InputError(f"{path}: lists {twice[0]} twice; leave one line")
     return [sequence_at(dataset_dir / f"seq-{number:02d}") for number in numbers]
 
 

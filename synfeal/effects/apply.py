@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.camera.projection import cell_directions
-from synfeal.config.effects import MotionBlurConfig
-from synfeal.config.models import CameraConfig, EffectsConfig
+from synfeal.config.dataset import CameraConfig
+from synfeal.config.effects import EffectsConfig, MotionBlurConfig
 from synfeal.effects.light import (
     AutoExposure,
     Light,
@@ -31,7 +31,7 @@ from synfeal.effects.light import (
 )
 from synfeal.effects.scene import Crowd, SceneRenderer
 from synfeal.geometry.poses import interpolate
-from synfeal.provenance import generator_of
+from synfeal.records.provenance import generator_of
 from synfeal.render.base import Depth, Rgb
 
 if TYPE_CHECKING:

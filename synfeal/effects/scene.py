@@ -8,15 +8,15 @@ the same ones.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.effects.light import GROUPS, Light
 from synfeal.errors import InputError
 from synfeal.mesh.load import load_mesh
@@ -89,8 +89,11 @@ class SceneRenderer(Renderer):
         render: RenderConfig,
         shares: Mapping[str, TexturedMesh] | None = None,  # of its light, by group of sources
         crowd: Crowd | None = None,
+        # gives what depth is taken of, where ``mesh`` has less detail
+        full: Callable[[], TexturedMesh] | None = None,
     ) -> None:
         self._camera, self._render, self._crowd = camera, render, crowd
+        self._mesh, self._full = mesh, full
         self._ideal = open_renderer(mesh, camera, render)
         even = render.model_copy(update={"background_rgb": (255 // len(GROUPS),) * 3})
         held = (shares or {}).items()
@@ -102,7 +105,20 @@ class SceneRenderer(Renderer):
 
     def render_rgbd(self, world_from_cam: Array) -> tuple[Rgb, Depth]:
         """Colours (H, W, 3) of the scene alone, in its own light, and depth (H, W)."""
-        return self._ideal.render_rgbd(world_from_cam)
+        if self._full is None:
+            return self._ideal.render_rgbd(world_from_cam)
+        return self._ideal.render(world_from_cam), self._solid.render_depth(world_from_cam)
+
+    @cached_property
+    def _solid(self) -> Renderer:
+        """Draws the full mesh, whose textures matter only where they cut something out."""
+        assert self._full is not None
+        mesh = self._full()
+        parts = (
+            part if part.alpha_cutoff is not None else replace(part, texture=None)
+            for part in mesh.parts
+        )
+        return open_renderer(replace(mesh, parts=tuple(parts)), self._camera, self._render)
 
     def left(self, world_from_cam: Array, weights: Mapping[str, float]) -> Light:
         """Factors (H, W, 3) of the light that is left with these weights of the groups."""
@@ -115,18 +131,31 @@ class SceneRenderer(Renderer):
     def along(self, path_m: Array, rng: np.random.Generator) -> SceneRenderer:
         """A renderer of the scene with what stands along a path (P, 3)."""
         assert self._crowd is not None, "opened without `clutter`"
-        parts = (part for parts, _ in self._crowd.along(path_m, rng) for part in parts)
-        both = TexturedMesh((*self._crowd.mesh.parts, *parts))
-        return SceneRenderer(both, self._camera, self._render)
+        objects = [part for parts, _ in self._crowd.along(path_m, rng) for part in parts]
+        both = TexturedMesh((*self._mesh.parts, *objects))
+        solid = TexturedMesh((*self._crowd.mesh.parts, *objects))
+        full = None if self._full is None else lambda: solid
+        return SceneRenderer(both, self._camera, self._render, full=full)
 
     def close(self) -> None:
         """Give the memory of all meshes back."""
         for renderer in (self._ideal, *self._shares.values()):
             renderer.close()
+        if "_solid" in self.__dict__:
+            self._solid.close()
 
 
-def open_scene(mesh: Path, camera: CameraConfig, render: RenderConfig | None) -> SceneRenderer:
+def open_scene(
+    mesh: Path, camera: CameraConfig, render: RenderConfig | None, detail: Path | None = None
+) -> SceneRenderer:
     """A renderer of a mesh, which knows what else effects ask for: shares of light, objects.
+
+    Args:
+        mesh: The full mesh, which depth is taken of and objects stand in.
+        camera: The camera of the frames.
+        render: How they are drawn.
+        detail: The mesh that colours are drawn of, as :mod:`synfeal.collection.detail` writes it;
+            None draws the full one, as does :attr:`RenderConfig.draws_full_mesh`.
 
     Raises:
         InputError: a mesh cannot be read, its shares are not there, or objects cannot be used.
@@ -143,4 +172,10 @@ def open_scene(mesh: Path, camera: CameraConfig, render: RenderConfig | None) ->
         )
     crowd = crowd_of(mesh, render)
     shares = {group: load_mesh(file) for group, file in files.items()}
-    return SceneRenderer(crowd.mesh if crowd else load_mesh(mesh), camera, render, shares, crowd)
+
+    def full() -> TexturedMesh:
+        return crowd.mesh if crowd else load_mesh(mesh)
+
+    if detail is None or render.draws_full_mesh:
+        return SceneRenderer(full(), camera, render, shares, crowd)
+    return SceneRenderer(load_mesh(detail), camera, render, crowd=crowd, full=full)

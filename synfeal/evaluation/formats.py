@@ -21,7 +21,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from synfeal.dataset.pose_table import COLUMNS, IMAGE
+from synfeal.dataset.pose_table import COLUMNS, IMAGE, SUPPORT
+from synfeal.dataset.sequence_listing import refuse_problems
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError, read_as
 from synfeal.evaluation.estimates import Convention, Estimates
@@ -84,11 +85,10 @@ def _from_directory(path: Path) -> Estimates:
 
 def read_sevenscenes(path: Path) -> Estimates:
     """A tree of ``pose.txt``."""
+    sequences = list_sequences(path)
+    refuse_problems(sequences)
     frames = [
-        (s.name, frame)
-        for s in list_sequences(path)
-        for frame in s.frames
-        if frame.number in s.numbers[POSE]
+        (s.name, frame) for s in sequences for frame in s.frames if frame.number in s.numbers[POSE]
     ]
     if not frames:
         raise InputError(f"{path}: its sequences hold no frame-XXXXXX.pose.txt")
@@ -136,24 +136,28 @@ def read_csv(path: Path, text: str) -> Estimates:
     with read_as(path, "CSV"):
         table = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
     header = tuple(table.columns)
-    if header not in (COLUMNS, (*COLUMNS, IMAGE), (IMAGE, *COLUMNS[2:])):
+    found = (IMAGE, *COLUMNS[2:])
+    if header not in (COLUMNS, (*COLUMNS, IMAGE), found, (*found, *SUPPORT)):
         raise InputError(
             f"{path}: the header must be {','.join(COLUMNS)} or image,{','.join(COLUMNS[2:])},"
             f" found '{','.join(header)[:80]}'"
         )
     places = [f"line {i}" for i in range(2, len(table) + 2)]
-    values = _numbers(path, places, table[list(COLUMNS[2:])].to_numpy().tolist())
+    cells = table[list(COLUMNS[2:])]
+    if header[-1] == SUPPORT[-1]:  # no pose, no numbers
+        cells = cells.replace("", "nan")
+    values = _numbers(path, places, cells.to_numpy().tolist())
     if not len(table):
         raise InputError(f"{path}: holds no poses below its header")
-    ordered = header[0] == COLUMNS[0]
+    named = IMAGE in header
     return Estimates(
-        "a pose table" if ordered else "poses of synfeal localize",
+        "a pose table" if header[0] == COLUMNS[0] else "poses of synfeal localize",
         OURS,
-        tuple(table["frame" if ordered else "image"]),
+        tuple(table[IMAGE if named else "frame"]),
         tuple(places),
         values[:, :3],
         values[:, 3:],
-        ordered,
+        ordered=not named,
     )
 
 

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.dataset.pose_table import read_pose_table
+from synfeal.dataset.pose_table import IMAGE, read_pose_table
+from synfeal.dataset.sequence_listing import POSE, gap_in, refuse_problems
 from synfeal.dataset.sevenscenes import SPLIT_FILES
+from synfeal.dataset.split_frames import rows_of_frames, table_problems
 from synfeal.errors import InputError
 from synfeal.evaluation.estimates import Estimates
 from synfeal.validation.frames import read_poses
@@ -36,6 +38,7 @@ class ScoredFrames:
     world_from_cam: Array  # (N, 4, 4)
     # (N,) what the bootstrap draws: straight paths of our data sets, else sequences
     path: NDArray[np.int64]
+    gap: Frame | None = None  # one that the numbers of the others leave out
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -44,8 +47,16 @@ class ScoredFrames:
 
 
 def read_scored_frames(dataset: Path, split: str) -> ScoredFrames:
-    """The frames of a split, all of which must have rigid poses."""
-    sequences = _of_split(dataset, split, list_sequences(dataset))
+    """The frames of a split, all of which must have rigid poses.
+
+    Raises:
+        InputError: the split or a pose cannot be read, a file does not say which frame it is of, or
+            the table of a split names other frames than there are.
+    """
+    everything = list_sequences(dataset)
+    sequences = _of_split(dataset, split, everything)
+    refuse_problems(sequences)
+    _check_tables(dataset, split, everything)
     frames = tuple(frames_of(sequences))
     poses, unreadable = read_poses(sequences)
     problems = check_rigid(poses, unreadable).failures
@@ -53,8 +64,11 @@ def read_scored_frames(dataset: Path, split: str) -> ScoredFrames:
     if problems or missing:
         reason = problems[0] if problems else f"{missing[0].path('pose.txt')}: missing"
         raise InputError(f"{reason}; synfeal validate says more")
+    for sequence in sequences:
+        sequence.files(POSE)  # refuses a pose that has no image where others have one
     matrices = np.array([poses[frame] for frame in frames])
-    return ScoredFrames(split, frames, matrices, _paths(dataset, split, frames))
+    gap = next((gap for sequence in sequences if (gap := gap_in(sequence))), None)
+    return ScoredFrames(split, frames, matrices, _paths(dataset, split, frames), gap)
 
 
 def _of_split(
@@ -63,19 +77,29 @@ def _of_split(
     if split == "all":
         return sequences
     splits, failures = read_splits(dataset, sequences)
-    if failures and split not in splits:
-        raise InputError(f"{failures[0]}; without it, give --split all")
+    of_split = [failure for failure in failures if SPLIT_FILES[split] in failure]
+    if of_split:
+        raise InputError(f"{of_split[0]}; correct it, or give --split all")
     if not splits[split]:
         raise InputError(f"{dataset / SPLIT_FILES[split]}: lists no sequence")
     return splits[split]
 
 
+def _check_tables(dataset: Path, split: str, sequences: list[SequenceListing]) -> None:
+    """Refuse a data set that lacks a frame its tables name, or has one that they do not."""
+    splits, _ = read_splits(dataset, sequences)
+    for name in SPLIT_FILES if split == "all" else (split,):
+        table = dataset / f"{name}.csv"
+        if name in splits and table.is_file():
+            problems = table_problems(table, frames_of(splits[name]))
+            if problems:
+                raise InputError(f"{problems[0]}; synfeal validate says more")
+
+
 def _paths(dataset: Path, split: str, frames: Sequence[Frame]) -> NDArray[np.int64]:
     table = dataset / f"{split}.csv"
     if table.is_file():
-        paths = read_pose_table(table).path
-        if len(paths) == len(frames):
-            return paths
+        return read_pose_table(table).path[rows_of_frames(table, frames)]
     stems = [frame.sequence.stem for frame in frames]
     return np.unique(stems, return_inverse=True)[1].astype(np.int64)
 
@@ -114,11 +138,30 @@ def _keys(frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float
     """Sequence and number of each estimate's frame."""
     pairs = list(zip(estimates.names, estimates.places, strict=True))
     if estimates.ordered:
-        return [_by_index(frames, name, f"{path}: {place}") for name, place in pairs]
+        keys = [_by_index(frames, name, f"{path}: {place}") for name, place in pairs]
+        _check_countable(frames, len(set(keys)), path)
+        return keys
     stems = list(dict.fromkeys(frame.sequence.stem for frame in frames.frames))
     timed = estimates.kind.startswith(("a TUM", "TUM"))
     find = _by_time if timed else _by_name
     return [find(name, stems, f"{path}: {place}", rate_hz) for name, place in pairs]
+
+
+def _check_countable(frames: ScoredFrames, n_named: int, path: Path) -> None:
+    """Refuse indices in place of names where they may count other frames than these."""
+    remedy = f"give names in a last column {IMAGE} (seq-01/frame-000000.color.png)"
+    if frames.split == "all":
+        raise InputError(f"{path}: its rows count the frames of one split, not of all; {remedy}")
+    if frames.gap is not None:
+        raise InputError(
+            f"{path}: names no frames, and {frames.gap.name} is missing, so its rows may count"
+            f" others; {remedy}"
+        )
+    if n_named != len(frames.frames):
+        raise InputError(
+            f"{path}: has poses of {n_named} frames without their names, but the {frames.split}"
+            f" split has {len(frames.frames)}; is it of this --split? If so, {remedy}"
+        )
 
 
 def _by_index(frames: ScoredFrames, name: str, where: str) -> Key:

@@ -2,8 +2,8 @@
 
 A frame counts as localized within a bound when its position *and* its orientation error are below
 it, as in hloc and ACE. 95 % limits come from a bootstrap over whole paths
-(:mod:`synfeal.bootstrap`). A frame without a pose has infinite errors: it is never within a bound,
-and makes a mean infinite.
+(:mod:`synfeal.evaluation.bootstrap`). A frame without a pose has infinite errors: it is never
+within a bound, and makes a mean infinite.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.bootstrap import Counts, limits, medians, path_counts
 from synfeal.dataset.pose_table import UNIT_TOLERANCE, PoseTable
+from synfeal.evaluation.bootstrap import Counts, limits, medians, path_counts
 from synfeal.geometry.poses import position_error_m
 from synfeal.geometry.rotations import rotation_angle_rad
-from synfeal.provenance import generator_of
+from synfeal.records.provenance import generator_of
 
 Array = NDArray[np.float64]
 Metrics = dict[str, float | None]

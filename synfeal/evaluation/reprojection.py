@@ -14,23 +14,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.bootstrap import medians
 from synfeal.camera.projection import cell_directions, cell_pixels, pixels_of_normalised
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.dataset.sevenscenes import INVALID_MM
 from synfeal.errors import InputError, read_as
+from synfeal.evaluation.bootstrap import medians
 from synfeal.evaluation.metrics import Metrics, draws, is_pose, means, with_limits
-from synfeal.files import atomic_path
 from synfeal.geometry.poses import relative
-from synfeal.mesh.rays import RayCaster
-from synfeal.mesh.triangles import load_collision_mesh
+from synfeal.records.files import atomic_path
 from synfeal.validation.listing import read_depth_mm
+
+if TYPE_CHECKING:
+    from synfeal.mesh.rays import RayCaster
 
 Array = NDArray[np.float64]
 
@@ -137,6 +139,10 @@ def depth_of_images(paths: Iterable[FrameFile], camera: CameraConfig) -> Iterato
 
 def write_scene_depth(collision: Path, plan: Path, camera: CameraConfig, out_depth: Path) -> None:
     """Write what planned frames show, as depths of a collision mesh."""
+    # Scoring does without them.
+    from synfeal.mesh.rays import RayCaster
+    from synfeal.mesh.triangles import load_collision_mesh
+
     caster = RayCaster(*load_collision_mesh(collision))
     poses = read_pose_table(plan).world_from_cam
     write_cell_depth(out_depth, cell_depth_m(caster, camera, poses))

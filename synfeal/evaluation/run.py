@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from synfeal.bootstrap import FEWEST_PATHS
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.errors import InputError, why
+from synfeal.evaluation.bootstrap import FEWEST_PATHS
 from synfeal.evaluation.estimates import CONVENTIONS, Convention, Estimates, checked_convention
 from synfeal.evaluation.formats import read_estimates
 from synfeal.evaluation.frames import ScoredFrames, match, read_scored_frames
@@ -132,7 +132,7 @@ def aligned(poses: Array, reference: Array, align: Align, path: Path) -> tuple[A
     try:
         scale, rotation, translation = umeyama_sim3(*pair, with_scale=align == "sim3")
     except ValueError as error:
-        raise InputError(f"{path}: cannot be aligned ({why(error)}); give --align none") from None
+        raise InputError(f"{path}: cannot be aligned ({why(error)}); give --align none") from error
     moved = poses.copy()
     moved[:, :3, :3] = rotation @ poses[:, :3, :3]
     moved[:, :3, 3] = scale * poses[:, :3, 3] @ rotation.T + translation

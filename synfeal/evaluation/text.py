@@ -20,7 +20,7 @@ from synfeal.evaluation.metrics import (
 )
 from synfeal.evaluation.reprojection import DCRE_BOUNDS
 from synfeal.evaluation.run import Evaluation, Settings
-from synfeal.files import atomic_path
+from synfeal.records.files import atomic_path
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -26,7 +26,7 @@ from synfeal.validation.listing import (
     read_depth_mm,
 )
 from synfeal.validation.manifest import check_splits, read_splits
-from synfeal.validation.poses import check_rigid
+from synfeal.validation.poses import check_rigid, check_tables
 
 # Links or copies the image of a frame.
 Place = Callable[[FrameFile, Path], None]
@@ -91,6 +91,7 @@ def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
     problems = check_names(sequences).failures + check_rigid(poses, unreadable).failures
     if any((dataset / name).exists() for name in SPLIT_FILES.values()):
         problems += check_splits(dataset, sequences, splits, split_failures).failures
+        problems += check_tables(dataset, poses, splits).failures
     split_of = {s.path: split for split, listed in splits.items() for s in listed}
     if problems:
         raise InputError(f"{problems[0]}; synfeal validate says more")

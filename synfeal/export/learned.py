@@ -37,8 +37,8 @@ from synfeal.export.frames import (
     rewrite_depth,
     write_lines,
 )
-from synfeal.files import write_json
 from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.records.files import write_json
 
 
 def export_ace(data: ExportSet, out: Path, place: Place) -> None:

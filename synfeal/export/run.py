@@ -12,7 +12,7 @@ from synfeal.dataset.frame_files import FrameFile, link_or_unpack
 from synfeal.export.frames import ExportSet, Place, read_export_set
 from synfeal.export.learned import export_ace, export_mstransformer, export_nerfstudio
 from synfeal.export.reconstruction import export_colmap, export_hloc, export_tum
-from synfeal.files import atomic_directory, refuse_existing
+from synfeal.records.files import atomic_directory, refuse_existing
 
 Exporter = Callable[[ExportSet, Path, Place], None]
 

@@ -18,7 +18,7 @@ from synfeal.geometry.rotations import (
 
 
 def pose_matrix(rotation: ArrayLike, position_m: ArrayLike) -> Array:
-    """Poses (..., 4, 4) from rotations (..., 3, 3) and positions (..., 3)."""
+    """Build poses (..., 4, 4) from rotations (..., 3, 3) and positions (..., 3)."""
     rotation = np.asarray(rotation, dtype=np.float64)
     pose = np.zeros((*rotation.shape[:-2], 4, 4))
     pose[..., :3, :3] = rotation
@@ -28,24 +28,27 @@ def pose_matrix(rotation: ArrayLike, position_m: ArrayLike) -> Array:
 
 
 def pose_from_quat(position_m: ArrayLike, quat_wxyz: ArrayLike) -> Array:
-    """Poses (..., 4, 4) from positions (..., 3) and quaternions (..., 4)."""
+    """Build poses (..., 4, 4) from positions (..., 3) and quaternions (..., 4)."""
     return pose_matrix(matrix_from_quat_wxyz(quat_wxyz), position_m)
 
 
 def quat_wxyz_of(pose: ArrayLike) -> Array:
-    """Quaternions (..., 4) of the rotations of poses (..., 4, 4)."""
+    """Return quaternions (..., 4) of the rotations of poses (..., 4, 4)."""
     return quat_wxyz_from_matrix(np.asarray(pose)[..., :3, :3])
 
 
 def inverse(pose: ArrayLike) -> Array:
-    """``cam_from_world`` (..., 4, 4) of ``world_from_cam``: transposes, never a general inverse."""
+    """Invert rigid motions (..., 4, 4): ``cam_from_world`` of ``world_from_cam``."""
     pose = np.asarray(pose, dtype=np.float64)
     rotation_t = np.swapaxes(pose[..., :3, :3], -1, -2)
     return pose_matrix(rotation_t, -(rotation_t @ pose[..., :3, 3:])[..., 0])
 
 
 def relative(world_from_a: ArrayLike, world_from_b: ArrayLike) -> Array:
-    """``a_from_b`` (..., 4, 4); subtracts positions first, so it is exact far from the origin."""
+    """Return ``a_from_b`` (..., 4, 4).
+
+    Positions are subtracted first, which keeps precision far from the origin.
+    """
     a = np.asarray(world_from_a, dtype=np.float64)
     b = np.asarray(world_from_b, dtype=np.float64)
     rotation_t = np.swapaxes(a[..., :3, :3], -1, -2)
@@ -54,7 +57,10 @@ def relative(world_from_a: ArrayLike, world_from_b: ArrayLike) -> Array:
 
 
 def interpolate(pose_a: ArrayLike, pose_b: ArrayLike, fraction: ArrayLike) -> Array:
-    """Poses (N, 4, 4) at fractions (N,) from a to b: straight line, constant angular velocity."""
+    """Interpolate poses (N, 4, 4) at fractions (N,) from a to b.
+
+    Positions follow a straight line, rotations turn at constant angular velocity.
+    """
     a, b = np.asarray(pose_a, dtype=np.float64), np.asarray(pose_b, dtype=np.float64)
     fraction = np.atleast_1d(np.asarray(fraction, dtype=np.float64))
     position = a[:3, 3] + fraction[:, None] * (b[:3, 3] - a[:3, 3])
@@ -62,13 +68,13 @@ def interpolate(pose_a: ArrayLike, pose_b: ArrayLike, fraction: ArrayLike) -> Ar
 
 
 def position_error_m(position_a_m: ArrayLike, position_b_m: ArrayLike) -> Array:
-    """Euclidean distances (...) between positions (..., 3)."""
+    """Return Euclidean distances (...) between positions (..., 3)."""
     offset = np.asarray(position_a_m) - np.asarray(position_b_m)
     return np.asarray(np.linalg.norm(offset, axis=-1))
 
 
 def pose_error(pose_a: ArrayLike, pose_b: ArrayLike) -> tuple[Array, Array]:
-    """Position error in metres and orientation error in radians between poses (..., 4, 4)."""
+    """Return position errors (m) and orientation errors (rad) between poses (..., 4, 4)."""
     a, b = np.asarray(pose_a, dtype=np.float64), np.asarray(pose_b, dtype=np.float64)
     position = position_error_m(a[..., :3, 3], b[..., :3, 3])
     return position, rotation_angle_rad(quat_wxyz_of(a), quat_wxyz_of(b))
@@ -77,8 +83,9 @@ def pose_error(pose_a: ArrayLike, pose_b: ArrayLike) -> tuple[Array, Array]:
 def umeyama_sim3(
     source: ArrayLike, target: ArrayLike, with_scale: bool = True
 ) -> tuple[float, Array, Array]:
-    """Scale, rotation (3, 3) and translation (3,) with ``target = scale * rotation @ source + t``.
+    """Fit scale, rotation (3, 3) and translation t (3,) that map source to target points.
 
+    The model is ``target = scale * rotation @ source + t``.
     Least squares over point pairs (N, 3), N >= 3 and not collinear (Umeyama, PAMI 1991, eq. 39-42).
     Without ``with_scale`` the scale is 1.
 
@@ -103,7 +110,7 @@ def umeyama_sim3(
 
 
 def _collinear(points: Array) -> bool:
-    """Whether points (N, 3) lie on a line, or as near to one as their rounding can tell."""
+    """Check whether points (N, 3) lie on a line up to rounding."""
     spread = np.linalg.svd(points - points.mean(0), compute_uv=False)
     rounding = 4.0 * np.finfo(float).eps * np.sqrt(len(points)) * np.abs(points).max()
     return bool(spread[1] <= max(1e-9 * spread[0], rounding))

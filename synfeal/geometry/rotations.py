@@ -13,7 +13,10 @@ BODY_FROM_CAM: Array = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 
 
 
 def canonical_quat_wxyz(quat_wxyz: ArrayLike) -> Array:
-    """Unit quaternions (..., 4) with w >= 0; if w is 0, the first non-zero one is positive."""
+    """Normalise quaternions (..., 4) to unit length and w >= 0.
+
+    If w is 0, the first non-zero component is made positive.
+    """
     quat = np.array(quat_wxyz, dtype=np.float64)
     quat /= np.linalg.norm(quat, axis=-1, keepdims=True)
     first_nonzero = np.argmax(quat != 0.0, axis=-1)[..., None]
@@ -22,21 +25,21 @@ def canonical_quat_wxyz(quat_wxyz: ArrayLike) -> Array:
 
 
 def quat_wxyz_from_matrix(rotation: ArrayLike) -> Array:
-    """Quaternions (..., 4) of the rotations nearest to the matrices (..., 3, 3)."""
+    """Return quaternions (..., 4) of the rotations nearest to the matrices (..., 3, 3)."""
     matrices = np.asarray(rotation, dtype=np.float64)
     flat = Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_quat(scalar_first=True)
     return canonical_quat_wxyz(flat).reshape(*matrices.shape[:-2], 4)
 
 
 def matrix_from_quat_wxyz(quat_wxyz: ArrayLike) -> Array:
-    """Rotation matrices (..., 3, 3) of quaternions (..., 4), which need not have unit length."""
+    """Return rotation matrices (..., 3, 3) of quaternions (..., 4) of any length but zero."""
     quat = np.asarray(quat_wxyz, dtype=np.float64)
     flat = Rotation.from_quat(quat.reshape(-1, 4), scalar_first=True).as_matrix()
     return np.asarray(flat, dtype=np.float64).reshape(*quat.shape[:-1], 3, 3)
 
 
 def rotation_angle_rad(quat_a_wxyz: ArrayLike, quat_b_wxyz: ArrayLike) -> Array:
-    """Geodesic angle (...) in [0, pi] between two rotations; q and -q are the same rotation.
+    """Return geodesic angles (...) in [0, pi] between rotations; q and -q are the same one.
 
     Uses atan2 of the relative quaternion, which keeps full precision near 0 and near pi where
     arccos of a dot product loses half of the digits.
@@ -50,7 +53,7 @@ def rotation_angle_rad(quat_a_wxyz: ArrayLike, quat_b_wxyz: ArrayLike) -> Array:
 
 
 def rotation_from_rpy(rpy_rad: ArrayLike) -> Array:
-    """``world_from_cam`` rotations (..., 3, 3) from roll, pitch and yaw (..., 3) of the body.
+    """Return ``world_from_cam`` rotations (..., 3, 3) from body roll, pitch and yaw (..., 3).
 
     ``Rz(yaw) Ry(pitch) Rx(roll)`` turns the body; at zero the camera looks along world x, upright.
     """
@@ -60,7 +63,7 @@ def rotation_from_rpy(rpy_rad: ArrayLike) -> Array:
 
 
 def slerp_quat_wxyz(quat_a_wxyz: ArrayLike, quat_b_wxyz: ArrayLike, fraction: ArrayLike) -> Array:
-    """Shortest-arc interpolation (N, 4) between two quaternions (4,) at fractions (N,)."""
+    """Interpolate quaternions (N, 4) on the shortest arc between two (4,) at fractions (N,)."""
     a = Rotation.from_quat(np.asarray(quat_a_wxyz, dtype=np.float64), scalar_first=True)
     b = Rotation.from_quat(np.asarray(quat_b_wxyz, dtype=np.float64), scalar_first=True)
     step = (b * a.inv()).as_rotvec()

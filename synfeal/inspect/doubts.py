@@ -9,7 +9,7 @@ from typing import Self, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import SceneConfig
+from synfeal.config.collection import SceneConfig
 from synfeal.inspect.freespace import FreeSpace, survey, viewpoint
 from synfeal.inspect.suggest import Suggestion, suggest
 from synfeal.inspect.surface import SurfacePoints, triangle_areas_m2
@@ -18,7 +18,7 @@ from synfeal.mesh.load import is_y_up, load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.planning.plan import sampling_box_of
-from synfeal.provenance import generator_of
+from synfeal.records.provenance import generator_of
 
 Array = NDArray[np.float64]
 

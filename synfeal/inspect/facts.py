@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from trimesh.triangles import cross
 
 import synfeal
-from synfeal.files import file_sha256
 from synfeal.inspect.doubts import (
     Inspection,
     colour_doubts,
@@ -28,6 +27,7 @@ from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.properties import mesh_properties, mesh_topology
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import merge_vertices
+from synfeal.records.files import file_sha256
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from synfeal.config.models import CameraConfig, SceneConfig
-from synfeal.files import atomic_path, refuse_foreign, write_json
+from synfeal.config.collection import SceneConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.geometry.poses import pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.inspect.doubts import Inspection
@@ -25,6 +25,7 @@ from synfeal.inspect.surface import ACROSS_RAD, viewer_mesh
 from synfeal.inspect.text import Facts, how_to_go_on, page_html, plain_text, sections_of
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
+from synfeal.records.files import atomic_path, refuse_foreign, write_json
 from synfeal.render import open_renderer
 
 Array = NDArray[np.float64]

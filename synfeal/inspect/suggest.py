@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import Box, CameraConfig, CollectionConfig, SceneConfig
+from synfeal.config.collection import Box, CollectionConfig, SceneConfig
+from synfeal.config.dataset import CameraConfig
+from synfeal.config.options import SCENE
 from synfeal.errors import InputError
 from synfeal.inspect.freespace import (
     CAMERA_HEIGHT_M,
@@ -21,8 +23,7 @@ from synfeal.inspect.freespace import (
 from synfeal.mesh.rays import RayCaster
 from synfeal.planning.coverage import EmptyPixels, empty_pixels
 from synfeal.planning.plan import plan_split
-from synfeal.provenance import generator_of
-from synfeal.settings import SCENE
+from synfeal.records.provenance import generator_of
 
 Array = NDArray[np.float64]
 

@@ -53,7 +53,7 @@ def check_indices(part: MeshPart, path: Path) -> None:
 
 
 def shows_one_colour(mesh: TexturedMesh) -> bool:
-    """Whether every image of the mesh would be of one colour, whatever textures it has."""
+    """Check whether every image of the mesh would be of one colour, whatever textures it has."""
     colours = np.concatenate([_extreme_colours(part) for part in mesh.parts])
     return bool(np.ptp(colours, axis=0).max() <= LEVELS)
 
@@ -195,7 +195,7 @@ def _count(findings: Findings, part: MeshPart, count: int, kind: str, what: str)
 
 
 def _without_area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which faces (F,) are a point or a line; a thin sliver is neither, however small."""
+    """Mark faces (F,) that are a point or a line; a thin sliver is neither, however small."""
     corners = vertices[faces]
     edges = np.roll(corners, -1, axis=1) - corners
     lengths = np.linalg.norm(edges, axis=2)

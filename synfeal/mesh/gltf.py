@@ -71,7 +71,7 @@ def _parse_json(path: Path, text: bytes) -> Json:
     except (ValueError, RecursionError) as error:  # also what is not UTF-8
         raise InputError(
             f"{path}: cannot be read as a mesh (its JSON is broken: {why(error)}); export it again"
-        ) from None
+        ) from error
     if not isinstance(header, dict) or not isinstance(header.get("asset"), dict):
         raise InputError(f"{path}: cannot be read as a mesh (its JSON is not that of a glTF)")
     version = str(header["asset"].get("version", "2.0"))

@@ -53,17 +53,17 @@ def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> Text
     try:
         world_from_file = WORLD_FROM_Y_UP if is_y_up(path, up_axis) else np.eye(3)
         parts = _read_parts(path, gltf, unit_m * world_from_file, findings)
-    except InputError:
+    except (InputError, MemoryError):
         raise
     except Exception as error:  # parsers of foreign files fail in every way there is
-        raise InputError(f"{path}: cannot be read as a mesh ({why(error)})") from None
+        raise InputError(f"{path}: cannot be read as a mesh ({why(error)})") from error
     mesh = TexturedMesh(parts, findings.sentences)
     checks.check_mesh(mesh, path)
     return mesh
 
 
 def is_y_up(path: Path, up_axis: UpAxis) -> bool:
-    """Whether y points up in a file; ``auto`` goes by its kind."""
+    """Check whether y points up in a file; ``auto`` means y up for glTF only."""
     return path.suffix.lower() in GLTF_SUFFIXES if up_axis == "auto" else up_axis == "y"
 
 

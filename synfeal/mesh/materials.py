@@ -63,7 +63,7 @@ class MaterialReader:
         self._known: dict[int, BaseMaterial] = {}
 
     def read(self, material: Any) -> BaseMaterial:
-        """What a trimesh material amounts to."""
+        """Reduce a trimesh material to its base colour, once per material."""
         if id(material) not in self._known:
             reduced = self._from_mtl if self._header is None else self._from_gltf
             self._known[id(material)] = reduced(material)
@@ -123,7 +123,7 @@ class MaterialReader:
 
 
 def is_opaque(texture: Pixels | None, base: Pixels) -> bool:
-    """Whether no texel lets anything through."""
+    """Check whether texture and base colour are fully opaque."""
     texture_opaque = texture is None or texture.shape[2] == 3 or texture[..., 3].min() == 255
     return bool(texture_opaque and base[3] == 255)
 

@@ -1,4 +1,4 @@
-"""What the simulator knows of a scene: triangles with one base colour source per part."""
+"""Model of a scene: triangles with one base colour source per part."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class MeshPart:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether any fragment can pass the alpha test; light shafts and the like never do."""
+        """Check whether any fragment can pass the alpha test; those of light shafts never do."""
         if self.alpha_cutoff is None:
             return True
         alpha = self.base_color[3] / 255.0

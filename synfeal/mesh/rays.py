@@ -56,9 +56,11 @@ class RayCaster:
         return np.where(face >= 0, hit["tfar"].astype(np.float64), np.inf), face
 
     def first_hit_m(self, origins: ArrayLike, directions: ArrayLike) -> NDArray[np.float64]:
-        """Distances (N,) in metres to the first triangle on each ray, ``inf`` where there is none.
+        """Return distances (N,) in metres to the first triangle on each ray, ``inf`` if none.
 
-        Takes what :meth:`first_hits` takes.
+        Args:
+            origins: Starts of the rays (N, 3), world, metres.
+            directions: Directions (N, 3) of any length but zero.
         """
         starts = self._starts(origins)
         limit_m = np.full(len(starts), np.inf, dtype=np.float32)
@@ -66,7 +68,14 @@ class RayCaster:
         return np.asarray(hit_m, dtype=np.float64)
 
     def sees(self, origins: ArrayLike, targets: ArrayLike) -> NDArray[np.bool_]:
-        """Whether the straight line between each of two points (N, 3) is free, (N,).
+        """Check whether nothing blocks the line from each origin to its target.
+
+        Args:
+            origins: Points (N, 3), world, metres.
+            targets: Points (N, 3), world, metres.
+
+        Returns:
+            True (N,) where the line is free.
 
         A point sees itself. Any hit on the line settles it, which is several times faster to find
         than the first.

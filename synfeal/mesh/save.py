@@ -15,10 +15,10 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from synfeal.errors import InputError
-from synfeal.files import atomic_path
 from synfeal.mesh.load import WORLD_FROM_Y_UP
 from synfeal.mesh.materials import SRGB_ATTRIBUTE, linear_from_srgb
 from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.records.files import atomic_path
 
 FLOAT32_BITS = 24  # of the mantissa
 

@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.errors import InputError, why
-from synfeal.files import atomic_path
 from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.records.files import atomic_path
 
 PLY_HEADER = """\
 ply
@@ -73,6 +72,8 @@ def load_collision_mesh(path: Path) -> Triangles:
         InputError: the file is missing, is no PLY with faces, or holds faces without vertices or
             vertices that are not finite.
     """
+    import trimesh  # half a second to load, and needed by jobs that read a mesh alone
+
     try:
         mesh = trimesh.load_mesh(str(path), process=False)
         found = Triangles(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64))
@@ -80,8 +81,10 @@ def load_collision_mesh(path: Path) -> Triangles:
         if not (found.faces.size and in_range.all() and np.isfinite(found.vertices_m).all()):
             raise ValueError("its faces or vertices are damaged; make the scene again")
         return found
+    except MemoryError:
+        raise
     except Exception as error:  # parsers of foreign files fail in every way there is
-        raise InputError(f"{path}: cannot be read as a collision mesh ({why(error)})") from None
+        raise InputError(f"{path}: cannot be read as a collision mesh ({why(error)})") from error
 
 
 def simplify(mesh: Triangles, n_faces: int) -> Triangles:
@@ -96,10 +99,10 @@ def simplify(mesh: Triangles, n_faces: int) -> Triangles:
     """
     try:
         import open3d as o3d  # a second to load, and needed by the workflow and by inspect alone
-    except ModuleNotFoundError:
+    except ModuleNotFoundError as error:
         raise InputError(
             "simplifying a mesh needs Open3D, which is not there; pip install 'synfeal[inspect]'"
-        ) from None
+        ) from error
 
     centre_m = mesh.vertices_m.mean(axis=0)  # far from the origin quadrics lose their digits
     full = o3d.geometry.TriangleMesh(

@@ -13,14 +13,15 @@ from scipy.spatial import cKDTree
 
 from synfeal.camera.distortion import fold_radius
 from synfeal.camera.projection import cell_directions, pixels_of_normalised
-from synfeal.config.models import CameraConfig, SceneConfig
+from synfeal.config.collection import SceneConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
-from synfeal.files import write_json
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, load_collision_mesh
 from synfeal.planning.plan import sampling_boxes_of
 from synfeal.planning.space import ConnectedSpace, PoseSpace, connected_space, pose_bounds
+from synfeal.records.files import write_json
 
 Array = NDArray[np.float64]
 

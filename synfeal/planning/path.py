@@ -9,12 +9,13 @@ testing one round at a time; the sizes of blocks and windows change the speed al
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import CollectionConfig
+from synfeal.config.collection import CollectionConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import interpolate, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
@@ -73,9 +74,10 @@ FIRST_WINDOW = 8  # candidates tested at once for a path; doubled while none is 
 class CandidateStream:
     """Rounds of candidates in the order they are drawn."""
 
-    def __init__(self, space: PoseSpace, candidates: int) -> None:
-        """Draw rounds of ``candidates`` poses."""
+    def __init__(self, space: PoseSpace, candidates: int, frame_spacing_m: float = np.inf) -> None:
+        """Draw rounds of ``candidates`` poses; frames of paths stand ``frame_spacing_m`` apart."""
         self._space, self._candidates = space, candidates
+        self._frame_spacing_m = frame_spacing_m
         self._poses = np.empty((0, candidates, 6))
         self._has_view = np.empty((0, candidates), np.bool_)
         self._at = 0
@@ -94,7 +96,9 @@ class CandidateStream:
                 self._draw()
             ahead = slice(self._at, self._at + min(window, max_rounds - tried))
             poses, has_view = self._poses[ahead], self._has_view[ahead]
-            found = farthest_admissible(self._space.caster, start, poses, has_view, min_path_m)
+            found = farthest_admissible(
+                self._space.caster, start, poses, has_view, min_path_m, self._clear_way(start)
+            )
             if found is not None:
                 self._at += found[0] + 1
                 target: NDArray[np.float64] = poses[found]
@@ -103,6 +107,18 @@ class CandidateStream:
             tried += len(poses)
             window *= 2
         return None
+
+    def _clear_way(self, start: Array) -> Callable[[Array], bool] | None:
+        """Return whether all frames from ``start`` (6,) to a target (6,) keep the clearance."""
+        clearance = self._space.clearance
+        if clearance is None:
+            return None
+
+        def is_clear(target: Array) -> bool:
+            n_frames = n_frames_of(start, target, self._frame_spacing_m)
+            return bool(clearance.keeps(path_vectors(start, target, n_frames)[:, :3]).all())
+
+        return is_clear
 
     def _draw(self) -> None:
         """Replace the block, which is used up, by the next."""
@@ -137,7 +153,8 @@ def independent_poses(space: PoseSpace, collection: CollectionConfig, n_frames: 
         n_empty = 0 if len(kept[-1]) else n_empty + 1
         if n_empty >= most_empty:
             raise InputError(
-                f"plan: no admissible pose among {n_empty * BLOCK} candidates; lower"
-                f" min_view_distance_m ({space.min_view_distance_m} m), or widen sampling_box"
+                f"plan: no admissible pose among {n_empty * BLOCK} candidates that looks farther"
+                f" than min_view_distance_m ({space.min_view_distance_m} m){space.also_asked};"
+                " lower it, or widen sampling_box"
             )
     return np.concatenate(kept)[:n_frames]

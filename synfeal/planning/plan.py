@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import Box, CollectionConfig, SceneConfig
+from synfeal.config.collection import Box, CollectionConfig, SceneConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.mesh.checks import check_sampling_box
+from synfeal.mesh.clearance import Clearance
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, load_collision_mesh
 from synfeal.planning.path import CandidateStream, independent_poses, path_poses, poses_of
@@ -48,7 +49,8 @@ def plan_mesh(
     """Plan one split in a mesh called ``name``; see :func:`plan_split`."""
     caster = RayCaster(*mesh)
     boxes = sampling_boxes_of(scene, caster.bounds_m, name)
-    return plan_split(caster, boxes, scene, collection, n_frames, rng, split)
+    clearance = Clearance(*mesh, scene.min_clearance_m) if scene.min_clearance_m > 0 else None
+    return plan_split(caster, boxes, scene, collection, n_frames, rng, split, clearance)
 
 
 def sampling_boxes_of(scene: SceneConfig, mesh_bounds_m: Array, name: str) -> Array:
@@ -83,6 +85,8 @@ def plan_split(
     n_frames: int,  # frames wanted, at least 1
     rng: np.random.Generator,  # the only source of randomness; not used to repeat
     split: str = "train",  # ``train`` or ``test``; which poses to repeat
+    # distance that cameras keep from surfaces, if any; not asked of poses that are repeated
+    clearance: Clearance | None = None,
 ) -> PoseTable:
     """Poses of ``n_frames`` frames of a split, as ``collection.mode`` says.
 
@@ -102,7 +106,7 @@ def plan_split(
     # One generator for each box, so that none shifts another's numbers.
     generators = [rng] if len(boxes) == 1 else rng.spawn(len(boxes))
     spaces = [
-        PoseSpace.of_scene(caster, box, scene, own)
+        PoseSpace.of_scene(caster, box, scene, own, clearance)
         for box, own in zip(boxes, generators, strict=True)
     ]
     if collection.mode == "random":
@@ -160,7 +164,7 @@ class _Turns:
 def _walk(space: PoseSpace, collection: CollectionConfig) -> Iterator[Array]:
     """Poses (n, 4, 4) of connected paths through one box: where one ends the next begins."""
     at = sample_start(space, collection.max_tries)  # itself no frame
-    stream = CandidateStream(space, collection.candidates)
+    stream = CandidateStream(space, collection.candidates, collection.frame_spacing_m)
     while True:
         target = stream.next_target(at, collection.min_path_m, collection.max_tries)
         if target is None:
@@ -168,10 +172,18 @@ def _walk(space: PoseSpace, collection: CollectionConfig) -> Iterator[Array]:
             raise InputError(
                 f"plan: no admissible target from ({where}) in {collection.max_tries} rounds of"
                 f" {collection.candidates} candidates; lower min_path_m ({collection.min_path_m} m)"
-                f" or min_view_distance_m ({space.min_view_distance_m} m), or widen sampling_box"
+                f" or min_view_distance_m ({space.min_view_distance_m} m){_or_clearance(space)},"
+                " or widen sampling_box"
             )
         yield path_poses(at, target, collection.frame_spacing_m, collection.interpolation)
         at = target
+
+
+def _or_clearance(space: PoseSpace) -> str:
+    """Name the clearance among what may be lowered, if there is one."""
+    if space.clearance is None:
+        return ""
+    return f" or min_clearance_m ({space.clearance.min_clearance_m} m)"
 
 
 def _table(paths: list[Array], n_frames: int) -> PoseTable:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.pose_table import PoseTable, check_unit, read_pose_table
-from synfeal.dataset.sevenscenes import SPLIT_FILES, frame_paths, read_pose, read_split
+from synfeal.dataset.sequence_listing import POSE, list_sequence
+from synfeal.dataset.sevenscenes import SPLIT_FILES, read_pose, read_split
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.geometry.rotations import canonical_quat_wxyz
@@ -47,13 +48,13 @@ def repeated_poses(
 def read_poses(source: Path, split: str) -> PoseTable:
     """Poses ``world_from_cam`` of a split (``train`` or ``test``), numbered from 0.
 
-    ``source`` is a data set of :mod:`synfeal.collection`, a 7-Scenes data set, a directory
+    ``source`` is a data set of :mod:`synfeal.collection.run`, a 7-Scenes data set, a directory
     of its frames (``frame-XXXXXX.pose.txt``), a pose table (``.csv``) or a trajectory in the
     format of the TUM benchmark (``.txt``). The last three hold one list of poses, which is the
     training split. Each sequence and each trajectory is one path, where no table says otherwise.
     """
     if (source / f"{split}.csv").is_file():
-        return _read_table(source / f"{split}.csv")
+        return read_pose_table(source / f"{split}.csv")
     if (source / SPLIT_FILES[split]).is_file():
         return _read_frames(read_split(source, split), source)
     if split != "train":
@@ -71,8 +72,8 @@ def read_poses(source: Path, split: str) -> PoseTable:
 
 
 def _read_table(path: Path) -> PoseTable:
-    """A pose table, its values as they are."""
-    table = read_pose_table(path)
+    """A pose table of one's own, numbered anew: nothing is paired with its rows."""
+    table = read_pose_table(path, any_frames=True)
     return PoseTable(np.arange(len(table)), table.path, table.position_m, table.quat_wxyz)
 
 
@@ -80,7 +81,10 @@ def _read_frames(directories: list[Path], source: Path) -> PoseTable:
     """The poses of 7-Scenes sequences, each a path."""
     if not directories:
         raise InputError(f"{source}: the list of its sequences is empty")
-    files = [frame_paths([directory], "pose.txt") for directory in directories]
+    files = [list_sequence(directory).files(POSE) for directory in directories]
+    for directory, sequence in zip(directories, files, strict=True):
+        if not sequence:
+            raise InputError(f"{directory}: holds no frame-XXXXXX.{POSE}; render it again")
     poses = np.array([_rigid(path) for sequence in files for path in sequence])
     path = np.repeat(np.arange(len(files)), [len(sequence) for sequence in files])
     return PoseTable(np.arange(len(poses)), path, poses[:, :3, 3].copy(), quat_wxyz_of(poses))

@@ -6,6 +6,7 @@ asked of it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
@@ -14,8 +15,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from synfeal.config.models import Angles, SceneConfig
+from synfeal.config.collection import Angles, SceneConfig
 from synfeal.errors import InputError
+from synfeal.geometry.rotations import rotation_from_rpy
+from synfeal.mesh.clearance import Clearance
 from synfeal.mesh.rays import RayCaster
 
 Array = NDArray[np.float64]
@@ -58,6 +61,30 @@ def has_free_view(
     return np.asarray((distance > min_view_distance_m) & np.isfinite(distance), dtype=np.bool_)
 
 
+# Tangents of the view's half angles, and rays of it: its edge counts, its corners do not.
+VIEW_TANGENT, VIEW_RAYS = (np.tan(np.deg2rad(25.0)), np.tan(np.deg2rad(20.0))), (6, 5)
+
+
+def seen_shares(caster: RayCaster, poses: PoseVectors) -> Array:
+    """Measure how much of what poses look at is there.
+
+    Args:
+        caster: Rays against the mesh.
+        poses: Pose vectors (N, 6).
+
+    Returns:
+        Shares (N,) of a view of 50 x 40 degrees, whatever the camera, that meet the mesh.
+    """
+    columns, rows = VIEW_RAYS
+    x = ((np.arange(columns) + 0.5) / columns * 2.0 - 1.0) * VIEW_TANGENT[0]
+    y = ((np.arange(rows) + 0.5) / rows * 2.0 - 1.0) * VIEW_TANGENT[1]
+    rays = np.stack([*np.meshgrid(x, y), np.ones((rows, columns))], axis=-1).reshape(-1, 3)
+    turned = np.einsum("nij,rj->nri", rotation_from_rpy(poses[:, 3:]), rays)
+    starts = np.broadcast_to(poses[:, None, :3], turned.shape)
+    hit_m = caster.first_hit_m(starts.reshape(-1, 3), turned.reshape(-1, 3))
+    return np.asarray(np.isfinite(hit_m).reshape(len(poses), -1).mean(axis=1))
+
+
 def admissible(
     caster: RayCaster, start: Array, poses: PoseVectors, min_view_distance_m: float
 ) -> NDArray[np.bool_]:
@@ -77,6 +104,8 @@ def farthest_admissible(
     rounds: PoseVectors,  # (R, k, 6) rounds of candidates
     has_view: NDArray[np.bool_],  # (R, k) which have a free view, see :func:`has_free_view`
     min_path_m: float,  # least length of a path
+    # whether the way from the start to a target (6,) is wide enough; None: every one is
+    is_clear_way: Callable[[Array], bool] | None = None,
 ) -> tuple[int, int] | None:
     """Index of the first round with an admissible candidate, and there of the farthest.
 
@@ -87,10 +116,13 @@ def farthest_admissible(
     fit = has_view & (length_m >= min_path_m)
     ends = rounds[fit, :3]
     fit[fit] = caster.sees(np.broadcast_to(start[:3], ends.shape), ends)
-    if not fit.any():
-        return None
-    first = int(np.argmax(fit.any(axis=1)))
-    return first, int(np.argmax(np.where(fit[first], length_m[first], -1.0)))
+    while fit.any():
+        first = int(np.argmax(fit.any(axis=1)))
+        farthest = int(np.argmax(np.where(fit[first], length_m[first], -1.0)))
+        if is_clear_way is None or is_clear_way(rounds[first, farthest]):
+            return first, farthest
+        fit[first, farthest] = False
+    return None
 
 
 @dataclass(frozen=True)
@@ -101,21 +133,48 @@ class PoseSpace:
     bounds: Array  # (2, 6) least and greatest value of each element of a pose vector
     min_view_distance_m: float  # least free view, the paper's ``d``
     rng: np.random.Generator  # where samples come from; each takes the next numbers
+    min_seen: float = 0.0  # least share of the view that meets the mesh, see :func:`seen_shares`
+    clearance: Clearance | None = None  # distance that cameras keep from surfaces, if any
 
     @classmethod
     def of_scene(
-        cls, caster: RayCaster, box_m: Array, scene: SceneConfig, rng: np.random.Generator
+        cls,
+        caster: RayCaster,
+        box_m: Array,
+        scene: SceneConfig,
+        rng: np.random.Generator,
+        clearance: Clearance | None = None,
     ) -> Self:
         """Of a box (2, 3), with the angles and the view distance of a scene."""
-        return cls(caster, pose_bounds(box_m, scene.angles), scene.min_view_distance_m, rng)
+        bounds = pose_bounds(box_m, scene.angles)
+        return cls(
+            caster=caster,
+            bounds=bounds,
+            min_view_distance_m=scene.min_view_distance_m,
+            rng=rng,
+            min_seen=scene.min_seen or 0.0,
+            clearance=clearance,
+        )
+
+    @property
+    def also_asked(self) -> str:
+        """Name the clearance in messages about poses that were not found, if there is one."""
+        if self.clearance is None:
+            return ""
+        return f" and keeps min_clearance_m ({self.clearance.min_clearance_m} m) from surfaces"
 
     def sample(self, count: int) -> PoseVectors:
         """Pose vectors (count, 6), uniform within the bounds."""
         return sample_poses(self.bounds, count, self.rng)
 
     def has_free_view(self, poses: PoseVectors) -> NDArray[np.bool_]:
-        """Which poses (N, 6) look far enough, (N,)."""
-        return has_free_view(self.caster, poses, self.min_view_distance_m)
+        """Which poses (N, 6) look far enough, at enough, and stand clear of surfaces, (N,)."""
+        good = has_free_view(self.caster, poses, self.min_view_distance_m)
+        if self.min_seen > 0.0:
+            good[good] = seen_shares(self.caster, poses[good]) >= self.min_seen
+        if self.clearance is not None:
+            good[good] = self.clearance.keeps(poses[good, :3])
+        return good
 
 
 N_POSES = 64
@@ -149,7 +208,8 @@ def largest_group(space: PoseSpace, max_tries: int, n_poses: int) -> PoseVectors
     if not len(found):
         raise InputError(
             f"plan: no pose in the sampling box looks farther than min_view_distance_m"
-            f" ({space.min_view_distance_m} m); lower it, or check sampling_box, unit_m and up_axis"
+            f" ({space.min_view_distance_m} m){space.also_asked}; lower it, or check sampling_box,"
+            " unit_m and up_axis"
         )
     group = seeing_groups(space.caster, found[:, :3])
     largest: PoseVectors = found[group == np.bincount(group).argmax()]

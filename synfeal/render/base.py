@@ -9,7 +9,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.mesh.model import MeshPart
 
 Rgb = NDArray[np.uint8]
@@ -33,6 +33,10 @@ class Renderer(Protocol):
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
         """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
         ...
+
+    def render_depth(self, world_from_cam: NDArray[np.float64]) -> Depth:
+        """Depth (H, W) as :meth:`render_rgbd` gives it, without colours where that is cheaper."""
+        return self.render_rgbd(world_from_cam)[1]
 
     def close(self) -> None:
         """Give the mesh's memory back; the renderer must not be used afterwards."""

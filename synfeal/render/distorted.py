@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from synfeal.camera.projection import normalised_of_pixels
-from synfeal.config.models import CameraConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.errors import InputError
 from synfeal.render.base import Depth, Renderer, Rgb
 
@@ -51,6 +51,10 @@ class DistortedRenderer(Renderer):
         """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
         rgb, depth_m = self._inner.render_rgbd(world_from_cam)
         return self._resampled(rgb), resampled_depth(depth_m, *self._depth_taps)
+
+    def render_depth(self, world_from_cam: NDArray[np.float64]) -> Depth:
+        """Depth (H, W) alone: metres along the optical axis, inf for nothing."""
+        return resampled_depth(self._inner.render_depth(world_from_cam), *self._depth_taps)
 
     def close(self) -> None:
         """Close the inner renderer."""

@@ -22,7 +22,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import TexturedMesh
@@ -125,6 +125,11 @@ class OpenglRenderer(Renderer):
         clip_from_mesh = self._clip_from_mesh(world_from_cam)
         with self._context:
             return self._draw_colour(clip_from_mesh), self._draw_depth(clip_from_mesh)
+
+    def render_depth(self, world_from_cam: NDArray[np.float64]) -> Depth:
+        """Depth (H, W) alone: metres along the optical axis, inf for nothing."""
+        with self._context:
+            return self._draw_depth(self._clip_from_mesh(world_from_cam))
 
     def _clip_from_mesh(self, world_from_cam: NDArray[np.float64]) -> NDArray[np.float64]:
         centred = np.array(world_from_cam, np.float64)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render.base import DEFAULTS, SHADERS, Depth, Renderer, Rgb, pieces, thresholded
 
@@ -78,17 +78,24 @@ class PyrenderRenderer(Renderer):
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         """Colours (H, W, 3) seen from a pose (4, 4)."""
-        centred = np.array(world_from_cam, np.float64)
-        centred[:3, 3] -= self._centre_m
-        self._scene.set_pose(self._camera, centred @ CAM_FROM_GL)
+        self._look_from(world_from_cam)
         samples = self._drawn(self._colour, self._supersampling, self._background)
         return mean_of_samples(samples, self._supersampling)
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
         """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
-        rgb = self.render(world_from_cam)
+        return self.render(world_from_cam), self.render_depth(world_from_cam)
+
+    def render_depth(self, world_from_cam: NDArray[np.float64]) -> Depth:
+        """Depth (H, W) alone: metres along the optical axis, inf for nothing."""
+        self._look_from(world_from_cam)
         depth_m = self._drawn(self._depth, 1, np.zeros(4))[..., 0]
-        return rgb, np.where(depth_m > 0.0, depth_m, np.float32(np.inf))
+        return np.where(depth_m > 0.0, depth_m, np.float32(np.inf))
+
+    def _look_from(self, world_from_cam: NDArray[np.float64]) -> None:
+        centred = np.array(world_from_cam, np.float64)
+        centred[:3, 3] -= self._centre_m
+        self._scene.set_pose(self._camera, centred @ CAM_FROM_GL)
 
     def _drawn(self, one_pass: _Pass, factor: int, background: NDArray[np.float64]) -> Any:
         """What a pass makes of the scene, ``factor`` times as large as the image (H, W, C)."""

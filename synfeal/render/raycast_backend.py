@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.config.models import CameraConfig, RenderConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.mesh.model import TexturedMesh
 from synfeal.render.base import DEFAULTS, Depth, Renderer, Rgb
 from synfeal.render.raycast_triangles import Floats, Points, TexturedTriangles, View

@@ -15,8 +15,10 @@ from synfeal.dataset.finish import MANIFEST
 from synfeal.errors import InputError
 from synfeal.validation.manifest import read_manifest
 
-# Depth and colour of 7-Scenes come from a Kinect; its authors give this for both.
-SEVEN_SCENES = CameraConfig(width=640, height=480, fx=585.0, fy=585.0, cx=320.0, cy=240.0)
+# Depth and colour of 7-Scenes come from the two cameras of a Kinect. The focal length that its
+# authors give is that of depth; with that of colour photographs and depth agree (docs/scanning.md).
+SEVEN_SCENES = CameraConfig(width=640, height=480, fx=525.0, fy=525.0, cx=320.0, cy=240.0)
+SEVEN_SCENES_DEPTH = SEVEN_SCENES.model_copy(update={"fx": 585.0, "fy": 585.0})
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,12 @@ class KnownCamera:
     config: CameraConfig  # its intrinsics and distortion
     source: str  # for the report
     assumed: bool = False  # nothing says that this is the camera
+    of_depth: CameraConfig | None = None  # that of the depth images, where it is another one
+
+    @property
+    def depth(self) -> CameraConfig:
+        """The camera of the depth images."""
+        return self.of_depth or self.config
 
 
 def camera_of_dataset(dataset: Path, camera_file: Path | None) -> KnownCamera:
@@ -38,7 +46,9 @@ def camera_of_dataset(dataset: Path, camera_file: Path | None) -> KnownCamera:
         )
     path = dataset / MANIFEST
     if not path.exists():
-        return KnownCamera(SEVEN_SCENES, "assumed: that of 7-Scenes", assumed=True)
+        return KnownCamera(
+            SEVEN_SCENES, "assumed: that of 7-Scenes", assumed=True, of_depth=SEVEN_SCENES_DEPTH
+        )
     return KnownCamera(_config(path, read_manifest(dataset).get("camera")), MANIFEST)
 
 
@@ -46,7 +56,7 @@ def _config(path: Path, values: object) -> CameraConfig:
     try:
         return CameraConfig.model_validate(values)
     except ValidationError as error:
-        raise InputError(f"{path}: camera: {describe(error)}") from None
+        raise InputError(f"{path}: camera: {describe(error)}") from error
 
 
 Array = NDArray[np.float64]

@@ -14,7 +14,9 @@ from statistics import median_low
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
+from synfeal.camera.projection import normalised_of_pixels, pixels_of_normalised
 from synfeal.config.dataset import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
@@ -76,11 +78,11 @@ def check_consistency(
     on_pair: Callable[[], object],
 ) -> list[Check]:
     """Compare every pair; one check for each measure and one for the camera."""
-    config = camera.config
+    config = camera.depth
     step = max(1, round(math.sqrt(config.width * config.height / GRID_PIXELS)))
     lens = Lens(config, step)
     moved = [Lens(config, step, tuple(row)) for row in np.diag(DELTA).tolist()]
-    view = lru_cache(GAPS[-1] + 2)(lambda frame: _view(frame, poses[frame], config))
+    view = lru_cache(GAPS[-1] + 2)(lambda frame: _view(frame, poses[frame], camera))
     compared: list[Pair] = []
     system = np.zeros((len(DELTA), len(DELTA) + 1))
     for a, b in pairs:
@@ -102,18 +104,36 @@ def check_consistency(
     return [Check(check.name, f"{check.text}; {why}", skipped=True) for check in checks]
 
 
-def _view(frame: Frame, world_from_cam: NDArray[np.float64], camera: CameraConfig) -> View | None:
-    """The frame, None if it cannot be read or has another size: other checks say so."""
+def _view(frame: Frame, world_from_cam: NDArray[np.float64], camera: KnownCamera) -> View | None:
+    """The frame, None if it cannot be read or has another size: other checks say so.
+
+    Colours are those of the pixels of depth, whichever camera took them.
+    """
     try:
         depth_mm = read_depth_mm(frame.path(DEPTH))
         grey = read_color(frame.path(COLOR)).astype(np.float32) @ LUMA
     except InputError:
         return None
-    if not depth_mm.shape == grey.shape == (camera.height, camera.width):
+    if grey.shape != (camera.config.height, camera.config.width):
         return None
+    if depth_mm.shape != (camera.depth.height, camera.depth.width):
+        return None
+    if camera.of_depth is not None:
+        grey = _registered(grey, camera.config, camera.of_depth)
     known = (depth_mm > 0) & (depth_mm < 65535)
     depth_m = np.where(known, depth_mm.astype(np.float32) / 1000.0, np.float32(np.inf))
     return View(world_from_cam, depth_m, grey)
+
+
+def _registered(
+    grey: NDArray[np.float32], color: CameraConfig, depth: CameraConfig
+) -> NDArray[np.float32]:
+    """An image (H, W) of the colour camera at the pixels of a depth camera in the same place."""
+    column, row = np.meshgrid(np.arange(depth.width) + 0.5, np.arange(depth.height) + 0.5)
+    pixel = pixels_of_normalised(color, normalised_of_pixels(depth, np.stack([column, row], -1)))
+    places = pixel[..., ::-1].transpose(2, 0, 1) - 0.5  # rows and columns, the first at 0
+    resampled: NDArray[np.float32] = map_coordinates(grey, places, order=1, mode="nearest")
+    return resampled
 
 
 def _overlap_check(pairs: list[Pair], poses: Poses, camera: CameraConfig) -> Check:

@@ -44,7 +44,8 @@ def kinds_of(sequences: Iterable[SequenceListing]) -> tuple[str, ...]:
 def check_names(sequences: Sequence[SequenceListing]) -> Check:
     """Frames are numbered 0, 1, 2, ... and have a file of each kind."""
     kinds = kinds_of(sequences)
-    failures = [failure for sequence in sequences for failure in _gaps(sequence, kinds)]
+    failures = [problem for sequence in sequences for problem in sequence.problems]
+    failures += [failure for sequence in sequences for failure in _gaps(sequence, kinds)]
     n_frames = len(frames_of(sequences))
     text = f"{n_frames} frames in {len(sequences)} sequences, each with {', '.join(kinds)}"
     return Check("names", text, tuple(failures))

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import io
-import re
-from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,50 +11,32 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from synfeal.dataset.frame_files import (
-    IMAGE_DAMAGE,
-    SUFFIX,
-    FrameFile,
-    frame_file,
-    is_archive,
-    sequence_at,
-    sequence_names,
+from synfeal.dataset.frame_files import IMAGE_DAMAGE, SUFFIX, FrameFile, sequence_at
+from synfeal.dataset.sequence_listing import (
+    COLOR,
+    DEPTH,
+    POSE,
+    Frame,
+    SequenceListing,
+    frames_of,
+    is_sequence,
+    list_sequence,
 )
-from synfeal.errors import InputError, read_as, why
+from synfeal.errors import InputError, why
 
-COLOR, DEPTH, POSE = "color.png", "depth.png", "pose.txt"
-_FRAME = re.compile(r"frame-(\d{6,})\.(color\.png|depth\.png|pose\.txt)")
-
-
-@dataclass(frozen=True)
-class Frame:
-    """One frame: its sequence (``seq-01`` or ``seq-01.zip``) and its number in it."""
-
-    sequence: Path
-    number: int
-
-    def path(self, kind: str) -> FrameFile:
-        """The file of one kind."""
-        return frame_file(self.sequence, f"frame-{self.number:06d}.{kind}")
-
-
-@dataclass(frozen=True)
-class SequenceListing:
-    """The frames of one sequence, by kind of file."""
-
-    path: Path
-    numbers: dict[str, set[int]]
-
-    @property
-    def name(self) -> str:
-        """Name of the sequence: ``seq-01``, archived or not."""
-        return self.path.stem
-
-    @cached_property
-    def frames(self) -> tuple[Frame, ...]:
-        """All frames of which any file is there, in order."""
-        numbers = sorted(set[int]().union(*self.numbers.values()))
-        return tuple(Frame(self.path, number) for number in numbers)
+__all__ = [
+    "COLOR",
+    "DEPTH",
+    "POSE",
+    "Check",
+    "Frame",
+    "Pixels",
+    "SequenceListing",
+    "frames_of",
+    "list_sequences",
+    "read_color",
+    "read_depth_mm",
+]
 
 
 def list_sequences(dataset: Path) -> list[SequenceListing]:
@@ -70,25 +49,14 @@ def list_sequences(dataset: Path) -> list[SequenceListing]:
         raise InputError(f"{dataset}: is not a directory; give the directory that holds seq-01")
     names = {path.name.removesuffix(SUFFIX) for path in dataset.glob("seq-*")}
     paths = [sequence_at(dataset / name) for name in names if name[4:].isdecimal()]
-    found = [path for path in paths if path.is_dir() or is_archive(path)]
+    found = [path for path in paths if is_sequence(path)]
     if not found:
         raise InputError(
             f"{dataset}: holds no seq-01 and no seq-01{SUFFIX}; give the directory of a 7-Scenes"
             " data set"
         )
-    return [_list(path) for path in sorted(found, key=lambda path: (int(path.stem[4:]), path.stem))]
-
-
-def frames_of(sequences: Iterable[SequenceListing]) -> list[Frame]:
-    """All frames of several sequences, in order."""
-    return [frame for sequence in sequences for frame in sequence.frames]
-
-
-def _list(path: Path) -> SequenceListing:
-    with read_as(path, "a sequence", OSError):
-        found = [match for name in sequence_names(path) if (match := _FRAME.fullmatch(name))]
-    kinds = (COLOR, DEPTH, POSE)
-    return SequenceListing(path, {k: {int(m[1]) for m in found if m[2] == k} for k in kinds})
+    found.sort(key=lambda path: (int(path.stem[4:]), path.stem))
+    return [list_sequence(path) for path in found]
 
 
 @dataclass(frozen=True)
@@ -144,8 +112,8 @@ def _decoded(path: FrameFile) -> Image.Image:
             image.verify()
         decoded = Image.open(io.BytesIO(content), formats=["PNG"])
         decoded.load()
-    except FileNotFoundError:
-        raise InputError(f"{path}: missing") from None
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: missing") from error
     except IMAGE_DAMAGE as error:
-        raise InputError(f"{path}: cannot be decoded ({why(error)})") from None
+        raise InputError(f"{path}: cannot be decoded ({why(error)})") from error
     return decoded

@@ -10,7 +10,7 @@ from typing import Any
 from synfeal.dataset.finish import MANIFEST, sequence_sha256
 from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
 from synfeal.errors import InputError, read_as, why
-from synfeal.files import read_json
+from synfeal.records.files import read_json
 from synfeal.validation.listing import Check, SequenceListing
 
 

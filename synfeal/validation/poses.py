@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from synfeal.dataset.pose_table import read_pose_table
+from synfeal.dataset.split_frames import rows_of_frames, table_problems
 from synfeal.errors import InputError
 from synfeal.validation.frames import Poses
 from synfeal.validation.listing import POSE, Check, Frame, SequenceListing, frames_of
@@ -71,11 +72,12 @@ def check_tables(
         except InputError as error:
             failures.append(str(error))
             continue
-        if len(table) != len(frames):
-            failures.append(f"{path}: {len(table)} rows for {len(frames)} frames")
+        if problems := table_problems(path, frames):
+            failures += problems
             continue
         bound = max(bound, TABLE_RATIO * float(np.abs(table.position_m).max(initial=0.0)))
-        for frame, row in zip(frames, table.world_from_cam, strict=True):
+        matrices = table.world_from_cam[rows_of_frames(path, frames)]
+        for frame, row in zip(frames, matrices, strict=True):
             if frame in poses:
                 differences.append(float(np.abs(poses[frame] - row).max()))
                 if differences[-1] > bound:

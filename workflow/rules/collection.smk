@@ -2,7 +2,7 @@
 
 
 # A job that calls one function, `params.function`, with the rule's files, parameters and wildcards
-# (synfeal.job.call); rules that add nothing else are `use rule call as ... with`.
+# (reproduction.runs.job.call); rules that add nothing else are `use rule call as ... with`.
 rule call:
     conda:
         "../envs/synfeal.yaml"
@@ -37,7 +37,7 @@ use rule call_4gb as scene with:
         clutter=f"{ROOT}/scenes/{{scene}}/clutter.json",
         properties=f"{ROOT}/scenes/{{scene}}/properties.json",
     params:
-        function="synfeal.scenes.prepare:prepare_scene",
+        function="synfeal.collection.prepare:prepare_scene",
         name=lambda w: w.scene,
         scene=lambda w, input: dump(CONFIG.scenes[w.scene], exclude={"sizes"})
         | {"path": file_of(input.mesh)},
@@ -87,11 +87,26 @@ use rule call as cell_depth with:
 SEQUENCE = f"{ROOT}/datasets/{{scene}}/{{camera}}/{{sequence}}{ARCHIVE}"
 
 
+# The mesh that frames of a camera are drawn of: what its resolution does not show is left out.
+use rule call_3gb as detail with:
+    input:
+        mesh=rules.scene.output.mesh,
+        plans=lambda w: plans_with_frames(w.scene, w.camera, "csv"),
+    output:
+        mesh=f"{ROOT}/scenes/{{scene}}/detail_{{camera}}.glb",
+        record=f"{ROOT}/scenes/{{scene}}/detail_{{camera}}.json",
+    params:
+        function="synfeal.collection.detail:write_detail",
+        camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
+        render=dump(CONFIG.render),
+
+
 use rule call_3gb as render with:
     input:
         mesh=rules.scene.output.mesh,
         plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w).split}.csv",
         extras=lambda w: beside_mesh(w.scene, CONFIG.render.effects),
+        detail=lambda w: detail_of(w.scene, w.camera, "glb"),
     output:
         frames=SEQUENCE if ARCHIVE else directory(SEQUENCE),
     params:
@@ -103,6 +118,22 @@ use rule call_3gb as render with:
         render=dump(CONFIG.render),
 
 
+# How much of its light comes from where: for light states, of stand-ins alone.
+use rule call_4gb as light_shares with:
+    output:
+        shares=expand(
+            f"{ROOT}/scenes/{{{{scene}}}}/light_{{group}}.glb", group=LIGHT_GROUPS
+        ),
+    params:
+        function="reproduction.rooms:save_light_shares",
+        builder=lambda w: CONFIG.scenes[w.scene].builder,
+        seed=lambda w: (
+            CONFIG.seed
+            if CONFIG.scenes[w.scene].seed is None
+            else CONFIG.scenes[w.scene].seed
+        ),
+
+
 # Built-in objects, where effects place some along every path.
 use rule call as cartons with:
     input:
@@ -110,7 +141,7 @@ use rule call as cartons with:
     output:
         cartons=cartons_of("{scene}"),
     params:
-        function="synfeal.scenes.prepare:save_cartons",
+        function="synfeal.collection.prepare:save_cartons",
 
 
 use rule call_3gb as render_speed with:
@@ -120,7 +151,7 @@ use rule call_3gb as render_speed with:
     output:
         speed=f"{ROOT}/scenes/{{scene}}/render_speed.csv",
     params:
-        function="synfeal.scenes.render_speed:write_render_speed",
+        function="reproduction.speed.rendering:write_render_speed",
         network_camera=dump(CONFIG.network_camera),
         groundtruth_camera=dump(CONFIG.groundtruth_camera),
         render_speed=dump(CONFIG.render_speed),
@@ -135,7 +166,7 @@ use rule call_3gb as collection_speed with:
     output:
         speed=f"{ROOT}/scenes/{{scene}}/collection_speed.json",
     params:
-        function="synfeal.scenes.speed:write_collection_speed",
+        function="reproduction.speed.collection:write_collection_speed",
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
         collection=lambda w, input: dump(CONFIG.collection)
         | {"repeat": file_of(input.repeat)},
@@ -149,6 +180,7 @@ use rule call_3gb as render_packed with:
         mesh=rules.scene.output.mesh,
         plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w, 'network').split}.csv",
         extras=lambda w: beside_mesh(w.scene, CONFIG.render.effects),
+        detail=lambda w: detail_of(w.scene, "network", "glb"),
     output:
         frames=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.npy"),
         record=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.json"),
@@ -167,6 +199,7 @@ use rule call_2gb as pack with:
         plan=rules.plan.output.plan,
         shards=lambda w: packed_shards(w.scene, w.split, "npy"),
         records=lambda w: packed_shards(w.scene, w.split, "json"),
+        detail=lambda w: detail_of(w.scene, "network", "json"),
     output:
         frames=f"{ROOT}/frames/{{scene}}/{{split}}.npy",
         record=f"{ROOT}/frames/{{scene}}/{{split}}.json",
@@ -189,6 +222,7 @@ use rule call as dataset with:
             if CONFIG.scenes[w.scene].clutter
             else []
         ),
+        detail=lambda w: detail_of(w.scene, w.camera, "json"),
     output:
         manifest=f"{ROOT}/datasets/{{scene}}/{{camera}}/manifest.json",
         train=f"{ROOT}/datasets/{{scene}}/{{camera}}/TrainSplit.txt",

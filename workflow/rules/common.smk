@@ -7,26 +7,31 @@ from snakemake.io import is_flagged, strip_wildcard_constraints
 from snakemake.logging import logger
 
 from baselines.localizers.registry import backbone_of
-from baselines.groundtruth.batches import batches_of
-from baselines.groundtruth.methods import (
+from baselines.labels.batches import batches_of
+from baselines.labels.methods import (
     METHODS,
-    check_sources,
-    estimation_parameters,
     frame_methods,
     graph_methods,
     stages_of,
+    truth_used,
 )
-from baselines.references.registry import (
-    answered_by,
-    data_sets,
-    has_structure,
-    in_group,
+from reproduction.design.labels import check_sources, estimation_parameters
+from reproduction.design.references import answered_by, data_sets, has_structure
+from baselines.references.registry import in_group
+from baselines.training.record import training_mb
+from reproduction.design.runs import training_parameters
+from reproduction.design.experiments import Run, read_design
+from reproduction.config.load import check_mesh_files, parse_config
+from reproduction.config.load import check_results
+from synfeal.config.load import read_yaml
+from reproduction.design.experiments import (
+    INJECTED,
+    Init,
+    common_every,
+    design_name,
+    split_init,
 )
-from baselines.training.record import training_mb, training_parameters
-from synfeal.config import Run, check_mesh_files, parse_config, read_design
-from synfeal.config.load import check_results, read_yaml
-from synfeal.config.experiments import INJECTED, Init, common_every, split_init
-from synfeal.config.models import MODELS
+from baselines.config.learning import MODELS
 from synfeal.config.effects import CLEAN, MIXED
 from synfeal.dataset.frame_files import SUFFIX
 from synfeal.dataset.finish import origin_of
@@ -34,10 +39,10 @@ from synfeal.dataset.sevenscenes import sequences_of
 from synfeal.effects.scene import carton_files
 from synfeal.effects.light import GROUPS as LIGHT_GROUPS
 from synfeal.errors import InputError
-from synfeal.labels import seed_names
-from synfeal.provenance import config_hash, seed_of
-from synfeal.report.predictions.restore import restored_files
-from synfeal.run_lock import begin_run
+from baselines.labels.injected import seed_names
+from synfeal.records.provenance import config_hash, seed_of
+from reproduction.runs.restore import restored_files
+from synfeal.records.lock import begin_run
 
 try:
     for path in workflow.configfiles:
@@ -50,7 +55,7 @@ try:
     check_results(CONFIG.root)
     DESIGN = read_design(CONFIG)
     EXPERIMENTS = DESIGN.rows
-    check_sources(EXPERIMENTS, CONFIG.experiments)
+    check_sources(EXPERIMENTS, design_name(CONFIG))
     RESTORED = restored_files(CONFIG)
 except InputError as error:
     sys.exit(f"error: {error}")
@@ -70,6 +75,8 @@ POSE_SETS = sorted({*TRUE_SETS, *ESTIMATED_SETS})
 TABLE_NAMES = ["table1_meshes", *DESIGN.tables]
 DRAWN_TABLES = ("table3_inconsistencies", "table4_size", "table7_images_shown")
 DRAWN = [table for table in TABLE_NAMES if table in DRAWN_TABLES]
+# Of label sets that a method re-estimates; without one these tables would have no rows.
+LABEL_TABLES = ("assistance", "label_error") if DESIGN.estimated else ()
 RECONSTRUCTED = tuple(METHODS)
 EXTERNAL = CONFIG.references.external
 ROBUSTNESS = CONFIG.robustness
@@ -321,7 +328,7 @@ def reference_sets(file):
     return [
         f"{ROOT}/references/{s}/{z}/{l}/{name}/{file}"
         for s, z, l in data_sets(EXPERIMENTS)
-        for name in answered_by(EXPERIMENTS, (s, z, l), EXTERNAL)
+        for name in answered_by(EXPERIMENTS, (s, z, l), CONFIG.references)
     ]
 
 
@@ -335,6 +342,20 @@ def beside_mesh(scene, effects):
         *(map(str, clutter.files) if clutter else []),
         *(cartons_of(scene) if clutter and not clutter.files else []),
     ]
+
+
+def detail_of(scene, camera, kind, render=CONFIG.render):
+    """What colours of a camera's frames are drawn of (``glb``), and what was left out (``json``);
+    nothing where the full mesh is drawn."""
+    full = render.draws_full_mesh
+    return [] if full else f"{ROOT}/scenes/{scene}/detail_{camera}.{kind}"
+
+
+def varied_detail(effects, kind):
+    """The same of frames with effects."""
+    usual = VARIATIONS.get(effects, CONFIG.render.effects)
+    render = CONFIG.render.model_copy(update={"effects": usual})
+    return detail_of(ROBUSTNESS.scene, "network", kind, render)
 
 
 def cartons_of(scene):
@@ -375,11 +396,16 @@ def varied_extras(names):
     return sorted({file for extras in files for file in extras})
 
 
-def robustness_made():
-    """Whether the robustness table has rows, and its data set is trained on here."""
+def robustness_asked():
+    """Whether the robustness table has rows: effects, and runs on its data set."""
     wanted = (ROBUSTNESS.scene, ROBUSTNESS.size, "synfeal", "pretrained")
     trained = any((r.scene, r.size, r.labels, r.init) == wanted for r in DESIGN.runs)
-    return bool(ROBUST_EFFECTS) and trained and not RESTORED
+    return ROBUSTNESS.made and bool(ROBUST_EFFECTS) and trained
+
+
+def robustness_made():
+    """Whether the robustness table is made here; frames with effects are not restored."""
+    return robustness_asked() and not RESTORED
 
 
 def varied_structure():
@@ -424,7 +450,7 @@ def run_plan(workflow):
     jobs = [job.benchmark for job in workflow.dag.needrun_jobs() if job.benchmark]
 
     def plan():
-        from synfeal.report.progress.plan import plan_run
+        from reproduction.plan.progress import plan_run
 
         return plan_run(CONFIG, DESIGN, map(str, jobs), workflow.cores or 1)
 

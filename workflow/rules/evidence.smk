@@ -7,19 +7,23 @@ use rule call as table1_meshes with:
     output:
         **table_files("table1_meshes", "table1_meshes"),
     params:
-        function="synfeal.report.meshes:write_meshes_table",
+        function="reproduction.tables.meshes:write_meshes_table",
         scenes=SCENES,
 
 
 use rule call as table with:
     input:
         metrics=lambda w: under("runs/{run}/metrics.json", run=runs_of(w.table)),
+        errors=lambda w: under(
+            "runs/{run}/errors.csv",
+            run=runs_of(w.table) if w.table == "table3_inconsistencies" else [],
+        ),
     output:
         **table_files("{table}", "table"),
     wildcard_constraints:
         table="table[2-9]_[a-z_]+",
     params:
-        function="synfeal.report.tables:write_table",
+        function="reproduction.tables.write:write_table",
         design=dump(DESIGN),
 
 
@@ -29,7 +33,7 @@ use rule call as recall with:
     output:
         **table_files("recall", "recall"),
     params:
-        function="synfeal.report.recall:write_recall_table",
+        function="reproduction.tables.recall:write_recall_table",
         design=dump(DESIGN),
 
 
@@ -39,7 +43,7 @@ use rule call as assistance with:
     output:
         **table_files("assistance"),
     params:
-        function="synfeal.report.assistance:write_assistance_table",
+        function="reproduction.tables.assistance:write_assistance_table",
         design=dump(DESIGN),
 
 
@@ -54,7 +58,7 @@ use rule call as label_error with:
     output:
         **table_files("label_error"),
     params:
-        function="synfeal.report.label_error:write_label_error_table",
+        function="reproduction.tables.label_error:write_label_error_table",
         design=dump(DESIGN),
 
 
@@ -62,7 +66,7 @@ use rule call as speed_vs_error with:
     input:
         curves=under("scenes/{scene}/collision_curve.csv", scene=SCENES),
         rendering=under("scenes/{scene}/render_speed.csv", scene=SCENES),
-        labels=rules.label_error.output.csv,
+        labels=under("tables/{t}.csv", t={"label_error"}.intersection(LABEL_TABLES)),
         trainings=under("tables/{t}.csv", t={"table4_size"} & {*TABLE_NAMES}),
         histories=table4_files("runs/{run}/history.csv"),
         effects=drawn_robustness(),
@@ -70,7 +74,7 @@ use rule call as speed_vs_error with:
     output:
         csv=f"{ROOT}/tables/speed_vs_error.csv",
     params:
-        function="synfeal.report.speed_vs_error:write_speed_vs_error",
+        function="reproduction.tables.speed_vs_error:write_speed_vs_error",
         scenes=SCENES,
 
 
@@ -78,7 +82,7 @@ use rule call_2gb as hard_cases with:
     output:
         csv=f"{ROOT}/tables/hard_cases.csv",
     params:
-        function="synfeal.report.hard_cases.table:write_hard_cases",
+        function="reproduction.hard_cases.table:write_hard_cases",
 
 
 use rule call as document with:
@@ -94,7 +98,7 @@ use rule call as document with:
     benchmark:
         f"{ROOT}/benchmarks/tables/document.tsv"
     params:
-        function="synfeal.report.document:write_document",
+        function="reproduction.report.document:write_document",
 
 
 use rule call_2gb as figures with:
@@ -117,7 +121,7 @@ use rule call_2gb as figures with:
             labels={"figure": "{figure}"},
         ),
     params:
-        function="synfeal.report.figures.registry:write_figures",
+        function="reproduction.figures.registry:write_figures",
         design=dump(DESIGN),
 
 
@@ -132,7 +136,7 @@ use rule call as summary with:
         md=f"{ROOT}/summary.md",
         txt=f"{ROOT}/summary.txt",
     params:
-        function="synfeal.report.summary:write_summary",
+        function="reproduction.report.summary:write_summary",
         design=dump(DESIGN),
 
 
@@ -141,6 +145,7 @@ use rule call as claims with:
         errors=under("runs/{run}/errors.csv", run=RUNS),
         common_errors=under("runs/{run}/common_errors.csv", run=RUNS),
         labels=under("labels/{set}/{split}.csv", set=TRUE_SETS, split=SPLITS),
+        estimated=under("labels/{set}/train.csv", set=ESTIMATED_SETS),
         assistance=under("labels/{set}/assistance.json", set=ESTIMATED_SETS),
         properties=rules.table1_meshes.input.properties,
         speed=under("scenes/{scene}/collection_speed.json", scene=SCENES),
@@ -151,16 +156,16 @@ use rule call as claims with:
             category="Claims",
         ),
     params:
-        function="synfeal.report.claims.table:write_claims",
+        function="reproduction.claims.table:write_claims",
         design=dump(DESIGN),
+        seed=CONFIG.seed,
 
 
 RESULTS = [
     *under("tables/{table}.csv", table=TABLE_NAMES),
     rules.speed_vs_error.output.csv,
     rules.hard_cases.output.csv,
-    rules.assistance.output.csv,
-    rules.label_error.output.csv,
+    *under("tables/{table}.csv", table=LABEL_TABLES),
     rules.references_table.output.csv,
     rules.recall.output.csv,
     *robustness_tables(),
@@ -172,8 +177,7 @@ RESULTS = [
 
 LABELS = [
     *every_label_set(),
-    rules.assistance.output.csv,
-    rules.label_error.output.csv,
+    *under("tables/{table}.csv", table=LABEL_TABLES),
     *label_figures(),
 ]
 
@@ -195,7 +199,7 @@ use rule call as provenance with:
         json=f"{ROOT}/provenance.json",
         csv=f"{ROOT}/benchmarks.csv",
     params:
-        function="synfeal.report.html.provenance:write_provenance",
+        function="reproduction.report.html.provenance:write_provenance",
         seed=CONFIG.seed,
         config_hash=config_hash(CONFIG),
 
@@ -211,8 +215,9 @@ use rule call_4gb as report with:
     output:
         html=f"{ROOT}/report.html",
     params:
-        function="synfeal.report.html.page:write_report",
+        function="reproduction.report.html.page:write_report",
         design=dump(DESIGN),
+        with_robustness=robustness_asked(),
 
 
 use rule call as report_document with:
@@ -224,4 +229,4 @@ use rule call as report_document with:
     output:
         tex=f"{ROOT}/report.tex",
     params:
-        function="synfeal.report.document:write_report_document",
+        function="reproduction.report.document:write_report_document",

@@ -20,7 +20,7 @@ use rule call as erroneous_labels with:
     benchmark:
         f"{ROOT}/benchmarks/labels/{ERRONEOUS}.tsv"
     params:
-        function="synfeal.labels:write_erroneous_labels",
+        function="baselines.labels.injected:write_erroneous_labels",
         seed=lambda w: seed_of(
             CONFIG.seed, *seed_names(w.error_kind, w.split), w.scene, w.size
         ),
@@ -37,7 +37,7 @@ use rule call_4gb as sfm with:
         trajectory=f"{STEM}/sfm/{BATCH}.csv",
         facts=f"{STEM}/sfm/{BATCH}.json",
     params:
-        function="baselines.groundtruth.sfm.batch:write_sfm",
+        function="baselines.labels.sfm.batch:write_sfm",
         start=lambda w: batch_of(w).start,
         stop=lambda w: batch_of(w).stop,
         camera=dump(CONFIG.groundtruth_camera),
@@ -52,7 +52,7 @@ use rule call_4gb as rgbd with:
         graph=f"{STEM}/rgbd/{BATCH}.g2o",
         facts=f"{STEM}/rgbd/{BATCH}.json",
     params:
-        function="baselines.groundtruth.rgbd.graph:write_rgbd",
+        function="baselines.labels.rgbd.graph:write_rgbd",
         start=lambda w: batch_of(w).start,
         stop=lambda w: batch_of(w).stop,
         camera=dump(CONFIG.groundtruth_camera),
@@ -73,7 +73,7 @@ use rule call_4gb as estimate with:
     benchmark:
         f"{ROOT}/benchmarks/{{frame_method}}/{BATCH_LOG}.tsv"
     params:
-        function="baselines.groundtruth.methods:write_estimate",
+        function="baselines.labels.methods:write_estimate",
         start=lambda w: batch_of(w).start,
         stop=lambda w: batch_of(w).stop,
         camera=dump(CONFIG.groundtruth_camera),
@@ -96,7 +96,7 @@ use rule call_2gb as posegraph with:
     benchmark:
         f"{ROOT}/benchmarks/{{graph_method}}/{BATCH_LOG}.tsv"
     params:
-        function="baselines.groundtruth.methods:write_solved",
+        function="baselines.labels.methods:write_solved",
         posegraph=dump(CONFIG.groundtruth.posegraph),
 
 
@@ -117,9 +117,10 @@ use rule call as chain with:
         assistance=CHAINED,
         record=f"{ESTIMATED}/estimation.json",
     params:
-        function="baselines.groundtruth.chain:write_label_set",
+        function="baselines.labels.chain:write_label_set",
         groundtruth=dump(
             CONFIG.groundtruth,
             include={"batch_frames", "assist_position_m", "assist_orientation_deg"},
         ),
+        truth_used=lambda w: truth_used(CONFIG.groundtruth, w.reconstructed).value,
         estimation=lambda w: estimation_parameters(CONFIG, w.reconstructed),

@@ -154,6 +154,6 @@ use rule call as references_table with:
     output:
         **table_files("references", "references"),
     params:
-        function="synfeal.report.references:write_references_table",
+        function="reproduction.tables.references:write_references_table",
         design=dump(DESIGN),
-        external={name: dump(method) for name, method in EXTERNAL.items()},
+        references=dump(CONFIG.references),

@@ -3,27 +3,12 @@
 VARIED = f"{ROOT}/robustness"
 
 
-# How much of its light comes from where: for light states, of stand-ins alone.
-use rule call_4gb as light_shares with:
-    output:
-        shares=expand(
-            f"{ROOT}/scenes/{{{{scene}}}}/light_{{group}}.glb", group=LIGHT_GROUPS
-        ),
-    params:
-        function="synfeal.scenes:save_light_shares",
-        builder=lambda w: CONFIG.scenes[w.scene].builder,
-        seed=lambda w: (
-            CONFIG.seed
-            if CONFIG.scenes[w.scene].seed is None
-            else CONFIG.scenes[w.scene].seed
-        ),
-
-
 use rule render_packed as render_varied with:
     input:
         extras=lambda w: varied_extras([w.effects]),
         mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
         plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/{{split}}.csv",
+        detail=lambda w: varied_detail(w.effects, "glb"),
     output:
         frames=temp(f"{VARIED}/shards/{{effects}}/{{split}}.npy"),
         record=temp(f"{VARIED}/shards/{{effects}}/{{split}}.json"),
@@ -38,6 +23,7 @@ use rule pack as pack_varied with:
         plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/{{split}}.csv",
         shards=[f"{VARIED}/shards/{{effects}}/{{split}}.npy"],
         records=[f"{VARIED}/shards/{{effects}}/{{split}}.json"],
+        detail=lambda w: varied_detail(w.effects, "json"),
     output:
         frames=f"{VARIED}/frames/{{effects}}/{{split}}.npy",
         record=f"{VARIED}/frames/{{effects}}/{{split}}.json",
@@ -125,7 +111,7 @@ use rule call_3gb as effects_speed with:
     output:
         csv=f"{ROOT}/scenes/{ROBUSTNESS.scene}/effects_speed.csv",
     params:
-        function="synfeal.scenes.speed:write_effects_speed",
+        function="reproduction.speed.collection:write_effects_speed",
         camera=dump(CONFIG.network_camera),
         render=dump(CONFIG.render),
         effects={name: dump(VARIATIONS[name]) for name in ROBUST_EFFECTS},
@@ -145,6 +131,6 @@ use rule call_2gb as robustness with:
     output:
         **table_files("robustness", "table"),
     params:
-        function="synfeal.report.robustness:write_robustness_table",
+        function="reproduction.tables.robustness:write_robustness_table",
         effects=ROBUST_EFFECTS,
         device=CONFIG.training.device,

@@ -1,4 +1,4 @@
-# One training per cell of the tables; predictions once, scores in a second, cheap pass.
+# One training per cell of the tables, predicted and scored at its end.
 RUN = f"{ROOT}/runs/{{scene}}/{{size}}/{{labels}}/{{init}}/{{model}}/seed{{repetition}}"
 RUN_LOG = "{scene}/{size}/{labels}/{init}/{model}/seed{repetition}"
 
@@ -26,6 +26,15 @@ use rule call as pretrain with:
         seed=lambda w: seed_of(CONFIG.seed, "pretrain", w.backbone),
 
 
+# Errors, and what is printed of them. Where runs were restored (synfeal restore), a rule of its own
+# scores; else the job that makes the predictions does, which saves it starting a process.
+SCORES = {
+    "errors": f"{RUN}/errors.csv",
+    "common_errors": f"{RUN}/common_errors.csv",
+    "metrics": f"{RUN}/metrics.json",
+}
+
+
 use rule call as train with:
     input:
         **unless_restored(
@@ -34,6 +43,8 @@ use rule call as train with:
             labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
             test_frames=f"{ROOT}/frames/{{scene}}/test.npy",
             test_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
+            truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
+            depth=f"{ROOT}/scenes/{{scene}}/test_depth.npy",
             weights=backbone_weights,
             common=lambda w: common_test_set(w.scene)[0],
             # The camera of packed frames, and their hash, are in the records beside them.
@@ -42,6 +53,7 @@ use rule call as train with:
             ),
         ),
     output:
+        **({} if RESTORED else SCORES),
         model=f"{RUN}/model.pt",
         history=f"{RUN}/history.csv",
         record=f"{RUN}/training.json",
@@ -50,26 +62,27 @@ use rule call as train with:
     resources:
         mem_mb=train_mem_mb,
     params:
-        function="baselines.training.run:train_and_predict",
+        function="baselines.training.experiment:train_and_score",
         run=lambda w: training_parameters(CONFIG, Run(**w)),
         every=lambda w: common_test_set(w.scene)[1],
-
-
-use rule call as score with:
-    input:
-        predictions=f"{RUN}/predictions.csv",
-        history=f"{RUN}/history.csv",
-        record=f"{RUN}/training.json",
-        labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
-        truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
-        train_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
-        depth=f"{ROOT}/scenes/{{scene}}/test_depth.npy",
-        common=f"{RUN}/common_predictions.csv",
-        common_truth=lambda w: common_test_set(w.scene)[0],
-    output:
-        errors=f"{RUN}/errors.csv",
-        common=f"{RUN}/common_errors.csv",
-        metrics=f"{RUN}/metrics.json",
-    params:
-        function="baselines.training.score:write_scores",
         camera=dump(CONFIG.network_camera),
+
+
+if RESTORED:
+
+    use rule call as score with:
+        input:
+            predictions=f"{RUN}/predictions.csv",
+            history=f"{RUN}/history.csv",
+            record=f"{RUN}/training.json",
+            labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
+            truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
+            train_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
+            depth=f"{ROOT}/scenes/{{scene}}/test_depth.npy",
+            common=f"{RUN}/common_predictions.csv",
+            common_truth=lambda w: common_test_set(w.scene)[0],
+        output:
+            **SCORES,
+        params:
+            function="baselines.training.score:write_scores",
+            camera=dump(CONFIG.network_camera),

@@ -1,4 +1,4 @@
-from synfeal.job import call, job
+from reproduction.runs.job import call, job
 
 with job(snakemake.log[0]):
     call(snakemake)

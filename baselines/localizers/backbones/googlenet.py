@@ -8,10 +8,12 @@ in ceil mode) we follow it, because its official weights only fit that network.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, cast
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from baselines.localizers.backbones import scaled_channels
 
@@ -41,7 +43,73 @@ class ConvBn(nn.Module):
 
     def forward(self, maps: Tensor) -> Tensor:
         """(B, n_in, H, W) to (B, n_out, ceil(H / stride), ceil(W / stride)); less if unpadded."""
-        return torch.relu_(self.bn(self.conv(maps)))
+        return torch.relu_(self.normalised(maps))
+
+    def normalised(self, maps: Tensor) -> Tensor:
+        """As ``forward``, before the ReLU."""
+        normalised: Tensor = self.bn(convolved(self.conv, self.conv.weight, maps))
+        return normalised
+
+
+def convolved(conv: nn.Conv2d, kernels: Tensor, maps: Tensor) -> Tensor:
+    """Convolve maps (B, n_in, H, W), channels last in memory, with kernels (n_out, n_in, h, w).
+
+    Kernels of one pixel are one matrix product with all pixels, which takes less time so.
+
+    Args:
+        conv: stride and padding; its own kernels are not looked at.
+        kernels: what to convolve with.
+        maps: what to convolve.
+    """
+    if conv.kernel_size == (1, 1) and conv.stride == (1, 1):
+        pixels = functional.linear(maps.permute(0, 2, 3, 1), kernels.flatten(1))
+        return pixels.permute(0, 3, 1, 2)
+    return functional.conv2d(maps, kernels, None, conv.stride, conv.padding)
+
+
+def side_by_side(layers: Sequence[ConvBn], maps: Tensor) -> Sequence[Tensor]:
+    """Apply layers that read the same maps as one layer.
+
+    That takes less time: layers of few channels are done sooner than they are started.
+
+    Args:
+        layers: of one kernel size and stride; they keep parameters and statistics of their own.
+        maps: what they read (B, n_in, H, W).
+
+    Returns:
+        The maps of each layer (B, n_out, H', W').
+    """
+    conv, norms = layers[0].conv, [layer.bn for layer in layers]
+    joined = convolved(conv, torch.cat([layer.conv.weight for layer in layers]), maps)
+    statistics = [running_statistics(norm) for norm in norms]
+    mean, variance = (torch.cat(parts) for parts in zip(*statistics, strict=True))
+    training = norms[0].training
+    joined = functional.batch_norm(
+        joined,
+        mean,
+        variance,
+        weight=torch.cat([norm.weight for norm in norms]),
+        bias=torch.cat([norm.bias for norm in norms]),
+        training=training,
+        momentum=norms[0].momentum or 0.0,
+        eps=norms[0].eps,
+    )
+    counts = [layer.conv.out_channels for layer in layers]
+    if training:
+        updated = zip(torch.split(mean, counts), torch.split(variance, counts), strict=True)
+        for norm, old, new in zip(norms, statistics, updated, strict=True):
+            old[0].copy_(new[0])
+            old[1].copy_(new[1])
+            if norm.num_batches_tracked is not None:
+                norm.num_batches_tracked.add_(1)
+    return torch.split(torch.relu_(joined), counts, dim=1)
+
+
+def running_statistics(norm: nn.BatchNorm2d) -> tuple[Tensor, Tensor]:
+    """Mean and variance (n,) that a layer keeps for evaluation."""
+    assert norm.running_mean is not None
+    assert norm.running_var is not None
+    return norm.running_mean, norm.running_var
 
 
 class InceptionMaps(NamedTuple):
@@ -68,7 +136,7 @@ class InceptionBackbone(nn.Module):
 
     def forward(self, images: Tensor) -> InceptionMaps:
         """Feature maps of images (B, 3, H, W) of zero mean and unit deviation per channel."""
-        return self.maps_of(images * self.input_scale + self.input_shift)
+        return self.maps_of(torch.addcmul(self.input_shift, images, self.input_scale))
 
     def maps_of(self, images: Tensor) -> InceptionMaps:
         """Feature maps of images (B, 3, H, W) scaled as the official weights expect them."""
@@ -103,8 +171,11 @@ class Inception(nn.Module):
 
     def forward(self, maps: Tensor) -> Tensor:
         """(B, n_in, H, W) to (B, n_out, H, W)."""
-        branches = (self.branch1, self.branch2, self.branch3, self.branch4)
-        return torch.cat([branch(maps) for branch in branches], dim=1)
+        reduce3, conv3 = (cast(ConvBn, layer) for layer in self.branch2)
+        reduce5, conv5 = (cast(ConvBn, layer) for layer in self.branch3)
+        one, reduced3, reduced5 = side_by_side([self.branch1, reduce3, reduce5], maps)
+        branches = [one, conv3(reduced3), conv5(reduced5), self.branch4(maps)]
+        return torch.cat(branches, dim=1)
 
 
 class GoogLeNet(InceptionBackbone):
@@ -133,8 +204,9 @@ class GoogLeNet(InceptionBackbone):
 
     def maps_of(self, images: Tensor) -> InceptionMaps:
         """Feature maps of images (B, 3, H, W) in [-1, 1]."""
-        maps = self.pool3(self.conv1(images))
-        maps = self.pool3(self.conv3(self.conv2(maps)))
+        # Pooling before the ReLU is the same as after it, and leaves it a quarter of the pixels.
+        maps = torch.relu_(self.pool3(self.conv1.normalised(images)))
+        maps = torch.relu_(self.pool3(self.conv3.normalised(self.conv2(maps))))
         points: dict[str, Tensor] = {}
         for name in INCEPTIONS:
             if name == "inception4a":

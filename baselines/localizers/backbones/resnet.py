@@ -62,7 +62,8 @@ class ResNet34(nn.Module):
 
     def forward(self, images: Tensor) -> ResNetMaps:
         """Feature maps of normalised images (B, 3, H, W)."""
-        layer1 = self.layer1(self.maxpool(torch.relu_(self.bn1(self.conv1(images)))))
+        # Pooling before the ReLU is the same as after it, and leaves it a quarter of the pixels.
+        layer1 = self.layer1(torch.relu_(self.maxpool(self.bn1(self.conv1(images)))))
         layer2 = self.layer2(layer1)
         layer3 = self.layer3(layer2)
         return ResNetMaps(layer1, layer2, layer3, self.layer4(layer3))

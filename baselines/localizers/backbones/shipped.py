@@ -17,7 +17,7 @@ import torch
 
 from baselines.localizers.registry import BackboneName
 from synfeal.errors import InputError, exit_status, why
-from synfeal.files import atomic_path, read_json, write_json
+from synfeal.records.files import atomic_path, read_json, write_json
 
 SHIPPED = Path(__file__).parent / "shipped"
 RECIPE = "config/start.yaml"
@@ -42,7 +42,7 @@ def shipped_weights_path(name: BackboneName, directory: Path = SHIPPED) -> Path:
     except (OSError, ValueError, LookupError) as error:
         raise InputError(
             f"{path}: cannot be read ({why(error)}); install the package again"
-        ) from None
+        ) from error
     if found != expected:
         raise InputError(f"{path}: is not the file that was shipped; install the package again")
     return path
@@ -69,7 +69,7 @@ def _ship(trained: Path, name: BackboneName, directory: Path) -> str:
     except Exception as error:  # torch.load raises whatever the file provokes
         raise InputError(
             f"{trained}: cannot be read ({why(error)}); run `make start` first"
-        ) from None
+        ) from error
     half = {k: v.half() if v.is_floating_point() else v for k, v in state.items()}
     content = safetensors.torch.save({k: v.contiguous() for k, v in half.items()})
     with atomic_path(directory / f"{name}.safetensors") as temporary:

@@ -10,13 +10,13 @@ import safetensors.torch
 import torch
 from torch import nn
 
+from baselines.config.learning import InceptionName
 from baselines.localizers.backbones.googlenet import GoogLeNet, InceptionBackbone
 from baselines.localizers.backbones.inception_v3 import InceptionV3
 from baselines.localizers.backbones.resnet import ResNet34
 from baselines.localizers.registry import BackboneName
-from synfeal.config.learning import InceptionName
 from synfeal.errors import InputError, why
-from synfeal.files import atomic_path
+from synfeal.records.files import atomic_path
 
 Backbone = InceptionBackbone | ResNet34
 
@@ -67,7 +67,7 @@ def load_backbone_weights(backbone: nn.Module, path: Path) -> None:
         state = {k: v for k, v in state.items() if not k.startswith(CLASSIFIERS)}
     except Exception as error:  # torch.load raises whatever the broken file provokes
         problem = why(error) if isinstance(error, OSError) else "torch did not save it, or as code"
-        raise InputError(f"{path}: cannot be read as backbone weights ({problem})") from None
+        raise InputError(f"{path}: cannot be read as backbone weights ({problem})") from error
     try:
         backbone.load_state_dict(state)
     except RuntimeError as error:
@@ -75,7 +75,7 @@ def load_backbone_weights(backbone: nn.Module, path: Path) -> None:
         raise InputError(
             f"{path}: does not fit {type(backbone).__name__} of this network.width ({unfit}); "
             "train the backbone again, or set the width it was trained with"
-        ) from None
+        ) from error
 
 
 def _download(url: str, path: Path) -> None:
@@ -87,7 +87,7 @@ def _download(url: str, path: Path) -> None:
         raise InputError(
             f"{path}: ImageNet weights are missing and {url} cannot be downloaded ({why(error)}); "
             f"fetch it on a machine with a network and put it at {path}"
-        ) from None
+        ) from error
     found = hashlib.sha256(content).hexdigest()
     if not found.startswith(expected):
         raise InputError(

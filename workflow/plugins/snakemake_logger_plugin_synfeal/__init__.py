@@ -3,8 +3,10 @@
 ``synfeal run`` calls it: ``PYTHONPATH=workflow/plugins snakemake --logger synfeal --cores 2 all``.
 
 Everything that Snakemake says is in its own log file; here it says what went wrong and no more.
+A dry run (``-n``) prints the jobs that a run would do.
 """
 
+import sys
 from logging import WARNING, LogRecord
 from pathlib import Path
 
@@ -12,8 +14,9 @@ from rich.console import Console
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from synfeal.report.cost.dry_run import job_name
-from synfeal.report.progress.view import RunView
+from reproduction.plan.dry_run import job_name
+from reproduction.plan.planned import planned_text
+from reproduction.plan.view import RunView
 
 SAID = ("Nothing to be done", "Complete log")
 
@@ -31,6 +34,7 @@ class LogHandler(LogHandlerBase):
         """Before any event."""
         self.view = RunView(Console(stderr=True, no_color=self.common_settings.nocolor or None))
         self.jobs: dict[int, tuple[str, list[Path]]] = {}
+        self.planned: list[str] = []  # of a dry run: names of its jobs
 
     def emit(self, record: LogRecord) -> None:
         """Called for one event after the other, in one thread."""
@@ -42,11 +46,17 @@ class LogHandler(LogHandlerBase):
     def close(self) -> None:
         """After all events."""
         self.view.end()
+        planned, self.planned = self.planned, []  # logging closes its handlers more than once
+        if planned:
+            sys.stdout.write(planned_text(planned))
         super().close()
 
     def _show(self, record: LogRecord) -> None:
         fields = record.__dict__
         match fields.get("event"):
+            case LogEvent.JOB_INFO if self.common_settings.dryrun:
+                if fields["benchmark"]:  # targets are no work
+                    self.planned.append(job_name(fields["benchmark"]))
             case LogEvent.JOB_INFO if fields["benchmark"]:
                 job = job_name(fields["benchmark"])
                 self.jobs[fields["jobid"]] = job, [Path(path) for path in fields["output"]]

@@ -1,0 +1,46 @@
+"""Commands of ``synfeal`` that work on data sets and trained models."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from baselines.cli import mapping, training
+from synfeal.cli.options import command, option
+
+DEVICES = ("auto", "cpu", "cuda")
+
+
+@command(
+    "poses of your own pictures by a trained model or a map",
+    "synfeal localize trained/model.pt photos/ --out poses.csv",
+    option(
+        "model",
+        "model.pt of synfeal train or of a training run in this place, or the folder that"
+        " synfeal map wrote",
+        type=Path,
+        metavar="MODEL",
+    ),
+    option(
+        "images",
+        "PNG or JPEG of any size, or a directory of them; a map must know their focal length, and"
+        " where nothing says what their lens sees, a model takes them to have the field of view of"
+        " its training frames, which is printed",
+        type=Path,
+        nargs="+",
+        metavar="IMAGE",
+    ),
+    *training.LOCALIZE_OPTIONS,
+    *mapping.MAP_OPTIONS,
+    option("--out", "file to write (poses.csv)", type=Path, default=Path("poses.csv")),
+    option("--device", "of a model: where to run (auto)", choices=DEVICES, default="auto"),
+)
+def localize(arguments: argparse.Namespace) -> None:
+    """Estimates where pictures were taken, with a model or a map of that place."""
+    if arguments.model.is_dir():
+        mapping.localize_by_map(arguments)
+    else:
+        training.localize_by_model(arguments)
+
+
+COMMANDS = (training.train, mapping.map, localize)

@@ -1,0 +1,127 @@
+"""The command ``synfeal map``, and ``synfeal localize`` with what it writes."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from baselines.cli.training import photograph_camera
+from synfeal.cli.meshes import RGBD_OPTIONS
+from synfeal.cli.options import command, option
+
+if TYPE_CHECKING:
+    from baselines.references.localized import LocalizedInMap
+    from synfeal.scan.camera import CameraOptions
+
+
+# Beyond, a focal length is not that of the camera: tolerances of lenses are a third of it.
+WRONG_FOCAL = 0.03
+
+log = logging.getLogger("synfeal")
+
+
+@command(
+    "a map of a place, to find photographs in without training",
+    "synfeal map mydata --out mymap",
+    option(
+        "dataset",
+        "data set of collect --depth, or posed photographs with depth (flat folder, seq-XX,"
+        " TUM RGB-D)",
+        type=Path,
+        metavar="DATASET",
+    ),
+    option("--out", "folder to write", type=Path, required=True, metavar="DIR"),
+    option(
+        "--frames",
+        "frames to take, from 0, the last one exclusive (all)",
+        type=int,
+        nargs=2,
+        metavar=("START", "STOP"),
+    ),
+    option("--every", "take one frame of so many (1)", type=int, default=1, metavar="K"),
+    option(
+        "--most",
+        "largest number of frames; of more, this many spread evenly (1000)",
+        type=int,
+        default=1000,
+        metavar="N",
+    ),
+    *RGBD_OPTIONS,
+    option("--seed", "of the vocabulary that retrieval learns (0)", type=int, default=0),
+)
+def map(arguments: argparse.Namespace) -> None:  # noqa: A001 (the name of the command)
+    """Builds a map of features that depth puts into space, from rendered frames or photographs."""
+    from baselines.references.localized import describe_map
+    from baselines.references.map_frames import FrameChoice, read_map_frames
+    from baselines.references.mapped import build_map
+
+    start, stop = arguments.frames or (0, None)
+    choice = FrameChoice(start, stop, every=arguments.every, most=arguments.most)
+    frames = read_map_frames(arguments.dataset, choice, camera_options(arguments))
+    made = build_map(frames, arguments.out, arguments.seed)
+    print(f"{arguments.out}: {describe_map(made)}, {made.record['seconds']:.0f} s")
+    print(f"synfeal localize {arguments.out} photos/ --out poses.csv")
+
+
+def camera_options(arguments: argparse.Namespace) -> CameraOptions:
+    """What :data:`RGBD_OPTIONS` say of the cameras."""
+    from synfeal.scan.camera import CameraOptions
+
+    aside = arguments.depth_from_color
+    return CameraOptions(
+        preset=arguments.preset,
+        color_camera=arguments.color_camera,
+        depth_camera=arguments.depth_camera,
+        color_focal_px=arguments.color_focal,
+        depth_focal_px=arguments.depth_focal,
+        depth_from_color=None if aside is None else tuple(aside),
+        depth_units_per_m=arguments.depth_scale,
+    )
+
+
+MAP_OPTIONS = (
+    option(
+        "--confidence",
+        "of a map: poses with less are left out as not localized (0.99)",
+        type=float,
+        default=0.99,
+        metavar="C",
+    ),
+)
+
+
+def localize_by_map(arguments: argparse.Namespace) -> None:
+    """Carry out ``synfeal localize`` with a map."""
+    from baselines.references.localized import localize_in_map
+
+    out: Path = arguments.out
+    done = localize_in_map(
+        arguments.model,
+        arguments.images,
+        out,
+        camera=photograph_camera(arguments),
+        world=arguments.world,
+        least_confidence=arguments.confidence,
+    )
+    if abs(done.focal_ratio - 1.0) > WRONG_FOCAL:  # not of NaN
+        log.warning(
+            "the photographs fit best with %.3f times the focal length given; is it that of their"
+            " camera? poses are off by about as large a share of the distance to what is seen",
+            done.focal_ratio,
+        )
+    if done.n_found == 0:
+        log.warning("is it another place, or is the focal length of the photographs wrong?")
+    print(f"{arguments.model}: {done.n_frames} frames, {done.n_points} features")
+    print(f"{out}: {found_text(done)}")
+
+
+def found_text(done: LocalizedInMap) -> str:
+    """How many photographs were localized, in which world, and what they took."""
+    lost = done.n_images - done.n_found
+    world = {"sequence": " in the world of the sequence", "mesh": " in the world of the mesh"}
+    where = world[done.world] if done.world else ""
+    counted = f"{done.n_found} of {done.n_images} photographs localized{where}, {lost} not"
+    support = f" by {done.inliers:.0f} inliers (median)" if done.n_found else ""
+    return f"{counted}{support}; {done.seconds:.2f} s a photograph (median)"

@@ -1,0 +1,241 @@
+"""The command ``synfeal train``, and what ``synfeal localize`` is told about photographs."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from baselines.config.learning import MODELS
+from synfeal.camera.photograph import PhotographCamera
+from synfeal.cli.options import command, option
+from synfeal.config.photometric import PhotometricConfig
+from synfeal.errors import InputError
+
+if TYPE_CHECKING:
+    from baselines.training.localize import Localized
+    from baselines.training.train import TrainedModel
+
+log = logging.getLogger("synfeal")
+
+CALIBRATION_OPTIONS = (
+    option(
+        "--camera",
+        "calibration of the photographs: OpenCV, ROS or COLMAP (docs/cameras.md)",
+        type=Path,
+        metavar="FILE",
+    ),
+    option(
+        "--focal",
+        "focal length of the photographs in their pixels, in place of a calibration",
+        type=float,
+        metavar="PX",
+    ),
+    option(
+        "--no-exif",
+        "do not take the focal length that photographs carry as EXIF",
+        action="store_true",
+    ),
+)
+
+LOCALIZE_OPTIONS = (
+    *CALIBRATION_OPTIONS,
+    option(
+        "--world",
+        "whose coordinates poses are written in, where the place was scanned from a sequence"
+        " (sequence)",
+        choices=("sequence", "mesh"),
+        default="sequence",
+    ),
+)
+
+
+def photograph_camera(arguments: argparse.Namespace) -> PhotographCamera:
+    """The camera of photographs by :data:`CALIBRATION_OPTIONS`.
+
+    Raises:
+        InputError: The calibration cannot be used.
+    """
+    return PhotographCamera.read(arguments.camera, arguments.focal, not arguments.no_exif)
+
+
+@command(
+    "a localizer for a data set of your own",
+    "synfeal train mydata --out trained",
+    option(
+        "datasets",
+        "data set of collect, or a sequence of photographs with poses (flat folder, seq-XX,"
+        " TUM RGB-D); several are learned from together",
+        type=Path,
+        nargs="+",
+        metavar="DATASET",
+    ),
+    option("--out", "directory of the model", type=Path, required=True, metavar="DIR"),
+    option("--localizer", "which of the five (posenet2)", choices=MODELS, default="posenet2"),
+    option("--images", "images to show in all (30000)", type=int, metavar="N"),
+    option("--minutes", "or about how long to learn", type=float, metavar="M"),
+    option(
+        "--frames",
+        "photographs to take, from 0, the last one exclusive; again for each further part",
+        type=int,
+        nargs=2,
+        action="append",
+        default=[],
+        metavar=("START", "STOP"),
+    ),
+    option(
+        "--held-out",
+        "share of the paths that are not learned from and tell the error (0.1)",
+        type=float,
+        default=0.1,
+        metavar="SHARE",
+    ),
+    option(
+        "--randomisation",
+        "`on`: other light, lens and sensor whenever an image is shown; `off`; or a YAML file"
+        " with its ranges (docs/localizing.md) (on)",
+        default="on",
+        metavar="on|off|FILE",
+    ),
+    *CALIBRATION_OPTIONS,
+    option("--device", "where to train (auto)", choices=("auto", "cpu", "cuda"), default="auto"),
+    option("--seed", "of all that is drawn (0)", type=int, default=0),
+)
+def train(arguments: argparse.Namespace) -> None:
+    """Trains a localizer on data sets; the same command again goes on where one was stopped."""
+    from baselines.training.own_frames import FrameRange
+    from baselines.training.train import DEFAULT_IMAGES, TrainJob
+    from baselines.training.train import train as learn
+
+    if arguments.images is not None and arguments.minutes is not None:
+        raise InputError("--minutes: --images says how long already; give one of the two")
+    if arguments.seed < 0:
+        raise InputError(f"--seed: must be 0 or above, found {arguments.seed}")
+    default = None if arguments.minutes is not None else DEFAULT_IMAGES
+    job = TrainJob(
+        datasets=tuple(arguments.datasets),
+        out=arguments.out,
+        localizer=arguments.localizer,
+        images=default if arguments.images is None else arguments.images,
+        minutes=arguments.minutes,
+        ranges=tuple(FrameRange(start, stop) for start, stop in arguments.frames),
+        photographs=photograph_camera(arguments),
+        held_out=arguments.held_out,
+        randomisation=_randomisation(arguments.randomisation),
+        device=arguments.device,
+        seed=arguments.seed,
+    )
+    logging.getLogger("baselines.training").setLevel(logging.INFO)
+    try:
+        done = learn(job)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("run the same command again to go on") from None
+    print(trained_text(done))
+    print(f"synfeal localize {done.model} photos/ --out poses.csv")
+
+
+def _randomisation(text: str) -> PhotometricConfig | None:
+    """The ranges that ``--randomisation`` stands for.
+
+    Raises:
+        InputError: The file cannot be read, or holds other keys or values.
+    """
+    if text in ("on", "off"):
+        return PhotometricConfig() if text == "on" else None
+    from pydantic import ValidationError
+
+    from synfeal.config.load import describe, read_yaml
+
+    path = Path(text)
+    try:
+        return PhotometricConfig.model_validate(read_yaml(path))
+    except ValidationError as error:
+        raise InputError(f"{path}: {describe(error)}") from None
+
+
+def trained_text(done: TrainedModel) -> str:
+    """What was trained, and how good it is."""
+    before = "had ended before: " if done.finished_before else ""
+    learned = (
+        f"{before}{done.images} images shown of {done.n_frames} frames on {done.n_paths} paths"
+    )
+    if done.errors is None:
+        return f"{done.model}: {learned}; nothing was held out, so its error is not known"
+    position, orientation = done.errors.position_m, done.errors.orientation_deg
+    error = f"median error on held-out paths {position:.3f} m / {orientation:.1f} degrees"
+    return f"{done.model}: {learned}; {error}"
+
+
+def localize_by_model(arguments: argparse.Namespace) -> None:
+    """Carry out ``synfeal localize`` with a checkpoint."""
+    from baselines.training.localize import localize
+
+    out: Path = arguments.out
+    done = localize(
+        arguments.model,
+        arguments.images,
+        out,
+        arguments.device,
+        camera=photograph_camera(arguments),
+        world=arguments.world,
+    )
+    if done.n_failed:
+        message = "%d of %d poses are not finite: the training of %s diverged"
+        log.warning(message, done.n_failed, done.n_images, arguments.model)
+    if done.n_beyond:
+        log.warning(
+            "%d of %d poses lie far outside of where training frames were: these pictures may be"
+            " of another place",
+            *(done.n_beyond, done.n_images),
+        )
+    print(f"{arguments.model}: {model_text(done)}")
+    if done.n_resampled:
+        print(f"{arguments.model}: {resampled_text(done)}")
+    print(f"{out}: {poses_text(done)}")
+
+
+def model_text(done: Localized) -> str:
+    """Which localizer it is, and which pictures it can read."""
+    description = done.description
+    px, camera = description.network.input_px, description.camera
+    if camera is None:
+        view = "the field of view of its training frames is not known"
+    elif description.network.view == "square":
+        view = f"the short side must see {camera.short_side_fov_deg:.1f} degrees"
+    else:
+        across, down = camera.fov_deg
+        view = f"they must see {across:.1f} x {down:.1f} degrees, as the training frames do"
+    lens = ", through the same distorting lens" if camera and any(camera.distortion) else ""
+    return f"{description.localizer}, pictures shrunk to {px} x {px} pixels; {view}{lens}"
+
+
+SOURCES = {
+    "file": "their calibration",
+    "focal": "their focal length",
+    "exif": "the focal length in their EXIF",
+}
+
+
+def resampled_text(done: Localized) -> str:
+    """By what the pictures were brought to the training camera, and what they do not show of it."""
+    which = "all" if done.n_resampled == done.n_images else f"{done.n_resampled} of {done.n_images}"
+    by = SOURCES[done.calibration] if done.calibration else ""
+    text = f"{which} pictures were brought to that view by {by}"
+    if done.outside < 5e-4:
+        return text
+    return (
+        f"{text}; {done.outside:.1%} of it lies outside of them and is filled with their border:"
+        " take pictures with a wider lens, or train with a narrower camera"
+    )
+
+
+def poses_text(done: Localized) -> str:
+    """How many poses, in which world, and what they took."""
+    alone_ms = done.read_ms + done.network_ms
+    parts = f"median: read {done.read_ms:.2f}, network {done.network_ms:.2f}"
+    rate = f"{done.images_per_s:.0f} pictures/s in batches, on {done.device}"
+    poses = "1 pose" if done.n_images == 1 else f"{done.n_images} poses"
+    world = {"sequence": " in the world of the sequence", "mesh": " in the world of the mesh"}
+    where = world[done.world] if done.world else ""
+    return f"{poses}{where}; {alone_ms:.2f} ms for one picture ({parts}), {rate}"

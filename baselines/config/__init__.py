@@ -1,0 +1,1 @@
+"""Typed configuration of label methods, localizers and references."""

@@ -1,0 +1,196 @@
+"""``synfeal localize`` with a map: photographs in, poses out, or "not localized"."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import median
+from typing import Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+import torch
+from numpy.typing import NDArray
+from PIL import Image
+
+from baselines.references.mapped import StructureMap, read_map
+from baselines.references.photographs import Answer, Finder
+from baselines.training.localize import find_pictures, open_picture
+from synfeal.camera.photograph import PhotographCamera
+from synfeal.dataset.pose_table import COLUMNS, IMAGE, SUPPORT
+from synfeal.dataset.render_sequence import Progress
+from synfeal.errors import InputError
+from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.records.files import writing_to
+from synfeal.records.tables import write_frame
+
+Array = NDArray[np.float64]
+World = Literal["sequence", "mesh"]
+
+HEADER = (IMAGE, *COLUMNS[2:], *SUPPORT)
+FOUND, NOT_FOUND = "localized", "not localized"
+# One pose in a hundred with no more support than this is chance.
+LEAST_CONFIDENCE = 0.99
+# So many photographs tell whether their focal length is right.
+FEWEST_RATIOS = 5
+DECIMALS = 6  # micrometres
+PART = 100  # photographs between two lines of progress
+
+
+class LocalizedInMap(NamedTuple):
+    """What became of some photographs.
+
+    Attributes:
+        n_images: Photographs.
+        n_found: Those that were localized.
+        inliers: Median number of features that agree with the pose, of those localized; NaN where
+            none was.
+        focal_ratio: Median over those localized of the focal length that fits best over the one
+            given; NaN where few were.
+        world: Whose coordinates poses are in, where there are two.
+        seconds: Median time for one photograph, all included.
+        n_frames: Frames of the map.
+        n_points: Features of the map.
+    """
+
+    n_images: int
+    n_found: int
+    inliers: float
+    focal_ratio: float
+    world: World | None
+    seconds: float
+    n_frames: int
+    n_points: int
+
+
+def localize_in_map(
+    folder: Path,
+    named: Sequence[Path],
+    out: Path,
+    *,
+    camera: PhotographCamera,
+    world: World = "sequence",
+    least_confidence: float = LEAST_CONFIDENCE,
+    seed: int = 0,
+) -> LocalizedInMap:
+    """Write the pose of each photograph as CSV (columns of ``HEADER``), in the order named.
+
+    Args:
+        folder: A map of ``synfeal map``.
+        named: Photographs, and directories that stand for theirs.
+        out: File to write; it appears when all are done. Where a photograph is not localized, its
+            pose is empty.
+        camera: Camera of the photographs.
+        world: Whose coordinates ``world_from_cam`` is written in, where the place was scanned from
+            a sequence that has its own.
+        least_confidence: Poses with less are not written.
+        seed: Of RANSAC's samples, the same for every photograph.
+
+    Raises:
+        InputError: The map or a photograph cannot be used, nothing says what a photograph's focal
+            length is, or ``out`` cannot be written.
+    """
+    if not 0 < least_confidence < 1:
+        raise InputError(
+            f"--confidence: must lie between 0 and 1, found {least_confidence:g}; 0.99 is usual"
+        )
+    place = read_map(folder)
+    pictures = find_pictures(named)
+    _check_out(out, pictures)
+    torch.set_num_threads(1)
+    taken_s: list[float] = []
+    answers = _find_all(Finder(place, seed), pictures, camera, taken_s)
+    poses = np.array([answer.world_from_cam for answer in answers])
+    found = np.array([a.support.confidence >= least_confidence for a in answers])
+    if world == "sequence" and place.sequence_from_world is not None:
+        poses = place.sequence_from_world @ poses
+    _write(out, pictures, poses, found, answers)
+    kept = [answer for answer, good in zip(answers, found, strict=True) if good]
+    counts = [answer.support.inliers for answer in kept]
+    ratios = np.array([answer.focal_ratio for answer in kept])
+    ratios = ratios[np.isfinite(ratios)]
+    return LocalizedInMap(
+        n_images=len(pictures),
+        n_found=int(found.sum()),
+        inliers=float(median(counts)) if counts else float("nan"),
+        focal_ratio=float(np.median(ratios)) if len(ratios) >= FEWEST_RATIOS else float("nan"),
+        world=None if place.sequence_from_world is None else world,
+        seconds=median(taken_s),
+        n_frames=len(place),
+        n_points=len(place.features.slope),
+    )
+
+
+def _find_all(
+    finder: Finder, pictures: Sequence[Path], camera: PhotographCamera, taken_s: list[float]
+) -> list[Answer]:
+    """Answers in the order of the photographs; notes how long each took."""
+    answers = []
+    with Progress(len(pictures), "localize") as progress:
+        for index, path in enumerate(pictures, start=1):
+            began = time.perf_counter()
+            image = open_picture(path)
+            answers.append(_find(finder, image, path, camera))
+            taken_s.append(time.perf_counter() - began)
+            progress.update()
+            if index % PART == 0:
+                name = f"photograph {index} of {len(pictures)}"
+                progress.part_done(name, PART, sum(taken_s[-PART:]))
+    return answers
+
+
+def _find(finder: Finder, image: Image.Image, path: Path, camera: PhotographCamera) -> Answer:
+    calibration = camera.of(image, path)
+    if calibration is None:
+        raise InputError(
+            f"{path}: nothing says what its focal length is, which its pose depends on; give the"
+            " camera's calibration with --camera, or its focal length in pixels with --focal"
+        )
+    return finder.find(finder.look_at(image, calibration))
+
+
+def _check_out(out: Path, pictures: Sequence[Path]) -> None:
+    """Refuse to overwrite anything but poses of an earlier command."""
+    if out.is_dir():
+        raise InputError(f"{out}: is a directory; name a file with --out")
+    if not os.path.lexists(out):
+        return
+    if out.exists() and any(path.exists() and out.samefile(path) for path in pictures):
+        raise InputError(f"{out}: is one of the inputs; choose another file with --out")
+    begins = f"{IMAGE},{','.join(COLUMNS[2:])}".encode()
+    try:
+        with out.open("rb") as file:
+            holds_poses = file.readline(200).startswith(begins)
+    except OSError:
+        holds_poses = False
+    if not holds_poses:
+        raise InputError(f"{out}: exists and holds no poses; choose another file with --out")
+
+
+def _write(
+    out: Path,
+    pictures: Sequence[Path],
+    poses: Array,
+    found: NDArray[np.bool_],
+    answers: Sequence[Answer],
+) -> None:
+    values = np.full((len(poses), 7), np.nan)
+    values[found, :3] = poses[found, :3, 3]
+    if found.any():
+        values[found, 3:] = quat_wxyz_of(poses[found])
+    frame = pd.DataFrame(values.round(DECIMALS), columns=list(COLUMNS[2:]))
+    frame.insert(0, IMAGE, pd.Series([str(path) for path in pictures], dtype=object))
+    status, inliers, confidence = SUPPORT
+    frame[status] = np.where(found, FOUND, NOT_FOUND)
+    frame[inliers] = [answer.support.inliers for answer in answers]
+    frame[confidence] = [round(answer.support.confidence, DECIMALS) for answer in answers]
+    with writing_to(out, lambda: "choose another file with --out"):
+        write_frame(out, frame, float_format=None)
+
+
+def describe_map(place: StructureMap) -> str:
+    """Say in a line what a map holds."""
+    per_frame = len(place.features.slope) / len(place)
+    return f"{len(place)} frames, {len(place.features.slope)} features ({per_frame:.0f} a frame)"

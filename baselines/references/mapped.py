@@ -1,0 +1,300 @@
+"""A map of a place: features of posed frames, put into space by depth; and frames to retrieve.
+
+``synfeal map`` writes it, ``synfeal localize`` finds photographs in it (photographs.py). Nothing is
+trained but the vocabulary of DenseVLAD. A map is a folder of plain files::
+
+    map.json        format, camera, worlds, what it was built from
+    frames.csv      poses of the frames, world_from_cam, with their names
+    features.npz    features of the frames and their depth
+    retrieval.npz   DenseVLAD of the frames, and its vocabulary
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from PIL import Image
+from pydantic import ValidationError
+
+from baselines.references.arrays import Vectors, read_arrays, write_arrays
+from baselines.references.descriptors import CHUNK, Vlad
+from baselines.references.features import Features
+from baselines.references.map_frames import MapFrames
+from synfeal.camera.projection import normalised_of_pixels
+from synfeal.config.dataset import CameraConfig
+from synfeal.config.load import describe
+from synfeal.dataset.packed import fit_frame
+from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
+from synfeal.dataset.render_sequence import Progress
+from synfeal.dataset.world import KEY, rigid_motion_of
+from synfeal.errors import InputError, read_as
+from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.records.files import (
+    atomic_directory,
+    file_sha256,
+    read_json,
+    refuse_existing,
+    write_json,
+    writing_to,
+)
+from synfeal.records.provenance import provenance
+from synfeal.records.tables import read_records
+
+Array = NDArray[np.float64]
+
+FORMAT, VERSION = "synfeal map", 1
+RECORD, FRAMES, FEATURES, RETRIEVAL = "map.json", "frames.csv", "features.npz", "retrieval.npz"
+VIEW_PX = 64  # side of what retrieval sees of a frame, squeezed into a square
+# Most features of a frame, and their least contrast (OpenCV's default is 0.04): rendered surfaces
+# are smoother than photographs of them.
+MAX_FEATURES, CONTRAST = 1000, 0.006
+FEWEST_FEATURES = 100  # of a map; on fewer there is nothing to find a photograph by
+REMEDY = "make the map again with synfeal map"
+
+
+@dataclass(frozen=True)
+class StructureMap:
+    """A place as posed frames with features that have depth.
+
+    Attributes:
+        names: Names of the frames.
+        world_from_cam: Their poses (N, 4, 4).
+        camera: Camera of the frames.
+        features: Features with depth.
+        vectors: Unit vectors (N, D) to retrieve frames by.
+        vlad: Describes a photograph by such a vector.
+        sequence_from_world: Rigid motion (4, 4) to the world of the scanned sequence, if any.
+        record: What ``map.json`` says beside these.
+    """
+
+    names: tuple[str, ...]
+    world_from_cam: Array
+    camera: CameraConfig
+    features: Features
+    vectors: Vectors
+    vlad: Vlad
+    sequence_from_world: Array | None
+    record: dict[str, Any]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @cached_property
+    def point_m(self) -> Array:
+        """Where the features (K, 3) lie in the world."""
+        pose = self.world_from_cam[self.features.frame]
+        turned = np.einsum("kij,kj->ki", pose[:, :3, :3], self.features.point_m)
+        return np.asarray(turned + pose[:, :3, 3])
+
+    @cached_property
+    def quat_wxyz(self) -> Array:
+        """Rotations of the frames (N, 4)."""
+        return quat_wxyz_of(self.world_from_cam)
+
+
+def detector(max_features: int = MAX_FEATURES) -> Any:
+    """SIFT as maps and photographs are searched with."""
+    cv2.setNumThreads(1)
+    return cv2.SIFT.create(max_features, contrastThreshold=CONTRAST, enable_precise_upscale=True)
+
+
+def detect(sift: Any, grey: NDArray[np.uint8]) -> tuple[Array, NDArray[np.uint8]]:
+    """Find features of an image.
+
+    Args:
+        sift: What :func:`detector` returns.
+        grey: Grey values (H, W).
+
+    Returns:
+        Positions (k, 2) in pixels, the first pixel's centre at (0.5, 0.5), and descriptors
+        (k, 128).
+    """
+    keypoints, descriptor = sift.detectAndCompute(grey, None)
+    if descriptor is None:
+        return np.zeros((0, 2)), np.zeros((0, 128), np.uint8)
+    pixel = np.array([point.pt for point in keypoints], dtype=np.float64) + 0.5
+    return pixel, descriptor.astype(np.uint8)
+
+
+def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
+    """Build a map of posed frames with depth, and write it.
+
+    Args:
+        frames: The frames.
+        out: Folder to write, which must not exist.
+        seed: Of the vocabulary.
+
+    Raises:
+        InputError: An image cannot be read, there are too few features, or ``out`` exists.
+    """
+    refuse_existing(out)
+    began = time.perf_counter()
+    features, views = _read_frames(frames)
+    if len(features.slope) < FEWEST_FEATURES:
+        raise InputError(
+            f"{frames.source}: only {len(features.slope)} features with depth in"
+            f" {len(frames)} frames, a map needs {FEWEST_FEATURES}; is it dark, or without texture?"
+        )
+    torch.set_num_threads(1)
+    vlad = Vlad.learn(views, seed)
+    record = {
+        "format": FORMAT,
+        "version": VERSION,
+        "frames": len(frames),
+        "features": len(features.slope),
+        "source": str(frames.source),
+        "rgbd_camera": frames.rgbd.record,
+        "max_features": MAX_FEATURES,
+        "contrast": CONTRAST,
+        "seconds": round(time.perf_counter() - began, 1),
+        "provenance": provenance(seed, "none"),
+    }
+    made = StructureMap(
+        names=frames.names,
+        world_from_cam=frames.world_from_cam,
+        camera=frames.camera,
+        features=features,
+        vectors=vlad.describe(views),
+        vlad=vlad,
+        sequence_from_world=frames.sequence_from_world,
+        record=record,
+    )
+    with writing_to(out, lambda: "choose another folder with --out"):
+        write_map(made, out)
+    return made
+
+
+def _read_frames(frames: MapFrames) -> tuple[Features, NDArray[np.uint8]]:
+    """Features with depth, and the views (N, 64, 64, 3) that retrieval compares."""
+    sift = detector()
+    views = np.empty((len(frames), VIEW_PX, VIEW_PX, 3), np.uint8)
+    found = []
+    with Progress(len(frames), "map") as progress:
+        began = time.perf_counter()
+        for index in range(len(frames)):
+            image = frames.read_color(index)
+            views[index] = fit_frame(Image.fromarray(image), VIEW_PX, "whole")
+            grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
+            pixel, descriptor = detect(sift, grey)
+            slope = normalised_of_pixels(frames.camera, pixel)
+            depth_m = frames.depth_at(frames.read_depth_m(index), slope)
+            good = np.isfinite(depth_m) & np.isfinite(slope).all(axis=1)
+            found.append((slope[good], depth_m[good], descriptor[good]))
+            progress.update()
+            if (index + 1) % CHUNK == 0:
+                name = f"frame {index + 1} of {len(frames)}"
+                progress.part_done(name, CHUNK, time.perf_counter() - began)
+                began = time.perf_counter()
+    slope, depth, descriptors = (np.concatenate(part) for part in zip(*found, strict=True))
+    start = np.cumsum([0, *(len(part[1]) for part in found)]).astype(np.int64)
+    return Features(start, slope, depth, descriptors), views
+
+
+def write_map(made: StructureMap, out: Path) -> None:
+    """Write a map; the folder appears when it is whole."""
+    count = np.arange(len(made))
+    pose = made.world_from_cam
+    table = PoseTable(count, 0 * count, pose[:, :3, 3], quat_wxyz_of(pose))
+    with atomic_directory(out) as folder:
+        write_pose_table(folder / FRAMES, table, list(made.names))
+        made.features.write(folder / FEATURES)
+        vlad = made.vlad
+        write_arrays(
+            folder / RETRIEVAL,
+            {
+                "vectors": made.vectors,
+                "words": vlad.words.numpy(),
+                "mean": vlad.mean,
+                "axes": vlad.axes,
+            },
+        )
+        sequence = made.sequence_from_world
+        record = {
+            **made.record,
+            "camera": made.camera.record,
+            KEY: None if sequence is None else sequence.tolist(),
+            "sha256": {name: file_sha256(folder / name) for name in (FRAMES, FEATURES, RETRIEVAL)},
+        }
+        write_json(folder / RECORD, record)
+
+
+def read_map(folder: Path) -> StructureMap:
+    """Read a map.
+
+    Raises:
+        InputError: It is no map, of a later version, or damaged.
+    """
+    record, camera, sequence_from_world = _read_record(folder)
+    table = read_pose_table(folder / FRAMES)
+    names = tuple(row["image"] for _, row in read_records(folder / FRAMES, ("image",), REMEDY))
+    features = Features.read(folder / FEATURES)
+    stored = read_arrays(folder / RETRIEVAL, ("vectors", "words", "mean", "axes"))
+    _check_shapes(folder, len(table), features, stored)
+    return StructureMap(
+        names=names,
+        world_from_cam=table.world_from_cam,
+        camera=camera,
+        features=features,
+        vectors=stored["vectors"],
+        vlad=Vlad(torch.from_numpy(stored["words"]), stored["mean"], stored["axes"]),
+        sequence_from_world=sequence_from_world,
+        record=record,
+    )
+
+
+def _read_record(folder: Path) -> tuple[dict[str, Any], CameraConfig, Array | None]:
+    path = folder / RECORD
+    if not path.is_file():
+        raise InputError(f"{folder}: holds no {RECORD}; give the folder that synfeal map wrote")
+    with read_as(path, "the record of a map", remedy=f"; {REMEDY}"):
+        record = read_json(path)
+        if not isinstance(record, dict) or record.get("format") != FORMAT:
+            raise ValueError(f"its format is not '{FORMAT}'")
+    if record.get("version") != VERSION:
+        raise InputError(
+            f"{path}: version: {record.get('version')!r} is not read, only {VERSION}; {REMEDY}"
+        )
+    try:
+        camera = CameraConfig.model_validate(record.get("camera"))
+    except ValidationError as error:
+        raise InputError(f"{path}: camera: {describe(error)}; {REMEDY}") from None
+    stored = record.get(KEY)
+    return record, camera, None if stored is None else rigid_motion_of(record, path)
+
+
+def _check_shapes(
+    folder: Path, n_frames: int, features: Features, stored: dict[str, NDArray[Any]]
+) -> None:
+    """Refuse files that are not of one map."""
+    starts = features.start
+    count = len(features.slope)
+    whole = (
+        starts.shape == (n_frames + 1,)
+        and starts[0] == 0
+        and starts[-1] == count
+        and bool((np.diff(starts) >= 0).all())
+        and features.slope.shape == (count, 2)
+        and features.depth_m.shape == (count,)
+        and features.descriptor.shape == (count, 128)
+    )
+    if not whole:
+        raise InputError(f"{folder / FEATURES}: is not of the frames of {FRAMES}; {REMEDY}")
+    words, mean, axes = stored["words"], stored["mean"], stored["axes"]
+    fits = (
+        words.ndim == 2
+        and words.shape[1] == 128
+        and mean.shape == (words.size,)
+        and axes.ndim == 2
+        and len(axes) == words.size
+        and stored["vectors"].shape == (n_frames, axes.shape[1])
+    )
+    if not fits:
+        raise InputError(f"{folder / RETRIEVAL}: is not of the frames of {FRAMES}; {REMEDY}")

@@ -1,0 +1,217 @@
+"""Photographs in a map: features matched with those of frames that look alike, then PnP.
+
+A photograph is reduced to the focal length of the map's frames, in pixels, so that a thing at the
+same distance has the same size in both and one pixel means the same angle. Its pose is found twice:
+from the frames that look most alike, then from those that were taken nearest to the first pose.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from baselines.references.arrays import most_alike
+from baselines.references.confidence import NO_SUPPORT, Support, support_of
+from baselines.references.correspondences import mutual_matches
+from baselines.references.features import roots_of
+from baselines.references.mapped import VIEW_PX, StructureMap, detect, detector
+from baselines.references.structure import pinhole, refined_focal_px, supported_pose
+from synfeal.camera.calibration import Calibration
+from synfeal.camera.distortion import distort, undistort
+from synfeal.camera.projection import cell_pixels, normalised_of_pixels
+from synfeal.config.dataset import CameraConfig
+from synfeal.geometry.poses import inverse
+from synfeal.geometry.rotations import quat_wxyz_from_matrix
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+RETRIEVED = 20  # frames that a photograph is matched with, each time
+RATIO = 0.85
+MAX_ERROR_PX = 6.0  # of the map's frames; poses of a scan contradict each other by some pixels
+# Matches that miss by this many times the largest error of an inlier may miss because the focal
+# length is wrong.
+FOCAL_ERRORS = 2.0
+SAMPLES = 4  # along each side of a pixel of what retrieval sees
+# How many metres a radian counts in "nearest": turning by 30 degrees changes what is seen about as
+# much as a step of a metre does.
+METRES_PER_RADIAN = 2.0
+
+
+class Photograph(NamedTuple):
+    """What is used of a photograph.
+
+    Attributes:
+        slope: x / z and y / z (k, 2) of the rays of its features, distortion removed.
+        roots: RootSIFT descriptors (k, 128).
+        view: It as the map's camera would have seen it (64, 64, 3), squeezed into a square.
+    """
+
+    slope: Array
+    roots: NDArray[np.float32]
+    view: NDArray[np.uint8]
+
+
+class Answer(NamedTuple):
+    """The pose of a photograph and what speaks for it.
+
+    Attributes:
+        world_from_cam: Pose (4, 4) in the world of the map, NaN where none was found.
+        support: Its evidence.
+        focal_ratio: Focal length that fits the matches best, over the one that was given; NaN where
+            no pose was found. Of one photograph it means little, for a step back looks much like
+            a shorter lens; of many the median does.
+    """
+
+    world_from_cam: Array
+    support: Support
+    focal_ratio: float
+
+
+NOT_FOUND = Answer(np.full((4, 4), np.nan), NO_SUPPORT, float("nan"))
+
+
+class Finder:
+    """Finds photographs in a map.
+
+    Args:
+        place: The map.
+        seed: Of RANSAC's samples.
+    """
+
+    def __init__(self, place: StructureMap, seed: int = 0) -> None:
+        self._place = place
+        self._seed = seed
+        self._sift = detector()
+        self._pinhole = pinhole(place.camera)
+        self._focal_px = np.array(place.camera.intrinsics[:2])
+
+    def look_at(self, image: Image.Image, calibration: Calibration) -> Photograph:
+        """Find the features of a photograph and what retrieval compares.
+
+        Args:
+            image: The photograph (RGB), of the calibration's size.
+            calibration: Its camera.
+        """
+        pixels = np.asarray(image)
+        full = np.array([calibration.width, calibration.height])
+        focal_px = np.array([calibration.fx, calibration.fy])
+        size = np.round(full * np.minimum(self._focal_px / focal_px, 1)).astype(int).clip(1)
+        if (size < full).any():
+            smaller = cv2.resize(pixels, size.tolist(), interpolation=cv2.INTER_AREA)
+            pixels = np.asarray(smaller, dtype=np.uint8)
+        scale = size / full
+        grey = np.asarray(cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
+        pixel, descriptor = detect(self._sift, grey)
+        centre = np.array([calibration.cx, calibration.cy])
+        slope = undistort((pixel / scale - centre) / focal_px, calibration.distortion)
+        known = np.isfinite(slope).all(axis=1)
+        looks = _places(calibration, self._place.camera) * scale
+        return Photograph(slope[known], roots_of(descriptor[known]), _sampled(pixels, looks))
+
+    def find(self, photograph: Photograph) -> Answer:
+        """Estimate where a photograph was taken."""
+        best = self._against(photograph, self.alike(photograph))
+        if best is None:
+            return NOT_FOUND
+        second = self._against(photograph, self.nearest(best.world_from_cam))
+        if second is not None and second.support.log10_nfa < best.support.log10_nfa:
+            best = second
+        return Answer(best.world_from_cam, best.support, self._focal_ratio(best))
+
+    def alike(self, photograph: Photograph) -> Rows:
+        """Frames of the map that look most alike, best first."""
+        vector = self._place.vlad.describe(photograph.view[None])
+        return most_alike(self._place.vectors, vector, RETRIEVED).ravel()
+
+    def nearest(self, world_from_cam: Array) -> Rows:
+        """Frames of the map that were taken nearest to a pose (4, 4), best first."""
+        place_m, quat_wxyz = self._place.world_from_cam[:, :3, 3], self._place.quat_wxyz
+        distance_m = np.linalg.norm(place_m - world_from_cam[:3, 3], axis=1)
+        cosine = np.abs(quat_wxyz @ quat_wxyz_from_matrix(world_from_cam[:3, :3]))
+        angle_rad = 2 * np.arccos(np.minimum(cosine, 1))
+        far = distance_m + METRES_PER_RADIAN * angle_rad
+        order: Rows = np.argsort(far, kind="stable")
+        return order[:RETRIEVED]
+
+    def _against(self, photograph: Photograph, frames: Rows) -> _Attempt | None:
+        """Estimate a pose from matches with some frames of the map."""
+        features = self._place.features
+        own, feature = [], []
+        for frame in frames:
+            mine, other = mutual_matches(photograph.roots, features.roots(int(frame)), RATIO)
+            own.append(mine)
+            feature.append(features.start[frame] + other)
+        matched = np.concatenate(own)
+        pixel = photograph.slope[matched] * self._focal_px
+        point_m = self._place.point_m[np.concatenate(feature)]
+        found = supported_pose(
+            pixel=pixel,
+            point_m=point_m,
+            camera=self._pinhole,
+            seed=self._seed,
+            max_error_px=MAX_ERROR_PX,
+        )
+        if found is None:
+            return None
+        camera = self._place.camera
+        support = support_of(
+            pixel=pixel,
+            own=matched,
+            inlier=found.inlier,
+            size=(camera.width, camera.height),
+            max_error_px=MAX_ERROR_PX,
+        )
+        return _Attempt(found.world_from_cam, support, pixel, point_m)
+
+    def _focal_ratio(self, attempt: _Attempt) -> float:
+        """Ratio of the best focal length to the one given, from matches that nearly agree."""
+        cam_from_world = inverse(attempt.world_from_cam)
+        in_cam_m = attempt.point_m @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            seen = in_cam_m[:, :2] / in_cam_m[:, 2:] * self._focal_px
+            near = np.linalg.norm(seen - attempt.pixel, axis=1) < FOCAL_ERRORS * MAX_ERROR_PX
+        near &= in_cam_m[:, 2] > 0
+        focal_px = refined_focal_px(
+            pixel=attempt.pixel[near],
+            point_m=attempt.point_m[near],
+            world_from_cam=attempt.world_from_cam,
+            camera=self._pinhole,
+        )
+        return focal_px / float(self._focal_px[0])
+
+
+class _Attempt(NamedTuple):
+    """A pose, its support, and the matches (m, 2), (m, 3) it was found from."""
+
+    world_from_cam: Array
+    support: Support
+    pixel: Array
+    point_m: Array
+
+
+def _sampled(pixels: NDArray[np.uint8], looks: Array) -> NDArray[np.uint8]:
+    """Colours (64, 64, 3) as means over samples at (64 s, 64 s, 2) pixels; edges are continued."""
+    column, row = np.moveaxis((looks - 0.5).astype(np.float32), -1, 0)
+    fine = cv2.remap(pixels, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    small = cv2.resize(fine, (VIEW_PX, VIEW_PX), interpolation=cv2.INTER_AREA)
+    return np.asarray(small, dtype=np.uint8)
+
+
+def _places(calibration: Calibration, camera: CameraConfig) -> Array:
+    """Pixels (64 s, 64 s, 2) of a photograph that show what the pixels of a map's view show."""
+    return _places_of(calibration, camera.model_dump_json())
+
+
+@lru_cache(8)
+def _places_of(calibration: Calibration, camera_json: str) -> Array:
+    camera = CameraConfig.model_validate_json(camera_json)
+    cells = cell_pixels(camera, VIEW_PX * SAMPLES, VIEW_PX * SAMPLES)
+    ray = np.nan_to_num(normalised_of_pixels(camera, cells))
+    centre = np.array([calibration.cx, calibration.cy])
+    return centre + distort(ray, calibration.distortion) * [calibration.fx, calibration.fy]

@@ -1,0 +1,342 @@
+"""A trained localizer on a person's own pictures: which files they are, and poses out."""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from statistics import median
+from typing import Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+import torch
+from numpy.typing import NDArray
+from PIL import Image, ImageOps
+from torch import Tensor
+
+from baselines.training.checkpoint import ModelDescription, TrainedLocalizer, read_checkpoint
+from baselines.training.device import open_device
+from baselines.training.predict import BATCH, DECIMALS, predict, predict_ms
+from baselines.training.resample import Resampler, same_view
+from synfeal.camera.calibration import Calibration
+from synfeal.camera.photograph import PhotographCamera, Source
+from synfeal.dataset.packed import View, fit_frame
+from synfeal.dataset.pose_table import COLUMNS
+from synfeal.dataset.render_sequence import Progress
+from synfeal.errors import InputError, why
+from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
+from synfeal.records.files import writing_to
+from synfeal.records.tables import write_frame
+
+Array = NDArray[np.float64]
+World = Literal["sequence", "mesh"]
+# A network guesses a little beyond what it has seen; half a metre is no extrapolation in any room.
+LEAST_MARGIN_M = 0.5
+
+log = logging.getLogger(__name__)
+
+HEADER = ("image", *COLUMNS[2:])
+
+
+class Localized(NamedTuple):
+    """What became of some pictures.
+
+    Attributes:
+        description: Of the localizer.
+        device: Where it ran, ``cpu`` or ``cuda``.
+        n_images: Pictures.
+        n_failed: Those whose pose is not finite.
+        n_beyond: Those whose pose lies far outside of the training positions.
+        n_resampled: Those that were brought to the training camera.
+        calibration: What told the camera of these.
+        outside: Largest share of the training view that one of these does not show.
+        world: Whose coordinates poses are in, where the two differ.
+        read_ms: Median time to read and shrink a picture.
+        network_ms: Median time of the network on one picture alone.
+        images_per_s: Pictures per second in batches, reading included.
+    """
+
+    description: ModelDescription
+    device: str
+    n_images: int
+    n_failed: int
+    n_beyond: int
+    n_resampled: int
+    calibration: Source | None
+    outside: float
+    world: World | None
+    read_ms: float
+    network_ms: float
+    images_per_s: float
+
+
+def localize(
+    model: Path,
+    named: Sequence[Path],
+    out: Path,
+    device: Literal["auto", "cpu", "cuda"],
+    *,
+    camera: PhotographCamera | None = None,
+    world: World = "sequence",
+) -> Localized:
+    """Write the pose of each picture as CSV (columns of ``HEADER``), in the order named.
+
+    Args:
+        model: Checkpoint.
+        named: Pictures, and directories that stand for their pictures.
+        out: File to write; it appears when all are done.
+        device: Where to run.
+        camera: Camera of the pictures; without one they are taken to show what training frames do.
+        world: Whose coordinates ``world_from_cam`` is written in, where the place was scanned from
+            a sequence that has its own; else they are those of the training labels. A pose that is
+            not finite is written as ``nan``.
+
+    Raises:
+        InputError: The model or a picture cannot be used, or ``out`` cannot be written.
+    """
+    trained = read_checkpoint(model, open_device(device))
+    reader = PictureReader(trained.description, camera or PhotographCamera(exif=False), model)
+    pictures = find_pictures(named)
+    _check_out(out, [model, *pictures])
+    network_ms = predict_ms(trained, _batch(trained, pictures[:1], reader))
+    reader.read_s.clear()
+    began = time.perf_counter()
+    position_m, quat_wxyz = _predict_all(trained, pictures, reader)
+    seconds = time.perf_counter() - began
+    beyond = _beyond(trained.description, position_m)
+    moved = trained.description.sequence_from_world
+    if moved is not None and world == "sequence":
+        position_m, quat_wxyz = _moved(np.array(moved), position_m, quat_wxyz)
+    _write(out, pictures, np.concatenate([position_m, quat_wxyz], axis=1))
+    good = np.isfinite(position_m).all(axis=1) & np.isfinite(quat_wxyz).all(axis=1)
+    return Localized(
+        description=trained.description,
+        device=trained.device.type,
+        n_images=len(pictures),
+        n_failed=int((~good).sum()),
+        n_beyond=int(beyond.sum()),
+        n_resampled=len(reader.resampled),
+        calibration=reader.source if reader.resampled else None,
+        outside=reader.outside,
+        world=None if moved is None else world,
+        read_ms=1000 * median(reader.read_s),
+        network_ms=network_ms,
+        images_per_s=len(pictures) / seconds,
+    )
+
+
+def _beyond(description: ModelDescription, position_m: Array) -> NDArray[np.bool_]:
+    """Which positions (N, 3) are farther outside of the training box than it is wide."""
+    if description.bounds_m is None:
+        return np.zeros(len(position_m), bool)
+    low, high = np.array(description.bounds_m)
+    margin = np.maximum(high - low, LEAST_MARGIN_M)
+    beyond: NDArray[np.bool_] = (position_m < low - margin) | (position_m > high + margin)
+    return np.asarray(beyond.any(axis=1))
+
+
+def _moved(sequence_from_world: Array, position_m: Array, quat_wxyz: Array) -> tuple[Array, Array]:
+    """Positions (N, 3) and quaternions (N, 4) in the sequence's world; ``nan`` stays ``nan``."""
+    position_m = position_m @ sequence_from_world[:3, :3].T + sequence_from_world[:3, 3]
+    moved = np.full_like(quat_wxyz, np.nan)
+    known = np.isfinite(quat_wxyz).all(axis=1)
+    if known.any():
+        pose = pose_from_quat(np.zeros((int(known.sum()), 3)), quat_wxyz[known])
+        moved[known] = quat_wxyz_of(sequence_from_world @ pose)
+    return position_m.round(DECIMALS), moved.round(DECIMALS)
+
+
+def _predict_all(
+    trained: TrainedLocalizer, pictures: Sequence[Path], reader: PictureReader
+) -> tuple[Array, Array]:
+    """Positions (N, 3) and quaternions (N, 4), in batches as a test set is predicted in."""
+    poses = []
+    with Progress(len(pictures), "localize") as progress:
+        for start in range(0, len(pictures), BATCH):
+            began = time.perf_counter()
+            batch = pictures[start : start + BATCH]
+            poses.append(predict(trained, _batch(trained, batch, reader)))
+            progress.update(len(batch))
+            if len(pictures) > BATCH:
+                name = f"picture {start + len(batch)} of {len(pictures)}"
+                progress.part_done(name, len(batch), time.perf_counter() - began)
+    position_m, quat_wxyz = zip(*poses, strict=True)
+    return np.concatenate(position_m), np.concatenate(quat_wxyz)
+
+
+def _batch(trained: TrainedLocalizer, pictures: Sequence[Path], reader: PictureReader) -> Tensor:
+    """Pictures as (B, 3, px, px) uint8, channels last."""
+    frames = np.stack([reader(path) for path in pictures])
+    return torch.from_numpy(frames).to(trained.device).permute(0, 3, 1, 2)
+
+
+def _check_out(out: Path, inputs: Sequence[Path]) -> None:
+    if out.is_dir():
+        raise InputError(f"{out}: is a directory; name a file with --out")
+    if out.exists() and any(path.exists() and out.samefile(path) for path in inputs):
+        raise InputError(f"{out}: is one of the inputs; choose another file with --out")
+    if os.path.lexists(out) and not _holds_poses(out):
+        raise InputError(f"{out}: exists and holds no poses; choose another file with --out")
+
+
+def _holds_poses(out: Path) -> bool:
+    """Whether an earlier command wrote it."""
+    try:
+        with out.open("rb") as file:
+            return file.readline(200).strip() == ",".join(HEADER).encode()
+    except OSError:
+        return False
+
+
+def _write(out: Path, pictures: Sequence[Path], poses: Array) -> None:
+    """Numbers with enough digits to read back the same values; names as the bytes they are."""
+    frame = pd.DataFrame(poses, columns=list(HEADER[1:]))
+    frame.insert(0, HEADER[0], pd.Series([str(path) for path in pictures], dtype=object))
+    with writing_to(out, lambda: "choose another file with --out"):
+        write_frame(out, frame, float_format=None, na_rep="nan")
+
+
+SUFFIXES = (".png", ".jpg", ".jpeg")
+# Modes of eight bits or fewer per channel; what else there is has no scale that is known.
+MODES = ("1", "L", "LA", "P", "PA", "RGB", "RGBA", "CMYK", "YCbCr")
+# A longer picture has no square with as much to see as a training frame has.
+MAX_ASPECT = 20
+
+
+def find_pictures(named: Iterable[Path]) -> list[Path]:
+    """The files named, and in place of a directory the pictures in it, sorted by name.
+
+    Of a 7-Scenes sequence these are the colour images: ``*.depth.png`` is left out.
+
+    Raises:
+        InputError: something named is not there, or a directory holds no picture.
+    """
+    found: list[Path] = []
+    for path in named:
+        if not (path.is_dir() or path.is_file()):
+            raise InputError(f"{path}: there is no such picture or directory")
+        found += _in(path) if path.is_dir() else [path]
+    return found
+
+
+def read_picture(path: Path, input_px: int, view: View = "square") -> NDArray[np.uint8]:
+    """Read a picture that shows what training frames do.
+
+    Args:
+        path: PNG or JPEG.
+        input_px: Side of the network's image.
+        view: What of the picture it shows.
+
+    Returns:
+        Pixels (input_px, input_px, 3), made by the function that packs training frames.
+
+    Raises:
+        InputError: As :func:`open_picture`.
+    """
+    return fit_frame(open_picture(path), input_px, view)
+
+
+def open_picture(path: Path) -> Image.Image:
+    """Read a picture as RGB, turned upright by its EXIF orientation.
+
+    Rendered frames have none, so the packer does not look. Grey, palette and CMYK become RGB; an
+    alpha channel is left out.
+
+    Raises:
+        InputError: The file is damaged, or is no picture of eight bits per channel.
+    """
+    try:
+        with Image.open(path, formats=("PNG", "JPEG")) as image:
+            if image.mode not in MODES:
+                problem = f"holds pixels of mode {image.mode}, such as depth, not 8-bit colours"
+            elif max(image.size) > MAX_ASPECT * min(image.size):
+                size = f"{image.width} x {image.height}"
+                problem = f"is {size} pixels, too long for a square to be cut out"
+            else:
+                upright = ImageOps.exif_transpose(image)
+                if "transparency" in upright.info:  # a palette's: Pillow knows this way only
+                    upright = upright.convert("RGBA")
+                return upright.convert("RGB")
+    except Exception as error:  # a damaged file is refused in every way there is
+        problem = f"cannot be read as a PNG or JPEG picture ({why(error)})"
+    raise InputError(f"{path}: {problem}; leave it out or repair it")
+
+
+class PictureReader:
+    """Reads pictures as the network is to see them.
+
+    Args:
+        description: Of the localizer: what its training frames were.
+        camera: Of the pictures.
+        model: The checkpoint, for messages.
+
+    Attributes:
+        read_s: How long each picture took, seconds.
+        resampled: Pictures that were brought to the training camera.
+        outside: Largest share of the training view that one of these does not show.
+        source: What tells the camera of pictures; None where nothing does.
+
+    Raises:
+        InputError: A calibration is given for a model that does not know its own camera.
+    """
+
+    def __init__(
+        self, description: ModelDescription, camera: PhotographCamera, model: Path
+    ) -> None:
+        self._network, self._target = description.network, description.camera
+        self._camera = camera
+        self.source = camera.source
+        if self._target is None and camera.source in ("file", "focal"):
+            raise InputError(
+                f"{model}: does not say which camera its training frames are of, so pictures"
+                " cannot be brought to it; leave the calibration out, or train on a data set of"
+                " synfeal collect"
+            )
+        self._resamplers: dict[Calibration, Resampler | None] = {}
+        self.read_s: list[float] = []
+        self.resampled: set[Path] = set()
+        self.outside = 0.0
+
+    def __call__(self, path: Path) -> NDArray[np.uint8]:
+        """Pixels (input_px, input_px, 3) of a picture."""
+        began = time.perf_counter()
+        image = self._brought(open_picture(path), path)
+        pixels = fit_frame(image, self._network.input_px, self._network.view)
+        self.read_s.append(time.perf_counter() - began)
+        return pixels
+
+    def _brought(self, image: Image.Image, path: Path) -> Image.Image:
+        """The picture as the training camera sees it, where both cameras are known."""
+        known = None if self._target is None else self._camera.of(image, path)
+        if known is None or self._target is None:
+            return image
+        self.resampled.add(path)
+        if known not in self._resamplers:
+            same = same_view(known, self._target)
+            self._resamplers[known] = None if same else Resampler(known, self._target)
+        resampler = self._resamplers[known]
+        if resampler is None:
+            return image
+        self.outside = max(self.outside, resampler.outside)
+        return resampler(image)
+
+
+def _in(directory: Path) -> list[Path]:
+    try:
+        files = sorted(path for path in directory.iterdir() if path.is_file())
+    except OSError as error:
+        raise InputError(f"{directory}: cannot be listed ({error.strerror})") from None
+    if any(directory.glob("seq-[0-9]*")):
+        raise InputError(f"{directory}: is a data set; name its sequences, {directory}/seq-01")
+    found = [path for path in files if _is_picture(path.name.lower())]
+    if not found:
+        raise InputError(f"{directory}: holds no {', '.join(SUFFIXES)}; name another directory")
+    return found
+
+
+def _is_picture(name: str) -> bool:
+    hidden_or_depth = name.startswith(".") or name.endswith(".depth.png")
+    return name.endswith(SUFFIXES) and not hidden_or_depth

@@ -1,0 +1,323 @@
+"""Frames of a person's own data sets, packed as every training run reads them.
+
+A data set is one that ``synfeal collect`` wrote, of which the training split is taken, or a
+sequence of photographs with poses (see :mod:`synfeal.dataset.posed_sequence`). Several are joined:
+all poses are taken to the world of the first, and photographs of a known camera to that of the
+rendered frames.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from baselines.config.learning import NetworkConfig
+from baselines.training.checkpoint import FrameCamera
+from baselines.training.resample import Resampler, same_view
+from synfeal.camera.calibration import Calibration
+from synfeal.camera.photograph import PhotographCamera
+from synfeal.dataset.finish import MANIFEST
+from synfeal.dataset.frame_files import FrameFile, read_image
+from synfeal.dataset.packed import fit_frame, new_packed
+from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
+from synfeal.dataset.posed_sequence import PosedFrames, read_posed_sequence
+from synfeal.dataset.render_sequence import Progress
+from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
+from synfeal.dataset.world import read_sequence_from_world
+from synfeal.errors import InputError
+from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.records.files import file_sha256, write_json
+from synfeal.validation.camera import camera_of_dataset
+
+log = logging.getLogger(__name__)
+
+Array = NDArray[np.float64]
+# Photographs have no paths: a sequence is cut into so many blocks of neighbours, which are held out
+# or learned from as a whole.
+BLOCKS = 10
+READERS = 4  # threads; files are decoded outside of Python's lock
+
+
+@dataclass(frozen=True)
+class FrameRange:
+    """Frames ``start`` to ``stop`` (exclusive) of a sequence of photographs, from 0."""
+
+    start: int
+    stop: int
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.start < self.stop:
+            raise InputError(
+                f"--frames: {self.start} {self.stop} holds no frame; give the first frame, from 0,"
+                " and one past the last"
+            )
+
+
+@dataclass(frozen=True)
+class OwnFrames:
+    """Training frames of one data set.
+
+    Attributes:
+        folder: Where it lies.
+        color: Image of each frame.
+        world_from_cam: Poses (N, 4, 4) in the data set's own world.
+        path: Index (N,) of the path of each frame, from 0: what is held out as a whole.
+        camera: Camera of the frames, where the data set says so; None for photographs.
+        sequence_from_world: Motion (4, 4) to the world of the sequence scanned, where it differs.
+    """
+
+    folder: Path
+    color: tuple[FrameFile, ...]
+    world_from_cam: Array
+    path: NDArray[np.int64]
+    camera: FrameCamera | None
+    sequence_from_world: Array | None
+
+    def __len__(self) -> int:
+        return len(self.color)
+
+
+@dataclass(frozen=True)
+class PackedFrames:
+    """What a training run reads.
+
+    Attributes:
+        frames: Packed frames, with a record beside them that names their camera.
+        labels: Pose table.
+        sequence_from_world: Motion (4, 4) from the world of the labels to that of the sequence.
+        camera: Camera of the frames before they were made smaller; None where it is not known.
+        n_paths: Paths that may be held out.
+    """
+
+    frames: Path
+    labels: Path
+    sequence_from_world: Array | None
+    camera: FrameCamera | None
+    n_paths: int
+
+
+def read_own_frames(folder: Path, ranges: Sequence[FrameRange]) -> OwnFrames:
+    """Find the training frames of a data set; images are not opened.
+
+    Args:
+        folder: Data set of ``synfeal collect``, or a sequence of photographs.
+        ranges: Frames to take of photographs; none: all.
+
+    Raises:
+        InputError: There are no such frames, or a file is missing or damaged.
+    """
+    split = os.path.lexists(folder / SPLIT_FILES["train"])
+    rendered = os.path.lexists(folder / MANIFEST)
+    if split:
+        sequences = [read_posed_sequence(path) for path in read_split(folder, "train")]
+        if not sequences:
+            raise InputError(
+                f"{folder / SPLIT_FILES['train']}: names no sequence; collect training frames"
+            )
+    if rendered and split:
+        parts, path = sequences, _paths_of_table(folder, sum(map(len, sequences)))
+    elif split:
+        parts = [part for whole in sequences for part in _ranges_of(folder, whole, ranges)]
+        path = None
+    else:
+        slices = [slice(r.start, r.stop) for r in ranges] or [slice(None)]
+        parts, path = [read_posed_sequence(folder, chosen) for chosen in slices], None
+    return OwnFrames(
+        folder=folder,
+        color=tuple(file for part in parts for file in part.color),
+        world_from_cam=np.concatenate([part.world_from_cam for part in parts]),
+        path=_blocks(parts) if path is None else path,
+        camera=_manifest_camera(folder) if rendered else None,
+        sequence_from_world=read_sequence_from_world(folder),
+    )
+
+
+def _ranges_of(
+    folder: Path, whole: PosedFrames, ranges: Sequence[FrameRange]
+) -> Iterator[PosedFrames]:
+    """Parts of one sequence of a split; without ranges all of it."""
+    if not ranges:
+        yield whole
+    for chosen in ranges:
+        part = whole[chosen.start : chosen.stop]
+        if not len(part):
+            raise InputError(
+                f"{folder}: a sequence has {len(whole)} frames, none of them in --frames"
+                f" {chosen.start} {chosen.stop}"
+            )
+        yield part
+
+
+def _paths_of_table(folder: Path, n_frames: int) -> NDArray[np.int64] | None:
+    """The path of each frame by ``train.csv``, None where there is none."""
+    table = folder / "train.csv"
+    if not table.is_file():
+        return None
+    path = read_pose_table(table).path
+    if len(path) != n_frames:
+        raise InputError(
+            f"{table}: has {len(path)} rows, but the sequences of the split hold {n_frames}"
+            " frames; run synfeal validate"
+        )
+    return path
+
+
+def _blocks(parts: Sequence[PosedFrames]) -> NDArray[np.int64]:
+    """Blocks of neighbours, numbered over all parts, in place of paths."""
+    found, first = [], 0
+    for part in parts:
+        count = min(BLOCKS, len(part))
+        found.append(first + np.arange(len(part)) * count // len(part))
+        first += count
+    return np.concatenate(found)
+
+
+def _manifest_camera(folder: Path) -> FrameCamera:
+    """The camera that the manifest of a data set names."""
+    camera = camera_of_dataset(folder, None).config
+    fx, fy, cx, cy = camera.intrinsics
+    return FrameCamera(
+        width=camera.width,
+        height=camera.height,
+        fx=fx,
+        fy=fy,
+        cx=cx,
+        cy=cy,
+        distortion=camera.distortion,
+    )
+
+
+def pack_own_frames(
+    sets: Sequence[OwnFrames], photographs: PhotographCamera, network: NetworkConfig, out: Path
+) -> PackedFrames:
+    """Write ``frames.npy``, ``frames.json`` and ``labels.csv`` of one or more data sets.
+
+    Args:
+        sets: Data sets; the first decides which world the labels are in.
+        photographs: Camera of those that do not name one.
+        network: Side of the packed images, and what of a frame they show.
+        out: Directory to write to.
+
+    Raises:
+        InputError: An image cannot be used, or the data sets do not fit together.
+    """
+    target = _target_camera(sets, photographs)
+    frames, labels = out / "frames.npy", out / "labels.csv"
+    jobs = [(own, file) for own in sets for file in own.color]
+    resamplers: dict[Calibration, Resampler | None] = {}
+
+    def pixels(job: tuple[OwnFrames, FrameFile]) -> NDArray[np.uint8]:
+        own, file = job
+        image = read_image(file, "RGB")
+        if own.camera is None:
+            image = _resampled(image, file, photographs, target, resamplers)
+        elif image.size != (own.camera.width, own.camera.height):
+            raise InputError(
+                f"{file}: is of {image.width}x{image.height} pixels, {own.folder / MANIFEST} says"
+                f" {own.camera.width}x{own.camera.height}; collect the data set again"
+            )
+        return fit_frame(image, network.input_px, network.view)
+
+    with (
+        new_packed(frames, len(jobs), network.input_px) as packed,
+        Progress(len(jobs), "pack") as progress,
+        ThreadPoolExecutor(READERS) as readers,
+    ):
+        try:
+            for index, small in enumerate(readers.map(pixels, jobs)):
+                packed[index] = small
+                progress.update()
+        finally:
+            readers.shutdown(cancel_futures=True)
+    write_pose_table(labels, _joined(sets))
+    _write_record(frames, target)
+    return PackedFrames(
+        frames=frames,
+        labels=labels,
+        sequence_from_world=_common_world(sets),
+        camera=target,
+        n_paths=sum(len(np.unique(own.path)) for own in sets),
+    )
+
+
+def _target_camera(sets: Sequence[OwnFrames], photographs: PhotographCamera) -> FrameCamera | None:
+    """The one camera that all frames are to be of: that of rendered frames where there are any."""
+    cameras = {own.camera: own for own in sets if own.camera is not None}
+    if len(cameras) > 1:
+        first, second = list(cameras.values())[:2]
+        raise InputError(
+            f"{second.folder / MANIFEST}: camera: is another than that of {first.folder}; collect"
+            " both with one camera, or train on one of them"
+        )
+    if cameras:
+        return next(iter(cameras))
+    known = photographs.of(read_image(sets[0].color[0]), sets[0].color[0])
+    if known is None:
+        return None
+    return FrameCamera(
+        width=known.width, height=known.height, fx=known.fx, fy=known.fy, cx=known.cx, cy=known.cy
+    )
+
+
+def _resampled(
+    image: Image.Image,
+    file: FrameFile,
+    photographs: PhotographCamera,
+    target: FrameCamera | None,
+    resamplers: dict[Calibration, Resampler | None],
+) -> Image.Image:
+    """A photograph as ``target`` sees it; as it is where one of the two cameras is not known."""
+    known = None if target is None else photographs.of(image, file)
+    if known is None or target is None:
+        return image
+    if known not in resamplers:
+        resamplers[known] = None if same_view(known, target) else Resampler(known, target)
+    resampler = resamplers[known]
+    return image if resampler is None else resampler(image)
+
+
+def _common_world(sets: Sequence[OwnFrames]) -> Array | None:
+    """From the world of the labels, that of the first data set, to the sequence's."""
+    return sets[0].sequence_from_world
+
+
+def _joined(sets: Sequence[OwnFrames]) -> PoseTable:
+    """All frames in the world of the first data set, their paths numbered one after the other.
+
+    Photographs are in the world of their sequence, rendered frames in that of the mesh.
+    """
+    common = _motion(sets[0])
+    poses, paths, first = [], [], 0
+    for own in sets:
+        common_from_own = np.linalg.inv(common) @ _motion(own)
+        poses.append(own.world_from_cam if own is sets[0] else common_from_own @ own.world_from_cam)
+        known, index = np.unique(own.path, return_inverse=True)
+        paths.append(first + index)
+        first += len(known)
+    world_from_cam = np.concatenate(poses)
+    return PoseTable(
+        frame=np.arange(len(world_from_cam)),
+        path=np.concatenate(paths),
+        position_m=world_from_cam[:, :3, 3].copy(),
+        quat_wxyz=quat_wxyz_of(world_from_cam),
+    )
+
+
+def _motion(own: OwnFrames) -> Array:
+    return np.eye(4) if own.sequence_from_world is None else own.sequence_from_world
+
+
+def _write_record(frames: Path, camera: FrameCamera | None) -> None:
+    """Say beside packed frames which camera they are of; without one there is no record."""
+    record = frames.with_suffix(".json")
+    record.unlink(missing_ok=True)
+    if camera is not None:
+        write_json(record, {"camera": camera.model_dump(), "sha256": file_sha256(frames)})

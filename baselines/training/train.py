@@ -1,0 +1,285 @@
+"""A localizer for a place of one's own: data sets in, ``model.pt`` out."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+from baselines.config.learning import (
+    AugmentationConfig,
+    LocalizerConfig,
+    ModelName,
+    NetworkConfig,
+    TrainingConfig,
+)
+from baselines.localizers.backbones.shipped import shipped_weights_path
+from baselines.localizers.registry import backbone_of
+from baselines.training.fit import PHOTOGRAPHS
+from baselines.training.own_frames import (
+    FrameRange,
+    OwnFrames,
+    PackedFrames,
+    pack_own_frames,
+    read_own_frames,
+)
+from baselines.training.run import Job, step_seconds, train_localizer
+from baselines.training.selection import HeldOutErrors, kept_errors
+from synfeal.camera.photograph import PhotographCamera
+from synfeal.config.photometric import PhotometricConfig
+from synfeal.errors import InputError
+from synfeal.records.files import read_json, refuse_foreign, write_json, writing_to
+from synfeal.records.provenance import provenance
+
+log = logging.getLogger(__name__)
+
+# The network of the default profile, whose backbones are shipped.
+NETWORK = NetworkConfig(input_px=64, view="whole", width=0.25)
+RATE = 1.5e-3
+RECIPES: dict[ModelName, LocalizerConfig] = {
+    "posenet": LocalizerConfig(learning_rate=RATE, beta=1.0, dropout=0.1),
+    "poselstm": LocalizerConfig(learning_rate=RATE, beta=1.0, dropout=0.1),
+    "hourglass": LocalizerConfig(learning_rate=RATE, beta=1.0, dropout=0.3, weight_decay=0.1),
+    "posenet2resnet": LocalizerConfig(
+        learning_rate=RATE, dropout=0.1, s_position=-1.0, s_orientation=-1.0
+    ),
+    "posenet2": LocalizerConfig(
+        learning_rate=RATE, dropout=0.1, s_position=-1.0, s_orientation=-1.0
+    ),
+}
+ROTATIONS = AugmentationConfig(tilt_deg=8.0, roll_deg=15.0)
+BATCH = 64
+DEFAULT_IMAGES = 30_000
+
+MODEL, HISTORY, RECORD = "model.pt", "history.csv", "training.json"
+# What lies there while a run is under way, and what a kill may leave.
+TEMPORARY = ("frames.npy", "frames.json", "labels.csv", "resume.pt", "budget.json")
+
+
+@dataclass(frozen=True)
+class TrainJob:
+    """What to train, on what, and for how long.
+
+    Attributes:
+        datasets: Data sets of ``synfeal collect`` or sequences of photographs, one or more.
+        out: Directory of the model.
+        localizer: Which of the five.
+        images: Images to show in all; None to go by ``minutes``.
+        minutes: How long to learn, about.
+        ranges: Frames to take of photographs; none: all.
+        photographs: Camera of photographs.
+        held_out: Share of the paths that are not learned from and tell the error.
+        randomisation: Ranges of light, lens and sensor; None to show images as they are.
+        rotations: Rotations of images; they need a known camera without distortion.
+        device: Where to train.
+        seed: Of all that is drawn.
+    """
+
+    datasets: Sequence[Path]
+    out: Path
+    localizer: ModelName = "posenet2"
+    images: int | None = DEFAULT_IMAGES
+    minutes: float | None = None
+    ranges: Sequence[FrameRange] = ()
+    photographs: PhotographCamera = field(default_factory=PhotographCamera)
+    held_out: float = 0.1
+    randomisation: PhotometricConfig | None = field(default_factory=PhotometricConfig)
+    rotations: AugmentationConfig = ROTATIONS
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    seed: int = 0
+
+
+class TrainedModel(NamedTuple):
+    """What came of a training run.
+
+    Attributes:
+        model: Checkpoint.
+        images: Images shown.
+        n_frames: Frames of all data sets.
+        n_paths: Paths they are of.
+        errors: On the frames of held-out paths; None where nothing was held out.
+        finished_before: Whether the same run had ended before, so that nothing was done.
+    """
+
+    model: Path
+    images: int
+    n_frames: int
+    n_paths: int
+    errors: HeldOutErrors | None
+    finished_before: bool = False
+
+
+def train(job: TrainJob) -> TrainedModel:
+    """Train a localizer on data sets and write ``model.pt``, ``history.csv``, ``training.json``.
+
+    A run that was stopped goes on when it is started again with the same settings, and ends with
+    the same bytes. One that has ended is not made again.
+
+    Raises:
+        InputError: A data set cannot be used, or ``out`` holds something else.
+        MemoryError: There is too little memory; no model is written.
+    """
+    _check(job)
+    settings = _settings(job)
+    if (job.out / RECORD).exists():
+        return _finished(job, settings)
+    sets = [read_own_frames(folder, job.ranges) for folder in job.datasets]
+    job.out.mkdir(parents=True, exist_ok=True)
+    with writing_to(job.out, lambda: "run the same command again when that is mended"):
+        packed = pack_own_frames(sets, job.photographs, NETWORK, job.out)
+        run = _job_of(job, packed)
+        return _trained(job, run, sets, packed, settings)
+
+
+def _trained(
+    job: TrainJob,
+    run: Job,
+    sets: Sequence[OwnFrames],
+    packed: PackedFrames,
+    settings: dict[str, Any],
+) -> TrainedModel:
+    """Train, write the record last, and remove what was needed on the way."""
+    began = time.monotonic()
+    rows = train_localizer(
+        run,
+        packed.frames,
+        packed.labels,
+        job.out / MODEL,
+        job.out / HISTORY,
+        weights=_start_of(run),
+        sequence_from_world=packed.sequence_from_world,
+    )
+    errors = kept_errors(rows)
+    n_frames = sum(map(len, sets))
+    origin = provenance(job.seed, "")
+    write_json(
+        job.out / RECORD,
+        {
+            "settings": settings,
+            "images": run.samples_seen,
+            "frames": {str(own.folder): len(own) for own in sets},
+            "paths": packed.n_paths,
+            "held_out": None if errors is None else errors._asdict(),
+            "seconds": round(time.monotonic() - began, 1),
+            **{key: origin[key] for key in ("commit", "packages", "platform")},
+        },
+    )
+    for name in TEMPORARY:
+        (job.out / name).unlink(missing_ok=True)
+    return TrainedModel(job.out / MODEL, run.samples_seen, n_frames, packed.n_paths, errors)
+
+
+def _check(job: TrainJob) -> None:
+    if job.images is not None and job.images < 1:
+        raise InputError(f"--images: must be at least 1, found {job.images}")
+    if job.minutes is not None and not 0 < job.minutes < 1e6:
+        raise InputError(f"--minutes: must be a positive number, found {job.minutes:g}")
+    if not 0 <= job.held_out < 1:
+        raise InputError(f"--held-out: must be a share from 0 to below 1, found {job.held_out:g}")
+    named = [path.resolve() for path in job.datasets]
+    if len(set(named)) < len(named):
+        raise InputError(f"{job.datasets[0]}: one data set is named twice; name each once")
+    own = (MODEL, HISTORY, RECORD, *TEMPORARY)
+    present = sorted(p.name for p in job.out.glob("*")) if job.out.is_dir() else []
+    left = [name for name in present if name.startswith(".") and _is_left(name)]
+    refuse_foreign(job.out, (*own, *left), "synfeal train")
+
+
+def _is_left(name: str) -> bool:
+    """Whether it is a file under the temporary name that one of ours has while it is written."""
+    stems = {Path(own).stem for own in (MODEL, HISTORY, RECORD, *TEMPORARY)}
+    return any(name.startswith(f".{stem}-") for stem in stems)
+
+
+def _settings(job: TrainJob) -> dict[str, Any]:
+    """All that decides the weights but the frames themselves, ready for JSON."""
+    camera = job.photographs
+    return {
+        "datasets": [str(path) for path in job.datasets],
+        "localizer": job.localizer,
+        "images": job.images,
+        "minutes": job.minutes,
+        "frames": [[r.start, r.stop] for r in job.ranges],
+        "camera": None if camera.calibration is None else repr(camera.calibration),
+        "focal_px": camera.focal_px,
+        "held_out": job.held_out,
+        "randomisation": (
+            None if job.randomisation is None else job.randomisation.model_dump(mode="json")
+        ),
+        "rotations": job.rotations.model_dump(mode="json"),
+        "seed": job.seed,
+    }
+
+
+def _finished(job: TrainJob, settings: dict[str, Any]) -> TrainedModel:
+    """The run that has ended here, if it is this one."""
+    path = job.out / RECORD
+    record = read_json(path)
+    differing = [key for key in settings if record["settings"].get(key) != settings[key]]
+    if differing or not (job.out / MODEL).is_file():
+        what = f"with another {differing[0]}" if differing else "and its model.pt is gone"
+        raise InputError(
+            f"{job.out}: holds a localizer trained {what}; delete it or choose another directory"
+            " with --out"
+        )
+    errors = None if record["held_out"] is None else HeldOutErrors(**record["held_out"])
+    n_frames = sum(record["frames"].values())
+    return TrainedModel(
+        job.out / MODEL, record["images"], n_frames, record["paths"], errors, finished_before=True
+    )
+
+
+def _job_of(job: TrainJob, packed: PackedFrames) -> Job:
+    """The training run, as the benchmark's are described."""
+    training = TrainingConfig(
+        samples_seen={},
+        batch_size=BATCH,
+        validation_share=job.held_out,
+        augmentation=_rotations(job, packed),
+        randomisation=job.randomisation,
+        device=job.device,
+    )
+    run = Job(
+        name=job.localizer,
+        network=NETWORK,
+        hyper=RECIPES[job.localizer],
+        training=training,
+        samples_seen=job.images or BATCH,
+        seed=job.seed,
+        exchanged=PHOTOGRAPHS,
+    )
+    if job.minutes is None:
+        return run
+    return run._replace(samples_seen=_images_in(job.minutes, run, packed, job.out))
+
+
+def _rotations(job: TrainJob, packed: PackedFrames) -> AugmentationConfig:
+    """Rotations of images, none through a camera that is not known or bends lines."""
+    camera = packed.camera
+    if camera is not None and not any(camera.distortion):
+        return job.rotations
+    if job.rotations.turns:
+        reason = "the camera is not known" if camera is None else "the lens has distortion"
+        log.warning("%s: images are not rotated, because %s", job.datasets[0], reason)
+    return AugmentationConfig()
+
+
+def _images_in(minutes: float, run: Job, packed: PackedFrames, out: Path) -> int:
+    """How many images to show; settled once, because a run that goes on must not change it."""
+    path = out / "budget.json"
+    if path.is_file():
+        settled = read_json(path)
+        if settled.get("minutes") == minutes and settled.get("localizer") == run.name:
+            return int(settled["images"])
+    seconds = step_seconds(run, packed.frames, packed.labels, _start_of(run))
+    images = max(1, round(60 * minutes / seconds)) * run.training.batch_size
+    write_json(path, {"minutes": minutes, "localizer": run.name, "images": images})
+    return images
+
+
+def _start_of(run: Job) -> Path:
+    """The shipped weights that its backbone starts from."""
+    return shipped_weights_path(backbone_of(run.name, run.network))

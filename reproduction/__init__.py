@@ -1,0 +1,1 @@
+"""The paper: its design, stand-in rooms, tables, claims, figures and report."""

@@ -1,0 +1,185 @@
+"""Commands about runs of the workflow; what they call lies above this module."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from synfeal.cli.options import command, option
+from synfeal.errors import InputError
+
+if TYPE_CHECKING:
+    from reproduction.plan.laws import Machine
+
+SNAKEFILE = Path("Snakefile")
+PLUGINS = Path("workflow/plugins")
+
+
+@command(
+    "what a run of a profile costs before it is started",
+    "synfeal plan --profile paper --cores 16 --gpus 1",
+    option("--profile", "a profile of config/, or its .yaml file (mini)", default="mini"),
+    option(
+        "--cores",
+        "processor cores, one job each (this machine's); several: a plan for each",
+        type=int,
+        nargs="+",
+        metavar="N",
+    ),
+    option(
+        "--gpus",
+        "GPUs, one training run each (0: train on cores); as many as --cores, or one",
+        type=int,
+        nargs="+",
+        default=[0],
+        metavar="N",
+    ),
+    option("--gpu-tflops", "assumed throughput of a GPU, TFLOP/s (10)", type=float, default=10.0),
+    option(
+        "--measured",
+        "runs to predict from (results/published/mini)",
+        type=Path,
+        nargs="+",
+        default=[Path("results/published/mini")],
+        metavar="RESULTS",
+    ),
+    option(
+        "--time-steps", "time some training steps on this machine: a minute", action="store_true"
+    ),
+    option("--csv", "write the plan as a table too", type=Path, metavar="FILE"),
+    option(
+        "--compare",
+        "no plan: predict this measured run from the others, and these from it",
+        type=Path,
+        metavar="RESULTS",
+    ),
+)
+def plan(arguments: argparse.Namespace) -> None:
+    """Predicts jobs, hours, memory and disk of a run of the workflow before it is started."""
+    from reproduction.plan.plan import compare_runs, plan_of, write_check, write_plans
+    from reproduction.plan.text import comparison_text, plan_text
+
+    machines = _machines(arguments)
+    if arguments.compare is None:
+        plans = plan_of(arguments.profile, arguments.measured, machines, arguments.time_steps)
+        print(plan_text(plans), end="")
+        if arguments.csv is not None:
+            write_plans(arguments.csv, plans)
+    else:
+        comparisons = compare_runs(arguments.measured, arguments.compare, arguments.time_steps)
+        print(comparison_text(comparisons), end="")
+        if arguments.csv is not None:
+            write_check(arguments.csv, comparisons)
+
+
+def _machines(arguments: argparse.Namespace) -> list[Machine]:
+    """What to plan for: as many numbers of GPUs as of cores, or one for all."""
+    from reproduction.plan.laws import Machine
+
+    cores, gpus = arguments.cores or [os.cpu_count() or 1], arguments.gpus
+    for flag, values, least in (("--cores", cores, 1), ("--gpus", gpus, 0)):
+        if min(values) < least:
+            raise InputError(f"{flag}: must be at least {least}, found {min(values)}")
+    if not 0 < arguments.gpu_tflops < float("inf"):
+        raise InputError(f"--gpu-tflops: must be above 0, found {arguments.gpu_tflops:g}")
+    gpus = gpus * len(cores) if len(gpus) == 1 else gpus
+    if len(gpus) != len(cores):
+        raise InputError(f"--gpus: {len(gpus)} numbers for {len(cores)} of --cores; give as many")
+    return [Machine(c, g, arguments.gpu_tflops) for c, g in zip(cores, gpus, strict=True)]
+
+
+@command(
+    "the workflow with a profile: every table of the paper",
+    "synfeal run --profile paper --cores 16 -- runs",
+    option(
+        "--profile",
+        "a profile of config/, or its .yaml file (mini); of several, later ones go over earlier"
+        " ones",
+        nargs="+",
+        default=["mini"],
+    ),
+    option("--cores", "jobs at a time, one core each (this machine's)", type=int, metavar="N"),
+    option(
+        "snakemake",
+        "after --: targets and further options of Snakemake (all)",
+        nargs="*",
+        metavar="SNAKEMAKE",
+    ),
+)
+def run(arguments: argparse.Namespace) -> None:
+    """Runs the workflow with a profile of config/ or a configuration of your own.
+
+    In a clone of Synfeal; shows its progress.
+    """
+    from reproduction.plan.runs import is_default, profile_path
+    from synfeal.config.load import read_yaml
+
+    if not SNAKEFILE.is_file():
+        raise InputError(f"{SNAKEFILE}: is not here; start the workflow in a clone of Synfeal")
+    cores = os.cpu_count() or 1 if arguments.cores is None else arguments.cores
+    if cores < 1:
+        raise InputError(f"--cores: must be at least 1, found {cores}")
+    paths = [profile_path(name) for name in arguments.profile]
+    for path in paths:
+        read_yaml(path)  # Snakemake would end in a traceback; what it holds the Snakefile checks
+    paths = [path for path in paths if not is_default(path)]
+    display = ["--logger", "synfeal", "--quiet", "host"]  # one line that stays, a table of scores
+    files = ["--configfile", *map(str, paths)] if paths else []
+    command = ["snakemake", *display, *files, "--cores", str(cores), *arguments.snakemake]
+    found = (str(PLUGINS.resolve()), os.environ.get("PYTHONPATH"))
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, found))}
+    os.execve(sys.executable, [sys.executable, "-m", *command], environment)
+
+
+@command(
+    "two result trees: did a change matter?",
+    "synfeal compare before/mini results/mini --out comparison",
+    option("results_a", "results before, e.g. a copy", type=Path, metavar="RESULTS_A"),
+    option("results_b", "results after: results/mini", type=Path, metavar="RESULTS_B"),
+    option("--out", "directory for compare.csv, compare.md and compare.png", type=Path),
+)
+def compare(arguments: argparse.Namespace) -> None:
+    """Compares two result trees run by run: which errors changed, by how much, with 95 % limits."""
+    from reproduction.compare.run import compare as compared
+
+    print(compared(arguments.results_a, arguments.results_b, arguments.out), end="")
+    if arguments.out:
+        print(f"\n{arguments.out}: compare.md, compare.png and compare.csv")
+
+
+@command(
+    "predictions of finished runs in one small file",
+    "synfeal keep results/mini --out predictions.zip",
+    option("results", "results of a run: results/mini", type=Path, metavar="RESULTS"),
+    option("--out", "file to write (RESULTS/predictions.zip)", type=Path),
+)
+def keep(arguments: argparse.Namespace) -> None:
+    """Packs the predictions of all finished runs into one small file.
+
+    Every table can be made again from it without training.
+    """
+    from reproduction.runs.keep import keep as pack
+
+    out: Path = arguments.out or arguments.results / "predictions.zip"
+    n_runs = pack(arguments.results, out)
+    print(f"{out}: {n_runs} runs, {out.stat().st_size / 1e6:.1f} MB")
+
+
+@command(
+    "finished runs back from such a file",
+    "synfeal restore predictions.zip results/mini",
+    option("package", "predictions.zip of synfeal keep", type=Path, metavar="FILE"),
+    option("results", "where to: results/<profile>", type=Path, metavar="RESULTS"),
+)
+def restore(arguments: argparse.Namespace) -> None:
+    """Puts the runs of a predictions.zip back, so that the workflow goes on from them."""
+    from reproduction.runs.restore import restore as unpack
+
+    written, there = unpack(arguments.package, arguments.results)
+    print(f"{arguments.results}: {written} runs restored, {there} were there already")
+
+
+COMMANDS = (plan, run, compare, keep, restore)

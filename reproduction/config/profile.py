@@ -1,0 +1,101 @@
+"""A profile: everything a run depends on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, model_validator
+
+from baselines.config.labels import GroundTruthConfig
+from baselines.config.learning import (
+    MODELS,
+    SHIPPED_WIDTH,
+    LocalizerConfig,
+    ModelName,
+    NetworkConfig,
+    PretrainingConfig,
+    TableName,
+    TrainingConfig,
+)
+from baselines.config.references import ReferencesConfig
+from synfeal.config.collection import (
+    Count,
+    Slug,
+    Strict,
+    part,
+)
+from synfeal.config.dataset import CameraConfig, DatasetConfig
+from synfeal.config.effects import RobustnessConfig
+
+
+class RenderSpeedConfig(Strict):
+    """How speed and error of rendering are measured, for `speed_vs_error.csv`."""
+
+    poses: Count = Field(6, description="views of each scene; half as many at the larger sizes")
+    sizes: int = Field(
+        3,
+        ge=1,
+        le=3,
+        description="how many of network_camera, groundtruth_camera and 640 × 480, smallest first",
+    )
+
+
+class Config(DatasetConfig):
+    """A profile: everything a run depends on."""
+
+    experiments: Path | tuple[dict[str, Any], ...] = Field(
+        Path("config/experiments.csv"),
+        description="the design as a table: its CSV file, or a list of its rows",
+    )
+    tables: tuple[TableName, ...] | None = Field(
+        None, description="tables of the design that are made; null: all that it has rows of"
+    )
+    datasets: tuple[Slug, ...] | None = Field(
+        None, description="scenes of the target `datasets`; null: those of the design"
+    )
+    groundtruth_camera: CameraConfig = part(CameraConfig, "of frames labels are estimated from")
+    render_speed: RenderSpeedConfig = part(RenderSpeedConfig, "what rendering is measured on")
+    groundtruth: GroundTruthConfig = part(GroundTruthConfig, "labels (docs/groundtruth.md)")
+    references: ReferencesConfig = part(ReferencesConfig, "other methods (docs/references.md)")
+    robustness: RobustnessConfig = part(RobustnessConfig, "tests with effects (docs/variation.md)")
+    network: NetworkConfig = part(NetworkConfig, "shape of all localizers")
+    training: TrainingConfig = Field(description="docs/localizers.md")
+    pretraining: PretrainingConfig = part(PretrainingConfig, "what runs start from (docs/start.md)")
+    localizers: dict[ModelName, LocalizerConfig] = Field(description="hyper-parameters of each")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        missing = [name for name in MODELS if name not in self.localizers]
+        if missing:
+            raise ValueError(f"localizers: {', '.join(missing)} missing; all five are compared")
+        if self.pretraining.source == "imagenet" and self.network.width != 1.0:
+            raise ValueError("network.width: must be 1 when pretraining.source is imagenet")
+        if self.pretraining.source == "shipped" and self.network.width != SHIPPED_WIDTH:
+            raise ValueError(
+                f"network.width: must be {SHIPPED_WIDTH} when pretraining.source is shipped"
+            )
+        unknown = sorted(set(self.datasets or ()) - set(self.scenes))
+        if unknown:
+            raise ValueError(f"datasets: '{unknown[0]}' is not one of {sorted(self.scenes)}")
+        if self.pretraining.source == "rooms" and not self.rooms:
+            raise ValueError("pretraining.source: rooms needs scenes with `builder: random_room`")
+        camera = self.network_camera
+        least = self.network.input_px + (self.network.view == "square")
+        if min(camera.width, camera.height) < least:
+            raise ValueError(
+                f"network_camera: both sides must be at least {least} pixels for"
+                f" network.input_px {self.network.input_px} and this network.view"
+            )
+        return self
+
+    @property
+    def rooms(self) -> list[str]:
+        """Scenes that backbones are pretrained on: no table has them."""
+        return [name for name, scene in self.scenes.items() if scene.builder == "random_room"]
+
+    def n_largest(self, scene: str, split: str) -> int:
+        """Frames planned and rendered for a split: those of the scene's largest size."""
+        if scene in self.rooms:
+            return self.pretraining.frames if split == "train" else 2
+        return max(self.n_frames(scene, size, split) for size in self.scenes[scene].sizes)

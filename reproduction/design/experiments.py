@@ -1,0 +1,305 @@
+"""The paper's design as a table: which data set and which initialisation each table row needs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from pydantic import Field, ValidationError, model_validator
+
+from baselines.config.learning import KEYS, MODELS, Repetitions, TableName
+from reproduction.config.profile import Config
+from synfeal.config.collection import NonNegative, Strict
+from synfeal.config.load import describe
+from synfeal.errors import InputError
+from synfeal.records.provenance import seed_of
+from synfeal.records.tables import read_records
+
+Start = Literal["pretrained", "scratch"]
+Init = Literal[
+    "pretrained",
+    "pretrained-half",
+    "pretrained-quarter",
+    "scratch",
+    "scratch-half",
+    "scratch-quarter",
+]
+# Share of `training.samples_seen` that a run is shown, by how its `init` ends.
+SHARES = {"": 1.0, "half": 0.5, "quarter": 0.25}
+# Errors that are put into true poses, of a size that noise_m and noise_deg name: one by frame,
+# one by path, a bend of space, another scale (`baselines/labels/injected.py`).
+INJECTED = ("noise", "offset", "bend", "scale")
+FROM_SCRATCH: TableName = "table5_from_scratch"
+
+
+class Experiment(Strict):
+    """One table row: five cells, one per localizer."""
+
+    table: TableName = Field(description="tables 6 and 7 are our own")
+    block: Literal["", "orientation", "position", "both"] = Field("", description="only of table 3")
+    scene: str = Field(description="a key of `scenes`")
+    size: str = Field(description="a key of `scenes.<scene>.sizes` and of `training.samples_seen`")
+    labels: str = Field(
+        "synfeal",
+        description="`synfeal`: true poses; `noise`, `offset`, `bend`, `scale`: with an error"
+        " (docs/tables.md); or a key of `METHODS` in `baselines/labels/methods.py`",
+    )
+    noise_m: NonNegative = Field(0.0, description="median position error put into labels, metres")
+    noise_deg: NonNegative = Field(
+        0.0, description="the same of orientation, degrees; 0 with `scale`"
+    )
+    init: Init = Field("pretrained", description="start, and share of `training.samples_seen`")
+
+    @model_validator(mode="after")
+    def _check(self) -> Experiment:
+        noisy = self.noise_m > 0 or self.noise_deg > 0
+        if noisy != (self.labels in INJECTED):
+            kinds = ", ".join(f"`{kind}`" for kind in INJECTED)
+            raise ValueError(
+                f"labels: must be one of {kinds} exactly when noise_m or noise_deg is above 0"
+            )
+        if self.labels == "scale" and (self.noise_deg or not self.noise_m):
+            raise ValueError("noise_deg: must be 0 with labels `scale`, which turn nothing")
+        if (self.table == "table3_inconsistencies") != (self.block != ""):
+            raise ValueError("block: rows of table 3, and only those, name one of three blocks")
+        for name in ("noise_m", "noise_deg"):
+            if float(f"{getattr(self, name):g}") != getattr(self, name):
+                raise ValueError(f"{name}: at most six digits, for they name the label set")
+        return self
+
+    @property
+    def estimated(self) -> bool:
+        """Whether a method re-estimated the labels."""
+        return self.labels not in ("synfeal", *INJECTED)
+
+    @property
+    def label_id(self) -> str:
+        """Directory name of the label set, e.g. ``sfm`` or ``noise-p0.1-r5``."""
+        if self.labels not in INJECTED:
+            return self.labels
+        return f"{self.labels}-p{self.noise_m:g}-r{self.noise_deg:g}"
+
+    @property
+    def pretrained(self) -> Experiment:
+        """The same data set, trained with transfer learning."""
+        return self.model_copy(update={"init": "pretrained"})
+
+
+COLUMNS = tuple(Experiment.model_fields)
+
+
+@dataclass(frozen=True, order=True)
+class Run:
+    """One training run: what the path of its results spells out."""
+
+    scene: str
+    size: str
+    labels: str
+    init: str
+    model: str
+    repetition: int
+
+    @property
+    def start(self) -> Start:
+        """Where its weights come from."""
+        return split_init(self.init)[0]
+
+    @property
+    def share(self) -> float:
+        """Share of the images of its size that it is shown."""
+        return SHARES[split_init(self.init)[1]]
+
+    def seed(self, profile_seed: int) -> int:
+        """Seed of what the run draws, its labels and how many images it is shown left out.
+
+        So runs that differ in their labels alone have the same initial weights, held-out paths,
+        order and rotations: a comparison of labels is paired.
+        """
+        names = (self.scene, self.size, self.start, self.model, self.repetition)
+        return seed_of(profile_seed, "train", *names)
+
+    @property
+    def directory(self) -> str:
+        """Path below ``<root>/runs``."""
+        return (
+            f"{self.scene}/{self.size}/{self.labels}/{self.init}/{self.model}/seed{self.repetition}"
+        )
+
+
+def split_init(init: str) -> tuple[Start, str]:
+    """Where an ``init`` starts from, and how it ends, a key of ``SHARES``."""
+    start, _, part = init.partition("-")
+    return cast(Start, start), part
+
+
+def read_experiments(config: Config) -> tuple[Experiment, ...]:
+    """The rows of ``config.experiments``, checked against the scenes and sizes of the profile.
+
+    What is wrong is said with file, or the configuration's key, with row and column.
+    """
+    seen: dict[tuple[str, ...], str] = {}
+    experiments = []
+    for where, row in _given_rows(config):
+        try:
+            experiment = Experiment.model_validate(row)
+        except ValidationError as error:
+            raise InputError(f"{where}: {describe(error)}") from error
+        keys = KEYS[experiment.table]
+        identity = (experiment.table, *(str(getattr(experiment, key)) for key in keys))
+        problem = _problem(experiment, config)
+        if identity in seen:
+            shown = f"{experiment.table} shows each {', '.join(keys)} once"
+            problem = f"{shown}, as in {seen[identity]}"
+        if problem:
+            raise InputError(f"{where}: {problem}")
+        seen[identity] = where
+        if config.tables is None or experiment.table in config.tables:
+            experiments.append(experiment)
+    if not experiments:
+        of = "" if config.tables is None else f" of tables {', '.join(config.tables)}"
+        raise InputError(f"{design_name(config)}: has no rows{of}; nothing would be run")
+    return tuple(experiments)
+
+
+def design_name(config: Config) -> str:
+    """Name the design in error lines: by its file, or by the key that holds its rows."""
+    given = config.experiments
+    return str(given) if isinstance(given, Path) else "experiments"
+
+
+def _given_rows(config: Config) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield every row as it is given, after the words that say where; nothing is checked."""
+    given, name = config.experiments, design_name(config)
+    if isinstance(given, Path):
+        header = f"the header must be {','.join(COLUMNS)}"
+        rows: Iterator[tuple[int, Mapping[str, Any]]] = iter(read_records(given, COLUMNS, header))
+    else:
+        rows = enumerate(given, start=1)
+    yield from ((f"{name}: row {number}", row) for number, row in rows)
+
+
+def _problem(row: Experiment, config: Config) -> str:
+    """Why a profile cannot run a row; nothing where it can."""
+    if row.scene not in config.scenes:
+        return f"scene '{row.scene}': allowed: {sorted(config.scenes)}"
+    if row.scene in config.rooms:
+        return f"scene '{row.scene}': is a room that backbones are pretrained on"
+    sizes = config.scenes[row.scene].sizes
+    if row.size not in sizes:
+        return f"size '{row.size}': allowed: {sorted(sizes)}"
+    if not sizes[row.size].test:
+        return f"size '{row.size}' has no test frames to score on"
+    if row.size not in config.training.samples_seen:
+        return f"size '{row.size}' has no training.samples_seen entry"
+    if any(config.groundtruth_camera.distortion) and row.estimated and row.labels != "sfm":
+        return (
+            f"labels '{row.labels}' need pinhole images; leave groundtruth_camera.distortion at"
+            " zero (a calibration sets it) or drop the row"
+        )
+    return ""
+
+
+class Design(Strict):
+    """Rows of tables and how often each of their runs is repeated.
+
+    A run has a name of its own, not a table's: tables that show the same one share it, repetition
+    by repetition, and each uses as many as there are.
+    """
+
+    rows: tuple[Experiment, ...] = Field(description="in the order of the file")
+    repetitions: Repetitions = Field(description="`training.repetitions`")
+    more_scenes: tuple[str, ...] = Field((), description="`groundtruth.more_scenes`")
+
+    @property
+    def estimated(self) -> list[tuple[str, str, str]]:
+        """Scene, size and labels of every label set that a method re-estimates."""
+        own = [(row.scene, row.size, row.labels) for row in self.rows if row.estimated]
+        more = [(scene, size, labels) for scene in self.more_scenes for _, size, labels in own]
+        return list(dict.fromkeys([*own, *more]))
+
+    @property
+    def tables(self) -> list[str]:
+        """The tables that have rows."""
+        return sorted({row.table for row in self.rows})
+
+    @property
+    def runs(self) -> list[Run]:
+        """Every run, each once: as many repetitions as any of the tables asks for."""
+        runs = {
+            Run(e.scene, e.size, e.label_id, e.init, model, repetition)
+            for row in self.rows
+            for e in _compared(row)
+            for model in MODELS
+            for repetition in range(self._asked(row.table))
+        }
+        return sorted(runs)
+
+    def rows_of(self, table: str) -> list[Experiment]:
+        """The rows of one table."""
+        return [row for row in self.rows if row.table == table]
+
+    def runs_of(self, row: Experiment, model: str) -> list[Run]:
+        """All repetitions of a cell, whichever table asked for them."""
+        cell = (row.scene, row.size, row.label_id, row.init)
+        asked = [
+            self._asked(other.table)
+            for other in self.rows
+            for e in _compared(other)
+            if (e.scene, e.size, e.label_id, e.init) == cell
+        ]
+        return [Run(*cell, model, repetition) for repetition in range(max(asked, default=0))]
+
+    def table_runs(self, table: str) -> list[Run]:
+        """Every run a table reads."""
+        rows = [e for row in self.rows_of(table) for e in _compared(row)]
+        return sorted({run for row in rows for model in MODELS for run in self.runs_of(row, model)})
+
+    def _asked(self, table: TableName) -> int:
+        return self.repetitions.get(table, self.repetitions.get("default", 1))
+
+
+def common_every(counts: Collection[int]) -> int:
+    """One in how many frames of a scene's largest test set is in its common one.
+
+    That has about as many frames as the smallest of the test sets, of ``counts`` frames.
+    """
+    return max(counts) // min(counts)
+
+
+def read_design(config: Config) -> Design:
+    """The design of a profile: :func:`read_experiments`, and what its further scenes need.
+
+    Raises:
+        InputError: a row, a further scene, or the data set of the robustness table is wrong.
+    """
+    _check_robustness(config)
+    rows, more_scenes = read_experiments(config), config.groundtruth.more_scenes
+    design = Design(rows=rows, repetitions=config.training.repetitions, more_scenes=more_scenes)
+    known = {(row.scene, row.size) for row in rows}
+    for scene, size, _ in design.estimated:
+        if (scene, size) not in known:
+            raise InputError(
+                f"groundtruth.more_scenes: '{scene}': {design_name(config)} has no row of size"
+                f" '{size}' in that scene"
+            )
+    return design
+
+
+def _check_robustness(config: Config) -> None:
+    """Refuse a robustness table of a data set that the profile does not define."""
+    scene, size = config.robustness.scene, config.robustness.size
+    if not config.robustness.effects:
+        return
+    if scene not in config.scenes:
+        known = sorted(config.scenes)
+        raise InputError(f"robustness.scene: '{scene}' is not one of {known}")
+    if size not in config.scenes[scene].sizes:
+        known = sorted(config.scenes[scene].sizes)
+        raise InputError(f"robustness.size: '{size}' is not one of {known}, the sizes of '{scene}'")
+
+
+def _compared(row: Experiment) -> list[Experiment]:
+    """A row and what its table shows it against: Table 5 the same run with transfer learning."""
+    return [row, row.pretrained] if row.table == FROM_SCRATCH else [row]

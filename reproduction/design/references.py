@@ -1,0 +1,54 @@
+"""Which reference methods answer for which data set of the design."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from baselines.config.references import Group, ReferencesConfig
+from baselines.labels.methods import METHODS, SIMULATOR
+from baselines.references.registry import REFERENCES
+from reproduction.design.experiments import Experiment
+
+DataSet = tuple[str, str, str]  # scene, size, label set
+PAPERS = ("table2_ground_truth", "table3_inconsistencies")
+
+
+def data_sets(rows: Iterable[Experiment]) -> list[DataSet]:
+    """The data sets of a design, each once."""
+    return sorted({(row.scene, row.size, row.label_id) for row in rows})
+
+
+def has_structure(rows: Iterable[Experiment], scene: str, size: str) -> bool:
+    """Whether frames with depth are rendered for a size: some label set is estimated from them."""
+    return any((r.scene, r.size) == (scene, size) and r.labels in METHODS for r in rows)
+
+
+def answered_by(
+    rows: Iterable[Experiment], data_set: DataSet, references: ReferencesConfig
+) -> list[str]:
+    """List the methods that answer for a data set: those of the registry, then somebody else's."""
+    rows, (scene, size, labels) = list(rows), data_set
+    groups: set[Group] = {"images"}
+    if has_structure(rows, scene, size):
+        same = [row for row in rows if (row.scene, row.size) == (scene, size)]
+        papers = [row for row in same if row.table in PAPERS]
+        few = worst(papers)
+        if references.structure_sets == "all" or labels in few | {"sfm"}:
+            groups.add("structure")
+        if any(row.label_id == labels for row in papers):
+            groups.add("adjusted")
+        if labels in few:
+            groups.add("coordinates")
+    asked = groups & set(references.groups)
+    own = [name for name, reference in REFERENCES.items() if reference.group in asked]
+    external = references.external.items()
+    return [*own, *(name for name, each in external if not each.labels or labels in each.labels)]
+
+
+def worst(rows: Iterable[Experiment]) -> set[str]:
+    """The simulator's label set, and the one with the largest noise of each block of Table 3."""
+    rows = list(rows)
+    blocks = {row.block for row in rows if row.block}
+    by_noise = sorted(rows, key=lambda row: (row.noise_m, row.noise_deg), reverse=True)
+    noisy = [next(row for row in by_noise if row.block == block) for block in blocks]
+    return {SIMULATOR} | {row.label_id for row in noisy}

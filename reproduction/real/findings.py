@@ -1,0 +1,126 @@
+"""What was found on real photographs, in sentences and as a table for pages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from reproduction.real.design import GIVEN, PHOTOGRAPHS, RANDOMISED, RENDERED, SFM
+from reproduction.tables.columns import side_sheet
+from reproduction.tables.layouts import TITLES
+from reproduction.tables.real import DIRECTIONS, LOST, NAME, ROWS, read_real, side_table
+from reproduction.tables.sheet import sheet_markdown
+from synfeal.records.tables import rows_of
+
+HEADLINE = "posenet2"
+
+
+def real_findings(root: Path) -> str:
+    """What a published run found, a sentence each."""
+    table = read_real(root / "tables" / f"{NAME}.csv")
+    return "\n".join(f"- {sentence}" for sentence in sentences(table))
+
+
+def real_table(root: Path) -> str:
+    """The table of a published run."""
+    table = read_real(root / "tables" / f"{NAME}.csv")
+    return sheet_markdown(side_sheet(side_table(table))).rstrip()
+
+
+def sentences(table: pd.DataFrame) -> Iterator[str]:
+    """What a table says: by direction, by localizer, by source of labels."""
+    given = table[table.labels == GIVEN]
+    main = given.direction.iloc[0]
+    for direction in given.direction.unique():
+        of = given[given.direction == direction]
+        yield from _direction(of, str(direction))
+    yield from _localizers(given[given.direction == main])
+    yield from _structure(given[given.direction == main])
+    yield from _labels(table[table.direction == main])
+
+
+def _one(table: pd.DataFrame, trained_on: str, method: str) -> Any | None:
+    found = rows_of(table[(table.trained_on == trained_on) & (table.method == method)])
+    return found[0] if found else None
+
+
+def _direction(table: pd.DataFrame, direction: str) -> Iterator[str]:
+    rendered = _one(table, RANDOMISED, HEADLINE)
+    photographs = _one(table, PHOTOGRAPHS, HEADLINE)
+    if rendered is None or photographs is None:
+        return
+    times = f"{rendered.times_position:.1f} times as exact ({_limits(rendered)})"
+    yield (
+        f"{DIRECTIONS[direction]}: {TITLES[HEADLINE]} that has seen nothing but renderings of the"
+        f" scan is at {_pose(rendered)} on {rendered.n_test:,} photographs, the same network"
+        f" trained on the scan's photographs at {_pose(photographs)}: {times}. Worst of"
+        f" {rendered.n_seeds} seeds: {rendered.position_m_worst:.3f} m."
+    )
+
+
+def _limits(row: Any) -> str:
+    return f"95 % limits {row.times_position_low:.1f} to {row.times_position_high:.1f}"
+
+
+def _pose(row: Any) -> str:
+    return _written(row.position_m, row.orientation_deg)
+
+
+def _written(position_m: float, orientation_deg: float) -> str:
+    if not math.isfinite(position_m):
+        return LOST
+    return f"{position_m:.3f} m / {orientation_deg:.1f}°"
+
+
+def _localizers(table: pd.DataFrame) -> Iterator[str]:
+    trained = table[table.method.isin(list(TITLES))]
+    for trained_on in (RANDOMISED, RENDERED, PHOTOGRAPHS, "both"):
+        rows = rows_of(trained[trained.trained_on == trained_on].sort_values("position_m"))
+        if len(rows) < 2:
+            continue
+        best, worst = rows[0], rows[-1]
+        yield (
+            f"Learned from {ROWS[trained_on]}: the {len(rows)} localizers are between"
+            f" {_pose(best)} ({TITLES[best.method]}) and {_pose(worst)} ({TITLES[worst.method]})."
+        )
+
+
+def _structure(table: pd.DataFrame) -> Iterator[str]:
+    for row in rows_of(table[table.method == "structure"]):
+        yield (
+            f"Structure, map of {ROWS[row.trained_on]}: {_pose(row)},"
+            f" {100 * row.recall_5cm_5deg:.0f} % within 5 cm and 5°,"
+            f" {100 * row.localized:.0f} % localized."
+        )
+    floors = [_one(table, RENDERED, name) for name in ("retrieval", "nearest")]
+    mean = _one(table, PHOTOGRAPHS, "mean")
+    if mean is not None and all(floors):
+        alike, nearest = floors
+        yield (
+            f"To compare: the rendered frame that looks most alike {_pose(alike)}, the rendered"
+            f" pose that is nearest (an oracle) {_pose(nearest)}, the mean pose {_pose(mean)}."
+        )
+
+
+def _labels(table: pd.DataFrame) -> Iterator[str]:
+    """How much the source of labels changes, in training and in testing."""
+    by_sfm = table[table.labels == SFM]
+    for row in rows_of(by_sfm[by_sfm.method.isin([*TITLES, "structure"])]):
+        given = _one(table[table.labels == GIVEN], row.trained_on, row.method)
+        if given is None:
+            continue
+        name = TITLES.get(row.method, "structure")
+        yield (
+            f"Whose labels, for {name}: with the whole chain on those by SfM the error is"
+            f" {_sfm(row)} against labels by SfM ({row.recall_5cm_5deg_sfm:.0%} within 5 cm and 5°)"
+            f" and {_pose(row)} against those of 7-Scenes; on those of 7-Scenes it is"
+            f" {_pose(given)} against them and {_sfm(given)} against those by SfM."
+        )
+
+
+def _sfm(row: Any) -> str:
+    return _written(row.position_m_sfm, row.orientation_deg_sfm)

@@ -1,0 +1,1 @@
+"""What a person reads: page, document, summary, published pages."""

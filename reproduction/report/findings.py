@@ -1,0 +1,375 @@
+"""What a run found, in plain words, most important first: each number with its 95 % limits.
+
+Every finding says whether errors are against the labels of the test set, as in the paper, or
+against the true poses. A run that lacks the rows of a finding has one finding less.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from reproduction.claims.verdicts import GROUPS
+from reproduction.report.intervals import Interval, cell_interval, mean_change
+from reproduction.report.published_claims import counts_now, interval_in, read_published
+from reproduction.tables.cells import schema_of
+from reproduction.tables.label_error import SCHEMA as LABEL_ERROR
+from reproduction.tables.layouts import TITLES
+from reproduction.tables.references import SCHEMA as REFERENCES
+from reproduction.tables.references import two_digits
+from synfeal.records.tables import Schema, read_frame, rows_of
+
+ROOM, SMALL, LARGE = "large_room", "6k", "80k"
+POSITION, ORIENTATION = "position_m_true", "orientation_deg_true"
+# What feature matching does without depth: points are where rays of two training frames meet.
+WITHOUT_DEPTH, ADJUSTED = "structure-rays", "structure-adjusted"
+SHAPES = {
+    "noise": "every frame has an error of its own",
+    "offset": "all frames of a path share one",
+    "bend": "space is bent",
+}
+
+
+class Finding(NamedTuple):
+    """One finding: a sentence to remember, what it rests on, and where to look it up."""
+
+    headline: str
+    evidence: str
+    against: str  # what errors are measured against
+    table: str  # below ``tables``, without suffix
+
+
+def read_table(root: Path, name: str, schema: Schema | None = None) -> pd.DataFrame:
+    """A published table; of localizers, where no columns are named."""
+    kinds = schema or schema_of(name, repeated=True)
+    return read_frame(root / "tables" / f"{name}.csv", kinds, "publish again")
+
+
+def can_tell(root: Path) -> bool:
+    """Check that a run has the rows that findings rest on, with scores and limits.
+
+    A handful of test paths gives no limits, and then nothing is told.
+    """
+    files = [root / "claims.csv", *(root / "tables" / f"{name}.csv" for name in NEEDED)]
+    if not all(path.is_file() for path in files):
+        return False
+    tables = [read_table(root, name) for name in NEEDED if name.startswith("table")]
+    if any(table[[POSITION, ORIENTATION]].isna().to_numpy().any() for table in tables):
+        return False
+    noisy = read_table(root, "table3_inconsistencies").query("block == 'both' and noise_m > 0")
+    exact = read_table(root, "table2_ground_truth").query("labels == 'synfeal'")
+    if not (len(localizers(root)) and len(noisy) and len(exact)):
+        return False
+    compared = [row for row in (reference(root, WITHOUT_DEPTH), best(localizers(root))) if row]
+    limits = [cell_interval(row, POSITION) for row in compared]
+    return all(math.isfinite(number) for interval in limits for number in interval)
+
+
+def findings(root: Path) -> list[Finding]:
+    """What published results, or a finished run, have to say, most important first."""
+    found = (finding(root) for finding in FINDINGS)
+    return [finding for finding in found if finding is not None]
+
+
+def localizers(root: Path, noise: tuple[float, float] = (0.0, 0.0)) -> pd.DataFrame:
+    """The five localizers of the small Large Room set, without or with noise in their labels."""
+    cells = read_table(root, "table3_inconsistencies")
+    if noise == (0.0, 0.0):
+        cells = read_table(root, "table4_size")
+        return cells[(cells.scene == ROOM) & (cells["size"] == SMALL)]
+    chosen = (cells.noise_m == noise[0]) & (cells.noise_deg == noise[1])
+    return cells[chosen & (cells.block == "both")]
+
+
+def reference(root: Path, method: str, noise: tuple[float, float] = (0.0, 0.0)) -> Any | None:
+    """A reference method on the same frames, None where it was not run."""
+    rows = read_table(root, "references", REFERENCES)
+    labels = "synfeal" if noise == (0.0, 0.0) else f"noise-p{noise[0]:g}-r{noise[1]:g}"
+    chosen = (rows.scene == ROOM) & (rows["size"] == SMALL) & (rows.labels == labels)
+    found = rows_of(rows[chosen & (rows.method == method) & rows.position_m_true.notna()])
+    return found[0] if found else None
+
+
+def most_noise(root: Path) -> tuple[float, float]:
+    """The highest noise in both parts of the labels, metres and degrees."""
+    cells = read_table(root, "table3_inconsistencies")
+    top = cells[cells.block == "both"].sort_values("noise_m").iloc[-1]
+    return float(top.noise_m), float(top.noise_deg)
+
+
+def best(cells: pd.DataFrame) -> Any:
+    """The localizer with the lowest position error."""
+    return rows_of(cells.sort_values(POSITION))[0]
+
+
+def structure_beats_regression(root: Path) -> Finding | None:
+    """Feature matching and regression on identical frames with exact labels."""
+    matched, network = reference(root, WITHOUT_DEPTH), best(localizers(root))
+    if matched is None:
+        return None
+    pair = [cell_interval(row, POSITION) for row in (matched, network)]
+    angles = [cell_interval(row, ORIENTATION) for row in (matched, network)]
+    factor = pair[1] / pair[0]
+    if factor.low <= 1:
+        return None
+    return Finding(
+        f"On identical frames, matching image features is {_times(factor.value)} times as exact as"
+        " regression.",
+        f"From {network.n_train:,} frames with exact poses and no depth, matched features give the"
+        f" pose of a test frame to {_cm(pair[0])} and {_deg(angles[0])}; the best of the five"
+        f" networks, {TITLES[network.model]}, to {_cm(pair[1])} and {_deg(angles[1])}.",
+        "labels and truth alike, for these labels are exact",
+        "references",
+    )
+
+
+def a_map_beats_exact_labels(root: Path) -> Finding | None:
+    """A bundle-adjusted map from noisy labels, and regression on exact ones."""
+    noise = most_noise(root)
+    adjusted, network = reference(root, ADJUSTED, noise), best(localizers(root))
+    if adjusted is None:
+        return None
+    ours, theirs = (
+        [cell_interval(row, measure) for measure in (POSITION, ORIENTATION)]
+        for row in (adjusted, network)
+    )
+    if not (ours[0].high < theirs[0].low and ours[1].high < theirs[1].low):
+        return None
+    return Finding(
+        "A map made from badly wrong poses beats regression trained on exact ones.",
+        f"Labels are {_noise(noise)} off. Bundle adjustment, which moves poses until the images"
+        f" agree, makes a map of them that finds test frames to {_cm(ours[0])} and {_deg(ours[1])};"
+        f" the best network, trained on exact labels, to {_cm(theirs[0])} and {_deg(theirs[1])}.",
+        "the truth",
+        "references",
+    )
+
+
+def shape_changes(root: Path) -> dict[str, tuple[Interval, Interval]]:
+    """By shape of label errors of one size, how they change both errors against the truth."""
+    cells = read_table(root, "table6_label_errors")
+    noise = most_noise(root)
+    clean = cells[cells.labels == "synfeal"]
+    at = (cells.noise_m == noise[0]) & (cells.noise_deg == noise[1])
+    found = {shape: cells[at & (cells.labels == shape)] for shape in SHAPES}
+    changes = {
+        shape: (mean_change(clean, rows, POSITION), mean_change(clean, rows, ORIENTATION))
+        for shape, rows in found.items()
+        if len(rows)
+    }
+    paired = paired_changes(root, "C5", "both")
+    return changes | ({"noise": paired} if paired and "noise" in changes else {})
+
+
+def shared_errors_stay(root: Path) -> Finding | None:
+    """Independent errors of labels, and errors that frames share."""
+    changes = shape_changes(root)
+    if len(changes) < len(SHAPES):
+        return None
+    own, path, space = (changes[shape][1] for shape in SHAPES)
+    if space.low <= own.high:
+        return None
+    headline = (
+        "Label errors that differ from frame to frame mostly average out; those that frames share"
+        " do not."
+        if path.low > own.high
+        else "Label errors that bend space do more harm than errors that differ by frame."
+    )
+    parts = [f"{_percent(changes[shape][1])} where {text}" for shape, text in SHAPES.items()]
+    return Finding(
+        headline,
+        f"Labels that are {_noise(most_noise(root))} off raise the networks' orientation error by"
+        f" {', '.join(parts[:-1])}, and {parts[-1]} (mean over the five).",
+        "the truth",
+        "table6_label_errors",
+    )
+
+
+def half_the_images(root: Path) -> tuple[Interval, Interval, float, float]:
+    """What twice the images alone change at the small size, and their share of the size's effect.
+
+    Shares are of logarithms, in which effects that follow one another add up.
+    """
+    shown = read_table(root, "table7_images_shown")
+    half, whole = (shown[shown.init == init] for init in ("pretrained-half", "pretrained"))
+    size = read_table(root, "table4_size")
+    room = size[size.scene == ROOM]
+    both = [
+        (
+            mean_change(half, whole, measure),
+            mean_change(room[room["size"] == SMALL], room[room["size"] == LARGE], measure),
+        )
+        for measure in (POSITION, ORIENTATION)
+    ]
+    shares = [math.log(images.value) / math.log(frames.value) for images, frames in both]
+    return both[0][0], both[1][0], shares[0], shares[1]
+
+
+def more_frames_help(root: Path) -> Finding | None:
+    """Size of the data set, and the part of its effect that is longer training."""
+    size = read_table(root, "table4_size")
+    room = size[size.scene == ROOM]
+    if not {SMALL, LARGE} <= {*room["size"]}:
+        return None
+    ends = room[room["size"] == SMALL], room[room["size"] == LARGE]
+    unpaired = mean_change(*ends, POSITION), mean_change(*ends, ORIENTATION)
+    position, orientation = paired_changes(root, "C7") or unpaired
+    if max(position.high, orientation.high) >= 1:
+        return None
+    images_m, images_deg, *shares = half_the_images(root)
+    low, high = sorted(round(100 * share) for share in shares)
+    return Finding(
+        "More frames help, and part of that is longer training.",
+        f"From {SMALL} to {LARGE} frames of the Large Room the position error changes by"
+        f" {_percent(position)} and the orientation error by {_percent(orientation)}"
+        f" {_printed(*ends)}. But larger sets are also shown more images, and twice the images"
+        f" alone change the errors at {SMALL} by {_change(images_m.value)} and"
+        f" {_change(images_deg.value)}, which is {low} to {high} % of that effect. No {SMALL} run"
+        f" was shown as many images as the {LARGE} runs.",
+        "labels and truth alike",
+        "table4_size",
+    )
+
+
+def no_difference_at_this_dose(root: Path) -> Finding | None:
+    """Labels of SfM and RGB-D SLAM in place of exact ones."""
+    cells = read_table(root, "table2_ground_truth")
+    errors = read_table(root, "label_error", LABEL_ERROR)
+    own = errors[
+        (errors.scene == ROOM) & (errors.split == "train") & (errors.assistance == "after")
+    ]
+    own = own.set_index("method")
+    exact = cells[cells.labels == "synfeal"]
+    names = {"sfm": "SfM", "rgbd-toro": "TORO", "rgbd-g2o": "g2o"}
+    if not {*names} <= {*own.index}:
+        return None
+    doses = [
+        f"{title} {100 * own.position_m_median[name]:.1f} cm"
+        f" and {own.orientation_deg_median[name]:.1f}°"
+        for name, title in names.items()
+    ]
+    changes = {
+        title: [mean_change(cells[cells.labels == name], exact, m) for m in (POSITION, ORIENTATION)]
+        for name, title in names.items()
+    }
+    single = paired_changes(root, "C2")
+    shown = [change for both in (*changes.values(), single or ()) for change in both]
+    if single is None or not all(change.holds(1.0) for change in shown):
+        return None
+    texts = [
+        f"{title} {' and '.join(_change(change.value) for change in both)}"
+        for title, both in changes.items()
+    ]
+    sfm = cells[cells.labels == "sfm"]
+    pairs = sfm.merge(exact, on="model", suffixes=("_sfm", "_exact"), validate="1:1")
+    lower = sum(
+        int((pairs[f"{m}_exact"] < pairs[f"{m}_sfm"]).sum()) for m in (POSITION, ORIENTATION)
+    )
+    posenet2 = (rows[rows.model == "posenet2"] for rows in (sfm, exact))
+    errors_m = 100 * exact[POSITION]
+    return Finding(
+        "Labels of SfM and RGB-D SLAM against exact ones: the difference is too small to see.",
+        f"These labels are off by a few centimetres (median {', '.join(doses)}), the networks by"
+        f" {errors_m.min():.0f} to {errors_m.max():.0f} cm: so small a dose cannot do much. Exact"
+        f" labels in their place change the position and orientation error, mean over the five, by"
+        f" {', '.join(texts)}. Against SfM's, {lower} of {2 * len(pairs)} errors are lower, so that"
+        f" a small gain is likely: PoseNet2's change by {_percent(single[0])} and"
+        f" {_percent(single[1])} {_printed(*posenet2)}.",
+        "the truth",
+        "table2_ground_truth",
+    )
+
+
+def paired_changes(root: Path, claim: str, part: str = "") -> tuple[Interval, Interval] | None:
+    """Changes of both errors on the same test frames, where a claim was judged by them.
+
+    Limits are narrower than those of :func:`mean_change`, for what makes a path hard cancels.
+    """
+    rows = read_published(root)
+    position, orientation = (interval_in(rows, claim, part, place) for place in range(2))
+    return (position, orientation) if position and orientation else None
+
+
+# Tables that the findings rest on.
+NEEDED = (
+    *("table2_ground_truth", "table3_inconsistencies", "table4_size", "table6_label_errors"),
+    *("table7_images_shown", "references", "label_error"),
+)
+# A run on photographs (`real`) has the first finding of all: whether a rendered scan localizes
+# photographs. Its function goes to the front of this list.
+FINDINGS: Sequence[Callable[[Path], Finding | None]] = (
+    structure_beats_regression,
+    a_map_beats_exact_labels,
+    shared_errors_stay,
+    more_frames_help,
+    no_difference_at_this_dose,
+)
+
+
+def sentences(root: Path, link: str = "") -> list[str]:
+    """Findings and verdict counts as Markdown, one item each.
+
+    Args:
+        root: published results.
+        link: from the page to ``root``, for the tables that findings rest on; no links without.
+    """
+    items = []
+    for found in findings(root):
+        where = f" ([table]({link}/tables/{found.table}.csv))" if link else ""
+        items.append(f"**{found.headline}** {found.evidence} *Against {found.against}.*{where}")
+    return [*items, verdict_sentence(root)]
+
+
+def verdict_sentence(root: Path) -> str:
+    """How the paper's claims fared against the truth, group by group."""
+    groups = counts_now(read_published(root), root)
+    parts = []
+    for group, title in GROUPS.items():
+        verdicts = ", ".join(f"{n} {verdict}" for verdict, n in groups[group].most_common())
+        parts.append(f"*{title}* {verdicts}")
+    total = sum(sum(counts.values()) for counts in groups.values())
+    return f"Of the paper's {total} claims, judged by the true poses: {'; '.join(parts)}."
+
+
+def _printed(before: pd.DataFrame, after: pd.DataFrame) -> str:
+    """The paper's changes of both errors, geometric mean over the localizers, in brackets."""
+    both = before.merge(after, on="model", suffixes=("_old", "_new"), validate="1:1")
+    texts = []
+    for measure in ("position_m", "orientation_deg"):
+        ratio = both[f"published_{measure}_new"] / both[f"published_{measure}_old"]
+        texts.append(_change(float(np.exp(np.log(ratio).mean()))))
+    return f"(printed: {texts[0]} and {texts[1]})"
+
+
+def _cm(interval: Interval) -> str:
+    value, low, high = (two_digits(100 * end) for end in interval)
+    return f"{value} cm ({low} – {high})"
+
+
+def _deg(interval: Interval) -> str:
+    value, low, high = (two_digits(end) for end in interval)
+    return f"{value}° ({low} – {high})"
+
+
+def _times(factor: float) -> str:
+    return f"{round(factor, -1 if factor >= 100 else 0):.0f}"
+
+
+def _noise(noise: tuple[float, float]) -> str:
+    return f"{100 * noise[0]:.0f} cm and {noise[1]:.0f}°"
+
+
+def _change(factor: float) -> str:
+    """A factor as a change in percent."""
+    change = round(100 * (factor - 1))  # an integer has no minus zero
+    return f"{change:+d} %".replace("-", "−") if change else "0 %"
+
+
+def _percent(interval: Interval) -> str:
+    value, low, high = map(_change, interval)
+    return f"{value} ({low.removesuffix(' %')} to {high})"

@@ -1,0 +1,267 @@
+"""``report.html``: what a run has found, in one file that loads nothing."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+from numpy.typing import NDArray
+from PIL import Image
+
+from baselines.config.learning import KEYS
+from reproduction.claims.verdicts import Verdict
+from reproduction.design.experiments import Design, Experiment
+from reproduction.figures.registry import CAPTIONS
+from reproduction.hard_cases import table as hard_cases
+from reproduction.report.findings import can_tell, findings
+from reproduction.report.findings_figure import panels, picture
+from reproduction.report.html.provenance import cost_sentence, origin_html, read_origin
+from reproduction.report.html.tables import (
+    claims_table,
+    read_claims,
+    render,
+    score_table,
+    side_html,
+    table_title,
+    verdict_table,
+)
+from reproduction.report.summary import run_sentences
+from reproduction.tables import (
+    assistance,
+    label_error,
+    meshes,
+    real,
+    recall,
+    references,
+    robustness,
+    speed_vs_error,
+)
+from reproduction.tables.cells import key_of, published_cells, read_cells
+from reproduction.tables.layouts import BLOCKS, SOURCES, scene_title
+from synfeal.dataset.pose_table import PoseTable, read_pose_table
+from synfeal.inspect.surface import SurfacePoints, viewer_js, viewer_mesh
+from synfeal.mesh.load import load_mesh
+from synfeal.records.files import write_text
+from synfeal.records.provenance import generator_of
+from synfeal.records.tables import read_frame
+
+LARGEST_SVG = 1_000_000  # bytes; clouds of points are smaller as a picture
+LARGEST_PNG = 250_000
+LARGEST_SIDE_PX = 1800
+
+
+def figure_files(folder: Path, captions: Mapping[str, str]) -> dict[str, Path]:
+    """One file per figure of a folder, those with captions first and in their order."""
+    found: dict[str, Path] = {}
+    for path in sorted(folder.glob("*.png")) + sorted(folder.glob("*.svg")):
+        is_large = path.suffix == ".svg" and path.stat().st_size > LARGEST_SVG
+        if not (is_large and path.stem in found):
+            found[path.stem] = path
+    order = [*(name for name in captions if name in found), *sorted(found)]
+    return {name: found[name] for name in dict.fromkeys(order)}
+
+
+def data_address(path: Path) -> str:
+    """A picture as a ``data:`` address; large PNG files become WebP."""
+    content, kind = path.read_bytes(), "svg+xml" if path.suffix == ".svg" else "png"
+    if kind == "png" and len(content) > LARGEST_PNG:
+        with Image.open(path) as image:
+            picture = image.convert("RGB")
+        picture.thumbnail((LARGEST_SIDE_PX, LARGEST_SIDE_PX))
+        buffer = io.BytesIO()
+        picture.save(buffer, "WEBP", quality=85, method=4)
+        content, kind = buffer.getvalue(), "webp"
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
+
+
+CLAIMS, PROVENANCE = "claims.csv", "provenance.json"
+# Beside the results of a profile may lie those of `make real`, which has no part in any profile.
+REAL = "real"
+REAL_CAPTIONS = {
+    "real_amount": "Photographs that were not scanned: errors of PoseNet2 against the number of"
+    " rendered frames, and against the number of photographs that were scanned.",
+    "real_cover": "The same errors against the share of a photograph that the scan covers.",
+}
+# Modules of the tables that follow tables 1 to 7.
+SIDE_TABLES: Sequence[Any] = (
+    *(references, recall, robustness, assistance, label_error, speed_vs_error, hard_cases),
+)
+
+
+def write_report(design: Design, root: Path, out_html: Path, with_robustness: bool = True) -> None:
+    """Write the page, one file that opens without a network.
+
+    Without claims, provenance or figures, their sections say so. Tables for which the design has
+    no rows are left out, and named under what is not here.
+
+    Args:
+        design: What was run.
+        root: Results of the profile.
+        out_html: File to write.
+        with_robustness: Whether the robustness table has rows.
+    """
+    rowless = rowless_tables(design, with_robustness)
+    sides = [module for module in SIDE_TABLES if module.NAME not in rowless]
+    cells = {table: read_cells(table, design, root) for table in design.tables}
+    claims = read_claims(root / CLAIMS) if (root / CLAIMS).exists() else []
+    origin = read_origin(root / PROVENANCE) if (root / PROVENANCE).exists() else {}
+    figures = figure_files(root / "figures", CAPTIONS)
+    figures |= figure_files(root.with_name(REAL) / "figures", REAL_CAPTIONS)
+    files = (CLAIMS, PROVENANCE, *(f"tables/{m.NAME}.csv" for m in (meshes, *sides)))
+    page = render(
+        "page.html",
+        profile=root.name,
+        opening=opening(root),
+        found=findings(root) if can_tell(root) else [],
+        sentences=[*run_sentences(cells), *([cost_sentence(origin)] if origin else [])],
+        counts=verdict_table(claims) if claims else "",
+        claims=claims_table(claims) if claims else "",
+        tables=[*_tables(cells, sides, root), *_real_table(root.with_name(REAL))],
+        figures=[
+            {
+                "name": name,
+                "caption": (CAPTIONS | REAL_CAPTIONS).get(name, name),
+                "address": data_address(path),
+            }
+            for name, path in figures.items()
+        ],
+        rooms=[room_html(s, root, design) for s in dict.fromkeys(r.scene for r in design.rows)],
+        origin=origin_html(origin) if origin else "",
+        skipped=[
+            *(f"{name} is missing." for name in files if not (root / name).exists()),
+            *(
+                [f"Without rows in this run: {'; '.join(map(table_title, rowless))}."]
+                * bool(rowless)
+            ),
+            *missing_rows(design.rows),
+            *(
+                f"{claim['id']} is not testable here: {claim['reason'] or 'no reason given'}"
+                for claim in claims
+                if Verdict.NOT_TESTABLE in (claim["verdict_labels"], claim["verdict_true"])
+            ),
+            *(
+                f"Not drawn, for lack of its data in this profile: figure {name}."
+                for name in CAPTIONS
+                if name not in figures
+            ),
+        ],
+        viewer_js=Markup(viewer_js()),
+    )
+    write_text(out_html, page)
+
+
+def opening(root: Path) -> str:
+    """The figure of the main findings as an address; nothing where the run lacks their rows."""
+    drawn = panels(root) if can_tell(root) else []
+    if not drawn:
+        return ""
+    content = base64.b64encode(picture(drawn)).decode("ascii")
+    return f"data:image/png;base64,{content}"
+
+
+def rowless_tables(design: Design, with_robustness: bool) -> list[str]:
+    """Side tables for which a design has no rows: of estimated labels, of frames with effects."""
+    of_labels = [] if design.estimated else [assistance.NAME, label_error.NAME]
+    return [*of_labels, *([] if with_robustness else [robustness.NAME])]
+
+
+def _tables(
+    cells: Mapping[str, pd.DataFrame], sides: Sequence[Any], root: Path
+) -> Iterator[dict[str, Any]]:
+    """Name, title and HTML of every table; no HTML where its file is missing."""
+    for module in (meshes, *sides):
+        path = root / "tables" / f"{module.NAME}.csv"
+        body = path.exists() and side_html(module.side_table(read_frame(path, module.SCHEMA)))
+        yield {"name": module.NAME, "title": table_title(module.NAME), "body": body}
+        for name, scores in cells.items() if module is meshes else ():
+            yield {"name": name, "title": table_title(name), "body": score_table(name, scores)}
+
+
+def _real_table(root: Path) -> Iterator[dict[str, Any]]:
+    """The table of `make real`, where that was run."""
+    path = root / "tables" / f"{real.NAME}.csv"
+    if path.exists():
+        body = side_html(real.side_table(real.read_real(path)))
+        yield {"name": real.NAME, "title": table_title(real.NAME), "body": body}
+
+
+def missing_rows(rows: Sequence[Experiment]) -> list[str]:
+    """By table, the paper's rows that this run's table of experiments leaves out."""
+    sentences = []
+    for table in KEYS:
+        own = {key_of(row, "")[:-1] for row in rows if row.table == table}
+        printed = dict.fromkeys(key[:-1] for key in published_cells(table))
+        absent = [_row_name(table, key) for key in printed if key not in own]
+        if absent and len(absent) == len(printed):
+            sentences.append(
+                f"{table_title(table)}: none of the paper's {len(printed)} rows is in this"
+                " profile's table of experiments."
+            )
+        elif absent:
+            sentences.append(
+                f"{table_title(table)}: {len(absent)} of the paper's {len(printed)} rows are not in"
+                f" this profile's table of experiments: {'; '.join(absent)}."
+            )
+    return sentences
+
+
+def _row_name(table: str, key: tuple[Any, ...]) -> str:
+    block, scene, size, labels, noise_m, noise_deg, _ = key
+    if block:
+        return f"{BLOCKS[block]} {noise_m:g} m, {noise_deg:g}°"
+    which = f", {SOURCES[labels]}" if table.startswith("table2") else f" {size}"
+    return f"{scene_title(scene)}{which}"
+
+
+SPLITS = {"train": ("Cameras, training", (0, 114, 178)), "test": ("Cameras, test", (213, 94, 0))}
+# Okabe and Ito's colours that are left, for label sets that were estimated.
+LABEL_RGB = ((204, 121, 167), (0, 158, 115), (230, 159, 0), (86, 180, 233), (0, 0, 0))
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Camera paths that are shown or hidden together."""
+
+    title: str  # what stands beside the box to tick
+    rgb: tuple[int, int, int]  # colour, 0 to 255
+    paths_m: tuple[Array, ...]  # one polyline (N, 3) per path, world, metres
+    is_shown: bool  # from the start
+
+
+def room_html(scene: str, root: Path, design: Design) -> Markup:
+    """The view of one scene, ready for ``report.js``; the design says what label sets there are."""
+    mesh = load_mesh(root / "scenes" / scene / "mesh.glb")
+    small = viewer_mesh(mesh, SurfacePoints.of(mesh, generator_of(0, "report", scene)))
+    drawn = trajectories(scene, root, design)
+    data = small.scene([(path, one.rgb) for one in drawn for path in one.paths_m])
+    return render("room.html", scene=scene, title=scene_title(scene), drawn=drawn, data=data)
+
+
+def trajectories(scene: str, root: Path, design: Design) -> list[Trajectory]:
+    """The planned cameras of both splits, then every estimated label set of the scene."""
+    found = [
+        Trajectory(title, rgb, paths_of(read_pose_table(path)), True)
+        for split, (title, rgb) in SPLITS.items()
+        if (path := root / "plans" / scene / f"{split}.csv").exists()
+    ]
+    sets = [(size, labels) for where, size, labels in design.estimated if where == scene]
+    for (size, labels), rgb in zip(sets, LABEL_RGB * len(sets), strict=False):
+        folder = root / "labels" / scene / size / labels
+        tables = [read_pose_table(folder / f"{split}.csv") for split in SPLITS]
+        paths = tuple(path for table in tables for path in paths_of(table))
+        found.append(Trajectory(f"{SOURCES[labels]} labels, {size}", rgb, paths, False))
+    return found
+
+
+def paths_of(table: PoseTable) -> tuple[Array, ...]:
+    """Camera centres (N, 3) of each path that has more than one frame."""
+    starts = np.flatnonzero(np.diff(table.path)) + 1
+    return tuple(path for path in np.split(table.position_m, starts) if len(path) > 1)

@@ -1,0 +1,170 @@
+"""Tables of the page, to be sorted: side tables, tables 2 to 7 in both scores, the claims."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from itertools import groupby, product
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from reproduction.claims.table import COLUMNS, verdict_counts
+from reproduction.claims.verdicts import GROUPS, MEANINGS, Verdict
+from reproduction.design.experiments import FROM_SCRATCH
+from reproduction.tables.columns import SCORES, Column, SideTable, cells_of
+from reproduction.tables.layouts import CHANGE
+from reproduction.tables.sheet import PAPER, Line, Value, footnotes
+from reproduction.tables.write import one_run_remarks, sheet_of
+from synfeal.errors import InputError
+from synfeal.records.tables import TEXT, read_frame, records_of
+
+ENVIRONMENT = Environment(
+    loader=PackageLoader("reproduction.report.html"),
+    autoescape=True,
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)
+
+
+def render(template: str, **values: Any) -> Markup:
+    """A template of the folder ``templates`` with its values."""
+    return Markup(ENVIRONMENT.get_template(template).render(**values))
+
+
+def side_html(table: SideTable) -> Markup:
+    """A side table, a row per row."""
+    rows = [
+        {"style": row.get("style", ""), "cells": [cells_of(row, c) for c in table.columns]}
+        for row in records_of(table.rows)
+    ]
+    switched = any(row["style"] in SCORES for row in rows) or any(c.scored for c in table.columns)
+    title = table_title(table.name)
+    return render("side_table.html", table=table, title=title, rows=rows, switched=switched)
+
+
+# The switch's two scores: kinds of lines. Where labels are the truth, there is one for both.
+STYLES = {"labels": "labels", "true": "truth"}
+SAME = "All labels of this table are true poses, so both scores are the same numbers."
+
+
+def score_table(name: str, cells: pd.DataFrame) -> Markup:
+    """One of tables 2 to 7, from what :func:`reproduction.tables.cells.read_cells` read for it."""
+    sheet = sheet_of(name, cells)
+    one_truth = not any(line.kind == "truth" for line in sheet.lines)
+    label = Column(sheet.headings[0])
+    block = Column("Noise in" if "table3" in name else "Scene")
+    titles = sheet.headings[2:]
+    rows: list[dict[str, Any]] = []
+    for (title, _), lines in groupby(sheet.lines, key=lambda line: (line.block, line.row)):
+        # The first row of those that compete for bold has a rule above.
+        first = not rows or title != rows[-1]["block"]
+        rows.append({"block": title, "first": first, **_row([*lines])})
+    return render(
+        "score_table.html",
+        name=name,
+        title=table_title(name),
+        text=sheet.caption,
+        marks=footnotes(sheet),
+        remarks=[
+            *([SAME] if one_truth else []),
+            *([CHANGE] if name == FROM_SCRATCH else []),
+            *one_run_remarks(cells),
+        ],
+        labels=[block, label] if any(row["block"] for row in rows) else [label],
+        titles=titles,
+        quantities=[Column(title, form="{}") for _ in titles for title in ("Position", "Orient.")],
+        rows=rows,
+    )
+
+
+def _row(lines: Sequence[Line]) -> dict[str, Any]:
+    """The lines of a row: its label, the paper's, and by number both scores and the paper's."""
+    kinds = {line.kind: line.cells for line in lines}
+
+    def value(kind: str, column: int, place: int) -> Value | None:
+        cells = kinds.get(kind) or kinds.get(kind.replace("truth", "labels"))
+        values = cells[column] if cells else []
+        return values[min(place, len(values) - 1)] if values else None
+
+    def yardstick(kind: str, column: int, place: int) -> Value | None:
+        found = value("yardstick", column, place) if kind == "labels" else None
+        return found._replace(text=f"yardstick {found.text}", bold=False) if found else None
+
+    numbers = [
+        {
+            "scores": {
+                style: (value(kind, *at), value(f"{kind} change", *at) or yardstick(kind, *at))
+                for style, kind in STYLES.items()
+            },
+            "paper": [value(PAPER, *at), value("paper change", *at)],
+        }
+        for at in product(range(2, len(lines[0].cells)), (0, 1))
+    ]
+    return {"label": value("labels", 0, 0), "paper": value(PAPER, 0, 0), "cells": numbers}
+
+
+def table_title(name: str) -> str:
+    """As in ``Table 4`` or ``Label error``."""
+    found = re.match(r"table(\d+)", name)
+    return f"Table {found[1]}" if found else name.replace("_", " ").capitalize()
+
+
+# A sign, a border and the words themselves tell verdicts apart without colour.
+BADGES: Mapping[str, tuple[str, str]] = {
+    Verdict.HOLDS: ("✓", "holds"),
+    Verdict.SMALLER: ("↘", "partly"),
+    Verdict.MIXED: ("±", "partly"),
+    Verdict.LESS: ("<", "fails"),
+    Verdict.NEGLIGIBLE: ("=", "fails"),
+    Verdict.OPPOSITE: ("✗", "fails"),
+    Verdict.REFUTED: ("✗", "fails"),
+    Verdict.UNDECIDED: ("?", "undecided"),
+    Verdict.NOT_LEARNT: ("–", "untestable"),
+    Verdict.NOT_TESTABLE: ("–", "untestable"),
+    Verdict.BY_CONSTRUCTION: ("·", "untestable"),
+}
+CLAIM_HEADINGS = ("Claim", "The paper says", "Published", "Measured here", "Verdict")
+Claims = Sequence[Mapping[str, str]]
+
+
+def read_claims(path: Path) -> Claims:
+    """The rows of ``claims.csv``."""
+    rows = records_of(read_frame(path, dict.fromkeys(COLUMNS, TEXT)))
+    for row in rows:
+        for score in SCORES:
+            if row[f"verdict_{score}"] not in BADGES:
+                where = f"{path}: claim '{row['id']}': verdict_{score}"
+                raise InputError(f"{where} must be one of {', '.join(BADGES)}")
+    return rows
+
+
+def claims_table(claims: Claims) -> Markup:
+    """One row per claim; measured values, limits and verdicts follow the switch."""
+    columns = [Column(title) for title in CLAIM_HEADINGS]
+    values = {"claims": claims, "columns": columns, "scores": list(SCORES), "badges": BADGES}
+    return render("claims.html", **values, reason=reason_of)
+
+
+def verdict_table(claims: Claims) -> Markup:
+    """How many claims of each group got which verdict, under either score."""
+    counts = {score: verdict_counts(claims, score) for score in SCORES}
+    found = {claim[f"verdict_{score}"] for claim in claims for score in SCORES}
+    return render(
+        "verdicts.html",
+        badges=BADGES,
+        groups=GROUPS,
+        verdicts=[verdict for verdict in BADGES if verdict in found],
+        counts=counts,
+        meanings=MEANINGS,
+    )
+
+
+def reason_of(reason: str, score: str) -> str:
+    """The reason of a verdict; where the two scores have their own, that of ``score``."""
+    found = re.fullmatch(r"labels: (?P<labels>.*); true: (?P<true>.*)", reason)
+    return found[score] if found else reason

@@ -1,0 +1,82 @@
+"""Numbers with 95 % limits from published tables, and how much one change moves the errors.
+
+Published tables hold medians with limits, not the errors of single frames. So a change between two
+cells is given limits as if their test paths had nothing in common: too wide where both were tested
+on the same frames, never too narrow. Limits of published cells that were combined from several
+training runs by the normal distribution are widened to Student's t here.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from reproduction.statistics.limits import PATHS_AND_SEEDS
+from reproduction.statistics.seeds import borrowed_deviations, half_width
+from synfeal.records.tables import rows_of
+
+NORMAL_95 = 1.96  # what limits were combined with before `limits_of` was a column
+
+
+class Interval(NamedTuple):
+    """A value and its 95 % limits."""
+
+    value: float
+    low: float
+    high: float
+
+    def holds(self, number: float) -> bool:
+        """Whether a number lies within the limits."""
+        return self.low <= number <= self.high
+
+    def __truediv__(self, other: Interval) -> Interval:
+        """A ratio, as if both were independent and log-normal."""
+        value = self.value / other.value
+        below = math.hypot(math.log(self.value / self.low), math.log(other.high / other.value))
+        above = math.hypot(math.log(self.high / self.value), math.log(other.value / other.low))
+        return Interval(value, value * math.exp(-below), value * math.exp(above))
+
+
+def cell_interval(row: Any, measure: str) -> Interval:
+    """A cell of a published table over test paths and training runs.
+
+    Args:
+        row: a row of one of tables 2 to 7, or of a reference method, which trains nothing.
+        measure: name of its error.
+    """
+    value, low, high, sd = (
+        float(getattr(row, f"{measure}{end}", math.nan)) for end in ("", "_low", "_high", "_sd")
+    )
+    below, above = value - low, high - value
+    n_seeds = int(row.n_seeds)
+    if getattr(row, "model", "") == "" or getattr(row, "limits_of", "") == PATHS_AND_SEEDS:
+        return Interval(value, low, high)
+    if n_seeds > 1:
+        error, degrees = sd / math.sqrt(n_seeds), float(n_seeds - 1)
+        normal = NORMAL_95 * error
+        below, above = (math.sqrt(max(d**2 - normal**2, 0.0)) for d in (below, above))
+    else:
+        lent = borrowed_deviations()[row.model, measure]
+        error, degrees = lent.relative_sd * value, float(lent.degrees_of_freedom)
+    low, high = value - half_width(below, error, degrees), value + half_width(above, error, degrees)
+    return Interval(value, low, high)
+
+
+def mean_change(before: pd.DataFrame, after: pd.DataFrame, measure: str) -> Interval:
+    """Factor by which an error changes, geometric mean over the localizers.
+
+    What moves one localizer is taken to move all of them: limits do not shrink with their number.
+
+    Args:
+        before: a row per localizer, of tables 2 to 7.
+        after: the same localizers.
+        measure: name of the error.
+    """
+    old = {row.model: cell_interval(row, measure) for row in rows_of(before)}
+    new = {row.model: cell_interval(row, measure) for row in rows_of(after)}
+    ratios = np.log([new[model] / old[model] for model in old])
+    value, low, high = np.exp(ratios.mean(axis=0))
+    return Interval(float(value), float(low), float(high))

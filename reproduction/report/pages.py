@@ -1,0 +1,253 @@
+"""The generated parts of pages: every number there comes from a tracked result file.
+
+A part stands between ``<!-- NAME PROFILE -->`` and ``<!-- /NAME -->`` and shows the published
+results of that profile; ``headline`` is the largest profile that is published.
+``python -m reproduction.report.pages`` writes all parts anew, and the figure of the read-me; with
+``--check`` it says whether that would change anything.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from baselines.config.learning import MODELS
+from reproduction.claims.table import claims_markdown
+from reproduction.real.findings import real_findings, real_table
+from reproduction.report.findings import read_table, sentences
+from reproduction.report.findings_figure import is_drawn_from, panels, write_findings_figure
+from reproduction.report.publish import PUBLISHED, RESULTS
+from reproduction.report.published_claims import read_published, rows_now, rules_note
+from reproduction.runs.results import read_result
+from reproduction.tables.assistance import SCHEMA as ASSISTANCE
+from reproduction.tables.assistance import TOTAL
+from reproduction.tables.label_error import SCHEMA as LABEL_ERROR
+from reproduction.tables.layouts import SOURCES, TITLES, scene_title
+from reproduction.tables.sheet import markdown_table
+from synfeal.errors import InputError, exit_status
+from synfeal.records.files import write_text
+from synfeal.records.tables import (
+    COUNT,
+    NUMBER,
+    TEXT,
+    read_frame,
+    records_of,
+    rows_of,
+)
+
+PAGES = (Path("README.md"), Path("docs/results.md"), Path("docs/scenes.md"))
+# Shows a run that needs photographs which are not ours to pass on: nothing until one is published.
+REAL_PAGE, REAL = Path("docs/real.md"), "real"
+FIGURE = Path("docs/images/findings.png")
+HEADLINES = ("night", "mini")
+LIMITS_NOTE = (
+    "In brackets: 95 % limits over test paths and training runs. Where [claims]({claims}) compare"
+    " the same errors frame by frame (the first change of the third finding, the fourth, and"
+    " PoseNet2 in the fifth) limits are theirs; other changes are treated as if both errors were"
+    " measured on different frames, which makes their limits wide."
+)
+PAPER_FRAMES = {"6k": 6000}
+SIFT = dict.fromkeys(
+    ("covered_share_mean", "covered_share_q10", "covered_share_q90", "keypoints_mean"), NUMBER
+)
+
+
+def headline() -> str:
+    """The profile whose results the read-me shows."""
+    return next((name for name in HEADLINES if (PUBLISHED / name).is_dir()), HEADLINES[-1])
+
+
+def findings(root: Path, top: str = "", claims_page: str = "docs/results.md") -> str:
+    """What the run found, most important first, and what its limits are.
+
+    Args:
+        root: published results.
+        top: from the page to the top of the repository, ending in a slash.
+        claims_page: from the page to the one with the claims.
+    """
+    *found, verdicts = sentences(root, f"{top}{root.as_posix()}")
+    items = "\n".join(f"{n}. {text}" for n, text in enumerate(found, start=1))
+    return f"{items}\n\n{verdicts}\n\n{LIMITS_NOTE.format(claims=f'{claims_page}#claims')}"
+
+
+def origin(root: Path) -> str:
+    """Which run the numbers are of."""
+    record = read_result(root / "provenance.json", ("commit", "machine", "stages"), "publish again")
+    cells = read_table(root, "table4_size")
+    first, seeds = cells.iloc[0], sorted(set(cells.n_seeds))
+    share = PAPER_FRAMES[first["size"]] / first.n_train
+    frames = "the paper's frames" if share == 1 else f"1/{share:.3g} of the paper's frames"
+    span = " to ".join(map(str, dict.fromkeys((seeds[0], seeds[-1]))))
+    runs = f"{span} training run{'' if span == '1' else 's'} per cell"
+    return (
+        f"Profile `{root.name}`: {frames}, {runs}, at commit"
+        f" `{record['commit'][:9]}` on {record['machine']['usable_cores']} cores"
+        f" ({record['machine']['processor']})."
+    )
+
+
+def size_table(root: Path) -> str:
+    """Table 4: errors against the true poses, published errors in brackets."""
+    cells = read_table(root, "table4_size")
+    frames = "(" + cells.n_train.astype(str) + ", " + cells.n_test.astype(str) + ")"
+    labels = cells.scene.map(scene_title) + " " + cells["size"] + " " + frames
+    return _localizer_table(cells, "scene, size (frames here)", labels)
+
+
+def labels_table(root: Path) -> str:
+    """Table 2, the same way."""
+    cells = read_table(root, "table2_ground_truth")
+    return _localizer_table(cells, "labels from", cells.labels.map(lambda n: SOURCES.get(n, n)))
+
+
+def assistance(root: Path) -> str:
+    """Batches that needed assistance, and how good the labels are."""
+    errors = read_table(root, "label_error", LABEL_ERROR)
+    errors = errors[errors.assistance == "after"]
+    position, orientation = 100 * errors.position_m_median, errors.orientation_deg_median
+    errors["text"] = position.map("{:.1f} cm, ".format) + orientation.map("{:.2f}°".format)
+    rms_cm, rms_deg = 100 * errors.position_m_rmse, errors.orientation_deg_rmse
+    errors["text"] += rms_cm.map("; {:.1f} cm, ".format) + rms_deg.map("{:.2f}°".format)
+    errors["text"] += (100 * (1 - errors.share_filled)).map("; {:.0f} %".format)
+    shown = errors.pivot(index=["scene", "method"], columns="split", values="text")
+    counts = read_table(root, "assistance", ASSISTANCE)
+    counts = counts[counts.split == TOTAL].join(shown, on=["scene", "method"])
+    published = [
+        ""
+        if pd.isna(row.published_assisted)
+        else f" *({row.published_assisted} of {row.published_batches})*"
+        for row in rows_of(counts)
+    ]
+    return markdown_table(
+        pd.DataFrame(
+            {
+                "scene": counts.scene.map(scene_title),
+                "labels from": counts.method.map(SOURCES),
+                "batches": counts.batches,
+                "assisted": counts.assisted.astype(str) + published,
+                "training: median; RMSE; registered": counts["train"],
+                "test: median; RMSE; registered": counts["test"],
+            }
+        )
+    )
+
+
+def claims(root: Path) -> str:
+    """Every claim with its verdict under both scores, and the rules they were made by."""
+    rows = read_published(root)
+    return f"{rules_note(rows, root)}\n\n{claims_markdown(rows_now(rows, root)).rstrip()}"
+
+
+def difficulty(folder: Path = RESULTS / "benchmarks" / "scene_difficulty") -> str:
+    """How hard the scenes are for localisation, one line per scene that was measured."""
+    names = sorted(path.name.removesuffix("-sift.csv") for path in folder.glob("*-sift.csv"))
+    return markdown_table(pd.DataFrame([_difficulty(folder, name) for name in names]))
+
+
+PARTS: dict[str, Callable[[Path], str]] = {
+    "findings": findings,
+    "answer": partial(findings, top="../", claims_page=""),
+    "origin": origin,
+    "size": size_table,
+    "labels": labels_table,
+    "assistance": assistance,
+    "claims": claims,
+    "difficulty": lambda root: difficulty(),
+    "real": real_findings,
+    "photographs": real_table,
+}
+
+
+def rewritten(text: str, part: Callable[[str, str], str]) -> str:
+    """A page with its generated parts replaced by ``part``, called with name and profile."""
+    pattern = re.compile(r"<!-- (\w+) (\w+) -->.*?<!-- /\1 -->", re.DOTALL)
+
+    def fresh(found: re.Match[str]) -> str:
+        name, profile = found.groups()
+        return f"<!-- {name} {profile} -->\n\n{part(name, profile)}\n\n<!-- /{name} -->"
+
+    return pattern.sub(fresh, text)
+
+
+def part_of(name: str, profile: str) -> str:
+    """A part of a page."""
+    if name not in PARTS:
+        raise InputError(f"<!-- {name} {profile} -->: no such part; known: {', '.join(PARTS)}")
+    return PARTS[name](PUBLISHED / (headline() if profile == "headline" else profile))
+
+
+def _localizer_table(cells: pd.DataFrame, heading: str, labels: pd.Series) -> str:
+    """A row per label in their order, a column per localizer."""
+    texts = [_cell(cell) for cell in rows_of(cells)]
+    table = cells.assign(row=labels, text=texts).pivot(index="row", columns="model", values="text")
+    table = table.loc[labels.unique(), list(MODELS)].rename(columns=TITLES)
+    return markdown_table(table.rename_axis(index=heading).reset_index())
+
+
+def _cell(cell: Any) -> str:
+    """Both errors in the paper's unit, positions as root mean squares over the axes."""
+    own = "failed"
+    if not pd.isna(cell.position_m_true):
+        position_rms_m = cell.position_m_true / math.sqrt(3)
+        own = f"{position_rms_m:.2f} m, {cell.orientation_deg_true:.1f}°"
+    if pd.isna(cell.published_position_m):  # a row the paper has not
+        return own
+    return f"{own} *({cell.published_position_m:.2f}, {cell.published_orientation_deg:.2f})*"
+
+
+def _difficulty(folder: Path, name: str) -> dict[str, str]:
+    sift = read_frame(folder / f"{name}-sift.csv", SIFT).iloc[0]
+    far = read_frame(folder / f"{name}-repetition.csv", {"far_share": NUMBER}).far_share[0]
+    share, low, high = (f"{100 * sift[column]:.0f} %" for column in list(SIFT)[:3])
+    counts = {"method": TEXT, "assisted": COUNT, "batches": COUNT}
+    methods = [
+        f"{SOURCES[row['method']]} {row['assisted']} of {row['batches']}"
+        for row in records_of(read_frame(folder / f"{name}-assistance.csv", counts))
+    ]
+    return {
+        "scene": scene_title(name),
+        "pixels near a keypoint": f"{share} (10 % of the frames below {low}, 10 % above {high})",
+        "keypoints": f"{sift.keypoints_mean:.0f}",
+        "best match far away": f"{100 * far:.1f} % of the frames",
+        "assisted batches": ", ".join(methods),
+    }
+
+
+def stale(check: bool) -> list[Path]:
+    """Pages, and the figure, that did not show the published results; written unless checking."""
+    writers: dict[Path, Callable[[], None]] = {}
+    for page in (*PAGES, *([REAL_PAGE] if (PUBLISHED / REAL).is_dir() else [])):
+        old = page.read_text(encoding="utf-8")
+        new = rewritten(old, part_of)
+        if new != old:
+            writers[page] = partial(write_text, page, new)
+    drawn = panels(PUBLISHED / headline())
+    if not is_drawn_from(FIGURE, drawn):
+        writers[FIGURE] = partial(write_findings_figure, drawn, FIGURE)
+    for write in () if check else writers.values():
+        write()
+    return list(writers)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write the generated parts of the pages, or check them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="exit 1 if anything would change")
+    check = parser.parse_args(argv).check
+    changed: list[Path] = []
+    status = exit_status(lambda: changed.extend(stale(check)), "run it again")
+    for path in changed:
+        print(f"{path}: {'run python -m reproduction.report.pages' if check else 'written anew'}")
+    return status or int(check and bool(changed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

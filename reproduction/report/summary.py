@@ -1,0 +1,122 @@
+"""The summary of a run: one page of Markdown, and a few lines for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from reproduction.design.experiments import Design
+from reproduction.tables import meshes, recall, references, robustness
+from reproduction.tables.cells import read_cells
+from reproduction.tables.columns import side_sheet
+from reproduction.tables.layouts import TITLES, scene_title
+from reproduction.tables.references import crossing_findings
+from reproduction.tables.sheet import sheet_markdown
+from reproduction.tables.write import sheet_of
+from synfeal.records.files import write_text
+from synfeal.records.tables import read_frame, rows_of
+
+SIDE_TABLES: Sequence[Any] = (references, recall, robustness)  # a run may lack some
+ALIVE = "table4_size"
+INTRO = """\
+# Results of profile `{profile}`
+
+Every cell is a median error over the test frames. Lines *paper* are the values the paper printed,
+on its own meshes and at its own scale. Errors are against the labels the test set carries (the
+paper's protocol) and against the true poses of the simulator. The same numbers with limits and
+frame counts are in `tables/*.csv`, and as LaTeX in `tables/*.tex`.
+"""
+
+
+def write_summary(design: Design, root: Path, out_md: Path, out_txt: Path) -> None:
+    """Write checks, then every table beside the paper's; and what a person sees when a run ends."""
+    cells = {name: read_cells(name, design, root) for name in design.tables}
+    findings = run_sentences(cells)
+    mesh_facts = meshes.read_meshes([*dict.fromkeys(row.scene for row in design.rows)], root)
+    sheets = [side_sheet(meshes.side_table(mesh_facts))]
+    sheets += [sheet_of(name, found) for name, found in cells.items()]
+    for module in SIDE_TABLES:
+        path = root / "tables" / f"{module.NAME}.csv"
+        if path.exists():
+            table = read_frame(path, module.SCHEMA)
+            findings += crossing_findings(table) if module is references else []
+            sheets.append(side_sheet(module.side_table(table)))
+    parts = [
+        INTRO.format(profile=root.name),
+        "## Do the localizers localize?\n",
+        "".join(f"- {finding}\n" for finding in findings),
+        "## Tables\n",
+        *map(sheet_markdown, sheets),
+    ]
+    write_text(out_md, "\n".join(parts))
+    write_text(out_txt, terminal_text(root, out_md, findings))
+
+
+def run_sentences(cells: Mapping[str, pd.DataFrame]) -> list[str]:
+    """How many cells of the tables have a score, which have none, and what Table 4 says."""
+    failed = [
+        f"{name} {cell.scene} {cell.size} {cell.label_id} {cell.model}"
+        for name, found in cells.items()
+        for cell in rows_of(found[found.n_finished == 0])
+    ]
+    which = f"; without one: {', '.join(failed)}" if failed else ""
+    total = sum(map(len, cells.values()))
+    counted = f"{total - len(failed)} of {total} table cells have a score{which}."
+    return [counted, *(alive_sentences(cells[ALIVE]) if ALIVE in cells else [])]
+
+
+def terminal_text(root: Path, summary: Path, findings: Sequence[str]) -> str:
+    """What a person sees when the run ends: findings, and where the tables are."""
+    places = {
+        "Report": root / "report.html",
+        "Tables": root / "tables",
+        "Figures": root / "figures",
+        "Summary": summary,
+    }
+    lines = [f"{name + ':':<8} {path}" for name, path in places.items()]
+    lines[0] += "   (one page with everything; open it in a browser)"
+    return "\n".join([*(f"- {finding}" for finding in findings), *lines]) + "\n"
+
+
+POSITION, ORIENTATION = "position_m_true", "orientation_deg_true"
+
+
+def alive_sentences(cells: pd.DataFrame) -> list[str]:
+    """What the cells of Table 4 say about each scene, by the errors against the true poses."""
+    scenes = cells.groupby("scene", sort=False)
+    return [text for scene, found in scenes for text in _sentences(scene_title(str(scene)), found)]
+
+
+def _sentences(title: str, cells: pd.DataFrame) -> list[str]:
+    """Errors at the largest size below half of the mean pose's, and what more frames change."""
+    n_train = cells.groupby("size", sort=False).n_train.first()
+    sizes = n_train.idxmin(), n_train.idxmax()
+    first, last = (cells[cells["size"] == size].set_index("model") for size in sizes)
+    half_m = last[f"baseline_{POSITION}"].iloc[0] / 2
+    below = int((last[POSITION] < half_m).sum())
+    errors = [
+        f"{TITLES[str(model)]} " + ("failed" if pd.isna(error_m) else f"{error_m:.2f} m")
+        for model, error_m in last[POSITION].items()
+    ]
+    lines = [
+        f"{title}, {sizes[1]}: {below} of {len(last)} localizers have a median position error below"
+        f" half of the mean-pose baseline ({half_m:.2f} m): {', '.join(errors)}."
+    ]
+    if pd.isna(half_m):
+        lines = [f"{title}, {sizes[1]}: the mean-pose baseline could not be computed."]
+    if sizes[0] != sizes[1]:
+        falls = [_falls(last[measure] < first[measure]) for measure in (POSITION, ORIENTATION)]
+        lines.append(
+            f"{title}, {sizes[0]} to {sizes[1]}: the position error falls for {falls[0]}, the"
+            f" orientation error for {falls[1]}."
+        )
+    return lines
+
+
+def _falls(falls: pd.Series) -> str:
+    others = [TITLES[str(model)] for model in falls.index[~falls]]
+    exceptions = f" (not {', '.join(others)})" if others else ""
+    return f"{falls.sum()} of {len(falls)}{exceptions}"

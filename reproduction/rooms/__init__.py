@@ -1,0 +1,46 @@
+"""Procedural stand-ins for meshes that cannot be downloaded freely."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from reproduction.rooms import large_room, random_room, sanctuary
+from reproduction.rooms.bake import light_shares, scanned_mesh
+from synfeal.errors import InputError
+from synfeal.mesh.model import TexturedMesh
+from synfeal.mesh.save import save_glb
+
+# What each is scanned from, by seed.
+BUILDERS = {
+    "large_room": large_room.ingredients,
+    "sanctuary": sanctuary.ingredients,
+    "random_room": random_room.ingredients,
+}
+# Scenes whose lights can be switched.
+SWITCHED = ("large_room", "sanctuary")
+
+
+def save_light_shares(builder: str, seed: int, out_shares: Sequence[Path]) -> None:
+    """Write ``light_<group>.glb`` of a stand-in for :func:`synfeal.effects.scene.open_scene`.
+
+    Raises:
+        InputError: its lights cannot be switched.
+    """
+    if builder not in SWITCHED:
+        raise InputError(f"builder: the lights of {builder} cannot be switched; leave states out")
+    for group, mesh in light_shares(*BUILDERS[builder](seed)).items():
+        save_glb(out_shares[0].with_name(f"light_{group}.glb"), mesh)
+
+
+def build_scene(builder: str, seed: int) -> TexturedMesh:
+    """The procedural scene ``builder``: textured, lit, z up, metres; the same bytes for one seed.
+
+    Raises:
+        InputError: if there is no such builder.
+    """
+    if builder not in BUILDERS:
+        raise InputError(
+            f"builder: no procedural scene '{builder}'; choose one of {sorted(BUILDERS)}"
+        )
+    return scanned_mesh(*BUILDERS[builder](seed))

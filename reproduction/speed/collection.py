@@ -1,0 +1,114 @@
+"""How fast frames are made on the machine at hand: collected, and with effects on them."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from synfeal.config.collection import CollectionConfig, SceneConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig
+from synfeal.config.effects import CLEAN, EffectsConfig
+from synfeal.dataset.frame_files import encode_png
+from synfeal.dataset.pose_table import PoseTable, read_frames, read_pose_table
+from synfeal.dataset.render_sequence import Effects, drawn, write_sequence
+from synfeal.effects.apply import Frame
+from synfeal.effects.scene import open_scene
+from synfeal.mesh.triangles import load_collision_mesh
+from synfeal.planning.plan import plan_mesh
+from synfeal.records.files import write_json
+from synfeal.records.provenance import CPU_INFO, processor_name
+from synfeal.records.tables import COUNT, NUMBER, TEXT, frame_of, write_frame
+from synfeal.records.timing import seconds_of
+
+PAPER_CAMERA = CameraConfig(width=640, height=480)  # what the published code renders
+FRAMES, PARTS = 100, 4
+EFFECTS_FRAMES = 40
+EFFECTS_SCHEMA = {"effects": TEXT, "width": COUNT, "height": COUNT, "cpu_s_per_frame": NUMBER}
+
+
+def write_collection_speed(
+    mesh: Path,  # textured, in the world frame
+    collision: Path,  # mesh that rays are cast against
+    scene: SceneConfig,  # its sampling box
+    collection: CollectionConfig,  # how paths are planned
+    render: RenderConfig,  # how frames are drawn
+    seed: int,  # of the plan
+    # ``width``, ``height``, ``frames_per_s`` of each part, ``processor``, ``cores``
+    out_speed: Path,
+) -> None:
+    """Collect 100 frames of 640 x 480 in four parts and write how fast each was.
+
+    A frame is a PNG file and its pose. The mesh is loaded once before, as in a job of any length.
+    """
+    began = time.perf_counter()
+    asked = (scene, collection, FRAMES, np.random.default_rng(seed), "train")
+    plan = plan_mesh(load_collision_mesh(collision), str(collision), *asked)
+    planning_s = (time.perf_counter() - began) / PARTS
+    with (
+        tempfile.TemporaryDirectory(dir=out_speed.parent) as folder,
+        open_scene(mesh, PAPER_CAMERA, render) as renderer,
+    ):
+        parts = enumerate(np.array_split(np.arange(FRAMES), PARTS))
+        seconds = seconds_of(
+            partial(write_sequence, renderer, plan.at(rows), Path(folder, f"seq-{part}"), False)
+            for part, rows in parts
+        )
+    write_json(
+        out_speed,
+        {
+            "width": PAPER_CAMERA.width,
+            "height": PAPER_CAMERA.height,
+            "frames_per_s": [round(FRAMES / PARTS / (s + planning_s), 2) for s in seconds],
+            "processor": processor_name(CPU_INFO),
+            "cores": len(os.sched_getaffinity(0)),
+        },
+    )
+
+
+def write_effects_speed(
+    mesh: Path,
+    plan: Path,
+    camera: CameraConfig,
+    render: RenderConfig,
+    effects: Mapping[str, EffectsConfig],
+    out_csv: Path,
+) -> None:
+    """Write a row for ideal frames and one for each of the effects; times differ between runs."""
+    poses = read_frames(plan, 0, min(EFFECTS_FRAMES, len(read_pose_table(plan))))
+    seconds = seconds_of_effects(mesh, poses, camera, render, effects)
+    size = {"width": camera.width, "height": camera.height}
+    rows = [{"effects": name, **size, "cpu_s_per_frame": s} for name, s in seconds.items()]
+    write_frame(out_csv, frame_of(rows, EFFECTS_SCHEMA), float_format=None)
+
+
+def seconds_of_effects(
+    mesh: Path,
+    poses: PoseTable,
+    camera: CameraConfig,
+    render: RenderConfig,
+    effects: Mapping[str, EffectsConfig],
+) -> dict[str, float]:
+    """Seconds of the processor that a frame takes, drawn and compressed: ideal, and with effects.
+
+    All are drawn in turn, so that what else the machine does slows them alike; the first frame
+    loads what all use, and does not count.
+    """
+    switched = [e for e in effects.values() if e.light and e.light.states]
+    opened = render.model_copy(update={"effects": switched[0] if switched else None})
+    with open_scene(mesh, camera, opened) as renderer:
+        through: dict[str, Effects | None] = {CLEAN: None}
+        through |= {name: (camera, each) for name, each in effects.items()}
+        frames = [drawn(renderer, poses, False, each) for each in through.values()]
+        works = [partial(_compress_next, each) for each in frames]
+        rows = [seconds_of(works, of_processor=True) for _ in range(len(poses))]
+    return dict(zip(through, np.mean(rows[1:], axis=0).tolist(), strict=True))
+
+
+def _compress_next(frames: Iterator[Frame]) -> None:
+    encode_png(next(frames)[0])

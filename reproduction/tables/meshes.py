@@ -1,0 +1,89 @@
+"""Table 1: the meshes of the scenes beside the paper's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from reproduction.runs.results import read_result
+from reproduction.tables.cells import FOLDER
+from reproduction.tables.columns import Column, SideTable, write_side
+from reproduction.tables.layouts import scene_title
+from synfeal.records.tables import (
+    COUNT,
+    MAYBE,
+    MAYBE_COUNT,
+    NUMBER,
+    TEXT,
+    frame_of,
+    read_frame,
+    records_of,
+    write_frame,
+)
+
+NAME = "table1_meshes"
+# Title, and how numbers are written.
+FACTS = {
+    "vertices": ("# Vertices", "{:,.0f}"),
+    "faces": ("# Faces", "{:,.0f}"),
+    "volume_m3": ("Volume [m³]", "{:,.2f}"),
+}
+SCHEMA = {
+    **{"scene": TEXT, "vertices": COUNT, "faces": COUNT, "volume_m3": NUMBER},
+    **{"published_vertices": MAYBE_COUNT, "published_faces": MAYBE_COUNT},
+    "published_volume_m3": MAYBE,
+}
+CAPTION = "Properties of the 3D textured meshes used."
+REMARK = (
+    "Vertices at distinct positions, as a scan file counts them: copies along texture seams count"
+    " once. Volume of the axis-aligned bounding box. In grey: the meshes of the paper."
+)
+
+
+def write_meshes_table(scenes: Sequence[str], root: Path, out_csv: Path, out_tex: Path) -> None:
+    """Write Table 1 from the properties of the scenes' meshes: a row per scene, ``SCHEMA``."""
+    meshes = read_meshes(scenes, root)
+    write_frame(out_csv, meshes)
+    write_side(out_tex, side_table(meshes))
+
+
+@dataclass(frozen=True)
+class MeshFacts:
+    """Properties of a scene's mesh: counts, and the volume of its bounding box in cubic metres."""
+
+    vertices: int
+    faces: int
+    volume_m3: float
+
+
+def read_meshes(scenes: Sequence[str], root: Path) -> pd.DataFrame:
+    """Columns ``SCHEMA`` of some scenes; what the paper has not is missing."""
+    own = pd.DataFrame([{"scene": s} | vars(read_mesh_facts(root, s)) for s in scenes])
+    published = read_frame(
+        FOLDER / f"{NAME}.csv", {name: SCHEMA[name] for name in ("scene", *FACTS)}
+    )
+    printed = published.rename(columns={fact: f"published_{fact}" for fact in FACTS})
+    return frame_of(records_of(own.merge(printed, how="left", on="scene")), SCHEMA)
+
+
+def read_mesh_facts(root: Path, scene: str) -> MeshFacts:
+    """Counts and volume from ``<root>/scenes/<scene>/properties.json``."""
+    path = root / "scenes" / scene / "properties.json"
+    facts: MeshFacts = read_result(path, FACTS, "make the scene again", MeshFacts)
+    return facts
+
+
+def side_table(meshes: pd.DataFrame) -> SideTable:
+    """Table 1 as the paper prints it: properties down, scenes across."""
+    columns = [Column("Property", "fact")]
+    rows = pd.DataFrame({"fact": [title for title, _ in FACTS.values()]})
+    for mesh in records_of(meshes):
+        scene, printed = mesh["scene"], f"published_{mesh['scene']}"
+        columns.append(Column(scene_title(scene), scene, text=scene, paper=printed))
+        for name, start in {scene: "", printed: "published_"}.items():
+            values = [(mesh[f"{start}{fact}"], form) for fact, (_, form) in FACTS.items()]
+            rows[name] = [None if pd.isna(value) else form.format(value) for value, form in values]
+    return SideTable(NAME, CAPTION, columns, rows, REMARK)

@@ -1,0 +1,129 @@
+"""The camera of a person's photographs: a calibration file, a focal length, or what EXIF says."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from PIL import ExifTags, Image
+
+from synfeal.camera.calibration import Calibration, read_calibration
+from synfeal.errors import InputError
+
+PINHOLE = (0.0, 0.0, 0.0, 0.0, 0.0)
+FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)
+# A picture whose sides are this far from the ratio that the camera wrote was cropped afterwards.
+ASPECT_TOLERANCE = 0.01
+
+Source = Literal["file", "focal", "exif"]
+
+
+@dataclass(frozen=True)
+class PhotographCamera:
+    """Source of the intrinsics of photographs.
+
+    Attributes:
+        calibration: Calibration file; photographs may be scaled versions of what it is for.
+        focal_px: Focal length in pixels of the photographs, in place of a file.
+        exif: Read the focal length from EXIF if neither is given.
+        file: Path of the calibration file, for messages.
+    """
+
+    calibration: Calibration | None = None
+    focal_px: float | None = None
+    exif: bool = True
+    file: Path | None = None
+
+    @classmethod
+    def read(cls, file: Path | None, focal_px: float | None, exif: bool) -> PhotographCamera:
+        """Read the calibration file, if one is given.
+
+        Raises:
+            InputError: It cannot be used, a focal length is given too, or that is no length.
+        """
+        if file is not None and focal_px is not None:
+            raise InputError("--focal: the calibration of --camera has one; give one of the two")
+        if focal_px is not None and not (math.isfinite(focal_px) and focal_px > 0):
+            raise InputError(f"--focal: must be a positive number of pixels, found {focal_px:g}")
+        calibration = None if file is None else read_calibration(file)
+        return cls(calibration, focal_px, exif, file)
+
+    @property
+    def source(self) -> Source | None:
+        """Return the kind of source of the intrinsics, or None if there is none."""
+        if self.calibration is not None:
+            return "file"
+        if self.focal_px is not None:
+            return "focal"
+        return "exif" if self.exif else None
+
+    def of(self, image: Image.Image, name: object) -> Calibration | None:
+        """Intrinsics for one photograph.
+
+        Args:
+            image: The photograph, upright.
+            name: What messages call it.
+
+        Returns:
+            Its camera; None where nothing is known of it.
+
+        Raises:
+            InputError: The photograph has other proportions than the calibration.
+        """
+        width, height = image.size
+        if self.calibration is not None:
+            try:
+                return self.calibration.scaled(width, height)
+            except ValueError as error:
+                raise InputError(f"{name}: its camera {self.file} {error}") from None
+        if self.focal_px is not None:
+            return _centred(width, height, self.focal_px)
+        if not self.exif:
+            return None
+        focal_px = exif_focal_px(image)
+        return None if focal_px is None else _centred(width, height, focal_px)
+
+
+def exif_focal_px(image: Image.Image) -> float | None:
+    """Focal length in pixels from EXIF's ``FocalLengthIn35mmFilm``, None where there is none.
+
+    It is the focal length that gives the same diagonal angle on film of 36 mm x 24 mm (CIPA
+    DCG-001), so pixels per millimetre follow from the diagonal. Where EXIF's own size of the image
+    has another aspect ratio, the picture was cropped later and the number no longer holds.
+    """
+    exif = image.getexif().get_ifd(ExifTags.IFD.Exif)
+    focal_mm = _number(exif.get(ExifTags.Base.FocalLengthIn35mmFilm))
+    if focal_mm is None:
+        return None
+    sides = (exif.get(ExifTags.Base.ExifImageWidth), exif.get(ExifTags.Base.ExifImageHeight))
+    taken = [_number(side) for side in sides]
+    if taken[0] is not None and taken[1] is not None:
+        short, long = sorted((taken[0], taken[1]))
+        ratio = (short / long) / (min(image.size) / max(image.size))
+        if abs(ratio - 1.0) > ASPECT_TOLERANCE:
+            return None
+    return focal_mm * math.hypot(*image.size) / FILM_DIAGONAL_MM
+
+
+def _number(value: object) -> float | None:
+    """A positive number, or None: files hold zeros and text where a camera knew nothing."""
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, ZeroDivisionError):
+        return None
+    return number if math.isfinite(number) and number > 0 else None
+
+
+def _centred(width: int, height: int, focal_px: float) -> Calibration:
+    """A pinhole camera with square pixels and the principal point in the middle."""
+    return Calibration(
+        width=width,
+        height=height,
+        fx=focal_px,
+        fy=focal_px,
+        cx=width / 2,
+        cy=height / 2,
+        distortion=PINHOLE,
+    )

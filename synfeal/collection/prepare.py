@@ -1,0 +1,184 @@
+"""The first stage: a scene from its source, and the objects placed in it."""
+
+from __future__ import annotations
+
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from trimesh.util import append_faces
+
+from synfeal.collection.collision import Rung, collision_mesh, write_curve
+from synfeal.config.collection import ClutterConfig, SceneConfig
+from synfeal.config.load import check_mesh_file
+from synfeal.dataset.finish import CLUTTER
+from synfeal.effects.scene import CARTONS, carton_files
+from synfeal.errors import InputError
+from synfeal.mesh.load import load_mesh
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.properties import mesh_properties
+from synfeal.mesh.save import save_glb
+from synfeal.mesh.standing import refuse_larger, standing
+from synfeal.mesh.triangles import Triangles, merge_vertices, save_collision_mesh
+from synfeal.objects import materials
+from synfeal.objects.canvas import VIVID, pick
+from synfeal.objects.patches import Maker, cell_corners
+from synfeal.planning.plan import sampling_box_of
+from synfeal.records.files import file_sha256, write_json
+from synfeal.records.provenance import generator_of
+
+
+def prepare_scene(
+    name: str, scene: SceneConfig, collision_agreement: float | None, seed: int, out_mesh: Path
+) -> None:
+    """Write what later stages read of a scene: ``out_mesh`` (``mesh.glb``, world frame).
+
+    Beside it ``collision.ply``, how that was chosen (``collision_curve.csv``, whose times differ
+    between runs), ``clutter.json`` (what was placed in it, if anything) and ``properties.json``.
+
+    Raises:
+        InputError: the mesh cannot be used, is not the expected file, or contradicts the
+            sampling box; or no pose in that box has a free view.
+    """
+    out_dir = out_mesh.parent
+    mesh, n_faces = prepare_mesh(name, scene, collision_agreement, seed, out_dir)
+    properties = {
+        **{"scene": name, "source": scene.source, "collision_faces": n_faces},
+        "origin": scene.builder if scene.source == "procedural" else str(scene.path),
+        **mesh_properties(mesh),
+        "findings": list(mesh.findings),
+    }
+    write_json(out_dir / "properties.json", properties)
+
+
+def prepare_mesh(
+    name: str, scene: SceneConfig, collision_agreement: float | None, seed: int, out_dir: Path
+) -> tuple[TexturedMesh, int]:
+    """Write ``collision.ply``, ``collision_curve.csv``, ``clutter.json``, and ``mesh.glb`` last.
+
+    Without ``collision_agreement`` the collision mesh is the mesh itself, and the curve is empty.
+
+    Returns:
+        The mesh, and how many faces its collision mesh has.
+    """
+    mesh = build_or_load(scene, seed, name)
+    box = sampling_box_of(scene, mesh.bounds_m, f"scenes.{name}")
+    curve: list[Rung] = []
+    if collision_agreement is None:
+        collision = merge_vertices(*mesh.merged())
+    else:
+        rng = generator_of(seed, "collision", name)
+        collision, curve = collision_mesh(mesh, scene, box, collision_agreement, rng)
+    places: list[dict[str, Any]] = []
+    if scene.clutter is not None:
+        rng = generator_of("clutter", scene.clutter.seed)
+        objects, places = cluttered(mesh, box, scene.clutter, rng, f"scenes.{name}.clutter")
+        # Paths avoid the objects as they are: none of them is simplified.
+        vertices, faces = zip(collision, objects.merged(), strict=True)
+        collision = Triangles(*append_faces(vertices, faces))
+        mesh = TexturedMesh((*mesh.parts, *objects.parts), mesh.findings)
+    write_json(out_dir / CLUTTER, places)
+    save_collision_mesh(out_dir / "collision.ply", collision)
+    write_curve(out_dir / "collision_curve.csv", curve)
+    save_glb(out_dir / "mesh.glb", mesh)
+    return mesh, len(collision.faces)
+
+
+# Packages that build scenes from a seed register them here: an entry point is named like its
+# builder and points to a function from that name and a seed to a textured mesh.
+BUILDERS = "synfeal.scene_builders"
+
+
+def build_scene(builder: str, seed: int) -> TexturedMesh:
+    """Build a procedural scene: textured, lit, z up, metres; the same bytes for one seed.
+
+    Raises:
+        InputError: no installed package has such a builder.
+    """
+    known = entry_points(group=BUILDERS)
+    if builder not in known.names:
+        raise InputError(
+            f"builder: no procedural scene '{builder}'; choose one of {sorted(known.names)}"
+        )
+    mesh: TexturedMesh = known[builder].load()(builder, seed)
+    return mesh
+
+
+def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:
+    """The scene's mesh: the stand-in of its ``builder``, or the file at its ``path``.
+
+    Textures that lie beside the file are not part of its hash.
+    """
+    if scene.source == "procedural":
+        return build_scene(str(scene.builder), seed if scene.seed is None else scene.seed)
+    path = Path(str(scene.path))
+    if scene.sha256 is not None:
+        check_mesh_file(path, f"scenes.{name}.path")
+        found = file_sha256(path)
+        if found != scene.sha256:
+            raise InputError(
+                f"scenes.{name}.sha256: {path} has {found}, expected {scene.sha256}; download it"
+                " again, or correct the hash if another version is meant"
+            )
+    return load_mesh(path, scene.up_axis, scene.unit_m)
+
+
+Array = NDArray[np.float64]
+TRIES = 2000  # places, before a scene is called too full
+DIM = 0.75  # of the built-in cartons beside their pictures: rooms are dimmer than paper
+
+
+def cluttered(
+    mesh: TexturedMesh, bounds_m: Array, clutter: ClutterConfig, rng: np.random.Generator, key: str
+) -> tuple[TexturedMesh, list[dict[str, Any]]]:
+    """The objects placed in a scene, and where each stands.
+
+    They are let down from the space between the corners ``bounds_m`` (2, 3); ``key`` is that of the
+    scene's settings, for messages.
+
+    Raises:
+        InputError: an object is larger than the scene, cannot be read, or finds no place.
+    """
+    kinds = [(path.stem, load_mesh(path)) for path in clutter.files]
+    if not kinds:
+        refuse_larger(np.full(3, clutter.size_m[1]), mesh, f"{key}: size_m: a carton")
+        kinds = [(f"carton-{n}", _carton(clutter, rng)) for n in range(min(clutter.count, CARTONS))]
+    for name, kind in kinds:
+        refuse_larger(np.ptp(kind.bounds_m, axis=0), mesh, f"{key}: {name}")
+    vertices, faces = mesh.merged()
+    parts: list[MeshPart] = []
+    places: list[dict[str, Any]] = []
+    found = standing(kinds, clutter.count, vertices[faces], bounds_m, rng, TRIES)
+    for number, each in enumerate(found):
+        if each is None:
+            raise InputError(
+                f"{key}: no place left for {kinds[number % len(kinds)][0]}, object {number + 1} of"
+                f" {clutter.count}; give fewer or smaller ones"
+            )
+        parts += each[0]
+        places.append(each[1])
+    return TexturedMesh(tuple(parts)), places
+
+
+def save_cartons(mesh: Path) -> None:
+    """Write the built-in objects beside the mesh of a scene, where rendering finds them."""
+    rng, usual = generator_of("cartons"), ClutterConfig()
+    for path in carton_files(mesh):
+        save_glb(path, _carton(usual, rng))
+
+
+def _carton(clutter: ClutterConfig, rng: np.random.Generator) -> TexturedMesh:
+    """A carton with labels."""
+    wide, deep, high = rng.uniform(*clutter.size_m, 3)
+    painter = materials.label(pick(rng, VIVID))
+    parts = []
+    for patch in Maker(rng).box((wide, deep, high), painter, 120).patches:
+        a, b, c, d = cell_corners(patch.points_m.shape[:2])
+        faces = np.concatenate([np.stack([a, c, d], 1), np.stack([a, d, b], 1)])
+        down, right = np.meshgrid(patch.row_shares, patch.column_shares, indexing="ij")
+        uv = np.stack([right.ravel(), 1 - down.ravel()], axis=1)
+        picture = (patch.picture * DIM).astype(np.uint8)
+        parts.append(MeshPart("side", patch.points_m.reshape(-1, 3), faces, uv, picture))
+    return TexturedMesh(tuple(parts))

@@ -1,0 +1,284 @@
+"""A whole data set from one mesh on one machine: the workflow's stages, one after the other.
+
+Scene, plan, sequences, finish: each is the function that the workflow's rule calls, with the same
+seeds, and is skipped where what it makes lies there under its final name.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+import synfeal
+from synfeal.collection.detail import write_detail
+from synfeal.collection.prepare import prepare_mesh, save_cartons
+from synfeal.config.dataset import CameraConfig, DatasetConfig
+from synfeal.dataset.finish import MANIFEST, finish_dataset, origin_of
+from synfeal.dataset.frame_files import SUFFIX
+from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
+from synfeal.dataset.render_pool import Studio, render_sequences
+from synfeal.dataset.render_sequence import Progress, resolved
+from synfeal.dataset.sevenscenes import Split, sequences_of
+from synfeal.dataset.world import read_scan_record, rigid_motion_of, write_sequence_from_world
+from synfeal.effects.scene import crowd_of
+from synfeal.errors import InputError
+from synfeal.mesh.checks import shows_one_colour
+from synfeal.mesh.load import is_y_up
+from synfeal.mesh.model import TexturedMesh
+from synfeal.mesh.rays import RayCaster
+from synfeal.mesh.triangles import load_collision_mesh
+from synfeal.planning.coverage import empty_pixels, scene_coverage
+from synfeal.planning.plan import plan_mesh
+from synfeal.records.files import write_json
+from synfeal.records.lock import WORK, clean_up, growing, place_of
+from synfeal.records.provenance import generator_of
+
+WARN_ABOVE = 0.1  # of all pixels: more than windows let through
+REFUSE_ABOVE = 0.95  # of all pixels: nobody wants a data set of the background
+
+log = logging.getLogger("synfeal")
+
+
+def refuse_invisible(mesh: TexturedMesh, camera: CameraConfig, name: str) -> None:
+    """Check that the mesh has colours and reaches beyond the near plane of a camera in it."""
+    if shows_one_colour(mesh):
+        raise InputError(
+            f"{name}: is of one colour, and so would be every image; put its texture files (of an"
+            " OBJ also the .mtl) where it names them, or export it with its texture"
+        )
+    diagonal_m = float(np.linalg.norm(mesh.bounds_m[1] - mesh.bounds_m[0]))
+    if diagonal_m <= camera.near_m:
+        raise InputError(
+            f"{name}: the mesh is {diagonal_m:.3g} m across, and cameras see nothing nearer than"
+            f" near_m ({camera.near_m:g} m); give the metres per unit of the file with --unit-m"
+        )
+
+
+def refuse_blank(
+    caster: RayCaster, plans: Mapping[Split, PoseTable], camera: CameraConfig, name: str
+) -> None:
+    """Warn of plans whose images would show little; refuse those that would show nothing."""
+    for split, plan in plans.items():
+        share = empty_pixels(caster, plan, camera).share
+        if share > REFUSE_ABOVE:
+            size_m = " x ".join(f"{side:.3g}" for side in np.diff(caster.bounds_m, axis=0)[0])
+            raise InputError(
+                f"{name}: {share:.0%} of the pixels of the {split} frames would be empty: the"
+                f" mesh spans {size_m} m, and cameras see nothing farther than far_m"
+                f" ({camera.far_m:g} m) or outside; give --unit-m or --box"
+                " (synfeal inspect suggests them)"
+            )
+        if share > WARN_ABOVE:
+            log.warning(
+                "%s: %.0f %% of the pixels of the %s frames will be empty: cameras look through"
+                " holes or past the mesh; another --box may help (synfeal inspect suggests one)",
+                *(name, 100 * share, split),
+            )
+
+
+SPLITS: tuple[Split, ...] = ("train", "test")
+
+
+@dataclass(frozen=True)
+class CollectJob:
+    """What to collect."""
+
+    config: DatasetConfig  # settings with one scene, of one size
+    packed_px: int | None  # side of packed frames that are written too, pixels, if any
+    out: Path  # directory to create
+
+    @property
+    def scene(self) -> str:
+        """The name of the scene."""
+        return next(iter(self.config.scenes))
+
+    @property
+    def counts(self) -> dict[Split, int]:
+        """Frames of each split."""
+        (size,) = self.config.scenes[self.scene].sizes
+        return {split: self.config.n_frames(self.scene, size, split) for split in SPLITS}
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides the bytes of the data set, ready for JSON."""
+        kept = self.config.model_dump(mode="json", exclude={"profile", "results"})
+        world = self.sequence_from_world
+        own = {} if world is None else {"sequence_from_world": world.tolist()}
+        return {"synfeal": synfeal.__version__, **kept, "packed_px": self.packed_px, **own}
+
+    @property
+    def sequence_from_world(self) -> NDArray[np.float64] | None:
+        """From the mesh's world to that of the sequence it was fused from, if it is a scan."""
+        scene = self.config.scenes[self.scene]
+        record = None if scene.path is None else read_scan_record(scene.path)
+        if scene.path is None or record is None:
+            return None
+        if scene.unit_m != 1.0 or not is_y_up(scene.path, scene.up_axis):
+            log.warning(
+                "%s: is not used, --unit-m or --up-axis moves the mesh away from what it says",
+                scene.path.with_suffix(".json"),
+            )
+            return None
+        return rigid_motion_of(record, scene.path.with_suffix(".json"))
+
+
+def collect(job: CollectJob, workers: int = 1) -> None:
+    """Plan and render a data set into ``job.out``, which appears when it is complete.
+
+    ``workers`` processes render, each a sequence at a time. What an earlier attempt made is kept
+    and not made again.
+
+    Raises:
+        InputError: ``out`` is not empty, the mesh cannot be used, no admissible pose is found, an
+            attempt with other settings stands in the way, or a file cannot be written.
+    """
+    if workers < 1:
+        raise InputError(f"--workers: must be at least 1, found {workers}")
+    side_px = min(job.config.network_camera.width, job.config.network_camera.height)
+    if job.packed_px is not None and not 0 < job.packed_px < side_px:
+        raise InputError(
+            f"--packed: {job.packed_px} px must be positive and less than both sides of the image"
+        )
+    out = place_of(job.out)
+    if clean_up(out):
+        return
+    sequence_from_world = job.sequence_from_world
+    with growing(out, job.settings) as part:
+        scene = part / WORK / "scene"
+        _prepare(job, scene)
+        plans = _plan(job, scene, part)
+        detail = _choose_detail(job, scene, part)
+        _render(job, plans, scene / "mesh.glb", detail, part, workers)
+        if sequence_from_world is not None:
+            write_sequence_from_world(part, sequence_from_world)
+        finish_dataset(
+            scene / "mesh.glb",
+            [part / f"{split}.csv" for split in plans],
+            job.config.network_camera,
+            job.counts,
+            job.config.shard_frames,
+            origin_of(job.config, job.scene),
+            part / MANIFEST,
+            packed_px=job.packed_px,
+            detail=detail and detail.with_suffix(".json"),
+        )
+
+
+def _prepare(job: CollectJob, scene: Path) -> None:
+    """The scene, unless it is there."""
+    if not (scene / "mesh.glb").is_file():
+        config, settings = job.config, job.config.scenes[job.scene]
+        agreement = config.collection.collision_agreement
+        mesh, _ = prepare_mesh(job.scene, settings, agreement, config.seed, scene)
+        refuse_invisible(mesh, config.network_camera, str(settings.path))
+    effects = job.config.render.effects
+    if effects and effects.clutter:
+        if not effects.clutter.files:
+            save_cartons(scene / "mesh.glb")
+        crowd_of(scene / "mesh.glb", job.config.render)  # what cannot be used is refused first
+
+
+def _plan(job: CollectJob, scene: Path, part: Path) -> dict[Split, PoseTable]:
+    """The plans of the splits that have frames, and what they cover."""
+    config, name = job.config, job.scene
+    splits = [split for split in SPLITS if job.counts[split]]
+    coverage = part / "coverage.json"
+    if not coverage.is_file():  # which is written last
+        collision, camera = scene / "collision.ply", config.network_camera
+        mesh, settings, plans = load_collision_mesh(collision), config.scenes[name], {}
+        for split in splits:
+            rng = generator_of(config.seed, "plan", name, split)
+            asked = (settings, config.collection, job.counts[split], rng, split)
+            plans[split] = plan_mesh(mesh, str(collision), *asked)
+        refuse_blank(RayCaster(*mesh), plans, camera, str(settings.path))
+        for split, plan in plans.items():
+            write_pose_table(part / f"{split}.csv", plan)
+        covered = {s: scene_coverage(collision, settings, plans[s], camera) for s in splits}
+        write_json(coverage, covered)
+    return {split: read_pose_table(part / f"{split}.csv") for split in splits}
+
+
+def _choose_detail(job: CollectJob, scene: Path, part: Path) -> Path | None:
+    """The mesh that colours are drawn of, if not of the full one; made unless it is there."""
+    config, detail = job.config, scene / "detail.glb"
+    if config.render.draws_full_mesh:
+        return None
+    record = detail.with_suffix(".json")
+    if not record.is_file():  # which is written last
+        plans = [part / f"{split}.csv" for split in SPLITS if job.counts[split]]
+        write_detail(
+            scene / "mesh.glb", plans, config.network_camera, config.render, detail, record
+        )
+    return detail
+
+
+def _render(
+    job: CollectJob,
+    plans: dict[Split, PoseTable],
+    mesh: Path,
+    detail: Path | None,
+    part: Path,
+    workers: int,
+) -> None:
+    """Render the sequences that are not there."""
+    config = job.config
+    suffix = SUFFIX if config.archive_sequences else ""
+    tasks = [
+        (part / f"{s.name}{suffix}", plans[s.split].between(s.start, s.stop))
+        for s in sequences_of(job.counts["train"], job.counts["test"], config.shard_frames)
+    ]
+    missing = [(out, poses) for out, poses in tasks if not out.exists()]
+    n_frames, n_missing = (sum(len(poses) for _, poses in some) for some in (tasks, missing))
+    studio = Studio(mesh, config.network_camera, config.render, config.network_depth, detail)
+    with Progress(n_frames, "collect", n_frames - n_missing) as progress:
+        render_sequences(studio, missing, workers, progress)
+
+
+LEAST_INPUT_PX = 32
+SAMPLES_SEEN = (
+    14_000  # images shown to each localizer, as in the smallest set of the default profile
+)
+HEADER = """\
+# The data set of `synfeal collect` with the same options, made by the workflow:
+#   synfeal run --profile THIS_FILE -- datasets
+# It appears in {root}/datasets/{scene}/network
+"""
+TRAINED = """\
+# The five localizers trained and tested on it, up to {root}/report.html:
+#   synfeal run --profile THIS_FILE
+"""
+UNTRAINED = """\
+# There are no test frames: for localizers to be trained and tested too, give --test-frames.
+"""
+
+
+def with_backend(config: DatasetConfig) -> DatasetConfig:
+    """The settings with the backend that ``auto`` stands for here: images depend on it."""
+    return config.model_copy(update={"render": resolved(config.render)})
+
+
+def configuration_text(job: CollectJob) -> str:
+    """The profile as YAML; every key is given, as keys that are not come from the default one.
+
+    Where there are test frames, its design is one row: the localizers on this data set.
+    """
+    camera = job.config.network_camera
+    values = job.config.model_dump(mode="json")
+    # The side of packed frames, which the workflow makes for networks, has to fit into the image.
+    input_px = job.packed_px or max(LEAST_INPUT_PX, min(64, camera.width - 1, camera.height - 1))
+    values |= {"datasets": [job.scene], "network": {"input_px": input_px}}
+    is_tested = job.counts["test"] > 0
+    if is_tested:
+        (size,) = job.config.scenes[job.scene].sizes
+        values["experiments"] = [{"table": "table4_size", "scene": job.scene, "size": size}]
+        values["training"] = {"samples_seen": {size: SAMPLES_SEEN}}
+    header = HEADER + (TRAINED if is_tested else UNTRAINED)
+    named = {"root": job.config.root, "scene": job.scene}
+    return header.format(**named) + yaml.safe_dump(values, sort_keys=False)

@@ -1,0 +1,329 @@
+"""Sequences of photographs with known poses: which file belongs to which, and where it was taken.
+
+Three layouts are read:
+
+- A flat folder, as one sequence of 7-Scenes is: ``frame-000000.color.png`` (or ``.jpg``),
+  ``frame-000000.depth.png``, ``frame-000000.pose.txt``.
+- A folder of such sequences, ``seq-01``, ``seq-02``, ..., each a folder or a ``.zip``.
+- TUM RGB-D ("File Formats of the RGB-D benchmark"): ``rgb.txt``, ``depth.txt`` and
+  ``groundtruth.txt``, which give files and poses by time stamp.
+
+Files belong together by name and nothing else; a gap is an error, not a shift of all that follows.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.dataset.frame_files import (
+    SUFFIX,
+    FrameFile,
+    frame_file,
+    is_archive,
+    sequence_at,
+    sequence_names,
+)
+from synfeal.dataset.sevenscenes import read_pose
+from synfeal.errors import InputError, read_as
+from synfeal.geometry.poses import interpolate, pose_from_quat
+
+COLOR_SUFFIXES = ("png", "jpg", "jpeg")
+FRAME = re.compile(r"frame-(\d+)\.(color\.(?:png|jpg|jpeg)|depth\.png|pose\.txt)")
+RGB_LIST, DEPTH_LIST, TRAJECTORY = "rgb.txt", "depth.txt", "groundtruth.txt"
+# Poses hold few digits in other people's files.
+RIGID_BOUND = 1e-3
+# Largest distance in time between a photograph and its depth image, and between a photograph and
+# each of the two poses it lies between: what the benchmark's own ``associate.py`` takes, and ten
+# poses of its motion capture.
+DEPTH_SLACK_S, POSE_SLACK_S = 0.02, 0.1
+
+log = logging.getLogger("synfeal")
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PosedFrames:
+    """Photographs of one or more sequences, in order.
+
+    Attributes:
+        names: One for each frame: ``frame-000000``, ``seq-01/frame-000000``, or the time stamp of
+            the photograph in a TUM sequence.
+        color: Colour images.
+        depth: Depth images, None for all frames of a sequence that has none.
+        world_from_cam: Poses (N, 4, 4), finite and rigid.
+    """
+
+    names: tuple[str, ...]
+    color: tuple[FrameFile, ...]
+    depth: tuple[FrameFile | None, ...]
+    world_from_cam: Array
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def has_depth(self) -> bool:
+        """Whether every frame has a depth image."""
+        return all(file is not None for file in self.depth)
+
+    def __getitem__(self, frames: slice) -> PosedFrames:
+        """Take some of the frames."""
+        return PosedFrames(
+            names=self.names[frames],
+            color=self.color[frames],
+            depth=self.depth[frames],
+            world_from_cam=self.world_from_cam[frames],
+        )
+
+
+def is_tum(path: Path) -> bool:
+    """Tell whether a folder is a sequence of the TUM RGB-D benchmark."""
+    return (path / RGB_LIST).is_file() and (path / TRAJECTORY).is_file()
+
+
+def read_posed_sequence(path: Path, frames: slice | None = None) -> PosedFrames:
+    """Read which files and poses a sequence has; images are not opened.
+
+    Args:
+        path: Folder (or ``.zip``) of frames, folder of ``seq-XX``, or TUM RGB-D sequence.
+        frames: Which frames, counted in order over all sequences, from 0; None for all. Only these
+            need to be whole.
+
+    Returns:
+        The frames. Those whose pose is not finite, which 7-Scenes' own tools write where tracking
+        was lost, are left out with a warning.
+
+    Raises:
+        InputError: It is no such sequence, a frame lacks a file, a pose is not rigid, or there is
+            no frame in the range.
+    """
+    if not path.is_dir() and not (is_archive(path) and path.is_file()):
+        raise InputError(f"{path}: is not a folder; give the folder of a posed sequence")
+    if path.is_dir() and is_tum(path):
+        return _chosen(_read_tum(path), frames, path)
+    listed = _listed(path)
+    chosen = listed if frames is None else listed[frames]
+    if not chosen:
+        raise InputError(
+            f"{path}: has {len(listed)} frames, none of them in the range asked for; frames are"
+            " counted from 0"
+        )
+    return _read_frames(chosen)
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """The files that one frame number has."""
+
+    sequence: Path
+    prefix: str  # of its name: ``seq-01/`` or nothing
+    number: str  # as it is written, ``000000``
+    files: dict[str, str]  # by kind: color, depth, pose
+
+    @property
+    def name(self) -> str:
+        return f"{self.prefix}frame-{self.number}"
+
+    def file(self, kind: str) -> FrameFile:
+        """A file it must have.
+
+        Raises:
+            InputError: It is missing.
+        """
+        if kind not in self.files:
+            endings = {"color": "color.png (or .jpg)", "depth": "depth.png", "pose": "pose.txt"}
+            missing = frame_file(self.sequence, f"frame-{self.number}.{endings[kind]}")
+            raise InputError(
+                f"{missing}: missing, other files of this frame are there; copy the sequence again"
+                " or delete the rest of the frame"
+            )
+        return frame_file(self.sequence, self.files[kind])
+
+
+def _listed(path: Path) -> list[_Entry]:
+    """All frames of which any file is there, in order, sequence after sequence."""
+    if is_archive(path):
+        entries = _entries(path, "")
+    else:
+        entries = _entries(path, "")
+        names = sorted({item.name.removesuffix(SUFFIX) for item in path.glob("seq-*")})
+        numbered = [name for name in names if name[4:].isdecimal()]
+        sequences = [sequence_at(path / name) for name in numbered]
+        sequences = [item for item in sequences if item.is_dir() or is_archive(item)]
+        if entries and sequences:
+            raise InputError(
+                f"{path}: holds frames and {sequences[0].name}; give one of its sequences"
+            )
+        sequences.sort(key=lambda item: int(item.stem[4:]))
+        for sequence in sequences:
+            entries += _entries(sequence, f"{sequence.stem}/")
+    if not entries:
+        raise InputError(
+            f"{path}: holds no frame-000000.color.png, no seq-01 and no {RGB_LIST} with"
+            f" {TRAJECTORY}; give the folder of a posed sequence"
+        )
+    return entries
+
+
+def _entries(sequence: Path, prefix: str) -> list[_Entry]:
+    """The frames of one sequence, in order of their numbers."""
+    found: dict[str, dict[str, str]] = {}
+    with read_as(sequence, "a sequence", OSError):
+        names = sequence_names(sequence)
+    for name in names:
+        match = FRAME.fullmatch(name)
+        if match is None:
+            continue
+        kind = match[2].partition(".")[0]
+        files = found.setdefault(match[1], {})
+        if kind in files:
+            raise InputError(
+                f"{frame_file(sequence, name)}: this frame has a second colour image,"
+                f" {files[kind]}; delete one of the two"
+            )
+        files[kind] = name
+    numbers = sorted(found, key=lambda number: (int(number), number))
+    return [_Entry(sequence, prefix, number, found[number]) for number in numbers]
+
+
+def _read_frames(entries: Sequence[_Entry]) -> PosedFrames:
+    """Files and poses of frames, all of which must be whole."""
+    with_depth = any("depth" in entry.files for entry in entries)
+    color = [entry.file("color") for entry in entries]
+    depth = [entry.file("depth") if with_depth else None for entry in entries]
+    poses = [_pose(entry.file("pose")) for entry in entries]
+    kept = [index for index, pose in enumerate(poses) if pose is not None]
+    if len(kept) < len(entries):
+        lost = next(entry for entry, pose in zip(entries, poses, strict=True) if pose is None)
+        if not kept:
+            raise InputError(f"{lost.file('pose')}: is not finite, and neither is any other pose")
+        log.warning(
+            "%s: is not finite; left out, and so are %d others of %d frames",
+            *(lost.file("pose"), len(entries) - len(kept) - 1, len(entries)),
+        )
+    return PosedFrames(
+        names=tuple(entries[index].name for index in kept),
+        color=tuple(color[index] for index in kept),
+        depth=tuple(depth[index] for index in kept),
+        world_from_cam=np.array([pose for pose in poses if pose is not None]),
+    )
+
+
+def _pose(path: FrameFile) -> Array | None:
+    """A rigid pose (4, 4), or None where it is not finite."""
+    with read_as(path, "a pose"):
+        cells = path.read_text(encoding="utf-8").split()
+        values = np.array(cells, np.float64)
+    if len(values) == 16 and not np.isfinite(values).all():
+        return None
+    pose = read_pose(path)  # says what is wrong with anything else
+    refuse_non_rigid(pose, path)
+    return pose
+
+
+def refuse_non_rigid(pose: Array, path: object) -> None:
+    """Check that a pose (4, 4) of ``path`` is a rotation and a translation."""
+    rotation = pose[:3, :3].clip(-2.0, 2.0)  # anything beyond 1 is none, and must not overflow
+    orthonormal = np.abs(rotation @ rotation.T - np.eye(3)).max() <= RIGID_BOUND
+    last_row = np.abs(pose[3] - [0.0, 0.0, 0.0, 1.0]).max() <= RIGID_BOUND
+    if not (orthonormal and last_row and np.linalg.det(rotation) > 0.0):
+        raise InputError(f"{path}: is not a rigid pose; its upper left 3x3 must be a rotation")
+
+
+def _chosen(sequence: PosedFrames, frames: slice | None, path: Path) -> PosedFrames:
+    chosen = sequence if frames is None else sequence[frames]
+    if not len(chosen):
+        raise InputError(
+            f"{path}: has {len(sequence)} frames, none of them in the range asked for; frames are"
+            " counted from 0"
+        )
+    return chosen
+
+
+def _read_tum(path: Path) -> PosedFrames:
+    """The photographs of a TUM sequence that have a pose, and depth where there is a list of it."""
+    color_s, color = _read_list(path, RGB_LIST)
+    keep = np.ones(len(color_s), bool)
+    depth: list[FrameFile | None] = [None] * len(color)
+    if (path / DEPTH_LIST).is_file():
+        depth_s, files = _read_list(path, DEPTH_LIST)
+        nearest = np.abs(depth_s[None, :] - color_s[:, None]).argmin(axis=1)
+        keep &= np.abs(depth_s[nearest] - color_s) <= DEPTH_SLACK_S
+        depth = [files[index] for index in nearest]
+    pose_s, poses = _read_trajectory(path / TRAJECTORY)
+    after = np.searchsorted(pose_s, color_s).clip(1, len(pose_s) - 1)
+    gap_s = np.maximum(color_s - pose_s[after - 1], pose_s[after] - color_s)
+    keep &= (gap_s <= POSE_SLACK_S) & (color_s >= pose_s[0]) & (color_s <= pose_s[-1])
+    kept = np.flatnonzero(keep)
+    if not len(kept):
+        raise InputError(
+            f"{path / TRAJECTORY}: no photograph of {RGB_LIST} was taken within its times; are the"
+            " three lists of one sequence?"
+        )
+    if len(kept) < len(color):
+        log.warning(
+            "%s: %d of %d photographs have no pose or depth near in time and are left out",
+            *(path, len(color) - len(kept), len(color)),
+        )
+    fraction = (color_s - pose_s[after - 1]) / (pose_s[after] - pose_s[after - 1])
+    between = [interpolate(poses[after[i] - 1], poses[after[i]], fraction[i])[0] for i in kept]
+    for file in (file for i in kept for file in (color[i], depth[i])):
+        if file is not None and not file.is_file():
+            raise InputError(f"{file}: missing, a list names it; copy the sequence again")
+    return PosedFrames(
+        names=tuple(color[i].stem for i in kept),
+        color=tuple(color[i] for i in kept),
+        depth=tuple(depth[i] for i in kept),
+        world_from_cam=np.array(between),
+    )
+
+
+def _lines(path: Path) -> Iterable[tuple[int, list[str]]]:
+    with read_as(path, "a list of time stamps"):
+        lines = path.read_text(encoding="utf-8").splitlines()
+    cells = ((number, line.partition("#")[0].split()) for number, line in enumerate(lines, 1))
+    return [(number, row) for number, row in cells if row]
+
+
+def _read_list(path: Path, name: str) -> tuple[Array, list[Path]]:
+    """Time stamps (N,) in seconds and files of ``rgb.txt`` or ``depth.txt``."""
+    rows = _lines(path / name)
+    stamps, files = [], []
+    for number, row in rows:
+        with read_as(f"{path / name}: line {number}", "a time stamp and a file"):
+            stamp, file = row  # ValueError where there are not two
+            stamps.append(float(stamp))
+        files.append(path / file)
+    if not files:
+        raise InputError(f"{path / name}: lists no images")
+    return np.array(stamps), files
+
+
+def _read_trajectory(path: Path) -> tuple[Array, Array]:
+    """Time stamps (N,) in seconds, rising, and poses (N, 4, 4) of a TUM trajectory."""
+    values = []
+    for number, row in _lines(path):
+        with read_as(f"{path}: line {number}", "timestamp tx ty tz qx qy qz qw"):
+            numbers = [float(cell) for cell in row]
+        if len(numbers) != 8 or not np.isfinite(numbers).all():
+            raise InputError(
+                f"{path}: line {number} must hold eight finite numbers: timestamp tx ty tz qx qy"
+                " qz qw"
+            )
+        if abs(float(np.linalg.norm(numbers[4:])) - 1.0) > RIGID_BOUND * 10:
+            raise InputError(f"{path}: line {number} holds a quaternion that is not of length 1")
+        values.append(numbers)
+    if len(values) < 2:
+        raise InputError(f"{path}: holds {len(values)} poses; a trajectory has two or more")
+    table = np.array(values)
+    table = table[np.argsort(table[:, 0], kind="stable")]
+    rising = np.concatenate([[True], np.diff(table[:, 0]) > 0.0])
+    table = table[rising]
+    return table[:, 0], pose_from_quat(table[:, 1:4], table[:, [7, 4, 5, 6]])

@@ -1,0 +1,135 @@
+"""Frames of a split, checked by name against the table of their poses."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.dataset.frame_files import FrameFile
+from synfeal.dataset.pose_table import HEADER, IMAGE, PoseTable, read_pose_table
+from synfeal.dataset.sequence_listing import Frame, SequenceListing, list_sequence, refuse_problems
+from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
+from synfeal.errors import InputError, read_as
+
+_IMAGE_NAME = re.compile(r"([^/]+)/(frame-[0-9]{6,16})\.color\.[A-Za-z]+")
+
+
+@dataclass(frozen=True)
+class SplitFrames:
+    """The frames of a split in the order of its sequences, and what its table says of them."""
+
+    sequences: tuple[SequenceListing, ...]
+    poses: PoseTable | None  # one row for each frame, in their order; None where there is no table
+
+    @property
+    def frames(self) -> tuple[Frame, ...]:
+        """Its frames, in order."""
+        return tuple(frame for sequence in self.sequences for frame in sequence.frames)
+
+    def files(self, kind: str) -> list[FrameFile]:
+        """The file of one kind of each frame, none missing.
+
+        Raises:
+            InputError: the file of a frame is missing.
+        """
+        return [file for sequence in self.sequences for file in sequence.files(kind)]
+
+
+def read_split_frames(dataset: Path, split: str) -> SplitFrames:
+    """List the frames of a split and pair them with the rows of ``<split>.csv`` by name.
+
+    Args:
+        dataset: directory of a data set with ``TrainSplit.txt`` and ``TestSplit.txt``.
+        split: ``train`` or ``test``.
+
+    Raises:
+        InputError: a sequence cannot be read, a file does not say which frame it is of, or the
+            table names other frames than there are.
+    """
+    sequences = tuple(list_sequence(path) for path in read_split(dataset, split))
+    refuse_problems(sequences)
+    for sequence in sequences:
+        if not sequence.frames:
+            raise InputError(
+                f"{sequence.path}: holds no frame, but {SPLIT_FILES[split]} lists it; restore it"
+            )
+    listed = SplitFrames(sequences, None)
+    path = dataset / f"{split}.csv"
+    if not path.is_file():
+        return listed
+    table = read_pose_table(path)
+    if problems := table_problems(path, listed.frames):
+        raise InputError(problems[0])
+    return SplitFrames(sequences, table.at(rows_of_frames(path, listed.frames)))
+
+
+def read_image_names(table: Path) -> tuple[str, ...] | None:
+    """Names of the images in the last column of a pose table; None where it has no such column.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    with read_as(table, "a pose table"):
+        header, *lines = table.read_text(encoding="utf-8").splitlines() or [""]
+    if header != f"{HEADER},{IMAGE}":
+        return None
+    return tuple(line.rpartition(",")[2] for line in lines)
+
+
+def table_problems(table: Path, frames: Sequence[Frame]) -> list[str]:
+    """Ways in which the rows of a pose table are not those of the frames, a sentence each.
+
+    A table without a column of names can be compared by length only.
+    """
+    images = read_image_names(table)
+    if images is None:
+        n_rows = len(read_pose_table(table))
+        return [] if n_rows == len(frames) else [f"{table}: {n_rows} rows for {len(frames)} frames"]
+    known = {frame.name for frame in frames}
+    line_of: dict[str, int] = {}
+    problems = []
+    for line, image in enumerate(images, start=2):
+        name = _frame_name(image)
+        if name is None:
+            problems.append(
+                f"{table}: line {line}: image '{image[:80]}' names no frame; names look like"
+                " seq-01/frame-000000.color.png"
+            )
+        elif name in line_of:
+            problems.append(
+                f"{table}: line {line}: {image} is named in line {line_of[name]}, too; leave one"
+            )
+        elif name not in known:
+            problems.append(
+                f"{table}: line {line} names {image}, which is not there; restore the frame, or"
+                " collect the data set again"
+            )
+        if name is not None:
+            line_of.setdefault(name, line)
+    problems += [
+        f"{table}: has no row for {frame.name}, which is there; restore the row, or collect the"
+        " data set again"
+        for frame in frames
+        if frame.name not in line_of
+    ]
+    return problems
+
+
+def rows_of_frames(table: Path, frames: Sequence[Frame]) -> NDArray[np.int64]:
+    """Row (N,) of each frame in a table in which :func:`table_problems` finds nothing."""
+    images = read_image_names(table)
+    if images is None:
+        return np.arange(len(frames))
+    row_of = {_frame_name(image): row for row, image in enumerate(images)}
+    return np.array([row_of[frame.name] for frame in frames], dtype=np.int64)
+
+
+def _frame_name(image: str) -> str | None:
+    """``seq-01/frame-000000`` of the name of an image."""
+    match = _IMAGE_NAME.fullmatch(image)
+    return f"{match[1]}/{match[2]}" if match else None

@@ -1,0 +1,1 @@
+"""Objects placed in scenes, and the painted patches they are made of."""

@@ -1,0 +1,197 @@
+"""Patches, the one element of a procedural scene: grids of points with a picture on each.
+
+Then grids for the shapes a room is made of, and boxes, turned shapes and pipes as items.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from synfeal.objects.canvas import Canvas, Painter
+
+Points = NDArray[np.float64]
+Real = TypeVar("Real", np.float32, np.float64)
+
+DETAIL = 2.6  # texels per metre over what a painter is asked for; 0.5 m at 640 px shows 1,100 px/m
+GRAIN = 0.012  # relative brightness of what is too small to be painted
+GRAIN_M = 0.006
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A grid of points seen from its front: rows run down, columns run to the right."""
+
+    points_m: Points  # (R, C, 3) metres
+    # (H, W, 3) uint8 albedo that is stretched over the grid, proportional to length
+    picture: NDArray[np.uint8]
+    glow: float = 0.0  # 0 for a surface that only reflects light, 1 for one that shines by itself
+
+    @property
+    def row_shares(self) -> NDArray[np.float64]:
+        """Return the position of each row on the picture, from 0 (top) to 1."""
+        return _shares(self.points_m)
+
+    @property
+    def column_shares(self) -> NDArray[np.float64]:
+        """Return the position of each column on the picture, from 0 (left) to 1."""
+        return _shares(self.points_m.swapaxes(0, 1))
+
+
+def _shares(points: Points) -> NDArray[np.float64]:
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=-1).mean(axis=1)
+    return np.asarray(np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum(), np.float64)
+
+
+def bilinear(
+    grid: NDArray[Real], row_at: NDArray[np.float64], column_at: NDArray[np.float64]
+) -> NDArray[Real]:
+    """Values of a (R, C, K) grid at fractional row and column indices, as (A, B, K)."""
+    top = np.clip(np.floor(row_at).astype(np.int64), 0, grid.shape[0] - 2)
+    left = np.clip(np.floor(column_at).astype(np.int64), 0, grid.shape[1] - 2)
+    below = (row_at - top)[:, None, None].astype(grid.dtype)
+    beside = (column_at - left)[None, :, None].astype(grid.dtype)
+    rows = grid[top] * (1 - below) + grid[top + 1] * below
+    mixed = rows[:, left] * (1 - beside) + rows[:, left + 1] * beside
+    return mixed.astype(grid.dtype, copy=False)
+
+
+@dataclass(frozen=True)
+class Item:
+    """A thing in a room: its patches."""
+
+    patches: tuple[Patch, ...]
+
+    def placed(self, x_m: float, y_m: float, z_m: float = 0.0, yaw_deg: float = 0.0) -> Item:
+        """The item turned about z, then moved."""
+        yaw = np.radians(yaw_deg)
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        world_from_item = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        offset = np.array([x_m, y_m, z_m])
+        return self._with(lambda points_m: points_m @ world_from_item.T + offset)
+
+    def clipped(self, lower_m: tuple[float, ...], upper_m: tuple[float, ...]) -> Item:
+        """The item pressed flat where it would stick out of a box, as leaves are by a wall."""
+        return self._with(lambda points_m: np.clip(points_m, lower_m, upper_m))
+
+    def _with(self, moved: Callable[[Points], Points]) -> Item:
+        return Item(tuple(replace(p, points_m=moved(p.points_m)) for p in self.patches))
+
+
+def joined(*things: Item | Iterable[Item]) -> Item:
+    """Several items as one, in their order."""
+    items = (each for thing in things for each in ([thing] if isinstance(thing, Item) else thing))
+    return Item(tuple(patch for item in items for patch in item.patches))
+
+
+def upright(
+    start_xy: tuple[float, float], end_xy: tuple[float, float], low_m: float, high_m: float
+) -> Points:
+    """A vertical sheet; from its front, ``start_xy`` is on the left and ``end_xy`` on the right."""
+    rows = [[(*start_xy, z), (*end_xy, z)] for z in (high_m, low_m)]
+    return np.array(rows, np.float64)
+
+
+def level(
+    x_m: tuple[float, float], y_m: tuple[float, float], z_m: float, face_down: bool = False
+) -> Points:
+    """A horizontal sheet that faces up (a floor) or down (a ceiling)."""
+    x0, x1 = x_m[::-1] if face_down else x_m
+    return np.array([[(x0, y, z_m), (x1, y, z_m)] for y in y_m[::-1]], np.float64)
+
+
+@dataclass(frozen=True)
+class Maker:
+    """The shapes that rooms are made of, each painted with the next numbers of a generator."""
+
+    rng: np.random.Generator
+
+    def sheet(self, points_m: Points, painter: Painter, px_per_m: float, glow: float = 0.0) -> Item:
+        """A grid of points (R, C, 3) with a picture of ``DETAIL * px_per_m`` texels per metre.
+
+        At least 4 a side. Whatever the painter draws gets a fine grain, so that no surface is flat
+        from nearby.
+        """
+        scale = DETAIL * px_per_m
+        down_m = np.linalg.norm(np.diff(points_m, axis=0), axis=-1).sum(axis=0).mean()
+        across_m = np.linalg.norm(np.diff(points_m, axis=1), axis=-1).sum(axis=1).mean()
+        height_px, width_px = (max(4, round(float(m) * scale)) for m in (down_m, across_m))
+        canvas = Canvas(self.rng, height_px, width_px, scale)
+        picture = painter(canvas)
+        if not glow:
+            picture = picture * (1 + np.float32(GRAIN) * canvas.noise(GRAIN_M, 2))[..., None]
+        quantised = np.round(np.clip(picture, 0, 1) * 255).astype(np.uint8)
+        return Item((Patch(np.asarray(points_m, np.float64), quantised, glow),))
+
+    def box(
+        self, size_m: tuple[float, float, float], painter: Painter, px_per_m: float,
+        faces: str = "fblrtu", front: Painter | None = None,
+    ) -> Item:  # fmt: skip
+        """A box on z = 0, centred in x and y.
+
+        ``faces`` names those built: front (−y), back, left (−x), right, top, under. ``front``
+        paints the front differently.
+        """
+        x, y, high = size_m[0] / 2, size_m[1] / 2, size_m[2]
+        sides = {
+            "f": upright((-x, -y), (x, -y), 0, high),
+            "b": upright((x, y), (-x, y), 0, high),
+            "l": upright((-x, y), (-x, -y), 0, high),
+            "r": upright((x, -y), (x, y), 0, high),
+            "t": level((-x, x), (-y, y), high),
+            "u": level((-x, x), (-y, y), 0, face_down=True),
+        }
+        painters = {"f": front or painter}
+        return joined(self.sheet(sides[f], painters.get(f, painter), px_per_m) for f in faces)
+
+    def turned(
+        self, profile_m: ArrayLike, painter: Painter, px_per_m: float, segments: int = 16
+    ) -> Item:
+        """A surface of revolution about z: ``profile_m`` (K, 2) is (radius, z), top to bottom."""
+        profile = np.asarray(profile_m, np.float64)
+        angle = np.linspace(-np.pi, np.pi, segments + 1)
+        ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        height = np.broadcast_to(profile[:, None, 1:], (len(profile), segments + 1, 1))
+        points = np.concatenate([profile[:, None, :1] * ring, height], axis=-1)
+        points[:, -1] = points[:, 0]
+        return self.sheet(points, painter, px_per_m)
+
+    def tube(
+        self, path_m: ArrayLike, radius_m: float, painter: Painter, px_per_m: float,
+        segments: int = 8,
+    ) -> Item:  # fmt: skip
+        """A pipe of constant radius along a polyline (K, 3)."""
+        path = np.asarray(path_m, np.float64)
+        tangent = np.gradient(path, axis=0)
+        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+        helper = np.eye(3)[np.argmin(np.abs(tangent).max(axis=0))]
+        side = np.cross(tangent, helper)
+        side /= np.linalg.norm(side, axis=1, keepdims=True)
+        other = np.cross(tangent, side)
+        angle = np.linspace(0, 2 * np.pi, segments + 1)[None, :, None]
+        ring = np.cos(angle) * side[:, None] - np.sin(angle) * other[:, None]
+        points = path[:, None] + radius_m * ring
+        points[:, -1] = points[:, 0]
+        return self.sheet(points, painter, px_per_m)
+
+    def on_wall(
+        self, centre_m: tuple[float, float, float], yaw_deg: float, size_m: tuple[float, float],
+        painter: Painter, px_per_m: float, depth_m: float = 0.02, glow: float = 0.0,
+    ) -> Item:  # fmt: skip
+        """A flat picture with a thin rim, its back at ``centre_m``; at yaw 0 it faces −y."""
+        width, height = size_m
+        face = upright((-width / 2, -depth_m), (width / 2, -depth_m), -height / 2, height / 2)
+        front = self.sheet(face, painter, px_per_m, glow)
+        rim = self.box((width, depth_m, height), lambda c: c.plain((0.3, 0.3, 0.3)), 40, "lrtu")
+        return joined(front, rim.placed(0, -depth_m / 2, -height / 2)).placed(*centre_m, yaw_deg)
+
+
+def cell_corners(shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """Vertices (4, N) of the cells of a grid: top left, top right, bottom left, bottom right."""
+    index = np.arange(shape[0] * shape[1]).reshape(shape)
+    corners = (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:])
+    return np.stack([corner.ravel() for corner in corners])

@@ -1,0 +1,1 @@
+"""Files, tables, provenance, locks and timings: whatever is put on record."""

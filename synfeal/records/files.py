@@ -1,0 +1,183 @@
+"""Files and directories that appear complete under their final names, or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import re
+import shutil
+import socket
+import tempfile
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from synfeal.errors import InputError
+
+# Names of what is being written begin so, then say by which process: nobody else's files do.
+UNFINISHED = ".synfeal-unfinished"
+
+
+def unfinished_prefix(name: str) -> str:
+    """Begin the name of a temporary file or directory that will become ``name``."""
+    host = re.sub(r"[^A-Za-z0-9.]", "_", socket.gethostname())
+    return f"{UNFINISHED}-{host}-{os.getpid()}-{name}-"
+
+
+@contextmanager
+def atomic_path(path: Path) -> Iterator[Path]:
+    """A temporary path beside ``path``, same suffix, renamed to it if the block succeeds.
+
+    Raises:
+        OSError: it cannot be written; whatever the system calls the file, ``path`` is named.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(
+        prefix=unfinished_prefix(path.stem), suffix=path.suffix, dir=path.parent
+    )
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    except OSError as error:
+        if error.filename in (None, name, temporary):
+            error.filename = str(path)
+        raise
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def read_json(path: Path) -> Any:
+    """Read a JSON file and refuse numbers that are not finite.
+
+    Raises:
+        OSError: the file cannot be read.
+        ValueError: it is not UTF-8, not JSON, or nested too deeply.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        return json.loads(text, parse_constant=_finite, parse_float=_finite, parse_int=_whole)
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
+
+
+def _finite(text: str) -> float:
+    if not math.isfinite(float(text)):
+        raise ValueError(f"{text[:20]} is not a finite number")
+    return float(text)
+
+
+def _whole(text: str) -> int:
+    _finite(text)
+    return int(text)
+
+
+def dotted(record: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested mappings as one: their keys joined by dots."""
+    flat: dict[str, Any] = {}
+    for key, value in record.items():
+        inner = dotted(value, f"{prefix}{key}.") if isinstance(value, Mapping) else None
+        flat |= {f"{prefix}{key}": value} if inner is None else inner
+    return flat
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write ``value`` as indented JSON with sorted keys; NaN is refused."""
+    write_text(path, json.dumps(value, indent=2, sort_keys=True, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file as a whole or not at all."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def file_sha256(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def refuse_existing(path: Path) -> None:
+    """Refuse to write where there is something already."""
+    if path.is_symlink() and not path.exists():
+        raise InputError(f"{path}: is a link that leads nowhere; choose another directory")
+    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+        raise InputError(f"{path}: exists and is not empty; delete it or choose another directory")
+
+
+def refuse_foreign(out: Path, own: Collection[str], origin: str) -> None:
+    """Refuse a directory with anything but what an earlier command of the same kind wrote.
+
+    ``own`` names the files that may be replaced; ``origin`` says what writes them, as in "is not
+    from a comparison".
+    """
+    if os.path.lexists(out) and not out.is_dir():
+        raise InputError(f"{out}: is a file; choose another directory with --out")
+    names = sorted(path.name for path in out.glob("*"))
+    others = [name for name in names if name not in own and not name.startswith(UNFINISHED)]
+    if others:
+        raise InputError(
+            f"{out}: holds '{others[0]}', which is not from {origin}; choose another directory"
+            " with --out"
+        )
+
+
+@contextmanager
+def writing_to(path: Path, remedy: Callable[[], str]) -> Iterator[None]:
+    """Say in one line that a file could not be written: a full disk, a read-only one.
+
+    In place of any ``OSError``; names ``path`` where the system names no file, and what to do then.
+    """
+    try:
+        yield
+    except OSError as error:
+        name, reason = error.filename or path, error.strerror or error
+        raise InputError(f"{name}: {reason}; {remedy()}") from error
+
+
+@contextmanager
+def atomic_directory(path: Path) -> Iterator[Path]:
+    """A temporary directory beside ``path`` that is renamed to it if the block succeeds."""
+    path = Path(path)
+    refuse_existing(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = Path(tempfile.mkdtemp(prefix=unfinished_prefix(path.name), dir=path.parent))
+    try:
+        yield temporary
+        temporary.chmod(0o755)
+        temporary.replace(path)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+class PlainLoader(yaml.SafeLoader):
+    """YAML that builds nothing but plain values, each key once, and without aliases.
+
+    A few lines of aliases can stand for gigabytes.
+    """
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """A node; an alias is refused."""
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.composer.ComposerError(None, None, "aliases (*name) are not read", mark)
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        """A mapping; a key that is there twice is refused."""
+        keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+        for place, key in enumerate(keys):
+            if key in keys[:place]:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"the key '{key}' is there twice", node.start_mark
+                )
+        return super().construct_mapping(node, deep)

@@ -1,0 +1,233 @@
+"""One command at a time in a directory, and nothing left there of those that were killed.
+
+A data set grows in ``<out>.part`` beside ``<out>``, until it is complete. What stands there under
+its final name is whole. ``.work`` holds what is needed on the way: the settings, the lock of the
+command at work, and the prepared scene. When all is there the directory is renamed, and then
+``.work`` goes.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import re
+import shutil
+import socket
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from synfeal.errors import InputError, why
+from synfeal.records.files import (
+    UNFINISHED,
+    dotted,
+    read_json,
+    refuse_existing,
+    unfinished_prefix,
+    write_json,
+    writing_to,
+)
+
+LOCK = ".lock"
+# Names of :func:`synfeal.records.files.unfinished_prefix`.
+TEMPORARY = re.compile(rf"{re.escape(UNFINISHED)}-(?P<host>[\w.]+)-(?P<process>\d+)-.+")
+# A job on another machine writes its files more often than that.
+ABANDONED_S = 24 * 3600.0
+
+
+def begin_run(root: Path) -> None:
+    """Keep other runs out of ``root`` until this process ends; put in order what earlier ones left.
+
+    The system frees the lock when the process ends, however it ends: nothing has to be unlocked.
+    What is not finished is removed, and no file stays dated in the future.
+
+    Raises:
+        InputError: another run is at work there, or nothing can be written there.
+    """
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        _lock(root / LOCK)  # nobody closes the descriptor before the process ends
+        _end_future(root)
+    except OSError as error:
+        raise InputError(
+            f"{error.filename or root}: {error.strerror}; nothing was started"
+        ) from error
+    remove_unfinished(root)
+
+
+@contextmanager
+def only_command(directory: Path, lock: Path) -> Iterator[None]:
+    """Keep other commands out of ``directory`` during the block, by a lock on the file ``lock``."""
+    descriptor = _lock(lock, directory)
+    try:
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def remove_unfinished(root: Path) -> None:
+    """Remove what killed processes left below ``root`` under the names of what is not finished.
+
+    What a process of this machine is still writing stays, and of other machines' what was touched
+    within a day: jobs of a killed run may go on elsewhere.
+    """
+    for folder, directories, files in os.walk(root):
+        for name in (*directories, *files):
+            path, found = Path(folder, name), TEMPORARY.fullmatch(name)
+            if found is None or not _abandoned(path, found["host"], int(found["process"])):
+                continue
+            if path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
+
+
+def _abandoned(path: Path, host: str, process: int) -> bool:
+    """Tell whether nobody writes a temporary file any more."""
+    if unfinished_prefix("").startswith(f"{UNFINISHED}-{host}-"):
+        try:
+            os.kill(process, 0)
+        except ProcessLookupError:
+            return True
+        except PermissionError:
+            pass  # somebody else's process
+        return False
+    try:
+        return time.time() - path.lstat().st_mtime > ABANDONED_S
+    except FileNotFoundError:  # it has just been finished
+        return False
+
+
+def _end_future(root: Path) -> None:
+    """Date now, in their order, what a clock that jumped back has left dated in the future.
+
+    Snakemake fails every job that reads a file younger than what the job writes.
+    """
+    now_ns = time.time_ns()
+    dates_ns = {path: path.lstat().st_mtime_ns for path in root.rglob("*") if path.is_file()}
+    future = {path: date_ns for path, date_ns in dates_ns.items() if date_ns > now_ns}
+    rank = {date_ns: rank for rank, date_ns in enumerate(sorted(set(future.values())))}
+    for path, date_ns in future.items():
+        new_ns = now_ns + rank[date_ns] * 1000  # dates are compared as floats: 1 µs is kept apart
+        os.utime(path, ns=(new_ns, new_ns), follow_symlinks=False)
+    if future:
+        print(f"{root}: {len(future)} files dated in the future are now dated now", file=sys.stderr)
+
+
+def _lock(path: Path, directory: Path | None = None) -> int:
+    """Lock a file through a descriptor, which holds the lock until it is closed."""
+    directory = directory or path.parent
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        holder = os.read(descriptor, 200).decode(errors="replace") or "it did not say which"
+        os.close(descriptor)
+        raise InputError(
+            f"{directory}: another run is at work there ({holder}); wait for its end, or end it"
+        ) from error
+    except OSError as error:  # some network file systems know no locks
+        print(f"{path}: {error.strerror}; see yourself that no other run starts", file=sys.stderr)
+        return descriptor
+    os.ftruncate(descriptor, 0)
+    os.write(descriptor, f"process {os.getpid()} on {socket.gethostname()}".encode())
+    return descriptor
+
+
+WORK = ".work"
+SETTINGS = "settings.json"
+
+
+@contextmanager
+def growing(out: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
+    """The directory that becomes ``out`` when the block ends, with what earlier commands made.
+
+    ``out`` is from :func:`place_of`, and must not exist yet or be an empty directory; ``settings``
+    are what decides its bytes, ready for JSON, and another command's must be the same.
+
+    Raises:
+        InputError: ``out`` is there already, cannot be written, grows from other settings, or
+            another command is at work on it.
+        KeyboardInterrupt: with what is kept, for the message.
+    """
+    refuse_existing(out)
+    part = out.with_name(f"{out.name}.part")
+    if part.is_dir() and not os.path.lexists(part / WORK / SETTINGS) and _holds_files(part):
+        raise InputError(
+            f"{part}: is not an unfinished data set; delete it or choose another --out"
+        )
+    try:
+        with writing_to(part, lambda: _kept(part)):
+            (part / WORK).mkdir(parents=True, exist_ok=True)
+            with only_command(part, part / WORK / "lock"):
+                check_settings(part, settings)
+                try:
+                    refuse_existing(out)  # by a command that has just ended
+                    remove_unfinished(part)
+                    yield part
+                    part.replace(out)
+                finally:
+                    if part.is_dir() and not _holds_files(part):
+                        shutil.rmtree(part, ignore_errors=True)
+            clean_up(out)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(_kept(part)) from None
+
+
+def _holds_files(part: Path) -> bool:
+    return any(path.name != WORK for path in part.iterdir())
+
+
+def place_of(out: Path) -> Path:
+    """``out`` as an absolute path, to which something can be renamed."""
+    try:
+        place = out.resolve()
+        if place.is_mount():
+            raise InputError(f"--out: {out} is a whole file system; name a directory in it")
+    except (OSError, RuntimeError) as error:  # a name that is too long; links in a loop
+        reason = getattr(error, "strerror", None) or "its links lead in a circle"
+        raise InputError(f"--out: {out}: {reason}; choose another directory") from error
+    return place
+
+
+def clean_up(out: Path) -> bool:
+    """Finish what a command left that was killed when ``out`` was complete; whether it was."""
+    was_complete = (out / WORK).is_dir()
+    if was_complete:
+        shutil.rmtree(out / WORK)
+    return was_complete
+
+
+def _kept(part: Path) -> str:
+    if not part.is_dir():
+        return "nothing was kept"
+    return f"what is done is kept in {part}; run the same command again to go on"
+
+
+def check_settings(part: Path, settings: Mapping[str, Any]) -> None:
+    """Check that ``part`` was begun with these settings; they are written where there are none."""
+    path = part / WORK / SETTINGS
+    if not os.path.lexists(path):
+        write_json(path, settings)
+    try:
+        found = read_json(path)
+        if not isinstance(found, dict):
+            raise ValueError("holds no mapping")
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{path}: cannot be read ({why(error)}); delete {part} to start anew"
+        ) from error
+    before, now = dotted(found), dotted(settings)
+    differing = [
+        f"{key} was {before.get(key)}, is {now.get(key)}"
+        for key in {**now, **before}
+        if before.get(key) != now.get(key)
+    ]
+    if differing:
+        raise InputError(
+            f"{path}: is of another data set ({'; '.join(differing)}); go on with the options of"
+            f" that one, or delete {part} to start anew"
+        )

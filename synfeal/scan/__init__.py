@@ -1,0 +1,1 @@
+"""From posed photographs with depth to a coloured mesh that stands upright."""

@@ -1,0 +1,228 @@
+"""The two cameras of an RGB-D sensor: their calibrations, how they sit together, known ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+from scipy.spatial.transform import Rotation
+
+from synfeal.config.dataset import CameraConfig
+from synfeal.config.load import describe
+from synfeal.dataset.finish import MANIFEST
+from synfeal.errors import InputError, read_as
+from synfeal.geometry.poses import pose_matrix
+from synfeal.records.files import read_json
+
+Array = NDArray[np.float64]
+MILLIMETRES = 1000.0
+
+
+@dataclass(frozen=True)
+class RgbdCamera:
+    """What turns the images of an RGB-D sensor into coloured points.
+
+    The poses of a sequence are taken to be those of its *photographs*: a rendering from a pose of
+    the sequence is comparable with the photograph of that name. Where they were estimated from
+    depth, as KinectFusion does, they are those of the depth camera in truth, 2.5 cm beside; the
+    offset that matters, the angle between the two cameras, then shows as a principal point of the
+    colour camera that is a few pixels off, and :mod:`synfeal.scan.consistency` finds it.
+
+    Attributes:
+        color: Intrinsics and lens of the photographs.
+        depth: Intrinsics and lens of the depth images.
+        depth_from_color: Rigid motion (4, 4) from the colour camera to the depth camera.
+        depth_units_per_m: What a depth of one metre is stored as.
+        source: Where the calibration comes from, for records.
+    """
+
+    color: CameraConfig
+    depth: CameraConfig
+    depth_from_color: Array
+    depth_units_per_m: float = MILLIMETRES
+    source: str = ""
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Its values, ready for JSON."""
+        return {
+            "color": intrinsics_record(self.color),
+            "depth": intrinsics_record(self.depth),
+            "depth_from_color": self.depth_from_color.tolist(),
+            "depth_units_per_m": self.depth_units_per_m,
+            "source": self.source,
+        }
+
+
+def intrinsics_record(camera: CameraConfig) -> dict[str, Any]:
+    """Size, pinhole and distortion of a camera, ready for JSON."""
+    return {
+        "width": camera.width,
+        "height": camera.height,
+        **camera.intrinsics._asdict(),
+        "distortion": list(camera.distortion),
+    }
+
+
+def pinhole(width: int, height: int, focal_px: float) -> CameraConfig:
+    """Build a camera with square pixels and its principal point in the middle of the image."""
+    return CameraConfig(
+        width=width, height=height, fx=focal_px, fy=focal_px, cx=width / 2.0, cy=height / 2.0
+    )
+
+
+def _tum(
+    fx: float, fy: float, cx: float, cy: float, *distortion: float
+) -> tuple[CameraConfig, CameraConfig]:
+    """Depth of the benchmark is registered to colour: one camera for both."""
+    lens = (*distortion, 0.0, 0.0, 0.0, 0.0, 0.0)[:5]
+    camera = CameraConfig(
+        width=640,
+        height=480,
+        fx=fx,
+        fy=fy,
+        cx=cx + 0.5,
+        cy=cy + 0.5,
+        distortion=lens,
+    )
+    return camera, camera
+
+
+def _known(pair: tuple[CameraConfig, CameraConfig], units_per_m: float, name: str) -> RgbdCamera:
+    return RgbdCamera(pair[0], pair[1], np.eye(4), units_per_m, f"preset {name}")
+
+
+# The Kinect of 7-Scenes: its authors give 585 px, which is the depth camera's; 525 px of the colour
+# camera is what its driver reports and what the photographs agree with. The Kinects of the TUM
+# benchmark: "Intrinsic Camera Calibration of the Kinect" on its page of file formats.
+PRESETS: Mapping[str, RgbdCamera] = {
+    "7scenes": _known((pinhole(640, 480, 525.0), pinhole(640, 480, 585.0)), 1000.0, "7scenes"),
+    "tum-fr1": _known(
+        _tum(517.3, 516.5, 318.6, 255.3, 0.2624, -0.9531, -0.0054, 0.0026, 1.1633),
+        *(5000.0, "tum-fr1"),
+    ),
+    "tum-fr2": _known(
+        _tum(520.9, 521.0, 325.1, 249.7, 0.2312, -0.7849, -0.0033, -0.0001, 0.9172),
+        *(5000.0, "tum-fr2"),
+    ),
+    "tum-fr3": _known(_tum(535.4, 539.2, 320.1, 247.6), 5000.0, "tum-fr3"),
+}
+
+
+@dataclass(frozen=True)
+class CameraOptions:
+    """What a person says of the cameras; None where nothing is said.
+
+    Attributes:
+        preset: Name of a known sensor, see :data:`PRESETS`.
+        color_camera: Calibration file of the photographs.
+        depth_camera: Calibration file of the depth images.
+        color_focal_px: Focal length of the photographs, the principal point in their middle.
+        depth_focal_px: The same of the depth images.
+        depth_from_color: Rotation vector in degrees, then translation in metres.
+        depth_units_per_m: What a depth of one metre is stored as.
+    """
+
+    preset: str | None = None
+    color_camera: Path | None = None
+    depth_camera: Path | None = None
+    color_focal_px: float | None = None
+    depth_focal_px: float | None = None
+    depth_from_color: tuple[float, ...] | None = None
+    depth_units_per_m: float | None = None
+
+
+def rgbd_camera(
+    options: CameraOptions,
+    sequence: Path,
+    color_size: tuple[int, int],
+    depth_size: tuple[int, int],
+    is_tum: bool,
+) -> RgbdCamera:
+    """Resolve what is known of the cameras of a sequence.
+
+    Options go before a preset, a preset before the manifest of a data set of our own. One camera
+    given for colour alone is that of depth too, as where depth is registered to colour.
+
+    Args:
+        options: What a person says.
+        sequence: The sequence, which may have a ``manifest.json``.
+        color_size: Width and height of its photographs, pixels.
+        depth_size: Width and height of its depth images, pixels.
+        is_tum: Whether it is in the format of the TUM benchmark, which stores 5000 units a metre.
+
+    Raises:
+        InputError: Nothing says what the focal length is, or two things do, or a calibration is of
+            another size of image.
+    """
+    if options.preset is not None:
+        base: RgbdCamera | None = PRESETS[options.preset]
+    else:
+        base = _of_manifest(sequence)
+    color = _one(options.color_camera, options.color_focal_px, color_size, "color")
+    depth = _one(options.depth_camera, options.depth_focal_px, depth_size, "depth")
+    if base is None:
+        if color is None:
+            raise InputError(
+                f"{sequence}: nothing says what its cameras are; give --preset"
+                f" ({', '.join(PRESETS)}), --color-camera FILE or --color-focal PX, and the same"
+                " for depth where depth is not registered to colour"
+            )
+        units = 5000.0 if is_tum else MILLIMETRES
+        base = RgbdCamera(color, depth or color, np.eye(4), units, "options")
+    elif color is not None or depth is not None:
+        base = replace(base, color=color or base.color, depth=depth or base.depth, source="options")
+    if options.depth_from_color is not None:
+        turn = Rotation.from_rotvec(options.depth_from_color[:3], degrees=True).as_matrix()
+        base = replace(base, depth_from_color=pose_matrix(turn, options.depth_from_color[3:]))
+    if options.depth_units_per_m is not None:
+        if not options.depth_units_per_m > 0:
+            raise InputError(f"--depth-scale: must be above 0, found {options.depth_units_per_m:g}")
+        base = replace(base, depth_units_per_m=options.depth_units_per_m)
+    _check_size(base.color, color_size, "colour", "--color-camera")
+    _check_size(base.depth, depth_size, "depth", "--depth-camera")
+    return base
+
+
+def _one(
+    file: Path | None, focal_px: float | None, size: tuple[int, int], kind: str
+) -> CameraConfig | None:
+    """A camera given as a file or a focal length, if it is."""
+    if file is not None and focal_px is not None:
+        raise InputError(f"--{kind}-focal: comes from --{kind}-camera too; leave one of them out")
+    if file is not None:
+        try:
+            return CameraConfig.model_validate(
+                {"calibration": file, "width": size[0], "height": size[1]}
+            )
+        except ValidationError as error:
+            raise InputError(f"--{kind}-camera: {describe(error)}") from None
+    if focal_px is not None:
+        if not 0 < focal_px < 1e5:
+            raise InputError(f"--{kind}-focal: must be above 0 pixels, found {focal_px:g}")
+        return pinhole(*size, focal_px)
+    return None
+
+
+def _of_manifest(sequence: Path) -> RgbdCamera | None:
+    """The camera of a data set of our own, which has one for colour and depth."""
+    path = sequence / MANIFEST
+    if not path.is_file():
+        return None
+    with read_as(path, "a manifest"):
+        values = read_json(path)
+        camera = CameraConfig.model_validate(values.get("camera", values))
+    return RgbdCamera(camera, camera, np.eye(4), MILLIMETRES, MANIFEST)
+
+
+def _check_size(camera: CameraConfig, size: tuple[int, int], kind: str, flag: str) -> None:
+    if (camera.width, camera.height) != size:
+        raise InputError(
+            f"{flag}: is of {camera.width}x{camera.height} pixels, the {kind} images are"
+            f" {size[0]}x{size[1]}; give the calibration of these images"
+        )

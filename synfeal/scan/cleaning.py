@@ -1,0 +1,42 @@
+"""Small floating pieces of a fused surface dropped: noise, and what a camera saw from afar."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from synfeal.scan.fusion import Surface
+
+
+def without_small_pieces(surface: Surface, min_area_m2: float) -> tuple[Surface, int]:
+    """Drop connected pieces that are smaller than an area.
+
+    Args:
+        surface: Triangles; those that share a vertex are connected.
+        min_area_m2: Pieces below are dropped, but never the largest.
+
+    Returns:
+        The rest, without unused vertices, and how many pieces were dropped.
+    """
+    piece = pieces_of(surface.faces, len(surface.vertices_m))
+    corners = surface.vertices_m[surface.faces]
+    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area_m2 = np.bincount(piece, np.linalg.norm(sides, axis=1) / 2.0)
+    kept = area_m2 >= min(min_area_m2, float(area_m2.max()))
+    used, faces = np.unique(surface.faces[kept[piece]], return_inverse=True)
+    rest = Surface(
+        vertices_m=surface.vertices_m[used],
+        normals=surface.normals[used],
+        faces=faces.reshape(-1, 3).astype(np.int64),
+    )
+    return rest, int(np.sum(~kept & (area_m2 > 0)))
+
+
+def pieces_of(faces: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]:
+    """Number (F,) of the connected piece that each triangle (F, 3) belongs to."""
+    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
+    graph = coo_array((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), (n_vertices,) * 2)
+    label = connected_components(graph, directed=False)[1]
+    return np.asarray(label[faces[:, 0]], np.int64)

@@ -1,0 +1,125 @@
+"""Depth images with poses fused into one surface.
+
+A truncated signed distance field on Open3D's hashed grid of voxel blocks (Dong et al., "ASH: A
+Modern Framework for Parallel Spatial Hashing in 3D Perception", PAMI 2022), and marching cubes.
+Colours are no part of it: :mod:`synfeal.scan.coloring` looks them up in the photographs, where
+every lens and every offset between the cameras can be told exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.camera.projection import normalised_of_pixels, pixels_of_normalised
+from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.posed_sequence import PosedFrames
+from synfeal.errors import InputError
+from synfeal.geometry.poses import inverse
+from synfeal.scan.camera import RgbdCamera
+from synfeal.scan.reading import Depth, read_depth_m
+
+Array = NDArray[np.float64]
+# Voxels per edge of a block, blocks to begin with (more are added), truncation in voxels, and how
+# many frames must have seen a surface for it to be kept: one alone is often a flying pixel.
+BLOCK_VOXELS, BLOCKS, TRUNCATION_VOXELS, MIN_WEIGHT = 8, 20_000, 4.0, 1.5
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Triangles without colours, in the world of the sequence.
+
+    Attributes:
+        vertices_m: (V, 3).
+        normals: (V, 3), unit length, towards where the cameras were.
+        faces: (F, 3), indices of vertices.
+    """
+
+    vertices_m: Array
+    normals: Array
+    faces: NDArray[np.int64]
+
+
+def fuse(
+    frames: PosedFrames,
+    camera: RgbdCamera,
+    voxel_m: float,
+    max_depth_m: float,
+    on_frame: Callable[[], object] = lambda: None,
+) -> Surface:
+    """Fuse the depth images of frames.
+
+    Args:
+        frames: Depth images, and poses of their photographs.
+        camera: Calibration.
+        voxel_m: Edge of a voxel, metres.
+        max_depth_m: Measurements beyond are left out.
+        on_frame: Called after every frame.
+
+    Raises:
+        InputError: Open3D is not installed, or no depth image shows anything.
+    """
+    try:
+        import open3d as o3d
+    except ImportError as error:
+        raise InputError(
+            f"scan: needs Open3D, which does not load here ({error}); pip install 'synfeal[scan]'"
+        ) from error
+    kind, scalar = o3d.core.float32, o3d.core.SizeVector([1])
+    grid = o3d.t.geometry.VoxelBlockGrid(
+        ("tsdf", "weight"), (kind, kind), (scalar, scalar), voxel_m, BLOCK_VOXELS, BLOCKS
+    )
+    flatten = Pinhole(camera.depth)
+    # Open3D cuts projected positions to whole pixels: with the centre of the first pixel at
+    # (0.5, 0.5) that is the nearest one.
+    matrix = o3d.core.Tensor.from_numpy(camera.depth.intrinsics.matrix())
+    size = (camera.depth.width, camera.depth.height)
+    color_from_depth = inverse(camera.depth_from_color)
+    for file, world_from_color in zip(frames.depth, frames.world_from_cam, strict=True):
+        assert file is not None
+        depth_m = flatten(read_depth_m(file, camera.depth_units_per_m, size))
+        if ((depth_m > 0) & (depth_m < max_depth_m)).any():
+            image = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(depth_m[..., None]))
+            cam_from_world = o3d.core.Tensor.from_numpy(
+                inverse(world_from_color @ color_from_depth)
+            )
+            view = (matrix, cam_from_world, 1.0, max_depth_m, TRUNCATION_VOXELS)
+            grid.integrate(grid.compute_unique_block_coordinates(image, *view), image, *view)
+        on_frame()
+    mesh = grid.extract_triangle_mesh(MIN_WEIGHT)
+    if "indices" not in mesh.triangle or not len(mesh.triangle["indices"]):
+        raise InputError(
+            f"scan: no surface within {max_depth_m:g} m is seen by two frames; give a larger"
+            " --max-depth, or --depth-scale if depth is not in millimetres"
+        )
+    legacy = mesh.to_legacy()
+    legacy.compute_vertex_normals()
+    return Surface(
+        vertices_m=np.asarray(legacy.vertices, np.float64),
+        normals=np.asarray(legacy.vertex_normals, np.float64),
+        faces=np.asarray(legacy.triangles, np.int64),
+    )
+
+
+class Pinhole:
+    """Depth images of a lens as those of the pinhole camera with the same matrix."""
+
+    def __init__(self, camera: CameraConfig) -> None:
+        self._index: NDArray[np.int64] | None = None
+        if any(camera.distortion):
+            straight = camera.model_copy(update={"distortion": (0.0,) * 5})
+            column, row = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+            pixel = np.stack([column, row], axis=-1).astype(np.float64) + 0.5
+            seen = pixels_of_normalised(camera, normalised_of_pixels(straight, pixel))
+            x, y = np.floor(np.nan_to_num(seen, nan=-1.0)).astype(np.int64).transpose(2, 0, 1)
+            inside = (x >= 0) & (x < camera.width) & (y >= 0) & (y < camera.height)
+            self._index = np.where(inside, y * camera.width + x, -1)
+
+    def __call__(self, depth_m: Depth) -> Depth:
+        """Depth (H, W), 0 where the lens does not look; the nearest pixel, for edges are sharp."""
+        if self._index is None:
+            return depth_m
+        return np.where(self._index >= 0, depth_m.reshape(-1)[self._index], np.float32(0.0))

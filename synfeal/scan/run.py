@@ -1,0 +1,286 @@
+"""From a posed RGB-D sequence to a scan: the stages of ``synfeal scan``, one after the other."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
+from synfeal.dataset.render_sequence import Progress
+from synfeal.errors import InputError
+from synfeal.geometry.poses import inverse
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.mesh.save import save_glb
+from synfeal.records.files import write_json
+from synfeal.scan.agreement import DepthAgreement, check_depth
+from synfeal.scan.camera import CameraOptions, RgbdCamera, intrinsics_record, rgbd_camera
+from synfeal.scan.cleaning import without_small_pieces
+from synfeal.scan.coloring import colors_of
+from synfeal.scan.consistency import N_FRAMES as FIT_FRAMES
+from synfeal.scan.consistency import ColorFit, fit_color, sightings_of, spread, with_color
+from synfeal.scan.fusion import Surface, fuse
+from synfeal.scan.gravity import Gravity, find_gravity, upright_world
+from synfeal.scan.picture import Comparison, compare, write_picture
+from synfeal.scan.reading import image_size
+
+Array = NDArray[np.float64]
+COMPARED = 24  # photographs that the scan is compared with
+# Beyond, a focal length is not that of the camera: tolerances of lenses are a tenth of it.
+WRONG_FOCAL = 0.03
+WARN_COVERED = 0.8
+
+log = logging.getLogger("synfeal")
+
+
+@dataclass(frozen=True)
+class ScanJob:
+    """What to scan.
+
+    Attributes:
+        sequence: Posed RGB-D frames, see :mod:`synfeal.dataset.posed_sequence`.
+        out: The ``.glb`` to write; ``.json`` and ``.png`` of the same name come beside it.
+        cameras: What is known of the cameras.
+        start: First frame.
+        stop: One past the last frame; None for all.
+        stride: Every so many frames are fused; those between are what the scan is compared with.
+        voxel_m: Edge of a voxel, metres.
+        max_depth_m: Depth beyond is left out.
+        min_piece_m2: Connected pieces of less surface are dropped.
+        poses_are: Direction of the poses.
+        gravity: Way down (3,) in the sequence's world; ``find`` from the planes of the scene;
+            ``keep`` leaves the axes as they are.
+        keep_calibration: Use the colour calibration as it is given, not as photographs agree best.
+    """
+
+    sequence: Path
+    out: Path
+    cameras: CameraOptions = field(default_factory=CameraOptions)
+    start: int = 0
+    stop: int | None = None
+    stride: int = 2
+    voxel_m: float = 0.01
+    max_depth_m: float = 4.0
+    min_piece_m2: float = 0.02
+    poses_are: Literal["world_from_cam", "cam_from_world"] = "world_from_cam"
+    gravity: tuple[float, float, float] | Literal["find", "keep"] = "find"
+    keep_calibration: bool = False
+
+    def check(self) -> None:
+        """Refuse numbers that mean nothing."""
+        if self.out.suffix.lower() != ".glb":
+            raise InputError(f"--out: {self.out}: a scan is binary glTF; end its name in .glb")
+        if self.start < 0 or (self.stop is not None and self.stop <= self.start):
+            raise InputError(f"--frames: {self.start} to {self.stop} holds no frame")
+        if self.stride < 1:
+            raise InputError(f"--stride: must be at least 1, found {self.stride}")
+        for flag, value in (
+            ("--voxel", self.voxel_m),
+            ("--max-depth", self.max_depth_m),
+        ):
+            if not 1e-4 <= value <= 1e3:
+                raise InputError(f"{flag}: must be 0.0001 to 1000 metres, found {value:g}")
+        if not (np.isfinite(self.min_piece_m2) and self.min_piece_m2 >= 0):
+            raise InputError(f"--min-piece: must be 0 square metres or more, {self.min_piece_m2:g}")
+        if not isinstance(self.gravity, str):
+            length = np.linalg.norm(self.gravity)
+            if not (np.isfinite(length) and length > 0):
+                raise InputError("--gravity: must be three numbers, not all 0")
+
+
+@dataclass(frozen=True)
+class Scan:
+    """What was made.
+
+    Attributes:
+        mesh: In its world, z up, metres.
+        record: What ``scan.json`` holds.
+        compared: Photographs beside renderings.
+    """
+
+    mesh: TexturedMesh
+    record: dict[str, Any]
+    compared: tuple[Comparison, ...]
+
+
+def scan(job: ScanJob) -> Scan:
+    """Fuse, clean, colour, set upright, compare with photographs, and write.
+
+    Raises:
+        InputError: The sequence cannot be used, its parts do not fit together, or no gravity is
+            found; the message says what to do.
+    """
+    job.check()
+    every = _read(job)
+    frames, held_out = every[:: job.stride], _held_out(every, job.stride)
+    camera = _camera(job, frames)
+    agreement = check_depth(frames, camera)
+    total = 2 * len(frames) + min(FIT_FRAMES, len(frames)) + min(COMPARED, len(held_out))
+    with Progress(total, "scan") as progress:
+        with _stage(progress, "depth fused", len(frames)):
+            surface = fuse(frames, camera, job.voxel_m, job.max_depth_m, progress.update)
+        surface, n_dropped = without_small_pieces(surface, job.min_piece_m2)
+        gravity, sequence_from_world = _world(job, surface, frames)
+        with _stage(progress, "calibration compared", min(FIT_FRAMES, len(frames))):
+            sightings = sightings_of(surface, frames, camera, progress.update)
+            fit = fit_color(sightings, camera.color)
+        if fit.is_better and not job.keep_calibration:
+            camera = with_color(camera, fit)
+        with _stage(progress, "colours found", len(frames)):
+            rgb = colors_of(surface, frames, camera, progress.update)
+        mesh = _mesh(surface, rgb, sequence_from_world)
+        some = spread(len(held_out), COMPARED)
+        shown = _at(held_out, some)
+        poses = inverse(sequence_from_world) @ shown.world_from_cam
+        with _stage(progress, "photographs compared", len(some)):
+            compared = compare(mesh, shown, poses, camera.color, progress.update)
+    _tell(job, agreement, fit, compared)
+    record = _record(job, frames, camera, agreement, fit, gravity, compared) | {
+        "sequence_from_world": sequence_from_world.tolist(),
+        "faces": mesh.n_faces,
+        "pieces_dropped": n_dropped,
+    }
+    title = (
+        f"{job.out.name}: {record['photographs']['difference']:.1f} grey levels from photographs,"
+        f" {record['photographs']['covered']:.0%} of them covered"
+    )
+    write_picture(compared, title, job.out.with_suffix(".png"))
+    write_json(job.out.with_suffix(".json"), record)
+    save_glb(job.out, mesh)
+    return Scan(mesh, record, tuple(compared))
+
+
+@contextmanager
+def _stage(progress: Progress, name: str, n_frames: int) -> Iterator[None]:
+    began = time.perf_counter()
+    yield
+    progress.part_done(name, n_frames, time.perf_counter() - began)
+
+
+def _read(job: ScanJob) -> PosedFrames:
+    every = read_posed_sequence(job.sequence, slice(job.start, job.stop))
+    if not every.has_depth:
+        raise InputError(
+            f"{job.sequence}: has no depth images; a scan is made of photographs with depth"
+        )
+    if job.poses_are == "cam_from_world":
+        every = replace(every, world_from_cam=inverse(every.world_from_cam))
+    return every
+
+
+def _held_out(every: PosedFrames, stride: int) -> PosedFrames:
+    """The frames that are not fused, or all where all are."""
+    index = [i for i in range(len(every)) if i % stride]
+    return _at(every, index) if index else every
+
+
+def _at(frames: PosedFrames, index: list[int]) -> PosedFrames:
+    return PosedFrames(
+        names=tuple(frames.names[i] for i in index),
+        color=tuple(frames.color[i] for i in index),
+        depth=tuple(frames.depth[i] for i in index),
+        world_from_cam=frames.world_from_cam[index],
+    )
+
+
+def _camera(job: ScanJob, frames: PosedFrames) -> RgbdCamera:
+    depth = frames.depth[0]
+    assert depth is not None
+    return rgbd_camera(
+        options=job.cameras,
+        sequence=job.sequence,
+        color_size=image_size(frames.color[0]),
+        depth_size=image_size(depth),
+        is_tum=is_tum(job.sequence),
+    )
+
+
+def _world(job: ScanJob, surface: Surface, frames: PosedFrames) -> tuple[Gravity | None, Array]:
+    """How gravity was found, if it was, and ``sequence_from_world`` (4, 4)."""
+    if job.gravity == "keep":
+        return None, np.eye(4)
+    if job.gravity == "find":
+        found = find_gravity(surface, frames.world_from_cam)
+        return found, upright_world(surface, found.up)
+    down = np.array(job.gravity, np.float64)
+    return None, upright_world(surface, -down / np.linalg.norm(down))
+
+
+def _mesh(surface: Surface, rgb: NDArray[np.uint8], sequence_from_world: Array) -> TexturedMesh:
+    world_from_sequence = inverse(sequence_from_world)
+    vertices = surface.vertices_m @ world_from_sequence[:3, :3].T + world_from_sequence[:3, 3]
+    return TexturedMesh((MeshPart("scan", vertices, surface.faces, vertex_rgb=rgb),))
+
+
+def _tell(
+    job: ScanJob, agreement: DepthAgreement, fit: ColorFit, compared: list[Comparison]
+) -> None:
+    """Warn of what is bad, and say what to do."""
+    given, best = fit.given.intrinsics, fit.fitted.intrinsics
+    if abs(fit.focal_change) > WRONG_FOCAL and fit.is_better:
+        said = (
+            f"scan: photographs agree best with a focal length of {best.fx:.0f} px,"
+            f" {given.fx:.0f} px was given for colour"
+        )
+        if job.keep_calibration:
+            log.warning(
+                "%s: give --color-focal %.0f, or leave out --keep-calibration", said, best.fx
+            )
+        else:
+            log.warning("%s: %.0f px is used; --keep-calibration uses what is given", said, best.fx)
+    covered = float(np.mean([one.covered.mean() for one in compared]))
+    if covered < WARN_COVERED:
+        log.warning(
+            "scan: covers %.0f %% of what photographs show; give more --frames or a larger"
+            " --max-depth (%g m)",
+            *(100 * covered, job.max_depth_m),
+        )
+
+
+def _record(
+    job: ScanJob,
+    frames: PosedFrames,
+    camera: RgbdCamera,
+    agreement: DepthAgreement,
+    fit: ColorFit,
+    gravity: Gravity | None,
+    compared: list[Comparison],
+) -> dict[str, Any]:
+    """What ``scan.json`` says but for the mesh itself."""
+    found = None
+    if gravity is not None:
+        found = {"up": gravity.up.tolist(), "level": gravity.level, "plumb": gravity.plumb}
+    differences = np.array([one.difference for one in compared])
+    return {
+        "sequence": job.sequence.resolve().name,
+        "frames": {
+            "start": job.start,
+            "stop": job.stop,
+            "stride": job.stride,
+            "fused": len(frames),
+            "first": frames.names[0],
+            "last": frames.names[-1],
+        },
+        "poses_are": job.poses_are,
+        "camera": camera.record,
+        "color_as_given": intrinsics_record(fit.given),
+        "voxel_m": job.voxel_m,
+        "max_depth_m": job.max_depth_m,
+        "gravity": found if found else "given" if job.gravity != "keep" else "kept",
+        "depth_agreement": None if np.isnan(agreement.share) else agreement.share,
+        "depth_best_focal_px": agreement.best_focal_px,
+        "color_disagreement": fit.record,
+        "photographs": {
+            "compared": len(compared),
+            "held_out": job.stride > 1,
+            "difference": float(np.nanmean(differences)),
+            "covered": float(np.mean([one.covered.mean() for one in compared])),
+        },
+    }

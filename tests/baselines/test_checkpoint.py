@@ -1,0 +1,90 @@
+"""Checkpoints say what they are, and files that are none are refused in one line."""
+
+import math
+
+import pytest
+import torch
+
+from baselines.config.learning import MODELS, NetworkConfig
+from baselines.training.checkpoint import frame_camera, read_checkpoint
+from baselines.training.predict import predict
+from synfeal.config.dataset import CameraConfig
+from synfeal.errors import InputError
+from synfeal.records.files import write_json
+from tests.support.coloured_frames import HYPER, NETWORK, save, untrained
+
+CPU = torch.device("cpu")
+
+
+@pytest.fixture
+def model(tmp_path):
+    return save(tmp_path / "model.pt", untrained())
+
+
+def changed(model, **values):
+    """The checkpoint with other entries; None takes one out."""
+    content = torch.load(model, weights_only=True) | values
+    torch.save({key: value for key, value in content.items() if value is not None}, model)
+    return model
+
+
+CONCATENATION = HYPER.model_copy(update={"skip": "concatenation"})
+INCEPTION_V3 = NetworkConfig(input_px=75, width=0.125, backbone="inception_v3")
+VARIANTS = [
+    *((name, NETWORK, HYPER) for name in MODELS),
+    ("hourglass", NETWORK, CONCATENATION),
+    ("poselstm", INCEPTION_V3, HYPER),
+]
+
+
+@pytest.mark.parametrize(("name", "network", "hyper"), VARIANTS)
+def test_a_checkpoint_is_all_that_prediction_needs(name, network, hyper, tmp_path):
+    trained = untrained(name, network, hyper)
+    found = read_checkpoint(save(tmp_path / "model.pt", trained), CPU)
+    assert found.description == trained.description
+    assert (found.description.localizer, found.description.network) == (name, network)
+    assert found.description.hyper == hyper
+    px = network.input_px
+    images = torch.randint(0, 256, (3, 3, px, px), dtype=torch.uint8)
+    for ours, theirs in zip(predict(found, images), predict(trained, images), strict=True):
+        assert (ours == theirs).all()
+
+
+UNKNOWN = {"localizer": "posenet2", "network": {"attention": True}}
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"description": None}, "does not say which localizer it is .*train it again"),
+        ({"description": {"localizer": "posenet3"}}, "its description cannot be used .*localizer"),
+        ({"description": UNKNOWN}, r"network\.attention: unknown key"),
+        ({"images": None}, "holds no trained localizer"),
+        ({"localizer": {}}, "not those of the posenet2 it describes.*train it again"),
+    ],
+)
+def test_a_damaged_checkpoint_is_one_line(model, values, message):
+    with pytest.raises(InputError, match=rf"model\.pt: .*{message}"):
+        read_checkpoint(changed(model, **values), CPU)
+
+
+OFF_CENTRE = {"width": 90, "height": 40, "fx": 30.0, "fy": 30.0, "cx": 45.0, "cy": 10.0}
+HALF = math.tan(math.radians(30))  # of 60 degrees across
+
+
+@pytest.mark.parametrize(
+    ("camera", "short_side_deg"),
+    [
+        ({"width": 128, "height": 96}, 2 * math.degrees(math.atan(HALF * 96 / 128))),
+        ({"width": 96, "height": 128}, 60.0),
+        # Off the centre: 10 pixels above the axis, 30 below it.
+        (OFF_CENTRE, math.degrees(math.atan(1 / 3)) + 45.0),
+    ],
+)
+def test_the_field_of_view_is_that_of_the_short_side(tmp_path, camera, short_side_deg):
+    assert frame_camera(tmp_path / "train.npy") is None
+    record = CameraConfig(**camera).record
+    write_json(tmp_path / "train.json", {"camera": record, "frames": 3})
+    found = frame_camera(tmp_path / "train.npy")
+    assert found is not None
+    assert found.short_side_fov_deg == pytest.approx(short_side_deg, rel=1e-12)

@@ -1,0 +1,220 @@
+"""Reference methods against closed forms, naive twins, and rooms whose poses are known."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from baselines.config.references import ReferencesConfig
+from baselines.references.arrays import most_alike
+from baselines.references.correspondences import (
+    Tracks,
+    join_matches,
+    match_test_frames,
+    mutual_matches,
+)
+from baselines.references.descriptors import Vlad, dense_sift, residuals, thumbnails
+from baselines.references.evidence import Evidence
+from baselines.references.features import Features, write_features
+from baselines.references.registry import in_group
+from baselines.references.retrieval import METRES_PER_RADIAN, nearest_rows
+from baselines.references.run import answer_and_score
+from baselines.references.structure import on_depth, triangulate
+from synfeal.dataset.pose_table import read_pose_table, write_pose_table
+from synfeal.geometry.poses import (
+    inverse,
+    pose_error,
+    pose_from_quat,
+    pose_matrix,
+    position_error_m,
+)
+from synfeal.geometry.rotations import rotation_angle_rad, rotation_from_rpy
+from tests.support.property_support import random_table, table_of
+from tests.support.room_scene import CAMERA, pose_at, write_room
+
+ROOT = Path(__file__).parents[2]
+CFG = ReferencesConfig(max_features=400)
+
+
+def frames(count, side=32, seed=0):
+    return np.random.default_rng(seed).integers(0, 200, (count, side, side, 3), dtype=np.uint8)
+
+
+@pytest.mark.parametrize("turn", range(4))
+def test_dense_sift_of_a_ramp_has_one_direction(turn):
+    ramp = np.rot90(np.broadcast_to(4 * np.arange(32), (32, 32)), turn)
+    picture = np.repeat(ramp[None, ..., None], 3, axis=3).astype(np.uint8)
+    inner = dense_sift(picture)[0].reshape(-1, 16, 8)
+    inner = inner[len(inner) // 2]  # a descriptor that touches no border
+    direction = [0, 6, 4, 2][turn]  # a turn to the left points the gradient up, against y
+    expected = torch.zeros(16, 8)
+    expected[:, direction] = 0.25  # sixteen equal cells, roots of an L1 norm of 1
+    torch.testing.assert_close(inner, expected, atol=1e-5, rtol=0)
+
+
+def test_vlad_is_the_sum_of_residuals_from_the_nearest_word():
+    words = torch.tensor([[0.0, 0.0], [10.0, 0.0]])
+    found = residuals(np.array([[[1.0, 0.0], [0.0, 2.0], [9.0, 0.0]]], np.float32), words)
+    # Word 0: (1, 0) + (0, 2), word 1: (-1, 0); each at length 1, then both together.
+    expected = np.array([1, 2, -np.sqrt(5), 0]) / np.sqrt(5) / np.sqrt(2)
+    np.testing.assert_allclose(found[0], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["thumbnail", "vlad"])
+def test_an_image_is_found_again_darker_and_shifted_in_tone(method):
+    train = frames(20)
+    describe = thumbnails if method == "thumbnail" else Vlad.learn(train, 3).describe
+    queries = (train[[4, 17, 9]] * 0.7 + 20).astype(np.uint8)
+    vectors = describe(train)
+    np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1, rtol=1e-5)
+    assert most_alike(vectors, describe(queries), 1)[:, 0].tolist() == [4, 17, 9]
+
+
+def test_the_most_alike_and_the_nearest_are_those_of_a_full_search():
+    rng = np.random.default_rng(1)
+    train, test = (rng.standard_normal((n, 6)).astype(np.float32) for n in (30, 11))
+    expected = np.argsort(-(test @ train.T), axis=1)
+    assert (most_alike(train, test, 5) == expected[:, :5]).all()
+    assert most_alike(train, test, 99).shape == (11, 30)
+    train, test = random_table(40, 0, 3), random_table(9, 1, 3)
+    cost = position_error_m(test.position_m[:, None], train.position_m)
+    angles = rotation_angle_rad(test.quat_wxyz[:, None], train.quat_wxyz[None])
+    expected = np.argmin(cost + METRES_PER_RADIAN * angles, axis=1)
+    assert (nearest_rows(train, test) == expected).all()
+
+
+def test_matches_are_those_of_a_naive_search():
+    rng = np.random.default_rng(2)
+    own = np.abs(rng.standard_normal((30, 8))).astype(np.float32)
+    other = np.concatenate([own[:20] + 0.05, np.abs(rng.standard_normal((15, 8)))]).astype("f4")
+    own, other = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (own, other))
+    expected = []
+    for i, vector in enumerate(own):
+        distance = np.linalg.norm(other - vector, axis=1)
+        j, second = np.argsort(distance)[:2]
+        back = np.argmin(np.linalg.norm(own - other[j], axis=1))
+        if distance[j] < 0.8 * distance[second] and back == i:
+            expected.append((i, j))
+    assert list(zip(*mutual_matches(own, other), strict=True)) == expected
+    assert expected
+    assert [len(part) for part in mutual_matches(own[:0], other)] == [0, 0]
+    assert [len(part) for part in mutual_matches(own, other[:1])] == [0, 0]
+
+
+TRAIN = [pose_at([-2 + 0.3 * i, -0.2 + 0.05 * i, 1.3], yaw_deg=3 * i - 9) for i in range(7)]
+TEST = [pose_at([-1.85, -0.2, 1.25], yaw_deg=-6), pose_at([-0.95, 0.1, 1.4], yaw_deg=5)]
+
+
+def evidence_of(labels, truth):
+    files = {split: labels / f"{split}.csv" for split in ("train", "test")}
+    files |= {f"{split}_truth": truth / f"{split}.csv" for split in ("train", "test")}
+    return Evidence(files, CAMERA, 0)
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory):
+    """Features of a furnished room's frames, matched; labels are the true poses."""
+    folder = tmp_path_factory.mktemp("room")
+    splits = {}
+    for split, poses in (("train", TRAIN), ("test", TEST)):
+        write_room(folder / split, poses)
+        found = folder / f"{split}.npz"
+        write_features([folder / split], split, len(poses), CAMERA, CFG, found)
+        splits[split] = Features.read(found)
+        write_pose_table(folder / "labels" / f"{split}.csv", table_of(poses))
+    evidence = evidence_of(folder / "labels", folder / "labels")
+    near = np.tile(np.arange(len(TRAIN)), (len(TEST), 1))
+    evidence.__dict__["correspondences"] = match_test_frames(*splits.values(), near)
+    return evidence
+
+
+def test_structure_finds_poses_that_move_with_the_labels(room):
+    position_m, angle_rad = pose_error(on_depth(room), np.stack(TEST))
+    assert position_m.max() < 0.02  # the depth is rounded to millimetres, features to half a pixel
+    assert np.degrees(angle_rad).max() < 0.5
+    # Labels in another world give the same answers in that world: nothing else is looked at.
+    moved = pose_matrix(rotation_from_rpy([0.3, -0.2, 1.9]), [4.0, -7.0, 0.5])
+    other = replace(room)
+    other.__dict__["correspondences"] = room.correspondences
+    other.__dict__["train"] = room.train.with_poses(moved @ room.train.world_from_cam)
+    np.testing.assert_allclose(on_depth(other), moved @ on_depth(room), atol=2e-3)
+
+
+def test_tracks_join_the_matches_of_a_point():
+    """Features 0 1 | 2 3 | 4 5 of three frames; the last two matches make a frame see one twice."""
+    features = Features(np.array([0, 2, 4, 6]), np.zeros((6, 2)), np.zeros(6), np.zeros((6, 128)))
+    tracks = join_matches(features, np.array([[0, 2], [2, 4]]))
+    assert tracks.of_feature.tolist() == [0, -1, 0, -1, 0, -1]
+    assert tracks.frame.tolist() == [0, 1, 2]
+    assert tracks.count == 1
+    tracks = join_matches(features, np.array([[0, 2], [2, 4], [1, 3], [3, 5], [1, 2]]))
+    assert tracks.count == 0
+    assert (tracks.of_feature == -1).all()
+
+
+BESIDE = [pose_at([0.02 * i**2, 0.3 * i - 0.9, 1.3], yaw_deg=3 * i - 9) for i in range(7)]
+
+
+def seen(poses, point_m):
+    """Tracks of points (T, 3) that every frame sees exactly, whatever stands between."""
+    point = inverse(poses)[:, None] @ np.append(point_m, np.ones((len(point_m), 1)), 1)[..., None]
+    slope = point[..., :2, 0] / point[..., 2:3, 0]
+    frame = np.repeat(np.arange(len(poses)), len(point_m))
+    track = np.tile(np.arange(len(point_m)), len(poses))
+    return Tracks(frame, slope.reshape(-1, 2), track, track)
+
+
+def test_exact_rays_meet_in_their_points_and_one_wrong_ray_is_outvoted():
+    poses, rng = np.stack(BESIDE), np.random.default_rng(0)
+    point_m = np.array([3.0, 0, 1.3]) + rng.uniform(-1, 1, (20, 3))
+    exact = seen(poses, point_m)
+    np.testing.assert_allclose(triangulate(exact, poses), point_m, atol=1e-9)
+    wrong = replace(exact, slope=exact.slope.copy())
+    wrong.slope[3 * len(point_m)] += 0.2  # frame 3's ray to point 0
+    np.testing.assert_allclose(triangulate(wrong, poses)[0], point_m[0], atol=0.02)
+    behind = seen(poses, point_m - [10, 0, 0])  # the same slopes, but behind the cameras
+    assert np.isnan(triangulate(behind, poses)).all()
+
+
+def test_a_frame_without_matches_fails_and_is_counted(room, tmp_path):
+    found = room.correspondences
+    first = found.of(0)
+    bare = replace(found, point_m=found.point_m.copy())
+    bare.point_m[first] = np.nan
+    other = replace(room)
+    other.__dict__["correspondences"] = bare
+    answer_and_score(other, ["structure-depth"], tmp_path, {"scene": "room"})
+    folder = tmp_path / "structure-depth"
+    metrics = json.loads((folder / "metrics.json").read_text())
+    assert metrics["failed"] == 1
+    assert metrics["n_test"] == 2
+    assert metrics["reference"] == "structure-depth"
+    rows = (folder / "predictions.csv").read_text().splitlines()
+    assert rows[1].endswith("nan,nan,nan,nan,nan,nan,nan")
+    assert np.isfinite([float(cell) for cell in rows[2].split(",")]).all()
+
+
+def test_retrieval_and_oracle_answer_with_labels(room, tmp_path):
+    """On test images that are training images, retrieval is exact, against labels and all."""
+    labels = tmp_path / "labels"
+    half = np.radians(4) / 2
+    step = pose_from_quat([0.1, 0, 0], [np.cos(half), 0, np.sin(half), 0])
+    noisy = room.train.with_poses(room.train.world_from_cam @ step)
+    write_pose_table(labels / "train.csv", noisy)
+    write_pose_table(labels / "test.csv", noisy.first(4))
+    write_pose_table(tmp_path / "truth" / "train.csv", room.train)
+    write_pose_table(tmp_path / "truth" / "test.csv", room.train.first(4))
+    evidence = evidence_of(labels, tmp_path / "truth")
+    vectors = thumbnails(frames(len(noisy)))
+    evidence.__dict__["descriptors"] = dict.fromkeys(("thumbnail", "vlad"), (vectors, vectors[:4]))
+    answer_and_score(evidence, in_group("images"), tmp_path / "out", {})
+    for name in in_group("images"):
+        answered = read_pose_table(tmp_path / "out" / name / "predictions.csv")
+        np.testing.assert_array_equal(answered.position_m, noisy.position_m[:4])
+        metrics = json.loads((tmp_path / "out" / name / "metrics.json").read_text())
+        assert metrics["position_m"] == 0
+        assert metrics["position_m_true"] == pytest.approx(0.1)
+        assert metrics["orientation_deg_true"] == pytest.approx(4.0)

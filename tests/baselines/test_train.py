@@ -1,0 +1,305 @@
+"""``synfeal train`` as a person uses it: data sets and photographs in, a model out."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from baselines.training.own_frames import FrameRange, pack_own_frames, read_own_frames
+from baselines.training.train import NETWORK, TrainJob, train
+from synfeal.camera.photograph import PhotographCamera
+from synfeal.cli import main
+from synfeal.dataset.packed import fit_frame
+from synfeal.dataset.pose_table import read_pose_table
+from synfeal.dataset.sevenscenes import pose_text
+from synfeal.dataset.world import write_sequence_from_world
+from synfeal.geometry.poses import pose_matrix
+from synfeal.geometry.rotations import rotation_from_rpy
+from synfeal.records.files import unfinished_prefix
+from tests.support.collected import refused
+
+ROOT = Path(__file__).parents[2]
+COUNT = 20
+WIDTH, HEIGHT = 80, 60
+PRODUCTS = ["history.csv", "model.pt", "training.json"]
+UNKNOWN = PhotographCamera(exif=False)
+
+
+def write_photographs(folder, count=COUNT, suffix="jpg", seed=0):
+    """A flat sequence whose colours say where the camera is."""
+    folder.mkdir(parents=True)
+    rng = np.random.default_rng(seed)
+    coarse = rng.integers(0, 256, (6, 8, 3), np.uint8)
+    scene = np.asarray(Image.fromarray(coarse).resize((WIDTH + count, HEIGHT)))
+    for index in range(count):
+        stem = folder / f"frame-{index:06d}"
+        Image.fromarray(scene[:, index : index + WIDTH]).save(f"{stem}.color.{suffix}")
+        turn = rotation_from_rpy([0.0, 0.05 * index, 0.1])
+        pose = pose_matrix(turn, np.array([0.02 * index, 0.5, 1.0]))
+        Path(f"{stem}.pose.txt").write_text(pose_text(pose))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def photographs(tmp_path_factory):
+    return write_photographs(tmp_path_factory.mktemp("photographs") / "flat")
+
+
+def run(out, *datasets, images=192, **further):
+    """Train for a moment."""
+    options = {"images": images, "device": "cpu", "photographs": UNKNOWN, **further}
+    return train(TrainJob(datasets=datasets, out=out, **options))
+
+
+@pytest.fixture(scope="module")
+def undisturbed(photographs, tmp_path_factory):
+    """What a run without a stop writes."""
+    out = tmp_path_factory.mktemp("undisturbed") / "out"
+    run(out, photographs)
+    return out
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from baselines.training import resume
+from baselines.training.fit import Fitting
+from tests.baselines.test_train import run
+resume.RESUME_EVERY_S = 0.0
+step, count = Fitting.step, [0]
+def stepping(self):
+    step(self)
+    count[0] += 1
+    if count[0] == 3:
+        os.kill(os.getpid(), getattr(signal, sys.argv[3]))
+Fitting.step = stepping
+run(Path(sys.argv[1]), Path(sys.argv[2]))
+"""
+
+
+@pytest.mark.parametrize("number", ["SIGKILL", "SIGTERM"])
+def test_a_run_that_was_killed_ends_with_the_same_bytes(photographs, undisturbed, tmp_path, number):
+    out = tmp_path / "out"
+    command = [sys.executable, "-c", KILLED, str(out), str(photographs), number]
+    process = subprocess.run(command, cwd=ROOT, env=os.environ, check=False, capture_output=True)
+    assert process.returncode == -getattr(signal, number), process.stderr.decode()
+    assert (out / "resume.pt").is_file()
+    assert not (out / "model.pt").exists()
+    (out / f"{unfinished_prefix('resume')}left.pt").touch()  # as when it is killed while it writes
+    run(out, photographs)
+    assert (out / "model.pt").read_bytes() == (undisturbed / "model.pt").read_bytes()
+    assert (out / "history.csv").read_bytes() == (undisturbed / "history.csv").read_bytes()
+    assert sorted(path.name for path in out.iterdir()) == PRODUCTS
+
+
+def test_a_run_that_has_ended_is_not_made_again(photographs, undisturbed, tmp_path):
+    out = Path(shutil.copytree(undisturbed, tmp_path / "out"))
+    before = (out / "model.pt").stat().st_mtime_ns
+    again = run(out, photographs)
+    assert again.finished_before
+    assert (out / "model.pt").stat().st_mtime_ns == before
+    record = json.loads((out / "training.json").read_text())
+    assert again.errors.position_m == record["held_out"]["position_m"]
+
+
+def test_what_is_said_leads_to_localize_and_evaluate(photographs, tmp_path, capsys, caplog):
+    out, poses = tmp_path / "trained", tmp_path / "poses.csv"
+    given = ["train", photographs, "--out", out, "--images", 320, "--device", "cpu", "--focal", 70]
+    assert main([str(argument) for argument in given]) == 0
+    said, line = capsys.readouterr().out.strip().splitlines()
+    assert "320 images shown of 20 frames on 10 paths" in said
+    assert "median error on held-out paths" in said
+    progress = r"320 of 320 samples, loss -?[\d.]+, held out [\d.]+ m/[\d.]+°.* 0 s left"
+    assert re.search(progress, caplog.text)
+    assert line.split()[:3] == ["synfeal", "localize", str(out / "model.pt")]
+    words = line.replace("photos/", str(photographs)).replace("poses.csv", str(poses)).split()
+    assert main([*words[1:], "--device", "cpu"]) == 0
+    assert len(poses.read_text().splitlines()) == COUNT + 1
+
+
+def described(model):
+    return torch.load(model, weights_only=True)["description"]
+
+
+def test_the_checkpoint_keeps_what_localize_needs(photographs, tmp_path):
+    camera = PhotographCamera(focal_px=70.0)
+    made = run(tmp_path / "out", photographs, images=64, photographs=camera)
+    kept = described(made.model)
+    assert (kept["camera"]["width"], kept["camera"]["fx"]) == (WIDTH, 70.0)
+    np.testing.assert_allclose(kept["bounds_m"], [[0, 0.5, 1], [0.38, 0.5, 1]], atol=1e-6)
+    assert "sequence_from_world" not in kept
+
+
+def test_a_data_set_is_learned_from_by_its_training_split(calm, tmp_path):
+    own = read_own_frames(calm, ())
+    table = read_pose_table(calm / "train.csv")
+    np.testing.assert_allclose(own.world_from_cam, table.world_from_cam, atol=1e-9)
+    np.testing.assert_array_equal(own.path, table.path)
+    packed = pack_own_frames([own], UNKNOWN, NETWORK, tmp_path)
+    frames = np.load(packed.frames)
+    for index, image in ((0, "seq-01/frame-000000"), (23, "seq-03/frame-000003")):
+        with Image.open(calm / f"{image}.color.png") as opened:
+            np.testing.assert_array_equal(frames[index], fit_frame(opened, 64, "whole"))
+    manifest = json.loads((calm / "manifest.json").read_text())
+    assert packed.camera.fx == pytest.approx(manifest["camera"]["fx"])
+
+
+def test_photographs_join_rendered_frames_in_their_world_and_camera(calm, photographs, tmp_path):
+    rendered = Path(shutil.copytree(calm, tmp_path / "set"))
+    moved = pose_matrix(rotation_from_rpy([0.3, -0.2, 2.0]), np.array([1.0, -2.0, 0.5]))
+    write_sequence_from_world(rendered, moved)
+    sets = [read_own_frames(folder, ()) for folder in (rendered, photographs)]
+    packed = pack_own_frames(sets, PhotographCamera(focal_px=70.0), NETWORK, tmp_path)
+    table = read_pose_table(packed.labels)
+    assert len(table) == 24 + COUNT
+    assert len(set(table.path[:24]) & set(table.path[24:])) == 0
+    np.testing.assert_allclose(table.world_from_cam[:24], sets[0].world_from_cam, atol=1e-9)
+    in_sequence = moved @ table.world_from_cam[24:]
+    np.testing.assert_allclose(in_sequence, sets[1].world_from_cam, atol=1e-9)
+    np.testing.assert_array_equal(packed.sequence_from_world, moved)
+    assert packed.camera.width == 40  # the rendered frames'
+    with Image.open(photographs / "frame-000000.color.jpg") as opened:
+        squeezed = fit_frame(opened, 64, "whole")
+    assert np.abs(np.load(packed.frames)[24].astype(int) - squeezed).mean() > 2  # it was resampled
+    made = run(tmp_path / "both", rendered, photographs, images=64)
+    np.testing.assert_allclose(described(made.model)["sequence_from_world"], moved)
+
+
+def test_parts_of_a_sequence_can_be_taken_and_are_cut_into_blocks(photographs):
+    own = read_own_frames(photographs, (FrameRange(0, 5), FrameRange(10, 14)))
+    names = [path.name[6:12] for path in own.color]
+    assert names == [f"{index:06d}" for index in (0, 1, 2, 3, 4, 10, 11, 12, 13)]
+    assert own.path.tolist() == list(range(9))
+    assert read_own_frames(photographs, ()).path.tolist() == [i // 2 for i in range(COUNT)]
+
+
+@pytest.mark.parametrize("suffix", ["png", "jpg"])
+def test_sequences_below_a_folder_are_read_with_either_kind_of_file(tmp_path, suffix):
+    for number in (1, 2):
+        write_photographs(tmp_path / "all" / f"seq-{number:02d}", 6, suffix, seed=number)
+    own = read_own_frames(tmp_path / "all", (FrameRange(4, 8),))
+    assert [path.parent.name for path in own.color] == ["seq-01"] * 2 + ["seq-02"] * 2
+
+
+def test_one_path_leaves_nothing_to_hold_out_and_is_learned_from(calm, tmp_path, capsys):
+    given = ["train", calm, "--out", tmp_path / "out", "--images", 64, "--device", "cpu"]
+    assert main([str(argument) for argument in given]) == 0
+    assert "nothing was held out" in capsys.readouterr().out
+
+
+def test_minutes_settle_the_images_once(photographs, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    settled = {"minutes": 0.5, "localizer": "posenet2", "images": 128}
+    (out / "budget.json").write_text(json.dumps(settled))
+    assert run(out, photographs, images=None, minutes=0.5).images == 128
+    made = run(tmp_path / "new", photographs, images=None, minutes=0.01)
+    assert made.images % 64 == 0
+    assert made.images >= 64
+
+
+def test_randomisation_changes_the_weights_and_can_be_turned_off(
+    photographs, undisturbed, tmp_path
+):
+    off = [run(tmp_path / name, photographs, randomisation=None).model for name in "ab"]
+    assert off[0].read_bytes() == off[1].read_bytes()
+    assert off[0].read_bytes() != (undisturbed / "model.pt").read_bytes()
+
+
+def without_a_pose(folder):
+    (folder / "frame-000003.pose.txt").unlink()
+
+
+def damaged_image(folder):
+    (folder / "frame-000003.color.jpg").write_bytes(b"no picture")
+
+
+def turned_pose(folder):
+    (folder / "frame-000003.pose.txt").write_text("2 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n")
+
+
+def emptied(folder):
+    for path in folder.iterdir():
+        path.unlink()
+
+
+@pytest.mark.parametrize(
+    ("harm", "words"),
+    [
+        (without_a_pose, "frame-000003.pose.txt: missing"),
+        (damaged_image, "frame-000003.color.jpg: cannot be read as an image"),
+        (turned_pose, "frame-000003.pose.txt: is not a rigid pose"),
+        (emptied, "give the folder of a posed sequence"),
+    ],
+)
+def test_a_sequence_that_cannot_be_used_is_told_in_one_line(
+    photographs, tmp_path, capsys, harm, words
+):
+    folder = Path(shutil.copytree(photographs, tmp_path / "flat"))
+    harm(folder)
+    out = tmp_path / "out"
+    assert words in refused(capsys, "train", folder, "--out", out, "--images", 64)
+    assert not (out / "model.pt").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--images", 0], "--images: must be at least 1"),
+        (["--minutes", 0], "--minutes: must be a positive number"),
+        (["--minutes", 1, "--images", 9], "--minutes: --images says how long already"),
+        (["--held-out", 1], "--held-out: must be a share"),
+        (["--frames", 5, 5], "--frames: 5 5 holds no frame"),
+        (["--frames", 100, 200], "none of them in the range"),
+        (["--focal", -1], "--focal: must be a positive number"),
+        (["--camera", "absent.yaml"], "absent.yaml: cannot be read as a calibration"),
+        (["--randomisation", "absent.yaml"], "absent.yaml: cannot be read as YAML"),
+        (["--seed", -1], "--seed: must be 0 or above"),
+    ],
+)
+def test_options_that_cannot_be_meant_are_told_in_one_line(
+    photographs, tmp_path, capsys, options, words
+):
+    assert words in refused(capsys, "train", photographs, "--out", tmp_path / "out", *options)
+    assert not (tmp_path / "out/model.pt").exists()
+
+
+def test_ranges_of_randomisation_come_from_a_file(photographs, tmp_path, capsys):
+    path = tmp_path / "light.yaml"
+    path.write_text("exposure_ev: [1, -1]\n")
+    given = ["train", photographs, "--out", tmp_path / "out", "--randomisation", path]
+    assert "light.yaml: exposure_ev: the first number" in refused(capsys, *given)
+    path.write_text("exposure_ev: [0, 0]\nblur: null\n")
+    assert main([str(a) for a in [*given, "--images", 64, "--device", "cpu"]]) == 0
+    kept = json.loads((tmp_path / "out/training.json").read_text())["settings"]["randomisation"]
+    assert kept["exposure_ev"] == [0, 0]
+    assert kept["blur"] is None
+
+
+def test_nothing_of_another_kind_is_written_over(photographs, undisturbed, tmp_path, capsys):
+    out = tmp_path / "mine"
+    out.mkdir()
+    (out / "thesis.tex").write_text("all of it")
+    assert "holds 'thesis.tex'" in refused(capsys, "train", photographs, "--out", out)
+    (out / "thesis.tex").unlink()
+    shutil.copytree(undisturbed, out, dirs_exist_ok=True)
+    line = refused(capsys, "train", photographs, "--out", out, "--images", 64)
+    assert "holds a localizer trained with another images" in line
+
+
+def test_data_sets_of_two_cameras_do_not_fit(calm, tmp_path, capsys):
+    other = Path(shutil.copytree(calm, tmp_path / "other"))
+    manifest = json.loads((other / "manifest.json").read_text())
+    manifest["camera"]["fx"] += 1.0
+    (other / "manifest.json").write_text(json.dumps(manifest))
+    line = refused(capsys, "train", calm, other, "--out", tmp_path / "out", "--images", 64)
+    assert "other/manifest.json: camera: is another than that of" in line

@@ -1,0 +1,79 @@
+"""Jobs import what they use: a budget of modules that a job of each kind must not import.
+
+Hundreds of jobs are processes of a few seconds, and large libraries take a second to import.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+# Functions of rules, and the modules that their jobs do without.
+BUDGETS = {
+    "baselines.training.score:write_scores": [
+        "torch",
+        "matplotlib",
+        "trimesh",
+        "open3d",
+        "networkx",
+        "scipy.optimize",
+        "sympy",
+    ],
+    "baselines.training.experiment:train_and_score": [
+        "torch._dynamo",
+        "torch._inductor",
+        "sympy",
+        "matplotlib",
+        "trimesh",
+        "open3d",
+        "networkx",
+        "scipy.optimize",
+    ],
+    "synfeal.dataset.render_sequence:render_packed": [
+        "torch",
+        "matplotlib",
+        "pandas",
+        "sympy",
+    ],
+    "synfeal.dataset.packed:write_packed": ["torch", "matplotlib", "pandas", "trimesh", "scipy"],
+    "synfeal.dataset.pose_table:write_first_frames": ["torch", "matplotlib", "pandas", "trimesh"],
+    "synfeal.planning.plan:write_plan": ["torch", "matplotlib", "pandas"],
+}
+OPTIMISERS = """
+import torch
+from baselines.training.optimizer import OPTIMISERS, Schedule
+for make in OPTIMISERS.values():
+    network = torch.nn.Linear(3, 2)
+    optimisation = make(network, Schedule(64, 8, 1e-3, 0.0))
+    for _ in range(2):
+        optimisation.step(network(torch.ones(1, 3)).sum())
+    optimisation.load_state_dict(optimisation.state_dict())
+"""
+
+
+def modules_after(code):
+    """What a new process has imported after this code."""
+    code += "\nimport json, sys\nprint(json.dumps(sorted(sys.modules)))"
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", code]
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    return set(json.loads(run.stdout))
+
+
+@pytest.mark.parametrize("function", BUDGETS)
+def test_a_job_does_not_import_what_it_does_not_use(function):
+    code = "import reproduction.runs.job\nfrom pkgutil import resolve_name\n"
+    code += f"resolve_name({function!r})"
+    imported = modules_after(code)
+    assert function.partition(":")[0] in imported
+    assert not imported.intersection(BUDGETS[function])
+
+
+def test_training_steps_do_not_import_torchs_compiler():
+    imported = modules_after(OPTIMISERS)
+    assert "torch" in imported
+    assert not imported & {"torch._dynamo", "torch._inductor", "sympy"}

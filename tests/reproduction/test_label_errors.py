@@ -1,0 +1,176 @@
+"""Kinds of label error: their sizes and shapes, from closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from baselines.labels.injected import OF_SPACE, add_noise, seed_names, with_error
+from baselines.labels.label_error import absolute_errors, share_within
+from reproduction.design.experiments import INJECTED
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.geometry.poses import pose_error, position_error_m
+from tests.support.property_support import (
+    directions,
+    few,
+    pose_of,
+    poses,
+    random_table,
+    seeds,
+    table_of,
+    turn,
+)
+
+
+def noise_of(clean, noisy):
+    """Displacements in metres and turns as rotation vectors."""
+    before, after = (Rotation.from_quat(t.quat_wxyz, scalar_first=True) for t in (clean, noisy))
+    return noisy.position_m - clean.position_m, (after * before.inv()).as_rotvec()
+
+
+def test_no_noise_changes_no_bit_and_the_seed_decides_part_by_part():
+    clean = random_table(50, 0, 7)
+    for noise_m, noise_deg in ((0.0, 0.0), (0.2, 0.0), (0.0, 10.0)):
+        noisy = add_noise(clean, noise_m, noise_deg, np.random.default_rng(2))
+        assert np.array_equal(noisy.position_m, clean.position_m) == (noise_m == 0)
+        assert np.array_equal(noisy.quat_wxyz, clean.quat_wxyz) == (noise_deg == 0)
+        np.testing.assert_array_equal(noisy.frame, clean.frame)
+        np.testing.assert_array_equal(noisy.path, clean.path)
+    one, other = (add_noise(clean, 0.1, 5.0, np.random.default_rng(seed)) for seed in (4, 5))
+    assert not np.array_equal(one.position_m, other.position_m)
+    alone = add_noise(clean, 0.1, 0.0, np.random.default_rng(4))
+    np.testing.assert_array_equal(alone.position_m, one.position_m)
+
+
+def test_directions_are_uniform_on_the_sphere():
+    count = 40_000
+    clean = random_table(count, 0, 7)
+    shift, turn = noise_of(clean, add_noise(clean, 1.0, 20.0, np.random.default_rng(3)))
+    for vectors in (shift, turn / np.radians(20.0)):
+        # A coordinate of a uniform unit vector is uniform on [-1, 1]: mean 0, variance 1/3.
+        bound = 5 / np.sqrt(count)
+        np.testing.assert_allclose(vectors.mean(axis=0), 0, atol=bound)
+        np.testing.assert_allclose(vectors.T @ vectors / count, np.eye(3) / 3, atol=bound)
+        below_half = (np.abs(vectors) < 0.5).mean(axis=0)
+        np.testing.assert_allclose(below_half, 0.5, atol=bound)
+    assert abs((shift * turn).sum(axis=1).mean()) < 5 / np.sqrt(count)
+
+
+@pytest.mark.parametrize(("noise_m", "noise_deg"), [(-0.1, 0.0), (0.0, -0.5), (-0.1, -5.0)])
+def test_negative_noise_is_refused(noise_m, noise_deg):
+    with pytest.raises(ValueError, match=f"must not be negative: {noise_m} m, {noise_deg} deg$"):
+        add_noise(random_table(2, 0, 7), noise_m, noise_deg, np.random.default_rng(0))
+
+
+SIZES = [(0.1, 5.0), (0.3, 20.0)]
+
+
+def erroneous(kind, table, train, noise_m=0.3, noise_deg=20.0, seed=1):
+    noise_deg = 0.0 if kind == "scale" else noise_deg
+    return with_error(kind, table, train, noise_m, noise_deg, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("kind", INJECTED)
+@pytest.mark.parametrize(("noise_m", "noise_deg"), SIZES)
+def test_every_kind_has_the_same_median_error_on_the_training_poses(kind, noise_m, noise_deg):
+    train = random_table(501, 0, 7)
+    found = erroneous(kind, train, train, noise_m, noise_deg)
+    position_m, orientation_rad = pose_error(found.world_from_cam, train.world_from_cam)
+    assert np.median(position_m) == pytest.approx(noise_m, rel=1e-9)
+    expected = 0.0 if kind == "scale" else noise_deg
+    assert np.degrees(np.median(orientation_rad)) == pytest.approx(expected, abs=1e-6)
+    np.testing.assert_array_equal(found.frame, train.frame)
+    np.testing.assert_array_equal(found.path, train.path)
+    np.testing.assert_allclose(np.linalg.norm(found.quat_wxyz, axis=1), 1)
+
+
+def test_an_offset_is_one_rigid_error_per_path_and_another_for_the_next():
+    clean = random_table(70, 0, 7)  # seven frames to a path
+    shift, turn = noise_of(clean, erroneous("offset", clean, clean))
+    for vectors, size in ((shift, 0.3), (turn, np.radians(20))):
+        by_path = vectors.reshape(10, 7, 3)
+        np.testing.assert_allclose(by_path, by_path[:, :1].repeat(7, axis=1), atol=1e-9)
+        np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), size)
+        assert position_error_m(by_path[1:, 0], by_path[:-1, 0]).min() > 1e-3
+
+
+def test_a_scale_multiplies_all_distances_from_the_first_camera_on():
+    train, test = random_table(101, 0, 7), random_table(40, 2, 7)
+    median_m = np.median(np.linalg.norm(train.position_m - train.position_m[0], axis=1))
+    found = [erroneous("scale", table, train).position_m for table in (train, test)]
+    np.testing.assert_array_equal(found[0][0], train.position_m[0])
+    for labels, truth in zip(found, (train, test), strict=True):
+        distances = [position_error_m(p[1:], p[:-1]) for p in (labels, truth.position_m)]
+        np.testing.assert_allclose(distances[0], (1 + 0.3 / median_m) * distances[1])
+    np.testing.assert_array_equal(erroneous("scale", test, train).quat_wxyz, test.quat_wxyz)
+
+
+def test_a_bend_belongs_to_space_and_is_smooth():
+    train = random_table(400, 0, 7)
+    low, high = train.position_m.min(axis=0), train.position_m.max(axis=0)
+    steps = np.linspace(0, 1, 2001)[:, None]
+    line = low + steps * (high - low)
+    still = np.tile([1.0, 0, 0, 0], (len(line), 1))
+    along = PoseTable(np.arange(len(line)), np.zeros(len(line), int), line, still)
+    shift, turn = noise_of(along, erroneous("bend", along, train))
+    # A sine of amplitude a and wavelength L changes by no more than 2 pi a / L per metre; the
+    # median length of the vectors is that of three sines, so a is below the median times 2.
+    travelled = np.linalg.norm(line[1] - line[0])
+    steepest = 2 * np.pi / (high - low).max() * np.sqrt(3)
+    for vectors, median in ((shift, 0.3), (turn, np.radians(20))):
+        change = np.linalg.norm(np.diff(vectors, axis=0), axis=1)
+        assert change.max() < steepest * 2 * median * travelled
+        assert np.ptp(vectors, axis=0).max() > median  # and yet it bends
+    # The same place has the same error, whichever split and path it is in.
+    again = PoseTable(train.frame, train.path[::-1], train.position_m, train.quat_wxyz)
+    one, two = (erroneous("bend", table, train).position_m for table in (train, again))
+    np.testing.assert_array_equal(one, two)
+
+
+def test_errors_of_space_are_seeded_alike_and_what_stands_still_is_not_scaled():
+    alike = [kind for kind in INJECTED if seed_names(kind, "train") == seed_names(kind, "test")]
+    assert sorted(alike) == sorted(OF_SPACE)
+    table = replace(random_table(3, 0, 7), position_m=np.ones((3, 3)))
+    np.testing.assert_array_equal(erroneous("scale", table, table).position_m, table.position_m)
+
+
+@pytest.mark.parametrize("kind", INJECTED)
+def test_two_sizes_of_a_kind_differ_in_size_alone(kind):
+    train = random_table(201, 0, 7)
+    small, large = (noise_of(train, erroneous(kind, train, train, *size)) for size in SIZES)
+    np.testing.assert_allclose(3 * small[0], large[0], atol=1e-9)
+    if kind != "scale":
+        np.testing.assert_allclose(4 * small[1], large[1], atol=1e-9)
+
+
+@few
+@given(st.lists(poses, min_size=1, max_size=5), directions, st.floats(0, 5), st.floats(0, 180))
+def test_labels_off_by_a_known_motion_have_that_error(listed, axis, off_m, off_deg):
+    truth = np.array(listed)
+    motion = pose_of(off_m * axis, turn(axis, np.radians(off_deg)))
+    errors = absolute_errors(table_of(truth @ motion), table_of(truth))
+    np.testing.assert_allclose(errors[0], off_m, atol=1e-9)
+    np.testing.assert_allclose(errors[1], off_deg, atol=1e-5)
+    assert share_within(errors, off_m + 1e-6, off_deg + 1e-4) == 1.0
+    assert share_within(errors, off_m - 1e-6, off_deg + 1e-4) == 0.0
+    assert share_within(errors, off_m + 1e-6, off_deg - 1e-4) == 0.0
+
+
+@few
+@given(seeds, st.floats(0.0, 10.0), st.floats(0.0, 180.0), st.lists(poses, min_size=1, max_size=5))
+@example(0, 0.0, 0.0, [np.eye(4)])
+@example(0, 0.0, 180.0, [np.eye(4)])
+def test_noise_moves_and_turns_every_pose_by_its_size(seed, noise_m, noise_deg, clean):
+    table = table_of(clean)
+    noisy = add_noise(table, noise_m, noise_deg, np.random.default_rng(seed))
+    moved_m = np.linalg.norm(noisy.position_m - table.position_m, axis=1)
+    np.testing.assert_allclose(moved_m, noise_m, atol=1e-12)
+    before, after = (Rotation.from_quat(t.quat_wxyz, scalar_first=True) for t in (table, noisy))
+    turned_deg = np.degrees((after * before.inv()).magnitude())
+    np.testing.assert_allclose(turned_deg, noise_deg, atol=1e-5)
+    assert (noisy.quat_wxyz[:, 0] >= 0).all()
+    np.testing.assert_array_equal(noisy.frame, table.frame)
+    np.testing.assert_array_equal(noisy.path, table.path)

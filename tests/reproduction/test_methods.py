@@ -1,0 +1,86 @@
+"""The list of methods, and the example of the page on adding one."""
+
+import re
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.config.labels import GroundTruthConfig, PoseGraphConfig
+from baselines.labels import methods
+from baselines.labels.batches import batches_of
+from baselines.labels.chain import chain_batches
+from baselines.labels.methods import METHODS, Method, estimate_batch, solve_graph
+from baselines.labels.posegraph.graph import Edge, PoseGraph
+from reproduction.figures.style import METHOD_STYLES
+from reproduction.tables.layouts import SOURCES
+from synfeal.config.dataset import CameraConfig
+from synfeal.geometry.poses import pose_matrix
+from tests.support.room_scene import straight_path
+
+PAGE = Path(__file__).parents[2] / "docs" / "groundtruth.md"
+CAMERA, CFG = CameraConfig(), GroundTruthConfig(batch_frames=10)
+
+
+@pytest.fixture
+def constant(monkeypatch):
+    """The method of the page, added as the page says."""
+    module_text, line = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    name = re.search(r"One module, `(.*?)\.py`", PAGE.read_text())[1].replace("/", ".")
+    module = types.ModuleType(name)
+    exec(module_text, module.__dict__)
+    monkeypatch.setitem(sys.modules, name, module)
+    (added,) = eval(f"{{{line}}}", {"Method": Method}).items()
+    monkeypatch.setitem(METHODS, *added)
+    return added[0]
+
+
+def test_the_example_of_the_page_labels_a_split(constant):
+    truth = straight_path(21, step_m=0.03, turn_deg=0.0)
+    batches = batches_of(len(truth), CFG.batch_frames)
+    estimates = []
+    for batch in batches:
+        paths = [Path(f"{k}.png") for k in range(batch.start, batch.stop)]
+        trajectory, facts = estimate_batch(constant, paths, paths, CAMERA, CFG, seed=0)
+        assert set(facts) == {"estimation_s", "peak_memory_mb"}
+        assert facts["peak_memory_mb"] > 1
+        estimates.append(trajectory)
+    labels, record = chain_batches(batches, estimates, truth, CFG)
+    # The camera moves 30 cm in a batch: each is assisted, and all other labels stand still.
+    assert [(b.assisted, b.lost) for b in record] == [(True, False)] * 2
+    np.testing.assert_allclose(labels.position_m[:10], np.tile(truth.position_m[0], (10, 1)))
+    np.testing.assert_allclose(labels.position_m[10:20], np.tile(truth.position_m[10], (10, 1)))
+    np.testing.assert_allclose(labels.position_m[20], truth.position_m[20])
+    assert constant in methods.frame_methods()
+    assert methods.stages_of(constant) == (constant,)
+
+
+def test_every_method_has_a_title_a_style_and_someone_who_runs_it():
+    for name, method in METHODS.items():
+        assert SOURCES[name] == method.title
+        assert name in METHOD_STYLES
+        assert not (method.estimate and method.optimiser)
+    own_rules = set(METHODS) - {*methods.frame_methods(), *methods.graph_methods()}
+    assert own_rules == {"sfm"}
+    rules = (PAGE.parent.parent / "workflow/rules/groundtruth.smk").read_text()
+    assert all(f"as {name} with:" in rules for name in own_rules)
+
+
+def test_odometry_alone_keeps_the_chain_that_an_optimiser_moves():
+    """Two motions of 1 m, and a closure that says 2.3 m: least squares gives each a third of it."""
+    unit = pose_matrix(np.eye(3), [1.0, 0, 0])
+    chain = np.stack([np.eye(4), unit, unit @ unit])
+    closure = pose_matrix(np.eye(3), [2.3, 0, 0])
+    edges = [
+        Edge(i, j, pose, np.eye(6)) for i, j, pose in ((0, 1, unit), (1, 2, unit), (0, 2, closure))
+    ]
+    graph, cfg = PoseGraph(chain, tuple(edges)), PoseGraphConfig()
+    alone, facts = solve_graph("rgbd-odometry", graph, cfg)
+    np.testing.assert_array_equal(alone.first_from_cam, chain)
+    assert alone.registered.all()
+    assert facts["estimation_s"] >= 0
+    for name in ("rgbd-g2o", "rgbd-open3d"):
+        solved, _ = solve_graph(name, graph, cfg)
+        np.testing.assert_allclose(solved.first_from_cam[:, 0, 3], [0, 1.1, 2.2], atol=1e-4)

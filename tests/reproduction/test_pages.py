@@ -1,0 +1,209 @@
+"""Publishing a run: small, whole and of one run; the pages have their numbers from it."""
+
+import hashlib
+import importlib
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from reproduction.report import pages
+from reproduction.report.pages import PAGES, PARTS, headline, main, part_of, rewritten
+from reproduction.report.publish import FINISHED, PUBLISHED, publish
+from reproduction.report.publish import main as publish_main
+from synfeal.errors import InputError
+from tests.support.report_results import change_cell
+
+REPOSITORY = Path(__file__).parents[2]
+MINI = REPOSITORY / "results/published/mini"
+DIFFICULTY = "results/benchmarks/scene_difficulty"
+
+
+@pytest.fixture
+def root(tmp_path, monkeypatch):
+    """A copy of the published results of mini; the working directory is the top of the copy."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(MINI, tmp_path / PUBLISHED / "mini")
+    shutil.copytree(REPOSITORY / "results/benchmarks/scene_difficulty", tmp_path / DIFFICULTY)
+    return tmp_path / PUBLISHED / "mini"
+
+
+def test_the_pages_show_the_published_results(monkeypatch):
+    monkeypatch.chdir(REPOSITORY)
+    assert main(["--check"]) == 0
+
+
+def test_what_pages_name_is_there():
+    page = (REPOSITORY / "docs/architecture.md").read_text()
+    ways = page.split("## Four ways")[1].split("\n## ")[0]
+    names = re.findall(r"`((?:synfeal|baselines)\.[\w.]+)`", ways)
+    assert len(names) > 20
+    for name in names:
+        module, _, function = name.rpartition(".")
+        assert callable(getattr(importlib.import_module(module), function)), name
+    page = (REPOSITORY / "docs/README.md").read_text()
+    paths = re.findall(r"`([\w.]+/[\w./]+)`", page)
+    assert len(paths) > 15
+    assert [path for path in paths if not (REPOSITORY / path).exists()] == []
+
+
+TABLES, SCENES = "published/mini/tables", "benchmarks/scene_difficulty"
+
+
+@pytest.mark.parametrize(
+    ("part", "file", "column", "value", "shown"),
+    [
+        ("size", f"{TABLES}/table4_size", "position_m_true", "7.654", "4.42 m"),  # over sqrt(3)
+        ("size", f"{TABLES}/table4_size", "published_position_m", "6.54", "*(6.54, "),
+        ("size", f"{TABLES}/table4_size", "position_m_true", "", "| failed *("),
+        ("labels", f"{TABLES}/table2_ground_truth", "orientation_deg_true", "99.87", "99.9°"),
+        ("difficulty", f"{SCENES}/large_room-sift", "covered_share_mean", "0.99", "| 99 % ("),
+        ("difficulty", f"{SCENES}/large_room-repetition", "far_share", "0.777", "77.7 %"),
+    ],
+)
+def test_changing_a_result_changes_the_text(root, part, file, column, value, shown):
+    assert shown not in PARTS[part](root)
+    change_cell(root.parent.parent / f"{file}.csv", column, value)
+    assert shown in PARTS[part](root)
+
+
+def test_parts_are_replaced_and_nothing_else():
+    text = "a\n<!-- x mini -->\nold\n<!-- /x -->\nb <!-- y -->\n<!-- x night -->\n<!-- /x -->\n"
+    once = rewritten(text, lambda name, profile: f"\\1 {name} of {profile}")
+    assert once == (
+        "a\n<!-- x mini -->\n\n\\1 x of mini\n\n<!-- /x -->\nb <!-- y -->\n"
+        "<!-- x night -->\n\n\\1 x of night\n\n<!-- /x -->\n"
+    )
+    assert rewritten(once, lambda name, profile: f"\\1 {name} of {profile}") == once
+
+
+def test_the_headline_is_of_the_largest_profile_published(root):
+    assert headline() == "mini"
+    shutil.copytree(root, root.with_name("night"))
+    change_cell(root.with_name("night") / "tables/table4_size.csv", "position_m_true", "7.654")
+    assert headline() == "night"
+    assert "4.42 m" in part_of("size", "headline")
+    assert "4.42 m" not in part_of("size", "mini")
+
+
+def test_unknown_parts_and_unpublished_results_are_input_errors(root):
+    for name in set(PARTS) - {"difficulty"}:
+        with pytest.raises(InputError, match="results/published/paper"):
+            part_of(name, "paper")
+    with pytest.raises(InputError, match="<!-- sizes mini -->: no such part"):
+        part_of("sizes", "mini")
+
+
+def test_check_writes_nothing_and_publishing_writes_all(root, capsys):
+    for page in PAGES:
+        page.parent.mkdir(exist_ok=True)
+        page.write_text("<!-- size headline --><!-- /size -->\n")
+    assert main(["--check"]) == 1
+    assert str(PAGES[0]) in capsys.readouterr().out
+    assert PAGES[0].read_text() == "<!-- size headline --><!-- /size -->\n"
+    assert not pages.FIGURE.exists()
+    assert main([]) == 0
+    assert "Large Room 6k" in PAGES[0].read_text()
+    assert main(["--check"]) == 0
+    references = root / "tables/references.csv"
+    rows = pd.read_csv(references)
+    rows["position_m_true"] /= 2
+    rows.to_csv(references, index=False)
+    assert main(["--check"]) == 1  # the figure alone
+
+
+REPOSITORY = Path(__file__).parents[2]
+LIMIT_MB = 4.0
+
+
+@pytest.fixture
+def finished(tmp_path, monkeypatch):
+    """A finished run in ``results/mini``, and pages that show one of its two figures."""
+    monkeypatch.chdir(tmp_path)
+    run = tmp_path / "results/mini"
+    texts = {
+        "tables/table1_meshes.csv": "scene\n",
+        "tables/table1_meshes.tex": "\\begin{table}\n",
+        "figures/shown.png": "png",
+        "figures/unseen.png": "png",
+        "runs/model.pt": "weights",
+        "report.html": "<html>",
+        **dict.fromkeys(FINISHED, "text\n"),
+    }
+    recorded = {
+        name: hashlib.sha256(text.encode()).hexdigest()
+        for name, text in texts.items()
+        if name.startswith(("tables", "figures"))
+    }
+    texts["provenance.json"] = json.dumps({"files": recorded})
+    for name, text in texts.items():
+        (run / name).parent.mkdir(parents=True, exist_ok=True)
+        (run / name).write_text(text)
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "README.md").write_text("![x](results/published/mini/figures/shown.png)\n")
+    (tmp_path / "docs/a.md").write_text("[x](../results/published/stretch/figures/other.png)\n")
+    return run
+
+
+def files_below(folder):
+    return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_a_run_is_published_without_what_no_page_shows_and_so_is_one_of_labels_alone(finished):
+    target = finished.parent / "published/mini"
+    (target / "tables").mkdir(parents=True)
+    (target / "tables/of_an_older_design.csv").write_text("old")
+    assert publish_main(["--profile", "mini"]) == 0
+    tables = {f"tables/table1_meshes.{end}" for end in ("csv", "tex")}
+    assert files_below(target) == tables | {"figures/shown.png"} | set(FINISHED)
+    assert all((target / name).read_bytes() == (finished / name).read_bytes() for name in tables)
+    for name in FINISHED:
+        (finished / name).unlink()
+    assert publish_main([]) == 0
+    assert "figures/shown.png" in files_below(finished.parent / "published/mini")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("claims.csv", None, "claims.csv: missing; finish the run"),
+        ("figures/shown.png", None, r"shown.png: missing, and README.md shows it"),
+        ("tables/table1_meshes.csv", "another run's", "is not the file of .*provenance.json"),
+    ],
+)
+def test_what_does_not_belong_together_is_not_published(finished, name, text, said):
+    if text is None:
+        (finished / name).unlink()
+    else:
+        (finished / name).write_text(text)
+    target = Path("results/published/mini")
+    target.mkdir(parents=True)
+    (target / "kept.txt").touch()
+    with pytest.raises(InputError, match=said):
+        publish(Path("results/mini"), target, [Path("README.md")])
+    assert files_below(target) == {"kept.txt"}
+
+
+def test_tracked_results_are_small_and_of_their_provenance():
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "results"], cwd=REPOSITORY, capture_output=True, check=True
+    )
+    paths = [REPOSITORY / name for name in listed.stdout.decode().split("\0") if name]
+    assert {p.relative_to(REPOSITORY).parts[1] for p in paths} == {"published", "benchmarks"}
+    assert sum(p.stat().st_size for p in paths) <= LIMIT_MB * 1e6
+
+
+@pytest.mark.parametrize("profile", ["mini", "night"])
+def test_published_results_are_those_of_a_recorded_run(profile):
+    finished = REPOSITORY / "results/published" / profile
+    record = json.loads((finished / "provenance.json").read_text())
+    assert len(record["commit"]) >= 40
+    assert record["stages"]
+    paths = [finished / "claims.csv", finished / "summary.md", *(finished / "tables").glob("*.csv")]
+    for path in [*paths, *(finished / "figures").glob("*")]:
+        sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+        assert record["files"][path.relative_to(finished).as_posix()] == sha256

@@ -1,0 +1,128 @@
+"""Table 8, its sentences and its figures, from rows whose numbers are known."""
+
+import math
+
+import pytest
+
+from reproduction.real.figures import draw_amount, draw_cover
+from reproduction.real.findings import real_findings, real_table
+from reproduction.report.html.page import _real_table
+from reproduction.tables.columns import write_side
+from reproduction.tables.real import AMOUNT, COVER, NAME, SCHEMA, read_real, side_table
+from synfeal.records.tables import frame_of, write_frame
+
+COUNTS = {"n_seeds": 3, "n_test": 500, "n_blocks": 10, "n_fused": 250, "correlation_frames": 31.0}
+
+
+def around(name, value):
+    return {name: value, f"{name}_low": 0.5 * value, f"{name}_high": 1.5 * value}
+
+
+def row(direction, trained_on, method, position_m, **further):
+    return {
+        "scene": "kitchen",
+        "direction": direction,
+        "labels": "given",
+        "trained_on": trained_on,
+        "method": method,
+        **around("position_m", position_m),
+        **around("orientation_deg", 40 * position_m),
+        **around("recall_5cm_5deg", 0.25),
+        **around("localized", 0.6),
+        "position_m_worst": 1.1 * position_m,
+        "orientation_deg_worst": 44 * position_m,
+        **COUNTS,
+        **further,
+    }
+
+
+@pytest.fixture
+def root(tmp_path):
+    rows = [
+        row("forward", "photographs", "posenet2", 0.48),
+        row("forward", "randomised", "posenet2", 0.12, **around("times_position", 4.0)),
+        row("forward", "randomised", "posenet", 0.16),
+        row("forward", "rendered", "structure", math.inf),
+        row("forward", "rendered", "retrieval", 0.31),
+        row("forward", "rendered", "nearest", 0.21),
+        row("forward", "photographs", "mean", 0.62),
+        row("reverse", "photographs", "posenet2", 0.46),
+        row("reverse", "randomised", "posenet2", 0.33, **around("times_position", 1.4)),
+    ]
+    write_frame(tmp_path / "tables" / f"{NAME}.csv", frame_of(rows, SCHEMA))
+    return tmp_path
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path):
+    (tmp_path / "tables").mkdir()
+
+
+def test_infinite_errors_and_missing_yardsticks_are_read_back(root):
+    table = read_real(root / "tables" / f"{NAME}.csv")
+    assert math.isinf(table.position_m[3])
+    assert table.position_m_sfm.isna().all()
+    assert table.n_test.tolist() == [500] * 9
+
+
+def test_sentences_give_the_numbers_of_their_rows(root):
+    text = real_findings(root)
+    assert "at 0.120 m / 4.8° on 500 photographs" in text
+    assert "at 0.480 m / 19.2°: 4.0 times as exact (95 % limits 2.0 to 6.0)" in text
+    assert "1.4 times as exact" in text
+    assert "between 0.120 m / 4.8° (PoseNet2) and 0.160 m / 6.4° (PoseNet)" in text
+    assert "Structure, map of rendered: half not localized, 25 % within 5 cm" in text
+    assert "the mean pose 0.620 m / 24.8°" in text
+
+
+def test_the_table_is_the_same_on_page_on_paper_and_in_markdown(root):
+    table = side_table(read_real(root / "tables" / f"{NAME}.csv"))
+    write_side(root / "table.tex", table)
+    tex = (root / "table.tex").read_text()
+    (shown,) = _real_table(root)
+    for text in (tex, str(shown["body"]), real_table(root)):
+        assert text.count("Scan of the second half, photographs of the first") >= 1
+        assert "0.120 m" in text
+        assert "half not localized" in text
+        assert "SfM" not in text  # nothing was scored against it
+    assert shown["title"] == "Table 8"
+
+
+def test_a_report_without_such_a_run_has_no_such_table(tmp_path):
+    assert list(_real_table(tmp_path)) == []
+
+
+def test_figures_show_every_point_and_mark_single_runs():
+    points = [
+        {"kind": kind, "trained_on": trained_on, "amount": amount, "n_seeds": seeds}
+        | around("position_m", error)
+        | around("orientation_deg", 30 * error)
+        for kind, trained_on, amount, seeds, error in (
+            ("frames", "randomised", 100, 1, 0.4),
+            ("frames", "randomised", 3000, 3, 0.12),
+            ("photographs", "photographs", 500, 3, 0.46),
+            ("photographs", "randomised", 50, 1, 0.5),
+        )
+    ]
+    panel = draw_amount(frame_of(points, AMOUNT)).axes[0]
+    line, *_, hollow = panel.get_lines()
+    assert line.get_xydata().tolist() == [[100, 0.4], [3000, 0.12]]
+    assert hollow.get_xydata().tolist() == [[100, 0.4]]
+
+
+def test_bins_of_few_photographs_are_not_drawn():
+    bins = [
+        {
+            "direction": "forward",
+            "trained_on": "randomised",
+            "share_low": share - 0.05,
+            "share_high": share + 0.05,
+            "share": share,
+            "n_test": count,
+            "position_m": 0.1 / share,
+            "orientation_deg": 4.0,
+        }
+        for share, count in ((0.45, 3), (0.75, 40), (0.95, 400))
+    ]
+    (line,) = draw_cover(frame_of(bins, COVER)).axes[0].get_lines()
+    assert line.get_xdata().tolist() == [75.0, 95.0]

@@ -1,0 +1,188 @@
+"""Which backend draws: failures are injected, and one process really cannot load EGL."""
+
+import importlib
+import logging
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from synfeal.config.dataset import RenderConfig
+from synfeal.errors import InputError
+from synfeal.mesh.model import MeshPart, TexturedMesh
+from synfeal.render import choose, open_renderer
+from synfeal.render.base import pieces
+from tests.support.small_room import (
+    BACKENDS,
+    LOOK_ALONG_X,
+    PYOPENGL_WARNS,
+    camera_of,
+    colored,
+    facing_quad,
+)
+
+pytestmark = pytest.mark.filterwarnings(PYOPENGL_WARNS)
+
+GREEN = TexturedMesh((facing_quad(2.0, 9.0, base_color=colored((0, 255, 0))),))
+
+
+@pytest.fixture(autouse=True)
+def forget():
+    """What worked is remembered for the process; not from one test to the next."""
+    yield
+    choose.why_not.cache_clear()
+    choose.fastest_working.cache_clear()
+
+
+@pytest.fixture
+def fresh(forget):
+    choose.why_not.cache_clear()
+    choose.fastest_working.cache_clear()
+
+
+def seen(backend="auto"):
+    with open_renderer(GREEN, camera_of(), RenderConfig(backend=backend)) as renderer:
+        assert (renderer.render(LOOK_ALONG_X) == [0, 255, 0]).all()
+        return type(renderer).__name__
+
+
+@pytest.mark.parametrize("name", BACKENDS)
+def test_a_backend_may_be_named(name):
+    assert seen(name).lower() == f"{name}renderer"
+
+
+@pytest.mark.usefixtures("fresh")
+def test_auto_takes_the_first_and_says_so_once(caplog):
+    caplog.set_level(logging.INFO, "synfeal")
+    assert seen().lower() == f"{BACKENDS[0]}renderer"
+    seen()
+    told = [record for record in caplog.records if record.levelno == logging.INFO]
+    assert len(told) == 1
+    assert BACKENDS[0] in told[0].getMessage()
+    if BACKENDS[0] == "opengl":
+        assert len(caplog.records) == 1
+
+
+def no_library(*_, **__):
+    raise ImportError("libEGL.so.1 not loaded")
+
+
+def no_device(*_, **__):
+    raise RuntimeError("requested device index 0,\nbut found 0 devices")
+
+
+def black(*_, **__):
+    class Black:
+        def render_rgbd(self, _):
+            return np.zeros((16, 16, 3), np.uint8), np.ones((16, 16), np.float32)
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_): ...
+
+    return Black()
+
+
+@pytest.mark.usefixtures("fresh")
+@pytest.mark.parametrize(
+    ("broken", "said"),
+    [
+        (no_library, "ImportError: libEGL.so.1 not loaded; pip install moderngl"),
+        (no_device, "RuntimeError: requested device index 0, but found 0 devices; pip"),
+        (black, "it draws a red square wrongly"),
+    ],
+)
+def test_auto_falls_back_with_one_warning(broken, said, monkeypatch, caplog):
+    monkeypatch.setitem(choose.BACKENDS, "opengl", broken)
+    assert seen() != "OpenglRenderer"
+    seen()
+    warnings = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
+    opengl_warnings = [line for line in warnings if "opengl does not work here" in line]
+    assert len(opengl_warnings) == 1
+    assert said in opengl_warnings[0]
+    assert "\n" not in opengl_warnings[0]
+
+
+@pytest.mark.usefixtures("fresh")
+@pytest.mark.parametrize(
+    ("name", "context", "opens"),
+    [
+        ("opengl", "shared_context", "moderngl.create_context"),
+        ("pyrender", "_context", "egl.get_device_by_index"),
+    ],
+)
+def test_a_context_that_cannot_be_made_names_the_packages(name, context, opens, monkeypatch):
+    if name not in BACKENDS:
+        pytest.skip(f"{name} does not work here anyway")
+    module = importlib.import_module(f"synfeal.render.{name}_backend")
+    monkeypatch.setattr(f"{module.__name__}.{opens}", no_device)
+    monkeypatch.setattr(module, context, getattr(module, context).__wrapped__)
+    assert seen() == ("OpenglRenderer" if name == "pyrender" else "PyrenderRenderer")
+    with pytest.raises(
+        InputError, match=rf"backend: {name} does not .*found 0 devices.*libegl1 libgl1 libgl1-mesa"
+    ):
+        seen(name)
+
+
+@pytest.mark.usefixtures("fresh")
+def test_when_nothing_works_all_of_it_is_named(monkeypatch):
+    for name in choose.BACKENDS:
+        monkeypatch.setitem(choose.BACKENDS, name, no_device)
+    with pytest.raises(InputError) as raised:
+        seen()
+    for name in choose.BACKENDS:
+        assert f"{name}: RuntimeError: requested device" in str(raised.value)
+
+
+DRAW = """
+import logging
+logging.basicConfig(format="%(levelname)s %(message)s")
+from tests.synfeal.test_render_choose import seen, InputError
+print(seen())
+for name in ("opengl", "pyrender"):
+    try:
+        seen(name)
+    except InputError as error:
+        print(error)
+"""
+
+
+@pytest.mark.parametrize("lacking", ["library", "driver"])
+def test_a_process_without_egl_still_draws(lacking, tmp_path):
+    """Once libEGL cannot be loaded, once it finds no driver."""
+    (tmp_path / "libEGL.so.1").write_bytes(b"no library")
+    places = {
+        "library": {"LD_LIBRARY_PATH": str(tmp_path)},
+        "driver": {"__EGL_VENDOR_LIBRARY_DIRS": str(tmp_path)},
+    }
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", DRAW],
+        env={**os.environ, **places[lacking]},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    name, opengl_error, pyrender_error = done.stdout.splitlines()
+    assert name == "RaycastRenderer"
+    for backend, error in (("opengl", opengl_error), ("pyrender", pyrender_error)):
+        assert f"render.backend: {backend} does not work here" in error
+        assert "libegl1" in error
+        assert f"WARNING render.backend: {backend} does not work here" in done.stderr
+
+
+def test_parts_with_too_many_vertices_are_drawn_in_pieces():
+    rng = np.random.default_rng(0)
+    vertices = rng.normal(size=(300, 3))
+    faces = rng.integers(0, 300, (500, 3))
+    uv, rgb = rng.random((300, 2)), rng.integers(0, 255, (300, 3), np.uint8)
+    part = MeshPart("part", vertices, faces, uv, vertex_rgb=rgb)
+    split = list(pieces(part, most_vertices=90))
+    assert max(len(piece.vertices_m) for piece in split) <= 90
+    for name, whole in (("vertices_m", vertices), ("uv", uv), ("vertex_rgb", rgb)):
+        corners = np.concatenate([getattr(piece, name)[piece.faces] for piece in split])
+        np.testing.assert_array_equal(corners, whole[faces])
+    assert list(pieces(part, most_vertices=300)) == [part]

@@ -1,0 +1,181 @@
+"""The workflow as a user meets it: what a dry run plans, and how a wrong configuration ends."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from baselines.labels.methods import METHODS
+
+ROOT = Path(__file__).parents[2]
+
+
+def snakemake(*arguments):
+    command = [sys.executable, "-m", "snakemake", "--cores", "2", *arguments]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def planned_jobs(results, *arguments):
+    """Jobs by rule that a dry run into an empty results directory plans."""
+    run = snakemake("--dry-run", "--config", f"results={results}", *arguments)
+    assert run.returncode == 0, run.stdout + run.stderr
+    return {name: int(n) for name, n in re.findall(r"^(\w+) +(\d+)$", run.stdout, re.MULTILINE)}
+
+
+def test_default_profile_plans_the_papers_tables(tmp_path):
+    jobs = planned_jobs(tmp_path)
+    # 21 data sets (5 label sources, 9 noises, 3 + 4 more sizes) and 4 starts from scratch, 5 models
+    assert jobs["train"] == 125
+    assert "score" not in jobs  # what trains scores, too
+    assert jobs["scene"] == 2
+    assert jobs["erroneous_labels"] == 9 * 2
+    assert jobs["sfm"] == jobs["rgbd"] == 24 + 10  # 1,500 and 625 frames in batches of 63
+    assert jobs["posegraph"] == 2 * jobs["rgbd"]
+    assert jobs["estimate"] == jobs["rgbd"]
+    assert jobs["chain"] == 4
+    assert jobs["image_references"] == 21
+    assert jobs["structure_references"] == 5  # true poses, SfM's, largest noise of three blocks
+    assert jobs["table"] + jobs["table1_meshes"] == 5
+    assert not jobs.keys() & {"adjusted_references", "coordinate_references", "train_varied"}
+
+
+def test_the_complete_profile_adds_our_own_tables(tmp_path):
+    jobs = planned_jobs(tmp_path, "--configfile", "config/complete.yaml")
+    assert jobs["train"] == 175  # 35 distinct data set x start x images, 5 models
+    assert jobs["erroneous_labels"] == (9 + 6) * 2
+    # Each data set once; structure where frames with depth are rendered: all but the larger sizes.
+    assert jobs["image_references"] == 27
+    assert jobs["structure_references"] == 20
+    assert jobs["adjusted_references"] == 14  # those of Tables 2 and 3
+    assert jobs["coordinate_references"] == 4  # simulator, largest noise of each block
+    assert jobs["descriptors"] == jobs["features"] == jobs["views"] == 2
+    assert jobs["correspondences"] == jobs["tracks"] == jobs["references_table"] == 1
+    assert jobs["table"] + jobs["table1_meshes"] == 7
+
+
+def test_the_record_of_a_run_reads_what_every_job_took_and_all_asks_every_job_for_an_output(
+    tmp_path,
+):
+    """Else the record depends on which jobs happen to have ended, and on a shared file system."""
+    out = tmp_path / "jobs.json"
+    command = ["reproduction.plan.dry_run", "config/smoke.yaml", str(tmp_path), str(out)]
+    subprocess.run([sys.executable, "-m", *command], cwd=ROOT, check=True, capture_output=True)
+    jobs = json.loads(out.read_text())
+    (read,) = (set(job["input"]) for job in jobs if job["rule"] == "provenance")
+    unread = {job["rule"] for job in jobs if job["benchmark"] and job["benchmark"] not in read}
+    assert unread == {"provenance", "report", "report_document"}  # made beside the record
+    # An output of a job that failed is missed only where a target asks for it.
+    (asked,) = (set(job["input"]) for job in jobs if job["rule"] == "all")
+    unasked = {job["rule"] for job in jobs if job["output"] and asked.isdisjoint(job["output"])}
+    assert unasked == {
+        "render_packed",
+        "render_varied",
+        "features",
+        "views",
+    }  # gone once they are used
+
+
+def test_a_single_experiment_is_a_target(tmp_path):
+    target = f"{tmp_path}/mini/runs/large_room/6k/synfeal/scratch/posenet2/seed0/metrics.json"
+    jobs = planned_jobs(tmp_path, "--", target)
+    assert jobs["train"] == 1
+    assert "sfm" not in jobs
+    assert "pretrain" not in jobs
+    # Only what one scene's network frames need: no image files, no frames for reconstruction.
+    assert jobs["render_packed"] == (20_000 + 5_000) / 2500
+    assert "render" not in jobs
+
+
+def test_the_stretch_profile_labels_with_every_method_and_trains_nothing(tmp_path):
+    jobs = planned_jobs(tmp_path, "--configfile", "config/stretch.yaml", "--", "labels")
+    assert not {"train", "score", "pretrain", "table"} & set(jobs)
+    assert jobs["sfm"] == jobs["rgbd"] == jobs["estimate"] == 4 + 1  # 1,000 and 250 frames
+    assert jobs["posegraph"] == 4 * jobs["rgbd"]
+    assert jobs["chain"] == len(METHODS)
+    assert jobs["assistance"] == jobs["label_error"] == jobs["speed_vs_error"] == 1
+    assert jobs["figures"] == 1
+
+
+def test_changing_one_noise_level_adds_only_that_rows_jobs(tmp_path):
+    changed = tmp_path / "experiments.csv"
+    shutil.copy(ROOT / "config/experiments.csv", changed)
+    text = changed.read_text()
+    row = "orientation,large_room,6k,noise,0,20,"
+    assert row in text
+    changed.write_text(text.replace(row, "orientation,large_room,6k,noise,0,25,"))
+    before = planned_runs(tmp_path)
+    after = planned_runs(tmp_path, f"experiments={changed}")
+    assert len(after - before) == len(before - after) == 5
+    assert all("noise-p0-r25" in path for path in after - before)
+
+
+def planned_runs(results, *config):
+    run = snakemake("--dry-run", "--config", f"results={results}", *config, "--", "runs")
+    assert run.returncode == 0, run.stdout + run.stderr
+    listing = snakemake("--summary", "--config", f"results={results}", *config, "--", "runs")
+    return set(re.findall(r"^\S+/metrics\.json", listing.stdout, re.MULTILINE))
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("scael=0.1", ["scael", "unknown key", "scale"]),
+        ("experiments={wrong_labels}", ["labels 'orb'", "rgbd-toro"]),
+    ],
+)
+def test_wrong_configuration_ends_in_one_line(tmp_path, override, words):
+    design = (ROOT / "config/experiments.csv").read_text().replace(",sfm,", ",orb,")
+    (tmp_path / "design.csv").write_text(design)
+    override = override.format(wrong_labels=tmp_path / "design.csv")
+    run = snakemake("--dry-run", "--config", override)
+    assert run.returncode == 1
+    errors = [line for line in run.stderr.splitlines() if line.startswith("error:")]
+    assert len(errors) == 1
+    assert all(word in errors[0] for word in words), errors[0]
+    assert "Traceback" not in run.stderr
+
+
+# Hands every planned job to its function's twin that checks its arguments and does nothing.
+CALLED = """
+import sys
+from functools import wraps
+from pathlib import Path
+from pkgutil import resolve_name
+from types import SimpleNamespace
+from snakemake.api import SnakemakeApi
+from snakemake.settings.types import (
+    ConfigSettings, DAGSettings, OutputSettings, ResourceSettings, StorageSettings
+)
+from reproduction.runs import job
+job.resolve_name = lambda place: wraps(resolve_name(place))(lambda **_: None)
+config = {"results": sys.argv[1], "profile": "smoke"}
+with SnakemakeApi(OutputSettings(dryrun=True)) as api:
+    workflow = api.workflow(
+        resource_settings=ResourceSettings(cores=1), storage_settings=StorageSettings(),
+        config_settings=ConfigSettings(config=config, configfiles=[Path("config/smoke.yaml")]),
+        snakefile=Path("Snakefile"),
+    )
+    dag = workflow.dag(DAGSettings(targets={"all"}, forceall=True))
+    dag.execute_workflow(executor="dryrun")
+    for each in workflow._workflow.dag.jobs:
+        if each.rule.name != "all":
+            given = {name: getattr(each, name) for name in ("input", "output", "params")}
+            job.call(SimpleNamespace(config=config, wildcards=each.wildcards, **given))
+            print("called", each.rule.name)
+"""
+
+
+def test_every_rule_gives_its_function_what_it_asks_for(tmp_path):
+    """Else a rule and a signature that no longer fit are found hours into a run."""
+    command = [sys.executable, "-c", CALLED, str(tmp_path)]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    called = set(re.findall(r"^called (\w+)$", run.stdout, re.MULTILINE))
+    assert called == set(planned_jobs(tmp_path, "--configfile", "config/smoke.yaml")) - {
+        "all",
+        "total",
+    }
