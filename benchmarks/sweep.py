@@ -98,7 +98,7 @@ def read_sweep(path: Path) -> Sweep:
     try:
         sweep = Sweep.model_validate(read_yaml(path))
     except ValidationError as error:
-        raise InputError(f"{path}: {describe(error)}") from None
+        raise InputError(f"{path}: {describe(error)}") from error
     if sweep.measure not in MEASURES:
         raise InputError(f"{path}: measure: '{sweep.measure}' must be one of {', '.join(MEASURES)}")
     return sweep
@@ -143,7 +143,7 @@ def _run(
         case = model.model_validate(_filled(raw, str(results)))
     except ValidationError as error:
         where = ", ".join(f"{name} {value}" for name, value in key.items())
-        raise InputError(f"{sweep.title} ({where}): {describe(error)}") from None
+        raise InputError(f"{sweep.title} ({where}): {describe(error)}") from error
     return Run(key, case, hashlib.sha256(settings.encode()).hexdigest()[:12])
 
 
@@ -174,7 +174,7 @@ def read_table(path: Path, keys: Sequence[str]) -> pd.DataFrame:
     try:
         table = pd.read_csv(path, dtype=dict.fromkeys(names, str), keep_default_na=False)
     except (ValueError, OSError) as error:
-        raise InputError(f"{path}: cannot be read as a table ({error})") from None
+        raise InputError(f"{path}: cannot be read as a table ({error})") from error
     if list(table.columns[: len(names)]) != names:
         raise InputError(f"{path}: must begin with the columns {', '.join(names)}; move it away")
     return table

@@ -38,9 +38,9 @@ class InputError(Exception):
 def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
     """Carry out what a command does: 0, or 1 with ``error: ...`` for what a person can fix.
 
-    That is an :class:`InputError`, and what the system refuses: a full or read-only disk, a name
-    that is too long, links that lead in a circle. Ctrl-C is 130, with what it leaves behind:
-    ``if_interrupted``, unless the ``KeyboardInterrupt`` says it itself.
+    That is an :class:`InputError`, too little memory, and what the system refuses: a full or
+    read-only disk, a name that is too long, links that lead in a circle. Ctrl-C is 130, with what
+    it leaves behind: ``if_interrupted``, unless the ``KeyboardInterrupt`` says it itself.
     """
     try:
         action()
@@ -52,6 +52,12 @@ def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
             raise
         place = f"{error.filename}: " if error.filename else ""
         print(f"error: {InputError(f'{place}{error.strerror}; {if_interrupted}')}", file=sys.stderr)
+        return 1
+    except MemoryError as error:
+        wanted = f" ({error})" if str(error) else ""
+        remedy = "end other programs, or use a machine with more"
+        line = InputError(f"out of memory{wanted}; {remedy}; {if_interrupted}")
+        print(f"error: {line}", file=sys.stderr)
         return 1
     except KeyboardInterrupt as interrupt:
         print(f"error: interrupted; {str(interrupt) or if_interrupted}", file=sys.stderr)

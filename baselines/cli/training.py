@@ -151,7 +151,7 @@ def _randomisation(text: str) -> PhotometricConfig | None:
     try:
         return PhotometricConfig.model_validate(read_yaml(path))
     except ValidationError as error:
-        raise InputError(f"{path}: {describe(error)}") from None
+        raise InputError(f"{path}: {describe(error)}") from error
 
 
 def trained_text(done: TrainedModel) -> str:

@@ -37,7 +37,7 @@ def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(
             f"{path}: cannot be read as arrays ({why(error)}); make it again"
-        ) from None
+        ) from error
 
 
 class Stored:

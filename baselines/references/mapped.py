@@ -265,7 +265,7 @@ def _read_record(folder: Path) -> tuple[dict[str, Any], CameraConfig, Array | No
     try:
         camera = CameraConfig.model_validate(record.get("camera"))
     except ValidationError as error:
-        raise InputError(f"{path}: camera: {describe(error)}; {REMEDY}") from None
+        raise InputError(f"{path}: camera: {describe(error)}; {REMEDY}") from error
     stored = record.get(KEY)
     return record, camera, None if stored is None else rigid_motion_of(record, path)
 

@@ -15,6 +15,7 @@ from PIL import Image
 from tqdm import tqdm
 
 from baselines.config.references import ReferencesConfig
+from baselines.localizers.memory import memory_errors
 from baselines.references.arrays import THUMBNAIL, VLAD, most_alike, read_described
 from baselines.references.correspondences import match_test_frames
 from baselines.references.features import Features, features_of
@@ -22,7 +23,7 @@ from baselines.references.run import pose_table
 from baselines.references.structure import lifted, localize
 from baselines.training.checkpoint import read_checkpoint
 from baselines.training.data import read_images
-from baselines.training.device import memory_errors, open_device
+from baselines.training.device import open_device
 from baselines.training.predict import predict
 from baselines.training.score import read_predictions
 from synfeal.config.dataset import CameraConfig, RenderConfig

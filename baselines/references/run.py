@@ -145,12 +145,12 @@ def run_external(
         raise InputError(
             f"references.external: command '{command}' cannot be filled ({why(error)});"
             f" placeholders are {', '.join(values)}"
-        ) from None
+        ) from error
     except (OSError, subprocess.CalledProcessError) as error:
         raise InputError(
             f"references.external: command '{command}' failed ({why(error)});"
             " the job's log has the rest"
-        ) from None
+        ) from error
     if not out.is_file():
         raise InputError(f"references.external: command '{command}' wrote no {out}")
     return out
@@ -171,7 +171,7 @@ def read_answers(path: Path, frames: PoseTable) -> PoseTable:
         message = (
             f"{path}: cannot be read as answers with columns {','.join(NEEDED)} ({why(error)})"
         )
-        raise InputError(message) from None
+        raise InputError(message) from error
     twice = found.frame[found.frame.duplicated()]
     if len(twice):
         raise InputError(f"{path}: frame {twice.iloc[0]:g} appears twice; keep one answer")

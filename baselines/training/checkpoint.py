@@ -12,7 +12,9 @@ from pydantic import Field, ValidationError
 
 from baselines.config.learning import LocalizerConfig, ModelName, NetworkConfig
 from baselines.localizers.base import Localizer
+from baselines.localizers.memory import is_out_of_memory, memory_errors
 from baselines.localizers.registry import build_localizer
+from baselines.localizers.saved import checked_state, load_saved
 from baselines.training.data import ImageStatistics
 from baselines.training.resume import serialised
 from synfeal.config.collection import Count, Finite, Positive, Strict
@@ -88,7 +90,7 @@ def frame_camera(frames: Path) -> FrameCamera | None:
         raise InputError(
             f"{record}: cannot be read as the record of packed frames ({why(error)});"
             " pack them again"
-        ) from None
+        ) from error
 
 
 @dataclass(frozen=True)
@@ -124,11 +126,13 @@ def save_checkpoint(
     save_atomically(path, checkpoint)
 
 
+@memory_errors()
 def read_checkpoint(path: Path, device: torch.device) -> TrainedLocalizer:
     """Build the localizer that a checkpoint describes, with its weights, on ``device``.
 
     Raises:
-        InputError: the file is missing or damaged, is no checkpoint, or is one without description.
+        InputError: The file is missing or damaged, is no checkpoint, or is one without description.
+        MemoryError: The device has too little memory for the localizer.
     """
     content = _read(path, device)
     if "description" not in content:
@@ -140,15 +144,19 @@ def read_checkpoint(path: Path, device: torch.device) -> TrainedLocalizer:
         description = ModelDescription.model_validate(content["description"])
     except ValidationError as error:
         reason = describe(error)
-        raise InputError(f"{path}: its description cannot be used ({reason})") from None
+        raise InputError(f"{path}: its description cannot be used ({reason})") from error
+    network = build_localizer(description.localizer, description.network, description.hyper)
+    network.place_on(device)
     try:
-        network = build_localizer(description.localizer, description.network, description.hyper)
-        network.place_on(device)
-        network.load_state_dict(content["localizer"])
-        statistics = _checked(ImageStatistics(**content["images"]))
-    except Exception:  # damaged values are refused in every way there is
-        message = f"{path}: its weights are not those of the {description.localizer} it describes"
-        raise InputError(f"{message}; train it again") from None
+        network.load_state_dict(checked_state(content["localizer"]))
+        statistics = _statistics(content["images"])
+    except (RuntimeError, ValueError) as error:
+        if is_out_of_memory(error):
+            raise
+        raise InputError(
+            f"{path}: its weights are not those of the {description.localizer} it describes;"
+            " train it again"
+        ) from error
     return TrainedLocalizer(description, network.eval(), statistics)
 
 
@@ -156,20 +164,28 @@ def _read(path: Path, device: torch.device) -> dict[str, Any]:
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; name the model.pt of a training run")
     try:
-        content = torch.load(path, map_location=device, weights_only=True)
-    except Exception:  # torch.load raises whatever the broken file provokes, with unsafe advice
+        content = load_saved(path, device)
+    except (OSError, ValueError) as error:
         raise InputError(
             f"{path}: is damaged or no trained localizer; name the model.pt of a training run"
-        ) from None
+        ) from error
     if not isinstance(content, dict) or not {"localizer", "images"} <= content.keys():
         raise InputError(f"{path}: holds no trained localizer; name the model.pt of a training run")
     return content
 
 
-def _checked(statistics: ImageStatistics) -> ImageStatistics:
-    for value in (statistics.mean, statistics.deviation):
+def _statistics(stored: object) -> ImageStatistics:
+    """Image statistics as they are stored.
+
+    Raises:
+        ValueError: They are not a mean and a positive deviation (1, 3, 1, 1).
+    """
+    values = checked_state(stored)
+    if values.keys() != {"mean", "deviation"}:
+        raise ValueError("its image statistics are not a mean and a deviation")
+    for value in values.values():
         if value.shape != (1, 3, 1, 1) or not value.isfinite().all():
             raise ValueError("its image statistics are damaged")
-    if not (statistics.deviation > 0).all():
+    if not (values["deviation"] > 0).all():
         raise ValueError("its image statistics have no standard deviation")
-    return statistics
+    return ImageStatistics(mean=values["mean"], deviation=values["deviation"])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Literal
 
 import torch
@@ -11,9 +9,6 @@ import torch
 from synfeal.errors import InputError
 
 Precision = Literal["float32", "bfloat16"]
-
-# What torch's RuntimeErrors say on a processor whose memory is used up.
-CPU_MEMORY_IS_OUT = ("DefaultCPUAllocator", "could not create a memory", "std::bad_alloc")
 
 
 def open_device(wanted: Literal["auto", "cpu", "cuda"]) -> torch.device:
@@ -53,16 +48,3 @@ def precision_on(device: torch.device, wanted: Literal["auto", "float32", "bfloa
 def autocast(device: torch.device, precision: Precision) -> torch.autocast:
     """A context in which networks compute in this precision; weights stay in float32."""
     return torch.autocast(device.type, torch.bfloat16, enabled=precision == "bfloat16")
-
-
-@contextmanager
-def memory_errors() -> Iterator[None]:
-    """Torch says in several ways that memory is used up; here it is always a MemoryError."""
-    try:
-        yield
-    except RuntimeError as error:
-        text = str(error)
-        on_gpu = isinstance(error, torch.OutOfMemoryError)
-        if not on_gpu and not any(words in text for words in CPU_MEMORY_IS_OUT):
-            raise
-        raise MemoryError(text.splitlines()[0].rpartition("DefaultCPUAllocator: ")[2]) from error

@@ -23,6 +23,7 @@ from baselines.training.predict import BATCH, DECIMALS, predict, predict_ms
 from baselines.training.resample import Resampler, same_view
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.photograph import PhotographCamera, Source
+from synfeal.dataset.frame_files import IMAGE_DAMAGE
 from synfeal.dataset.packed import View, fit_frame
 from synfeal.dataset.pose_table import COLUMNS
 from synfeal.dataset.render_sequence import Progress
@@ -260,7 +261,7 @@ def open_picture(path: Path) -> Image.Image:
                 if "transparency" in upright.info:  # a palette's: Pillow knows this way only
                     upright = upright.convert("RGBA")
                 return upright.convert("RGB")
-    except Exception as error:  # a damaged file is refused in every way there is
+    except IMAGE_DAMAGE as error:
         problem = f"cannot be read as a PNG or JPEG picture ({why(error)})"
     raise InputError(f"{path}: {problem}; leave it out or repair it")
 
@@ -328,7 +329,7 @@ def _in(directory: Path) -> list[Path]:
     try:
         files = sorted(path for path in directory.iterdir() if path.is_file())
     except OSError as error:
-        raise InputError(f"{directory}: cannot be listed ({error.strerror})") from None
+        raise InputError(f"{directory}: cannot be listed ({error.strerror})") from error
     if any(directory.glob("seq-[0-9]*")):
         raise InputError(f"{directory}: is a data set; name its sequences, {directory}/seq-01")
     found = [path for path in files if _is_picture(path.name.lower())]

@@ -11,9 +11,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from baselines.localizers.memory import memory_errors
 from baselines.training.checkpoint import TrainedLocalizer, read_checkpoint
 from baselines.training.data import read_images
-from baselines.training.device import memory_errors, open_device
+from baselines.training.device import open_device
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 
 # Of a prediction, metres and quaternions: float32 holds hardly more, and files stay small.

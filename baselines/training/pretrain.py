@@ -25,10 +25,11 @@ from baselines.localizers.backbones.weights import (
 )
 from baselines.localizers.base import Localizer, OutputLayer, PooledFeature
 from baselines.localizers.losses import LearnedWeightLoss, PosePrediction
+from baselines.localizers.memory import memory_errors
 from baselines.localizers.registry import BackboneName
 from baselines.training.checkpoint import save_atomically
 from baselines.training.data import LabelledFrames, image_statistics, read_labelled_frames
-from baselines.training.device import memory_errors, open_device, precision_on
+from baselines.training.device import open_device, precision_on
 from baselines.training.fit import LAST_WEIGHTS, fit
 from baselines.training.optimizer import Schedule
 from baselines.training.resume import ResumeFile, digest

@@ -69,7 +69,7 @@ def read_training_record(path: Path) -> dict[str, Any]:
     except (OSError, ValueError, TypeError, LookupError) as error:
         raise InputError(
             f"{path}: cannot be read as the record of a training run ({why(error)}); train it again"
-        ) from None
+        ) from error
     return dict(record)
 
 

@@ -83,16 +83,22 @@ class ResumeFile:
             return None
         try:
             content = self._path.read_bytes()
-            state, checksum = content[:-DIGEST_BYTES], content[-DIGEST_BYTES:]
-            if hashlib.sha256(state).digest() != checksum:
-                raise ValueError("its checksum is wrong")
-            found: dict[str, Any] = torch.load(io.BytesIO(state), "cpu", weights_only=True)
-            if found["fingerprint"] != self._fingerprint:
-                raise ValueError("it is of another training run")
-        except Exception as error:  # torch.load raises whatever the broken file provokes
-            log.warning("%s: ignored, %s; training starts anew", self._path, why(error)[:200])
+        except OSError as error:
+            self._say_ignored(why(error))
+            return None
+        state, checksum = content[:-DIGEST_BYTES], content[-DIGEST_BYTES:]
+        if hashlib.sha256(state).digest() != checksum:
+            self._say_ignored("its checksum is wrong")
+            return None
+        # Whole, hence written by this class: an error from here on is no damage.
+        found: dict[str, Any] = torch.load(io.BytesIO(state), "cpu", weights_only=True)
+        if found["fingerprint"] != self._fingerprint:
+            self._say_ignored("it is of another training run")
             return None
         return found
+
+    def _say_ignored(self, reason: str) -> None:
+        log.warning("%s: ignored, %s; training starts anew", self._path, reason)
 
 
 class RandomState:

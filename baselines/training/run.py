@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from baselines.config.learning import LocalizerConfig, ModelName, NetworkConfig, TrainingConfig
 from baselines.localizers.backbones.weights import load_backbone_weights
 from baselines.localizers.base import Localizer
+from baselines.localizers.memory import memory_errors
 from baselines.localizers.registry import build_localizer
 from baselines.training.checkpoint import ModelDescription, frame_camera, save_checkpoint
 from baselines.training.data import (
@@ -23,7 +24,7 @@ from baselines.training.data import (
     image_statistics,
     read_labelled_frames,
 )
-from baselines.training.device import memory_errors, open_device, precision_on
+from baselines.training.device import open_device, precision_on
 from baselines.training.fit import (
     HALVE_EVERY,
     NOT_KEPT,

@@ -77,7 +77,7 @@ class PhotographCamera:
             try:
                 return self.calibration.scaled(width, height)
             except ValueError as error:
-                raise InputError(f"{name}: its camera {self.file} {error}") from None
+                raise InputError(f"{name}: its camera {self.file} {error}") from error
         if self.focal_px is not None:
             return _centred(width, height, self.focal_px)
         if not self.exif:

@@ -138,7 +138,7 @@ def _camera(mesh: Path, sequence: Path, record: dict[str, Any] | None) -> Camera
     try:
         return CameraConfig.model_validate(values)
     except ValidationError as error:
-        raise InputError(f"{path}: camera: {describe(error)}") from None
+        raise InputError(f"{path}: camera: {describe(error)}") from error
 
 
 def resized(camera: CameraConfig, width: int | None, height: int | None) -> CameraConfig:
@@ -152,7 +152,7 @@ def resized(camera: CameraConfig, width: int | None, height: int | None) -> Came
     try:
         small = lens.scaled(width, height)
     except ValueError as error:
-        raise InputError(f"--width: the camera of --like {error}") from None
+        raise InputError(f"--width: the camera of --like {error}") from error
     return camera.model_copy(
         update={
             "width": small.width,

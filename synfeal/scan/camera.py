@@ -201,7 +201,7 @@ def _one(
                 {"calibration": file, "width": size[0], "height": size[1]}
             )
         except ValidationError as error:
-            raise InputError(f"--{kind}-camera: {describe(error)}") from None
+            raise InputError(f"--{kind}-camera: {describe(error)}") from error
     if focal_px is not None:
         if not 0 < focal_px < 1e5:
             raise InputError(f"--{kind}-focal: must be above 0 pixels, found {focal_px:g}")

@@ -50,6 +50,22 @@ def test_weights_of_another_width_or_hash_are_refused(tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["narrow.pt"]
 
 
+@pytest.mark.parametrize(
+    "error", [torch.OutOfMemoryError("full"), AttributeError("ours")], ids=["memory", "fault"]
+)
+@pytest.mark.parametrize("place", [(torch, "load"), (torch.nn.Module, "load_state_dict")])
+def test_neither_memory_nor_a_fault_is_blamed_on_the_weights(place, error, tmp_path, monkeypatch):
+    backbone = build_backbone("resnet34", 0.125)
+    torch.save(backbone.state_dict(), tmp_path / "backbone.pt")
+
+    def fail(*args, **kwargs):
+        raise error
+
+    monkeypatch.setattr(*place, fail)
+    with pytest.raises(type(error)):
+        load_backbone_weights(backbone, tmp_path / "backbone.pt")
+
+
 @all_backbones
 def test_without_a_network_the_message_says_where_to_put_the_file(name, tmp_path, monkeypatch):
     def refuse(url, timeout):

@@ -6,6 +6,8 @@ import pytest
 import torch
 
 from baselines.config.learning import MODELS, NetworkConfig
+from baselines.localizers.base import Localizer
+from baselines.training import checkpoint
 from baselines.training.checkpoint import frame_camera, read_checkpoint
 from baselines.training.predict import predict
 from synfeal.config.dataset import CameraConfig
@@ -66,6 +68,53 @@ UNKNOWN = {"localizer": "posenet2", "network": {"attention": True}}
 def test_a_damaged_checkpoint_is_one_line(model, values, message):
     with pytest.raises(InputError, match=rf"model\.pt: .*{message}"):
         read_checkpoint(changed(model, **values), CPU)
+
+
+GPU_IS_FULL = torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB.")
+CPU_IS_FULL = RuntimeError(
+    "[enforce fail at alloc_cpu.cpp:124] err == 0. DefaultCPUAllocator: can't allocate memory"
+)
+OUR_FAULT = AttributeError("'NoneType' object has no attribute 'shape'")
+# Steps of reading a checkpoint, as the module or class and the function of it that takes the step.
+STEPS = [
+    (torch, "load"),
+    (checkpoint, "build_localizer"),
+    (Localizer, "place_on"),
+    (Localizer, "load_state_dict"),
+]
+
+
+def fail_at(monkeypatch, step, error):
+    def fail(*args, **kwargs):
+        raise error
+
+    monkeypatch.setattr(*step, fail)
+
+
+@pytest.mark.parametrize("step", STEPS, ids=lambda step: step[1])
+@pytest.mark.parametrize("error", [GPU_IS_FULL, CPU_IS_FULL], ids=["GPU", "CPU"])
+def test_a_lack_of_memory_is_not_blamed_on_the_checkpoint(model, step, error, monkeypatch):
+    fail_at(monkeypatch, step, error)
+    with pytest.raises(MemoryError, match="memory") as caught:
+        read_checkpoint(model, CPU)
+    assert caught.value.__cause__ is error
+
+
+@pytest.mark.parametrize("step", STEPS, ids=lambda step: step[1])
+def test_a_fault_of_the_program_is_not_blamed_on_the_checkpoint(model, step, monkeypatch):
+    fail_at(monkeypatch, step, OUR_FAULT)
+    with pytest.raises(AttributeError, match="no attribute 'shape'"):
+        read_checkpoint(model, CPU)
+
+
+def test_a_changed_weight_is_noticed_and_its_cause_kept(model):
+    content = model.read_bytes()
+    weight = torch.load(model, weights_only=True)["images"]["mean"].numpy().tobytes()
+    place = content.index(weight)
+    model.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
+    with pytest.raises(InputError, match=r"model\.pt: is damaged") as caught:
+        read_checkpoint(model, CPU)
+    assert "damaged" in str(caught.value.__cause__)
 
 
 OFF_CENTRE = {"width": 90, "height": 40, "fx": 30.0, "fy": 30.0, "cx": 45.0, "cy": 10.0}

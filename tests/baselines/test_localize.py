@@ -118,6 +118,19 @@ def test_one_bad_picture_stops_all_and_leaves_what_there_was(run, tmp_path, caps
     assert sorted(tmp_path.iterdir()) == before
 
 
+def test_too_little_memory_is_one_line_that_blames_nobody(run, tmp_path, capsys, monkeypatch):
+    def fail(*args, **kwargs):
+        raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB.")
+
+    monkeypatch.setattr(torch, "load", fail)
+    line = refused(
+        capsys, "localize", run / "model.pt", run / "seq-01", "--out", tmp_path / "poses.csv"
+    )
+    assert line.startswith("error: out of memory (CUDA out of memory. Tried to allocate 2.00 GiB.)")
+    assert "train it again" not in line
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("out", ["seq-01", "model.pt", "seq-01/frame-000000.color.png"])
 def test_nothing_of_the_input_is_overwritten(run, capsys, out):
     size = (run / out).stat().st_size

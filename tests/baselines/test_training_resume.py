@@ -136,6 +136,21 @@ def test_a_file_that_is_not_its_own_is_ignored(
     assert "resume.pt: ignored" in caplog.text
 
 
+@pytest.mark.parametrize("error", [torch.OutOfMemoryError("full"), AttributeError("ours")])
+def test_a_sound_file_is_not_given_up_for_another_error(error, tmp_path, monkeypatch):
+    """Without this a run that lacks memory for a moment would lose all that it had learned."""
+    file = resume.ResumeFile(tmp_path / "resume.pt", "a run")
+    file.save_if_due({"random": resume.RandomState(torch.device("cpu"))}, now=True)
+
+    def fail(*args, **kwargs):
+        raise error
+
+    monkeypatch.setattr(torch, "load", fail)
+    with pytest.raises(type(error)):
+        file.load({})
+    assert (tmp_path / "resume.pt").exists()
+
+
 def test_a_digest_tells_any_change():
     values = [
         ("a", torch.zeros(2)),

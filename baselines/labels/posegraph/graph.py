@@ -115,7 +115,7 @@ def read_g2o(path: Path) -> PoseGraph:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a g2o file ({why(error)})") from None
+        raise InputError(f"{path}: cannot be read as a g2o file ({why(error)})") from error
     vertices: dict[int, Array] = {}
     edges: list[Edge] = []
     for number, line in enumerate(text.splitlines(), start=1):
@@ -147,7 +147,7 @@ def _graph(vertices: dict[int, Array], edges: Sequence[Edge], path: Path) -> Pos
     try:
         check_connected(graph)
     except ValueError as error:
-        raise InputError(f"{path}: {error}; is the file cut short? Make it again") from None
+        raise InputError(f"{path}: {error}; is the file cut short? Make it again") from error
     return graph
 
 
@@ -156,7 +156,7 @@ def _numbers(cells: Sequence[str], count: int, where: str) -> Array:
     try:
         values = np.array([float(cell) for cell in cells])
     except ValueError as error:
-        raise InputError(f"{where}: {why(error)}") from None
+        raise InputError(f"{where}: {why(error)}") from error
     if len(values) != count or not np.isfinite(values).all():
         raise InputError(f"{where}: needs {count} finite numbers, found {len(values)}")
     return values

@@ -16,7 +16,8 @@ import safetensors.torch
 import torch
 
 from baselines.localizers.registry import BackboneName
-from synfeal.errors import InputError, exit_status, why
+from baselines.localizers.saved import checked_state, load_saved
+from synfeal.errors import InputError, exit_status, read_as, why
 from synfeal.records.files import atomic_path, read_json, write_json
 
 SHIPPED = Path(__file__).parent / "shipped"
@@ -64,12 +65,8 @@ def ship(results: Path, directory: Path = SHIPPED) -> None:
 
 
 def _ship(trained: Path, name: BackboneName, directory: Path) -> str:
-    try:
-        state = torch.load(trained, map_location="cpu", weights_only=True)
-    except Exception as error:  # torch.load raises whatever the file provokes
-        raise InputError(
-            f"{trained}: cannot be read ({why(error)}); run `make start` first"
-        ) from error
+    with read_as(trained, "a backbone", remedy="; run `make start` first"):
+        state = checked_state(load_saved(trained))
     half = {k: v.half() if v.is_floating_point() else v for k, v in state.items()}
     content = safetensors.torch.save({k: v.contiguous() for k, v in half.items()})
     with atomic_path(directory / f"{name}.safetensors") as temporary:

@@ -7,15 +7,17 @@ import urllib.request
 from pathlib import Path
 
 import safetensors.torch
-import torch
+from safetensors import SafetensorError
 from torch import nn
 
 from baselines.config.learning import InceptionName
 from baselines.localizers.backbones.googlenet import GoogLeNet, InceptionBackbone
 from baselines.localizers.backbones.inception_v3 import InceptionV3
 from baselines.localizers.backbones.resnet import ResNet34
+from baselines.localizers.memory import is_out_of_memory
 from baselines.localizers.registry import BackboneName
-from synfeal.errors import InputError, why
+from baselines.localizers.saved import checked_state, load_saved
+from synfeal.errors import InputError, read_as, why
 from synfeal.records.files import atomic_path
 
 Backbone = InceptionBackbone | ResNet34
@@ -59,18 +61,17 @@ def load_backbone_weights(backbone: nn.Module, path: Path) -> None:
     Raises:
         InputError: the file cannot be read as a state dict, or belongs to another shape of network.
     """
-    try:
+    with read_as(path, "backbone weights", OSError, ValueError, SafetensorError):
         if path.suffix == ".safetensors":
             state = safetensors.torch.load_file(path)
         else:
-            state = torch.load(path, map_location="cpu", weights_only=True)
-        state = {k: v for k, v in state.items() if not k.startswith(CLASSIFIERS)}
-    except Exception as error:  # torch.load raises whatever the broken file provokes
-        problem = why(error) if isinstance(error, OSError) else "torch did not save it, or as code"
-        raise InputError(f"{path}: cannot be read as backbone weights ({problem})") from error
+            state = checked_state(load_saved(path))
+    state = {name: value for name, value in state.items() if not name.startswith(CLASSIFIERS)}
     try:
         backbone.load_state_dict(state)
     except RuntimeError as error:
+        if is_out_of_memory(error):
+            raise
         unfit = str(error).splitlines()[1].strip()
         raise InputError(
             f"{path}: does not fit {type(backbone).__name__} of this network.width ({unfit}); "
