@@ -46,7 +46,7 @@ archive: $(INSTALLED)  ## PROFILE's tables, figures, report.html and predictions
 	$(BIN)/synfeal keep results/$(PROFILE)
 	tar --create --gzip --file build/results-$(PROFILE).tar.gz --directory results \
 	  --owner 0 --group 0 --sort name --exclude '.snakemake*' \
-	  $(addprefix $(PROFILE)/,report.html report.tex summary.md claims.csv provenance.json benchmarks.csv tables figures predictions.zip)
+	  $(addprefix $(PROFILE)/,report.html summary.md claims.csv provenance.json benchmarks.csv tables figures predictions.zip)
 	@echo build/results-$(PROFILE).tar.gz
 
 plan: smoke  ## what paper and gpu cost, and what such plans are worth (results/benchmarks)

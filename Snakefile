@@ -43,7 +43,6 @@ rule all:
         lambda w: and_behind(*EVIDENCE),
         f"{ROOT}/provenance.json",
         f"{ROOT}/report.html",
-        f"{ROOT}/report.tex",
 
 
 rule scenes:
@@ -108,5 +107,5 @@ onstart:
 
 
 onsuccess:
-    summary = Path(ROOT, "summary.txt")
-    print(summary.read_text() if summary.exists() else "", end="")
+    if Path(ROOT, "report.html").exists():
+        print(f"Report: {ROOT}/report.html (one page; open it in a browser)")

@@ -93,7 +93,7 @@ STAGES: dict[str, Stage] = {
     "render_speed": Stage("scene", "image sizes"),
     **dict.fromkeys(("collection_speed", "tables"), Stage()),
     "claims": Stage("", "frames"),
-    **dict.fromkeys(("figures", "summary", "provenance", "report", "report_document"), Stage()),
+    **dict.fromkeys(("figures", "summary", "provenance", "report"), Stage()),
 }
 
 

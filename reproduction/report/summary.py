@@ -1,4 +1,4 @@
-"""The summary of a run: one page of Markdown, and a few lines for the terminal."""
+"""Summarise a run on one page of Markdown."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ frame counts are in `tables/*.csv`, and as LaTeX in `tables/*.tex`.
 """
 
 
-def write_summary(design: Design, root: Path, out_md: Path, out_txt: Path) -> None:
-    """Write checks, then every table beside the paper's; and what a person sees when a run ends."""
+def write_summary(design: Design, root: Path, out_md: Path) -> None:
+    """Write whether localizers learned, then every table beside the paper's."""
     cells = {name: read_cells(name, design, root) for name in design.tables}
     findings = run_sentences(cells)
     mesh_facts = meshes.read_meshes([*dict.fromkeys(row.scene for row in design.rows)], root)
@@ -52,7 +52,6 @@ def write_summary(design: Design, root: Path, out_md: Path, out_txt: Path) -> No
         *map(sheet_markdown, sheets),
     ]
     write_text(out_md, "\n".join(parts))
-    write_text(out_txt, terminal_text(root, out_md, findings))
 
 
 def run_sentences(cells: Mapping[str, pd.DataFrame]) -> list[str]:
@@ -66,19 +65,6 @@ def run_sentences(cells: Mapping[str, pd.DataFrame]) -> list[str]:
     total = sum(map(len, cells.values()))
     counted = f"{total - len(failed)} of {total} table cells have a score{which}."
     return [counted, *(alive_sentences(cells[ALIVE]) if ALIVE in cells else [])]
-
-
-def terminal_text(root: Path, summary: Path, findings: Sequence[str]) -> str:
-    """What a person sees when the run ends: findings, and where the tables are."""
-    places = {
-        "Report": root / "report.html",
-        "Tables": root / "tables",
-        "Figures": root / "figures",
-        "Summary": summary,
-    }
-    lines = [f"{name + ':':<8} {path}" for name, path in places.items()]
-    lines[0] += "   (one page with everything; open it in a browser)"
-    return "\n".join([*(f"- {finding}" for finding in findings), *lines]) + "\n"
 
 
 POSITION, ORIENTATION = "position_m_true", "orientation_deg_true"

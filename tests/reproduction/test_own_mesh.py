@@ -96,7 +96,7 @@ def test_the_file_on_the_page_is_short_and_its_dry_run_lists_the_jobs_of_one_row
     jobs = jobs_of(dry_run(own_profile(tmp_path)))
     trained = {f"train/my_room/small/synfeal/pretrained/{name}/seed0" for name in LOCALIZERS}
     assert {job for job in jobs if job.startswith("train")} == trained
-    assert {"scene/my_room", "tables/table4_size", "figures", "report", "report_document"} <= jobs
+    assert {"scene/my_room", "tables/table4_size", "figures", "report"} <= jobs
     without_rows = (
         OF_LABELS | {"tables/robustness"} | {f"tables/{t}" for t in {*ROWS} - {"table4_size"}}
     )
@@ -236,7 +236,7 @@ def test_the_page_and_the_summary_leave_out_the_table_without_rows(
     assert shown == {*KEYS} - {table} | of_labels
     assert "robustness.csv is missing" not in html
     assert "Without rows in this run:" in html
-    write_summary(design, finished, tmp_path / "summary.md", tmp_path / "summary.txt")
+    write_summary(design, finished, tmp_path / "summary.md")
     assert len(re.findall(r"^\*\*", (tmp_path / "summary.md").read_text(), re.MULTILINE)) >= 5
 
 

@@ -67,7 +67,7 @@ def test_the_record_of_a_run_reads_what_every_job_took_and_all_asks_every_job_fo
     jobs = json.loads(out.read_text())
     (read,) = (set(job["input"]) for job in jobs if job["rule"] == "provenance")
     unread = {job["rule"] for job in jobs if job["benchmark"] and job["benchmark"] not in read}
-    assert unread == {"provenance", "report", "report_document"}  # made beside the record
+    assert unread == {"provenance", "report"}  # made beside the record
     # An output of a job that failed is missed only where a target asks for it.
     (asked,) = (set(job["input"]) for job in jobs if job["rule"] == "all")
     unasked = {job["rule"] for job in jobs if job["output"] and asked.isdisjoint(job["output"])}

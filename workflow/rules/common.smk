@@ -259,13 +259,9 @@ def runs_of(table):
     return [run.directory for run in DESIGN.table_runs(table)]
 
 
-def table_files(name, caption=None):
-    """A table, CSV and LaTeX; with a caption of ``workflow/report`` it is in Snakemake's report."""
-    csv, shown = f"{ROOT}/tables/{name}.csv", f"../report/{caption}.rst"
-    return {
-        "csv": report(csv, caption=shown, category="Tables") if caption else csv,
-        "tex": f"{ROOT}/tables/{name}.tex",
-    }
+def table_files(name):
+    """A table, CSV and LaTeX."""
+    return {kind: f"{ROOT}/tables/{name}.{kind}" for kind in ("csv", "tex")}
 
 
 def table4_files(pattern):

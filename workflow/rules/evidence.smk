@@ -5,7 +5,7 @@ use rule call as table1_meshes with:
     input:
         properties=under("scenes/{scene}/properties.json", scene=SCENES),
     output:
-        **table_files("table1_meshes", "table1_meshes"),
+        **table_files("table1_meshes"),
     params:
         function="reproduction.tables.meshes:write_meshes_table",
         scenes=SCENES,
@@ -19,7 +19,7 @@ use rule call as table with:
             run=runs_of(w.table) if w.table == "table3_inconsistencies" else [],
         ),
     output:
-        **table_files("{table}", "table"),
+        **table_files("{table}"),
     wildcard_constraints:
         table="table[2-9]_[a-z_]+",
     params:
@@ -31,7 +31,7 @@ use rule call as recall with:
     input:
         metrics=METRICS,
     output:
-        **table_files("recall", "recall"),
+        **table_files("recall"),
     params:
         function="reproduction.tables.recall:write_recall_table",
         design=dump(DESIGN),
@@ -113,13 +113,7 @@ use rule call_2gb as figures with:
         collision=under("scenes/{scene}/collision.ply", scene=SCENES),
         frames=under("frames/{scene}/test.npy", scene=SCENES),
     output:
-        dir=report(
-            directory(f"{ROOT}/figures"),
-            patterns=["{figure}.png"],
-            caption="../report/figure.rst",
-            category="Figures",
-            labels={"figure": "{figure}"},
-        ),
+        dir=directory(f"{ROOT}/figures"),
     params:
         function="reproduction.figures.registry:write_figures",
         design=dump(DESIGN),
@@ -134,7 +128,6 @@ use rule call as summary with:
         properties=rules.table1_meshes.input.properties,
     output:
         md=f"{ROOT}/summary.md",
-        txt=f"{ROOT}/summary.txt",
     params:
         function="reproduction.report.summary:write_summary",
         design=dump(DESIGN),
@@ -150,11 +143,7 @@ use rule call as claims with:
         properties=rules.table1_meshes.input.properties,
         speed=under("scenes/{scene}/collection_speed.json", scene=SCENES),
     output:
-        csv=report(
-            f"{ROOT}/claims.csv",
-            caption="../report/claims.rst",
-            category="Claims",
-        ),
+        csv=f"{ROOT}/claims.csv",
     params:
         function="reproduction.claims.table:write_claims",
         design=dump(DESIGN),
@@ -218,15 +207,3 @@ use rule call_4gb as report with:
         function="reproduction.report.html.page:write_report",
         design=dump(DESIGN),
         with_robustness=robustness_asked(),
-
-
-use rule call as report_document with:
-    input:
-        tables=rules.document.input.tables,
-        hard_cases=rules.hard_cases.output.csv,
-        claims=rules.claims.output.csv,
-        figures=rules.figures.output.dir,
-    output:
-        tex=f"{ROOT}/report.tex",
-    params:
-        function="reproduction.report.document:write_report_document",

@@ -152,7 +152,7 @@ use rule call as references_table with:
         facts=reference_sets("facts.json"),
         localizers=METRICS,
     output:
-        **table_files("references", "references"),
+        **table_files("references"),
     params:
         function="reproduction.tables.references:write_references_table",
         design=dump(DESIGN),

@@ -129,7 +129,7 @@ use rule call_2gb as robustness with:
         varied=expand(f"{VARIED}/frames/{{effects}}/test.npy", effects=ROBUST_EFFECTS),
         labels=expand(f"{ROOT}/labels/{ROBUST_SET}/{{split}}.csv", split=SPLITS),
     output:
-        **table_files("robustness", "table"),
+        **table_files("robustness"),
     params:
         function="reproduction.tables.robustness:write_robustness_table",
         effects=ROBUST_EFFECTS,

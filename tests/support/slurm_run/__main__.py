@@ -152,14 +152,13 @@ if __name__ == "__main__":
 
 # What the controller writes about a node that is lost and found.
 RECOVERY = re.compile(r"requeu|not responding|now responding|returned to service", re.IGNORECASE)
-NAMES_ITS_RUN = "summary.txt"  # says in which directory its run's tables lie
 
 
 def differing_files(local: Path, slurm: Path) -> tuple[list[str], list[str]]:
     """Files promised to be the same, apart from times, and those that are not or lack."""
     expected, found = hashes_of(local), hashes_of(slurm)
     return tuple(
-        sorted(n for n in names if not reason_to_differ(n) and n != NAMES_ITS_RUN)
+        sorted(n for n in names if not reason_to_differ(n))
         for names in (expected, differing(expected, found))
     )
 

@@ -15,8 +15,6 @@ TIMED = {
     "logs/*": "progress and times",
     "provenance.json": "dates, times and hashes of timed files",
     "report.html": "shows what jobs took",
-    "report.tex": "shows times of hard cases",
-    "summary.txt": "says where the results lie",
     "references/*/facts.json": "what answers took",
     "scenes/*/collection_speed.json": "times of frames",
     "scenes/*/effects_speed.csv": "times of frames",
