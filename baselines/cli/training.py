@@ -48,6 +48,13 @@ LOCALIZE_OPTIONS = (
         choices=("sequence", "mesh"),
         default="sequence",
     ),
+    option(
+        "--turns",
+        "of a model: average each pose over N virtual rotations of the camera, there and back"
+        " (8); 0: the picture as it is, faster and less exact",
+        type=int,
+        metavar="N",
+    ),
 )
 
 
@@ -169,7 +176,7 @@ def trained_text(done: TrainedModel) -> str:
 
 def localize_by_model(arguments: argparse.Namespace) -> None:
     """Carry out ``synfeal localize`` with a checkpoint."""
-    from baselines.training.localize import localize
+    from baselines.training.localize import DEFAULT_TURNS, localize
 
     out: Path = arguments.out
     done = localize(
@@ -179,6 +186,7 @@ def localize_by_model(arguments: argparse.Namespace) -> None:
         arguments.device,
         camera=photograph_camera(arguments),
         world=arguments.world,
+        turns=DEFAULT_TURNS if arguments.turns is None else arguments.turns,
     )
     if done.n_failed:
         message = "%d of %d poses are not finite: the training of %s diverged"
@@ -233,7 +241,8 @@ def resampled_text(done: Localized) -> str:
 def poses_text(done: Localized) -> str:
     """How many poses, in which world, and what they took."""
     alone_ms = done.read_ms + done.network_ms
-    parts = f"median: read {done.read_ms:.2f}, network {done.network_ms:.2f}"
+    views = f" on {done.views} views" if done.views > 1 else ""
+    parts = f"median: read {done.read_ms:.2f}, network {done.network_ms:.2f}{views}"
     rate = f"{done.images_per_s:.0f} pictures/s in batches, on {done.device}"
     poses = "1 pose" if done.n_images == 1 else f"{done.n_images} poses"
     world = {"sequence": " in the world of the sequence", "mesh": " in the world of the mesh"}

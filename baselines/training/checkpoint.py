@@ -10,7 +10,12 @@ from typing import Any
 import torch
 from pydantic import Field, ValidationError
 
-from baselines.config.learning import LocalizerConfig, ModelName, NetworkConfig
+from baselines.config.learning import (
+    AugmentationConfig,
+    LocalizerConfig,
+    ModelName,
+    NetworkConfig,
+)
 from baselines.localizers.base import Localizer
 from baselines.localizers.memory import is_out_of_memory, memory_errors
 from baselines.localizers.registry import build_localizer
@@ -58,7 +63,7 @@ Point = tuple[Finite, Finite, Finite]
 class ModelDescription(Strict):
     """What stands in a checkpoint beside its weights."""
 
-    unless_none = ("sequence_from_world", "bounds_m")
+    unless_none = ("sequence_from_world", "bounds_m", "rotations")
 
     localizer: ModelName = Field(description="name of the localizer")
     network: NetworkConfig = Field(description="shape it was built with")
@@ -71,6 +76,9 @@ class ModelDescription(Strict):
     )
     bounds_m: tuple[Point, Point] | None = Field(
         None, description="corners of the box that the training positions lie in"
+    )
+    rotations: AugmentationConfig | None = Field(
+        None, description="that training images were turned by, where they were"
     )
 
 

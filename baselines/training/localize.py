@@ -19,8 +19,9 @@ from torch import Tensor
 
 from baselines.training.checkpoint import ModelDescription, TrainedLocalizer, read_checkpoint
 from baselines.training.device import open_device
-from baselines.training.predict import BATCH, DECIMALS, predict, predict_ms
+from baselines.training.predict import BATCH, DECIMALS, median_ms
 from baselines.training.resample import Resampler, same_view
+from baselines.training.virtual_views import VirtualViews
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.photograph import PhotographCamera, Source
 from synfeal.dataset.frame_files import IMAGE_DAMAGE
@@ -36,6 +37,8 @@ Array = NDArray[np.float64]
 World = Literal["sequence", "mesh"]
 # A network guesses a little beyond what it has seen; half a metre is no extrapolation in any room.
 LEAST_MARGIN_M = 0.5
+# Pairs of virtual rotations: twice as many change errors by less than their seeds do.
+DEFAULT_TURNS = 8
 
 log = logging.getLogger(__name__)
 
@@ -56,7 +59,8 @@ class Localized(NamedTuple):
         outside: Largest share of the training view that one of these does not show.
         world: Whose coordinates poses are in, where the two differ.
         read_ms: Median time to read and shrink a picture.
-        network_ms: Median time of the network on one picture alone.
+        network_ms: Median time of the network on all views of one picture alone.
+        views: Views of each picture that its pose is the mean of.
         images_per_s: Pictures per second in batches, reading included.
     """
 
@@ -71,6 +75,7 @@ class Localized(NamedTuple):
     world: World | None
     read_ms: float
     network_ms: float
+    views: int
     images_per_s: float
 
 
@@ -82,6 +87,7 @@ def localize(
     *,
     camera: PhotographCamera | None = None,
     world: World = "sequence",
+    turns: int = DEFAULT_TURNS,
 ) -> Localized:
     """Write the pose of each picture as CSV (columns of ``HEADER``), in the order named.
 
@@ -94,18 +100,23 @@ def localize(
         world: Whose coordinates ``world_from_cam`` is written in, where the place was scanned from
             a sequence that has its own; else they are those of the training labels. A pose that is
             not finite is written as ``nan``.
+        turns: Pairs of virtual rotations that a pose is averaged over; 0: the picture as it is.
 
     Raises:
         InputError: The model or a picture cannot be used, or ``out`` cannot be written.
     """
     trained = read_checkpoint(model, open_device(device))
+    if turns < 0:
+        raise InputError(f"--turns: must be 0 or above, found {turns}")
     reader = PictureReader(trained.description, camera or PhotographCamera(exif=False), model)
     pictures = find_pictures(named)
     _check_out(out, [model, *pictures])
-    network_ms = predict_ms(trained, _batch(trained, pictures[:1], reader))
+    views = VirtualViews(trained, turns)
+    first = _batch(trained, pictures[:1], reader)
+    network_ms = median_ms(lambda: views.predict(first))
     reader.read_s.clear()
     began = time.perf_counter()
-    position_m, quat_wxyz = _predict_all(trained, pictures, reader)
+    position_m, quat_wxyz = _predict_all(trained, views, pictures, reader)
     seconds = time.perf_counter() - began
     beyond = _beyond(trained.description, position_m)
     moved = trained.description.sequence_from_world
@@ -125,6 +136,7 @@ def localize(
         world=None if moved is None else world,
         read_ms=1000 * median(reader.read_s),
         network_ms=network_ms,
+        views=views.count,
         images_per_s=len(pictures) / seconds,
     )
 
@@ -151,7 +163,10 @@ def _moved(sequence_from_world: Array, position_m: Array, quat_wxyz: Array) -> t
 
 
 def _predict_all(
-    trained: TrainedLocalizer, pictures: Sequence[Path], reader: PictureReader
+    trained: TrainedLocalizer,
+    views: VirtualViews,
+    pictures: Sequence[Path],
+    reader: PictureReader,
 ) -> tuple[Array, Array]:
     """Positions (N, 3) and quaternions (N, 4), in batches as a test set is predicted in."""
     poses = []
@@ -159,7 +174,7 @@ def _predict_all(
         for start in range(0, len(pictures), BATCH):
             began = time.perf_counter()
             batch = pictures[start : start + BATCH]
-            poses.append(predict(trained, _batch(trained, batch, reader)))
+            poses.append(views.predict(_batch(trained, batch, reader)))
             progress.update(len(batch))
             if len(pictures) > BATCH:
                 name = f"picture {start + len(batch)} of {len(pictures)}"

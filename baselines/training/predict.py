@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
@@ -61,23 +62,33 @@ def predict(
     normalise = trained.statistics.normalise
     main = [trained.network(normalise(batch))[0] for batch in torch.split(images, BATCH)]
     position_m = torch.cat([p.position_m for p in main]).double().cpu()
-    quat_wxyz = torch.cat([p.quat_wxyz for p in main]).double().cpu()
-    # In double precision the length of no float32 quaternion but 0 is 0; 0 / 0 and inf / inf: nan.
-    quat_wxyz /= torch.linalg.vector_norm(quat_wxyz, dim=1, keepdim=True)
-    quat_wxyz = torch.where(quat_wxyz.isfinite().all(dim=1, keepdim=True), quat_wxyz, torch.nan)
+    quat_wxyz = normalised_quat_wxyz(torch.cat([p.quat_wxyz for p in main]))
     quat_wxyz = torch.where(quat_wxyz[:, :1] < 0, -quat_wxyz, quat_wxyz)
     return position_m.numpy().round(DECIMALS), quat_wxyz.numpy().round(DECIMALS)
 
 
-def predict_ms(trained: TrainedLocalizer, images: Tensor) -> float:
-    """Median milliseconds of predicting images (N, 3, H, W) at once, after one that is not timed.
+def normalised_quat_wxyz(quat_wxyz: Tensor) -> Tensor:
+    """Scale quaternions (N, 4) of any length to 1, in double precision on the processor.
 
-    Ends when the poses are on the processor.
+    One of zeros, or with a value that is not finite, is no rotation and becomes ``nan``.
     """
-    predict(trained, images)
+    # In double precision the length of no float32 quaternion but 0 is 0; 0 / 0 and inf / inf: nan.
+    unit = quat_wxyz.double().cpu()
+    unit = unit / torch.linalg.vector_norm(unit, dim=1, keepdim=True)
+    return torch.where(unit.isfinite().all(dim=1, keepdim=True), unit, torch.nan)
+
+
+def predict_ms(trained: TrainedLocalizer, images: Tensor) -> float:
+    """Median milliseconds of predicting images (N, 3, H, W) at once."""
+    return median_ms(lambda: predict(trained, images))
+
+
+def median_ms(act: Callable[[], object]) -> float:
+    """Time an action that ends on the processor: median of a few, after one that is not timed."""
+    act()
     times_s = []
     for _ in range(TIMED_CALLS):
         begin = time.perf_counter()
-        predict(trained, images)
+        act()
         times_s.append(time.perf_counter() - begin)
     return 1000 * float(np.median(times_s))

@@ -123,6 +123,7 @@ def train_localizer(
     identity = digest(*job, augment and augment.state_dict(), *material.fingerprints())
     resume = ResumeFile(out_model.with_name("resume.pt"), identity)
     rows = _fit(job, material, augment, resume)
+    turns = job.training.augmentation
     description = ModelDescription(
         localizer=job.name,
         network=job.network,
@@ -130,6 +131,7 @@ def train_localizer(
         camera=frame_camera(frames),
         sequence_from_world=_rows_of(sequence_from_world),
         bounds_m=_bounds_m(job, material),
+        rotations=turns if job.protocol.images == "rotated" and turns.turns else None,
     )
     save_checkpoint(out_model, material.localizer, material.statistics, description)
     write_history(out_history, rows)

@@ -65,7 +65,7 @@ RGBD_OPTIONS = (
     option("--min-view-distance", "least free view at the end of a path, metres (1.2)", type=float),
     option(
         "--min-seen",
-        "least share of a view that meets the mesh (0; 0.7 with --like)",
+        "least share of a view that meets the mesh (0; 0.85 with --like)",
         type=float,
     ),
     option("--min-clearance", "least distance of cameras from surfaces, metres (0)", type=float),

@@ -30,7 +30,7 @@ from synfeal.records.files import read_json
 Array = NDArray[np.float64]
 # Least free view of a photograph, metres, for people photograph tables from nearer than rooms; and
 # the least share of it that the scan shows: at the border of a scan cameras could look past it.
-MIN_VIEW_DISTANCE_M, MIN_SEEN = 0.8, 0.7
+MIN_VIEW_DISTANCE_M, MIN_SEEN = 0.8, 0.85
 FULL_TURN_DEG, STEEPEST_DEG = 330.0, 89.0
 
 
