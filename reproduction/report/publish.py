@@ -31,7 +31,7 @@ def publish(root: Path, target: Path, pages: Iterable[Path]) -> None:
 
     Args:
         root: results of the run, ``results/<profile>``.
-        target: where its published files go; what lies there is replaced.
+        target: where its published files go; what lies there is replaced as a whole, or stays.
         pages: Markdown files; figures of ``target`` that they show are published.
 
     Raises:
@@ -43,8 +43,7 @@ def publish(root: Path, target: Path, pages: Iterable[Path]) -> None:
         raise InputError(f"{root}/tables: holds no tables; make the results first")
     paths = [*tables, *_records(root), *_shown_figures(root, target, pages)]
     _check_provenance(root, paths)
-    shutil.rmtree(target, ignore_errors=True)
-    with atomic_directory(target) as directory:
+    with atomic_directory(target, replace=True) as directory:
         for path in paths:
             copy = directory / path.relative_to(root)
             copy.parent.mkdir(exist_ok=True)

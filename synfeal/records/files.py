@@ -145,16 +145,37 @@ def writing_to(path: Path, remedy: Callable[[], str]) -> Iterator[None]:
 
 
 @contextmanager
-def atomic_directory(path: Path) -> Iterator[Path]:
-    """A temporary directory beside ``path`` that is renamed to it if the block succeeds."""
+def atomic_directory(path: Path, *, replace: bool = False) -> Iterator[Path]:
+    """Yield a temporary directory beside ``path`` that takes its name if the block succeeds.
+
+    Args:
+        path: The directory to be made.
+        replace: Replace a directory that is already there. It keeps its name until the new one is
+            complete, and gets it back if the new one cannot take it; both renames follow each
+            other immediately.
+
+    Raises:
+        InputError: ``path`` is not empty, and not to be replaced.
+        OSError: The directory cannot be written.
+    """
     path = Path(path)
-    refuse_existing(path)
+    if not replace:
+        refuse_existing(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = Path(tempfile.mkdtemp(prefix=unfinished_prefix(path.name), dir=path.parent))
+    former = temporary.with_name(f"{temporary.name}-former")
     try:
         yield temporary
         temporary.chmod(0o755)
-        temporary.replace(path)
+        if replace and path.exists():
+            path.rename(former)
+        try:
+            temporary.replace(path)
+        except OSError:
+            if former.exists():
+                former.rename(path)
+            raise
+        shutil.rmtree(former, ignore_errors=True)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 

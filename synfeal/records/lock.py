@@ -8,7 +8,6 @@ command at work, and the prepared scene. When all is there the directory is rena
 
 from __future__ import annotations
 
-import fcntl
 import os
 import re
 import shutil
@@ -19,6 +18,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from filelock import FileLock, Timeout
 
 from synfeal.errors import InputError, why
 from synfeal.records.files import (
@@ -36,6 +37,8 @@ LOCK = ".lock"
 TEMPORARY = re.compile(rf"{re.escape(UNFINISHED)}-(?P<host>[\w.]+)-(?P<process>\d+)-.+")
 # A job on another machine writes its files more often than that.
 ABANDONED_S = 24 * 3600.0
+# Locks of runs, which the system releases when this process ends.
+_held_to_the_end: list[FileLock] = []
 
 
 def begin_run(root: Path) -> None:
@@ -49,7 +52,7 @@ def begin_run(root: Path) -> None:
     """
     try:
         root.mkdir(parents=True, exist_ok=True)
-        _lock(root / LOCK)  # nobody closes the descriptor before the process ends
+        _held_to_the_end.append(_lock(root / LOCK))
         _end_future(root)
     except OSError as error:
         raise InputError(
@@ -61,11 +64,11 @@ def begin_run(root: Path) -> None:
 @contextmanager
 def only_command(directory: Path, lock: Path) -> Iterator[None]:
     """Keep other commands out of ``directory`` during the block, by a lock on the file ``lock``."""
-    descriptor = _lock(lock, directory)
+    held = _lock(lock, directory)
     try:
         yield
     finally:
-        os.close(descriptor)
+        held.release()
 
 
 def remove_unfinished(root: Path) -> None:
@@ -117,24 +120,35 @@ def _end_future(root: Path) -> None:
         print(f"{root}: {len(future)} files dated in the future are now dated now", file=sys.stderr)
 
 
-def _lock(path: Path, directory: Path | None = None) -> int:
-    """Lock a file through a descriptor, which holds the lock until it is closed."""
+def _lock(path: Path, directory: Path | None = None) -> FileLock:
+    """Lock a file, and write into it who holds the lock.
+
+    Args:
+        path: The file, created where it is missing.
+        directory: Named in messages; the folder of ``path`` by default.
+
+    Returns:
+        The lock, held until it is released, is garbage, or the process ends.
+
+    Raises:
+        InputError: Another process holds the lock.
+        OSError: The file cannot be created.
+    """
     directory = directory or path.parent
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    path.touch(0o644)
+    lock = FileLock(path, timeout=0, fallback_to_soft=False)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        holder = os.read(descriptor, 200).decode(errors="replace") or "it did not say which"
-        os.close(descriptor)
+        lock.acquire()
+    except Timeout as error:
+        holder = path.read_text(errors="replace") or "it did not say which"
         raise InputError(
             f"{directory}: another run is at work there ({holder}); wait for its end, or end it"
         ) from error
     except OSError as error:  # some network file systems know no locks
         print(f"{path}: {error.strerror}; see yourself that no other run starts", file=sys.stderr)
-        return descriptor
-    os.ftruncate(descriptor, 0)
-    os.write(descriptor, f"process {os.getpid()} on {socket.gethostname()}".encode())
-    return descriptor
+    else:
+        path.write_text(f"process {os.getpid()} on {socket.gethostname()}")
+    return lock
 
 
 WORK = ".work"

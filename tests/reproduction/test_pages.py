@@ -188,6 +188,25 @@ def test_what_does_not_belong_together_is_not_published(finished, name, text, sa
     assert files_below(target) == {"kept.txt"}
 
 
+def test_an_interrupted_publication_leaves_what_was_published(finished, monkeypatch):
+    target = Path("results/published/mini")
+    target.mkdir(parents=True)
+    (target / "kept.txt").touch()
+
+    def full_disk(source, copy):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(copy))
+
+    with monkeypatch.context() as patch:
+        patch.setattr("shutil.copyfile", full_disk)
+        with pytest.raises(OSError, match="No space left"):
+            publish(Path("results/mini"), target, [Path("README.md")])
+    assert files_below(target.parent) == {"mini/kept.txt"}
+    publish(Path("results/mini"), target, [Path("README.md")])
+    assert "claims.csv" in files_below(target)
+    assert "kept.txt" not in files_below(target)
+    assert [path.name for path in target.parent.iterdir()] == ["mini"]
+
+
 def test_tracked_results_are_small_and_of_their_provenance():
     listed = subprocess.run(
         ["git", "ls-files", "-z", "results"], cwd=REPOSITORY, capture_output=True, check=True

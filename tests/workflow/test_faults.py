@@ -231,7 +231,7 @@ def test_jumped_clocks_leave_no_date_in_the_future_and_missing_locks_are_said(
     def no_locks(descriptor, operation):
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
-    monkeypatch.setattr("synfeal.records.lock.fcntl.flock", no_locks)
+    monkeypatch.setattr("fcntl.flock", no_locks)
     begin_run(tmp_path)
     message = f"{tmp_path}/.lock: No locks available; see yourself that no other run starts\n"
     assert capsys.readouterr().err == message
