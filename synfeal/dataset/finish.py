@@ -20,6 +20,7 @@ from synfeal.effects.scene import crowd_of
 from synfeal.records.files import file_sha256, read_json, write_json
 from synfeal.records.provenance import frame_versions
 from synfeal.records.tables import write_frame
+from synfeal.render.choose import graphics
 
 MANIFEST = "manifest.json"
 CLUTTER = "clutter.json"  # beside the mesh: which objects stand about in it, and where
@@ -39,7 +40,8 @@ def finish_dataset(
 ) -> None:
     """Write what is made of all frames together beside the sequences of a data set.
 
-    Poses with the names of the images, their coverage, split files, contact sheet, manifest.
+    Poses with the names of the images, their coverage, split files, contact sheet, manifest. What
+    draws is described for the machine that this runs on.
     """
     directory = out_manifest.parent
     splits: list[Split] = [split for split, count in counts.items() if count]
@@ -56,7 +58,10 @@ def finish_dataset(
         covered = {s: read_json(path) for s, path in zip(splits, coverage, strict=True)}
         write_json(directory / "coverage.json", covered)
     write_contact_sheet(frame_paths(list(paths.values()), "color.png"), directory / "preview.png")
+    drawn_by = graphics(origin["render"]["backend"])
+    origin = {**origin, "render": origin["render"] | {"backend": drawn_by["backend"]}}
     about = {"mesh_sha256": file_sha256(mesh), **origin, **_write_effects(directory, origin, mesh)}
+    about["graphics"] = drawn_by
     if detail is not None:
         about["detail"] = read_json(detail)
     clutter = mesh.with_name(CLUTTER)

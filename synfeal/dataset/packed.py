@@ -109,14 +109,15 @@ def fit_frame(image: Image.Image, input_px: int, view: View = "square") -> NDArr
     return np.asarray(small.crop((left, top, left + input_px, top + input_px)))
 
 
-def _read_shard(path: Path) -> dict[str, object]:
+def _read_shard(path: Path) -> dict[str, Any]:
+    """Read which frames a shard holds, and what drew them."""
     damage = (OSError, ValueError, TypeError, LookupError)
     with read_as(path, "the record of a shard", *damage, remedy="; render it again"):
         record = read_json(path)
         frames, backend = record["frames"], record["backend"]
         if type(frames) is not int or type(backend) is not str:
             raise ValueError("frames must be a whole number, backend a name")
-    return {"name": path.stem, "frames": frames, "backend": backend}
+    return {"name": path.stem, **record}
 
 
 def write_packed(
@@ -134,15 +135,17 @@ def write_packed(
     square = "short side resized to S + 1 px, then centre crop"
     seen = square if view == "square" else "the whole frame resized to S x S px"
     packed = read_packed(out_frames)
+    parts = [_read_shard(path) for path in records]
+    backends = ", ".join(sorted({part["backend"] for part in parts}))  # never ``auto``
     record = {
         "format": f"uint8 (N, S, S, 3); {seen}",
         "frames": len(packed),
         "input_px": packed.shape[1],
         "camera": camera.record,
-        "render": render.model_dump(mode="json"),
+        "render": render.model_dump(mode="json") | {"backend": backends},
         "plan_sha256": file_sha256(plan),
         "sha256": file_sha256(out_frames),
-        "shards": [_read_shard(path) for path in records],
+        "shards": parts,
         "versions": frame_versions(),
     }
     if detail is not None:

@@ -32,7 +32,7 @@ from synfeal.records.files import (
     writing_to,
 )
 from synfeal.render.base import Depth, Rgb
-from synfeal.render.choose import fastest_working
+from synfeal.render.choose import fastest_working, graphics
 
 
 class Progress(tqdm):  # type: ignore[type-arg]
@@ -178,8 +178,7 @@ def render_packed(
     """Render rows ``start`` to ``stop`` of a plan into one array, as :func:`pack_frames` packs.
 
     ``detail`` is what is drawn in place of ``mesh``, see :func:`synfeal.effects.scene.open_scene`.
-    ``.json`` beside it, in place of ``.npy``, says how many frames it holds and which backend drew
-    them.
+    ``.json`` beside it, in place of ``.npy``, says how many frames it holds and what drew them.
     """
     chosen, poses = resolved(render), read_frames(plan, start, stop)
     with (
@@ -193,6 +192,6 @@ def render_packed(
         for index, (rgb, _) in enumerate(frames):
             packed[index] = fit_frame(Image.fromarray(rgb), input_px, view)
             progress.update()
-        record = {"frames": len(poses), "backend": chosen.backend}
+        record = {"frames": len(poses), **graphics(chosen.backend)}
         write_json(out_frames.with_suffix(".json"), record)
     progress.part_done(out_frames.stem, len(poses), time.perf_counter() - began)

@@ -18,10 +18,19 @@ from pydantic import BaseModel
 import synfeal
 
 PACKAGES = (
-    *("gtsam", "numpy", "open3d", "pycolmap", "pyrender"),
-    *("scipy", "synfeal", "torch", "trimesh"),
+    "embreex",
+    "gtsam",
+    "moderngl",
+    "numpy",
+    "open3d",
+    "pycolmap",
+    "pyrender",
+    "scipy",
+    "synfeal",
+    "torch",
+    "trimesh",
 )
-DRAWING = ("deflate", "numpy", "pillow", "pyrender", "trimesh")
+DRAWING = ("deflate", "embreex", "moderngl", "numpy", "pillow", "pyrender", "trimesh")
 UNKNOWN = "unknown"
 CPU_INFO = Path("/proc/cpuinfo")
 

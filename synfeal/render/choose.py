@@ -95,6 +95,27 @@ def why_not(name: str) -> str | None:
     return None
 
 
+def graphics(backend: str) -> dict[str, str]:
+    """Describe what draws on this machine, for the records of frames.
+
+    Args:
+        backend: Name of a backend, or ``auto``.
+
+    Returns:
+        ``backend``, never ``auto``; where it draws with OpenGL, ``gl_vendor``, ``gl_renderer`` and
+        ``gl_version`` of the driver as it names them.
+    """
+    name = fastest_working() if backend == "auto" else backend
+    if name == "raycast" or why_not("opengl") is not None:
+        return {"backend": name}
+    from synfeal.render.opengl_backend import shared_context
+
+    with shared_context() as context:
+        info = context.info
+    keys = ("GL_VENDOR", "GL_RENDERER", "GL_VERSION")
+    return {"backend": name, **{key.lower(): str(info[key]) for key in keys}}
+
+
 # Looks along world x, upright.
 _FACING = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 

@@ -1,8 +1,10 @@
 """Publishing a run: small, whole and of one run; the pages have their numbers from it."""
 
+import errno
 import hashlib
 import importlib
 import json
+import os
 import re
 import shutil
 import subprocess

@@ -19,6 +19,7 @@ from reproduction.tables.columns import Column, SideTable
 from synfeal.records.files import file_sha256, write_json
 from synfeal.records.provenance import CPU_INFO, processor_name, provenance
 from synfeal.records.tables import records_of
+from synfeal.render.choose import graphics
 
 
 def write_provenance(
@@ -64,7 +65,7 @@ def hashes(results: Iterable[Path], root: Path) -> dict[str, str]:
 
 
 def machine() -> dict[str, Any]:
-    """Processor, its usable cores, memory in GiB, and the GPU (None without one)."""
+    """Describe processor, usable cores, memory in GiB, GPU (None without one) and OpenGL driver."""
     from torch import cuda  # torch takes a second to load
 
     pages, page_bytes = os.sysconf("SC_PHYS_PAGES"), os.sysconf("SC_PAGE_SIZE")
@@ -73,6 +74,7 @@ def machine() -> dict[str, Any]:
         "usable_cores": len(os.sched_getaffinity(0)),
         "memory_gib": round(pages * page_bytes / 2**30, 1),
         "gpu": cuda.get_device_name() if cuda.is_available() else None,
+        "graphics": graphics("auto"),
     }
 
 
@@ -85,6 +87,7 @@ class _Machine(BaseModel):
     usable_cores: int
     memory_gib: float
     gpu: str | None
+    graphics: dict[str, str] = {}  # older records lack it
 
 
 class _Stage(BaseModel):
