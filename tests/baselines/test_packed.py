@@ -48,7 +48,9 @@ def test_frames_rendered_into_an_array_are_those_of_the_files(tmp_path):
     record = json.loads((tmp_path / "train.json").read_text())
     assert (record["frames"], record["input_px"]) == (5, 24)
     assert [(s["name"], s["frames"]) for s in record["shards"]] == [("seq-01", 3), ("seq-02", 2)]
-    assert {s["backend"] for s in record["shards"]} <= set(BACKENDS)
+    assert {s["backend"] for s in record["shards"]} == {record["render"]["backend"]}
+    assert record["render"]["backend"] in BACKENDS  # never "auto", which the settings said
+    assert all(s["backend"] == "raycast" or s["gl_renderer"] for s in record["shards"])
     for name, file in (("sha256", "train.npy"), ("plan_sha256", "plan.csv")):
         assert record[name] == hashlib.sha256((tmp_path / file).read_bytes()).hexdigest()
 

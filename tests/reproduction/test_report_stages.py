@@ -66,6 +66,7 @@ def test_the_record_says_what_ran_where_and_for_how_long(benchmarks):
         "figures/a.png": "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855",
     }
     assert record["machine"]["usable_cores"] >= 1
+    assert record["machine"]["graphics"]["backend"] != "auto"
     assert "4 jobs took 15.5 s of computing together" in cost_sentence(record)
     assert record["commit"] in origin_html(record)
 

@@ -111,6 +111,11 @@ def test_the_background_has_the_colour_asked_for(mesh, tmp_path, backend):
     with Image.open(tmp_path / "set" / "seq-01" / "frame-000000.color.png") as frame:
         assert frame.getpixel((0, 0)) == (10, 200, 30)
         assert frame.getpixel((20, 16)) != (10, 200, 30)
+    manifest = json.loads((tmp_path / "set" / "manifest.json").read_text())
+    assert manifest["graphics"]["backend"] == manifest["render"]["backend"] == backend
+    assert {"embreex", "moderngl"} <= manifest["versions"].keys()
+    assert ("gl_renderer" in manifest["graphics"]) == (backend == "opengl")
+    assert all(manifest["graphics"].values())
 
 
 def test_print_config_and_manifest_say_the_same(calm):

@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 
 from baselines.labels.batches import failed_trajectory, read_trajectory, write_trajectory
 from baselines.labels.posegraph.graph import PoseGraph, write_g2o
-from baselines.training.checkpoint import save_atomically
 from baselines.localizers.memory import memory_errors
+from baselines.training.checkpoint import save_atomically
 from baselines.training.resume import ResumeFile
 from baselines.training.selection import HistoryRow, write_history
 from reproduction.figures.registry import save
