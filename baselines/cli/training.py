@@ -197,10 +197,33 @@ def localize_by_model(arguments: argparse.Namespace) -> None:
             " of another place",
             *(done.n_beyond, done.n_images),
         )
+    warn_of_unlike(arguments.model, done)
     print(f"{arguments.model}: {model_text(done)}")
     if done.n_resampled:
         print(f"{arguments.model}: {resampled_text(done)}")
     print(f"{out}: {poses_text(done)}")
+
+
+# Of pictures of the place 5 % are called unlike; twice as many are no chance any more.
+SUSPICIOUS = 0.1
+
+
+def warn_of_unlike(model: Path, done: Localized) -> None:
+    """Say that pictures seem to be of another place, or that the model cannot tell."""
+    if done.n_unlike is None:
+        log.warning(
+            "%s: cannot tell pictures of another place (written before models could, by the"
+            " benchmark, or from one path); synfeal train makes one that can",
+            model,
+        )
+    elif done.n_unlike > SUSPICIOUS * done.n_images:
+        scene = done.description.scene
+        log.warning(
+            "%d of %d pictures are unlike the frames that %s was trained on%s (column typicality:"
+            " 0.05 or less, as of 5 %% of pictures of that place); do not trust their poses if they"
+            " are of another place",
+            *(done.n_unlike, done.n_images, model, f" in '{scene}'" if scene else ""),
+        )
 
 
 def model_text(done: Localized) -> str:

@@ -22,6 +22,7 @@ from baselines.localizers.registry import build_localizer
 from baselines.localizers.saved import checked_state, load_saved
 from baselines.training.data import ImageStatistics
 from baselines.training.resume import serialised
+from baselines.training.typicality import Calibration
 from synfeal.config.collection import Count, Finite, Positive, Strict
 from synfeal.config.load import describe
 from synfeal.errors import InputError, why
@@ -63,7 +64,7 @@ Point = tuple[Finite, Finite, Finite]
 class ModelDescription(Strict):
     """What stands in a checkpoint beside its weights."""
 
-    unless_none = ("sequence_from_world", "bounds_m", "rotations")
+    unless_none = ("sequence_from_world", "bounds_m", "rotations", "scene")
 
     localizer: ModelName = Field(description="name of the localizer")
     network: NetworkConfig = Field(description="shape it was built with")
@@ -80,6 +81,7 @@ class ModelDescription(Strict):
     rotations: AugmentationConfig | None = Field(
         None, description="that training images were turned by, where they were"
     )
+    scene: str | None = Field(None, description="name of the place it was trained in")
 
 
 def frame_camera(frames: Path) -> FrameCamera | None:
@@ -108,6 +110,7 @@ class TrainedLocalizer:
     description: ModelDescription  # what it is
     network: Localizer  # the network on its device, in evaluation mode
     statistics: ImageStatistics  # of the images it was trained on
+    calibration: Calibration | None = None  # tells pictures of another place, where it has one
 
     @property
     def device(self) -> torch.device:
@@ -123,7 +126,11 @@ def save_atomically(path: Path, value: Any) -> None:
 
 
 def save_checkpoint(
-    path: Path, localizer: Localizer, statistics: ImageStatistics, description: ModelDescription
+    path: Path,
+    localizer: Localizer,
+    statistics: ImageStatistics,
+    description: ModelDescription,
+    calibration: Calibration | None = None,
 ) -> None:
     """Write everything prediction needs; tensors and plain values, so that reading runs no code."""
     checkpoint = {
@@ -131,6 +138,8 @@ def save_checkpoint(
         "localizer": {name: v.detach().cpu() for name, v in localizer.state_dict().items()},
         "images": {"mean": statistics.mean.cpu(), "deviation": statistics.deviation.cpu()},
     }
+    if calibration is not None:
+        checkpoint["calibration"] = calibration._asdict()
     save_atomically(path, checkpoint)
 
 
@@ -158,6 +167,7 @@ def read_checkpoint(path: Path, device: torch.device) -> TrainedLocalizer:
     try:
         network.load_state_dict(checked_state(content["localizer"]))
         statistics = _statistics(content["images"])
+        calibration = _calibration(content.get("calibration"))
     except (RuntimeError, ValueError) as error:
         if is_out_of_memory(error):
             raise
@@ -165,7 +175,7 @@ def read_checkpoint(path: Path, device: torch.device) -> TrainedLocalizer:
             f"{path}: its weights are not those of the {description.localizer} it describes;"
             " train it again"
         ) from error
-    return TrainedLocalizer(description, network.eval(), statistics)
+    return TrainedLocalizer(description, network.eval(), statistics, calibration)
 
 
 def _read(path: Path, device: torch.device) -> dict[str, Any]:
@@ -197,3 +207,22 @@ def _statistics(stored: object) -> ImageStatistics:
     if not (values["deviation"] > 0).all():
         raise ValueError("its image statistics have no standard deviation")
     return ImageStatistics(mean=values["mean"], deviation=values["deviation"])
+
+
+def _calibration(stored: object) -> Calibration | None:
+    """The calibration as it is stored; None in checkpoints written before there was any.
+
+    Raises:
+        ValueError: It is damaged.
+    """
+    if stored is None:
+        return None
+    values = checked_state(stored)
+    if values.keys() != set(Calibration._fields):
+        raise ValueError("its calibration is not that of features and distances")
+    features, distance = values["features"].cpu(), values["distance"].cpu()
+    if features.dim() != 2 or distance.dim() != 1 or not len(features) or not len(distance):
+        raise ValueError("its calibration is damaged")
+    if not (features.isfinite().all() and (distance.diff() >= 0).all()):
+        raise ValueError("its calibration is damaged")
+    return Calibration(features=features, distance=distance)

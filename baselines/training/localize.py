@@ -21,12 +21,13 @@ from baselines.training.checkpoint import ModelDescription, TrainedLocalizer, re
 from baselines.training.device import open_device
 from baselines.training.predict import BATCH, DECIMALS, median_ms
 from baselines.training.resample import Resampler, same_view
+from baselines.training.typicality import OUTSIDE, features_of, typicality
 from baselines.training.virtual_views import VirtualViews
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.photograph import PhotographCamera, Source
 from synfeal.dataset.frame_files import IMAGE_DAMAGE
 from synfeal.dataset.packed import View, fit_frame
-from synfeal.dataset.pose_table import COLUMNS
+from synfeal.dataset.pose_table import COLUMNS, SEEN
 from synfeal.dataset.render_sequence import Progress
 from synfeal.errors import InputError, why
 from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
@@ -42,7 +43,9 @@ DEFAULT_TURNS = 8
 
 log = logging.getLogger(__name__)
 
-HEADER = ("image", *COLUMNS[2:])
+HEADER = ("image", *COLUMNS[2:], *SEEN)
+# What an earlier version wrote, which may be written over too.
+EARLIER_HEADER = HEADER[: -len(SEEN)]
 
 
 class Localized(NamedTuple):
@@ -54,6 +57,7 @@ class Localized(NamedTuple):
         n_images: Pictures.
         n_failed: Those whose pose is not finite.
         n_beyond: Those whose pose lies far outside of the training positions.
+        n_unlike: Those that are unlike the training frames; None where the model cannot tell.
         n_resampled: Those that were brought to the training camera.
         calibration: What told the camera of these.
         outside: Largest share of the training view that one of these does not show.
@@ -69,6 +73,7 @@ class Localized(NamedTuple):
     n_images: int
     n_failed: int
     n_beyond: int
+    n_unlike: int | None
     n_resampled: int
     calibration: Source | None
     outside: float
@@ -90,6 +95,9 @@ def localize(
     turns: int = DEFAULT_TURNS,
 ) -> Localized:
     """Write the pose of each picture as CSV (columns of ``HEADER``), in the order named.
+
+    ``status`` is ``inside`` of what the model has seen, ``outside``, ``unknown`` where the model
+    cannot tell, or ``no pose``; ``typicality`` and ``outside_m`` are those of :class:`Seen`.
 
     Args:
         model: Checkpoint.
@@ -116,20 +124,21 @@ def localize(
     network_ms = median_ms(lambda: views.predict(first))
     reader.read_s.clear()
     began = time.perf_counter()
-    position_m, quat_wxyz = _predict_all(trained, views, pictures, reader)
+    position_m, quat_wxyz, features = _predict_all(trained, views, pictures, reader)
     seconds = time.perf_counter() - began
-    beyond = _beyond(trained.description, position_m)
+    seen = _seen(trained, position_m, features)
     moved = trained.description.sequence_from_world
     if moved is not None and world == "sequence":
         position_m, quat_wxyz = _moved(np.array(moved), position_m, quat_wxyz)
-    _write(out, pictures, np.concatenate([position_m, quat_wxyz], axis=1))
-    good = np.isfinite(position_m).all(axis=1) & np.isfinite(quat_wxyz).all(axis=1)
+    good = np.asarray(np.isfinite(position_m).all(axis=1) & np.isfinite(quat_wxyz).all(axis=1))
+    _write(out, pictures, np.concatenate([position_m, quat_wxyz], axis=1), good, seen)
     return Localized(
         description=trained.description,
         device=trained.device.type,
         n_images=len(pictures),
         n_failed=int((~good).sum()),
-        n_beyond=int(beyond.sum()),
+        n_beyond=int(seen.beyond.sum()),
+        n_unlike=None if trained.calibration is None else int(seen.unlike.sum()),
         n_resampled=len(reader.resampled),
         calibration=reader.source if reader.resampled else None,
         outside=reader.outside,
@@ -141,14 +150,50 @@ def localize(
     )
 
 
-def _beyond(description: ModelDescription, position_m: Array) -> NDArray[np.bool_]:
-    """Which positions (N, 3) are farther outside of the training box than it is wide."""
-    if description.bounds_m is None:
-        return np.zeros(len(position_m), bool)
-    low, high = np.array(description.bounds_m)
-    margin = np.maximum(high - low, LEAST_MARGIN_M)
-    beyond: NDArray[np.bool_] = (position_m < low - margin) | (position_m > high + margin)
-    return np.asarray(beyond.any(axis=1))
+class Seen(NamedTuple):
+    """How far answers lie outside of what a localizer has seen.
+
+    Attributes:
+        typicality: Share (N,) of frames of the place that are at least as unlike those of other
+            paths as the picture; ``nan`` where the model cannot tell.
+        outside_m: Distance (N,) of positions to the box of the training positions; ``nan`` where
+            the model does not say which that is.
+        beyond: Positions (N,) that are farther outside of that box than it is wide.
+    """
+
+    typicality: Array
+    outside_m: Array
+    beyond: NDArray[np.bool_]
+
+    @property
+    def unlike(self) -> NDArray[np.bool_]:
+        """Pictures (N,) that are unlike the training frames."""
+        return np.asarray(self.typicality <= OUTSIDE)
+
+    def status(self, good: NDArray[np.bool_]) -> NDArray[np.object_]:
+        """Words (N,) of the column ``status``; ``good`` (N,) are finite poses."""
+        told = [~good, self.unlike | self.beyond, np.isfinite(self.typicality)]
+        words = np.select(told, ["no pose", "outside", "inside"], default="unknown")
+        return words.astype(object)
+
+
+def _seen(trained: TrainedLocalizer, position_m: Array, features: Tensor) -> Seen:
+    """Compare pictures and answers with what was learned from.
+
+    Args:
+        trained: Localizer.
+        position_m: Its answers (N, 3) in the world of the training labels.
+        features: Of the pictures (N, F).
+    """
+    unknown, calibration = np.full(len(position_m), np.nan), trained.calibration
+    typical = unknown if calibration is None else typicality(calibration, features).round(DECIMALS)
+    if trained.description.bounds_m is None:
+        return Seen(typical, unknown, np.zeros(len(position_m), bool))
+    low, high = np.array(trained.description.bounds_m)
+    excess_m = np.maximum(np.maximum(low - position_m, position_m - high), 0.0)
+    beyond = excess_m > np.maximum(high - low, LEAST_MARGIN_M)
+    outside_m = np.linalg.norm(excess_m, axis=1).round(DECIMALS)
+    return Seen(typical, outside_m, np.asarray(beyond.any(axis=1)))
 
 
 def _moved(sequence_from_world: Array, position_m: Array, quat_wxyz: Array) -> tuple[Array, Array]:
@@ -167,20 +212,26 @@ def _predict_all(
     views: VirtualViews,
     pictures: Sequence[Path],
     reader: PictureReader,
-) -> tuple[Array, Array]:
-    """Positions (N, 3) and quaternions (N, 4), in batches as a test set is predicted in."""
-    poses = []
+) -> tuple[Array, Array, Tensor]:
+    """Positions (N, 3), quaternions (N, 4) and features (N, F).
+
+    In batches as a test set is predicted in.
+    """
+    poses, features = [], []
     with Progress(len(pictures), "localize") as progress:
         for start in range(0, len(pictures), BATCH):
             began = time.perf_counter()
             batch = pictures[start : start + BATCH]
-            poses.append(views.predict(_batch(trained, batch, reader)))
+            images = _batch(trained, batch, reader)
+            poses.append(views.predict(images))
+            normalised = trained.statistics.normalise(images)
+            features.append(features_of(trained.network, normalised))
             progress.update(len(batch))
             if len(pictures) > BATCH:
                 name = f"picture {start + len(batch)} of {len(pictures)}"
                 progress.part_done(name, len(batch), time.perf_counter() - began)
     position_m, quat_wxyz = zip(*poses, strict=True)
-    return np.concatenate(position_m), np.concatenate(quat_wxyz)
+    return np.concatenate(position_m), np.concatenate(quat_wxyz), torch.cat(features)
 
 
 def _batch(trained: TrainedLocalizer, pictures: Sequence[Path], reader: PictureReader) -> Tensor:
@@ -202,15 +253,28 @@ def _holds_poses(out: Path) -> bool:
     """Whether an earlier command wrote it."""
     try:
         with out.open("rb") as file:
-            return file.readline(200).strip() == ",".join(HEADER).encode()
+            found = file.readline(200).strip().decode(errors="replace")
+            return found in (",".join(HEADER), ",".join(EARLIER_HEADER))
     except OSError:
         return False
 
 
-def _write(out: Path, pictures: Sequence[Path], poses: Array) -> None:
-    """Numbers with enough digits to read back the same values; names as the bytes they are."""
-    frame = pd.DataFrame(poses, columns=list(HEADER[1:]))
+def _write(
+    out: Path, pictures: Sequence[Path], poses: Array, good: NDArray[np.bool_], seen: Seen
+) -> None:
+    """Numbers with enough digits to read back the same values; names as the bytes they are.
+
+    Args:
+        out: File to write.
+        pictures: The pictures (N).
+        poses: Positions and quaternions (N, 7).
+        good: Poses (N,) that are finite.
+        seen: How far they lie outside of what the model has seen.
+    """
+    frame = pd.DataFrame(poses, columns=list(EARLIER_HEADER[1:]))
     frame.insert(0, HEADER[0], pd.Series([str(path) for path in pictures], dtype=object))
+    further = seen.status(good), seen.typicality, seen.outside_m
+    frame = frame.assign(**dict(zip(SEEN, further, strict=True)))
     with writing_to(out, lambda: "choose another file with --out"):
         write_frame(out, frame, float_format=None, na_rep="nan")
 

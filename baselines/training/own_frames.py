@@ -34,7 +34,7 @@ from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
 from synfeal.dataset.world import read_sequence_from_world
 from synfeal.errors import InputError
 from synfeal.geometry.poses import quat_wxyz_of
-from synfeal.records.files import file_sha256, write_json
+from synfeal.records.files import file_sha256, read_json, write_json
 from synfeal.validation.camera import camera_of_dataset
 
 log = logging.getLogger(__name__)
@@ -72,6 +72,7 @@ class OwnFrames:
         path: Index (N,) of the path of each frame, from 0: what is held out as a whole.
         camera: Camera of the frames, where the data set says so; None for photographs.
         sequence_from_world: Motion (4, 4) to the world of the sequence scanned, where it differs.
+        scene: Name of the place: by the manifest, else that of the folder.
     """
 
     folder: Path
@@ -80,6 +81,7 @@ class OwnFrames:
     path: NDArray[np.int64]
     camera: FrameCamera | None
     sequence_from_world: Array | None
+    scene: str
 
     def __len__(self) -> int:
         return len(self.color)
@@ -137,6 +139,7 @@ def read_own_frames(folder: Path, ranges: Sequence[FrameRange]) -> OwnFrames:
         path=_blocks(parts) if path is None else path,
         camera=_manifest_camera(folder) if rendered else None,
         sequence_from_world=read_sequence_from_world(folder),
+        scene=_scene_of(folder),
     )
 
 
@@ -178,6 +181,14 @@ def _blocks(parts: Sequence[PosedFrames]) -> NDArray[np.int64]:
         found.append(first + np.arange(len(part)) * count // len(part))
         first += count
     return np.concatenate(found)
+
+
+def _scene_of(folder: Path) -> str:
+    """Name of the place that a data set shows."""
+    manifest = folder / MANIFEST
+    scene = read_json(manifest).get("scene") if manifest.is_file() else None
+    name = scene.get("name") if isinstance(scene, dict) else None
+    return str(name or folder.resolve().name)
 
 
 def _manifest_camera(folder: Path) -> FrameCamera:

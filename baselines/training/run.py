@@ -40,6 +40,7 @@ from baselines.training.record import write_training_record
 from baselines.training.resume import ResumeFile, digest
 from baselines.training.rotation import random_rotation
 from baselines.training.selection import HistoryRow, write_history
+from baselines.training.typicality import calibrate
 
 log = logging.getLogger(__name__)
 
@@ -105,6 +106,8 @@ def train_localizer(
     augment: Augmentation | None = None,  # in place of the rotations that ``training`` asks for
     # (4, 4) from the world of ``labels`` to that of the sequence scanned, where they differ
     sequence_from_world: NDArray[np.float64] | None = None,
+    scene: str | None = None,  # name of the place
+    calibrated: bool = False,  # whether the checkpoint is to tell pictures of another place
 ) -> list[HistoryRow]:
     """Train a localizer and write its checkpoint and its history (columns of ``HistoryRow``).
 
@@ -132,8 +135,13 @@ def train_localizer(
         sequence_from_world=_rows_of(sequence_from_world),
         bounds_m=_bounds_m(job, material),
         rotations=turns if job.protocol.images == "rotated" and turns.turns else None,
+        scene=scene,
     )
-    save_checkpoint(out_model, material.localizer, material.statistics, description)
+    localizer, statistics, learned, held_out = material
+    calibration = None
+    if calibrated:
+        calibration = calibrate(localizer, statistics, learned, held_out, _randomisation(job))
+    save_checkpoint(out_model, localizer, statistics, description, calibration)
     write_history(out_history, rows)
     resume.remove()
     return rows

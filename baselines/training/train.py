@@ -151,6 +151,8 @@ def _trained(
         job.out / HISTORY,
         weights=_start_of(run),
         sequence_from_world=packed.sequence_from_world,
+        scene=" + ".join(dict.fromkeys(own.scene for own in sets)),
+        calibrated=True,
     )
     errors = kept_errors(rows)
     n_frames = sum(map(len, sets))

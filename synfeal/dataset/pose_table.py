@@ -26,6 +26,8 @@ REGISTERED = "registered"
 IMAGE = "image"
 # Further columns of poses found in a map: whether one was found, and what speaks for it.
 SUPPORT = ("status", "inliers", "confidence")
+# Further columns of poses that a network gave: whether it has seen the like of a picture.
+SEEN = ("status", "typicality", "outside_m")
 UNIT_TOLERANCE = 1e-2
 
 

@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from synfeal.dataset.pose_table import COLUMNS, IMAGE, SUPPORT
+from synfeal.dataset.pose_table import COLUMNS, IMAGE, SEEN, SUPPORT
 from synfeal.dataset.sequence_listing import refuse_problems
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError, read_as
@@ -137,7 +137,8 @@ def read_csv(path: Path, text: str) -> Estimates:
         table = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
     header = tuple(table.columns)
     found = (IMAGE, *COLUMNS[2:])
-    if header not in (COLUMNS, (*COLUMNS, IMAGE), found, (*found, *SUPPORT)):
+    known = (COLUMNS, (*COLUMNS, IMAGE), found, (*found, *SUPPORT), (*found, *SEEN))
+    if header not in known:
         raise InputError(
             f"{path}: the header must be {','.join(COLUMNS)} or image,{','.join(COLUMNS[2:])},"
             f" found '{','.join(header)[:80]}'"

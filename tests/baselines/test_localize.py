@@ -73,11 +73,12 @@ def localized(model, out, *images):
 
 def test_frames_of_a_run_get_its_predictions_to_the_last_digit(run, tmp_path):
     header, *rows = localized(run / "model.pt", tmp_path / "poses.csv", run / "seq-01")
-    assert header == ["image", "tx", "ty", "tz", "qw", "qx", "qy", "qz"]
+    pose = ["image", "tx", "ty", "tz", "qw", "qx", "qy", "qz"]
+    assert header == [*pose, "status", "typicality", "outside_m"]
     names = [f"frame-{index:06d}.color.png" for index in range(COUNT)]
     assert [Path(row[0]).name for row in rows] == names
     predictions = (run / "predictions.csv").read_text().splitlines()[1:]
-    assert [row[1:] for row in rows] == [line.split(",")[2:] for line in predictions]
+    assert [row[1:8] for row in rows] == [line.split(",")[2:] for line in predictions]
     assert len({tuple(row) for row in rows}) == COUNT
 
 
@@ -154,7 +155,8 @@ NAN, ZERO = math.nan, [0.0, 0.0, 0.0, 0.0]
 def test_a_pose_that_is_none_is_nan_and_counted(run, tmp_path, caplog, position_m, quat_wxyz):
     model = save(tmp_path / "model.pt", answering(position_m, quat_wxyz))
     _, *rows = localized(model, tmp_path / "poses.csv", run / "seq-01/frame-000000.color.png")
-    pose = np.float64(rows[0][1:])
+    pose = np.float64(rows[0][1:8])
+    assert rows[0][8] == "no pose"
     np.testing.assert_array_equal(pose[:3], position_m)
     assert np.isnan(pose[3:]).all() == (quat_wxyz != [1.0, 0.0, 0.0, 0.0])
     assert "1 of 1 poses are not finite" in caplog.text
@@ -252,7 +254,7 @@ def poses_of(model, folder, *options, status=0):
     out = folder.parent / "poses.csv"
     given = ["localize", model, folder, "--out", out, "--device", "cpu", *options]
     assert main([str(value) for value in given]) == status
-    return np.array([[*row.values()][1:] for _, row in read_records(out)], float)
+    return np.array([[*row.values()][1:8] for _, row in read_records(out)], float)
 
 
 def pixels_of(folder, trained, **camera):

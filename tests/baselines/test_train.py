@@ -137,6 +137,7 @@ def test_the_checkpoint_keeps_what_localize_needs(photographs, tmp_path):
     assert (kept["camera"]["width"], kept["camera"]["fx"]) == (WIDTH, 70.0)
     np.testing.assert_allclose(kept["bounds_m"], [[0, 0.5, 1], [0.38, 0.5, 1]], atol=1e-6)
     assert "sequence_from_world" not in kept
+    assert kept["scene"] == "flat"
 
 
 def test_a_data_set_is_learned_from_by_its_training_split(calm, tmp_path):
