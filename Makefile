@@ -41,18 +41,18 @@ publish: $(INSTALLED)  ## track what PROFILE's run made (results/published), and
 	$(BIN)/python -m reproduction.report.publish --profile $(PROFILE)
 	$(BIN)/python -m reproduction.report.pages
 
-archive: $(INSTALLED)  ## PROFILE's tables, figures, report.html and predictions in one file, for a release
+archive: $(INSTALLED)  ## PROFILE's report, figures, and all that its tables are made from, in one file
 	mkdir -p build
-	$(BIN)/synfeal keep results/$(PROFILE)
 	tar --create --gzip --file build/results-$(PROFILE).tar.gz --directory results \
-	  --owner 0 --group 0 --sort name --exclude '.snakemake*' \
-	  $(addprefix $(PROFILE)/,report.html summary.md claims.csv provenance.json benchmarks.csv tables figures predictions.zip)
+	  --owner 0 --group 0 --sort name --exclude '.*' \
+	  $(addprefix --exclude=,*.glb *.ply *.pt *.npz *.g2o errors.csv common_errors.csv) \
+	  $(addprefix $(PROFILE)/,report.html summary.md claims.csv provenance.json benchmarks.csv) \
+	  $(addprefix $(PROFILE)/,benchmarks tables figures labels groundtruth runs references scenes)
 	@echo build/results-$(PROFILE).tar.gz
 
-plan: smoke  ## what paper and gpu cost, and what such plans are worth (results/benchmarks)
+plan: smoke  ## what paper costs, and what such plans are worth (results/benchmarks)
 	mkdir -p results/benchmarks/smoke && cp results/smoke/benchmarks.csv results/benchmarks/smoke/
 	$(BIN)/synfeal plan --profile paper --cores 16 64 --gpus 1 4 --csv results/benchmarks/plan_paper.csv
-	$(BIN)/synfeal plan --profile gpu --cores 16 --gpus 1 --csv results/benchmarks/plan_gpu.csv
 	$(BIN)/synfeal plan --measured results/benchmarks/smoke --compare results/published/mini \
 	  --csv results/benchmarks/plan_check.csv
 

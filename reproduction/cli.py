@@ -150,36 +150,4 @@ def compare(arguments: argparse.Namespace) -> None:
         print(f"\n{arguments.out}: compare.md, compare.png and compare.csv")
 
 
-@command(
-    "predictions of finished runs in one small file",
-    "synfeal keep results/mini --out predictions.zip",
-    option("results", "results of a run: results/mini", type=Path, metavar="RESULTS"),
-    option("--out", "file to write (RESULTS/predictions.zip)", type=Path),
-)
-def keep(arguments: argparse.Namespace) -> None:
-    """Packs the predictions of all finished runs into one small file.
-
-    Every table can be made again from it without training.
-    """
-    from reproduction.runs.keep import keep as pack
-
-    out: Path = arguments.out or arguments.results / "predictions.zip"
-    n_runs = pack(arguments.results, out)
-    print(f"{out}: {n_runs} runs, {out.stat().st_size / 1e6:.1f} MB")
-
-
-@command(
-    "finished runs back from such a file",
-    "synfeal restore predictions.zip results/mini",
-    option("package", "predictions.zip of synfeal keep", type=Path, metavar="FILE"),
-    option("results", "where to: results/<profile>", type=Path, metavar="RESULTS"),
-)
-def restore(arguments: argparse.Namespace) -> None:
-    """Puts the runs of a predictions.zip back, so that the workflow goes on from them."""
-    from reproduction.runs.restore import restore as unpack
-
-    written, there = unpack(arguments.package, arguments.results)
-    print(f"{arguments.results}: {written} runs restored, {there} were there already")
-
-
-COMMANDS = (plan, run, compare, keep, restore)
+COMMANDS = (plan, run, compare)

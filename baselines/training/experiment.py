@@ -1,7 +1,7 @@
 """A training run of the workflow: train, predict, and score in one process.
 
 A process that scores one run and nothing else spends its time on imports. So scores are written
-where predictions are made; those of restored predictions, which nobody makes here, are written by
+where predictions are made; those of an archive's predictions are written by
 :func:`baselines.training.score.write_scores` alone.
 """
 

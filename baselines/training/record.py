@@ -1,6 +1,6 @@
 """What a run was trained from, beside its predictions: whether a later run would be the same.
 
-Predictions travel further than models and frames (``synfeal keep``). Where they arrive, this record
+Predictions travel further than models and frames (``make archive``). Where they arrive, this record
 tells whether the configuration and the labels there are those that they were made with. Free of
 torch, as is the memory of a run, so that a workflow may import both.
 """

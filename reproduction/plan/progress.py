@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -39,6 +39,23 @@ def plan_run(config: Config, design: Design, benchmarks: Iterable[str], cores: i
     return RunPlan(config.root, expected_s, tuple(design.runs), cores)
 
 
+def to_do(measured: Mapping[str, Sequence[str]], counts: Mapping[str, int]) -> list[str]:
+    """Choose the jobs that a run most likely does.
+
+    Args:
+        measured: By rule, the file of each of its jobs that Snakemake writes what it took to.
+        counts: Jobs that Snakemake says it is going to do, by rule.
+
+    Returns:
+        As many of these files as there are jobs to do, those that are not there yet first.
+    """
+    chosen = []
+    for rule, paths in measured.items():
+        by_need = sorted(paths, key=lambda path: Path(path).exists())
+        chosen += by_need[: counts.get(rule, 0)]
+    return chosen
+
+
 def _expected_s(profile: Profile, benchmarks: Iterable[str]) -> dict[str, float]:
     """Seconds by job from the planner's laws (docs/cost.md); none where no run was published."""
     try:
@@ -70,8 +87,17 @@ class TimeLeft:
         self._taken_s: dict[str, float] = {}
 
     def started(self, job: str, now_s: float) -> None:
-        """A job began."""
+        """A job began; if it was not expected, it takes the place of one of its stage that was."""
         self._began[job] = now_s
+        if job not in self.expected_s:
+            begun = self._began.keys() | self._taken_s.keys()
+            waiting = (other for other in self.expected_s if other not in begun)
+            instead = next((other for other in waiting if _stage(other) == _stage(job)), None)
+            if instead is not None:
+                self.expected_s = {
+                    job if other == instead else other: seconds
+                    for other, seconds in self.expected_s.items()
+                }
 
     def finished(self, job: str, now_s: float) -> None:
         """A job ended."""

@@ -1,1 +1,1 @@
-"""Runs of the workflow: jobs, results, predictions kept and restored."""
+"""Runs of the workflow: jobs and results."""

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import inspect
 import logging
 import os
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path, PurePath
-from pkgutil import resolve_name
-from typing import Any
+from pathlib import Path
 
 from pydantic import validate_call
 
@@ -48,39 +45,17 @@ def job(log: str | Path) -> Iterator[None]:
         os.close(real_stderr)
 
 
-def call(snakemake: Any) -> None:
-    """Call the function that a rule names, ``params.function``, with what it is asked for by name.
+def run_job(log: str, function: Callable[..., None], /, **arguments: object) -> None:
+    """Call the function of a rule inside :func:`job`.
 
-    An argument is the rule's parameter, input or wildcard of that name, ``out_<name>`` its output
-    ``<name>``, ``files`` its inputs that are one file, by name, ``wildcards`` its wildcards, and
-    ``root`` the results directory where this job has it, which with a storage plugin is a copy.
-    Texts become paths, numbers and models as annotated; what a rule lacks keeps its default.
-
-    Raises:
-        InputError: the output was restored (``synfeal restore``), not made here: the rule has no
-            inputs to make it again.
+    Args:
+        log: The job's log file.
+        function: What the rule does.
+        arguments: Its arguments as Snakemake has them: texts become paths, numbers and
+            configuration models as the function annotates them.
     """
-    function = resolve_name(snakemake.params.function)
-    wildcards = dict(snakemake.wildcards.items())
-    inputs = {name: files for name, files in snakemake.input.items() if files}
-    given = {**wildcards, **dict(snakemake.input.items()), **dict(snakemake.params.items())}
-    files = {name: path for name, path in inputs.items() if isinstance(path, str)}
-    given |= {"files": files, "wildcards": wildcards}
-    given |= {f"out_{name}": path for name, path in snakemake.output.items()}
-    asked = inspect.signature(function).parameters
-    if "root" in asked:
-        root = PurePath(snakemake.config["results"], snakemake.config["profile"]).as_posix()
-        output = str(snakemake.output[0])
-        given["root"] = output[: output.rindex(root) + len(root)]
-    bare = {name for name, _ in snakemake.input.items() if name in asked} - {*inputs}
-    needed = {name for name, argument in asked.items() if argument.default is argument.empty}
-    if not inputs and bare & needed:
-        raise InputError(
-            f"{snakemake.output[0]}: was restored, not made here; restore it once more, or delete"
-            " restored.json to make everything anew"
-        )
-    left = {name for name in {*asked} - needed if name in bare or name not in given}
-    validate_call(function)(**{name: given[name] for name in asked if name not in left})
+    with job(log):
+        validate_call(function)(**arguments)
 
 
 def _sentence(error: InputError | MemoryError | OSError) -> InputError:

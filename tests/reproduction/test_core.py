@@ -5,17 +5,14 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
 from PIL import Image
-from snakemake.iocontainers import Namedlist
 
-from reproduction.runs.job import call
-from synfeal.errors import InputError, why
+from synfeal.errors import why
 from synfeal.records.files import atomic_path, write_json
 from synfeal.records.provenance import generator_of, seed_of
 from synfeal.records.tables import (
@@ -125,30 +122,31 @@ def test_job_tells_a_person_one_line_and_logs_the_rest_and_a_defects_traceback(t
     assert "ZeroDivisionError" in (tmp_path / "job.log").read_text()
 
 
-def test_a_rule_calls_its_function_with_files_and_the_results_of_its_job(tmp_path):
-    table, document = tmp_path / "table.tex", tmp_path / "tables/all.tex"
-    table.write_text("% one table")
-    document.parent.mkdir()
-    job = SimpleNamespace(
-        wildcards=Namedlist(fromdict={"scene": "large_room"}),
-        input=Namedlist(fromdict={"tables": [str(table)]}),
-        params=Namedlist(fromdict={"function": "reproduction.report.document:write_document"}),
-        output=Namedlist(fromdict={"tex": str(document)}),
-    )
-    call(job)
-    assert "% one table" in document.read_text()
-    # With a storage plugin the configured path is the end of a longer one.
-    root = tmp_path / "results/smoke/stored/results/smoke"
-    function = "reproduction.tables.meshes:write_meshes_table"
-    job = SimpleNamespace(
-        config={"results": "results/", "profile": "smoke"},
-        wildcards=Namedlist(),
-        input=Namedlist(),
-        params=Namedlist(fromdict={"function": function, "scenes": ["hall"]}),
-        output=Namedlist(fromdict={end: f"{root}/tables/a.{end}" for end in ("csv", "tex")}),
-    )
-    with pytest.raises(InputError, match=f"^{root}/scenes/hall/properties.json: "):
-        call(job)
+CALL = """
+import json
+from pathlib import Path
+from reproduction.runs.job import run_job
+from synfeal.config.dataset import CameraConfig
+
+def draw(camera: CameraConfig, count: int, out: Path) -> None:
+    print("drawing")
+    out.write_text(json.dumps([camera.width, count]))
+
+run_job({log!r}, draw, camera={{"width": 64, "height": 48}}, count="3", out={out!r})
+"""
+
+
+def test_a_job_hands_its_function_what_that_annotates(tmp_path):
+    log, out = tmp_path / "job.log", tmp_path / "out.json"
+    code = CALL.format(log=str(log), out=str(out))
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert json.loads(out.read_text()) == [64, 3]
+    assert log.read_text() == "drawing\n"
+    wrong = code.replace("count='3'", "count='x'").replace('count="3"', 'count="x"')
+    run = subprocess.run([sys.executable, "-c", wrong], capture_output=True, text=True, check=False)
+    assert run.returncode == 1
+    assert "count" in log.read_text()
 
 
 SCHEMA = {"name": TEXT, "n": COUNT, "x": NUMBER, "y": MAYBE, "k": MAYBE_COUNT}

@@ -65,7 +65,7 @@ def test_every_method_has_a_title_a_style_and_someone_who_runs_it():
     own_rules = set(METHODS) - {*methods.frame_methods(), *methods.graph_methods()}
     assert own_rules == {"sfm"}
     rules = (PAGE.parent.parent / "workflow/rules/groundtruth.smk").read_text()
-    assert all(f"as {name} with:" in rules for name in own_rules)
+    assert all(f"rule {name}:" in rules for name in own_rules)
 
 
 def test_odometry_alone_keeps_the_chain_that_an_optimiser_moves():

@@ -14,7 +14,7 @@ from rich.console import Console
 from baselines.config.learning import MODELS
 from reproduction.config.load import load_config
 from reproduction.design.experiments import Run, read_design
-from reproduction.plan.progress import RunPlan, TimeLeft, plan_run
+from reproduction.plan.progress import RunPlan, TimeLeft, plan_run, to_do
 from reproduction.plan.view import FirstScores, RunView
 from synfeal.records.files import write_json
 from tests.support.planned_runs import planned
@@ -65,6 +65,25 @@ def test_every_job_of_a_profile_has_an_expected_time(monkeypatch):
     assert set(plan.expected_s) == set(keys)
     assert len(set(plan.expected_s.values())) > 10  # laws, not one number for all
     assert plan.expected_s["train/large_room/6k/synfeal/pretrained/posenet/seed0"] > 2
+
+
+def test_jobs_without_a_measurement_are_taken_for_those_that_run(tmp_path):
+    files = {f"{rule}{n}": tmp_path / f"{rule}-{n}.tsv" for rule in "ab" for n in range(3)}
+    measured = {rule: [str(files[f"{rule}{n}"]) for n in range(3)] for rule in "ab"}
+    files["a0"].touch()
+    assert to_do(measured, {"a": 2, "total": 2}) == [str(files["a1"]), str(files["a2"])]
+    assert len(to_do(measured, {"a": 3, "b": 1, "target": 1})) == 4
+
+
+def test_a_job_that_was_not_expected_takes_the_place_of_one_that_was():
+    left = TimeLeft({"train/a": 10.0, "train/b": 30.0, "report": 5.0}, 1)
+    left.started("train/c", 0.0)
+    assert left.expected_s == {"train/c": 10.0, "train/b": 30.0, "report": 5.0}
+    left.started("figures", 0.0)
+    left.finished("train/c", 10.0)
+    left.finished("figures", 10.0)
+    assert left.expected_s["figures"] == 10.0
+    assert left.count("train") == (1, 2)
 
 
 @pytest.fixture
@@ -139,8 +158,10 @@ rule bad:
     benchmark: "results/benchmarks/bad.tsv"
     shell: "echo the disk is full > {log}; exit 1"
 onstart:
-    plan = RunPlan(Path("results"), {"good": 1.0, "bad": 1.0}, (), 1)
-    logger.info(None, extra={"plan": lambda: plan})
+    def plan(counts):
+        expected_s = {name: 1.0 for name in ("good", "bad") if counts[name] == 1}
+        return RunPlan(Path("results"), expected_s, (), 1)
+    logger.info(None, extra={"plan": plan})
 """
 
 

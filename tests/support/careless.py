@@ -89,8 +89,6 @@ TABLE = {
     "plan gpus": ("plan", "--gpus", ("-1",)),
     "plan throughput": ("plan", "--gpu-tflops", NUMBERS[:4]),
     "compare": ("compare {} empty", "", DATA_SETS),
-    "keep": ("keep {}", "", (*PLACES, "empty", "notes.txt")),
-    "restore": ("restore {} new", "", (*PLACES, "empty", "notes.txt", "room.glb")),
 }
 
 

@@ -1,33 +1,7 @@
 # Mesh in, data sets with exact poses out (section 3 of the paper).
 
 
-# A job that calls one function, `params.function`, with the rule's files, parameters and wildcards
-# (reproduction.runs.job.call); rules that add nothing else are `use rule call as ... with`.
-rule call:
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
-    script:
-        "../scripts/call.py"
-
-
-use rule call as call_2gb with:
-    resources:
-        mem_mb=grown(2000),
-
-
-use rule call as call_3gb with:
-    resources:
-        mem_mb=grown(3000),
-
-
-use rule call as call_4gb with:
-    resources:
-        mem_mb=grown(4000),
-
-
-use rule call_4gb as scene with:
+rule scene:
     input:
         mesh=lambda w: CONFIG.scenes[w.scene].path or [],
     output:
@@ -36,193 +10,299 @@ use rule call_4gb as scene with:
         curve=f"{ROOT}/scenes/{{scene}}/collision_curve.csv",
         clutter=f"{ROOT}/scenes/{{scene}}/clutter.json",
         properties=f"{ROOT}/scenes/{{scene}}/properties.json",
+    log:
+        f"{ROOT}/logs/scene/{{scene}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/scene/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(4000),
     params:
-        function="synfeal.collection.prepare:prepare_scene",
         name=lambda w: w.scene,
         scene=lambda w, input: dump(CONFIG.scenes[w.scene], exclude={"sizes"})
         | {"path": file_of(input.mesh)},
         collision_agreement=CONFIG.collection.collision_agreement,
         seed=CONFIG.seed,
+    script:
+        "../scripts/scene.py"
 
 
-use rule call_2gb as plan with:
+rule plan:
     input:
         collision=rules.scene.output.collision,
         repeat=CONFIG.collection.repeat or [],
     output:
         plan=f"{ROOT}/plans/{{scene}}/{{split}}.csv",
+    log:
+        f"{ROOT}/logs/plan/{{scene}}/{{split}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/plan/{{scene}}/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(2000),
     params:
-        function="synfeal.planning.plan:write_plan",
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
         collection=lambda w, input: dump(CONFIG.collection)
         | {"repeat": file_of(input.repeat)},
         n_frames=lambda w: CONFIG.n_largest(w.scene, w.split),
         seed=lambda w: seed_of(CONFIG.seed, "plan", w.scene, w.split),
+    script:
+        "../scripts/plan.py"
 
 
-use rule call as coverage with:
+rule coverage:
     input:
         collision=rules.scene.output.collision,
         plan=rules.plan.output.plan,
     output:
         coverage=f"{ROOT}/plans/{{scene}}/{{split}}.coverage.json",
+    log:
+        f"{ROOT}/logs/coverage/{{scene}}/{{split}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/coverage/{{scene}}/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="synfeal.planning.coverage:write_coverage",
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
         camera=dump(CONFIG.network_camera),
+    script:
+        "../scripts/coverage.py"
 
 
 # What test frames show, at a few points of each: for the reprojection error of predicted poses.
-use rule call as cell_depth with:
+rule cell_depth:
     input:
         collision=rules.scene.output.collision,
         plan=f"{ROOT}/plans/{{scene}}/test.csv",
     output:
         depth=f"{ROOT}/scenes/{{scene}}/test_depth.npy",
+    log:
+        f"{ROOT}/logs/cell_depth/{{scene}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/cell_depth/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="synfeal.evaluation.reprojection:write_scene_depth",
         camera=dump(CONFIG.network_camera),
+    script:
+        "../scripts/cell_depth.py"
 
 
+ARCHIVE = SUFFIX if CONFIG.archive_sequences else ""
 SEQUENCE = f"{ROOT}/datasets/{{scene}}/{{camera}}/{{sequence}}{ARCHIVE}"
 
 
 # The mesh that frames of a camera are drawn of: what its resolution does not show is left out.
-use rule call_3gb as detail with:
+rule detail:
     input:
         mesh=rules.scene.output.mesh,
-        plans=lambda w: plans_with_frames(w.scene, w.camera, "csv"),
+        plans=lambda w: FILES.plans(w.scene, w.camera, "csv"),
     output:
         mesh=f"{ROOT}/scenes/{{scene}}/detail_{{camera}}.glb",
         record=f"{ROOT}/scenes/{{scene}}/detail_{{camera}}.json",
+    log:
+        f"{ROOT}/logs/detail/{{scene}}/detail_{{camera}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/detail/{{scene}}/detail_{{camera}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(3000),
     params:
-        function="synfeal.collection.detail:write_detail",
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
         render=dump(CONFIG.render),
+    script:
+        "../scripts/detail.py"
 
 
-use rule call_3gb as render with:
+rule render:
     input:
         mesh=rules.scene.output.mesh,
-        plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w).split}.csv",
-        extras=lambda w: beside_mesh(w.scene, CONFIG.render.effects),
-        detail=lambda w: detail_of(w.scene, w.camera, "glb"),
+        plan=lambda w: f"{ROOT}/plans/{w.scene}/{FILES.sequence(w.scene, w.camera, w.sequence).split}.csv",
+        extras=lambda w: FILES.beside_mesh(w.scene, CONFIG.render.effects),
+        detail=lambda w: FILES.detail(w.scene, w.camera, "glb") or [],
     output:
         frames=SEQUENCE if ARCHIVE else directory(SEQUENCE),
+    log:
+        f"{ROOT}/logs/render/{{scene}}/{{camera}}/{{sequence}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/render/{{scene}}/{{camera}}/{{sequence}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(3000),
     params:
-        function="synfeal.dataset.render_sequence:render_sequence",
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
-        start=lambda w: sequence_named(w).start,
-        stop=lambda w: sequence_named(w).stop,
+        start=lambda w: FILES.sequence(w.scene, w.camera, w.sequence).start,
+        stop=lambda w: FILES.sequence(w.scene, w.camera, w.sequence).stop,
         with_depth=lambda w: w.camera == "groundtruth" or CONFIG.network_depth,
         render=dump(CONFIG.render),
+    script:
+        "../scripts/render.py"
 
 
 # How much of its light comes from where: for light states, of stand-ins alone.
-use rule call_4gb as light_shares with:
+rule light_shares:
     output:
-        shares=expand(
-            f"{ROOT}/scenes/{{{{scene}}}}/light_{{group}}.glb", group=LIGHT_GROUPS
-        ),
+        shares=[f"{ROOT}/scenes/{{scene}}/light_{group}.glb" for group in LIGHT_GROUPS],
+    log:
+        f"{ROOT}/logs/light_shares/{{scene}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/light_shares/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(4000),
     params:
-        function="reproduction.rooms:save_light_shares",
         builder=lambda w: CONFIG.scenes[w.scene].builder,
         seed=lambda w: (
             CONFIG.seed
             if CONFIG.scenes[w.scene].seed is None
             else CONFIG.scenes[w.scene].seed
         ),
+    script:
+        "../scripts/light_shares.py"
 
 
 # Built-in objects, where effects place some along every path.
-use rule call as cartons with:
+rule cartons:
     input:
         mesh=rules.scene.output.mesh,
     output:
-        cartons=cartons_of("{scene}"),
-    params:
-        function="synfeal.collection.prepare:save_cartons",
+        cartons=FILES.cartons("{scene}"),
+    log:
+        f"{ROOT}/logs/cartons/{{scene}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/cartons/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
+    script:
+        "../scripts/cartons.py"
 
 
-use rule call_3gb as render_speed with:
+rule render_speed:
     input:
         mesh=rules.scene.output.mesh,
         plan=f"{ROOT}/plans/{{scene}}/test.csv",
     output:
         speed=f"{ROOT}/scenes/{{scene}}/render_speed.csv",
+    log:
+        f"{ROOT}/logs/render_speed/{{scene}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/render_speed/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(3000),
     params:
-        function="reproduction.speed.rendering:write_render_speed",
         network_camera=dump(CONFIG.network_camera),
         groundtruth_camera=dump(CONFIG.groundtruth_camera),
         render_speed=dump(CONFIG.render_speed),
         render=dump(CONFIG.render),
+    script:
+        "../scripts/render_speed.py"
 
 
-use rule call_3gb as collection_speed with:
+rule collection_speed:
     input:
         mesh=rules.scene.output.mesh,
         collision=rules.scene.output.collision,
         repeat=CONFIG.collection.repeat or [],
     output:
         speed=f"{ROOT}/scenes/{{scene}}/collection_speed.json",
+    log:
+        f"{ROOT}/logs/collection_speed/{{scene}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/collection_speed/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(3000),
     params:
-        function="reproduction.speed.collection:write_collection_speed",
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
         collection=lambda w, input: dump(CONFIG.collection)
         | {"repeat": file_of(input.repeat)},
         render=dump(CONFIG.render),
         seed=lambda w: seed_of(CONFIG.seed, "collection speed", w.scene),
+    script:
+        "../scripts/collection_speed.py"
 
 
 # What the localizers see goes from the renderer straight into an array, not through image files.
-use rule call_3gb as render_packed with:
+rule render_packed:
     input:
         mesh=rules.scene.output.mesh,
-        plan=lambda w: f"{ROOT}/plans/{w.scene}/{sequence_named(w, 'network').split}.csv",
-        extras=lambda w: beside_mesh(w.scene, CONFIG.render.effects),
-        detail=lambda w: detail_of(w.scene, "network", "glb"),
+        plan=lambda w: f"{ROOT}/plans/{w.scene}/{FILES.sequence(w.scene, 'network', w.sequence).split}.csv",
+        extras=lambda w: FILES.beside_mesh(w.scene, CONFIG.render.effects),
+        detail=lambda w: FILES.detail(w.scene, "network", "glb") or [],
     output:
         frames=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.npy"),
         record=temp(f"{ROOT}/frames/{{scene}}/shards/{{sequence}}.json"),
+    log:
+        f"{ROOT}/logs/render_packed/{{scene}}/{{sequence}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/render_packed/{{scene}}/{{sequence}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(3000),
     params:
-        function="synfeal.dataset.render_sequence:render_packed",
         camera=dump(CONFIG.network_camera),
-        start=lambda w: sequence_named(w, "network").start,
-        stop=lambda w: sequence_named(w, "network").stop,
+        start=lambda w: FILES.sequence(w.scene, "network", w.sequence).start,
+        stop=lambda w: FILES.sequence(w.scene, "network", w.sequence).stop,
         input_px=CONFIG.network.input_px,
         view=CONFIG.network.view,
         render=dump(CONFIG.render),
+    script:
+        "../scripts/render_packed.py"
 
 
-use rule call_2gb as pack with:
+rule pack:
     input:
         plan=rules.plan.output.plan,
-        shards=lambda w: packed_shards(w.scene, w.split, "npy"),
-        records=lambda w: packed_shards(w.scene, w.split, "json"),
-        detail=lambda w: detail_of(w.scene, "network", "json"),
+        shards=lambda w: FILES.packed_shards(w.scene, w.split, "npy"),
+        records=lambda w: FILES.packed_shards(w.scene, w.split, "json"),
+        detail=lambda w: FILES.detail(w.scene, "network", "json") or [],
     output:
         frames=f"{ROOT}/frames/{{scene}}/{{split}}.npy",
         record=f"{ROOT}/frames/{{scene}}/{{split}}.json",
+    log:
+        f"{ROOT}/logs/pack/{{scene}}/{{split}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/pack/{{scene}}/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(2000),
     params:
-        function="synfeal.dataset.packed:write_packed",
         camera=dump(CONFIG.network_camera),
         render=dump(CONFIG.render),
         view=CONFIG.network.view,
+    script:
+        "../scripts/pack.py"
 
 
-use rule call as dataset with:
+rule dataset:
     input:
         mesh=rules.scene.output.mesh,
-        sequences=lambda w: sequence_dirs(w.scene, w.camera),
-        plans=lambda w: plans_with_frames(w.scene, w.camera, "csv"),
-        coverage=lambda w: plans_with_frames(w.scene, w.camera, "coverage.json"),
-        extras=lambda w: beside_mesh(w.scene, CONFIG.render.effects),
+        sequences=lambda w: FILES.sequence_dirs(w.scene, w.camera),
+        plans=lambda w: FILES.plans(w.scene, w.camera, "csv"),
+        coverage=lambda w: FILES.plans(w.scene, w.camera, "coverage.json"),
+        extras=lambda w: FILES.beside_mesh(w.scene, CONFIG.render.effects),
         clutter=lambda w: (
             [f"{ROOT}/scenes/{w.scene}/clutter.json"]
             if CONFIG.scenes[w.scene].clutter
             else []
         ),
-        detail=lambda w: detail_of(w.scene, w.camera, "json"),
+        detail=lambda w: FILES.detail(w.scene, w.camera, "json") or [],
     output:
         manifest=f"{ROOT}/datasets/{{scene}}/{{camera}}/manifest.json",
         train=f"{ROOT}/datasets/{{scene}}/{{camera}}/TrainSplit.txt",
@@ -233,15 +313,24 @@ use rule call as dataset with:
             for split in SPLITS
             if all(CONFIG.n_largest(scene, split) for scene in CONFIG.scenes)
         ],
+    log:
+        f"{ROOT}/logs/dataset/{{scene}}/{{camera}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/dataset/{{scene}}/{{camera}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="synfeal.dataset.finish:finish_dataset",
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
-        counts=lambda w: {s: n_frames(w.scene, w.camera, s) for s in SPLITS},
+        counts=lambda w: {s: FILES.n_frames(w.scene, w.camera, s) for s in SPLITS},
         shard_frames=CONFIG.shard_frames,
         origin=lambda w: origin_of(CONFIG, w.scene),
+    script:
+        "../scripts/dataset.py"
 
 
-use rule call as true_labels with:
+rule true_labels:
     input:
         plan=f"{ROOT}/plans/{{scene}}/{{split}}.csv",
     output:
@@ -250,6 +339,11 @@ use rule call as true_labels with:
         f"{ROOT}/logs/labels/{{scene}}/{{size}}/synfeal/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/labels/{{scene}}/{{size}}/synfeal/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="synfeal.dataset.pose_table:write_first_frames",
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
+    script:
+        "../scripts/true_labels.py"

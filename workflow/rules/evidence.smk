@@ -1,95 +1,183 @@
 # Tables, figures and the summary: they read result files and compute nothing upstream.
 
 
-use rule call as table1_meshes with:
+rule table1_meshes:
     input:
-        properties=under("scenes/{scene}/properties.json", scene=SCENES),
+        properties=under("scenes/{scene}/properties.json", scene=FILES.scenes),
     output:
         **table_files("table1_meshes"),
+    log:
+        f"{ROOT}/logs/tables/table1_meshes.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/table1_meshes.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="reproduction.tables.meshes:write_meshes_table",
-        scenes=SCENES,
+        scenes=FILES.scenes,
+    script:
+        "../scripts/table1_meshes.py"
 
 
-use rule call as table with:
+rule table:
     input:
-        metrics=lambda w: under("runs/{run}/metrics.json", run=runs_of(w.table)),
+        metrics=lambda w: under("runs/{run}/metrics.json", run=FILES.runs_of(w.table)),
         errors=lambda w: under(
             "runs/{run}/errors.csv",
-            run=runs_of(w.table) if w.table == "table3_inconsistencies" else [],
+            run=FILES.runs_of(w.table) if w.table == "table3_inconsistencies" else [],
         ),
     output:
         **table_files("{table}"),
+    log:
+        f"{ROOT}/logs/tables/{{table}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/{{table}}.tsv"
     wildcard_constraints:
         table="table[2-9]_[a-z_]+",
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="reproduction.tables.write:write_table",
         design=dump(DESIGN),
+    script:
+        "../scripts/table.py"
 
 
-use rule call as recall with:
+rule references_table:
     input:
-        metrics=METRICS,
+        metrics=FILES.of_references("metrics.json"),
+        facts=FILES.of_references("facts.json"),
+        localizers=FILES.of_runs("metrics.json"),
+    output:
+        **table_files("references"),
+    log:
+        f"{ROOT}/logs/tables/references.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/references.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
+    params:
+        design=dump(DESIGN),
+        references=dump(CONFIG.references),
+    script:
+        "../scripts/references_table.py"
+
+
+rule recall:
+    input:
+        metrics=FILES.of_runs("metrics.json"),
     output:
         **table_files("recall"),
+    log:
+        f"{ROOT}/logs/tables/recall.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/recall.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="reproduction.tables.recall:write_recall_table",
         design=dump(DESIGN),
+    script:
+        "../scripts/recall.py"
 
 
-use rule call as assistance with:
+rule assistance:
     input:
-        records=under("labels/{set}/assistance.json", set=ESTIMATED_SETS),
+        records=under("labels/{set}/assistance.json", set=FILES.estimated_sets),
     output:
         **table_files("assistance"),
+    log:
+        f"{ROOT}/logs/tables/assistance.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/assistance.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="reproduction.tables.assistance:write_assistance_table",
         design=dump(DESIGN),
+    script:
+        "../scripts/assistance.py"
 
 
-use rule call as label_error with:
+rule label_error:
     input:
-        labels=under("labels/{set}/{split}.csv", set=POSE_SETS, split=SPLITS),
+        labels=under("labels/{set}/{split}.csv", set=FILES.pose_sets, split=SPLITS),
         unassisted=under(
-            "labels/{set}/{split}-unassisted.csv", set=ESTIMATED_SETS, split=SPLITS
+            "labels/{set}/{split}-unassisted.csv",
+            set=FILES.estimated_sets,
+            split=SPLITS,
         ),
-        records=under("labels/{set}/assistance.json", set=ESTIMATED_SETS),
-        facts=batch_facts(),
+        records=under("labels/{set}/assistance.json", set=FILES.estimated_sets),
+        facts=FILES.batch_facts(),
     output:
         **table_files("label_error"),
+    log:
+        f"{ROOT}/logs/tables/label_error.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/label_error.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="reproduction.tables.label_error:write_label_error_table",
         design=dump(DESIGN),
+    script:
+        "../scripts/label_error.py"
 
 
-use rule call as speed_vs_error with:
+rule speed_vs_error:
     input:
-        curves=under("scenes/{scene}/collision_curve.csv", scene=SCENES),
-        rendering=under("scenes/{scene}/render_speed.csv", scene=SCENES),
-        labels=under("tables/{t}.csv", t={"label_error"}.intersection(LABEL_TABLES)),
-        trainings=under("tables/{t}.csv", t={"table4_size"} & {*TABLE_NAMES}),
-        histories=table4_files("runs/{run}/history.csv"),
-        effects=drawn_robustness(),
-        measured=table4_files("benchmarks/train/{run}.tsv"),
+        curves=under("scenes/{scene}/collision_curve.csv", scene=FILES.scenes),
+        rendering=under("scenes/{scene}/render_speed.csv", scene=FILES.scenes),
+        labels=under(
+            "tables/{t}.csv", t={"label_error"}.intersection(FILES.label_tables)
+        ),
+        trainings=under("tables/{t}.csv", t={"table4_size"}.intersection(FILES.tables)),
+        histories=under("runs/{run}/history.csv", run=FILES.runs_of("table4_size")),
+        effects=FILES.drawn_robustness(),
+        measured=under("benchmarks/train/{run}.tsv", run=FILES.runs_of("table4_size")),
     output:
         csv=f"{ROOT}/tables/speed_vs_error.csv",
+    log:
+        f"{ROOT}/logs/tables/speed_vs_error.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/speed_vs_error.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="reproduction.tables.speed_vs_error:write_speed_vs_error",
-        scenes=SCENES,
+        scenes=FILES.scenes,
+    script:
+        "../scripts/speed_vs_error.py"
 
 
-use rule call_2gb as hard_cases with:
+rule hard_cases:
     output:
         csv=f"{ROOT}/tables/hard_cases.csv",
-    params:
-        function="reproduction.hard_cases.table:write_hard_cases",
+    log:
+        f"{ROOT}/logs/tables/hard_cases.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/hard_cases.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(2000),
+    script:
+        "../scripts/hard_cases.py"
 
 
-use rule call as document with:
+rule document:
     input:
         tables=[
-            *under("tables/{t}.tex", t=[*TABLE_NAMES, "references", "recall"]),
-            *robustness_tables("tex"),
+            *under("tables/{t}.tex", t=[*FILES.tables, "references", "recall"]),
+            *FILES.robustness_tables("tex"),
         ],
     output:
         tex=f"{ROOT}/tables/all_tables.tex",
@@ -97,113 +185,147 @@ use rule call as document with:
         f"{ROOT}/logs/tables/document.log",
     benchmark:
         f"{ROOT}/benchmarks/tables/document.tsv"
-    params:
-        function="reproduction.report.document:write_document",
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
+    script:
+        "../scripts/document.py"
 
 
-use rule call_2gb as figures with:
+rule figures:
     input:
-        tables=under("tables/{table}.csv", table=DRAWN),
-        references=rules.references_table.output.csv if DRAWN else [],
-        robustness=drawn_robustness(),
+        tables=under("tables/{table}.csv", table=FILES.drawn_tables),
+        references=rules.references_table.output.csv if FILES.drawn_tables else [],
+        robustness=FILES.drawn_robustness(),
         speed=rules.speed_vs_error.output.csv,
-        labels=under("labels/{set}/{split}.csv", set=POSE_SETS, split=SPLITS),
-        assistance=under("labels/{set}/assistance.json", set=ESTIMATED_SETS),
-        errors=under("runs/{run}/errors.csv", run=runs_of("table4_size")),
-        collision=under("scenes/{scene}/collision.ply", scene=SCENES),
-        frames=under("frames/{scene}/test.npy", scene=SCENES),
+        labels=under("labels/{set}/{split}.csv", set=FILES.pose_sets, split=SPLITS),
+        assistance=under("labels/{set}/assistance.json", set=FILES.estimated_sets),
+        errors=under("runs/{run}/errors.csv", run=FILES.runs_of("table4_size")),
+        collision=under("scenes/{scene}/collision.ply", scene=FILES.scenes),
+        frames=under("frames/{scene}/test.npy", scene=FILES.scenes),
     output:
         dir=directory(f"{ROOT}/figures"),
+    log:
+        f"{ROOT}/logs/figures.log",
+    benchmark:
+        f"{ROOT}/benchmarks/figures.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(2000),
     params:
-        function="reproduction.figures.registry:write_figures",
         design=dump(DESIGN),
+    script:
+        "../scripts/figures.py"
 
 
-use rule call as summary with:
+rule summary:
     input:
-        metrics=METRICS,
+        metrics=FILES.of_runs("metrics.json"),
         references=rules.references_table.output.csv,
         recall=rules.recall.output.csv,
-        robustness=robustness_tables(),
+        robustness=FILES.robustness_tables(),
         properties=rules.table1_meshes.input.properties,
     output:
         md=f"{ROOT}/summary.md",
+    log:
+        f"{ROOT}/logs/summary.log",
+    benchmark:
+        f"{ROOT}/benchmarks/summary.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="reproduction.report.summary:write_summary",
         design=dump(DESIGN),
+    script:
+        "../scripts/summary.py"
 
 
-use rule call as claims with:
+rule claims:
     input:
-        errors=under("runs/{run}/errors.csv", run=RUNS),
-        common_errors=under("runs/{run}/common_errors.csv", run=RUNS),
-        labels=under("labels/{set}/{split}.csv", set=TRUE_SETS, split=SPLITS),
-        estimated=under("labels/{set}/train.csv", set=ESTIMATED_SETS),
-        assistance=under("labels/{set}/assistance.json", set=ESTIMATED_SETS),
+        errors=FILES.of_runs("errors.csv"),
+        common_errors=FILES.of_runs("common_errors.csv"),
+        labels=under("labels/{set}/{split}.csv", set=FILES.true_sets, split=SPLITS),
+        estimated=under("labels/{set}/train.csv", set=FILES.estimated_sets),
+        assistance=under("labels/{set}/assistance.json", set=FILES.estimated_sets),
         properties=rules.table1_meshes.input.properties,
-        speed=under("scenes/{scene}/collection_speed.json", scene=SCENES),
+        speed=under("scenes/{scene}/collection_speed.json", scene=FILES.scenes),
     output:
         csv=f"{ROOT}/claims.csv",
+    log:
+        f"{ROOT}/logs/claims.log",
+    benchmark:
+        f"{ROOT}/benchmarks/claims.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="reproduction.claims.table:write_claims",
         design=dump(DESIGN),
         seed=CONFIG.seed,
+    script:
+        "../scripts/claims.py"
 
 
+# Files that the record has hashes of, and the report shows.
 RESULTS = [
-    *under("tables/{table}.csv", table=TABLE_NAMES),
+    *under("tables/{table}.csv", table=FILES.tables),
     rules.speed_vs_error.output.csv,
     rules.hard_cases.output.csv,
-    *under("tables/{table}.csv", table=LABEL_TABLES),
+    *under("tables/{table}.csv", table=FILES.label_tables),
     rules.references_table.output.csv,
     rules.recall.output.csv,
-    *robustness_tables(),
+    *FILES.robustness_tables(),
     rules.figures.output.dir,
     rules.summary.output.md,
     rules.claims.output.csv,
 ]
 
 
-LABELS = [
-    *every_label_set(),
-    *under("tables/{table}.csv", table=LABEL_TABLES),
-    *label_figures(),
-]
-
-# All but what records and reports a run; how much of its scene a plan covers is read by people alone.
-EVIDENCE = [
-    *RESULTS,
-    rules.document.output.tex,
-    *every_label_set(),
-    *under("plans/{scene}/{split}.coverage.json", scene=SCENES, split=SPLITS),
-    *manifests("groundtruth"),
-]
-
-
-use rule call as provenance with:
+rule provenance:
     input:
         results=RESULTS,
-        measured=lambda w: measurements(*EVIDENCE),
+        measured=lambda w: measured_by(*JOBS),
     output:
         json=f"{ROOT}/provenance.json",
         csv=f"{ROOT}/benchmarks.csv",
+    log:
+        f"{ROOT}/logs/provenance.log",
+    benchmark:
+        f"{ROOT}/benchmarks/provenance.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="reproduction.report.html.provenance:write_provenance",
         seed=CONFIG.seed,
         config_hash=config_hash(CONFIG),
+    script:
+        "../scripts/provenance.py"
 
 
-use rule call_4gb as report with:
+rule report:
     input:
         provenance=rules.provenance.output.json,
         results=RESULTS,
-        metrics=METRICS,
-        meshes=under("scenes/{scene}/mesh.glb", scene=SCENES),
-        plans=under("plans/{scene}/{split}.csv", scene=SCENES, split=SPLITS),
-        labels=under("labels/{set}/{split}.csv", set=POSE_SETS, split=SPLITS),
+        metrics=FILES.of_runs("metrics.json"),
+        meshes=under("scenes/{scene}/mesh.glb", scene=FILES.scenes),
+        plans=under("plans/{scene}/{split}.csv", scene=FILES.scenes, split=SPLITS),
+        labels=under("labels/{set}/{split}.csv", set=FILES.pose_sets, split=SPLITS),
     output:
         html=f"{ROOT}/report.html",
+    log:
+        f"{ROOT}/logs/report.log",
+    benchmark:
+        f"{ROOT}/benchmarks/report.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(4000),
     params:
-        function="reproduction.report.html.page:write_report",
         design=dump(DESIGN),
-        with_robustness=robustness_asked(),
+        with_robustness=FILES.has_robustness,
+    script:
+        "../scripts/report.py"

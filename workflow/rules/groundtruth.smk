@@ -1,7 +1,6 @@
 # Label sets other than the simulator's: reconstructed in batches with assistance, or with errors.
 
 ESTIMATED = f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}"
-CHAINED = f"{ESTIMATED}/assistance.json"
 TRUE = f"{ROOT}/labels/{{scene}}/{{size}}/synfeal"
 ERRONEOUS = "{scene}/{size}/{error_kind}-p{noise_m}-r{noise_deg}/{split}"
 STEM = f"{ROOT}/groundtruth/{{scene}}/{{size}}"
@@ -9,7 +8,7 @@ BATCH = "{split}/batch-{batch}"
 BATCH_LOG = "{scene}/{size}/{split}/batch-{batch}"
 
 
-use rule call as erroneous_labels with:
+rule erroneous_labels:
     input:
         truth=f"{TRUE}/{{split}}.csv",
         train=f"{TRUE}/train.csv",
@@ -19,52 +18,70 @@ use rule call as erroneous_labels with:
         f"{ROOT}/logs/labels/{ERRONEOUS}.log",
     benchmark:
         f"{ROOT}/benchmarks/labels/{ERRONEOUS}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="baselines.labels.injected:write_erroneous_labels",
         seed=lambda w: seed_of(
             CONFIG.seed, *seed_names(w.error_kind, w.split), w.scene, w.size
         ),
+    script:
+        "../scripts/erroneous_labels.py"
 
 
-use rule call_4gb as sfm with:
+rule sfm:
     input:
-        **unless_restored(
-            [f"{STEM}/sfm/{BATCH}.json"],
-            sequences=batch_sequences,
-            truth=f"{TRUE}/{{split}}.csv",
-        ),
+        sequences=lambda w: FILES.frames_of_batch(w.scene, w.size, w.split, w.batch),
+        truth=f"{TRUE}/{{split}}.csv",
     output:
         trajectory=f"{STEM}/sfm/{BATCH}.csv",
         facts=f"{STEM}/sfm/{BATCH}.json",
+    log:
+        f"{ROOT}/logs/sfm/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/sfm/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(4000),
     params:
-        function="baselines.labels.sfm.batch:write_sfm",
-        start=lambda w: batch_of(w).start,
-        stop=lambda w: batch_of(w).stop,
+        start=lambda w: FILES.batch(w.scene, w.size, w.split, w.batch).start,
+        stop=lambda w: FILES.batch(w.scene, w.size, w.split, w.batch).stop,
         camera=dump(CONFIG.groundtruth_camera),
         sfm=dump(CONFIG.groundtruth.sfm),
         seed=lambda w: seed_of(CONFIG.seed, "sfm", w.scene, w.size, w.split, w.batch),
+    script:
+        "../scripts/sfm.py"
 
 
-use rule call_4gb as rgbd with:
+rule rgbd:
     input:
-        **unless_restored([f"{STEM}/rgbd/{BATCH}.json"], sequences=batch_sequences),
+        sequences=lambda w: FILES.frames_of_batch(w.scene, w.size, w.split, w.batch),
     output:
         graph=f"{STEM}/rgbd/{BATCH}.g2o",
         facts=f"{STEM}/rgbd/{BATCH}.json",
+    log:
+        f"{ROOT}/logs/rgbd/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/rgbd/{{scene}}/{{size}}/{{split}}/batch-{{batch}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(4000),
     params:
-        function="baselines.labels.rgbd.graph:write_rgbd",
-        start=lambda w: batch_of(w).start,
-        stop=lambda w: batch_of(w).stop,
+        start=lambda w: FILES.batch(w.scene, w.size, w.split, w.batch).start,
+        stop=lambda w: FILES.batch(w.scene, w.size, w.split, w.batch).stop,
         camera=dump(CONFIG.groundtruth_camera),
         rgbd=dump(CONFIG.groundtruth.rgbd),
         seed=lambda w: seed_of(CONFIG.seed, "depth-sensor", w.scene),
+    script:
+        "../scripts/rgbd.py"
 
 
-use rule call_4gb as estimate with:
+rule estimate:
     input:
-        **unless_restored(
-            [f"{STEM}/{{frame_method}}/{BATCH}.json"], sequences=batch_sequences
-        ),
+        sequences=lambda w: FILES.frames_of_batch(w.scene, w.size, w.split, w.batch),
     output:
         trajectory=f"{STEM}/{{frame_method}}/{BATCH}.csv",
         facts=f"{STEM}/{{frame_method}}/{BATCH}.json",
@@ -72,22 +89,25 @@ use rule call_4gb as estimate with:
         f"{ROOT}/logs/{{frame_method}}/{BATCH_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/{{frame_method}}/{BATCH_LOG}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(4000),
     params:
-        function="baselines.labels.methods:write_estimate",
-        start=lambda w: batch_of(w).start,
-        stop=lambda w: batch_of(w).stop,
+        start=lambda w: FILES.batch(w.scene, w.size, w.split, w.batch).start,
+        stop=lambda w: FILES.batch(w.scene, w.size, w.split, w.batch).stop,
         camera=dump(CONFIG.groundtruth_camera),
         groundtruth=lambda w: dump(
             CONFIG.groundtruth, include={METHODS[w.frame_method].settings}
         ),
         seed=lambda w: seed_of(CONFIG.seed, "depth-sensor", w.scene),
+    script:
+        "../scripts/estimate.py"
 
 
-use rule call_2gb as posegraph with:
+rule posegraph:
     input:
-        **unless_restored(
-            [f"{STEM}/{{graph_method}}/{BATCH}.json"], graph=f"{STEM}/rgbd/{BATCH}.g2o"
-        ),
+        graph=f"{STEM}/rgbd/{BATCH}.g2o",
     output:
         trajectory=f"{STEM}/{{graph_method}}/{BATCH}.csv",
         facts=f"{STEM}/{{graph_method}}/{BATCH}.json",
@@ -95,32 +115,47 @@ use rule call_2gb as posegraph with:
         f"{ROOT}/logs/{{graph_method}}/{BATCH_LOG}.log",
     benchmark:
         f"{ROOT}/benchmarks/{{graph_method}}/{BATCH_LOG}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(2000),
     params:
-        function="baselines.labels.methods:write_solved",
         posegraph=dump(CONFIG.groundtruth.posegraph),
+    script:
+        "../scripts/posegraph.py"
 
 
-use rule call as chain with:
+rule chain:
     input:
-        **unless_restored(
-            [CHAINED],
-            train_batches=lambda w: batch_files(w, "train"),
-            test_batches=lambda w: batch_files(w, "test"),
-            train_truth=f"{TRUE}/train.csv",
-            test_truth=f"{TRUE}/test.csv",
+        train_batches=lambda w: FILES.batch_files(
+            w.scene, w.size, w.reconstructed, "train"
         ),
+        test_batches=lambda w: FILES.batch_files(
+            w.scene, w.size, w.reconstructed, "test"
+        ),
+        train_truth=f"{TRUE}/train.csv",
+        test_truth=f"{TRUE}/test.csv",
     output:
         train=f"{ESTIMATED}/train.csv",
         test=f"{ESTIMATED}/test.csv",
         train_unassisted=f"{ESTIMATED}/train-unassisted.csv",
         test_unassisted=f"{ESTIMATED}/test-unassisted.csv",
-        assistance=CHAINED,
+        assistance=f"{ESTIMATED}/assistance.json",
         record=f"{ESTIMATED}/estimation.json",
+    log:
+        f"{ROOT}/logs/chain/{{scene}}/{{size}}/{{reconstructed}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/chain/{{scene}}/{{size}}/{{reconstructed}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
     params:
-        function="baselines.labels.chain:write_label_set",
         groundtruth=dump(
             CONFIG.groundtruth,
             include={"batch_frames", "assist_position_m", "assist_orientation_deg"},
         ),
         truth_used=lambda w: truth_used(CONFIG.groundtruth, w.reconstructed).value,
         estimation=lambda w: estimation_parameters(CONFIG, w.reconstructed),
+    script:
+        "../scripts/chain.py"

@@ -75,7 +75,6 @@ rule part:
     conda:
         "../envs/synfeal.yaml"
     params:
-        function="reproduction.real.stages:write_part",
         sequence=SETTINGS["sequence"],
         sequence_name=SETTINGS["sequence_name"],
         sfm_labels=SETTINGS["sfm_labels"],
@@ -84,7 +83,7 @@ rule part:
         labels=lambda w: PARTS[w.part].labels,
         photographs=lambda w: PARTS[w.part].photographs,
     script:
-        "../scripts/call.py"
+        "../scripts/real/part.py"
 
 
 rule scan:
@@ -167,10 +166,9 @@ rule fewer_frames:
     conda:
         "../envs/synfeal.yaml"
     params:
-        function="reproduction.real.stages:write_prefix",
         dataset=subpath(input[0], parent=True),
     script:
-        "../scripts/call.py"
+        "../scripts/real/fewer_frames.py"
 
 
 # It goes on where it was stopped: what it needs for that is no output that Snakemake deletes.
@@ -277,10 +275,9 @@ rule references:
     conda:
         "../envs/synfeal.yaml"
     params:
-        function="reproduction.real.stages:write_references",
         rendered=subpath(input.manifest, parent=True),
     script:
-        "../scripts/call.py"
+        "../scripts/real/references.py"
 
 
 rule cover:
@@ -296,10 +293,8 @@ rule cover:
         f"{ROOT}/benchmarks/cover/{{part}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    params:
-        function="reproduction.real.stages:write_cover",
     script:
-        "../scripts/call.py"
+        "../scripts/real/cover.py"
 
 
 # Of photographs that may not be passed on: it stays here.
@@ -316,10 +311,8 @@ rule picture:
         f"{ROOT}/benchmarks/picture/{{part}}.tsv"
     conda:
         "../envs/synfeal.yaml"
-    params:
-        function="reproduction.real.stages:write_comparison",
     script:
-        "../scripts/call.py"
+        "../scripts/real/picture.py"
 
 
 rule real_tables:
@@ -343,10 +336,9 @@ rule real_tables:
     conda:
         "../envs/synfeal.yaml"
     params:
-        function="reproduction.real.tables:write_real_tables",
         config=SETTINGS,
     script:
-        "../scripts/call.py"
+        "../scripts/real/tables.py"
 
 
 rule real_figures:
@@ -363,7 +355,5 @@ rule real_figures:
         f"{ROOT}/benchmarks/real_figures.tsv"
     conda:
         "../envs/synfeal.yaml"
-    params:
-        function="reproduction.real.figures:write_real_figures",
     script:
-        "../scripts/call.py"
+        "../scripts/real/figures.py"

@@ -2,25 +2,39 @@
 # are found once per scene or data set and serve all of its label sets.
 FOUND = f"{ROOT}/references/{{scene}}/{{size}}"
 REFERENCE = f"{FOUND}/{{labels}}"
-REFERENCE_LOG = "{scene}/{size}/{labels}"
-STRUCTURE = {n: f"{FOUND}/{n}.npz" for n in ("correspondences", "tracks")}
+# What every method is given: labels and true poses of both splits.
+POSES = {
+    "train": f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
+    "train_truth": f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/train.csv",
+    "test": f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
+    "test_truth": f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
+}
 
 
-use rule call_3gb as descriptors with:
+rule descriptors:
     input:
         train=f"{ROOT}/frames/{{scene}}/train.npy",
         test=f"{ROOT}/frames/{{scene}}/test.npy",
     output:
         descriptors=f"{ROOT}/references/{{scene}}/descriptors.npz",
+    log:
+        f"{ROOT}/logs/descriptors/{{scene}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/descriptors/{{scene}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(3000),
     params:
-        function="baselines.references.descriptors:write_descriptors",
-        learned_from=lambda w: smallest_train(w.scene),
+        learned_from=lambda w: FILES.smallest_train(w.scene),
         seed=lambda w: seed_of(CONFIG.seed, "descriptors", w.scene),
+    script:
+        "../scripts/descriptors.py"
 
 
-use rule call_3gb as features with:
+rule features:
     input:
-        sequences=lambda w: sequence_dirs(
+        sequences=lambda w: FILES.sequence_dirs(
             w.scene,
             "groundtruth",
             w.split,
@@ -32,55 +46,90 @@ use rule call_3gb as features with:
         f"{ROOT}/logs/features/{{scene}}/{{size}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/features/{{scene}}/{{size}}/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(3000),
     params:
-        function="baselines.references.features:write_features",
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
         camera=dump(CONFIG.groundtruth_camera),
         references=dump(CONFIG.references, exclude={"coordinate_samples"}),
+    script:
+        "../scripts/features.py"
 
 
-use rule call_3gb as correspondences with:
+rule correspondences:
     input:
         descriptors=rules.descriptors.output.descriptors,
         train=f"{FOUND}/features-train.npz",
         test=f"{FOUND}/features-test.npz",
     output:
         matches=f"{FOUND}/correspondences.npz",
+    log:
+        f"{ROOT}/logs/correspondences/{{scene}}/{{size}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/correspondences/{{scene}}/{{size}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(3000),
     params:
-        function="baselines.references.correspondences:write_matches",
         retrieved=CONFIG.references.retrieved,
+    script:
+        "../scripts/correspondences.py"
 
 
-use rule call_3gb as tracks with:
+rule tracks:
     input:
         descriptors=rules.descriptors.output.descriptors,
         train=f"{FOUND}/features-train.npz",
     output:
         tracks=f"{FOUND}/tracks.npz",
-    params:
-        function="baselines.references.correspondences:write_tracks",
+    log:
+        f"{ROOT}/logs/tracks/{{scene}}/{{size}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tracks/{{scene}}/{{size}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(3000),
+    script:
+        "../scripts/tracks.py"
 
 
-use rule call_2gb as image_references with:
+rule image_references:
     input:
-        **evidence_for(
-            in_group("images"),
-            descriptors=f"{ROOT}/references/{{scene}}/descriptors.npz",
-        ),
+        **POSES,
+        descriptors=rules.descriptors.output.descriptors,
     output:
-        references=reference_files(REFERENCE, in_group("images")),
+        references=FILES.reference_files(REFERENCE, in_group("images")),
+    log:
+        f"{ROOT}/logs/image_references/{{scene}}/{{size}}/{{labels}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/image_references/{{scene}}/{{size}}/{{labels}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(2000),
     params:
-        function="baselines.references.run:answer_group",
         group="images",
         camera=dump(CONFIG.network_camera),
         seed=lambda w: seed_of(CONFIG.seed, "references", w.scene, w.size, w.labels),
+    script:
+        "../scripts/references.py"
 
 
 use rule image_references as structure_references with:
     input:
-        **evidence_for(in_group("structure"), **STRUCTURE),
+        **POSES,
+        correspondences=rules.correspondences.output.matches,
+        tracks=rules.tracks.output.tracks,
     output:
-        references=reference_files(REFERENCE, in_group("structure")),
+        references=FILES.reference_files(REFERENCE, in_group("structure")),
+    log:
+        f"{ROOT}/logs/structure_references/{{scene}}/{{size}}/{{labels}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/structure_references/{{scene}}/{{size}}/{{labels}}.tsv"
     resources:
         mem_mb=grown(3000),
     params:
@@ -91,14 +140,20 @@ use rule image_references as structure_references with:
 # In jobs of their own, as these take longer and are asked of fewer label sets.
 use rule structure_references as adjusted_references with:
     input:
-        **evidence_for(in_group("adjusted"), **STRUCTURE),
+        **POSES,
+        correspondences=rules.correspondences.output.matches,
+        tracks=rules.tracks.output.tracks,
     output:
-        references=reference_files(REFERENCE, in_group("adjusted")),
+        references=FILES.reference_files(REFERENCE, in_group("adjusted")),
+    log:
+        f"{ROOT}/logs/adjusted_references/{{scene}}/{{size}}/{{labels}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/adjusted_references/{{scene}}/{{size}}/{{labels}}.tsv"
     params:
         group="adjusted",
 
 
-use rule call_2gb as views with:
+rule views:
     input:
         sequences=rules.features.input.sequences,
     output:
@@ -107,22 +162,29 @@ use rule call_2gb as views with:
         f"{ROOT}/logs/views/{{scene}}/{{size}}/{{split}}.log",
     benchmark:
         f"{ROOT}/benchmarks/views/{{scene}}/{{size}}/{{split}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(2000),
     params:
-        function="baselines.references.features:write_views",
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
         camera=dump(CONFIG.groundtruth_camera),
         side=(CONFIG.network_camera.width, CONFIG.network_camera.height),
+    script:
+        "../scripts/views.py"
 
 
 use rule structure_references as coordinate_references with:
     input:
-        **evidence_for(
-            in_group("coordinates"),
-            train_views=f"{FOUND}/views-train.npz",
-            test_views=f"{FOUND}/views-test.npz",
-        ),
+        **POSES,
+        train_views=f"{FOUND}/views-train.npz",
+        test_views=f"{FOUND}/views-test.npz",
     output:
-        references=reference_files(REFERENCE, in_group("coordinates")),
+        references=FILES.reference_files(REFERENCE, in_group("coordinates")),
+    log:
+        f"{ROOT}/logs/coordinate_references/{{scene}}/{{size}}/{{labels}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/coordinate_references/{{scene}}/{{size}}/{{labels}}.tsv"
     params:
         group="coordinates",
         samples_seen=CONFIG.references.coordinate_samples,
@@ -130,30 +192,26 @@ use rule structure_references as coordinate_references with:
         seed=lambda w: seed_of(CONFIG.seed, "scene coordinates", w.scene, w.size),
 
 
-use rule call_4gb as external_reference with:
+rule external_reference:
     input:
-        **evidence_for(
-            ["{external}"],
-            poses=external_poses,
-            train_frames=f"{ROOT}/frames/{{scene}}/train.npy",
-            test_frames=f"{ROOT}/frames/{{scene}}/test.npy",
+        **POSES,
+        poses=lambda w: FILES.external_poses(w.external, w) or [],
+        train_frames=f"{ROOT}/frames/{{scene}}/train.npy",
+        test_frames=f"{ROOT}/frames/{{scene}}/test.npy",
+    output:
+        references=FILES.reference_files(REFERENCE, ["{external}"]),
+    log:
+        f"{ROOT}/logs/external_reference/{{scene}}/{{size}}/{{labels}}/{{external}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/external_reference/{{scene}}/{{size}}/{{labels}}/{{external}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(4000),
+    params:
+        method=lambda w: dump(
+            CONFIG.references.external[w.external], exclude={"title", "labels"}
         ),
-    output:
-        references=reference_files(REFERENCE, ["{external}"]),
-    params:
-        function="baselines.references.run:answer_externally",
-        method=lambda w: dump(EXTERNAL[w.external], exclude={"title", "labels"}),
-        named=placeholders,
-
-
-use rule call as references_table with:
-    input:
-        metrics=reference_sets("metrics.json"),
-        facts=reference_sets("facts.json"),
-        localizers=METRICS,
-    output:
-        **table_files("references"),
-    params:
-        function="reproduction.tables.references:write_references_table",
-        design=dump(DESIGN),
-        references=dump(CONFIG.references),
+        named=lambda w: {name: w[name] for name in ("scene", "size", "labels")},
+    script:
+        "../scripts/external_reference.py"

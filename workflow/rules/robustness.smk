@@ -1,136 +1,192 @@
 # The same test paths in other light, through another camera (docs/variation.md): localizers trained
 # on ideal frames, and once more on frames with all effects mixed in.
 VARIED = f"{ROOT}/robustness"
+ROBUST_SCENE = CONFIG.robustness.scene
 
 
 use rule render_packed as render_varied with:
     input:
-        extras=lambda w: varied_extras([w.effects]),
-        mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
-        plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/{{split}}.csv",
-        detail=lambda w: varied_detail(w.effects, "glb"),
+        extras=lambda w: FILES.varied_extras([w.effects]),
+        mesh=f"{ROOT}/scenes/{ROBUST_SCENE}/mesh.glb",
+        plan=f"{ROOT}/plans/{ROBUST_SCENE}/{{split}}.csv",
+        detail=lambda w: FILES.varied_detail(w.effects, "glb") or [],
     output:
         frames=temp(f"{VARIED}/shards/{{effects}}/{{split}}.npy"),
         record=temp(f"{VARIED}/shards/{{effects}}/{{split}}.json"),
+    log:
+        f"{ROOT}/logs/render_varied/{{effects}}/{{split}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/render_varied/{{effects}}/{{split}}.tsv"
     params:
         start=0,
-        stop=lambda w: robust_frames(w.split),
-        render=varied_render,
+        stop=lambda w: FILES.robust_frames(w.split),
+        render=lambda w: dump(FILES.varied_render(w.effects)),
 
 
 use rule pack as pack_varied with:
     input:
-        plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/{{split}}.csv",
+        plan=f"{ROOT}/plans/{ROBUST_SCENE}/{{split}}.csv",
         shards=[f"{VARIED}/shards/{{effects}}/{{split}}.npy"],
         records=[f"{VARIED}/shards/{{effects}}/{{split}}.json"],
-        detail=lambda w: varied_detail(w.effects, "json"),
+        detail=lambda w: FILES.varied_detail(w.effects, "json") or [],
     output:
         frames=f"{VARIED}/frames/{{effects}}/{{split}}.npy",
         record=f"{VARIED}/frames/{{effects}}/{{split}}.json",
+    log:
+        f"{ROOT}/logs/pack_varied/{{effects}}/{{split}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/pack_varied/{{effects}}/{{split}}.tsv"
     params:
-        render=varied_render,
+        render=lambda w: dump(FILES.varied_render(w.effects)),
 
 
-use rule call as train_varied with:
+rule train_varied:
     input:
         frames=f"{VARIED}/frames/mixed/train.npy",
-        labels=f"{ROOT}/labels/{ROBUST_SET}/train.csv",
+        labels=f"{ROOT}/labels/{FILES.robust_set}/train.csv",
         test_frames=f"{VARIED}/frames/mixed/test.npy",
-        test_labels=f"{ROOT}/labels/{ROBUST_SET}/test.csv",
-        weights=lambda w: f"{ROOT}/pretrained/{backbone_of(w.model, CONFIG.network)}.pt",
+        test_labels=f"{ROOT}/labels/{FILES.robust_set}/test.csv",
+        weights=lambda w: FILES.weights(w.model, "pretrained") or [],
         records=expand(f"{VARIED}/frames/mixed/{{split}}.json", split=SPLITS),
     output:
         model=f"{VARIED}/runs/{{model}}/model.pt",
         history=f"{VARIED}/runs/{{model}}/history.csv",
         record=f"{VARIED}/runs/{{model}}/training.json",
         predictions=f"{VARIED}/runs/{{model}}/predictions.csv",
+    log:
+        f"{ROOT}/logs/train_varied/{{model}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/train_varied/{{model}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
     resources:
         mem_mb=lambda w, attempt: attempt
         * training_mb(
-            sum(map(robust_frames, SPLITS)),
+            FILES.n_of_size(ROBUST_SCENE, CONFIG.robustness.size),
             CONFIG.network,
             CONFIG.training.batch_size,
         ),
     params:
-        function="baselines.training.run:train_and_predict",
-        run=lambda w: training_parameters(CONFIG, robust_run(w.model)),
+        run=lambda w: training_parameters(CONFIG, FILES.robust_run(w.model)),
+    script:
+        "../scripts/train_varied.py"
 
 
 # Vectors of the ideal and of the varied frames: what the map of each training set is searched by.
-use rule call_3gb as varied_descriptors with:
+rule varied_descriptors:
     input:
         **{
-            CLEAN: f"{ROOT}/frames/{ROBUSTNESS.scene}/test.npy",
-            **{n: f"{VARIED}/frames/{n}/test.npy" for n in ROBUST_EFFECTS},
+            CLEAN: f"{ROOT}/frames/{ROBUST_SCENE}/test.npy",
+            **{n: f"{VARIED}/frames/{n}/test.npy" for n in FILES.tested_effects},
             "train": lambda w: (
                 f"{VARIED}/frames/{MIXED}/train.npy"
                 if w.trained_on == MIXED
-                else f"{ROOT}/frames/{ROBUSTNESS.scene}/train.npy"
+                else f"{ROOT}/frames/{ROBUST_SCENE}/train.npy"
             ),
         },
     output:
         descriptors=f"{VARIED}/descriptors/{{trained_on}}.npz",
+    log:
+        f"{ROOT}/logs/varied_descriptors/{{trained_on}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/varied_descriptors/{{trained_on}}.tsv"
     wildcard_constraints:
         trained_on=f"{CLEAN}|{MIXED}",
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(3000),
     params:
-        function="baselines.references.descriptors:write_descriptors",
         counts={
-            **dict.fromkeys([CLEAN, *ROBUST_EFFECTS], robust_frames("test")),
-            "train": robust_frames("train"),
+            **dict.fromkeys(
+                [CLEAN, *FILES.tested_effects], FILES.robust_frames("test")
+            ),
+            "train": FILES.robust_frames("train"),
         },
-        learned_from=smallest_train(ROBUSTNESS.scene),
-        seed=seed_of(CONFIG.seed, "descriptors", ROBUSTNESS.scene),
+        learned_from=FILES.smallest_train(ROBUST_SCENE),
+        seed=seed_of(CONFIG.seed, "descriptors", ROBUST_SCENE),
+    script:
+        "../scripts/varied_descriptors.py"
 
 
 # A sample of the test frames, large enough for features, against the map of the ideal frames.
-use rule call_3gb as varied_structure with:
+rule varied_structure:
     input:
-        extras=lambda w: varied_extras([w.effects]),
-        mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
-        plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/test.csv",
+        extras=lambda w: FILES.varied_extras([w.effects]),
+        mesh=f"{ROOT}/scenes/{ROBUST_SCENE}/mesh.glb",
+        plan=f"{ROOT}/plans/{ROBUST_SCENE}/test.csv",
         descriptors=f"{VARIED}/descriptors/clean.npz",
-        features=f"{ROOT}/references/{ROBUSTNESS.scene}/{ROBUSTNESS.size}/features-train.npz",
-        labels=f"{ROOT}/labels/{ROBUST_SET}/train.csv",
+        features=f"{ROOT}/references/{ROBUST_SCENE}/{CONFIG.robustness.size}/features-train.npz",
+        labels=f"{ROOT}/labels/{FILES.robust_set}/train.csv",
     output:
         predictions=f"{VARIED}/structure/{{effects}}.csv",
+    log:
+        f"{ROOT}/logs/varied_structure/{{effects}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/varied_structure/{{effects}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(3000),
     params:
-        function="baselines.references.robustness:write_varied",
-        n_test=robust_frames("test"),
-        sample=ROBUSTNESS.structure_frames,
+        n_test=FILES.robust_frames("test"),
+        sample=CONFIG.robustness.structure_frames,
         camera=dump(CONFIG.groundtruth_camera),
-        render=varied_render,
+        render=lambda w: dump(FILES.varied_render(w.effects)),
         references=dump(CONFIG.references, exclude={"coordinate_samples"}),
-        seed=seed_of(CONFIG.seed, "references", *ROBUST_SET.split("/")),
+        seed=seed_of(CONFIG.seed, "references", *FILES.robust_set.split("/")),
+    script:
+        "../scripts/varied_structure.py"
 
 
-use rule call_3gb as effects_speed with:
+rule effects_speed:
     input:
-        extras=varied_extras(VARIATIONS),
-        mesh=f"{ROOT}/scenes/{ROBUSTNESS.scene}/mesh.glb",
-        plan=f"{ROOT}/plans/{ROBUSTNESS.scene}/test.csv",
+        extras=FILES.varied_extras(FILES.variations),
+        mesh=f"{ROOT}/scenes/{ROBUST_SCENE}/mesh.glb",
+        plan=f"{ROOT}/plans/{ROBUST_SCENE}/test.csv",
     output:
-        csv=f"{ROOT}/scenes/{ROBUSTNESS.scene}/effects_speed.csv",
+        csv=f"{ROOT}/scenes/{ROBUST_SCENE}/effects_speed.csv",
+    log:
+        f"{ROOT}/logs/effects_speed.log",
+    benchmark:
+        f"{ROOT}/benchmarks/effects_speed.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(3000),
     params:
-        function="reproduction.speed.collection:write_effects_speed",
         camera=dump(CONFIG.network_camera),
         render=dump(CONFIG.render),
-        effects={name: dump(VARIATIONS[name]) for name in ROBUST_EFFECTS},
+        effects={name: dump(FILES.variations[name]) for name in FILES.tested_effects},
+    script:
+        "../scripts/effects_speed.py"
 
 
-use rule call_2gb as robustness with:
+rule robustness:
     input:
-        clean=[f"{ROOT}/runs/{robust_run(m).directory}/model.pt" for m in MODELS],
+        clean=[f"{ROOT}/runs/{FILES.robust_run(m).directory}/model.pt" for m in MODELS],
         mixed=expand(f"{VARIED}/runs/{{model}}/model.pt", model=MODELS),
         descriptors=expand(
             f"{VARIED}/descriptors/{{trained_on}}.npz", trained_on=[CLEAN, MIXED]
         ),
-        structure=varied_structure(),
-        test=f"{ROOT}/frames/{ROBUSTNESS.scene}/test.npy",
-        varied=expand(f"{VARIED}/frames/{{effects}}/test.npy", effects=ROBUST_EFFECTS),
-        labels=expand(f"{ROOT}/labels/{ROBUST_SET}/{{split}}.csv", split=SPLITS),
+        structure=FILES.varied_structure(),
+        test=f"{ROOT}/frames/{ROBUST_SCENE}/test.npy",
+        varied=expand(
+            f"{VARIED}/frames/{{effects}}/test.npy", effects=FILES.tested_effects
+        ),
+        labels=expand(f"{ROOT}/labels/{FILES.robust_set}/{{split}}.csv", split=SPLITS),
     output:
         **table_files("robustness"),
+    log:
+        f"{ROOT}/logs/tables/robustness.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/robustness.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(2000),
     params:
-        function="reproduction.tables.robustness:write_robustness_table",
-        effects=ROBUST_EFFECTS,
+        effects=FILES.tested_effects,
         device=CONFIG.training.device,
+    script:
+        "../scripts/robustness.py"

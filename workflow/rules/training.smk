@@ -1,9 +1,8 @@
 # One training per cell of the tables, predicted and scored at its end.
 RUN = f"{ROOT}/runs/{{scene}}/{{size}}/{{labels}}/{{init}}/{{model}}/seed{{repetition}}"
-RUN_LOG = "{scene}/{size}/{labels}/{init}/{model}/seed{repetition}"
 
 
-use rule call as pretrain with:
+rule pretrain:
     input:
         frames=[f"{ROOT}/frames/{room}/train.npy" for room in CONFIG.rooms],
         labels=[f"{ROOT}/plans/{room}/train.csv" for room in CONFIG.rooms],
@@ -11,6 +10,12 @@ use rule call as pretrain with:
         records=[f"{ROOT}/frames/{room}/train.json" for room in CONFIG.rooms],
     output:
         weights=f"{ROOT}/pretrained/{{backbone}}.pt",
+    log:
+        f"{ROOT}/logs/pretrain/{{backbone}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/pretrain/{{backbone}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(
             training_mb(
@@ -20,69 +25,51 @@ use rule call as pretrain with:
             )
         ),
     params:
-        function="baselines.training.pretrain:pretrain_backbone",
         pretraining=dump(CONFIG.pretraining),
         network=dump(CONFIG.network),
         seed=lambda w: seed_of(CONFIG.seed, "pretrain", w.backbone),
+    script:
+        "../scripts/pretrain.py"
 
 
-# Errors, and what is printed of them. Where runs were restored (synfeal restore), a rule of its own
-# scores; else the job that makes the predictions does, which saves it starting a process.
-SCORES = {
-    "errors": f"{RUN}/errors.csv",
-    "common_errors": f"{RUN}/common_errors.csv",
-    "metrics": f"{RUN}/metrics.json",
-}
-
-
-use rule call as train with:
+# Scored where it is trained, which saves starting a process.
+rule train:
     input:
-        **unless_restored(
-            [f"{RUN}/predictions.csv"],
-            frames=f"{ROOT}/frames/{{scene}}/train.npy",
-            labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
-            test_frames=f"{ROOT}/frames/{{scene}}/test.npy",
-            test_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
-            truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
-            depth=f"{ROOT}/scenes/{{scene}}/test_depth.npy",
-            weights=backbone_weights,
-            common=lambda w: common_test_set(w.scene)[0],
-            # The camera of packed frames, and their hash, are in the records beside them.
-            records=lambda w: under(
-                "frames/{scene}/{split}.json", scene=w.scene, split=SPLITS
-            ),
-        ),
+        frames=f"{ROOT}/frames/{{scene}}/train.npy",
+        labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
+        test_frames=f"{ROOT}/frames/{{scene}}/test.npy",
+        test_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
+        truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
+        depth=f"{ROOT}/scenes/{{scene}}/test_depth.npy",
+        weights=lambda w: FILES.weights(w.model, w.init) or [],
+        common=lambda w: FILES.common_test_set(w.scene)[0],
+        # The camera of packed frames, and their hash, are in the records beside them.
+        records=expand(f"{ROOT}/frames/{{{{scene}}}}/{{split}}.json", split=SPLITS),
     output:
-        **({} if RESTORED else SCORES),
+        errors=f"{RUN}/errors.csv",
+        common_errors=f"{RUN}/common_errors.csv",
+        metrics=f"{RUN}/metrics.json",
         model=f"{RUN}/model.pt",
         history=f"{RUN}/history.csv",
         record=f"{RUN}/training.json",
         predictions=f"{RUN}/predictions.csv",
         common=f"{RUN}/common_predictions.csv",
+    log:
+        f"{ROOT}/logs/train/{{scene}}/{{size}}/{{labels}}/{{init}}/{{model}}/seed{{repetition}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/train/{{scene}}/{{size}}/{{labels}}/{{init}}/{{model}}/seed{{repetition}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
     resources:
-        mem_mb=train_mem_mb,
+        mem_mb=lambda w, attempt: attempt
+        * training_mb(
+            FILES.n_of_size(w.scene, w.size),
+            CONFIG.network,
+            CONFIG.training.batch_size,
+        ),
     params:
-        function="baselines.training.experiment:train_and_score",
         run=lambda w: training_parameters(CONFIG, Run(**w)),
-        every=lambda w: common_test_set(w.scene)[1],
+        every=lambda w: FILES.common_test_set(w.scene)[1],
         camera=dump(CONFIG.network_camera),
-
-
-if RESTORED:
-
-    use rule call as score with:
-        input:
-            predictions=f"{RUN}/predictions.csv",
-            history=f"{RUN}/history.csv",
-            record=f"{RUN}/training.json",
-            labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/test.csv",
-            truth=f"{ROOT}/labels/{{scene}}/{{size}}/synfeal/test.csv",
-            train_labels=f"{ROOT}/labels/{{scene}}/{{size}}/{{labels}}/train.csv",
-            depth=f"{ROOT}/scenes/{{scene}}/test_depth.npy",
-            common=f"{RUN}/common_predictions.csv",
-            common_truth=lambda w: common_test_set(w.scene)[0],
-        output:
-            **SCORES,
-        params:
-            function="baselines.training.score:write_scores",
-            camera=dump(CONFIG.network_camera),
+    script:
+        "../scripts/train.py"

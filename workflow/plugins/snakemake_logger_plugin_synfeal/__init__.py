@@ -35,6 +35,7 @@ class LogHandler(LogHandlerBase):
         self.view = RunView(Console(stderr=True, no_color=self.common_settings.nocolor or None))
         self.jobs: dict[int, tuple[str, list[Path]]] = {}
         self.planned: list[str] = []  # of a dry run: names of its jobs
+        self.counts: dict[str, int] = {}  # jobs that are to run, by rule
 
     def emit(self, record: LogRecord) -> None:
         """Called for one event after the other, in one thread."""
@@ -68,8 +69,10 @@ class LogHandler(LogHandlerBase):
             case LogEvent.JOB_ERROR:
                 job = self._finish(fields["jobid"])
                 self.view.failed(job or fields["rule_name"], map(Path, fields["log"]))
-            case _ if "plan" in fields:
-                self.view.begin(fields["plan"]())
+            case LogEvent.RUN_INFO:
+                self.counts = dict(fields["stats"])
+            case _ if "plan" in fields:  # of the Snakefile's `onstart`
+                self.view.begin(fields["plan"](self.counts))
             case _ if record.levelno >= WARNING or record.getMessage().startswith(SAID):
                 self.view.say(self.format(record))
 

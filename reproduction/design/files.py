@@ -1,0 +1,359 @@
+"""Files of a profile that follow from its configuration and its design.
+
+Rules ask here for lists of inputs. Nothing here knows Snakemake or looks at the disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from baselines.config.learning import MODELS
+from baselines.labels.batches import Batch, batches_of
+from baselines.labels.methods import stages_of
+from baselines.localizers.registry import backbone_of
+from reproduction.config.profile import Config
+from reproduction.design.experiments import Design, Run, common_every, split_init
+from reproduction.design.references import DataSet, answered_by, data_sets, has_structure
+from synfeal.config.dataset import RenderConfig
+from synfeal.config.effects import CLEAN, MIXED, EffectsConfig
+from synfeal.dataset.frame_files import SUFFIX
+from synfeal.dataset.sevenscenes import Sequence, sequences_of
+from synfeal.effects.light import GROUPS as LIGHT_GROUPS
+from synfeal.effects.scene import carton_files
+
+SPLITS = ("train", "test")
+REFERENCE_FILES = ("predictions.csv", "errors.csv", "metrics.json", "facts.json")
+# Tables that figures are drawn from.
+DRAWN_TABLES = ("table3_inconsistencies", "table4_size", "table7_images_shown")
+
+
+@dataclass(frozen=True)
+class Files:
+    """Names of the files of a profile, below its results.
+
+    Args:
+        config: The profile.
+        design: Its table of experiments.
+    """
+
+    config: Config
+    design: Design
+
+    @cached_property
+    def root(self) -> str:
+        """Directory of the results."""
+        return self.config.root.as_posix()
+
+    # The design
+
+    @cached_property
+    def scenes(self) -> list[str]:
+        """Scenes of the design."""
+        return sorted({row.scene for row in self.design.rows})
+
+    @cached_property
+    def sizes(self) -> list[tuple[str, str]]:
+        """Scenes and sizes of the design."""
+        return sorted({(row.scene, row.size) for row in self.design.rows})
+
+    @cached_property
+    def labelled_scenes(self) -> list[str]:
+        """Scenes of which some label set is estimated, so of which large frames are rendered."""
+        return sorted({scene for scene, _, _ in self.design.estimated})
+
+    @cached_property
+    def tables(self) -> list[str]:
+        """The paper's tables, and ours of training runs."""
+        return ["table1_meshes", *self.design.tables]
+
+    @cached_property
+    def drawn_tables(self) -> list[str]:
+        """Those of them that figures are drawn from."""
+        return [table for table in self.tables if table in DRAWN_TABLES]
+
+    @cached_property
+    def label_tables(self) -> tuple[str, ...]:
+        """Tables of estimated label sets; none where none is estimated."""
+        return ("assistance", "label_error") if self.design.estimated else ()
+
+    @cached_property
+    def backbones(self) -> list[str]:
+        """Backbones that runs start from with transfer learning."""
+        models = {run.model for run in self.design.runs if run.start == "pretrained"}
+        return sorted({backbone_of(model, self.config.network) for model in models})
+
+    # Frames
+
+    def n_frames(self, scene: str, camera: str, split: str) -> int:
+        """Frames of a split that are rendered with a camera: no more than are used."""
+        if camera == "network":
+            return self.config.n_largest(scene, split)
+        sizes = {size for labelled, size, _ in self.design.estimated if labelled == scene}
+        return max((self.config.n_frames(scene, size, split) for size in sizes), default=0)
+
+    def sequences(self, scene: str, camera: str) -> list[Sequence]:
+        """Parts that the frames of a camera are rendered in, of both splits."""
+        n_train, n_test = (self.n_frames(scene, camera, split) for split in SPLITS)
+        return sequences_of(n_train, n_test, self.config.shard_frames)
+
+    def sequence(self, scene: str, camera: str, name: str) -> Sequence:
+        """The part of this name."""
+        return next(s for s in self.sequences(scene, camera) if s.name == name)
+
+    def packed_shards(self, scene: str, split: str, kind: str) -> list[str]:
+        """Parts of packed frames, in order: ``npy``, or ``json`` that says what they are."""
+        sequences = (s for s in self.sequences(scene, "network") if s.split == split)
+        return [f"{self.root}/frames/{scene}/shards/{s.name}.{kind}" for s in sequences]
+
+    def sequence_dirs(
+        self, scene: str, camera: str, split: str | None = None, stop: int | None = None
+    ) -> list[str]:
+        """Sequences of image files, directories or archives.
+
+        Args:
+            scene: Of these frames.
+            camera: ``network`` or ``groundtruth``.
+            split: Of one split alone.
+            stop: Those alone that hold frames below this one.
+        """
+        suffix = SUFFIX if self.config.archive_sequences else ""
+        return [
+            f"{self.root}/datasets/{scene}/{camera}/{s.name}{suffix}"
+            for s in self.sequences(scene, camera)
+            if split in (None, s.split) and (stop is None or s.start < stop)
+        ]
+
+    def plans(self, scene: str, camera: str, kind: str) -> list[str]:
+        """Plans of the splits that have frames; ``kind`` is ``csv`` or ``coverage.json``.
+
+        Coverage is known of whole plans, which only the network camera renders.
+        """
+        if kind != "csv" and camera != "network":
+            return []
+        splits = [split for split in SPLITS if self.n_frames(scene, camera, split)]
+        return [f"{self.root}/plans/{scene}/{split}.{kind}" for split in splits]
+
+    def manifests(self, camera: str) -> list[str]:
+        """Data sets of image files."""
+        scenes = self.scenes if camera == "network" else self.labelled_scenes
+        return [f"{self.root}/datasets/{scene}/{camera}/manifest.json" for scene in scenes]
+
+    def light_shares(self, scene: str, effects: EffectsConfig | None) -> list[str]:
+        """Shares of a scene's light, where effects switch its lamps."""
+        switched = effects and effects.light and effects.light.states
+        groups = LIGHT_GROUPS if switched else ()
+        return [f"{self.root}/scenes/{scene}/light_{group}.glb" for group in groups]
+
+    def cartons(self, scene: str) -> list[str]:
+        """The built-in objects of a scene."""
+        mesh = self.config.root / "scenes" / scene / "mesh.glb"
+        return [path.as_posix() for path in carton_files(mesh)]
+
+    def beside_mesh(self, scene: str, effects: EffectsConfig | None) -> list[str]:
+        """Files that effects need of a scene: shares of its light, and objects."""
+        clutter = effects.clutter if effects else None
+        own = [path.as_posix() for path in clutter.files] if clutter else []
+        built_in = self.cartons(scene) if clutter and not clutter.files else []
+        return [*self.light_shares(scene, effects), *own, *built_in]
+
+    def detail(
+        self, scene: str, camera: str, kind: str, render: RenderConfig | None = None
+    ) -> str | None:
+        """Mesh that a camera's colours are drawn of (``glb``), and what it leaves out (``json``).
+
+        None where the full mesh is drawn.
+        """
+        if (render or self.config.render).draws_full_mesh:
+            return None
+        return f"{self.root}/scenes/{scene}/detail_{camera}.{kind}"
+
+    # Labels
+
+    def batches(self, scene: str, size: str, split: str) -> list[Batch]:
+        """Batches that the labels of a split are estimated in."""
+        count = self.config.n_frames(scene, size, split)
+        return batches_of(count, self.config.groundtruth.batch_frames)
+
+    def batch(self, scene: str, size: str, split: str, index: str) -> Batch:
+        """A batch by its number in file names."""
+        return self.batches(scene, size, split)[int(index)]
+
+    def frames_of_batch(self, scene: str, size: str, split: str, index: str) -> list[str]:
+        """Sequences of image files up to the one that a batch ends in."""
+        stop = self.batch(scene, size, split, index).stop
+        return self.sequence_dirs(scene, "groundtruth", split, stop)
+
+    def batch_files(self, scene: str, size: str, method: str, split: str) -> list[str]:
+        """Trajectories of all batches of a split by one method."""
+        folder = f"{self.root}/groundtruth/{scene}/{size}/{method}/{split}"
+        return [f"{folder}/batch-{b.index:03d}.csv" for b in self.batches(scene, size, split)]
+
+    def batch_facts(self) -> list[str]:
+        """Records of all batches of the estimated label sets, stage by stage."""
+        return sorted(
+            {
+                f"{self.root}/groundtruth/{scene}/{size}/{stage}/{split}/batch-{b.index:03d}.json"
+                for scene, size, method in self.design.estimated
+                for stage in stages_of(method)
+                for split in SPLITS
+                for b in self.batches(scene, size, split)
+            }
+        )
+
+    @cached_property
+    def true_sets(self) -> list[str]:
+        """Sets of true labels."""
+        return [f"{scene}/{size}/synfeal" for scene, size in self.sizes]
+
+    @cached_property
+    def estimated_sets(self) -> list[str]:
+        """Estimated label sets."""
+        return ["/".join(names) for names in self.design.estimated]
+
+    @cached_property
+    def pose_sets(self) -> list[str]:
+        """Sets of true and of estimated labels."""
+        return sorted({*self.true_sets, *self.estimated_sets})
+
+    # Training runs and reference methods
+
+    def runs_of(self, table: str) -> list[str]:
+        """Folders of the runs that a table reads."""
+        return [run.directory for run in self.design.table_runs(table)]
+
+    def of_runs(self, file: str) -> list[str]:
+        """A file of every run."""
+        return [f"{self.root}/runs/{run.directory}/{file}" for run in self.design.runs]
+
+    def weights(self, model: str, init: str) -> str | None:
+        """Backbone that a run starts from; None where it starts from scratch."""
+        if split_init(init)[0] == "scratch":
+            return None
+        return f"{self.root}/pretrained/{backbone_of(model, self.config.network)}.pt"
+
+    def common_test_set(self, scene: str) -> tuple[str, int]:
+        """Test frames that localizers of all sizes answer, beside their own.
+
+        Returns:
+            True poses of the scene's largest test set, and one in how many of its frames is taken.
+        """
+        sizes = {size for of, size in self.sizes if of == scene}
+        counts = {self.config.n_frames(scene, size, "test"): size for size in sizes}
+        largest = counts[max(counts)]
+        return f"{self.root}/labels/{scene}/{largest}/synfeal/test.csv", common_every(counts)
+
+    def n_of_size(self, scene: str, size: str) -> int:
+        """Frames of both splits of a size, which a training run holds in memory."""
+        return sum(self.config.n_frames(scene, size, split) for split in SPLITS)
+
+    def smallest_train(self, scene: str) -> int:
+        """Training frames of a scene's smallest size."""
+        sizes = {size for of, size in self.sizes if of == scene}
+        return min(self.config.n_frames(scene, size, "train") for size in sizes)
+
+    def references(self) -> dict[DataSet, list[str]]:
+        """Reference methods that answer for each data set."""
+        rows, settings = self.design.rows, self.config.references
+        return {key: answered_by(rows, key, settings) for key in data_sets(rows)}
+
+    def of_references(self, file: str) -> list[str]:
+        """A file of every reference method and data set."""
+        return [
+            f"{self.root}/references/{'/'.join(key)}/{name}/{file}"
+            for key, names in self.references().items()
+            for name in names
+        ]
+
+    def external_poses(self, name: str, data_set: Mapping[str, str]) -> str | None:
+        """File with the answers of somebody else's localizer; None where it is run here.
+
+        Args:
+            name: Of the localizer, a key of ``references.external``.
+            data_set: Its ``scene``, ``size`` and ``labels``.
+        """
+        pattern = self.config.references.external[name].poses
+        return pattern.format(**data_set) if pattern else None
+
+    def reference_files(self, folder: str, names: Iterable[str]) -> list[str]:
+        """What reference methods write in the folder of one data set."""
+        return [f"{folder}/{name}/{file}" for name in names for file in REFERENCE_FILES]
+
+    # Robustness: test frames with effects
+
+    @cached_property
+    def variations(self) -> dict[str, EffectsConfig]:
+        """Effects of the robustness table by name, ``mixed`` among them."""
+        robust = self.config.robustness
+        scene = self.config.scenes.get(robust.scene)
+        own_mesh = scene is not None and scene.source == "mesh"
+        return robust.rendered(self.config.collection, own_mesh)
+
+    @cached_property
+    def tested_effects(self) -> list[str]:
+        """Effects that test frames are rendered with."""
+        return [name for name in self.variations if name != MIXED]
+
+    @cached_property
+    def robust_set(self) -> str:
+        """Label set of the robustness table."""
+        robust = self.config.robustness
+        return f"{robust.scene}/{robust.size}/synfeal"
+
+    def robust_run(self, model: str) -> Run:
+        """The localizer trained on frames without effects."""
+        robust = self.config.robustness
+        return Run(robust.scene, robust.size, "synfeal", "pretrained", model, repetition=0)
+
+    @property
+    def has_robustness(self) -> bool:
+        """Whether the robustness table has rows: effects, and runs on its data set."""
+        robust = self.config.robustness
+        if not (robust.made and self.tested_effects):
+            return False
+        tested = {self.robust_run(model).directory for model in MODELS}
+        return any(run.directory in tested for run in self.design.runs)
+
+    @property
+    def has_robust_structure(self) -> bool:
+        """Whether frames with depth are rendered of its data set."""
+        robust = self.config.robustness
+        return has_structure(self.design.rows, robust.scene, robust.size)
+
+    def robust_frames(self, split: str) -> int:
+        """Frames of a split of its data set."""
+        robust = self.config.robustness
+        return self.config.n_frames(robust.scene, robust.size, split)
+
+    def varied_detail(self, effects: str, kind: str) -> str | None:
+        """The same as :meth:`detail`, of frames with a variation."""
+        scene = self.config.robustness.scene
+        return self.detail(scene, "network", kind, self.varied_render(effects))
+
+    def varied_render(self, effects: str) -> RenderConfig:
+        """Settings of rendering with a variation; ``clean`` is the profile's own."""
+        chosen = self.variations.get(effects, self.config.render.effects)
+        return self.config.render.model_copy(update={"effects": chosen})
+
+    def varied_extras(self, names: Iterable[str]) -> list[str]:
+        """Files that variations need of the scene beside its mesh."""
+        scene = self.config.robustness.scene
+        effects = [self.varied_render(name).effects for name in names]
+        return sorted({file for each in effects for file in self.beside_mesh(scene, each)})
+
+    def varied_structure(self) -> list[str]:
+        """Structure-based poses of the varied test frames."""
+        names = [CLEAN, *self.tested_effects] if self.has_robust_structure else []
+        return [f"{self.root}/robustness/structure/{name}.csv" for name in names]
+
+    def robustness_tables(self, kind: str = "csv") -> list[str]:
+        """The robustness table, where it has rows."""
+        return [f"{self.root}/tables/robustness.{kind}"] if self.has_robustness else []
+
+    def drawn_robustness(self) -> list[str]:
+        """Files of it that figures and speeds read, where figures of runs are drawn."""
+        if not (self.has_robustness and self.drawn_tables):
+            return []
+        speed = f"{self.root}/scenes/{self.config.robustness.scene}/effects_speed.csv"
+        return [speed, *self.robustness_tables()]

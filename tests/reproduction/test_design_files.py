@@ -1,0 +1,89 @@
+"""Files and jobs of a profile, on designs small enough to count by hand."""
+
+from itertools import pairwise
+
+import pytest
+
+from reproduction.config.load import load_config
+from reproduction.design.experiments import read_design
+from reproduction.design.files import Files
+from reproduction.design.jobs import jobs_of_run
+from tests import CONFIG
+
+ROW = {"table": "table4_size", "scene": "large_room", "size": "6k"}
+
+
+def files_of(*rows, **changes):
+    """Files of the smoke profile with this design: 60 + 25 frames in batches of 20."""
+    config = load_config(CONFIG / "config.yaml", CONFIG / "smoke.yaml")
+    config = config.model_copy(update={"experiments": rows, "tables": None, **changes})
+    return Files(config, read_design(config))
+
+
+def test_one_row_needs_its_scene_five_runs_and_no_large_frame():
+    files = files_of(ROW)
+    jobs = jobs_of_run(files)
+    assert jobs["scene"] == [{"scene": "large_room"}]
+    assert jobs["plan"] == [{"scene": "large_room", "split": s} for s in ("train", "test")]
+    assert {job["model"] for job in jobs["train"]} == {
+        "posenet",
+        "poselstm",
+        "hourglass",
+        "posenet2resnet",
+        "posenet2",
+    }
+    assert len(jobs["train"]) == 5
+    assert not {"render", "dataset", "sfm", "rgbd", "chain", "features", "assistance"} & set(jobs)
+    assert files.manifests("groundtruth") == []
+    assert files.label_tables == ()
+
+
+def test_an_estimated_row_adds_its_batches_and_large_frames():
+    jobs = jobs_of_run(files_of(ROW, {**ROW, "table": "table2_ground_truth", "labels": "sfm"}))
+    # Batches share a frame: 60 frames are 3 of up to 21, 25 are 2.
+    batches = [(job["split"], job["batch"]) for job in jobs["sfm"]]
+    counts = {"train": 3, "test": 2}
+    assert batches == [(s, f"00{b}") for s, count in counts.items() for b in range(count)]
+    assert jobs["chain"] == [{"scene": "large_room", "size": "6k", "reconstructed": "sfm"}]
+    assert {job["camera"] for job in jobs["render"]} == {"groundtruth"}
+    assert "rgbd" not in jobs
+    assert len(jobs["train"]) == 10
+
+
+@pytest.mark.parametrize("labels", ["rgbd-toro", "rgbd-g2o"])
+def test_pose_graphs_are_built_once_and_solved_by_each_method(labels):
+    row = {**ROW, "table": "table2_ground_truth", "labels": labels}
+    jobs = jobs_of_run(files_of(ROW, row))
+    assert len(jobs["rgbd"]) == len(jobs["posegraph"]) == 5
+    assert {job["graph_method"] for job in jobs["posegraph"]} == {labels}
+
+
+def test_scratch_starts_from_nothing_and_errors_of_labels_are_named_by_their_size():
+    noisy = {
+        **ROW,
+        "table": "table3_inconsistencies",
+        "block": "position",
+        "labels": "noise",
+        "noise_m": 0.3,
+    }
+    files = files_of({**ROW, "init": "scratch"}, {**noisy, "init": "scratch"})
+    jobs = jobs_of_run(files)
+    assert "pretrain" not in jobs
+    assert files.weights("posenet2", "scratch-half") is None
+    assert files.weights("posenet2", "pretrained").endswith("/pretrained/googlenet.pt")
+    assert [(job["noise_m"], job["noise_deg"]) for job in jobs["erroneous_labels"]] == [
+        ("0.3", "0")
+    ] * 2
+
+
+def test_sequences_end_where_frames_do():
+    files = files_of(ROW, shard_frames=25)
+    names = [s.name for s in files.sequences("large_room", "network")]
+    assert len(names) == len(set(names))
+    train = [s for s in files.sequences("large_room", "network") if s.split == "train"]
+    assert train[0].start == 0
+    assert train[-1].stop == files.n_frames("large_room", "network", "train")
+    assert all(a.stop == b.start for a, b in pairwise(train))
+    dirs = files.sequence_dirs("large_room", "network", "train", stop=26)
+    assert [path.rsplit("/", 1)[1] for path in dirs] == ["seq-01", "seq-02"]
+    assert len(files.packed_shards("large_room", "train", "npy")) == len(train)
