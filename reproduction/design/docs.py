@@ -21,7 +21,7 @@ from reproduction.design.experiments import Experiment
 from synfeal.config.load import merge, read_yaml
 from synfeal.records.files import atomic_path, dotted
 
-PROFILES = ("smoke", "mini", "night", "gpu", "paper")
+PROFILES = ("smoke", "mini", "night", "paper")
 DEFAULT_PROFILE = "mini"
 COMPARED = (
     "scale",

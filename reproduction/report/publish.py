@@ -27,7 +27,7 @@ FINISHED = ("claims.csv", "summary.md", "provenance.json", "benchmarks.csv")
 def publish(root: Path, target: Path, pages: Iterable[Path]) -> None:
     """Replace what is published of a profile by what its run made.
 
-    A run of labels alone (``config/stretch.yaml``) has tables and figures and no more.
+    A run of labels alone (target ``labels``) has tables and figures and no more.
 
     Args:
         root: results of the run, ``results/<profile>``.

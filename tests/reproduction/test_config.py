@@ -18,7 +18,6 @@ from tests.support.report_results import design_of, experiment
 PROFILES = {
     "mini": ("config.yaml",),
     "smoke": ("config.yaml", "smoke.yaml"),
-    "gpu": ("config.yaml", "gpu.yaml"),
     "paper": ("config.yaml", "paper.yaml"),
 }
 
@@ -189,7 +188,7 @@ def test_a_size_needs_a_training_length_and_a_byte_order_mark_does_no_harm(tmp_p
 
 
 def test_documentation_that_drifted_is_noticed(tmp_path, capsys):
-    for name in ("config.yaml", "smoke.yaml", "night.yaml", "gpu.yaml", "paper.yaml"):
+    for name in ("config.yaml", "smoke.yaml", "night.yaml", "paper.yaml"):
         (tmp_path / name).write_bytes((CONFIG / name).read_bytes())
     assert main(["--folder", str(tmp_path)]) == 0
     assert main(["--check", "--folder", str(tmp_path)]) == 0

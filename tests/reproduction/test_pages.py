@@ -147,7 +147,7 @@ def finished(tmp_path, monkeypatch):
         (run / name).write_text(text)
     (tmp_path / "docs").mkdir()
     (tmp_path / "README.md").write_text("![x](results/published/mini/figures/shown.png)\n")
-    (tmp_path / "docs/a.md").write_text("[x](../results/published/stretch/figures/other.png)\n")
+    (tmp_path / "docs/a.md").write_text("[x](../results/published/other/figures/other.png)\n")
     return run
 
 
