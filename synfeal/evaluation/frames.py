@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.dataset.finish import MANIFEST
+from synfeal.dataset.frame_files import sequence_at
 from synfeal.dataset.pose_table import IMAGE, read_pose_table
+from synfeal.dataset.posed_sequence import is_tum, read_posed_sequence
 from synfeal.dataset.sequence_listing import POSE, gap_in, refuse_problems
 from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.dataset.split_frames import rows_of_frames, table_problems
@@ -19,7 +23,7 @@ from synfeal.evaluation.estimates import Estimates
 from synfeal.validation.frames import read_poses
 from synfeal.validation.listing import Frame, SequenceListing, frames_of, list_sequences
 from synfeal.validation.manifest import read_splits
-from synfeal.validation.poses import check_rigid
+from synfeal.validation.poses import check_rigid, rigid_bound
 
 Array = NDArray[np.float64]
 
@@ -49,17 +53,22 @@ class ScoredFrames:
 def read_scored_frames(dataset: Path, split: str) -> ScoredFrames:
     """The frames of a split, all of which must have rigid poses.
 
+    Photographs with poses, a flat folder of frames or folders ``seq-XX`` that no file splits, are
+    scored all together, whatever the split.
+
     Raises:
         InputError: the split or a pose cannot be read, a file does not say which frame it is of, or
             the table of a split names other frames than there are.
     """
+    if _is_unsplit(dataset):
+        return _unsplit_photographs(dataset)
     everything = list_sequences(dataset)
     sequences = _of_split(dataset, split, everything)
     refuse_problems(sequences)
     _check_tables(dataset, split, everything)
     frames = tuple(frames_of(sequences))
     poses, unreadable = read_poses(sequences)
-    problems = check_rigid(poses, unreadable).failures
+    problems = check_rigid(poses, unreadable, rigid_bound(dataset)).failures
     missing = [frame for frame in frames if frame not in poses]
     if problems or missing:
         reason = problems[0] if problems else f"{missing[0].path('pose.txt')}: missing"
@@ -69,6 +78,35 @@ def read_scored_frames(dataset: Path, split: str) -> ScoredFrames:
     matrices = np.array([poses[frame] for frame in frames])
     gap = next((gap for sequence in sequences if (gap := gap_in(sequence))), None)
     return ScoredFrames(split, frames, matrices, _paths(dataset, split, frames), gap)
+
+
+def _is_unsplit(dataset: Path) -> bool:
+    """Whether a folder holds frames, and nothing says which are for training."""
+    told = (MANIFEST, *SPLIT_FILES.values())
+    if not dataset.is_dir() or any(os.path.lexists(dataset / name) for name in told):
+        return False
+    return is_tum(dataset) or any(dataset.glob("frame-*")) or any(dataset.glob("seq-[0-9]*"))
+
+
+def _unsplit_photographs(dataset: Path) -> ScoredFrames:
+    """All photographs of a folder that have a pose."""
+    if is_tum(dataset):
+        raise InputError(
+            f"{dataset}: poses of TUM RGB-D sequences are scored by the tools of that benchmark and"
+            " by evo; give a folder of frame-000000.color.png and frame-000000.pose.txt"
+        )
+    photographs = read_posed_sequence(dataset)
+    frames = tuple(_frame_named(dataset, name) for name in photographs.names)
+    stems = [frame.sequence.stem for frame in frames]
+    path = np.unique(stems, return_inverse=True)[1].astype(np.int64)
+    return ScoredFrames("all", frames, photographs.world_from_cam, path)
+
+
+def _frame_named(dataset: Path, name: str) -> Frame:
+    """The frame that ``seq-01/frame-000000`` or ``frame-000000`` names."""
+    sequence, _, frame = name.rpartition("/")
+    where = sequence_at(dataset / sequence) if sequence else dataset
+    return Frame(where, int(frame.removeprefix("frame-")))
 
 
 def _of_split(

@@ -26,7 +26,7 @@ from synfeal.validation.listing import (
     read_depth_mm,
 )
 from synfeal.validation.manifest import check_splits, read_splits
-from synfeal.validation.poses import check_rigid, check_tables
+from synfeal.validation.poses import check_rigid, check_tables, rigid_bound
 
 # Links or copies the image of a frame.
 Place = Callable[[FrameFile, Path], None]
@@ -88,7 +88,10 @@ def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
         )
     splits, split_failures = read_splits(dataset, sequences)
     poses, unreadable = read_poses(sequences)
-    problems = check_names(sequences).failures + check_rigid(poses, unreadable).failures
+    problems = (
+        check_names(sequences).failures
+        + check_rigid(poses, unreadable, rigid_bound(dataset)).failures
+    )
     if any((dataset / name).exists() for name in SPLIT_FILES.values()):
         problems += check_splits(dataset, sequences, splits, split_failures).failures
         problems += check_tables(dataset, poses, splits).failures

@@ -18,6 +18,7 @@ from synfeal.validation.poses import (
     check_rigid,
     check_tables,
     choose_pairs,
+    rigid_bound,
     rigid_poses,
 )
 
@@ -44,13 +45,14 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
     n_frames = len(frames_of(sequences))
     size = None if camera is None or camera.assumed else camera.config
     poses, pose_failures = read_poses(sequences)
+    bound = rigid_bound(dataset)
     with tqdm(
         total=2 * n_frames, unit="frame", desc="validate", leave=False, disable=None
     ) as progress:
         checks = [
             check_names(sequences),
             *check_images(sequences, size, progress.update),
-            check_rigid(poses, pose_failures),
+            check_rigid(poses, pose_failures, bound),
             check_tables(dataset, poses, splits),
             check_splits(dataset, sequences, splits, split_failures),
             check_leaks(poses, splits),
@@ -58,16 +60,15 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
         ]
     if camera is None:
         return [*checks, Check("camera", "unknown", camera_failures)]
-    return checks + _geometry(sequences, poses, camera, every_pair)
+    return checks + _geometry(sequences, rigid_poses(poses, bound), camera, every_pair)
 
 
 def _geometry(
-    sequences: Sequence[SequenceListing], poses: Poses, camera: KnownCamera, every_pair: bool
+    sequences: Sequence[SequenceListing], rigid: Poses, camera: KnownCamera, every_pair: bool
 ) -> list[Check]:
     """The checks that need depth, the camera and rigid poses."""
     if DEPTH not in kinds_of(sequences):
         return [Check("pairs", "no depth images: frames cannot be compared", skipped=True)]
-    rigid = rigid_poses(poses)
     pairs = choose_pairs(sequences, rigid, every_pair)
     if not pairs:
         return [Check("pairs", "no two frames of a sequence to compare", skipped=True)]
