@@ -15,13 +15,13 @@ import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import NamedTuple, Self, get_args
+from typing import NamedTuple, Self
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from baselines.config.learning import ModelName
+from baselines.config.learning import MODELS
 from synfeal.errors import InputError, exit_status
 from synfeal.records.tables import write_frame
 
@@ -108,7 +108,7 @@ def build_parser() -> argparse.ArgumentParser:
     """The options."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.step_time", description=__doc__)
     parser.add_argument("--before", type=Path, required=True, help="root of the other tree")
-    parser.add_argument("--models", nargs="+", default=get_args(ModelName), help="(all five)")
+    parser.add_argument("--models", nargs="+", default=MODELS, help="(all five)")
     parser.add_argument(
         "--profile", type=Path, default=HERE / "config/config.yaml", help="(config/config.yaml)"
     )

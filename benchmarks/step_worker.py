@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 import time
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 import torch
@@ -77,7 +76,7 @@ def fitting_of(model: ModelName, profile: Path) -> Fitting:
 
 def main(model: str, profile: str) -> None:
     """Take as many steps as each line of standard input says, until it ends."""
-    run = fitting_of(cast(ModelName, model), Path(profile))
+    run = fitting_of(model, Path(profile))
     for line in sys.stdin:
         began = time.process_time()
         for _ in range(int(line)):

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal, Self, get_args
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, SerializeAsAny, ValidationError, model_validator
 
+from baselines.registry.declarations import declared
+from baselines.registry.kinds import LocalizerKind
 from synfeal.config.collection import (
     Count,
     Finite,
@@ -17,30 +20,8 @@ from synfeal.config.collection import (
     Strict,
     part,
 )
+from synfeal.config.load import describe
 from synfeal.config.photometric import PhotometricConfig
-
-TableName = Literal[
-    "table2_ground_truth",
-    "table3_inconsistencies",
-    "table4_size",
-    "table5_from_scratch",
-    "table6_label_errors",
-    "table7_images_shown",
-]
-# A table shows each combination of these columns once.
-KEYS: Mapping[str, tuple[str, ...]] = {
-    "table2_ground_truth": ("scene", "labels"),
-    "table3_inconsistencies": ("block", "noise_m", "noise_deg"),
-    "table4_size": ("scene", "size"),
-    "table5_from_scratch": ("scene", "size"),
-    "table6_label_errors": ("labels", "noise_m", "noise_deg"),
-    "table7_images_shown": ("scene", "size", "init"),
-}
-assert set(KEYS) == set(get_args(TableName))
-
-# Seeds per run of a table; `default` where a table is not named.
-Repetitions = dict[Literal["default", TableName], Count]
-
 
 InceptionName = Literal["googlenet", "inception_v3"]
 # Of the backbones that come with the package.
@@ -128,10 +109,6 @@ class TrainingConfig(Strict):
     )
     batch_size: Count = Field(32, description="images per step")
     samples_seen: dict[str, Count] = Field(description="images shown in all, by size")
-    repetitions: Repetitions = Field(
-        {"default": 1},
-        description="seeds per run, by table; a run that several tables show gets the most",
-    )
     device: Literal["auto", "cpu", "cuda"] = Field("auto", description="where to train")
 
     @model_validator(mode="after")
@@ -160,5 +137,38 @@ class PretrainingConfig(Strict):
     weights_dir: Path = Field(Path("weights"), description="imagenet: where files are kept")
 
 
-MODELS = ("posenet", "poselstm", "hourglass", "posenet2resnet", "posenet2")
-ModelName = Literal["posenet", "poselstm", "hourglass", "posenet2resnet", "posenet2"]
+LOCALIZERS = declared(LocalizerKind)
+MODELS = tuple(LOCALIZERS)
+if TYPE_CHECKING:
+    ModelName = str
+else:
+    ModelName = Literal[MODELS]
+
+
+def hyper_of(name: str) -> type[LocalizerConfig]:
+    """Return the model of a localizer's hyper-parameters."""
+    model: type[LocalizerConfig] = resolve_name(LOCALIZERS[name].hyper)
+    return model
+
+
+def _by_own_models(values: object) -> object:
+    """Read the hyper-parameters of localizers of other packages by their own models.
+
+    Those that are not named get their defaults.
+    """
+    if not isinstance(values, Mapping):
+        return values
+    read = dict(values)
+    for name, kind in LOCALIZERS.items():
+        if not kind.place.startswith("baselines."):
+            try:
+                read[name] = hyper_of(name).model_validate(read.get(name, {}))
+            except ValidationError as error:
+                raise ValueError(f"{name}.{describe(error)}") from error
+    return read
+
+
+# Hyper-parameters by name of the localizer.
+Localizers = Annotated[
+    dict[ModelName, SerializeAsAny[LocalizerConfig]], BeforeValidator(_by_own_models)
+]

@@ -6,9 +6,8 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from baselines.registry.kinds import Group
 from synfeal.config.collection import Count, Positive, Slug, Strict, part
-
-Group = Literal["images", "structure", "adjusted", "coordinates"]
 
 
 class ExternalConfig(Strict):

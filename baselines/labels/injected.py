@@ -20,15 +20,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from pkgutil import resolve_name
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from baselines.registry.declarations import declared
+from baselines.registry.kinds import LabelError
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.geometry.rotations import canonical_quat_wxyz
 
 Array = NDArray[np.float64]
+
+
+@LabelError(name="noise", title="independent noise", rank=1)
+def independent_noise(
+    table: PoseTable,
+    train: PoseTable,
+    noise_m: float,
+    noise_deg: float,
+    rng: np.random.Generator,
+) -> PoseTable:
+    """Displace and turn each frame by itself; see :func:`add_noise` and :func:`with_error`."""
+    return add_noise(table, noise_m, noise_deg, rng)
 
 
 def add_noise(
@@ -75,44 +90,91 @@ def unit_vectors(count: int, rng: np.random.Generator) -> Array:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True), dtype=np.float64)
 
 
-# Kinds whose errors belong to space: both splits have the same.
-OF_SPACE = ("bend", "scale")
+@LabelError(name="offset", title="one error per path", rank=2)
+def offset_per_path(
+    table: PoseTable,
+    train: PoseTable,
+    noise_m: float,
+    noise_deg: float,
+    rng: np.random.Generator,
+) -> PoseTable:
+    """Give each path one displacement and one rotation; see :func:`with_error`."""
+    paths, place = np.unique(table.path, return_inverse=True)
+    shift, axis = unit_vectors(len(paths), rng), unit_vectors(len(paths), rng)
+    return displaced(table, noise_m * shift[place], np.radians(noise_deg) * axis[place])
+
+
+@LabelError(name="bend", title="a bend of space", rank=3, of_space=True)
+def bend_of_space(
+    table: PoseTable,
+    train: PoseTable,
+    noise_m: float,
+    noise_deg: float,
+    rng: np.random.Generator,
+) -> PoseTable:
+    """Displace and turn by two smooth fields in space; see :func:`with_error`.
+
+    Both sizes are given, so the rotations are not those that the displacements would imply.
+    """
+    shift_m = _smooth_field(train.position_m, noise_m, rng)
+    rotvec_rad = _smooth_field(train.position_m, np.radians(noise_deg), rng)
+    return displaced(table, shift_m(table.position_m), rotvec_rad(table.position_m))
+
+
+@LabelError(name="scale", title="a wrong scale", rank=4, of_space=True, turns=False)
+def wrong_scale(
+    table: PoseTable,
+    train: PoseTable,
+    noise_m: float,
+    noise_deg: float,
+    rng: np.random.Generator,
+) -> PoseTable:
+    """Multiply distances from the first training camera, where a map would begin, by a factor.
+
+    Nothing is drawn and nothing is turned; see :func:`with_error`.
+    """
+    origin_m = train.position_m[0]
+    distance_m = np.median(np.linalg.norm(train.position_m - origin_m, axis=1))
+    share = noise_m / distance_m if distance_m > 0 else 0.0
+    shift_m = share * (table.position_m - origin_m)
+    return displaced(table, shift_m, np.zeros_like(shift_m))
+
+
+LABEL_ERRORS = declared(LabelError)
 
 
 def with_error(
-    kind: str,  # one of :data:`reproduction.design.experiments.INJECTED`
-    table: PoseTable,  # true poses of a split
-    train: PoseTable,  # true poses of the training split
-    noise_m: float,  # median position error, metres
-    noise_deg: float,  # median orientation error, degrees; 0 with `scale`
-    # source of directions and shapes. In the same state for both splits where the error is one of
-    # space, in another for each split elsewhere.
+    kind: str,
+    table: PoseTable,
+    train: PoseTable,
+    noise_m: float,
+    noise_deg: float,
     rng: np.random.Generator,
 ) -> PoseTable:
-    """The same frames with erroneous poses."""
-    angle_rad = np.radians(noise_deg)
-    if kind == "noise":
-        return add_noise(table, noise_m, noise_deg, rng)
-    if kind == "offset":  # one displacement and one rotation per path
-        paths, place = np.unique(table.path, return_inverse=True)
-        shift, axis = unit_vectors(len(paths), rng), unit_vectors(len(paths), rng)
-        return displaced(table, noise_m * shift[place], angle_rad * axis[place])
-    if kind == "bend":  # two fields in space, of displacements and of rotation vectors
-        # Both sizes are given, so the rotations are not those that the displacements would imply.
-        fields = [_smooth_field(train.position_m, size, rng) for size in (noise_m, angle_rad)]
-        return displaced(table, *(field(table.position_m) for field in fields))
-    if kind == "scale":  # by one factor about the first training camera, where a map would begin
-        origin_m = train.position_m[0]
-        distance_m = np.median(np.linalg.norm(train.position_m - origin_m, axis=1))
-        share = noise_m / distance_m if distance_m > 0 else 0.0
-        shift_m = share * (table.position_m - origin_m)
-        return displaced(table, shift_m, np.zeros_like(shift_m))
-    raise ValueError(f"labels have no error of the kind '{kind}'")
+    """Put an error into poses.
+
+    Args:
+        kind: Key of ``LABEL_ERRORS``.
+        table: True poses of a split.
+        train: True poses of the training split, on which the error has its size.
+        noise_m: Median position error, metres.
+        noise_deg: Median orientation error, degrees; 0 where the error turns nothing.
+        rng: Source of directions and shapes. In the same state for both splits where the error is
+            one of space, in another for each split elsewhere.
+
+    Returns:
+        The same frames with erroneous poses.
+    """
+    put = resolve_name(LABEL_ERRORS[kind].place)
+    erroneous: PoseTable = put(
+        table=table, train=train, noise_m=noise_m, noise_deg=noise_deg, rng=rng
+    )
+    return erroneous
 
 
 def seed_names(kind: str, split: str) -> tuple[str, ...]:
-    """What the seed of a label set depends on beside the scene and the size; never on a level."""
-    return (kind,) if kind in OF_SPACE else (kind, split)
+    """Return what the seed of a label set depends on, beside scene and size; never on a level."""
+    return (kind,) if LABEL_ERRORS[kind].of_space else (kind, split)
 
 
 def _smooth_field(
@@ -145,8 +207,15 @@ def write_erroneous_labels(
     out_labels: Path,
 ) -> None:
     """Write the true poses of a split with an error (:func:`with_error`)."""
-    tables, rng = (read_pose_table(truth), read_pose_table(train)), np.random.default_rng(seed)
-    write_pose_table(out_labels, with_error(error_kind, *tables, noise_m, noise_deg, rng))
+    erroneous = with_error(
+        kind=error_kind,
+        table=read_pose_table(truth),
+        train=read_pose_table(train),
+        noise_m=noise_m,
+        noise_deg=noise_deg,
+        rng=np.random.default_rng(seed),
+    )
+    write_pose_table(out_labels, erroneous)
 
 
 def constant_pose(train: PoseTable, frames: PoseTable) -> PoseTable:

@@ -24,6 +24,7 @@ from baselines.labels.batches import BatchTrajectory
 from baselines.labels.projective_icp import pyramid_of, register
 from baselines.labels.rgbd.dense import matched_depths
 from baselines.labels.rgbd.frames import RgbdFrame, near, open3d_depth, read_frame
+from baselines.registry.kinds import LabelMethod
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.geometry.poses import inverse
@@ -156,6 +157,13 @@ def _cam_from_first(first_from_cam: Array) -> o3d.core.Tensor:
     return o3d.core.Tensor.from_numpy(np.ascontiguousarray(inverse(first_from_cam)))
 
 
+@LabelMethod(
+    name="kinect-fusion",
+    title="KinectFusion",
+    rank=6,
+    works_on="frames",
+    settings="kinect_fusion",
+)
 def kinect_fusion_batch(
     color_paths: Sequence[FrameFile],  # colour images in order; depth alone is tracked
     # 16-bit depth images in millimetres, 65535 where nothing was hit

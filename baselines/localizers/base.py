@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
@@ -10,6 +11,7 @@ from torch import Tensor, nn
 from baselines.config.learning import LocalizerConfig
 from baselines.localizers.backbones import scaled_channels
 from baselines.localizers.losses import BetaLoss, LearnedWeightLoss, PoseLoss, PosePrediction
+from baselines.registry.kinds import LocalizerKind
 from synfeal.errors import InputError
 
 # Width of the localisation feature of PoseNet and its successors.
@@ -59,10 +61,16 @@ AUXILIARY_WEIGHT = 0.3
 
 
 class Localizer(nn.Module):
-    """A network from images to poses with its own loss."""
+    """A network from images to poses with its own loss.
 
-    backbone: nn.Module  # the part that may start from pretrained weights
-    # loss of one prediction; its parameters, if any, are trained with the network
+    Attributes:
+        kind: Declaration of the class.
+        backbone: Part that may start from pretrained weights.
+        criterion: Loss of one prediction; its parameters, if any, are trained with the network.
+    """
+
+    kind: ClassVar[LocalizerKind]
+    backbone: nn.Module
     criterion: PoseLoss
 
     def forward(self, images: Tensor) -> list[PosePrediction]:

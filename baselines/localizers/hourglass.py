@@ -24,6 +24,7 @@ from baselines.localizers.backbones import scaled_channels
 from baselines.localizers.backbones.resnet import ResNet34
 from baselines.localizers.base import Localizer, PoseRegressor, beta_loss
 from baselines.localizers.losses import PosePrediction
+from baselines.registry.kinds import LocalizerKind
 
 
 class UpBlock(nn.Module):
@@ -42,6 +43,14 @@ class UpBlock(nn.Module):
         return torch.cat([upsampled, encoder], 1) if self.concatenate else upsampled + encoder
 
 
+@LocalizerKind(
+    name="hourglass",
+    title="Hourglass",
+    rank=3,
+    backbone="resnet34",
+    halve_every=(50, 500),
+    style={"color": "#D55E00", "marker": "^", "linestyle": "-."},
+)
 class Hourglass(Localizer):
     """ResNet-34 encoder, decoder with skip connections, regressor, fixed weight ``beta``."""
 
@@ -66,7 +75,7 @@ class Hourglass(Localizer):
             nn.Dropout(hyper.dropout),
             PoseRegressor(n_features),
         )
-        self.criterion = beta_loss("hourglass", hyper)
+        self.criterion = beta_loss(self.kind.name, hyper)
 
     def forward(self, images: Tensor) -> list[PosePrediction]:
         """One prediction."""

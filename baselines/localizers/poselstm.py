@@ -27,6 +27,7 @@ from baselines.localizers.backbones import scaled_channels
 from baselines.localizers.backbones.weights import build_inception
 from baselines.localizers.base import Localizer, PoseRegressor, beta_loss
 from baselines.localizers.losses import PosePrediction
+from baselines.registry.kinds import LocalizerKind
 
 ROWS, COLUMNS, HIDDEN = 32, 64, 128
 
@@ -49,6 +50,13 @@ class FourDirectionLstm(nn.Module):
         return torch.cat([*vertical, *horizontal], dim=1)
 
 
+@LocalizerKind(
+    name="poselstm",
+    title="PoseLSTM",
+    rank=2,
+    halve_every=(150, 500),
+    style={"color": "#0072B2", "marker": "s", "linestyle": "--"},
+)
 class PoseLstm(Localizer):
     """An Inception network, its feature reduced by LSTMs in four directions, weight ``beta``."""
 
@@ -65,7 +73,7 @@ class PoseLstm(Localizer):
         )
         self.lstm = FourDirectionLstm(rows, columns, scaled_channels(HIDDEN, side))
         self.regressor = nn.Sequential(nn.Dropout(hyper.dropout), PoseRegressor(self.lstm.n_out))
-        self.criterion = beta_loss("poselstm", hyper)
+        self.criterion = beta_loss(self.kind.name, hyper)
 
     def forward(self, images: Tensor) -> list[PosePrediction]:
         """One prediction."""

@@ -23,6 +23,7 @@ from baselines.localizers.backbones import scaled_channels
 from baselines.localizers.backbones.weights import build_inception
 from baselines.localizers.base import Localizer, PooledRegressor, PoseRegressor, beta_loss
 from baselines.localizers.losses import PosePrediction
+from baselines.registry.kinds import LocalizerKind
 
 
 class AuxiliaryRegressor(nn.Sequential):
@@ -42,6 +43,13 @@ class AuxiliaryRegressor(nn.Sequential):
         )
 
 
+@LocalizerKind(
+    name="posenet",
+    title="PoseNet",
+    rank=1,
+    halve_every=(60, 300),
+    style={"color": "#000000", "marker": "o", "linestyle": "-"},
+)
 class PoseNet(Localizer):
     """An Inception network, a regressor at its end, two on the way, fixed weight ``beta``."""
 
@@ -52,7 +60,7 @@ class PoseNet(Localizer):
         self.regressor = PooledRegressor(self.backbone.n_out, network.width, hyper.dropout)
         self.auxiliary1 = AuxiliaryRegressor(first, network.width, hyper.dropout)
         self.auxiliary2 = AuxiliaryRegressor(second, network.width, hyper.dropout)
-        self.criterion = beta_loss("posenet", hyper)
+        self.criterion = beta_loss(self.kind.name, hyper)
 
     def forward(self, images: Tensor) -> list[PosePrediction]:
         """Main prediction, then those of the first and second auxiliary regressor."""

@@ -24,8 +24,16 @@ from baselines.localizers.backbones.resnet import ResNet34
 from baselines.localizers.backbones.weights import build_inception
 from baselines.localizers.base import Localizer, PooledRegressor, learned_loss
 from baselines.localizers.losses import PosePrediction
+from baselines.registry.kinds import LocalizerKind
 
 
+@LocalizerKind(
+    name="posenet2",
+    title="PoseNet2",
+    rank=5,
+    halve_every=(150, 300),
+    style={"color": "#CC79A7", "marker": "v", "linestyle": (0, (5, 1, 1, 1, 1, 1))},
+)
 class PoseNet2(Localizer):
     """An Inception network, one regressor, learned weights."""
 
@@ -40,6 +48,14 @@ class PoseNet2(Localizer):
         return [self.regressor(self.backbone(images).last)]
 
 
+@LocalizerKind(
+    name="posenet2resnet",
+    title="PoseNet2ResNet",
+    rank=4,
+    backbone="resnet34",
+    halve_every=(150, 400),
+    style={"color": "#009E73", "marker": "D", "linestyle": ":"},
+)
 class PoseNet2ResNet(Localizer):
     """The same on ResNet-34, the variant that Synfeal adds to the comparison.
 

@@ -1,34 +1,38 @@
-"""The localizers by name, and their backbones; torch is loaded when one is built."""
+"""Build localizers by name; torch is loaded when one is built."""
 
 from __future__ import annotations
 
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Literal
 
-from baselines.config.learning import LocalizerConfig, NetworkConfig
+from baselines.config.learning import LOCALIZERS, LocalizerConfig, NetworkConfig
 
 if TYPE_CHECKING:
     from baselines.localizers.base import Localizer
 
 BackboneName = Literal["googlenet", "inception_v3", "resnet34"]
 
-# The class of each, ``module:name``.
-LOCALIZERS = {
-    "posenet": "baselines.localizers.posenet:PoseNet",
-    "poselstm": "baselines.localizers.poselstm:PoseLstm",
-    "hourglass": "baselines.localizers.hourglass:Hourglass",
-    "posenet2resnet": "baselines.localizers.posenet2:PoseNet2ResNet",
-    "posenet2": "baselines.localizers.posenet2:PoseNet2",
-}
-RESNET_LOCALIZERS = frozenset({"hourglass", "posenet2resnet"})
-
 
 def backbone_of(model: str, network: NetworkConfig) -> BackboneName:
-    """The backbone of a localizer: ResNet-34, or the Inception network of the configuration."""
-    return "resnet34" if model in RESNET_LOCALIZERS else network.backbone
+    """Return the backbone of a localizer: its own, or the Inception network of the configuration.
+
+    Args:
+        model: Name of the localizer.
+        network: Shape of all localizers.
+    """
+    return LOCALIZERS[model].backbone or network.backbone
 
 
 def build_localizer(name: str, network: NetworkConfig, hyper: LocalizerConfig) -> Localizer:
-    """A localizer of this shape, randomly initialised from torch's global generator."""
-    localizer: Localizer = resolve_name(LOCALIZERS[name])(network, hyper)
+    """Build a localizer, randomly initialised from torch's global generator.
+
+    Args:
+        name: Name of the localizer.
+        network: Shape of all localizers.
+        hyper: Its hyper-parameters.
+
+    Raises:
+        InputError: A hyper-parameter that it needs is not given.
+    """
+    localizer: Localizer = resolve_name(LOCALIZERS[name].place)(network, hyper)
     return localizer

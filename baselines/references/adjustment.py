@@ -10,6 +10,7 @@ from baselines.labels.sfm.mapping import adjustment_of
 from baselines.references.correspondences import Tracks
 from baselines.references.evidence import Evidence
 from baselines.references.structure import on_points, pinhole, triangulate
+from baselines.registry.kinds import ReferenceMethod
 from synfeal.geometry.poses import inverse, pose_matrix, umeyama_sim3
 
 Array = NDArray[np.float64]
@@ -26,6 +27,12 @@ ITERATIONS, FITS = 10, 5
 PRIOR_M = 0.1
 
 
+@ReferenceMethod(
+    name="structure-adjusted",
+    title="Structure, bundle-adjusted",
+    rank=6,
+    group="adjusted",
+)
 def adjusted(evidence: Evidence) -> Array:
     """Poses (N, 4, 4) against points triangulated after bundle adjustment moved training poses.
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
 from baselines.references.arrays import THUMBNAIL, VLAD, most_alike
 from baselines.references.evidence import Evidence
+from baselines.registry.kinds import ReferenceMethod
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 
 CHUNK = 500
@@ -23,10 +22,34 @@ def nearest_label(evidence: Evidence, descriptor: str) -> NDArray[np.float64]:
     return evidence.train.world_from_cam[usable[most_alike(train[usable], test, 1)[:, 0]]]
 
 
-by_thumbnail = partial(nearest_label, descriptor=THUMBNAIL)
-by_vlad = partial(nearest_label, descriptor=VLAD)
+@ReferenceMethod(
+    name="nearest-thumbnail",
+    title="Nearest image, thumbnails",
+    rank=1,
+    group="images",
+)
+def by_thumbnail(evidence: Evidence) -> NDArray[np.float64]:
+    """Answer with the label (N, 4, 4) of the training image with the nearest thumbnail."""
+    return nearest_label(evidence, THUMBNAIL)
 
 
+@ReferenceMethod(
+    name="nearest-vlad",
+    title="Nearest image, DenseVLAD",
+    rank=2,
+    group="images",
+)
+def by_vlad(evidence: Evidence) -> NDArray[np.float64]:
+    """Answer with the label (N, 4, 4) of the training image with the nearest DenseVLAD."""
+    return nearest_label(evidence, VLAD)
+
+
+@ReferenceMethod(
+    name="nearest-pose",
+    title="Nearest training pose (oracle)",
+    rank=3,
+    group="images",
+)
 def nearest_pose(evidence: Evidence) -> NDArray[np.float64]:
     """The label of the training frame whose true pose is nearest to the test frame's true pose.
 

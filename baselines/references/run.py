@@ -19,9 +19,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from baselines.config.references import Group
 from baselines.references.evidence import Evidence
 from baselines.references.registry import REFERENCES, in_group
+from baselines.registry.kinds import Group
 from baselines.training.score import score_run
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import COLUMNS, PoseTable, read_pose_table, write_pose_table
@@ -56,7 +56,7 @@ def answer_and_score(
     for name in names:
         facts: Facts = {}
         with timed(facts, "answer_s"):
-            answer = resolve_name(f"baselines.references.{REFERENCES[name].answer}")
+            answer = resolve_name(REFERENCES[name].place)
             poses = pose_table(evidence.test_frames, answer(evidence))
         known = {**info, "reference": name}
         score_answers(poses, evidence.files, out_dir / name, known, facts)

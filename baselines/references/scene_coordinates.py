@@ -22,6 +22,7 @@ from baselines.localizers.base import OutputLayer
 from baselines.references.evidence import Evidence
 from baselines.references.features import Views
 from baselines.references.structure import absolute_pose, pinhole
+from baselines.registry.kinds import ReferenceMethod
 from baselines.training.data import ImageStatistics, image_statistics
 from baselines.training.device import autocast, open_device, precision_on
 from baselines.training.optimizer import Schedule, optimisation_of
@@ -112,6 +113,12 @@ MAX_ERROR_OF_WIDTH = 0.05
 LOGGED = 50  # steps
 
 
+@ReferenceMethod(
+    name="scene-coordinates",
+    title="Scene coordinates",
+    rank=7,
+    group="coordinates",
+)
 def by_coordinates(evidence: Evidence) -> Array:
     """Poses (N, 4, 4) of the test frames, NaN where none is found."""
     device = open_device("auto")

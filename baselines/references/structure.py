@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from baselines.references.correspondences import Correspondences, Tracks
 from baselines.references.evidence import Evidence
+from baselines.registry.kinds import ReferenceMethod
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import inverse, pose_matrix
@@ -29,6 +30,12 @@ CONFIDENCE, MAX_TRIALS = 0.9999, 500
 MIN_INLIERS = 8
 
 
+@ReferenceMethod(
+    name="structure-depth",
+    title="Structure, points from depth",
+    rank=4,
+    group="structure",
+)
 def on_depth(evidence: Evidence) -> Array:
     """Poses (N, 4, 4) against features lifted by the training frames' depth; NaN where none."""
     places = lifted(evidence.correspondences, evidence.train)
@@ -149,6 +156,12 @@ ROUNDS = 4
 SCALE_RAD = 0.007
 
 
+@ReferenceMethod(
+    name="structure-rays",
+    title="Structure, points triangulated",
+    rank=5,
+    group="structure",
+)
 def triangulated(evidence: Evidence) -> Array:
     """Poses (N, 4, 4) against points triangulated from the labels; NaN where none is found."""
     return on_points(evidence, triangulate(evidence.tracks, evidence.train.world_from_cam))

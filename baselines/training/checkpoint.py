@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from pydantic import Field, ValidationError
+from pydantic import Field, SerializeAsAny, ValidationError, ValidationInfo, field_validator
 
 from baselines.config.learning import (
     AugmentationConfig,
     LocalizerConfig,
     ModelName,
     NetworkConfig,
+    hyper_of,
 )
 from baselines.localizers.base import Localizer
 from baselines.localizers.memory import is_out_of_memory, memory_errors
@@ -68,7 +69,7 @@ class ModelDescription(Strict):
 
     localizer: ModelName = Field(description="name of the localizer")
     network: NetworkConfig = Field(description="shape it was built with")
-    hyper: LocalizerConfig = Field(description="hyper-parameters it was built with")
+    hyper: SerializeAsAny[LocalizerConfig] = Field(description="hyper-parameters it was built with")
     camera: FrameCamera | None = Field(None, description="of the training frames, where known")
     sequence_from_world: tuple[Row, Row, Row, Row] | None = Field(
         None,
@@ -82,6 +83,12 @@ class ModelDescription(Strict):
         None, description="that training images were turned by, where they were"
     )
     scene: str | None = Field(None, description="name of the place it was trained in")
+
+    @field_validator("hyper", mode="before")
+    @classmethod
+    def _by_own_model(cls, value: object, info: ValidationInfo) -> object:
+        model = hyper_of(info.data["localizer"]) if "localizer" in info.data else LocalizerConfig
+        return value if model is LocalizerConfig else model.model_validate(value)
 
 
 def frame_camera(frames: Path) -> FrameCamera | None:

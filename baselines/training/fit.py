@@ -9,7 +9,6 @@ from typing import Protocol as Interface
 import torch
 from torch import Tensor
 
-from baselines.config.learning import ModelName
 from baselines.localizers.base import Localizer
 from baselines.training.averaging import WeightAverage
 from baselines.training.data import BatchOrder, ImageStatistics, LabelledFrames
@@ -50,16 +49,6 @@ PROTOCOLS: dict[Literal["corrected", "published"], Protocol] = {
 # For photographs: ``corrected``, but the weights are averaged. Held-out renderings look like those
 # learned from, and do not tell which weights suit photographs.
 PHOTOGRAPHS = PROTOCOLS["corrected"]._replace(selection="averaged")
-
-# After which share of a training run the rate is halved: step over epochs in the authors' read-me.
-HALVE_EVERY: dict[ModelName, float] = {
-    "posenet": 60 / 300,
-    "poselstm": 150 / 500,
-    "hourglass": 50 / 500,
-    "posenet2resnet": 150 / 400,
-    "posenet2": 150 / 300,
-}
-
 
 LAST_WEIGHTS = PROTOCOLS["corrected"]._replace(selection="last")
 NOT_KEPT = ResumeFile(None, "")

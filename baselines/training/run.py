@@ -11,7 +11,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from baselines.config.learning import LocalizerConfig, ModelName, NetworkConfig, TrainingConfig
+from baselines.config.learning import (
+    LOCALIZERS,
+    LocalizerConfig,
+    ModelName,
+    NetworkConfig,
+    TrainingConfig,
+    hyper_of,
+)
 from baselines.localizers.backbones.weights import load_backbone_weights
 from baselines.localizers.base import Localizer
 from baselines.localizers.memory import memory_errors
@@ -26,7 +33,6 @@ from baselines.training.data import (
 )
 from baselines.training.device import open_device, precision_on
 from baselines.training.fit import (
-    HALVE_EVERY,
     NOT_KEPT,
     PROTOCOLS,
     Augmentation,
@@ -69,8 +75,14 @@ class Job(NamedTuple):
     @property
     def schedule(self) -> Schedule:
         """How long and how fast."""
-        rates = self.hyper.learning_rate, self.hyper.weight_decay, HALVE_EVERY[self.name]
-        return Schedule(self.samples_seen, self.training.batch_size, *rates)
+        step, epochs = LOCALIZERS[self.name].halve_every
+        return Schedule(
+            samples_seen=self.samples_seen,
+            batch_size=self.training.batch_size,
+            learning_rate=self.hyper.learning_rate,
+            weight_decay=self.hyper.weight_decay,
+            halve_every=step / epochs,
+        )
 
 
 class Material(NamedTuple):
@@ -268,7 +280,7 @@ def train_and_predict(
     inputs = {"frames": frames, "labels": labels, "test_frames": test_frames}
     inputs |= {"test_labels": test_labels} | ({"weights": weights} if weights else {})
     training = TrainingConfig(**run["training"], samples_seen={})
-    network, hyper = NetworkConfig(**run["network"]), LocalizerConfig(**run["localizer"])
+    network, hyper = NetworkConfig(**run["network"]), hyper_of(model)(**run["localizer"])
     job = Job(model, network, hyper, training, run["samples_seen"], run["seed"])
     test = test_frames, test_labels
     train_localizer(job, frames, labels, out_model, out_history, weights=weights, test=test)

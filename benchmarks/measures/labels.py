@@ -13,7 +13,7 @@ from pydantic import Field
 from baselines.config.labels import GroundTruthConfig
 from baselines.labels.chain import fill_gaps
 from baselines.labels.kinect_fusion import kinect_fusion_batch
-from baselines.labels.posegraph.optimise import optimise
+from baselines.labels.posegraph.optimise import optimise_lm
 from baselines.labels.rgbd import rgbd_graph
 from baselines.labels.sfm import sfm_batch
 from synfeal.config.collection import Strict
@@ -73,7 +73,7 @@ def run_rgbd(case: BatchCase, seed: int) -> dict[str, float]:
     files = batch.color, batch.depth, case.groundtruth_camera
     graph, facts = rgbd_graph(*files, cfg.rgbd, seed_of(seed, "rgbd"))
     begin_s = time.process_time()
-    optimised = optimise("g2o", graph, cfg.posegraph).first_from_cam
+    optimised = optimise_lm(graph, cfg.posegraph.lm_iterations)
     optimise_s = time.process_time() - begin_s
     return {
         "pairs_accepted": facts["pairs_accepted"],

@@ -11,13 +11,14 @@ import numpy as np
 import torch
 from pydantic import Field, TypeAdapter, model_validator
 
-from baselines.config.learning import LocalizerConfig, ModelName, NetworkConfig, TrainingConfig
+from baselines.config.learning import Localizers, ModelName, NetworkConfig
 from baselines.localizers.registry import backbone_of
 from baselines.training.checkpoint import read_checkpoint
 from baselines.training.data import read_images
 from baselines.training.fit import PROTOCOLS, Protocol
 from baselines.training.predict import BATCH, predict_ms, predict_poses
 from baselines.training.run import Job, train_localizer
+from reproduction.config.tables import RepeatedTraining
 from synfeal.config.collection import Strict
 from synfeal.dataset.packed import read_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
@@ -46,8 +47,8 @@ class Case(Strict):
         default_factory=dict, description="parts exchanged in the protocol of `training`"
     )
     network: NetworkConfig = Field(description="shape of the network")
-    localizers: dict[ModelName, LocalizerConfig] = Field(description="settings of each localizer")
-    training: TrainingConfig = Field(description="settings of all")
+    localizers: Localizers = Field(description="settings of each localizer")
+    training: RepeatedTraining = Field(description="settings of all")
 
     @model_validator(mode="after")
     def _check_protocol(self) -> Self:

@@ -11,14 +11,12 @@ from baselines.config.labels import GroundTruthConfig
 from baselines.config.learning import (
     MODELS,
     SHIPPED_WIDTH,
-    LocalizerConfig,
-    ModelName,
+    Localizers,
     NetworkConfig,
     PretrainingConfig,
-    TableName,
-    TrainingConfig,
 )
 from baselines.config.references import ReferencesConfig
+from reproduction.config.tables import RepeatedTraining, TableName
 from synfeal.config.collection import (
     Count,
     Slug,
@@ -60,9 +58,9 @@ class Config(DatasetConfig):
     references: ReferencesConfig = part(ReferencesConfig, "other methods (docs/references.md)")
     robustness: RobustnessConfig = part(RobustnessConfig, "tests with effects (docs/variation.md)")
     network: NetworkConfig = part(NetworkConfig, "shape of all localizers")
-    training: TrainingConfig = Field(description="docs/localizers.md")
+    training: RepeatedTraining = Field(description="docs/localizers.md")
     pretraining: PretrainingConfig = part(PretrainingConfig, "what runs start from (docs/start.md)")
-    localizers: dict[ModelName, LocalizerConfig] = Field(description="hyper-parameters of each")
+    localizers: Localizers = Field(description="hyper-parameters of each")
 
     @model_validator(mode="after")
     def _check(self) -> Self:

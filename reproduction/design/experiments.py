@@ -9,8 +9,10 @@ from typing import Any, Literal, cast
 
 from pydantic import Field, ValidationError, model_validator
 
-from baselines.config.learning import KEYS, MODELS, Repetitions, TableName
+from baselines.config.learning import MODELS
+from baselines.labels.injected import LABEL_ERRORS
 from reproduction.config.profile import Config
+from reproduction.config.tables import KEYS, Repetitions, TableName
 from synfeal.config.collection import NonNegative, Strict
 from synfeal.config.load import describe
 from synfeal.errors import InputError
@@ -28,9 +30,8 @@ Init = Literal[
 ]
 # Share of `training.samples_seen` that a run is shown, by how its `init` ends.
 SHARES = {"": 1.0, "half": 0.5, "quarter": 0.25}
-# Errors that are put into true poses, of a size that noise_m and noise_deg name: one by frame,
-# one by path, a bend of space, another scale (`baselines/labels/injected.py`).
-INJECTED = ("noise", "offset", "bend", "scale")
+# Errors that are put into true poses, of a size that noise_m and noise_deg name.
+INJECTED = tuple(LABEL_ERRORS)
 FROM_SCRATCH: TableName = "table5_from_scratch"
 
 
@@ -44,7 +45,7 @@ class Experiment(Strict):
     labels: str = Field(
         "synfeal",
         description="`synfeal`: true poses; `noise`, `offset`, `bend`, `scale`: with an error"
-        " (docs/tables.md); or a key of `METHODS` in `baselines/labels/methods.py`",
+        " (docs/tables.md); or a label method (docs/groundtruth.md)",
     )
     noise_m: NonNegative = Field(0.0, description="median position error put into labels, metres")
     noise_deg: NonNegative = Field(
@@ -60,8 +61,11 @@ class Experiment(Strict):
             raise ValueError(
                 f"labels: must be one of {kinds} exactly when noise_m or noise_deg is above 0"
             )
-        if self.labels == "scale" and (self.noise_deg or not self.noise_m):
-            raise ValueError("noise_deg: must be 0 with labels `scale`, which turn nothing")
+        turns = self.labels not in LABEL_ERRORS or LABEL_ERRORS[self.labels].turns
+        if not turns and (self.noise_deg or not self.noise_m):
+            raise ValueError(
+                f"noise_deg: must be 0 with labels `{self.labels}`, which turn nothing"
+            )
         if (self.table == "table3_inconsistencies") != (self.block != ""):
             raise ValueError("block: rows of table 3, and only those, name one of three blocks")
         for name in ("noise_m", "noise_deg"):

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from baselines.config.learning import MODELS
-from baselines.config.references import Group
 from baselines.labels.methods import frame_methods, graph_methods, stages_of
 from baselines.references.registry import in_group
+from baselines.registry.kinds import Group
 from reproduction.design.experiments import INJECTED
 from reproduction.design.files import SPLITS, Files
 from reproduction.design.references import DataSet

@@ -28,7 +28,8 @@ def estimation_parameters(config: Config, name: str) -> dict[str, Any]:
     """The part of a configuration that the labels of a method depend on, ready for JSON."""
     chained = {"batch_frames", "assist_position_m", "assist_orientation_deg"}
     method = METHODS[name]
-    settings = {"rgbd", "posegraph"} if method.optimiser else {method.settings or name}
+    on_graph = method.works_on == "graph"
+    settings = {"rgbd", "posegraph"} if on_graph else {method.settings or name}
     return {
         "groundtruth": config.groundtruth.model_dump(mode="json", include=chained | settings),
         "camera": config.groundtruth_camera.model_dump(mode="json"),

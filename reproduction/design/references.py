@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from baselines.config.references import Group, ReferencesConfig
+from baselines.config.references import ReferencesConfig
 from baselines.labels.methods import METHODS, SIMULATOR
 from baselines.references.registry import REFERENCES
+from baselines.registry.kinds import Group
 from reproduction.design.experiments import Experiment
 
 DataSet = tuple[str, str, str]  # scene, size, label set

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
-from baselines.config.learning import ModelName
 from reproduction.config.profile import Config
 from reproduction.design.experiments import Run
 
@@ -16,7 +15,7 @@ def training_parameters(config: Config, run: Run) -> dict[str, Any]:
     """
     hyper = config.training.model_dump(mode="json", exclude={"samples_seen", "repetitions"})
     parameters = {
-        "localizer": config.localizers[cast(ModelName, run.model)].model_dump(mode="json"),
+        "localizer": config.localizers[run.model].model_dump(mode="json"),
         "network": config.network.model_dump(mode="json"),
         "training": hyper,
         "samples_seen": round(run.share * config.training.samples_seen[run.size]),

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from baselines.config.learning import LOCALIZERS
 from baselines.labels.methods import METHODS
 
 # Okabe and Ito's colours; within each set no two lines share a marker or a dash pattern.
@@ -18,12 +19,14 @@ BLACK, BLUE, VERMILION, GREEN = "#000000", "#0072B2", "#D55E00", "#009E73"
 PURPLE, ORANGE, SKY = "#CC79A7", "#E69F00", "#56B4E9"
 Style = dict[str, Any]
 
+# Of localizers that declare no style.
+SPARE_STYLES: tuple[Style, ...] = (
+    {"color": ORANGE, "marker": "P", "linestyle": (0, (1, 2))},
+    {"color": SKY, "marker": "X", "linestyle": (0, (8, 2))},
+)
+_spare = cycle(SPARE_STYLES)
 MODEL_STYLES: dict[str, Style] = {
-    "posenet": {"color": BLACK, "marker": "o", "linestyle": "-"},
-    "poselstm": {"color": BLUE, "marker": "s", "linestyle": "--"},
-    "hourglass": {"color": VERMILION, "marker": "^", "linestyle": "-."},
-    "posenet2resnet": {"color": GREEN, "marker": "D", "linestyle": ":"},
-    "posenet2": {"color": PURPLE, "marker": "v", "linestyle": (0, (5, 1, 1, 1, 1, 1))},
+    name: dict(kind.style or next(_spare)) for name, kind in LOCALIZERS.items()
 }
 METHOD_STYLES: dict[str, Style] = dict(
     zip(

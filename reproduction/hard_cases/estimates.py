@@ -17,6 +17,7 @@ from scipy.stats import kstest, norm
 
 from baselines.config.labels import PoseGraphConfig
 from baselines.labels import injected as labels
+from baselines.labels.methods import solve_graph
 from baselines.labels.posegraph import optimise, toro
 from baselines.labels.posegraph.graph import Edge, PoseGraph
 from reproduction.hard_cases.exact import REFUSED, Trial, exact, mpf
@@ -91,7 +92,7 @@ def in_two_parts(method: str) -> Trial:
     graph = PoseGraph(np.tile(np.eye(4), (4, 1, 1)), edges)
     return Trial(
         naive=lambda: graph.first_from_cam,
-        ours=lambda: optimise.optimise(method, graph, PoseGraphConfig()).first_from_cam,
+        ours=lambda: solve_graph(f"rgbd-{method}", graph, PoseGraphConfig())[0].first_from_cam,
         truth=REFUSED,
     )
 

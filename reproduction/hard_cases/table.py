@@ -127,7 +127,7 @@ CASES = (
     }),
     Family("pose graphs", "position", "m", "one edge per pair of nodes", "optimise_toro", RATIONAL,
            0.02, {"TORO: an edge twice": lambda: estimates.edge_twice("toro")}),  # it cools down
-    Family("pose graphs", REFUSAL, "1", "no test", "optimise", BY_CONSTRUCTION, 0.0, {
+    Family("pose graphs", REFUSAL, "1", "no test", "solve_graph", BY_CONSTRUCTION, 0.0, {
         "LM: two parts": lambda: estimates.in_two_parts("g2o"),
         "TORO: two parts": lambda: estimates.in_two_parts("toro"),
     }),

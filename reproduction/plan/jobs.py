@@ -195,7 +195,7 @@ def _train(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
     part = {"scene": config.robustness.scene, "size": config.robustness.size, **part}
     size = part["size"]
     train, test = (config.n_frames(part["scene"], size, split) for split in ("train", "test"))
-    hyper = config.localizers[part["model"]]  # type: ignore[index]
+    hyper = config.localizers[part["model"]]
     work = training_work(part["model"], config.network, hyper)
     share = SHARES[split_init(part.get("init", "pretrained"))[1]]
     samples, batch = round(share * config.training.samples_seen[size]), config.training.batch_size

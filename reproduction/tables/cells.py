@@ -14,7 +14,8 @@ from typing import Any
 
 import pandas as pd
 
-from baselines.config.learning import KEYS, MODELS
+from baselines.config.learning import MODELS
+from reproduction.config.tables import KEYS
 from reproduction.design.experiments import FROM_SCRATCH, Design, Experiment
 from reproduction.statistics.limits import (
     BASELINES,

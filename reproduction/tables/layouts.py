@@ -7,23 +7,14 @@ from typing import Any
 
 import pandas as pd
 
+from baselines.config.learning import LOCALIZERS
+from baselines.labels.injected import LABEL_ERRORS
 from baselines.labels.methods import METHODS, SIMULATOR
 from reproduction.design.experiments import FROM_SCRATCH, split_init
 
-TITLES = {
-    "posenet": "PoseNet",
-    "poselstm": "PoseLSTM",
-    "hourglass": "Hourglass",
-    "posenet2resnet": "PoseNet2ResNet",
-    "posenet2": "PoseNet2",
-}
+TITLES = {name: kind.title for name, kind in LOCALIZERS.items()}
 SOURCES = {**{name: method.title for name, method in METHODS.items()}, "synfeal": "Synfeal"}
-ERRORS = {
-    "noise": "independent noise",
-    "offset": "one error per path",
-    "bend": "a bend of space",
-    "scale": "a wrong scale",
-}
+ERRORS = {name: kind.title for name, kind in LABEL_ERRORS.items()}
 STARTS = {"pretrained": "transfer learning", "scratch": "from scratch"}
 PARTS = {"": "", "half": ", half of the images", "quarter": ", a quarter of the images"}
 # What has not been trained, printed beside the localizers: columns of metrics.
@@ -91,7 +82,7 @@ def data_set_titles(table: pd.DataFrame) -> pd.Series:
 
 def label_title(labels: str) -> str:
     """A label set as tables call it: ``noise-p0.1-r5`` is noise 0.1 m, 5°."""
-    found = re.fullmatch(r"(\w+)-p([\d.]+)-r([\d.]+)", labels)
+    found = re.fullmatch(r"([\w-]+)-p([\d.]+)-r([\d.]+)", labels)
     return f"{found[1]} {found[2]} m, {found[3]}°" if found else SOURCES.get(labels, labels)
 
 

@@ -1,6 +1,5 @@
 """One contract for all five localizers in all their shapes, and losses with closed forms."""
 
-import re
 import sys
 from types import ModuleType
 from typing import NamedTuple
@@ -8,22 +7,19 @@ from typing import NamedTuple
 import pytest
 import torch
 
-from baselines.config.learning import MODELS, LocalizerConfig, NetworkConfig
+from baselines.config.learning import LOCALIZERS, MODELS, LocalizerConfig, NetworkConfig
 from baselines.localizers.backbones.weights import build_backbone
 from baselines.localizers.base import PoseRegressor
 from baselines.localizers.hourglass import UpBlock
 from baselines.localizers.losses import PosePrediction
 from baselines.localizers.poselstm import FourDirectionLstm
 from baselines.localizers.registry import (
-    LOCALIZERS,
-    RESNET_LOCALIZERS,
     backbone_of,
     build_localizer,
 )
 from synfeal.errors import InputError
-from tests import ROOT
+from tests.support.added_methods import examples
 
-PAGE = ROOT / "docs" / "localizers.md"
 NETWORK = NetworkConfig(input_px=32, width=0.125)
 HYPER = LocalizerConfig(learning_rate=3e-3, dropout=0.0, beta=1.0, s_orientation=-1.0)
 INCEPTION_V3 = NetworkConfig(backbone="inception_v3", input_px=75, width=0.125)
@@ -51,7 +47,7 @@ class Case(NamedTuple):
 
 CASES = {
     **{name: Case(name) for name in MODELS},
-    **{f"{n}-inception_v3": Case(n, INCEPTION_V3) for n in MODELS if n not in RESNET_LOCALIZERS},
+    **{f"{n}-inception_v3": Case(n, INCEPTION_V3) for n in MODELS if not LOCALIZERS[n].backbone},
     "hourglass-concatenation": Case("hourglass", hyper=CONCATENATION),
 }
 
@@ -171,12 +167,11 @@ def test_an_up_block_adds_or_appends_the_encoders_maps():
 
 def test_the_example_of_the_page_is_a_localizer(monkeypatch):
     """It keeps the contract with either backbone, once it is added as the page says."""
-    module, line = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
-    ((name, place),) = eval(f"{{{line}}}").items()
-    direct = ModuleType(place.partition(":")[0])
-    exec(module, direct.__dict__)
+    direct = ModuleType("my_methods.direct")
+    exec(examples()["direct"], direct.__dict__)
     monkeypatch.setitem(sys.modules, direct.__name__, direct)
-    monkeypatch.setitem(LOCALIZERS, name, place)
+    name = direct.Direct.kind.name
+    monkeypatch.setitem(LOCALIZERS, name, direct.Direct.kind)
     for network in (NETWORK, INCEPTION_V3):
         case = Case(name, network)
         test_predictions_have_the_contracts_shapes_and_teach_every_parameter(case)

@@ -7,13 +7,12 @@ import pytest
 import torch
 from scipy.spatial.transform import Rotation
 
-from baselines.config.learning import MODELS
 from baselines.labels.injected import add_noise
 from baselines.localizers.losses import PosePrediction
 from baselines.localizers.registry import build_localizer
 from baselines.training import selection
 from baselines.training.data import BatchOrder, held_out_paths
-from baselines.training.fit import HALVE_EVERY, PROTOCOLS, fit
+from baselines.training.fit import PROTOCOLS, fit
 from baselines.training.optimizer import Schedule, optimisation_of
 from baselines.training.selection import HeldOutErrors, Selection, held_out_errors
 from reproduction.design.experiments import Run
@@ -175,7 +174,6 @@ def test_the_rate_is_halved_at_each_share():
         rates.append(optimisation.learning_rate)
         optimisation.step(parameter(torch.ones(2)).sum())
     assert rates == pytest.approx([0.8] * 30 + [0.4] * 30 + [0.2] * 30 + [0.1] * 10)
-    assert set(HALVE_EVERY) == set(MODELS)
 
 
 @pytest.mark.parametrize(("kind", "decays"), [("muon", False), ("adamw", False), ("halving", True)])

@@ -1,6 +1,5 @@
 """The list of methods, and the example of the page on adding one."""
 
-import re
 import sys
 import types
 from pathlib import Path
@@ -12,29 +11,28 @@ from baselines.config.labels import GroundTruthConfig, PoseGraphConfig
 from baselines.labels import methods
 from baselines.labels.batches import batches_of
 from baselines.labels.chain import chain_batches
-from baselines.labels.methods import METHODS, Method, estimate_batch, solve_graph
+from baselines.labels.methods import METHODS, estimate_batch, solve_graph
 from baselines.labels.posegraph.graph import Edge, PoseGraph
 from reproduction.figures.style import METHOD_STYLES
 from reproduction.tables.layouts import SOURCES
 from synfeal.config.dataset import CameraConfig
 from synfeal.geometry.poses import pose_matrix
+from tests import ROOT
+from tests.support.added_methods import examples
 from tests.support.room_scene import straight_path
 
-PAGE = Path(__file__).parents[2] / "docs" / "groundtruth.md"
 CAMERA, CFG = CameraConfig(), GroundTruthConfig(batch_frames=10)
 
 
 @pytest.fixture
 def constant(monkeypatch):
     """The method of the page, added as the page says."""
-    module_text, line = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
-    name = re.search(r"One module, `(.*?)\.py`", PAGE.read_text())[1].replace("/", ".")
-    module = types.ModuleType(name)
-    exec(module_text, module.__dict__)
-    monkeypatch.setitem(sys.modules, name, module)
-    (added,) = eval(f"{{{line}}}", {"Method": Method}).items()
-    monkeypatch.setitem(METHODS, *added)
-    return added[0]
+    module = types.ModuleType("my_methods.constant")
+    exec(examples()["constant"], module.__dict__)
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    kind = module.constant_batch.kind
+    monkeypatch.setitem(METHODS, kind.name, kind)
+    return kind.name
 
 
 def test_the_example_of_the_page_labels_a_split(constant):
@@ -61,10 +59,9 @@ def test_every_method_has_a_title_a_style_and_someone_who_runs_it():
     for name, method in METHODS.items():
         assert SOURCES[name] == method.title
         assert name in METHOD_STYLES
-        assert not (method.estimate and method.optimiser)
     own_rules = set(METHODS) - {*methods.frame_methods(), *methods.graph_methods()}
     assert own_rules == {"sfm"}
-    rules = (PAGE.parent.parent / "workflow/rules/groundtruth.smk").read_text()
+    rules = (ROOT / "workflow/rules/groundtruth.smk").read_text()
     assert all(f"rule {name}:" in rules for name in own_rules)
 
 

@@ -8,8 +8,8 @@ import sys
 import pytest
 import yaml
 
-from baselines.config.learning import KEYS
 from reproduction.config.load import load_config
+from reproduction.config.tables import KEYS
 from reproduction.design.experiments import read_design
 from reproduction.plan.planned import planned_text
 from reproduction.report.html import page

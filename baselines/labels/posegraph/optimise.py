@@ -1,4 +1,4 @@
-"""The optimisers by the names they have in label sources: ``rgbd-toro``, ``rgbd-g2o``, ...
+"""Optimisers of pose graphs, each a label method.
 
 The g2o row is Levenberg-Marquardt by gtsam, the maintained library with Python wheels: both solve
 the same non-linear least squares problem, the sum over the edges of the squared Mahalanobis norm of
@@ -8,17 +8,15 @@ are.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import gtsam
 import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
 from baselines.config.labels import PoseGraphConfig
-from baselines.labels.batches import BatchTrajectory
-from baselines.labels.posegraph.graph import PoseGraph, check_connected, swapped_blocks
+from baselines.labels.posegraph.graph import PoseGraph, swapped_blocks
 from baselines.labels.posegraph.toro import optimise_toro
+from baselines.registry.kinds import LabelMethod
 from synfeal.geometry.poses import relative
 
 # Fixes the first pose, which the edges leave free, to a nanometre.
@@ -52,25 +50,34 @@ def optimise_lm(graph: PoseGraph, iterations: int) -> NDArray[np.float64]:
     return np.array([result.atPose3(node).matrix() for node in range(len(graph))])
 
 
-Optimiser = Callable[[PoseGraph, PoseGraphConfig], np.ndarray]
+@LabelMethod(
+    name="rgbd-toro",
+    title="RGB-D SLAM w/ TORO",
+    rank=2,
+    works_on="graph",
+    published_assisted=6,
+)
+def by_toro(graph: PoseGraph, cfg: PoseGraphConfig) -> NDArray[np.float64]:
+    """Optimise a pose graph by TORO; see :func:`~baselines.labels.posegraph.toro.optimise_toro`."""
+    return optimise_toro(graph, cfg.toro_iterations, cfg.toro_epsilon)
 
 
-OPTIMISERS: dict[str, Optimiser] = {
-    "toro": lambda graph, cfg: optimise_toro(graph, cfg.toro_iterations, cfg.toro_epsilon),
-    "g2o": lambda graph, cfg: optimise_lm(graph, cfg.lm_iterations),
-    "open3d": lambda graph, cfg: optimise_open3d(graph, cfg.lm_iterations),
-}
+@LabelMethod(
+    name="rgbd-g2o",
+    title="RGB-D SLAM w/ g2o",
+    rank=3,
+    works_on="graph",
+    published_assisted=4,
+)
+def by_g2o(graph: PoseGraph, cfg: PoseGraphConfig) -> NDArray[np.float64]:
+    """Optimise a pose graph by Levenberg-Marquardt; see :func:`optimise_lm`."""
+    return optimise_lm(graph, cfg.lm_iterations)
 
 
-def optimise(name: str, graph: PoseGraph, cfg: PoseGraphConfig) -> BatchTrajectory:
-    """Trajectory of a batch by one of ``OPTIMISERS``; odometry gives every frame a pose.
-
-    Raises:
-        ValueError: the edges do not connect all nodes.
-    """
-    check_connected(graph)
-    poses = OPTIMISERS[name](graph, cfg)
-    return BatchTrajectory(poses, np.ones(len(poses), dtype=bool))
+@LabelMethod(name="rgbd-open3d", title="RGB-D SLAM w/ Open3D", rank=4, works_on="graph")
+def by_open3d(graph: PoseGraph, cfg: PoseGraphConfig) -> NDArray[np.float64]:
+    """Optimise a pose graph by Open3D; see :func:`optimise_open3d`."""
+    return optimise_open3d(graph, cfg.lm_iterations)
 
 
 def optimise_open3d(graph: PoseGraph, iterations: int) -> NDArray[np.float64]:

@@ -34,6 +34,7 @@ from baselines.labels.sfm.pairs import (
     thumbnails,
     verification_options,
 )
+from baselines.registry.kinds import LabelMethod
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.pose_table import read_frames
@@ -98,6 +99,7 @@ def write_sfm(
     write_trajectory(out_trajectory, trajectory)
 
 
+@LabelMethod(name="sfm", title="SfM", rank=1, works_on="rule", published_assisted=3)
 def sfm_batch(
     color_paths: Sequence[FrameFile],  # images of the batch in order
     camera: CameraConfig,  # their camera

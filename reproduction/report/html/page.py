@@ -15,8 +15,8 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 from PIL import Image
 
-from baselines.config.learning import KEYS
 from reproduction.claims.verdicts import Verdict
+from reproduction.config.tables import KEYS
 from reproduction.design.experiments import Design, Experiment
 from reproduction.figures.registry import CAPTIONS
 from reproduction.hard_cases import table as hard_cases

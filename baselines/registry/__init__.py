@@ -1,0 +1,1 @@
+"""Localizers, label methods, label errors and reference methods, found by their declarations."""
