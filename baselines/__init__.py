@@ -1,1 +1,1 @@
-"""What the paper compares: other ground truths, and five localizers trained on every data set."""
+"""Label methods, localizers, training and reference methods for camera localization data sets."""

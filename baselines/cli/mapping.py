@@ -66,7 +66,7 @@ def map(arguments: argparse.Namespace) -> None:  # noqa: A001 (the name of the c
 
 
 def camera_options(arguments: argparse.Namespace) -> CameraOptions:
-    """What :data:`RGBD_OPTIONS` say of the cameras."""
+    """Read the options of colour and depth camera, :data:`RGBD_OPTIONS`."""
     from synfeal.scan.camera import CameraOptions
 
     aside = arguments.depth_from_color
@@ -118,7 +118,7 @@ def localize_by_map(arguments: argparse.Namespace) -> None:
 
 
 def found_text(done: LocalizedInMap) -> str:
-    """How many photographs were localized, in which world, and what they took."""
+    """Summarise in a line how many photographs were localized, in which world, how fast."""
     lost = done.n_images - done.n_found
     world = {"sequence": " in the world of the sequence", "mesh": " in the world of the mesh"}
     where = world[done.world] if done.world else ""

@@ -162,7 +162,7 @@ def _randomisation(text: str) -> PhotometricConfig | None:
 
 
 def trained_text(done: TrainedModel) -> str:
-    """What was trained, and how good it is."""
+    """Summarise in a line what was trained and its error on held-out paths."""
     before = "had ended before: " if done.finished_before else ""
     learned = (
         f"{before}{done.images} images shown of {done.n_frames} frames on {done.n_paths} paths"
@@ -195,7 +195,8 @@ def localize_by_model(arguments: argparse.Namespace) -> None:
         log.warning(
             "%d of %d poses lie far outside of where training frames were: these pictures may be"
             " of another place",
-            *(done.n_beyond, done.n_images),
+            done.n_beyond,
+            done.n_images,
         )
     warn_of_unlike(arguments.model, done)
     print(f"{arguments.model}: {model_text(done)}")
@@ -227,7 +228,7 @@ def warn_of_unlike(model: Path, done: Localized) -> None:
 
 
 def model_text(done: Localized) -> str:
-    """Which localizer it is, and which pictures it can read."""
+    """Summarise in a line which localizer a model is and which field of view it expects."""
     description = done.description
     px, camera = description.network.input_px, description.camera
     if camera is None:
@@ -262,7 +263,7 @@ def resampled_text(done: Localized) -> str:
 
 
 def poses_text(done: Localized) -> str:
-    """How many poses, in which world, and what they took."""
+    """Summarise in a line how many poses were written, in which world, how fast."""
     alone_ms = done.read_ms + done.network_ms
     views = f" on {done.views} views" if done.views > 1 else ""
     parts = f"median: read {done.read_ms:.2f}, network {done.network_ms:.2f}{views}"

@@ -78,12 +78,12 @@ class AugmentationConfig(Strict):
 
     @property
     def turns(self) -> bool:
-        """Whether anything changes."""
+        """Return whether images are rotated at all."""
         return max(self.tilt_deg, self.roll_deg) > 0
 
 
 class TrainingConfig(Strict):
-    """How all localizers are trained."""
+    """Training settings shared by all localizers."""
 
     unless_none = ("randomisation",)
 
@@ -122,7 +122,7 @@ class TrainingConfig(Strict):
 
 
 class PretrainingConfig(Strict):
-    """What `init: pretrained` starts from."""
+    """Weights that `init: pretrained` starts from."""
 
     source: Literal["shipped", "rooms", "imagenet"] = Field(
         "shipped",

@@ -55,7 +55,7 @@ class TruthUsed(StrEnum):
 
 @dataclass(frozen=True)
 class BatchRecord:
-    """What happened to one batch; errors are those of its last pose against the true one."""
+    """Record of one batch; errors are those of its last pose against the true one."""
 
     index: int  # position of the batch in its split
     start: int  # first frame
@@ -137,7 +137,7 @@ def chain_unassisted(
     truth: PoseTable,
     anchored: bool = False,
 ) -> PoseTable:
-    """What the labels were without assistance: no pose is replaced, a lost batch stands still.
+    """Chain batches without assistance: no pose is replaced, a lost batch stands still.
 
     Arguments and errors are those of :func:`chain_batches`.
     """

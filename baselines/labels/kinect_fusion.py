@@ -143,7 +143,7 @@ class FusedModel:
         return last @ motion if self._agrees(frame, shown_m, motion, min_fitness) else None
 
     def _agrees(self, frame: RgbdFrame, shown_m: Depth, motion: Array, min_fitness: float) -> bool:
-        """Whether enough of a frame falls on the model, and nearly all of that agrees with it."""
+        """Check that enough of a frame falls on the model and nearly all of that agrees with it."""
         model_m, frame_m, n_points = matched_depths(shown_m, frame.depth_m, motion, self._camera)
         known = np.isfinite(model_m)
         limit_m = self._cfg.voxel_m + _DEPTH_SHARE * frame_m[known]

@@ -1,4 +1,4 @@
-"""How good labels are: absolute and relative errors against the true poses.
+"""Errors of labels against the true poses, absolute and relative.
 
 Source: J. Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems", IROS 2012.
 Absolute errors are taken as they are: the first label is the true pose, so nothing is aligned.

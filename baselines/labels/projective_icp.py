@@ -85,7 +85,7 @@ def register(
 
 
 def _constraint(system: Array) -> float:
-    """How well a system (6, 6) constrains a motion: 0 where one motion leaves the surface in place.
+    """Rate how well a system (6, 6) constrains a motion; 0 if one leaves the surface in place.
 
     The smallest eigenvalue of the mean over pairs, lengths measured so that turns and shifts weigh
     the same in it; 1/3 at the most (Gelfand et al., 3DIM 2003).

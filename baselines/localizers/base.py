@@ -1,4 +1,4 @@
-"""What all localizers have in common: regressors that turn maps into poses, and the loss."""
+"""Base class of the localizers, and the regressors that turn feature maps into poses."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ N_FEATURES = 2048
 
 
 class OutputLayer(nn.Module):
-    """What predicts; every layer before it is hidden. Optimisers tell the two apart."""
+    """Layer that predicts; every layer before it is hidden. Optimisers tell the two apart."""
 
 
 class PoseRegressor(OutputLayer):

@@ -1,4 +1,4 @@
-"""What a reader compares localizers with: image retrieval, an oracle, and structure-based poses.
+"""Methods that localizers are compared with: image retrieval, an oracle, structure-based poses.
 
 descriptors.py describes images as a whole, features.py in parts; correspondences.py matches parts.
 None of them reads a label, so each is computed once for all label sets of a data set. evidence.py

@@ -90,7 +90,7 @@ def adjust(tracks: Tracks, world_from_cam: Array, point_m: Array, camera: pycolm
 def errors_px(
     tracks: Tracks, world_from_cam: Array, point_m: Array, camera: pycolmap.Camera
 ) -> Array:
-    """How far (M,) from its observations each point (T, 3) is seen by the poses (N, 4, 4)."""
+    """Compute the reprojection errors (M,) in pixels of points (T, 3) seen by poses (N, 4, 4)."""
     cam_from_world = inverse(world_from_cam)[tracks.frame]
     point = np.einsum("mij,mj->mi", cam_from_world[:, :3, :3], point_m[tracks.track])
     point += cam_from_world[:, :3, 3]

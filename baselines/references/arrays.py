@@ -49,7 +49,7 @@ class Stored:
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """What :meth:`write` wrote.
+        """Read what :meth:`write` wrote.
 
         Raises:
             InputError: the file cannot be read.
@@ -59,7 +59,7 @@ class Stored:
 
 @dataclass(frozen=True)
 class ByFrame(Stored):
-    """What belongs to frames, one frame after the other."""
+    """Arrays whose rows belong to frames, one frame after the other."""
 
     start: NDArray[np.int64]  # (N + 1,) where that of each frame begins; the last is its number
 
@@ -67,7 +67,7 @@ class ByFrame(Stored):
         return len(self.start) - 1
 
     def of(self, frame: int) -> slice:
-        """What belongs to a frame."""
+        """Return the rows that belong to a frame."""
         return slice(int(self.start[frame]), int(self.start[frame + 1]))
 
 

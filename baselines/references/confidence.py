@@ -1,4 +1,4 @@
-"""How sure a pose is that some of many matches agree with: could it be chance?
+"""Confidence in a pose from its inliers: could as many matches agree by chance?
 
 After the a-contrario criterion of Moisan and Stival (IJCV 2004; as AC-RANSAC, Moulon et al., ACCV
 2012): of *m* matches that are all wrong, and lie anywhere in the image, the expected number of

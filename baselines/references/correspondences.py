@@ -1,4 +1,4 @@
-"""Which features look alike: of test and training frames, and, as tracks, of training frames."""
+"""Matches between test and training frames, and tracks through training frames."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def find_tracks(features: Features, pairs: Rows) -> Tracks:
 
 
 def rigid(slope_i: NDArray[np.float64], slope_j: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which matches (m, 2), (m, 2) of two views agree on an essential matrix; none where few do."""
+    """Mark matches (m, 2), (m, 2) of two views that agree on an essential matrix, if enough do."""
     nothing = np.zeros(len(slope_i), dtype=bool)
     if len(slope_i) < MIN_INLIERS:
         return nothing

@@ -1,4 +1,4 @@
-"""What the reference methods may look at, read when a method asks for it."""
+"""Inputs of the reference methods, read when a method asks for them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Evidence:
 
     @cached_property
     def test_frames(self) -> PoseTable:
-        """Which test frames there are; its poses are what methods are asked for."""
+        """Test frames; the poses in the table are what methods are asked for."""
         return read_pose_table(self.files["test"])
 
     @cached_property

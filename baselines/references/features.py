@@ -1,4 +1,4 @@
-"""What is found in the frames of a split once, as all label sets share it: features, small views.
+"""Features and small views of the frames of a split, shared by all its label sets.
 
 Features are SIFT; OpenCV's implementation takes half the time of COLMAP's for the same matches.
 Views are what a scene-coordinate network sees: frames with depth, reduced to the size of the
@@ -180,7 +180,7 @@ def write_views(
 
 
 def cell_pixels(camera: CameraConfig, width: int, height: int) -> Array:
-    """Where the middles (R, C, 2) of the cells of a reduced image lie in the camera's image.
+    """Compute the pixels (R, C, 2) of the cell centres of a reduced image in the camera's image.
 
     The first pixel's centre is at (0.5, 0.5) in both.
     """

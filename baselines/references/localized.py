@@ -40,7 +40,7 @@ PART = 100  # photographs between two lines of progress
 
 
 class LocalizedInMap(NamedTuple):
-    """What became of some photographs.
+    """Result of localizing photographs in a map.
 
     Attributes:
         n_images: Photographs.

@@ -89,7 +89,7 @@ class StructureMap:
 
     @cached_property
     def point_m(self) -> Array:
-        """Where the features (K, 3) lie in the world."""
+        """Positions (K, 3) of the features in the world, metres."""
         pose = self.world_from_cam[self.features.frame]
         turned = np.einsum("kij,kj->ki", pose[:, :3, :3], self.features.point_m)
         return np.asarray(turned + pose[:, :3, 3])

@@ -44,7 +44,7 @@ METRES_PER_RADIAN = 2.0
 
 
 class Photograph(NamedTuple):
-    """What is used of a photograph.
+    """Features and descriptors of a photograph, with its camera.
 
     Attributes:
         slope: x / z and y / z (k, 2) of the rays of its features, distortion removed.

@@ -71,19 +71,34 @@ def score_answers(
 ) -> None:
     """Write ``predictions.csv``, ``errors.csv``, ``metrics.json`` and ``facts.json`` of a method.
 
-    Answers are poses of the test frames, NaN where there is none; ``info`` are further keys of the
-    metrics, and ``facts`` what the answers took.
+    Args:
+        answers: Poses of the test frames, NaN where there is none.
+        files: Labels and true poses by name: ``train``, ``test``, ``test_truth``.
+        folder: Where the files are written.
+        info: Further keys of the metrics.
+        facts: What the answers took.
     """
-    write_pose_table(folder / "predictions.csv", answers)
+    predictions = folder / "predictions.csv"
+    write_pose_table(predictions, answers)
     score_run(
-        *(folder / "predictions.csv", files["test"], files["test_truth"], files["train"]),
-        *(folder / "errors.csv", folder / "metrics.json", info),
+        predictions=predictions,
+        labels=files["test"],
+        truth=files["test_truth"],
+        train_labels=files["train"],
+        out_errors=folder / "errors.csv",
+        out_metrics=folder / "metrics.json",
+        info=info,
     )
     write_json(folder / "facts.json", facts | {"frames": len(answers)})
 
 
 def pose_table(frames: PoseTable, world_from_cam: NDArray[np.float64]) -> PoseTable:
-    """A table of poses (N, 4, 4) of which some may be NaN."""
+    """Make a pose table of which some poses may be NaN.
+
+    Args:
+        frames: Frames and paths of the table; its poses are not used.
+        world_from_cam: Poses (N, 4, 4).
+    """
     good = np.asarray(np.isfinite(world_from_cam).all(axis=(1, 2)))
     position_m, quat_wxyz = np.full((len(good), 3), np.nan), np.full((len(good), 4), np.nan)
     position_m[good] = world_from_cam[good, :3, 3]
@@ -96,16 +111,23 @@ NEEDED = ("frame", *COLUMNS[2:])
 
 
 def answer_externally(
-    files: Mapping[str, Path],  # labels, true poses and packed frames by name, and ``poses``
-    method: Mapping[str, Any],  # settings: ``command`` or ``poses``
-    named: Mapping[str, str],  # see :func:`run_external`
-    wildcards: Mapping[str, str],  # further keys of the metrics
-    out_references: Sequence[Path],  # files to write, all in one folder
+    files: Mapping[str, Path],
+    method: Mapping[str, Any],
+    named: Mapping[str, str],
+    wildcards: Mapping[str, str],
+    out_references: Sequence[Path],
 ) -> None:
     """Run the command of a method, or take its file ``poses``, and score the answers.
 
+    Args:
+        files: Labels, true poses and packed frames by name, and ``poses``.
+        method: Settings: ``command`` or ``poses``.
+        named: Data set, for the placeholders of the command; see :func:`run_external`.
+        wildcards: Further keys of the metrics.
+        out_references: Files to write, all in one folder.
+
     Raises:
-        InputError: the command fails, or the answers cannot be read.
+        InputError: The command fails, or the answers cannot be read.
     """
     folder, facts = out_references[0].parent, Facts()
     with timed(facts, "answer_s"):
@@ -120,13 +142,21 @@ def answer_externally(
 def run_external(
     command: str, files: Mapping[str, Path], named: Mapping[str, str], folder: Path
 ) -> Path:
-    """Run a command that writes ``answers.csv`` to a folder; where that lies.
+    """Run a command that writes ``answers.csv`` to a folder.
 
-    Its placeholders are ``named``, training frames and labels, test frames and their number, and
-    ``out``.
+    Args:
+        command: Command line; its placeholders are the keys of ``named``, training frames and
+            labels, test frames and their number, and ``out``.
+        files: Packed frames and labels by name: ``train_frames``, ``train``, ``test_frames``,
+            ``test``.
+        named: Values of further placeholders.
+        folder: Where the answers are written.
+
+    Returns:
+        Path of the answers.
 
     Raises:
-        InputError: the command has an unknown placeholder, fails, or writes nothing.
+        InputError: The command has an unknown placeholder, fails, or writes nothing.
     """
     folder.mkdir(parents=True, exist_ok=True)
     out = folder / "answers.csv"
@@ -157,12 +187,17 @@ def run_external(
 
 
 def read_answers(path: Path, frames: PoseTable) -> PoseTable:
-    """Answers for some test frames, in any order; NaN for frames that are not in the file.
+    """Read answers for some test frames, in any order.
 
-    It is CSV with at least the columns ``frame,tx,ty,tz,qw,qx,qy,qz``: ``world_from_cam``.
+    Args:
+        path: CSV with at least the columns ``frame,tx,ty,tz,qw,qx,qy,qz``: ``world_from_cam``.
+        frames: The test frames.
+
+    Returns:
+        Poses of all test frames, NaN for those that are not in the file.
 
     Raises:
-        InputError: the file cannot be read, lacks a column, holds anything but numbers, or names a
+        InputError: The file cannot be read, lacks a column, holds anything but numbers, or names a
             frame twice or one that is not in the test set.
     """
     try:

@@ -43,7 +43,7 @@ def on_depth(evidence: Evidence) -> Array:
 
 
 def lifted(matches: Correspondences, train: PoseTable) -> Array:
-    """Where (C, 3) the depth of the training frames says matches lie in the world.
+    """Lift matches to points (C, 3) in the world by the depth of the training frames.
 
     NaN where that frame has no depth, or a label that was only filled in.
     """

@@ -63,7 +63,7 @@ Point = tuple[Finite, Finite, Finite]
 
 
 class ModelDescription(Strict):
-    """What stands in a checkpoint beside its weights."""
+    """Description of a trained localizer, stored beside its weights."""
 
     unless_none = ("sequence_from_world", "bounds_m", "rotations", "scene")
 
@@ -121,7 +121,7 @@ class TrainedLocalizer:
 
     @property
     def device(self) -> torch.device:
-        """Where the network is."""
+        """Return the device that the network is on."""
         return self.statistics.mean.device
 
 

@@ -168,7 +168,7 @@ class BatchOrder:
         return batch
 
     def state_dict(self) -> dict[str, Any]:
-        """Where the order stands."""
+        """Return the state of the order."""
         return {"generator": self._generator.get_state(), "pending": self._pending.clone()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
@@ -178,7 +178,7 @@ class BatchOrder:
 
 
 def held_out_paths(path: NDArray[np.int64], share: float, seed: int) -> NDArray[np.bool_]:
-    """Which frames (N,) are held out: those of a share of the paths (N,), drawn by seed.
+    """Mark the frames (N,) to hold out: those of a share of the paths (N,), drawn by seed.
 
     Whole paths, because neighbouring frames of a path are nearly the same image. At least one path
     where there are two or more and ``share`` is not 0; never all.

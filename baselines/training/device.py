@@ -1,4 +1,4 @@
-"""Where networks run, in which precision, and what the processor is told first."""
+"""Device and precision of networks, and the settings of the processor."""
 
 from __future__ import annotations
 

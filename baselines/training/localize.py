@@ -49,7 +49,7 @@ EARLIER_HEADER = HEADER[: -len(SEEN)]
 
 
 class Localized(NamedTuple):
-    """What became of some pictures.
+    """Result of localizing pictures by a trained model.
 
     Attributes:
         description: Of the localizer.
@@ -250,7 +250,7 @@ def _check_out(out: Path, inputs: Sequence[Path]) -> None:
 
 
 def _holds_poses(out: Path) -> bool:
-    """Whether an earlier command wrote it."""
+    """Check that an earlier command wrote a file."""
     try:
         with out.open("rb") as file:
             found = file.readline(200).strip().decode(errors="replace")

@@ -166,7 +166,7 @@ WARM_UP = 0.05
 
 
 class Schedule(NamedTuple):
-    """How long and how fast to learn."""
+    """Length and learning rates of a training run."""
 
     samples_seen: int  # images shown in all, rounded up to whole batches
     batch_size: int  # images per step
@@ -219,7 +219,7 @@ class Optimisation:
 
 
 def optimisation_of(kind: OptimiserName, network: nn.Module, schedule: Schedule) -> Optimisation:
-    """What a protocol trains ``network`` with."""
+    """Make the optimiser of a protocol for a network."""
     return OPTIMISERS[kind](network, schedule)
 
 

@@ -89,7 +89,7 @@ class OwnFrames:
 
 @dataclass(frozen=True)
 class PackedFrames:
-    """What a training run reads.
+    """Packed frames and poses that a training run reads.
 
     Attributes:
         frames: Packed frames, with a record beside them that names their camera.

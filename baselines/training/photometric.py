@@ -79,7 +79,7 @@ class PhotometricRandomisation:
         return levels_of(light).contiguous(memory_format=torch.channels_last)
 
     def state_dict(self) -> dict[str, Tensor]:
-        """Where the generator stands."""
+        """Return the state of the generator."""
         return {"generator": self._generator.get_state()}
 
     def load_state_dict(self, state: Mapping[str, Tensor], /) -> None:

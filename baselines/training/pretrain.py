@@ -128,15 +128,21 @@ def _train_on_rooms(
     student = RoomsNetwork(backbone, network.width, len(rooms))
     student.place_on(device)
     log.info("%s: %d frames of %d rooms on %s", backbone, len(data), len(rooms), device)
-    rate = pretraining.learning_rate
     identity = digest(network, pretraining, seed, student.state_dict(), statistics.mean)
     resume = ResumeFile(out.with_name(f"resume-{backbone}.pt"), identity)
     # Not Muon: ten thousand of its steps leave kernels fifteen times as long, and channels that one
     # image in a batch excites; what starts from there learns no faster than from scratch.
     fit(
-        *(student, data, statistics),
-        Schedule(pretraining.samples_seen, pretraining.batch_size, rate, WEIGHT_DECAY),
-        seed,
+        localizer=student,
+        frames=data,
+        statistics=statistics,
+        schedule=Schedule(
+            samples_seen=pretraining.samples_seen,
+            batch_size=pretraining.batch_size,
+            learning_rate=pretraining.learning_rate,
+            weight_decay=WEIGHT_DECAY,
+        ),
+        seed=seed,
         protocol=LAST_WEIGHTS._replace(optimiser="adamw"),
         precision=precision_on(device, "auto"),
         augment=random_rotation(rooms[0][0], network, pretraining.augmentation, seed),

@@ -1,4 +1,4 @@
-"""What a run was trained from, beside its predictions: whether a later run would be the same.
+"""Record of the inputs of a training run, which tells whether a later run would be the same.
 
 Predictions travel further than models and frames (``make archive``). Where they arrive, this record
 tells whether the configuration and the labels there are those that they were made with. Free of

@@ -68,7 +68,7 @@ class Resampler:
 def _source_pixels(
     source: Calibration, target: FrameCamera, samples: int
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Where the source shows what a fine grid of the target's pixels shows, and whether it does.
+    """Map a fine grid of the target's pixels to the source, and mark those that it shows.
 
     Returns:
         Pixels (rows, columns, 2), finite, and a mask (rows, columns): false where a lens folds over
@@ -90,7 +90,7 @@ def _source_pixels(
 
 
 def same_view(source: Calibration, target: FrameCamera) -> bool:
-    """Whether photographs only have to be made smaller or larger to be those of the target."""
+    """Check that scaling alone turns the photographs into those of the target camera."""
     x, y = target.width / source.width, target.height / source.height
     scaled = (x * source.fx, y * source.fy, x * source.cx, y * source.cy)
     own = (target.fx, target.fy, target.cx, target.cy)

@@ -163,7 +163,7 @@ def _add(total: Any, value: object) -> None:
 
 
 def serialised(value: Any) -> memoryview:
-    """What ``torch.save`` writes, made in memory: the same value gives the same bytes.
+    """Serialise as ``torch.save`` does, in memory: the same value gives the same bytes.
 
     Writing to a path, torch puts the name of the file, here a temporary one, into every record, and
     what it says of a full disk is ``unexpected pos``.

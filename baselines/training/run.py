@@ -57,7 +57,7 @@ FramesAndLabels = tuple[Path, Path] | None
 
 
 class Job(NamedTuple):
-    """What is trained, and how."""
+    """A training run: localizer, settings, seed."""
 
     name: ModelName
     network: NetworkConfig
@@ -74,7 +74,7 @@ class Job(NamedTuple):
 
     @property
     def schedule(self) -> Schedule:
-        """How long and how fast."""
+        """Length and learning rates of the run."""
         step, epochs = LOCALIZERS[self.name].halve_every
         return Schedule(
             samples_seen=self.samples_seen,
@@ -86,7 +86,7 @@ class Job(NamedTuple):
 
 
 class Material(NamedTuple):
-    """What a training run begins with: a network, and frames that it learns from."""
+    """Network and frames that a training run begins with."""
 
     localizer: Localizer  # with its first weights, on the device of the frames
     statistics: ImageStatistics  # of all images
@@ -163,7 +163,7 @@ TIMED_STEPS = 8
 
 
 def step_seconds(job: Job, frames: Path, labels: Path, weights: Path | None) -> float:
-    """How long one step of a training run takes here; nothing is written.
+    """Measure the seconds that one step of a training run takes here; nothing is written.
 
     Args:
         job: The run; how many images it shows does not matter.
@@ -200,7 +200,7 @@ def _bounds_m(job: Job, material: Material) -> Any:
 def _material(
     job: Job, frames: Path, labels: Path, weights: Path | None, test: FramesAndLabels
 ) -> Material:
-    """What the run begins with, on its device."""
+    """Load the network and the frames of a run onto its device."""
     device = open_device(job.training.device)
     data = read_labelled_frames(frames, labels, job.network.input_px, device)
     learned, held_out = _split(job, data, test)
@@ -217,7 +217,7 @@ def _material(
 def _fit(
     job: Job, material: Material, augment: Augmentation | None, resume: ResumeFile
 ) -> list[HistoryRow]:
-    """Train the network in place; the history."""
+    """Train the network in place and return the history."""
     localizer, statistics, learned, held_out = material
     if job.protocol.selection == "averaged":
         aside = 0 if held_out is None else len(held_out)
@@ -227,7 +227,11 @@ def _fit(
     else:
         log.info("weights are chosen on %d frames (%s)", len(held_out), job.protocol.selection)
     return fit(
-        *(localizer, learned, statistics, job.schedule, job.seed),
+        localizer=localizer,
+        frames=learned,
+        statistics=statistics,
+        schedule=job.schedule,
+        seed=job.seed,
         protocol=job.protocol,
         held_out=held_out,
         patience=job.training.patience,
@@ -239,7 +243,7 @@ def _fit(
 
 
 def _randomisation(job: Job) -> PhotometricRandomisation | None:
-    """How images are made to look, where that is asked for."""
+    """Make the randomisation of images, where one is configured."""
     config = job.training.randomisation
     return None if config is None else PhotometricRandomisation(config, job.seed)
 

@@ -1,4 +1,4 @@
-"""What is noted while a localizer learns: its history, and the best weights on held-out frames."""
+"""Progress of a training run: its history, and the best weights on held-out frames."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class HeldOutErrors(NamedTuple):
     orientation_deg: float
 
     def score(self, selection: SelectionKind) -> float:
-        """What the kept weights have least of.
+        """Selection criterion; lower is better.
 
         ``test``: the loss, as the paper's authors do. ``validation``: the product of the two median
         errors. No unit and no weight enters, so losses whose weights are learned can be compared
@@ -90,7 +90,7 @@ class Selection:
         return errors
 
     def stale(self, patience: int | None) -> bool:
-        """Whether there have been ``patience`` evaluations without a new best."""
+        """Check for ``patience`` evaluations in a row without a new best."""
         return patience is not None and self._since_best >= patience
 
     def restore(self) -> None:
@@ -167,12 +167,12 @@ class Progress:
 
     @property
     def diverged(self) -> bool:
-        """Whether the loss has stopped being finite."""
+        """Check whether the loss has stopped being finite."""
         return bool(self.rows) and not math.isfinite(self.rows[-1].loss)
 
     @property
     def ended(self) -> bool:
-        """Whether all steps are done, or further ones are pointless."""
+        """Check whether all steps are done, or further ones are pointless."""
         return self.done == self._steps or self.diverged
 
     def add(self, loss: Tensor) -> None:

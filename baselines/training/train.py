@@ -61,7 +61,7 @@ TEMPORARY = ("frames.npy", "frames.json", "labels.csv", "resume.pt", "budget.jso
 
 @dataclass(frozen=True)
 class TrainJob:
-    """What to train, on what, and for how long.
+    """A call of ``synfeal train``: localizer, data sets, length.
 
     Attributes:
         datasets: Data sets of ``synfeal collect`` or sequences of photographs, one or more.
@@ -93,7 +93,7 @@ class TrainJob:
 
 
 class TrainedModel(NamedTuple):
-    """What came of a training run.
+    """Result of a training run.
 
     Attributes:
         model: Checkpoint.
@@ -191,7 +191,7 @@ def _check(job: TrainJob) -> None:
 
 
 def _is_left(name: str) -> bool:
-    """Whether it is a file under the temporary name that one of ours has while it is written."""
+    """Check for a file under the temporary name that one of ours has while it is written."""
     stems = {Path(own).stem for own in (MODEL, HISTORY, RECORD, *TEMPORARY)}
     return any(name.startswith(f".{stem}-") for stem in stems)
 
@@ -270,7 +270,7 @@ def _rotations(job: TrainJob, packed: PackedFrames) -> AugmentationConfig:
 
 
 def _images_in(minutes: float, run: Job, packed: PackedFrames, out: Path) -> int:
-    """How many images to show; settled once, because a run that goes on must not change it."""
+    """Settle how many images to show, once: a run that goes on must not change it."""
     path = out / "budget.json"
     if path.is_file():
         settled = read_json(path)

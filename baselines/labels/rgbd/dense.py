@@ -9,7 +9,7 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from baselines.config.labels import RgbdConfig
-from baselines.labels.rgbd.frames import RgbdFrame, align, near
+from baselines.labels.rgbd.frames import SINGULAR, RgbdFrame, align, near
 from synfeal.config.dataset import CameraConfig
 
 Array = NDArray[np.float64]
@@ -89,7 +89,7 @@ def normals_of(point_m: Array) -> Array:
 
 
 def constraint(depth_m: Depth, camera: CameraConfig) -> float:
-    """How well the surfaces in view constrain a motion: 0 where one motion leaves them in place.
+    """Rate how well the surfaces in view constrain a motion; 0 if one motion leaves them in place.
 
     Distances to the tangent planes change under a small motion by ``normal . (v + w x point)``. The
     result is the smallest eigenvalue of the mean of the outer products of those rows, points
@@ -152,12 +152,19 @@ def register(
     try:
         for steps, huber_m in _PASSES:
             i_from_j = odometry.rgbd_odometry_multi_scale(
-                *(j, i, matrix, i_from_j, 1.0, cfg.max_depth_m),
-                [odometry.OdometryConvergenceCriteria(count) for count in steps],
-                _METHODS[method],
-                odometry.OdometryLossParams(2 * cfg.max_rmse_m, huber_m),
+                source=j,
+                target=i,
+                intrinsics=matrix,
+                init_source_to_target=i_from_j,
+                depth_scale=1.0,
+                depth_max=cfg.max_depth_m,
+                criteria_list=[odometry.OdometryConvergenceCriteria(count) for count in steps],
+                method=_METHODS[method],
+                params=odometry.OdometryLossParams(2 * cfg.max_rmse_m, huber_m),
             ).transformation
-    except RuntimeError:  # a singular system: nothing in view constrains the motion
+    except RuntimeError as error:
+        if SINGULAR not in str(error):
+            raise
         return None
     found = np.asarray(i_from_j.numpy(), dtype=np.float64)
     return found if np.isfinite(found).all() else None
@@ -165,13 +172,13 @@ def register(
 
 @dataclass(frozen=True)
 class DenseOdometry:
-    """What registering two frames needs besides them."""
+    """Settings with which pairs of frames are registered."""
 
     camera: CameraConfig
     cfg: RgbdConfig
 
     def constrained(self, frame: RgbdFrame) -> bool:
-        """Whether what is compared can tell every motion of the camera."""
+        """Check that what is compared can tell every motion of the camera."""
         if self.cfg.method != "point-to-plane":
             return True
         return constraint(frame.depth_m, self.camera) >= MIN_CONSTRAINT

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 class Stage(NamedTuple):
-    """How images are compared, and for how long."""
+    """Stage of the registration: resolution, residuals, stopping rule."""
 
     stride: int  # every how many pixels are compared
     max_steps: int  # steps at the most
@@ -63,7 +63,7 @@ Surfaces = dict[int, Surface]
 
 
 def near(a: Array, b: Array, max_m: float = MAX_CHANGE_M, max_deg: float = MAX_CHANGE_DEG) -> bool:
-    """Whether a motion (4, 4), by default a refined one, stays near another, its starting point."""
+    """Check that a motion (4, 4) stays near another one (4, 4), its starting point."""
     change_m, change_rad = pose_error(a, b)
     return bool(change_m <= max_m and np.degrees(change_rad) <= max_deg)
 
@@ -81,10 +81,21 @@ def _surface(depth_m: NDArray[np.float32], matrix: Array, stride: int) -> Surfac
     )
 
 
-def align(i: Surfaces, j: Surfaces, start: Array, max_difference_m: float) -> Array | None:
-    """Motion ``i_from_j`` (4, 4) near a starting point (4, 4), or None where there is none.
+# What Open3D says where nothing in view constrains the motion.
+SINGULAR = "Singular 6x6 linear system"
 
-    Points of j move towards the planes of i; where depth differs by more they do not count.
+
+def align(i: Surfaces, j: Surfaces, start: Array, max_difference_m: float) -> Array | None:
+    """Register frame j to frame i by point-to-plane distances.
+
+    Args:
+        i: Surfaces whose planes points move towards.
+        j: Surfaces whose points move.
+        start: Motion ``i_from_j`` (4, 4) to start from.
+        max_difference_m: Points whose depth differs by more do not count, metres.
+
+    Returns:
+        Motion ``i_from_j`` (4, 4), or None where nothing in view constrains it.
     """
     i_from_j = o3d.core.Tensor.from_numpy(np.ascontiguousarray(start))
     try:
@@ -92,13 +103,20 @@ def align(i: Surfaces, j: Surfaces, start: Array, max_difference_m: float) -> Ar
             target, source = i[stage.stride], j[stage.stride]
             for _ in range(stage.max_steps):
                 step = o3d.t.pipelines.odometry.compute_odometry_result_point_to_plane(
-                    *(source.points, target.points, target.normals, target.intrinsics),
-                    *(i_from_j, max_difference_m, stage.huber_m),
+                    source_vertex_map=source.points,
+                    target_vertex_map=target.points,
+                    target_normal_map=target.normals,
+                    intrinsics=target.intrinsics,
+                    init_source_to_target=i_from_j,
+                    depth_outlier_trunc=max_difference_m,
+                    depth_huber_delta=stage.huber_m,
                 ).transformation
                 i_from_j = step @ i_from_j
                 if near(step.numpy(), np.eye(4), stage.rest_m, stage.rest_deg):
                     break
-    except RuntimeError:  # a singular system: nothing in view constrains the motion
+    except RuntimeError as error:
+        if SINGULAR not in str(error):
+            raise
         return None
     found = np.asarray(i_from_j.numpy(), dtype=np.float64)
     return found if np.isfinite(found).all() else None
@@ -123,7 +141,7 @@ class RgbdFrame:
 
     @cached_property
     def surfaces(self) -> Surfaces:
-        """What the depth shows, as all stages of the registration take it."""
+        """Surfaces seen in the depth image, by stride of the registration's stages."""
         measured = np.where(np.isfinite(self.depth_m), self.depth_m, np.float32(np.nan))
         matrix = self.camera.intrinsics.matrix(centre_shift_px=-0.5)
         strides = {stage.stride for stage in STAGES}
@@ -167,7 +185,7 @@ RANGE_M = (0.5, 4.5)
 
 
 def kinect_depth(depth_m: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.float32]:
-    """What a Kinect measures where the depth is ``depth_m`` (H, W); inf where it sees nothing.
+    """Simulate the depth (H, W) in metres that a Kinect measures; inf where it sees nothing.
 
     It measures disparity: inverse depth in steps of fixed size, with noise of about half a step
     that grows with the square of the depth once it is converted (Khoshelham and Elberink, Sensors

@@ -107,7 +107,7 @@ class View:
 
     @cached_property
     def constrained(self) -> bool:
-        """Whether dense odometry can tell every motion from this view."""
+        """Check that dense odometry can tell every motion from this view."""
         return self.dense.constrained(self.frame)
 
     def from_features(self, other: View, min_inliers: int) -> Array | None:

@@ -32,7 +32,7 @@ _STARTS = (None, 0.5, 0.25, 0.75)
 
 @dataclass(frozen=True)
 class Matches:
-    """What the mappers start from."""
+    """Verified matches of a batch, the input of both mappers."""
 
     images: Path  # directory of the images
     database: Path  # their features and verified matches
@@ -42,7 +42,7 @@ class Matches:
 
 @dataclass(frozen=True)
 class Mapping:
-    """What the mapper made of a batch."""
+    """Result of mapping a batch."""
 
     model: pycolmap.Reconstruction | None  # the one that explains the most; None when there is none
     models: int  # how many models there are: the parts that the batch fell into

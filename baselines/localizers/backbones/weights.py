@@ -44,7 +44,7 @@ def build_backbone(name: BackboneName, width: float) -> Backbone:
 
 
 def imagenet_weights_path(name: BackboneName, weights_dir: Path) -> Path:
-    """Where the official ImageNet weights are, downloaded and checked if they are not there yet.
+    """Return the file of the official ImageNet weights; download and check it if it is missing.
 
     Raises:
         InputError: the file cannot be downloaded, or is not the one its name promises.
