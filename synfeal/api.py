@@ -181,7 +181,7 @@ def evaluate(path: AnyPath, poses: AnyPath, **settings: Any) -> Evaluation:
     """Score poses against a data set, as ``synfeal evaluate`` does.
 
     Args:
-        path: Data set.
+        path: Data set, or a file of poses as the reference.
         poses: File of the poses to score.
         settings: Fields of :class:`synfeal.evaluation.run.Settings`.
     """

@@ -15,6 +15,11 @@ CONVENTIONS = tuple(
     for direction in ("world_from_cam", "cam_from_world")
     for order in ("wxyz", "xyzw")
 )
+# fmt: off
+POSE_FORMATS = (
+    "7scenes", "tum", "kitti", "euroc", "colmap", "hloc", "pgt", "ace", "ace0", "csv",
+)
+# fmt: on
 FILES = ("scores.csv", "errors.csv", "errors.png")
 DATASET = option("dataset", "directory of seq-01 or seq-01.zip", type=Path, metavar="DATASET")
 CAMERA = option("--camera", "calibration file (manifest.json)", type=Path, metavar="FILE")
@@ -89,13 +94,25 @@ def export(arguments: argparse.Namespace) -> None:
 @command(
     "how good are these poses? yours or another program's",
     "synfeal evaluate mydata results_ace.txt --out scores",
-    DATASET,
+    option(
+        "dataset",
+        "directory of seq-01 or seq-01.zip, or a file of poses as the reference",
+        type=Path,
+        metavar="DATASET",
+    ),
     option(
         "poses",
-        "7-Scenes tree, TUM trajectory (or a directory of seq-01.txt, ...), COLMAP model, result"
-        " file of hloc or ACE, pose table, poses.csv of synfeal localize",
+        "7-Scenes tree, TUM trajectory (or a directory of seq-01.txt, ...), KITTI, EuRoC, COLMAP"
+        " model, result file of hloc, ACE, ACE0 or DSAC*, pseudo ground truth, pose table,"
+        " poses.csv of synfeal localize",
         type=Path,
         metavar="POSES",
+    ),
+    option(
+        "--format",
+        "of POSES (told by what they hold)",
+        choices=POSE_FORMATS,
+        dest="file_format",
     ),
     option("--split", "frames to score (test)", choices=("test", "train", "all"), default="test"),
     option(
@@ -110,7 +127,7 @@ def export(arguments: argparse.Namespace) -> None:
         "what POSES hold, where it is not what their format says",
         choices=CONVENTIONS,
     ),
-    option("--rate", "TUM: frames a second (30)", type=float, default=30.0, metavar="HZ"),
+    option("--rate", "TUM and EuRoC: frames a second (30)", type=float, default=30.0, metavar="HZ"),
     CAMERA,
     option("--out", "directory for scores.csv, errors.csv and errors.png", type=Path),
 )
@@ -123,8 +140,15 @@ def evaluate(arguments: argparse.Namespace) -> None:
     out: Path | None = arguments.out
     if out:
         refuse_foreign(out, FILES, "an evaluation")
-    names = ("split", "align", "convention", "rate", "labels", "camera")
-    settings = run.Settings(*(getattr(arguments, name) for name in names))
+    settings = run.Settings(
+        split=arguments.split,
+        align=arguments.align,
+        convention=arguments.convention,
+        rate_hz=arguments.rate,
+        labels=arguments.labels,
+        camera=arguments.camera,
+        file_format=arguments.file_format,
+    )
     found = run.evaluate(arguments.dataset, arguments.poses, settings)
     print(report_text(arguments.poses, settings, found), end="")
     if out:

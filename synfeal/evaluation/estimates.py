@@ -21,6 +21,10 @@ from synfeal.geometry.poses import inverse, pose_error, pose_from_quat
 Array = NDArray[np.float64]
 Direction = Literal["world_from_cam", "cam_from_world"]
 Order = Literal["wxyz", "xyzw"]
+# How a pose says which frame it is of: a name, a time in seconds, or the index of the frame
+# within the split.
+FrameKey = Literal["name", "time", "index"]
+KITTI = "KITTI poses"
 
 
 class Convention(NamedTuple):
@@ -44,12 +48,12 @@ class Estimates:
 
     kind: str  # what it was read as, e.g. ``an ACE result file``.
     convention: Convention  # that of ``kind``, which is how its poses are taken
-    names: tuple[str, ...]  # (N) what each pose is called, or the index of its frame
+    names: tuple[str, ...]  # (N) what ``frame_key`` says: names, seconds or indices
     places: tuple[str, ...]  # (N) where each stands, for messages
     translation: Array  # (N, 3) fourth columns of the matrices
     # (N, 4) quaternions in the order of ``convention``; not a number where a matrix is no rotation
     quat: Array
-    ordered: bool = False  # names are indices of frames within the split (our own tables)
+    frame_key: FrameKey = "name"
 
     def world_from_cam(self, convention: Convention) -> Array:
         """Poses (N, 4, 4); not a number where there is no rotation."""

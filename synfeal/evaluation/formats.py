@@ -2,10 +2,18 @@
 
 - 7-Scenes: ``seq-XX/frame-XXXXXX.pose.txt``, four rows of ``world_from_cam``.
 - TUM RGB-D ("File Formats"): ``timestamp tx ty tz qx qy qz qw``, ``world_from_cam``.
+- KITTI odometry (``devkit/readme.txt``): the first three rows of ``world_from_cam``, one line for
+  each frame, in order.
+- EuRoC (Burri et al., IJRR 2016; ``state_groundtruth_estimate0/data.csv``): a CSV of a time in
+  whole nanoseconds, position and quaternion ``wxyz`` of ``world_from_body``, and further columns.
 - COLMAP ("Output Format"): ``images.txt`` or ``images.bin``, ``cam_from_world``, ``wxyz``.
 - hloc (``localize_sfm``) and visuallocalization.net: ``name qw qx qy qz tx ty tz``,
   ``cam_from_world``.
-- ACE (``test_ace.py``): the same and three numbers more, both errors and the number of inliers.
+- Pseudo ground truth (``tsattler/visloc_pseudo_gt_limitations``): the same and the focal length;
+  estimates of that repository are hloc's.
+- ACE (``test_ace.py``): hloc's and three numbers more, both errors and the number of inliers.
+- ACE0 (``poses_final.txt``): hloc's and two numbers more, focal length and confidence. DSAC* has as
+  many, both errors.
 - CSV: our tables of poses (``frame,path,tx,...``) and what ``synfeal localize`` writes
   (``image,tx,...``), ``world_from_cam``, ``wxyz``.
 """
@@ -15,7 +23,9 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 import pandas as pd
@@ -25,7 +35,7 @@ from synfeal.dataset.pose_table import COLUMNS, IMAGE, SEEN, SUPPORT
 from synfeal.dataset.sequence_listing import refuse_problems
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError, read_as
-from synfeal.evaluation.estimates import Convention, Estimates
+from synfeal.evaluation.estimates import KITTI, Convention, Estimates, FrameKey
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.validation.listing import POSE, list_sequences
 from synfeal.validation.poses import rigid_defects
@@ -35,21 +45,61 @@ Array = NDArray[np.float64]
 OURS, COLMAP = Convention("world_from_cam", "wxyz"), Convention("cam_from_world", "wxyz")
 TUM = Convention("world_from_cam", "xyzw")
 MODELS = ("images.txt", "images.bin")
-# Numbers on a line of text, by whether a name stands before them.
-NAMED, TIMED = {7: "an hloc result file", 10: "an ACE result file"}, 8
 RIGID_BOUND = 1e-3  # text of few digits
 
+FormatName = Literal[
+    "7scenes", "tum", "kitti", "euroc", "colmap", "hloc", "pgt", "ace", "ace0", "csv"
+]
+FORMATS: tuple[FormatName, ...] = get_args(FormatName)
 
-def read_estimates(path: Path) -> Estimates:
+
+@dataclass(frozen=True)
+class LineFormat:
+    """A format of one pose on each line, numbers separated by spaces.
+
+    Attributes:
+        kind: What it is called, with its article.
+        convention: What its poses map, and the order of their quaternions.
+        frame_key: How a line says which frame it is of.
+        n_numbers: Numbers on a line; a name before them is none.
+        holds: What stands on a line, for messages.
+    """
+
+    kind: str
+    convention: Convention
+    frame_key: FrameKey
+    n_numbers: int
+    holds: str
+
+
+LINE_FORMATS: dict[FormatName, LineFormat] = {
+    "tum": LineFormat("a TUM trajectory", TUM, "time", 8, "timestamp and seven numbers (TUM)"),
+    "kitti": LineFormat(KITTI, OURS, "index", 12, "twelve numbers (KITTI)"),
+    "hloc": LineFormat("an hloc result file", COLMAP, "name", 7, "name and seven (hloc)"),
+    "pgt": LineFormat("pseudo ground truth", COLMAP, "name", 8, "name and eight (pgt)"),
+    "ace0": LineFormat(
+        "an ACE0 or DSAC* result file", COLMAP, "name", 9, "name and nine (ACE0, DSAC*)"
+    ),
+    "ace": LineFormat("an ACE result file", COLMAP, "name", 10, "name and ten (ACE)"),
+}
+
+
+def read_estimates(path: Path, file_format: FormatName | None = None) -> Estimates:
     """Poses from any of the formats above.
 
+    Args:
+        path: File or directory.
+        file_format: Its format; None to tell it by what it holds.
+
     Raises:
-        InputError: the path is missing, in none of these formats, in two of them, or damaged.
+        InputError: the path is missing, in none of these formats, in two of them, or damaged; or
+            it is not in ``file_format``.
     """
-    if path.is_dir():
-        return _from_directory(path)
-    if path.name in MODELS:
-        return read_colmap(path.parent)
+    if path.is_dir() or path.name in MODELS:
+        found = _from_directory(path) if path.is_dir() else read_colmap(path.parent)
+        if file_format not in (None, _name_of(found)):
+            raise InputError(f"{path}: is {found.kind}, not {file_format}; correct --format")
+        return found
     if not os.path.lexists(path):
         raise InputError(f"{path}: missing; give a file of poses, or a directory")
     with read_as(path, "poses"):
@@ -58,9 +108,23 @@ def read_estimates(path: Path) -> Estimates:
     rows = [(i, row) for i, row in rows if row and not row[0].startswith("#")]
     if not rows:
         raise InputError(f"{path}: holds no poses")
-    if "," in rows[0][1][0]:
-        return read_csv(path, text)
-    return read_lines(path, rows)
+    if file_format in ("7scenes", "colmap"):
+        raise InputError(f"{path}: is a file; a {file_format} set of poses is a directory")
+    first = rows[0][1][0]
+    if file_format in ("csv", "euroc") or (file_format is None and "," in first):
+        whole = _is_number(first.partition(",")[0]) and file_format != "csv"
+        return read_euroc(path, text) if whole or file_format == "euroc" else read_csv(path, text)
+    return read_lines(path, rows, file_format)
+
+
+def _name_of(found: Estimates) -> FormatName:
+    """The format of poses that were read from a directory."""
+    names: dict[str, FormatName] = {
+        "a 7-Scenes tree": "7scenes",
+        "a COLMAP model": "colmap",
+        "TUM trajectories": "tum",
+    }
+    return names[found.kind]
 
 
 def _from_directory(path: Path) -> Estimates:
@@ -93,16 +157,13 @@ def read_sevenscenes(path: Path) -> Estimates:
     if not frames:
         raise InputError(f"{path}: its sequences hold no frame-XXXXXX.pose.txt")
     matrices = np.array([read_pose(frame.path(POSE)) for _, frame in frames])
-    quat = np.full((len(matrices), 4), np.nan)
-    rigid = rigid_defects(matrices).max(axis=1) <= RIGID_BOUND
-    quat[rigid] = quat_wxyz_of(matrices[rigid])
     return Estimates(
         "a 7-Scenes tree",
         OURS,
         tuple(f"{name}/frame-{frame.number:06d}" for name, frame in frames),
         tuple(str(frame.path(POSE)) for _, frame in frames),
         matrices[:, :3, 3],
-        quat,
+        _quat_of_rotations(matrices),
     )
 
 
@@ -158,39 +219,124 @@ def read_csv(path: Path, text: str) -> Estimates:
         tuple(places),
         values[:, :3],
         values[:, 3:],
-        ordered=not named,
+        frame_key="name" if named else "index",
     )
 
 
-def read_lines(path: Path, rows: Sequence[tuple[int, list[str]]]) -> Estimates:
-    """Lines of text: TUM, hloc or ACE, by how many numbers they have and whether a name."""
-    named = not _is_number(rows[0][1][0])
-    counts = {len(row) - named for _, row in rows}
-    first = len(rows[0][1]) - named
-    if first not in (NAMED if named else (TIMED,)):
-        raise InputError(f"{path}: line {rows[0][0]} {_advice(first, named)}")
-    if len(counts) > 1:
-        line, row = next((i, row) for i, row in rows if len(row) - named != first)
-        raise InputError(f"{path}: line {line} has {len(row)} columns, those above {first + named}")
+def read_euroc(path: Path, text: str) -> Estimates:
+    """EuRoC's ground truth, or a table of its first eight columns."""
+    lines = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip()]
+    rows = [
+        (i, [cell.strip() for cell in line.rstrip(", ").split(",")])
+        for i, line in lines
+        if not line.startswith("#")
+    ]
     places = [f"line {i}" for i, _ in rows]
+    for place, (_, row) in zip(places, rows, strict=True):
+        if len(row) < 8:
+            raise InputError(
+                f"{path}: {place} has {len(row)} columns; EuRoC's are a time in nanoseconds, three"
+                " of the position, four of the quaternion, and more"
+            )
+        if not row[0].isdecimal():
+            raise InputError(
+                f"{path}: {place}: the time '{row[0][:40]}' must be whole nanoseconds (EuRoC); a"
+                " TUM trajectory has seconds, and spaces in place of commas"
+            )
+    values = _numbers(path, places, [row[1:8] for _, row in rows])
+    stamps_ns = [int(row[0]) for _, row in rows]
+    return Estimates(
+        "a EuRoC trajectory",
+        OURS,
+        tuple(f"{ns // 10**9}.{ns % 10**9:09d}" for ns in stamps_ns),
+        tuple(places),
+        values[:, :3],
+        values[:, 3:],
+        frame_key="time",
+    )
+
+
+def read_lines(
+    path: Path, rows: Sequence[tuple[int, list[str]]], file_format: FormatName | None = None
+) -> Estimates:
+    """Lines of text, by how many numbers they have and whether a name."""
+    line_format = _line_format(path, rows[0], file_format)
+    columns = line_format.n_numbers + (line_format.frame_key == "name")
+    for line, row in rows:
+        if len(row) != columns:
+            raise InputError(f"{path}: line {line} has {len(row)} columns, those above {columns}")
+    places = [f"line {i}" for i, _ in rows]
+    if line_format.frame_key == "index":
+        return _of_matrices(path, line_format, places, [row for _, row in rows])
     values = _numbers(path, places, [row[1:8] for _, row in rows])
     names = tuple(row[0] for _, row in rows)
-    if named:
-        return Estimates(NAMED[first], COLMAP, names, tuple(places), values[:, 4:], values[:, :4])
-    _numbers(path, places, [[name] for name in names])
-    return Estimates("a TUM trajectory", TUM, names, tuple(places), values[:, :3], values[:, 3:])
-
-
-def _advice(count: int, named: bool) -> str:
-    known = (
-        "timestamp and seven numbers (TUM), name and seven (hloc), name and ten (ACE), or a CSV"
-        f" header {','.join(COLUMNS)}"
+    if line_format.frame_key == "time":
+        _numbers(path, places, [[name] for name in names])
+    else:
+        _numbers(path, places, [row[8:] for _, row in rows])
+    if line_format.convention.order == "xyzw":
+        position, quat = values[:, :3], values[:, 3:]
+    else:
+        quat, position = values[:, :4], values[:, 4:]
+    return Estimates(
+        line_format.kind,
+        line_format.convention,
+        names,
+        tuple(places),
+        position,
+        quat,
+        frame_key=line_format.frame_key,
     )
-    if named:
-        return f"has a name and {count} numbers; known are {known}"
-    guesses = {12: "KITTI's format, which does not say which frame a pose is of", 4: "one matrix"}
-    guess = f" ({guesses[count]})" if count in guesses else ""
-    return f"has {count} numbers and no name{guess}; known are {known}"
+
+
+def _line_format(
+    path: Path, first: tuple[int, list[str]], file_format: FormatName | None
+) -> LineFormat:
+    """The format of the first line (its number, its columns)."""
+    line, row = first
+    if file_format is not None:
+        told = LINE_FORMATS[file_format]
+        columns = told.n_numbers + (told.frame_key == "name")
+        if len(row) != columns:
+            raise InputError(
+                f"{path}: line {line} has {len(row)} columns, {file_format} has {columns};"
+                " correct --format, or leave it out"
+            )
+        return told
+    named = not _is_number(row[0])
+    for known in LINE_FORMATS.values():
+        if (known.frame_key == "name", known.n_numbers) == (named, len(row) - named):
+            return known
+    count = f"a name and {len(row) - 1} numbers" if named else f"{len(row)} numbers and no name"
+    held = ", ".join(known.holds for known in LINE_FORMATS.values())
+    raise InputError(
+        f"{path}: line {line} has {count}; known are {held}, or a CSV header {','.join(COLUMNS)}"
+    )
+
+
+def _of_matrices(
+    path: Path, line_format: LineFormat, places: Sequence[str], rows: Sequence[Sequence[str]]
+) -> Estimates:
+    """Poses of which three rows of four numbers stand on a line."""
+    matrices = np.tile(np.eye(4), (len(rows), 1, 1))
+    matrices[:, :3] = _numbers(path, places, rows).reshape(-1, 3, 4)
+    return Estimates(
+        line_format.kind,
+        line_format.convention,
+        tuple(map(str, range(len(rows)))),
+        tuple(places),
+        matrices[:, :3, 3],
+        _quat_of_rotations(matrices),
+        frame_key=line_format.frame_key,
+    )
+
+
+def _quat_of_rotations(matrices: Array) -> Array:
+    """Quaternions (N, 4) ``wxyz``, not a number where a matrix (N, 4, 4) is no rigid motion."""
+    quat = np.full((len(matrices), 4), np.nan)
+    rigid = rigid_defects(matrices).max(axis=1) <= RIGID_BOUND
+    quat[rigid] = quat_wxyz_of(matrices[rigid])
+    return quat
 
 
 def read_tum_sequences(paths: Sequence[Path]) -> Estimates:
@@ -206,6 +352,7 @@ def read_tum_sequences(paths: Sequence[Path]) -> Estimates:
         tuple(f"{p.name}, {w}" for p, e in zip(paths, parts, strict=True) for w in e.places),
         np.concatenate([part.translation for part in parts]),
         np.concatenate([part.quat for part in parts]),
+        frame_key="time",
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ from synfeal.dataset.sequence_listing import POSE, gap_in, refuse_problems
 from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.dataset.split_frames import rows_of_frames, table_problems
 from synfeal.errors import InputError
-from synfeal.evaluation.estimates import Estimates
+from synfeal.evaluation.estimates import KITTI, Estimates, FrameKey
 from synfeal.validation.frames import read_poses
 from synfeal.validation.listing import Frame, SequenceListing, frames_of, list_sequences
 from synfeal.validation.manifest import read_splits
@@ -35,19 +35,42 @@ Key = tuple[str, int]  # sequence and number of a frame
 
 @dataclass(frozen=True)
 class ScoredFrames:
-    """Frames of a split in order."""
+    """Frames of a split in order, or the poses of a file that stands in place of a data set.
 
-    split: str  # ``test``, ``train`` or ``all``
-    frames: tuple[Frame, ...]  # (N) their files
-    world_from_cam: Array  # (N, 4, 4)
-    # (N,) what the bootstrap draws: straight paths of our data sets, else sequences
+    Attributes:
+        split: ``test``, ``train`` or ``all``; ``reference`` of a file of poses.
+        names: ``seq-01/frame-000000`` (N); of a file what it calls its poses.
+        world_from_cam: Poses (N, 4, 4).
+        path: What the bootstrap draws (N,): straight paths of our data sets, else sequences.
+        frames: Files (N) of the frames; none of a file of poses.
+        gap: Frame that the numbers of the others leave out.
+        frame_key: How a file of poses says which frame one is of.
+        n_left_out: Poses of a file that are not scored, because nothing was estimated then.
+    """
+
+    split: str
+    names: tuple[str, ...]
+    world_from_cam: Array
     path: NDArray[np.int64]
-    gap: Frame | None = None  # one that the numbers of the others leave out
+    frames: tuple[Frame, ...] = ()
+    gap: Frame | None = None
+    frame_key: FrameKey | None = None
+    n_left_out: int = 0
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """``seq-01/frame-000000``."""
-        return tuple(f"{f.sequence.stem}/frame-{f.number:06d}" for f in self.frames)
+    def title(self) -> str:
+        """What is scored, for messages."""
+        return self.split if self.frame_key else f"{self.split} split"
+
+    def at(self, chosen: NDArray[np.int64]) -> ScoredFrames:
+        """The poses of a file with these indices (K,); the others are left out."""
+        return replace(
+            self,
+            names=tuple(self.names[index] for index in chosen),
+            world_from_cam=self.world_from_cam[chosen],
+            path=self.path[chosen],
+            n_left_out=len(self.names) - len(np.unique(chosen)),
+        )
 
 
 def read_scored_frames(dataset: Path, split: str) -> ScoredFrames:
@@ -77,7 +100,14 @@ def read_scored_frames(dataset: Path, split: str) -> ScoredFrames:
         sequence.files(POSE)  # refuses a pose that has no image where others have one
     matrices = np.array([poses[frame] for frame in frames])
     gap = next((gap for sequence in sequences if (gap := gap_in(sequence))), None)
-    return ScoredFrames(split, frames, matrices, _paths(dataset, split, frames), gap)
+    return ScoredFrames(
+        split=split,
+        names=tuple(frame.name for frame in frames),
+        world_from_cam=matrices,
+        path=_paths(dataset, split, frames),
+        frames=frames,
+        gap=gap,
+    )
 
 
 def _is_unsplit(dataset: Path) -> bool:
@@ -99,7 +129,13 @@ def _unsplit_photographs(dataset: Path) -> ScoredFrames:
     frames = tuple(_frame_named(dataset, name) for name in photographs.names)
     stems = [frame.sequence.stem for frame in frames]
     path = np.unique(stems, return_inverse=True)[1].astype(np.int64)
-    return ScoredFrames("all", frames, photographs.world_from_cam, path)
+    return ScoredFrames(
+        split="all",
+        names=tuple(frame.name for frame in frames),
+        world_from_cam=photographs.world_from_cam,
+        path=path,
+        frames=frames,
+    )
 
 
 def _frame_named(dataset: Path, name: str) -> Frame:
@@ -175,19 +211,20 @@ def match(
 def _keys(frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float) -> list[Key]:
     """Sequence and number of each estimate's frame."""
     pairs = list(zip(estimates.names, estimates.places, strict=True))
-    if estimates.ordered:
+    if estimates.frame_key == "index":
         keys = [_by_index(frames, name, f"{path}: {place}") for name, place in pairs]
-        _check_countable(frames, len(set(keys)), path)
+        _check_countable(frames, len(set(keys)), path, estimates)
         return keys
     stems = list(dict.fromkeys(frame.sequence.stem for frame in frames.frames))
-    timed = estimates.kind.startswith(("a TUM", "TUM"))
-    find = _by_time if timed else _by_name
+    find = _by_time if estimates.frame_key == "time" else _by_name
     return [find(name, stems, f"{path}: {place}", rate_hz) for name, place in pairs]
 
 
-def _check_countable(frames: ScoredFrames, n_named: int, path: Path) -> None:
+def _check_countable(frames: ScoredFrames, n_named: int, path: Path, estimates: Estimates) -> None:
     """Refuse indices in place of names where they may count other frames than these."""
     remedy = f"give names in a last column {IMAGE} (seq-01/frame-000000.color.png)"
+    if estimates.kind == KITTI:
+        remedy = "KITTI's format has no names, give another"
     if frames.split == "all":
         raise InputError(f"{path}: its rows count the frames of one split, not of all; {remedy}")
     if frames.gap is not None:

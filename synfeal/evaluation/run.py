@@ -16,9 +16,10 @@ from synfeal.dataset.pose_table import PoseTable
 from synfeal.errors import InputError, why
 from synfeal.evaluation.bootstrap import FEWEST_PATHS
 from synfeal.evaluation.estimates import CONVENTIONS, Convention, Estimates, checked_convention
-from synfeal.evaluation.formats import read_estimates
+from synfeal.evaluation.formats import FormatName, read_estimates
 from synfeal.evaluation.frames import ScoredFrames, match, read_scored_frames
 from synfeal.evaluation.metrics import MEANS, ORIENTATION, POSITION, Metrics, pose_errors, summary
+from synfeal.evaluation.reference import match_reference, met_in_time, read_reference
 from synfeal.evaluation.reprojection import dcre, dcre_summary, depth_of_images
 from synfeal.geometry.poses import quat_wxyz_of, umeyama_sim3
 from synfeal.validation.camera import camera_of_dataset
@@ -40,6 +41,7 @@ class Settings(NamedTuple):
     rate_hz: float = 30.0  # frames a second of time stamps
     labels: Path | None = None  # poses of the same frames as a second yardstick
     camera: Path | None = None  # calibration file, for the DCRE
+    file_format: FormatName | None = None  # of the poses; None tells it by what the file holds
 
 
 @dataclass(frozen=True)
@@ -64,21 +66,34 @@ class Evaluation:
 
 
 def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
-    """Score poses."""
-    frames = read_scored_frames(dataset, settings.split)
-    estimates, row, convention, predicted = _read(poses, frames, settings, settings.convention)
+    """Score poses.
+
+    Args:
+        dataset: Data set, or a file of poses as the reference.
+        poses: What is scored.
+        settings: What a person may choose.
+
+    Raises:
+        InputError: One of the files cannot be used.
+    """
+    frames = _scored(dataset, settings)
+    estimates = read_estimates(poses, settings.file_format)
+    if frames.frame_key == "time":
+        frames, row = met_in_time(frames, estimates, poses)
+    else:
+        row = _matched(frames, estimates, poses, settings)
+    convention, predicted = _taken(poses, frames, estimates, row, settings, settings.convention)
     yardsticks = {DATASET: frames.world_from_cam}
     if settings.labels:
         yardsticks[LABELS] = _labels(settings.labels, frames, settings)
-    camera = camera_of_dataset(dataset, settings.camera).config
-    depth_m = _depth(frames, camera)
+    camera, depth_m = _camera_and_depth(dataset, frames, settings)
     errors: dict[str, Array] = {}
     scales: dict[str, float] = {}
     for end, reference in yardsticks.items():
         moved, scales[end] = aligned(predicted, reference, settings.align, poses)
         tables = _table(moved, frames), _table(reference, frames)
         errors |= {f"{name}{end}": values for name, values in pose_errors(*tables).items()}
-        if depth_m is not None:
+        if camera is not None and depth_m is not None:
             errors[f"dcre{end}"] = dcre(*tables, depth_m, camera)
     rotations = np.asarray(np.isfinite(predicted).all(axis=(1, 2)))
     if not rotations.any():
@@ -87,27 +102,61 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
     return Evaluation(frames, estimates, convention, row, rotations, errors, metrics, scales)
 
 
-def _read(
-    path: Path, frames: ScoredFrames, settings: Settings, convention: str | None
-) -> tuple[Estimates, NDArray[np.int64], Convention, Array]:
-    """Estimates, which frame each is of, as what they are taken, and poses (N, 4, 4) of the frames.
+def _scored(dataset: Path, settings: Settings) -> ScoredFrames:
+    """The frames of a data set, or of a file of poses."""
+    if not dataset.is_file() or dataset.suffix == ".zip":
+        return read_scored_frames(dataset, settings.split)
+    if settings.split != "test" or settings.camera is not None:
+        option = "--camera" if settings.split == "test" else "--split"
+        raise InputError(f"{option}: {dataset} is a file of poses and has none; leave it out")
+    return read_reference(dataset)
+
+
+def _matched(
+    frames: ScoredFrames, estimates: Estimates, path: Path, settings: Settings
+) -> NDArray[np.int64]:
+    """Row (N,) of the estimate of each frame; -1 where there is none."""
+    if frames.frame_key is not None:
+        return match_reference(frames, estimates, path)
+    return match(frames, estimates, path, settings.rate_hz)
+
+
+def _camera_and_depth(
+    dataset: Path, frames: ScoredFrames, settings: Settings
+) -> tuple[CameraConfig | None, Array | None]:
+    """What the reprojection error takes; a file of poses has neither."""
+    if frames.frame_key is not None:
+        return None, None
+    camera = camera_of_dataset(dataset, settings.camera).config
+    return camera, _depth(frames, camera)
+
+
+def _taken(
+    path: Path,
+    frames: ScoredFrames,
+    estimates: Estimates,
+    row: NDArray[np.int64],
+    settings: Settings,
+    convention: str | None,
+) -> tuple[Convention, Array]:
+    """As what estimates are taken, and the poses (N, 4, 4) of the frames.
 
     These are not a number where there is none.
     """
-    estimates = read_estimates(path)
-    row = match(frames, estimates, path, settings.rate_hz)
     there = row >= 0
     if not convention and settings.align == "none":
         checked_convention(path, estimates, row[there], frames.world_from_cam[there])
     taken = CONVENTIONS[convention] if convention else estimates.convention
     poses = estimates.world_from_cam(taken)[row]
     poses[~there] = np.nan
-    return estimates, row, taken, poses
+    return taken, poses
 
 
 def _labels(path: Path, frames: ScoredFrames, settings: Settings) -> Array:
     """Poses (N, 4, 4) of a second yardstick, which must have every frame."""
-    *_, poses = _read(path, frames, settings, None)
+    estimates = read_estimates(path)
+    row = _matched(frames, estimates, path, settings)
+    _, poses = _taken(path, frames, estimates, row, settings, None)
     lost = np.flatnonzero(~np.isfinite(poses).all(axis=(1, 2)))
     if len(lost):
         raise InputError(

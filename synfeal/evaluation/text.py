@@ -18,6 +18,7 @@ from synfeal.evaluation.metrics import (
     cumulative,
     joint_error,
 )
+from synfeal.evaluation.reference import MOST_APART_S
 from synfeal.evaluation.reprojection import DCRE_BOUNDS
 from synfeal.evaluation.run import Evaluation, Settings
 from synfeal.records.files import atomic_path
@@ -76,12 +77,17 @@ def report_text(poses: Path, settings: Settings, found: Evaluation) -> str:
 
 
 def _findings(poses: Path, settings: Settings, found: Evaluation) -> list[str]:
-    n_frames, there = len(found.frames.frames), found.row >= 0
+    n_frames, there = len(found.frames.names), found.row >= 0
     lines = [
         f"{poses}: {found.estimates.kind}, {len(found.estimates.names)} poses, taken as"
         f" {found.convention.direction} with quaternions {found.convention.order}",
-        f"{found.frames.split} split: {n_frames} frames, {int(there.sum())} of them with a pose",
+        f"{found.frames.title}: {n_frames} frames, {int(there.sum())} of them with a pose",
     ]
+    if found.frames.n_left_out:
+        lines.append(
+            f"{found.frames.n_left_out} poses of the reference have no estimate within"
+            f" {MOST_APART_S:g} s and are left out"
+        )
     names = np.array(found.frames.names)
     lines += _some("without a pose, which counts as a failure", names[~there])
     lines += _some("no rotation, which counts likewise", names[there & ~found.rotations])

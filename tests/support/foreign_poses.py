@@ -2,7 +2,7 @@
 
 import numpy as np
 import pycolmap
-from evo.core.trajectory import PoseTrajectory3D
+from evo.core.trajectory import PosePath3D, PoseTrajectory3D
 from evo.tools import file_interface
 from scipy.spatial.transform import Rotation
 
@@ -97,6 +97,39 @@ def write_hloc(path, poses):
     return _write_lines(path, poses, "{}/frame-{:06d}.color.png")
 
 
+def write_ace0(path, poses):
+    """ACE0's rule (``write_pose_to_pose_file``): image, pose, focal length and confidence."""
+    return _write_lines(path, poses, "data/{}/frame-{:06d}.color.png", " 525.5 6731.0")
+
+
+def write_pgt(path, poses):
+    """The rule of the pseudo ground truth: image name, pose, focal length."""
+    return _write_lines(path, poses, "{}/frame-{:06d}.color.png", " 525.505")
+
+
+def write_kitti(path, poses):
+    """By evo's writer: a line for each frame of the split."""
+    file_interface.write_kitti_poses_file(path, PosePath3D(poses_se3=list(poses)))
+    return path
+
+
+EUROC_HEADER = (
+    "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [],"
+    " q_RS_z [], v_RS_R_x [m s^-1]"
+)
+
+
+def write_euroc(path, poses, stamps_ns):
+    """EuRoC's rule (``state_groundtruth_estimate0/data.csv``), with one column that is not read."""
+    quat = Rotation.from_matrix(poses[:, :3, :3]).as_quat(scalar_first=True)
+    rows = np.concatenate([poses[:, :3, 3], quat, np.zeros((len(poses), 1))], axis=1).tolist()
+    lines = [
+        f"{stamp},{','.join(map(repr, row))}" for stamp, row in zip(stamps_ns, rows, strict=True)
+    ]
+    path.write_text("\n".join([EUROC_HEADER, *lines]) + "\n")
+    return path
+
+
 def write_tree(folder, poses):
     for (sequence, number), pose in zip(frame_names(), poses, strict=True):
         (folder / sequence).mkdir(parents=True, exist_ok=True)
@@ -128,6 +161,9 @@ WRITERS = {
     "COLMAP binary": lambda p, poses: write_colmap(p, poses, binary=True),
     "hloc": write_hloc,
     "ACE": write_ace,
+    "ACE0": write_ace0,
+    "pseudo ground truth": write_pgt,
+    "KITTI": write_kitti,
     "pose table": write_table,
     "synfeal localize": write_localized,
 }

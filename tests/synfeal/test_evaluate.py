@@ -143,6 +143,7 @@ def each(change):
     return lambda lines: [change(line) for line in lines]
 
 
+IDENTITY = "1 0 0 0 0 1 0 0 0 0 1 0"
 BAD_LINES = {
     "ACE, a column short": (ACE, cut(5, 10), "line 6 has 10 columns, those above 11"),
     "word for a number": (HLOC, each(lambda x: x[:-3] + "abc"), "is not a number"),
@@ -153,7 +154,20 @@ BAD_LINES = {
     "no sequence": (HLOC, each(lambda x: x.partition("/")[2]), "does not say of which sequence"),
     "twice": (HLOC, lambda x: [*x, x[4]], "seq-02/frame-000004 has two poses, line 5 and line 25"),
     "of another data set": (HLOC, each(lambda x: x.replace("seq-0", "seq-4")), "none of its 24"),
-    "KITTI": (HLOC, lambda _: ["1 0 0 0 0 1 0 0 0 0 1 0"] * 24, "KITTI"),
+    "KITTI, a line short": (HLOC, lambda _: [IDENTITY] * 23, "without their names"),
+    "KITTI, no rotations": (HLOC, lambda _: [IDENTITY.replace("1", "2")] * 24, "is a rotation and"),
+    "eleven numbers": (HLOC, lambda _: [IDENTITY[:-2]] * 24, "line 1 has 11 numbers and no name"),
+    "pgt, a focal length in words": (
+        HLOC,
+        each(lambda x: f"{x} wide"),
+        "line 1: 'wide' is not a number",
+    ),
+    "EuRoC in seconds": (
+        HLOC,
+        lambda _: ["1403715524.9,0,0,0,1,0,0,0"] * 24,
+        "must be whole nanoseconds",
+    ),
+    "EuRoC, a column short": (HLOC, lambda _: ["#t", "14,0,0,0,1,0,0"], "line 2 has 7 columns"),
     "TUM of two sequences": (TUM, lambda x: x, "do not say of which sequence"),
     "table, other header": (TABLE, with_line(0, "frame,x,y,z"), "the header must be"),
     "table, half a frame": (TABLE, with_line(2, "1.5,0,0,0,0,1,0,0,0"), "must be a whole number"),
