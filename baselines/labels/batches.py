@@ -26,11 +26,17 @@ from synfeal.records.tables import read_numbers, write_numbers
 
 @dataclass(frozen=True)
 class Batch:
-    """A run of consecutive frames that is estimated on its own."""
+    """A run of consecutive frames that is estimated on its own.
 
-    index: int  # position of the batch in its split
-    start: int  # first frame, which is also the last frame of the batch before
-    stop: int  # one past the last frame
+    Attributes:
+        index: Position of the batch in its split.
+        start: First frame, which is also the last frame of the batch before.
+        stop: One past the last frame.
+    """
+
+    index: int
+    start: int
+    stop: int
 
     def __len__(self) -> int:
         return self.stop - self.start
@@ -62,12 +68,16 @@ HEADER = "frame,registered,tx,ty,tz,qw,qx,qy,qz"
 
 @dataclass(frozen=True)
 class BatchTrajectory:
-    """Estimated motion inside one batch."""
+    """Estimated motion inside one batch.
 
-    # (n, 4, 4) poses relative to the first frame; where a frame is not registered the entry is the
-    # identity and means nothing
+    Attributes:
+        first_from_cam: (n, 4, 4) poses relative to the first frame; where a frame is not registered
+            the entry is the identity and means nothing.
+        registered: (n,) whether the method found the frame's pose.
+    """
+
     first_from_cam: NDArray[np.float64]
-    registered: NDArray[np.bool_]  # (n,) whether the method found the frame's pose
+    registered: NDArray[np.bool_]
 
     def __post_init__(self) -> None:
         n = len(self.registered)

@@ -55,19 +55,33 @@ class TruthUsed(StrEnum):
 
 @dataclass(frozen=True)
 class BatchRecord:
-    """Record of one batch; errors are those of its last pose against the true one."""
+    """Record of one batch; errors are those of its last pose against the true one.
 
-    index: int  # position of the batch in its split
-    start: int  # first frame
-    stop: int  # one past the last frame
-    registered: int  # frames whose pose the method found
-    filled: int  # frames whose label was interpolated or held
-    lost: bool  # the method found no motion at all
-    assisted: bool  # the last pose was replaced by the true one
-    error_before_m: float  # position error before assistance (of a lost batch: of standing still)
-    error_before_deg: float  # orientation error before assistance
-    error_after_m: float  # position error the next batch starts with
-    error_after_deg: float  # orientation error the next batch starts with
+    Attributes:
+        index: Position of the batch in its split.
+        start: First frame.
+        stop: One past the last frame.
+        registered: Frames whose pose the method found.
+        filled: Frames whose label was interpolated or held.
+        lost: The method found no motion at all.
+        assisted: The last pose was replaced by the true one.
+        error_before_m: Position error before assistance (of a lost batch: of standing still).
+        error_before_deg: Orientation error before assistance.
+        error_after_m: Position error the next batch starts with.
+        error_after_deg: Orientation error the next batch starts with.
+    """
+
+    index: int
+    start: int
+    stop: int
+    registered: int
+    filled: int
+    lost: bool
+    assisted: bool
+    error_before_m: float
+    error_before_deg: float
+    error_after_m: float
+    error_after_deg: float
 
 
 def summary_of(records: Sequence[BatchRecord]) -> dict[str, Any]:
@@ -82,14 +96,20 @@ def summary_of(records: Sequence[BatchRecord]) -> dict[str, Any]:
 
 
 def chain_batches(
-    # all batches of the split in order, from ``batches_of(len(truth), ...)``
     batches: Sequence[Batch],
-    trajectories: Sequence[BatchTrajectory],  # one estimate per batch
-    truth: PoseTable,  # true poses of the split; the first one anchors the chain
-    cfg: GroundTruthConfig,  # the two thresholds
-    anchored: bool = False,  # whether batches have a place of their own instead of the last label
+    trajectories: Sequence[BatchTrajectory],
+    truth: PoseTable,
+    cfg: GroundTruthConfig,
+    anchored: bool = False,
 ) -> tuple[PoseTable, list[BatchRecord]]:
     """Labels of a whole split from its batches, and what assistance they needed.
+
+    Args:
+        batches: All batches of the split in order, from ``batches_of(len(truth), ...)``.
+        trajectories: One estimate per batch.
+        truth: True poses of the split; the first one anchors the chain.
+        cfg: The two thresholds.
+        anchored: Batches have a place of their own instead of starting at the last label.
 
     Returns:
         The labels (frames and paths of ``truth``, other poses) and a record per batch.
@@ -171,12 +191,21 @@ def fill_gaps(trajectory: BatchTrajectory) -> Array:
 def _place(
     batch: Batch,
     trajectory: BatchTrajectory,
-    world_from_first: Array,  # label of the first frame
-    world_from_batch: Array,  # where ``first_from_cam`` starts
+    world_from_first: Array,
+    world_from_batch: Array,
     true_world_from_last: Array,
     cfg: GroundTruthConfig,
 ) -> tuple[Array, BatchRecord]:
-    """World poses (n, 4, 4) of one batch, assisted where needed, and its record."""
+    """Place one batch in the world, assist it where needed; returns poses (n, 4, 4) and a record.
+
+    Args:
+        batch: The batch.
+        trajectory: Its estimate.
+        world_from_first: Label (4, 4) of the first frame.
+        world_from_batch: Pose (4, 4) that ``first_from_cam`` is relative to.
+        true_world_from_last: True pose (4, 4) of the last frame.
+        cfg: The two thresholds.
+    """
     lost = not trajectory.registered[1:].any()
     poses = world_from_batch @ fill_gaps(trajectory)
     before_m, before_deg = _error(poses[-1], true_world_from_last)
@@ -188,11 +217,19 @@ def _place(
         poses[-1] = true_world_from_last
     poses[0] = world_from_first
     after_m, after_deg = _error(poses[-1], true_world_from_last)
-    registered = int(trajectory.registered.sum())
-    filled = int((~trajectory.registered[1:]).sum())
-    frames = batch.index, batch.start, batch.stop, registered, filled
-    errors = before_m, before_deg, after_m, after_deg
-    return poses, BatchRecord(*frames, bool(lost), bool(assisted), *errors)
+    return poses, BatchRecord(
+        index=batch.index,
+        start=batch.start,
+        stop=batch.stop,
+        registered=int(trajectory.registered.sum()),
+        filled=int((~trajectory.registered[1:]).sum()),
+        lost=bool(lost),
+        assisted=bool(assisted),
+        error_before_m=before_m,
+        error_before_deg=before_deg,
+        error_after_m=after_m,
+        error_after_deg=after_deg,
+    )
 
 
 def _error(pose: Array, true_pose: Array) -> tuple[float, float]:
@@ -250,14 +287,22 @@ def write_label_set(
 
 
 def chain_split(
-    trajectories: Sequence[Path],  # files of its batches, in order
-    truth: Path,  # its true poses
-    labels: Path,  # where its labels are written
-    unassisted: Path,  # where the labels are written that it would have without assistance
-    cfg: GroundTruthConfig,  # frames per batch, and the two thresholds
-    anchored: bool = False,  # see :func:`chain_batches`
+    trajectories: Sequence[Path],
+    truth: Path,
+    labels: Path,
+    unassisted: Path,
+    cfg: GroundTruthConfig,
+    anchored: bool = False,
 ) -> list[BatchRecord]:
     """Chain the batches of one split, and return a record per batch.
+
+    Args:
+        trajectories: Files of its batches, in order.
+        truth: Its true poses.
+        labels: Pose table to write: its labels.
+        unassisted: Pose table to write: the labels that it would have without assistance.
+        cfg: Frames per batch, and the two thresholds.
+        anchored: Batches have a place of their own; see :func:`chain_batches`.
 
     Raises:
         InputError: a file cannot be read, or a trajectory is not of its batch.

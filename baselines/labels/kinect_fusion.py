@@ -165,14 +165,20 @@ def _cam_from_first(first_from_cam: Array) -> o3d.core.Tensor:
     settings="kinect_fusion",
 )
 def kinect_fusion_batch(
-    color_paths: Sequence[FrameFile],  # colour images in order; depth alone is tracked
-    # 16-bit depth images in millimetres, 65535 where nothing was hit
+    color_paths: Sequence[FrameFile],
     depth_paths: Sequence[FrameFile],
-    camera: CameraConfig,  # camera of both
-    cfg: KinectFusionConfig,  # sensor, model, and when tracking is lost
-    seed: int = 0,  # of the sensor's noise; unused by the ideal one
+    camera: CameraConfig,
+    cfg: KinectFusionConfig,
+    seed: int = 0,
 ) -> BatchTrajectory:
     """Track one batch.
+
+    Args:
+        color_paths: Colour images in order; depth alone is tracked.
+        depth_paths: 16-bit depth images in millimetres, 65535 where nothing was hit.
+        camera: Camera of colour and depth.
+        cfg: Sensor, model, and when tracking is lost.
+        seed: Seed of the sensor's noise; unused by the ideal one.
 
     Returns:
         Poses relative to the first frame; lost frames are unregistered.

@@ -31,14 +31,20 @@ class Spread:
 
 @dataclass(frozen=True)
 class RelativeError:
-    """Error of the motion over a fixed number of frames."""
+    """Error of the motion over a fixed number of frames.
 
-    rmse_m: float  # root mean square of the translation's error, metres
-    rmse_deg: float  # the same of the rotation's, degrees
-    # all errors of translation over all true metres travelled; not a number where the camera stands
-    # still
+    Attributes:
+        rmse_m: Root mean square of the translation's error, metres.
+        rmse_deg: The same of the rotation's, degrees.
+        per_metre_m: All errors of translation over all true metres travelled; not a number where
+            the camera stands still.
+        per_metre_deg: The same of rotation, degrees per metre.
+    """
+
+    rmse_m: float
+    rmse_deg: float
     per_metre_m: float
-    per_metre_deg: float  # the same of rotation, degrees per metre
+    per_metre_deg: float
 
 
 def absolute_errors(labels: PoseTable, truth: PoseTable) -> PoseErrors:

@@ -73,15 +73,24 @@ def write_estimate(
 
 
 def estimate_batch(
-    name: str,  # a key of ``METHODS``
-    color_paths: Sequence[FrameFile],  # colour images in order
-    # 16-bit depth images in millimetres, 65535 where nothing was hit
+    name: str,
+    color_paths: Sequence[FrameFile],
     depth_paths: Sequence[FrameFile],
-    camera: CameraConfig,  # camera of both
-    groundtruth: GroundTruthConfig,  # of which the function is given what ``Method.settings`` names
-    seed: int,  # of whatever is random
+    camera: CameraConfig,
+    groundtruth: GroundTruthConfig,
+    seed: int,
 ) -> tuple[BatchTrajectory, Facts]:
-    """Trajectory of a batch by a method with a function, and what it took."""
+    """Estimate a batch by a method that works on frames; returns its trajectory and what it took.
+
+    Args:
+        name: Key of ``METHODS``.
+        color_paths: Colour images in order.
+        depth_paths: 16-bit depth images in millimetres, 65535 where nothing was hit.
+        camera: Camera of colour and depth.
+        groundtruth: Settings of all methods; the function is given those that
+            ``LabelMethod.settings`` names.
+        seed: Seed of whatever is random.
+    """
     method = METHODS[name]
     function = resolve_name(method.place)
     settings = getattr(groundtruth, method.settings) if method.settings else None

@@ -67,9 +67,13 @@ DISTANCES: dict[Literal["norm", "mse"], Distances] = {
 
 
 class PoseLoss(nn.Module):
-    """A weighted sum of a distance of positions and one of quaternions."""
+    """A weighted sum of a distance of positions and one of quaternions.
 
-    distance: Literal["norm", "mse"] = "norm"  # a key of ``DISTANCES``
+    Attributes:
+        distance: Key of ``DISTANCES``.
+    """
+
+    distance: Literal["norm", "mse"] = "norm"
 
     def distances(
         self, prediction: PosePrediction, position_m: Tensor, quat_wxyz: Tensor

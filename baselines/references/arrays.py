@@ -59,9 +59,13 @@ class Stored:
 
 @dataclass(frozen=True)
 class ByFrame(Stored):
-    """Arrays whose rows belong to frames, one frame after the other."""
+    """Arrays whose rows belong to frames, one frame after the other.
 
-    start: NDArray[np.int64]  # (N + 1,) where that of each frame begins; the last is its number
+    Attributes:
+        start: First row (N + 1,) of each frame; the last entry is the number of rows.
+    """
+
+    start: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.start) - 1

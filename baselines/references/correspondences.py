@@ -23,14 +23,19 @@ RATIO = 0.8
 
 @dataclass(frozen=True)
 class Correspondences(ByFrame):
-    """C matches of the test frames, one frame after the other."""
+    """C matches of the test frames, one frame after the other.
 
-    slope: NDArray[np.float64]  # (C, 2) of the test feature's ray
-    # (C,) index of the training feature among those of all training frames
+    Attributes:
+        slope: (C, 2) of the test feature's ray.
+        feature: (C,) index of the training feature among those of all training frames.
+        train: (C,) the training frame it belongs to.
+        point_m: (C, 3) where that frame's depth says it lies, in its camera's coordinates; not
+            finite where there is no depth.
+    """
+
+    slope: NDArray[np.float64]
     feature: NDArray[np.int64]
-    train: NDArray[np.int64]  # (C,) the training frame it belongs to
-    # (C, 3) where that frame's depth says it lies, in its camera's coordinates; not finite where
-    # there is no depth
+    train: NDArray[np.int64]
     point_m: NDArray[np.float64]
 
 
@@ -92,14 +97,20 @@ CONFIDENCE, MAX_TRIALS = 0.999, 500
 
 @dataclass(frozen=True)
 class Tracks(Stored):
-    """Observations of points by the training frames."""
+    """Observations of points by the training frames.
 
-    frame: Rows  # (M,) training frame of each observation
-    slope: NDArray[np.float64]  # (M, 2) of its ray
-    # (M,) index of the point, 0 to T - 1; every point is seen in two frames or more, and by none
-    # twice
+    Attributes:
+        frame: (M,) training frame of each observation.
+        slope: (M, 2) of its ray.
+        track: (M,) index of the point, 0 to T - 1; every point is seen in two frames or more, and
+            by none twice.
+        of_feature: (K,) the point that a training feature shows, or -1.
+    """
+
+    frame: Rows
+    slope: NDArray[np.float64]
     track: Rows
-    of_feature: Rows  # (K,) the point that a training feature shows, or -1
+    of_feature: Rows
 
     @property
     def count(self) -> int:

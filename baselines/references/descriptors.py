@@ -90,11 +90,16 @@ def _windowed(maps: Tensor, cell_px: int) -> Tensor:
 
 @dataclass(frozen=True)
 class Vlad:
-    """A learned DenseVLAD."""
+    """A learned DenseVLAD.
 
-    words: Tensor  # (64, 128) visual words
-    mean: Vectors  # (64 * 128,) of the training frames
-    # (64 * 128, D) principal axes, each over the root of its singular value; D <= 256
+    Attributes:
+        words: Visual words (64, 128).
+        mean: Mean (64 * 128,) over the training frames.
+        axes: Principal axes (64 * 128, D), each over the root of its singular value; D <= 256.
+    """
+
+    words: Tensor
+    mean: Vectors
     axes: Vectors
 
     @classmethod
@@ -140,15 +145,21 @@ def parts_of(values: NDArray[T]) -> Iterator[NDArray[T]]:
 
 
 def write_descriptors(
-    # packed frames by name; the vocabulary and the axes come from those of ``train``
     files: Mapping[str, Path],
-    # how many of them: those of the smallest size, so that no size sees frames that are not its own
     learned_from: int,
-    seed: int,  # of the samples and of k-means
-    out_descriptors: Path,  # arrays to write, ``<descriptor>_<name>`` (N, D)
-    counts: Mapping[str, int] | None = None,  # how many frames of each, if not all
+    seed: int,
+    out_descriptors: Path,
+    counts: Mapping[str, int] | None = None,
 ) -> None:
     """Describe packed frames as wholes.
+
+    Args:
+        files: Packed frames by name; the vocabulary and the axes come from those of ``train``.
+        learned_from: Number of them: those of the smallest size, so that no size sees frames that
+            are not its own.
+        seed: Seed of the samples and of k-means.
+        out_descriptors: Arrays to write, ``<descriptor>_<name>`` (N, D).
+        counts: Number of frames of each, if not all.
 
     Raises:
         InputError: packed frames cannot be read.

@@ -20,14 +20,19 @@ class Evidence:
 
     Methods answer from ``train`` and from what is computed of images and depth. The file of
     ``test_truth`` is for the oracle, whose use of it is the point.
+
+    Attributes:
+        files: Files by name: labels (``train``, ``test``), true poses (``train_truth``,
+            ``test_truth``), and what the methods of a group need.
+        camera: Camera of the frames that features were found in.
+        seed: Seed of whatever is random.
+        samples_seen: Images that a method that learns is shown.
     """
 
-    # by name: labels (``train``, ``test``), true poses (``train_truth``, ``test_truth``), and what
-    # the methods of a group need
     files: Mapping[str, Path]
-    camera: CameraConfig  # of the frames that features were found in
-    seed: int  # of whatever is random
-    samples_seen: int = 0  # images that a method that learns is shown
+    camera: CameraConfig
+    seed: int
+    samples_seen: int = 0
 
     @cached_property
     def train(self) -> PoseTable:

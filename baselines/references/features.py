@@ -33,12 +33,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Features(ByFrame):
-    """K features of the frames of a split, one frame after the other."""
+    """K features of the frames of a split, one frame after the other.
 
-    slope: Array  # (K, 2) x / z and y / z of the rays they lie on, lens distortion removed
-    # (K,) along the optical axis, inf where there is none; of no use for test frames
+    Attributes:
+        slope: (K, 2) x / z and y / z of the rays they lie on, lens distortion removed.
+        depth_m: (K,) along the optical axis, inf where there is none; of no use for test frames.
+        descriptor: (K, 128) uint8.
+    """
+
+    slope: Array
     depth_m: Array
-    descriptor: NDArray[np.uint8]  # (K, 128) uint8
+    descriptor: NDArray[np.uint8]
 
     @property
     def frame(self) -> NDArray[np.int64]:
@@ -135,13 +140,18 @@ STRIDE = 4  # pixels between the cells of the network's output
 
 @dataclass(frozen=True)
 class Views(Stored):
-    """Frames of a split as a scene-coordinate network sees them."""
+    """Frames of a split as a scene-coordinate network sees them.
 
-    images: NDArray[np.uint8]  # (N, h, w, 3) uint8
-    # (R, C, 2) x / z and y / z of the ray through the middle of each cell, distortion removed; cell
-    # (r, c) is centred on pixel (4 r, 4 c)
+    Attributes:
+        images: (N, h, w, 3) uint8.
+        slope: (R, C, 2) x / z and y / z of the ray through the middle of each cell, distortion
+            removed; cell (r, c) is centred on pixel (4 r, 4 c).
+        depth_m: (N, R, C) along the optical axis there, inf where there is none.
+    """
+
+    images: NDArray[np.uint8]
     slope: Array
-    depth_m: NDArray[np.float32]  # (N, R, C) along the optical axis there, inf where there is none
+    depth_m: NDArray[np.float32]
 
     def __len__(self) -> int:
         return len(self.images)

@@ -50,19 +50,29 @@ Files = Mapping[str, Path]
 
 
 def write_varied(
-    effects: str,  # what the descriptors call all test frames that are drawn like these
-    # ``mesh``, ``plan`` of the test frames, ``labels``, ``features`` with depth and ``descriptors``
-    # of the training frames
+    effects: str,
     files: Mapping[str, Path],
-    n_test: int,  # test frames there are
-    sample: int,  # how many of them are drawn at most, spread evenly
-    camera: CameraConfig,  # of the frames
-    render: RenderConfig,  # with effects
-    references: ReferencesConfig,  # features and retrieval
-    seed: int,  # of RANSAC
-    out_predictions: Path,  # poses of the frames drawn, NaN where none is found
+    n_test: int,
+    sample: int,
+    camera: CameraConfig,
+    render: RenderConfig,
+    references: ReferencesConfig,
+    seed: int,
+    out_predictions: Path,
 ) -> None:
     """Draw some test frames with effects, and write what ``structure-depth`` answers for them.
+
+    Args:
+        effects: Name in the descriptors of all test frames that are drawn like these.
+        files: ``mesh``, ``plan`` of the test frames, ``labels``, ``features`` with depth and
+            ``descriptors`` of the training frames.
+        n_test: Number of test frames.
+        sample: Largest number of them that are drawn, spread evenly.
+        camera: Camera of the frames.
+        render: Settings of the renderer, with effects.
+        references: Settings of features and retrieval.
+        seed: Seed of RANSAC.
+        out_predictions: Poses of the frames drawn, NaN where none is found.
 
     Raises:
         InputError: a file cannot be read.
@@ -87,16 +97,23 @@ def write_varied(
 
 @memory_errors()
 def robustness_table(
-    models: Mapping[str, Files],  # checkpoints of localizers, by training set and name
-    descriptors: Files,  # of the training frames and of all test frames, by training set
-    # tables of what :func:`baselines.references.robustness.write_varied` finds on ideal training
-    # frames, by effects; empty where there are none
+    models: Mapping[str, Files],
+    descriptors: Files,
     structure: Files,
-    test_frames: Files,  # packed test frames by the name of their effects
-    labels: Path,  # folder of the true poses, ``train.csv`` and ``test.csv``: the same for all
-    device: Literal["auto", "cpu", "cuda"] = "auto",  # where to predict
+    test_frames: Files,
+    labels: Path,
+    device: Literal["auto", "cpu", "cuda"] = "auto",
 ) -> pd.DataFrame:
     """Median errors by training set, method and effects, with 95 % limits over whole paths.
+
+    Args:
+        models: Checkpoints of localizers, by training set and name.
+        descriptors: Descriptors of the training frames and of all test frames, by training set.
+        structure: Tables of what :func:`baselines.references.robustness.write_varied` finds on
+            ideal training frames, by effects; empty where there are none.
+        test_frames: Packed test frames by the name of their effects.
+        labels: Folder of the true poses, ``train.csv`` and ``test.csv``: the same for all.
+        device: Device to predict on.
 
     Raises:
         InputError: a file cannot be used.

@@ -142,14 +142,23 @@ def world_points(views: Views, world_from_cam: Array) -> NDArray[np.float32]:
 
 
 def learn(
-    images: Tensor,  # (N, 3, h, w) uint8
-    points: Tensor,  # (N, 3, R, C) in metres; not finite where they are not known
-    statistics: ImageStatistics,  # of the images
-    samples_seen: int,  # images shown in all
-    seed: int,  # of the initial weights and the order of the images
-    device: torch.device,  # where to learn
+    images: Tensor,
+    points: Tensor,
+    statistics: ImageStatistics,
+    samples_seen: int,
+    seed: int,
+    device: torch.device,
 ) -> CoordinateNetwork:
-    """A network trained by the mean distance of points, with the localizers' optimiser."""
+    """Train a network by the mean distance of points, with the localizers' optimiser.
+
+    Args:
+        images: Images (N, 3, h, w) uint8.
+        points: Points (N, 3, R, C) that the cells show, metres; not finite where unknown.
+        statistics: Statistics of the images.
+        samples_seen: Images shown in all.
+        seed: Seed of the initial weights and of the order of the images.
+        device: Device to learn on.
+    """
     torch.manual_seed(seed)
     known = points.movedim(1, -1)[points.isfinite().all(dim=1)]
     network = CoordinateNetwork(known.mean(dim=0))

@@ -80,10 +80,15 @@ def absolute_pose(
 
 
 class SupportedPose(NamedTuple):
-    """A pose and the matches that agree with it."""
+    """A pose and the matches that agree with it.
 
-    world_from_cam: Array  # (4, 4)
-    inlier: NDArray[np.bool_]  # (n,) of the matches
+    Attributes:
+        world_from_cam: Pose (4, 4).
+        inlier: Matches (n,) that agree with it.
+    """
+
+    world_from_cam: Array
+    inlier: NDArray[np.bool_]
 
 
 def supported_pose(

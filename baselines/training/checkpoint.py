@@ -112,12 +112,19 @@ def frame_camera(frames: Path) -> FrameCamera | None:
 
 @dataclass(frozen=True)
 class TrainedLocalizer:
-    """A localizer that was read from a checkpoint, ready for prediction."""
+    """A localizer that was read from a checkpoint, ready for prediction.
 
-    description: ModelDescription  # what it is
-    network: Localizer  # the network on its device, in evaluation mode
-    statistics: ImageStatistics  # of the images it was trained on
-    calibration: Calibration | None = None  # tells pictures of another place, where it has one
+    Attributes:
+        description: Description of the localizer.
+        network: The network on its device, in evaluation mode.
+        statistics: Statistics of the images that it was trained on.
+        calibration: Tells pictures of another place, where it has one.
+    """
+
+    description: ModelDescription
+    network: Localizer
+    statistics: ImageStatistics
+    calibration: Calibration | None = None
 
     @property
     def device(self) -> torch.device:

@@ -44,13 +44,21 @@ class Batch(NamedTuple):
 
 @dataclass(frozen=True)
 class LabelledFrames:
-    """A split on the device, or a part of one: parts share the images."""
+    """A split on the device, or a part of one: parts share the images.
 
-    images: Tensor  # (N, 3, H, W) uint8 of the split, channels last in memory
-    position_m: Tensor  # (M, 3) float32, of the part
-    quat_wxyz: Tensor  # (M, 4) float32, of the part, unit length
-    path: NDArray[np.int64]  # (M,) index of the straight path each frame of the part belongs to
-    rows: Tensor  # (M,) int64: which of the images belong to the part
+    Attributes:
+        images: (N, 3, H, W) uint8 of the split, channels last in memory.
+        position_m: (M, 3) float32, of the part.
+        quat_wxyz: (M, 4) float32, of the part, unit length.
+        path: (M,) index of the straight path each frame of the part belongs to.
+        rows: (M,) int64: which of the images belong to the part.
+    """
+
+    images: Tensor
+    position_m: Tensor
+    quat_wxyz: Tensor
+    path: NDArray[np.int64]
+    rows: Tensor
 
     def __len__(self) -> int:
         return len(self.rows)

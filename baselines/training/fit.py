@@ -19,23 +19,27 @@ from baselines.training.selection import HistoryRow, Progress, Selection, Select
 
 
 class Protocol(NamedTuple):
-    """The parts of a training run that decide what its score means."""
+    """The parts of a training run that decide what its score means.
 
-    # ``shuffled`` draws a new order for every epoch, ``collected`` shows the frames of one path
-    # after the other, as they were collected
+    Attributes:
+        order: ``shuffled`` draws a new order for every epoch, ``collected`` shows the frames of one
+            path after the other, as they were collected.
+        selection: Whose errors decide which weights are kept: those on ``validation`` paths held
+            out of the training set, those on the ``test`` set. ``last`` keeps the last weights.
+            ``averaged`` keeps the mean of those of the last part of the run, and only looks at
+            ``validation`` paths.
+        distance: ``norm``: Euclidean distances, ``q`` and ``-q`` are one rotation. ``mse``: mean
+            squared differences of coordinates, predicted quaternions normalised first.
+        optimiser: ``muon`` for kernels and AdamW for the rest, or ``adamw`` for all: the rate
+            rises, then falls to nothing. ``halving``: Adam with L2 regularisation of all
+            parameters, the rate is halved at regular intervals.
+        images: ``rotated``: by ``training.augmentation``; ``plain``: as they were collected.
+    """
+
     order: Literal["shuffled", "collected"]
-    # whose errors decide which weights are kept: those on ``validation`` paths held out of the
-    # training set, those on the ``test`` set. ``last`` keeps the last weights. ``averaged`` keeps
-    # the mean of those of the last part of the run, and only looks at ``validation`` paths.
     selection: SelectionKind
-    # ``norm``: Euclidean distances, ``q`` and ``-q`` are one rotation. ``mse``: mean squared
-    # differences of coordinates, predicted quaternions normalised first.
     distance: Literal["norm", "mse"]
-    # ``muon`` for kernels and AdamW for the rest, or ``adamw`` for all: the rate rises, then falls
-    # to nothing. ``halving``: Adam with L2 regularisation of all parameters, the rate is halved at
-    # regular intervals.
     optimiser: OptimiserName
-    # ``rotated``: by ``training.augmentation``; ``plain``: as they were collected
     images: Literal["rotated", "plain"]
 
 
@@ -70,20 +74,35 @@ class Augmentation(Restorable, Interface):
 
 @dataclass
 class Fitting:
-    """A training run between two steps: what it is made of, and how a step is taken."""
+    """A training run between two steps: what it is made of, and how a step is taken.
 
-    localizer: Localizer  # on the device of the frames
-    frames: LabelledFrames  # to learn from
-    statistics: ImageStatistics  # of the images
-    optimisation: Optimisation  # updates the weights
-    order: BatchOrder  # of the frames
-    progress: Progress  # losses and history so far
-    selection: Selection  # which weights are kept
-    evaluations: frozenset[int]  # steps after which these are chosen among
-    precision: Precision  # of the network; losses and weights are float32
-    randomise: Randomisation | None  # applied to each batch of images
-    augment: Augmentation | None  # applied to each batch of normalised images
-    average: WeightAverage | None  # of the weights
+    Attributes:
+        localizer: Localizer on the device of the frames.
+        frames: Frames to learn from.
+        statistics: Statistics of the images.
+        optimisation: Optimiser with its schedule.
+        order: Order of the frames.
+        progress: Losses and history so far.
+        selection: Choice of the weights that are kept.
+        evaluations: Steps after which these are chosen among.
+        precision: Precision of the network; losses and weights are float32.
+        randomise: Changes each batch of images before it is normalised.
+        augment: Changes each batch of normalised images, and its labels.
+        average: Running average of the weights.
+    """
+
+    localizer: Localizer
+    frames: LabelledFrames
+    statistics: ImageStatistics
+    optimisation: Optimisation
+    order: BatchOrder
+    progress: Progress
+    selection: Selection
+    evaluations: frozenset[int]
+    precision: Precision
+    randomise: Randomisation | None
+    augment: Augmentation | None
+    average: WeightAverage | None
 
     @property
     def parts(self) -> dict[str, Restorable]:
@@ -125,28 +144,38 @@ class Fitting:
 
 
 def fit(
-    # see :class:`Fitting`, as for ``frames``, ``statistics``, ``precision``, ``randomise`` and
-    # ``augment``
     localizer: Localizer,
-    frames: LabelledFrames,  # to learn from
-    statistics: ImageStatistics,  # of the images
-    schedule: Schedule,  # how long and how fast
-    seed: int,  # of the order of the frames; dropout draws from torch's global generator
+    frames: LabelledFrames,
+    statistics: ImageStatistics,
+    schedule: Schedule,
+    seed: int,
     *,
-    protocol: Protocol = LAST_WEIGHTS,  # how
-    # frames that decide which weights are kept; without any it is the last ones
+    protocol: Protocol = LAST_WEIGHTS,
     held_out: LabelledFrames | None = None,
-    patience: int | None = None,  # evaluations without a new best after which training stops
-    precision: Precision = "float32",  # of the network
-    randomise: Randomisation | None = None,  # of how images look
-    augment: Augmentation | None = None,  # of the images
-    # where the state is kept; a run that finds its own there goes on with it
+    patience: int | None = None,
+    precision: Precision = "float32",
+    randomise: Randomisation | None = None,
+    augment: Augmentation | None = None,
     resume: ResumeFile = NOT_KEPT,
 ) -> list[HistoryRow]:
     """Train in place and return the history.
 
     Stops when the loss is no longer finite. Such a run has failed: all its weights become NaN, also
     where weights from before would do, because a good one is not one that was stopped in time.
+
+    Args:
+        localizer: Localizer on the device of the frames; it is trained in place.
+        frames: Frames to learn from.
+        statistics: Statistics of the images.
+        schedule: Length and learning rates.
+        seed: Seed of the order of the frames; dropout draws from torch's global generator.
+        protocol: Order, selection, distance, optimiser and images of the run.
+        held_out: Frames that decide which weights are kept; without any it is the last ones.
+        patience: Evaluations without a new best after which training stops.
+        precision: Precision of the network.
+        randomise: Changes how images look, before they are normalised.
+        augment: Changes normalised images and the labels with them.
+        resume: File of the state; a run that finds its own there goes on with it.
     """
     selection = Selection(protocol.selection, localizer, statistics, held_out, precision)
     run = Fitting(

@@ -91,14 +91,23 @@ class Muon(Untraced):
 
 
 class _Member(NamedTuple):
-    """A parameter of a stack."""
+    """A parameter of a stack.
 
-    position: int  # among the parameters with gradients
-    matrix: Tensor  # view of the parameter (out, in * kh * kw)
-    permuted: bool  # whether the columns stand in the order of channels-last memory
-    upright: bool  # whether there are more rows than columns
-    gram: Tensor  # view of its Gram matrix, of the shorter side
-    longer: float  # by which steps are longer than the rate
+    Attributes:
+        position: Among the parameters with gradients.
+        matrix: View of the parameter (out, in * kh * kw).
+        permuted: The columns stand in the order of channels-last memory.
+        upright: There are more rows than columns.
+        gram: View of its Gram matrix, of the shorter side.
+        longer: Factor by which steps are longer than the rate.
+    """
+
+    position: int
+    matrix: Tensor
+    permuted: bool
+    upright: bool
+    gram: Tensor
+    longer: float
 
 
 class _Stack:
@@ -166,13 +175,20 @@ WARM_UP = 0.05
 
 
 class Schedule(NamedTuple):
-    """Length and learning rates of a training run."""
+    """Length and learning rates of a training run.
 
-    samples_seen: int  # images shown in all, rounded up to whole batches
-    batch_size: int  # images per step
-    learning_rate: float  # the highest one; Muon's is ``MUON_RATE`` times it
-    weight_decay: float  # decoupled, but with ``halving`` of the loss
-    # share of the training run after which the rate is halved (``halving``)
+    Attributes:
+        samples_seen: Images shown in all, rounded up to whole batches.
+        batch_size: Images per step.
+        learning_rate: The highest one; Muon's is ``MUON_RATE`` times it.
+        weight_decay: Decoupled, but with ``halving`` of the loss.
+        halve_every: Share of the training run after which the rate is halved (``halving``).
+    """
+
+    samples_seen: int
+    batch_size: int
+    learning_rate: float
+    weight_decay: float
     halve_every: float = 1.0
 
     @property

@@ -27,14 +27,22 @@ TIMED_CALLS = 10
 
 @memory_errors()
 def predict_poses(
-    model: Path,  # checkpoint
-    frames: Path,  # packed frames of the split
-    labels_like: Path,  # a pose table that says which frames there are; its poses are not used
-    out: Path,  # pose table to write; a value the network gives no finite number for is ``nan``
-    device: Literal["auto", "cpu", "cuda"] = "auto",  # where to predict
-    every: int = 1,  # predict the first of each so many frames
+    model: Path,
+    frames: Path,
+    labels_like: Path,
+    out: Path,
+    device: Literal["auto", "cpu", "cuda"] = "auto",
+    every: int = 1,
 ) -> None:
     """Write predictions as a pose table with unit quaternions, w >= 0.
+
+    Args:
+        model: Checkpoint.
+        frames: Packed frames of the split.
+        labels_like: A pose table that says which frames there are; its poses are not used.
+        out: Pose table to write; a value the network gives no finite number for is ``nan``.
+        device: Device to predict on.
+        every: Predict the first of each so many frames.
 
     Raises:
         InputError: one of the files cannot be used.

@@ -82,16 +82,24 @@ class RoomsNetwork(Localizer):
 
 @memory_errors()
 def pretrain_backbone(
-    backbone: BackboneName,  # which one
-    network: NetworkConfig,  # input side and width
-    # where the weights come from, and how long they are trained if they are new
+    backbone: BackboneName,
+    network: NetworkConfig,
     pretraining: PretrainingConfig,
-    seed: int,  # of the initial weights, the order of frames and their rotations
-    out_weights: Path,  # state dict to write
-    frames: Sequence[Path] = (),  # packed frames of each room; none unless ``source`` is ``rooms``
-    labels: Sequence[Path] = (),  # their true poses, likewise
+    seed: int,
+    out_weights: Path,
+    frames: Sequence[Path] = (),
+    labels: Sequence[Path] = (),
 ) -> None:
     """Write the state dict that ``init: pretrained`` starts from.
+
+    Args:
+        backbone: Name of the backbone.
+        network: Input side and width.
+        pretraining: Source of the weights, and length of the training that makes new ones.
+        seed: Seed of the initial weights, the order of frames and their rotations.
+        out_weights: State dict to write.
+        frames: Packed frames of each room; none unless ``source`` is ``rooms``.
+        labels: Their true poses, likewise.
 
     Raises:
         InputError: a file cannot be used, or the ImageNet weights cannot be had.

@@ -57,15 +57,22 @@ FramesAndLabels = tuple[Path, Path] | None
 
 
 class Job(NamedTuple):
-    """A training run: localizer, settings, seed."""
+    """A training run: localizer, settings, seed.
+
+    Attributes:
+        hyper: Hyper-parameters of this localizer.
+        samples_seen: Images shown in all.
+        seed: Seed of first weights, paths held out, order of frames, rotations and dropout.
+        exchanged: In place of the protocol that ``training`` names.
+    """
 
     name: ModelName
     network: NetworkConfig
-    hyper: LocalizerConfig  # of this localizer
+    hyper: LocalizerConfig
     training: TrainingConfig
-    samples_seen: int  # images shown in all
-    seed: int  # of first weights, paths held out, order of frames, rotations and dropout
-    exchanged: Protocol | None = None  # in place of the protocol that ``training`` names
+    samples_seen: int
+    seed: int
+    exchanged: Protocol | None = None
 
     @property
     def protocol(self) -> Protocol:
@@ -86,12 +93,19 @@ class Job(NamedTuple):
 
 
 class Material(NamedTuple):
-    """Network and frames that a training run begins with."""
+    """Network and frames that a training run begins with.
 
-    localizer: Localizer  # with its first weights, on the device of the frames
-    statistics: ImageStatistics  # of all images
-    learned: LabelledFrames  # frames to learn from
-    held_out: LabelledFrames | None  # frames that decide which weights are kept, if any
+    Attributes:
+        localizer: Localizer with its first weights, on the device of the frames.
+        statistics: Statistics of all images.
+        learned: Frames to learn from.
+        held_out: Frames that decide which weights are kept, if any.
+    """
+
+    localizer: Localizer
+    statistics: ImageStatistics
+    learned: LabelledFrames
+    held_out: LabelledFrames | None
 
     def fingerprints(self) -> list[object]:
         """All that a run depends on beside its settings; of its images, samples."""
@@ -108,22 +122,35 @@ class Material(NamedTuple):
 @memory_errors()
 def train_localizer(
     job: Job,
-    frames: Path,  # packed frames (N, px, px, 3); the first ones are those of ``labels``
-    labels: Path,  # pose table of the training set
+    frames: Path,
+    labels: Path,
     out_model: Path,
     out_history: Path,
     *,
-    weights: Path | None = None,  # state dict the backbone starts from; without, from scratch
-    test: FramesAndLabels = None,  # read only where weights are chosen by the test set
-    augment: Augmentation | None = None,  # in place of the rotations that ``training`` asks for
-    # (4, 4) from the world of ``labels`` to that of the sequence scanned, where they differ
+    weights: Path | None = None,
+    test: FramesAndLabels = None,
+    augment: Augmentation | None = None,
     sequence_from_world: NDArray[np.float64] | None = None,
-    scene: str | None = None,  # name of the place
-    calibrated: bool = False,  # whether the checkpoint is to tell pictures of another place
+    scene: str | None = None,
+    calibrated: bool = False,
 ) -> list[HistoryRow]:
     """Train a localizer and write its checkpoint and its history (columns of ``HistoryRow``).
 
     Beside the checkpoint lies ``resume.pt`` until the run is finished.
+
+    Args:
+        job: Localizer, settings, length and seed.
+        frames: Packed frames (N, px, px, 3); the first ones are those of ``labels``.
+        labels: Pose table of the training set.
+        out_model: Checkpoint to write.
+        out_history: CSV to write, one row per evaluation.
+        weights: State dict the backbone starts from; without, from scratch.
+        test: Packed frames and labels of the test set, read only where weights are chosen by it.
+        augment: Augmentation in place of the rotations that ``training`` asks for.
+        sequence_from_world: Motion (4, 4) from the world of ``labels`` to that of the sequence
+            scanned, where they differ.
+        scene: Name of the place.
+        calibrated: Store what tells pictures of another place from those of this one.
 
     Returns:
         The history.
@@ -263,24 +290,39 @@ def _split(
 
 
 def train_and_predict(
-    model: ModelName,  # which localizer
-    frames: Path,  # packed frames to learn from, the first of which are those of ``labels``
-    labels: Path,  # their poses
-    test_frames: Path,  # packed frames of the test set
-    # their poses, of which only the frames are read, but by a published protocol
+    model: ModelName,
+    frames: Path,
+    labels: Path,
+    test_frames: Path,
     test_labels: Path,
-    run: dict[str, Any],  # see :func:`reproduction.design.runs.training_parameters`
-    out_model: Path,  # checkpoint
-    out_history: Path,  # losses
-    out_record: Path,  # what the run was trained from
-    out_predictions: Path,  # poses of the test frames
-    weights: Path | None = None,  # of the backbone; none from scratch
-    # pose table of the common test set, of whose frames one in ``every`` is predicted
+    run: dict[str, Any],
+    out_model: Path,
+    out_history: Path,
+    out_record: Path,
+    out_predictions: Path,
+    weights: Path | None = None,
     common: Path | None = None,
-    every: int = 1,  # see there
-    out_common: Path | None = None,  # poses of the common test set
+    every: int = 1,
+    out_common: Path | None = None,
 ) -> None:
-    """Train a localizer, and predict the test frames it is scored on."""
+    """Train a localizer, and predict the test frames it is scored on.
+
+    Args:
+        model: Name of the localizer.
+        frames: Packed frames to learn from, the first of which are those of ``labels``.
+        labels: Their poses.
+        test_frames: Packed frames of the test set.
+        test_labels: Their poses, of which only the frames are read, but by a published protocol.
+        run: Settings as :func:`reproduction.design.runs.training_parameters` gives them.
+        out_model: Checkpoint.
+        out_history: Losses.
+        out_record: Record to write of what the run was trained from.
+        out_predictions: Poses of the test frames.
+        weights: State dict that the backbone starts from; without, from scratch.
+        common: Pose table of the common test set, of whose frames one in ``every`` is predicted.
+        every: Distance in frames between those of the common test set that are predicted.
+        out_common: Poses of the common test set.
+    """
     inputs = {"frames": frames, "labels": labels, "test_frames": test_frames}
     inputs |= {"test_labels": test_labels} | ({"weights": weights} if weights else {})
     training = TrainingConfig(**run["training"], samples_seen={})

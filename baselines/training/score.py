@@ -45,14 +45,13 @@ def write_scores(
 
 
 def score_run(
-    predictions: Path,  # pose table of the test frames; may hold ``nan``
-    labels: Path,  # the test split's labels
-    truth: Path,  # the test split's true poses
-    train_labels: Path,  # labels that the run was trained on
-    out_errors: Path,  # CSV to write, one row per frame
-    out_metrics: Path,  # JSON to write
-    info: Mapping[str, Any],  # further keys of the JSON, e.g. what the run was.
-    # what the test frames show, for the DCRE, and their camera
+    predictions: Path,
+    labels: Path,
+    truth: Path,
+    train_labels: Path,
+    out_errors: Path,
+    out_metrics: Path,
+    info: Mapping[str, Any],
     depth: tuple[Path, CameraConfig] | None = None,
 ) -> None:
     """Write the errors of every test frame, and what is printed of them.
@@ -65,6 +64,16 @@ def score_run(
     or without a unit quaternion; their error is infinite. Means and recalls are those of
     :func:`synfeal.evaluation.metrics.summary`, ``dcre`` that of
     :mod:`synfeal.evaluation.reprojection`. What is not finite is ``null`` in the JSON.
+
+    Args:
+        predictions: Pose table of the test frames; may hold ``nan``.
+        labels: The test split's labels.
+        truth: The test split's true poses.
+        train_labels: Labels that the run was trained on.
+        out_errors: CSV to write, one row per frame.
+        out_metrics: JSON to write.
+        info: Further keys of the JSON, e.g. what the run was.
+        depth: Depth that the test frames show, for the DCRE, and their camera.
 
     Raises:
         InputError: a file cannot be read, the tables are not about the same frames, or the labels

@@ -33,20 +33,32 @@ _CELLS = {_VERTEX: 8, _EDGE: 2 + 7 + len(_UPPER[0])}
 
 @dataclass(frozen=True)
 class Edge:
-    """A measured motion."""
+    """A measured motion.
 
-    i: int  # node the motion starts from
-    j: int  # node it leads to
-    i_from_j: Array  # (4, 4) measured pose of node j in the frame of node i
-    information: Array  # (6, 6) inverse covariance, translation first
+    Attributes:
+        i: Node the motion starts from.
+        j: Node it leads to.
+        i_from_j: Measured pose (4, 4) of node j in the frame of node i.
+        information: Inverse covariance (6, 6), translation first.
+    """
+
+    i: int
+    j: int
+    i_from_j: Array
+    information: Array
 
 
 @dataclass(frozen=True)
 class PoseGraph:
-    """A batch as a graph."""
+    """A batch as a graph.
 
-    first_from_cam: Array  # (n, 4, 4) initial poses relative to node 0
-    edges: tuple[Edge, ...]  # measured motions
+    Attributes:
+        first_from_cam: Initial poses (n, 4, 4) relative to node 0.
+        edges: Measured motions.
+    """
+
+    first_from_cam: Array
+    edges: tuple[Edge, ...]
 
     def __len__(self) -> int:
         return len(self.first_from_cam)

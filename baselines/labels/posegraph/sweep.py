@@ -63,19 +63,29 @@ _rotated, _part = compiled(_rotated), compiled(_part)
 
 @compiled
 def sweep(
-    quat_wxyz: Array,  # rotations of ``parent_from_node``
-    position_m: Array,  # translations likewise
-    # (E + 1,) where the path of each edge begins in the arrays that follow
+    quat_wxyz: Array,
+    position_m: Array,
     first: NDArray[np.int64],
-    nodes: NDArray[np.int64],  # (P,) nodes of all paths, one path after the other
-    # (P,) whether the path passes the node's parameter towards the parent
+    nodes: NDArray[np.int64],
     upward: NDArray[np.bool_],
-    shares: Array,  # (P, 2) cumulative weights along the paths, rotation and translation
-    gains: Array,  # (E, 2) likewise
-    measured_quat: Array,  # (E, 4) rotations of the measured motions
-    measured_m: Array,  # (E, 3) their translations
+    shares: Array,
+    gains: Array,
+    measured_quat: Array,
+    measured_m: Array,
 ) -> None:
-    """Correct all edges in turn; ``quat_wxyz`` (n, 4) and ``position_m`` (n, 3) change in place."""
+    """Correct all edges in turn; ``quat_wxyz`` (n, 4) and ``position_m`` (n, 3) change in place.
+
+    Args:
+        quat_wxyz: Rotations of ``parent_from_node``.
+        position_m: Translations likewise.
+        first: (E + 1,) where the path of each edge begins in the arrays that follow.
+        nodes: (P,) nodes of all paths, one path after the other.
+        upward: (P,) whether the path passes the node's parameter towards the parent.
+        shares: (P, 2) cumulative weights along the paths, rotation and translation.
+        gains: (E, 2) likewise.
+        measured_quat: (E, 4) rotations of the measured motions.
+        measured_m: (E, 3) their translations.
+    """
     longest = np.max(first[1:] - first[:-1])
     turned, place = np.empty((longest + 1, 4)), np.zeros((longest + 1, 3))
     turned[0] = np.array([1.0, 0.0, 0.0, 0.0])

@@ -54,15 +54,21 @@ _DELAY = 10
 
 @dataclass(frozen=True)
 class _PathEdge:
-    """An edge with what its updates need."""
+    """An edge with what its updates need.
 
-    i_from_j: Array  # (4, 4) measured motion
-    # (L,) the nodes whose parameters lie on the path, in order from i to j
+    Attributes:
+        i_from_j: (4, 4) measured motion.
+        nodes: (L,) the nodes whose parameters lie on the path, in order from i to j.
+        upward: (L,) whether the path passes the node's parameter towards the parent.
+        top_depth: Depth of the lowest common ancestor.
+        weight: (2,) smallest eigenvalue of the information: rotation, translation.
+    """
+
+    i_from_j: Array
     nodes: NDArray[np.int64]
-    # (L,) whether the path passes the node's parameter towards the parent
     upward: NDArray[np.bool_]
-    top_depth: int  # depth of the lowest common ancestor
-    weight: Array  # (2,) smallest eigenvalue of the information: rotation, translation
+    top_depth: int
+    weight: Array
 
 
 def optimise_toro(graph: PoseGraph, iterations: int, epsilon: float) -> Array:

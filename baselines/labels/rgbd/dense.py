@@ -128,10 +128,15 @@ MIN_CONSTRAINT = 1e-3
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion that was found."""
+    """A motion that was found.
 
-    i_from_j: Array  # (4, 4)
-    agreement: float  # share of the points of j whose depth agrees closely with image i
+    Attributes:
+        i_from_j: Motion (4, 4) from camera j to camera i.
+        agreement: Share of the points of j whose depth agrees closely with image i.
+    """
+
+    i_from_j: Array
+    agreement: float
 
 
 def register(

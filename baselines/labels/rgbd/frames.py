@@ -27,13 +27,21 @@ Array = NDArray[np.float64]
 
 
 class Stage(NamedTuple):
-    """Stage of the registration: resolution, residuals, stopping rule."""
+    """Stage of the registration: resolution, residuals, stopping rule.
 
-    stride: int  # every how many pixels are compared
-    max_steps: int  # steps at the most
-    huber_m: float  # depth difference beyond which a point counts by its distance, not its square
-    rest_m: float  # a step that moves the camera by no more is the last
-    rest_deg: float  # a step that moves the camera by no more is the last
+    Attributes:
+        stride: Pixels from one compared pixel to the next.
+        max_steps: Steps at the most.
+        huber_m: Depth difference beyond which a point counts by its distance, not its square.
+        rest_m: Steps end with one that moves the camera by no more, metres.
+        rest_deg: The same of its rotation, degrees.
+    """
+
+    stride: int
+    max_steps: int
+    huber_m: float
+    rest_m: float
+    rest_deg: float
 
 
 # The first stages find a motion, but pull those that depth hardly tells by 0.1 degrees; the last
@@ -128,11 +136,17 @@ _INVALID_MM = (0, 65535)
 
 @dataclass(frozen=True)
 class RgbdFrame:
-    """One frame."""
+    """One frame.
 
-    color: NDArray[np.uint8]  # (H, W, 3) uint8
-    depth_m: NDArray[np.float32]  # (H, W) along the optical axis, inf where nothing was measured
-    camera: CameraConfig  # of both
+    Attributes:
+        color: Image (H, W, 3) uint8.
+        depth_m: Depth (H, W) along the optical axis, inf where nothing was measured.
+        camera: Camera of both images.
+    """
+
+    color: NDArray[np.uint8]
+    depth_m: NDArray[np.float32]
+    camera: CameraConfig
 
     @cached_property
     def rgbd(self) -> o3d.t.geometry.RGBDImage:

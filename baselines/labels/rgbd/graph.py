@@ -68,14 +68,20 @@ def write_rgbd(
 
 
 def rgbd_graph(
-    color_paths: Sequence[FrameFile],  # colour images in order
-    # 16-bit depth images in millimetres, 65535 where nothing was hit
+    color_paths: Sequence[FrameFile],
     depth_paths: Sequence[FrameFile],
-    camera: CameraConfig,  # camera of both
-    cfg: RgbdConfig,  # sensor, odometry, keyframes, and the gates of accepted motions
-    seed: int = 0,  # of the sensor's noise; unused by the ideal one
+    camera: CameraConfig,
+    cfg: RgbdConfig,
+    seed: int = 0,
 ) -> tuple[PoseGraph, Facts]:
     """Pose graph of one batch: an edge per neighbouring pair and the accepted loop closures.
+
+    Args:
+        color_paths: Colour images in order.
+        depth_paths: 16-bit depth images in millimetres, 65535 where nothing was hit.
+        camera: Camera of colour and depth.
+        cfg: Sensor, odometry, keyframes, and the gates of accepted motions.
+        seed: Seed of the sensor's noise; unused by the ideal one.
 
     Returns:
         The graph with the chained odometry as initial poses, and what making it took.

@@ -30,12 +30,19 @@ _MIN_MATCHES = 6
 
 @dataclass(frozen=True)
 class FrameFeatures:
-    """Features of one frame."""
+    """Features of one frame.
 
-    keypoints: pycolmap.FeatureKeypoints  # as pycolmap's matcher takes them
-    descriptors: pycolmap.FeatureDescriptors  # likewise
-    pixel: Array  # (k, 2) positions in the image
-    point_m: Array  # (k, 3) in camera coordinates; not finite where there is no depth
+    Attributes:
+        keypoints: Keypoints as pycolmap's matcher takes them.
+        descriptors: Their descriptors.
+        pixel: Positions (k, 2) in the image.
+        point_m: Positions (k, 3) in camera coordinates; not finite where there is no depth.
+    """
+
+    keypoints: pycolmap.FeatureKeypoints
+    descriptors: pycolmap.FeatureDescriptors
+    pixel: Array
+    point_m: Array
 
 
 class FeatureOdometry:

@@ -101,16 +101,22 @@ def write_sfm(
 
 @LabelMethod(name="sfm", title="SfM", rank=1, works_on="rule", published_assisted=3)
 def sfm_batch(
-    color_paths: Sequence[FrameFile],  # images of the batch in order
-    camera: CameraConfig,  # their camera
-    # (n, 4, 4) true poses, used for scale and placement only
+    color_paths: Sequence[FrameFile],
+    camera: CameraConfig,
     true_world_from_cam: NDArray[np.float64],
-    cfg: SfmConfig,  # features, matching and mapping
-    seed: int,  # of RANSAC and of the mapper
+    cfg: SfmConfig,
+    seed: int,
 ) -> tuple[BatchTrajectory, Facts]:
     """Estimate the poses of one batch from its colour images.
 
     One thread and a fixed seed make the poses repeatable to the bit on one machine.
+
+    Args:
+        color_paths: Images of the batch in order.
+        camera: Their camera.
+        true_world_from_cam: True poses (n, 4, 4), used for scale and placement only.
+        cfg: Features, matching and mapping.
+        seed: Seed of RANSAC and of the mapper.
 
     Returns:
         Poses relative to the true pose of the first frame, none registered where the mapper finds

@@ -33,11 +33,17 @@ ROUNDING = 1e-12  # of coordinates: what lies closer together than this share of
 
 @dataclass(frozen=True)
 class Similarity:
-    """Map from a model to the world: ``x_world = scale * rotation @ x_model + shift_m``."""
+    """Map from a model to the world: ``x_world = scale * rotation @ x_model + shift_m``.
 
-    scale: float  # metres per unit of the model
-    rotation: Array  # (3, 3) world_from_model
-    shift_m: Array  # (3,)
+    Attributes:
+        scale: Metres per unit of the model.
+        rotation: Rotation (3, 3) ``world_from_model``.
+        shift_m: Shift (3,) in the world, metres.
+    """
+
+    scale: float
+    rotation: Array
+    shift_m: Array
 
     def place(self, model_from_cam: Array) -> Array:
         """Return ``world_from_cam`` (N, 4, 4), metres, of poses in the model (N, 4, 4)."""

@@ -32,22 +32,36 @@ _STARTS = (None, 0.5, 0.25, 0.75)
 
 @dataclass(frozen=True)
 class Matches:
-    """Verified matches of a batch, the input of both mappers."""
+    """Verified matches of a batch, the input of both mappers.
 
-    images: Path  # directory of the images
-    database: Path  # their features and verified matches
-    image_ids: tuple[int, ...]  # in the order of the frames
-    matched_points: int  # image points with at least one verified match
+    Attributes:
+        images: Directory of the images.
+        database: Their features and verified matches.
+        image_ids: Identifiers in the order of the frames.
+        matched_points: Image points with at least one verified match.
+    """
+
+    images: Path
+    database: Path
+    image_ids: tuple[int, ...]
+    matched_points: int
 
 
 @dataclass(frozen=True)
 class Mapping:
-    """Result of mapping a batch."""
+    """Result of mapping a batch.
 
-    model: pycolmap.Reconstruction | None  # the one that explains the most; None when there is none
-    models: int  # how many models there are: the parts that the batch fell into
-    starts: int  # how often the mapper started
-    explained: float  # share of the matched image points that ``model`` explains
+    Attributes:
+        model: The one that explains the most; None when there is none.
+        models: Number of models: the parts that the batch fell into.
+        starts: Number of times that the mapper started.
+        explained: Share of the matched image points that ``model`` explains.
+    """
+
+    model: pycolmap.Reconstruction | None
+    models: int
+    starts: int
+    explained: float
 
 
 def read_matches(images: Path, database: Path) -> Matches:

@@ -121,10 +121,15 @@ class InceptionMaps(NamedTuple):
 
 
 class InceptionBackbone(nn.Module):
-    """GoogLeNet or Inception v3 without its classifiers."""
+    """GoogLeNet or Inception v3 without its classifiers.
 
-    n_aux: tuple[int, int]  # channels of the maps ``auxiliary1`` and ``auxiliary2``
-    n_out: int  # channels of the last map
+    Attributes:
+        n_aux: Channels of the maps ``auxiliary1`` and ``auxiliary2``.
+        n_out: Channels of the last map.
+    """
+
+    n_aux: tuple[int, int]
+    n_out: int
     input_scale: Tensor
     input_shift: Tensor
 

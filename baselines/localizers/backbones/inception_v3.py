@@ -29,9 +29,13 @@ class Conv(NamedTuple):
 
 
 class Branch(NamedTuple):
-    """Steps one after the other; the convolutions of one step stand side by side."""
+    """Steps one after the other; the convolutions of one step stand side by side.
 
-    pool: str  # ``average``, ``maximum`` or none
+    Attributes:
+        pool: ``average``, ``maximum`` or none.
+    """
+
+    pool: str
     steps: list[list[Conv]]
 
 
