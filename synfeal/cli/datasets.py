@@ -9,7 +9,7 @@ from pathlib import Path
 from synfeal.cli.options import command, option
 from synfeal.errors import InputError
 
-FORMATS = ("ace", "colmap", "hloc", "mstransformer", "nerfstudio", "tum")
+FORMATS = ("ace", "colmap", "hloc", "mstransformer", "nerfstudio", "rosbag", "tum")
 CONVENTIONS = tuple(
     f"{direction}-{order}"
     for direction in ("world_from_cam", "cam_from_world")

@@ -28,8 +28,8 @@ from synfeal.validation.listing import (
 from synfeal.validation.manifest import check_splits, read_splits
 from synfeal.validation.poses import check_rigid, check_tables, rigid_bound
 
-# Links or copies the image of a frame.
-Place = Callable[[FrameFile, Path], None]
+# Links or copies the image of a frame; without a target it only counts the frame as written.
+Place = Callable[[FrameFile, Path | None], None]
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from synfeal.dataset.frame_files import FrameFile, link_or_unpack
 from synfeal.export.frames import ExportSet, Place, read_export_set
 from synfeal.export.learned import export_ace, export_mstransformer, export_nerfstudio
 from synfeal.export.reconstruction import export_colmap, export_hloc, export_tum
+from synfeal.export.rosbag import export_rosbag
 from synfeal.records.files import atomic_directory, refuse_existing
 
 Exporter = Callable[[ExportSet, Path, Place], None]
@@ -22,6 +23,7 @@ FORMATS: dict[str, Exporter] = {
     "hloc": export_hloc,
     "mstransformer": export_mstransformer,
     "nerfstudio": export_nerfstudio,
+    "rosbag": export_rosbag,
     "tum": export_tum,
 }
 
@@ -41,9 +43,11 @@ def export(dataset: Path, to: str, out: Path, copy: bool, camera_file: Path | No
         ) as progress,
     ):
 
-        def place(source: FrameFile, target: Path) -> None:
+        def place(source: FrameFile, target: Path | None) -> None:
             """Link to an absolute path, or copy; what is archived, always."""
-            if copy and isinstance(source, Path):
+            if target is None:
+                pass
+            elif copy and isinstance(source, Path):
                 target.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(source, target)
             else:

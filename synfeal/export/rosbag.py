@@ -1,0 +1,161 @@
+"""A ROS 2 bag for each sequence: colour, depth, camera, odometry and transforms.
+
+Sources: sensor_msgs and nav_msgs of ROS 2 Humble; REP 103 (optical frames are x right, y down, z
+forward, as here); REP 118 (depth images ``16UC1`` in millimetres, 0 where there is none). Pixel
+centres of ``CameraInfo`` are at whole numbers, as OpenCV's, so its principal point is half a pixel
+less than ours.
+
+Frames are 1/30 s apart by their numbers, and the first is at 1 s: a time of 0 means "the latest" to
+ROS. The twist of the odometry is not known: it is 0, and so are all covariances.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from synfeal.dataset.sevenscenes import INVALID_MM, SPLIT_FILES
+from synfeal.errors import InputError
+from synfeal.export.frames import ExportFrame, ExportSet, Place
+from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.validation.listing import read_color, read_depth_mm
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
+
+FRAMES_PER_S = 30
+FIRST_NS = 10**9
+WORLD, CAMERA = "world", "camera_color_optical_frame"
+COLOR, DEPTH = "/camera/color", "/camera/depth"
+Messages = Iterator[tuple[str, Any]]  # topic and message
+
+
+def export_rosbag(data: ExportSet, out: Path, place: Place) -> None:
+    """Write ``seq-XX/{metadata.yaml,seq-XX.db3}`` and the files that list the splits.
+
+    Raises:
+        InputError: The package rosbags is not there.
+    """
+    try:
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise InputError(
+            "--to rosbag: needs the package rosbags, which is not there; pip install 'synfeal[ros]'"
+        ) from None
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for sequence, frames in groupby(data.frames, key=lambda frame: frame.sequence):
+        _write_bag(out / sequence, data, store, frames, place)
+    if data.has_splits:
+        for name in SPLIT_FILES.values():
+            shutil.copyfile(data.path / name, out / name)
+
+
+def _write_bag(
+    path: Path, data: ExportSet, store: Typestore, frames: Iterator[ExportFrame], place: Place
+) -> None:
+    from rosbags.rosbag2 import Writer
+
+    with Writer(path, version=9) as writer:
+        connections: dict[str, Any] = {}
+        for frame in frames:
+            time_ns = FIRST_NS + frame.frame.number * 10**9 // FRAMES_PER_S
+            for topic, message in _messages(data, store, frame, time_ns):
+                kind = message.__msgtype__
+                if topic not in connections:
+                    connections[topic] = writer.add_connection(topic, kind, typestore=store)
+                content = store.serialize_cdr(message, kind)
+                writer.write(connections[topic], time_ns, content)
+            place(frame.color, None)
+
+
+def _messages(data: ExportSet, store: Typestore, frame: ExportFrame, time_ns: int) -> Messages:
+    """Everything that stands in the bag of one frame."""
+    types = store.types
+    stamp = types["builtin_interfaces/msg/Time"](sec=time_ns // 10**9, nanosec=time_ns % 10**9)
+    optical = types["std_msgs/msg/Header"](stamp=stamp, frame_id=CAMERA)
+    in_world = types["std_msgs/msg/Header"](stamp=stamp, frame_id=WORLD)
+    info = _camera_info(data, store, optical)
+    yield f"{COLOR}/image_raw", _image(store, optical, read_color(frame.color), "rgb8")
+    yield f"{COLOR}/camera_info", info
+    if data.has_depth:
+        depth_mm = read_depth_mm(frame.depth)
+        known_mm = np.where(depth_mm == INVALID_MM, 0, depth_mm).astype(np.uint16)
+        yield f"{DEPTH}/image_raw", _image(store, optical, known_mm, "16UC1")
+        yield f"{DEPTH}/camera_info", info
+    yield from _poses(store, frame, in_world)
+
+
+def _image(store: Typestore, header: Any, pixels: np.ndarray, encoding: str) -> Any:
+    """``sensor_msgs/Image`` of pixels (H, W) or (H, W, 3)."""
+    content = np.ascontiguousarray(pixels)
+    height, width = content.shape[:2]
+    return store.types["sensor_msgs/msg/Image"](
+        header=header,
+        height=height,
+        width=width,
+        encoding=encoding,
+        is_bigendian=0,
+        step=content.nbytes // height,
+        data=content.astype(content.dtype.newbyteorder("<"), copy=False).view(np.uint8).ravel(),
+    )
+
+
+def _camera_info(data: ExportSet, store: Typestore, header: Any) -> Any:
+    """``sensor_msgs/CameraInfo``: OpenCV's camera, nothing cut out and not rectified."""
+    camera = data.camera
+    matrix = camera.intrinsics.matrix()
+    matrix[:2, 2] -= 0.5
+    region = store.types["sensor_msgs/msg/RegionOfInterest"](
+        x_offset=0, y_offset=0, height=0, width=0, do_rectify=False
+    )
+    return store.types["sensor_msgs/msg/CameraInfo"](
+        header=header,
+        height=camera.height,
+        width=camera.width,
+        distortion_model="plumb_bob",
+        d=np.array(camera.distortion, np.float64),
+        k=matrix.ravel(),
+        r=np.eye(3).ravel(),
+        p=np.hstack([matrix, np.zeros((3, 1))]).ravel(),
+        binning_x=0,
+        binning_y=0,
+        roi=region,
+    )
+
+
+def _poses(store: Typestore, frame: ExportFrame, header: Any) -> Messages:
+    """``nav_msgs/Odometry`` and ``tf2_msgs/TFMessage`` of ``world_from_cam``."""
+    types = store.types
+    x, y, z = frame.world_from_cam[:3, 3].tolist()
+    qw, qx, qy, qz = quat_wxyz_of(frame.world_from_cam).tolist()
+    rotation = types["geometry_msgs/msg/Quaternion"](x=qx, y=qy, z=qz, w=qw)
+    vector = types["geometry_msgs/msg/Vector3"]
+    none = vector(x=0.0, y=0.0, z=0.0)
+    pose = types["geometry_msgs/msg/Pose"](
+        position=types["geometry_msgs/msg/Point"](x=x, y=y, z=z), orientation=rotation
+    )
+    yield (
+        "/odom",
+        types["nav_msgs/msg/Odometry"](
+            header=header,
+            child_frame_id=CAMERA,
+            pose=types["geometry_msgs/msg/PoseWithCovariance"](pose=pose, covariance=np.zeros(36)),
+            twist=types["geometry_msgs/msg/TwistWithCovariance"](
+                twist=types["geometry_msgs/msg/Twist"](linear=none, angular=none),
+                covariance=np.zeros(36),
+            ),
+        ),
+    )
+    transform = types["geometry_msgs/msg/TransformStamped"](
+        header=header,
+        child_frame_id=CAMERA,
+        transform=types["geometry_msgs/msg/Transform"](
+            translation=vector(x=x, y=y, z=z), rotation=rotation
+        ),
+    )
+    yield "/tf", types["tf2_msgs/msg/TFMessage"](transforms=[transform])
