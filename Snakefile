@@ -4,7 +4,7 @@
 # One experiment:   snakemake --cores 2 results/mini/runs/large_room/6k/synfeal/pretrained/posenet2/seed0/metrics.json
 from snakemake.utils import min_version
 
-min_version("9.0")
+min_version("9.6")
 
 
 configfile: "config/config.yaml"

@@ -98,20 +98,20 @@ def grown(mem_mb):
 def made_by(*names):
     """An output of every job of these rules; none of rules that the profile does without."""
     return [
-        plain(output)
+        file
         for name in names
         for job in JOBS.get(name, [])
-        for output in expand(getattr(rules, name).output[0], **job)
+        for file in expand(plain(getattr(rules, name).output[0]), **job)
     ]
 
 
 def measured_by(*names):
     """What Snakemake measured of every job of these rules."""
     return [
-        plain(file)
+        file
         for name in names
         for job in JOBS.get(name, [])
-        for file in expand(getattr(rules, name).benchmark, **job)
+        for file in expand(plain(getattr(rules, name).benchmark), **job)
     ]
 
 

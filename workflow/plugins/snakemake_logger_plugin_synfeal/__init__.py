@@ -7,7 +7,7 @@ A dry run (``-n``) prints the jobs that a run would do.
 """
 
 import sys
-from logging import WARNING, LogRecord
+from logging import WARNING, Handler, LogRecord
 from pathlib import Path
 
 from rich.console import Console
@@ -32,6 +32,7 @@ class LogHandler(LogHandlerBase):
 
     def __post_init__(self) -> None:
         """Before any event."""
+        Handler.__init__(self)  # the interface of Snakemake 9.0 leaves that out
         self.view = RunView(Console(stderr=True, no_color=self.common_settings.nocolor or None))
         self.jobs: dict[int, tuple[str, list[Path]]] = {}
         self.planned: list[str] = []  # of a dry run: names of its jobs
