@@ -1,5 +1,6 @@
 """The workflow as a user meets it: what a dry run plans, and how a wrong configuration ends."""
 
+import importlib.util
 import json
 import re
 import shutil
@@ -183,7 +184,14 @@ def test_every_script_gives_its_function_what_it_asks_for(tmp_path):
     assert {"scene", "train", "external_reference", "robustness", "report"} <= called.keys()
     scripts = {path.name for path in (ROOT / "workflow/scripts").glob("*.py")}
     # `smoke` neither places objects nor has these methods; `score` is the other Snakefile's.
-    assert scripts - set(called.values()) <= {"cartons.py", "estimate.py", "score.py"}
+    assert scripts - set(called.values()) <= {"run_cartons.py", "run_estimate.py", "run_score.py"}
+
+
+def test_no_script_is_called_like_a_module_that_jobs_may_import():
+    """Snakemake puts the folder of a script before all others that modules are looked for in."""
+    names = {path.stem for path in (ROOT / "workflow/scripts").rglob("*.py")}
+    assert {name for name in names if importlib.util.find_spec(name) is not None} == set()
+    assert all(name.startswith("run_") for name in names)
 
 
 WORKFLOW = sorted(

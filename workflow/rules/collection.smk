@@ -25,7 +25,7 @@ rule scene:
         collision_agreement=CONFIG.collection.collision_agreement,
         seed=CONFIG.seed,
     script:
-        "../scripts/scene.py"
+        "../scripts/run_scene.py"
 
 
 rule plan:
@@ -49,7 +49,7 @@ rule plan:
         n_frames=lambda w: CONFIG.n_largest(w.scene, w.split),
         seed=lambda w: seed_of(CONFIG.seed, "plan", w.scene, w.split),
     script:
-        "../scripts/plan.py"
+        "../scripts/run_plan.py"
 
 
 rule coverage:
@@ -70,7 +70,7 @@ rule coverage:
         scene=lambda w: dump(CONFIG.scenes[w.scene], exclude={"sizes"}),
         camera=dump(CONFIG.network_camera),
     script:
-        "../scripts/coverage.py"
+        "../scripts/run_coverage.py"
 
 
 # What test frames show, at a few points of each: for the reprojection error of predicted poses.
@@ -91,7 +91,7 @@ rule cell_depth:
     params:
         camera=dump(CONFIG.network_camera),
     script:
-        "../scripts/cell_depth.py"
+        "../scripts/run_cell_depth.py"
 
 
 ARCHIVE = SUFFIX if CONFIG.archive_sequences else ""
@@ -118,7 +118,7 @@ rule detail:
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
         render=dump(CONFIG.render),
     script:
-        "../scripts/detail.py"
+        "../scripts/run_detail.py"
 
 
 rule render:
@@ -144,7 +144,7 @@ rule render:
         with_depth=lambda w: w.camera == "groundtruth" or CONFIG.network_depth,
         render=dump(CONFIG.render),
     script:
-        "../scripts/render.py"
+        "../scripts/run_render.py"
 
 
 # How much of its light comes from where: for light states, of stand-ins alone.
@@ -167,7 +167,7 @@ rule light_shares:
             else CONFIG.scenes[w.scene].seed
         ),
     script:
-        "../scripts/light_shares.py"
+        "../scripts/run_light_shares.py"
 
 
 # Built-in objects, where effects place some along every path.
@@ -185,7 +185,7 @@ rule cartons:
     resources:
         mem_mb=grown(1000),
     script:
-        "../scripts/cartons.py"
+        "../scripts/run_cartons.py"
 
 
 rule render_speed:
@@ -208,7 +208,7 @@ rule render_speed:
         render_speed=dump(CONFIG.render_speed),
         render=dump(CONFIG.render),
     script:
-        "../scripts/render_speed.py"
+        "../scripts/run_render_speed.py"
 
 
 rule collection_speed:
@@ -233,7 +233,7 @@ rule collection_speed:
         render=dump(CONFIG.render),
         seed=lambda w: seed_of(CONFIG.seed, "collection speed", w.scene),
     script:
-        "../scripts/collection_speed.py"
+        "../scripts/run_collection_speed.py"
 
 
 # What the localizers see goes from the renderer straight into an array, not through image files.
@@ -262,7 +262,7 @@ rule render_packed:
         view=CONFIG.network.view,
         render=dump(CONFIG.render),
     script:
-        "../scripts/render_packed.py"
+        "../scripts/run_render_packed.py"
 
 
 rule pack:
@@ -287,7 +287,7 @@ rule pack:
         render=dump(CONFIG.render),
         view=CONFIG.network.view,
     script:
-        "../scripts/pack.py"
+        "../scripts/run_pack.py"
 
 
 rule dataset:
@@ -327,7 +327,7 @@ rule dataset:
         shard_frames=CONFIG.shard_frames,
         origin=lambda w: origin_of(CONFIG, w.scene),
     script:
-        "../scripts/dataset.py"
+        "../scripts/run_dataset.py"
 
 
 rule true_labels:
@@ -346,4 +346,4 @@ rule true_labels:
     params:
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
     script:
-        "../scripts/true_labels.py"
+        "../scripts/run_true_labels.py"

@@ -17,7 +17,7 @@ rule table1_meshes:
     params:
         scenes=FILES.scenes,
     script:
-        "../scripts/table1_meshes.py"
+        "../scripts/run_table1_meshes.py"
 
 
 rule table:
@@ -42,7 +42,7 @@ rule table:
     params:
         design=dump(DESIGN),
     script:
-        "../scripts/table.py"
+        "../scripts/run_table.py"
 
 
 rule references_table:
@@ -64,7 +64,7 @@ rule references_table:
         design=dump(DESIGN),
         references=dump(CONFIG.references),
     script:
-        "../scripts/references_table.py"
+        "../scripts/run_references_table.py"
 
 
 rule recall:
@@ -83,7 +83,7 @@ rule recall:
     params:
         design=dump(DESIGN),
     script:
-        "../scripts/recall.py"
+        "../scripts/run_recall.py"
 
 
 rule assistance:
@@ -102,7 +102,7 @@ rule assistance:
     params:
         design=dump(DESIGN),
     script:
-        "../scripts/assistance.py"
+        "../scripts/run_assistance.py"
 
 
 rule label_error:
@@ -128,7 +128,7 @@ rule label_error:
     params:
         design=dump(DESIGN),
     script:
-        "../scripts/label_error.py"
+        "../scripts/run_label_error.py"
 
 
 rule speed_vs_error:
@@ -155,7 +155,7 @@ rule speed_vs_error:
     params:
         scenes=FILES.scenes,
     script:
-        "../scripts/speed_vs_error.py"
+        "../scripts/run_speed_vs_error.py"
 
 
 rule hard_cases:
@@ -170,7 +170,7 @@ rule hard_cases:
     resources:
         mem_mb=grown(2000),
     script:
-        "../scripts/hard_cases.py"
+        "../scripts/run_hard_cases.py"
 
 
 rule document:
@@ -190,7 +190,7 @@ rule document:
     resources:
         mem_mb=grown(1000),
     script:
-        "../scripts/document.py"
+        "../scripts/run_document.py"
 
 
 rule figures:
@@ -217,7 +217,7 @@ rule figures:
     params:
         design=dump(DESIGN),
     script:
-        "../scripts/figures.py"
+        "../scripts/run_figures.py"
 
 
 rule summary:
@@ -240,7 +240,7 @@ rule summary:
     params:
         design=dump(DESIGN),
     script:
-        "../scripts/summary.py"
+        "../scripts/run_summary.py"
 
 
 rule claims:
@@ -266,7 +266,7 @@ rule claims:
         design=dump(DESIGN),
         seed=CONFIG.seed,
     script:
-        "../scripts/claims.py"
+        "../scripts/run_claims.py"
 
 
 # Files that the record has hashes of, and the report shows.
@@ -303,7 +303,7 @@ rule provenance:
         seed=CONFIG.seed,
         config_hash=config_hash(CONFIG),
     script:
-        "../scripts/provenance.py"
+        "../scripts/run_provenance.py"
 
 
 rule report:
@@ -328,4 +328,4 @@ rule report:
         design=dump(DESIGN),
         with_robustness=FILES.has_robustness,
     script:
-        "../scripts/report.py"
+        "../scripts/run_report.py"

@@ -27,7 +27,7 @@ rule erroneous_labels:
             CONFIG.seed, *seed_names(w.error_kind, w.split), w.scene, w.size
         ),
     script:
-        "../scripts/erroneous_labels.py"
+        "../scripts/run_erroneous_labels.py"
 
 
 rule sfm:
@@ -52,7 +52,7 @@ rule sfm:
         sfm=dump(CONFIG.groundtruth.sfm),
         seed=lambda w: seed_of(CONFIG.seed, "sfm", w.scene, w.size, w.split, w.batch),
     script:
-        "../scripts/sfm.py"
+        "../scripts/run_sfm.py"
 
 
 rule rgbd:
@@ -76,7 +76,7 @@ rule rgbd:
         rgbd=dump(CONFIG.groundtruth.rgbd),
         seed=lambda w: seed_of(CONFIG.seed, "depth-sensor", w.scene),
     script:
-        "../scripts/rgbd.py"
+        "../scripts/run_rgbd.py"
 
 
 rule estimate:
@@ -102,7 +102,7 @@ rule estimate:
         ),
         seed=lambda w: seed_of(CONFIG.seed, "depth-sensor", w.scene),
     script:
-        "../scripts/estimate.py"
+        "../scripts/run_estimate.py"
 
 
 rule posegraph:
@@ -122,7 +122,7 @@ rule posegraph:
     params:
         posegraph=dump(CONFIG.groundtruth.posegraph),
     script:
-        "../scripts/posegraph.py"
+        "../scripts/run_posegraph.py"
 
 
 rule chain:
@@ -158,4 +158,4 @@ rule chain:
         truth_used=lambda w: truth_used(CONFIG.groundtruth, w.reconstructed).value,
         estimation=lambda w: estimation_parameters(CONFIG, w.reconstructed),
     script:
-        "../scripts/chain.py"
+        "../scripts/run_chain.py"

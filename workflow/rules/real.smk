@@ -83,7 +83,7 @@ rule part:
         labels=lambda w: PARTS[w.part].labels,
         photographs=lambda w: PARTS[w.part].photographs,
     script:
-        "../scripts/real/part.py"
+        "../scripts/real/run_part.py"
 
 
 rule scan:
@@ -168,7 +168,7 @@ rule fewer_frames:
     params:
         dataset=subpath(input[0], parent=True),
     script:
-        "../scripts/real/fewer_frames.py"
+        "../scripts/real/run_fewer_frames.py"
 
 
 # It goes on where it was stopped: what it needs for that is no output that Snakemake deletes.
@@ -277,7 +277,7 @@ rule references:
     params:
         rendered=subpath(input.manifest, parent=True),
     script:
-        "../scripts/real/references.py"
+        "../scripts/real/run_references.py"
 
 
 rule cover:
@@ -294,7 +294,7 @@ rule cover:
     conda:
         "../envs/synfeal.yaml"
     script:
-        "../scripts/real/cover.py"
+        "../scripts/real/run_cover.py"
 
 
 # Of photographs that may not be passed on: it stays here.
@@ -312,7 +312,7 @@ rule picture:
     conda:
         "../envs/synfeal.yaml"
     script:
-        "../scripts/real/picture.py"
+        "../scripts/real/run_picture.py"
 
 
 rule real_tables:
@@ -338,7 +338,7 @@ rule real_tables:
     params:
         config=SETTINGS,
     script:
-        "../scripts/real/tables.py"
+        "../scripts/real/run_tables.py"
 
 
 rule real_figures:
@@ -356,4 +356,4 @@ rule real_figures:
     conda:
         "../envs/synfeal.yaml"
     script:
-        "../scripts/real/figures.py"
+        "../scripts/real/run_figures.py"

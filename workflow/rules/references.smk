@@ -29,7 +29,7 @@ rule descriptors:
         learned_from=lambda w: FILES.smallest_train(w.scene),
         seed=lambda w: seed_of(CONFIG.seed, "descriptors", w.scene),
     script:
-        "../scripts/descriptors.py"
+        "../scripts/run_descriptors.py"
 
 
 rule features:
@@ -55,7 +55,7 @@ rule features:
         camera=dump(CONFIG.groundtruth_camera),
         references=dump(CONFIG.references, exclude={"coordinate_samples"}),
     script:
-        "../scripts/features.py"
+        "../scripts/run_features.py"
 
 
 rule correspondences:
@@ -76,7 +76,7 @@ rule correspondences:
     params:
         retrieved=CONFIG.references.retrieved,
     script:
-        "../scripts/correspondences.py"
+        "../scripts/run_correspondences.py"
 
 
 rule tracks:
@@ -94,7 +94,7 @@ rule tracks:
     resources:
         mem_mb=grown(3000),
     script:
-        "../scripts/tracks.py"
+        "../scripts/run_tracks.py"
 
 
 rule image_references:
@@ -116,7 +116,7 @@ rule image_references:
         camera=dump(CONFIG.network_camera),
         seed=lambda w: seed_of(CONFIG.seed, "references", w.scene, w.size, w.labels),
     script:
-        "../scripts/references.py"
+        "../scripts/run_references.py"
 
 
 use rule image_references as structure_references with:
@@ -171,7 +171,7 @@ rule views:
         camera=dump(CONFIG.groundtruth_camera),
         side=(CONFIG.network_camera.width, CONFIG.network_camera.height),
     script:
-        "../scripts/views.py"
+        "../scripts/run_views.py"
 
 
 use rule structure_references as coordinate_references with:
@@ -214,4 +214,4 @@ rule external_reference:
         ),
         named=lambda w: {name: w[name] for name in ("scene", "size", "labels")},
     script:
-        "../scripts/external_reference.py"
+        "../scripts/run_external_reference.py"

@@ -69,7 +69,7 @@ rule train_varied:
     params:
         run=lambda w: training_parameters(CONFIG, FILES.robust_run(w.model)),
     script:
-        "../scripts/train_varied.py"
+        "../scripts/run_train_varied.py"
 
 
 # Vectors of the ideal and of the varied frames: what the map of each training set is searched by.
@@ -106,7 +106,7 @@ rule varied_descriptors:
         learned_from=FILES.smallest_train(ROBUST_SCENE),
         seed=seed_of(CONFIG.seed, "descriptors", ROBUST_SCENE),
     script:
-        "../scripts/varied_descriptors.py"
+        "../scripts/run_varied_descriptors.py"
 
 
 # A sample of the test frames, large enough for features, against the map of the ideal frames.
@@ -136,7 +136,7 @@ rule varied_structure:
         references=dump(CONFIG.references, exclude={"coordinate_samples"}),
         seed=seed_of(CONFIG.seed, "references", *FILES.robust_set.split("/")),
     script:
-        "../scripts/varied_structure.py"
+        "../scripts/run_varied_structure.py"
 
 
 rule effects_speed:
@@ -159,7 +159,7 @@ rule effects_speed:
         render=dump(CONFIG.render),
         effects={name: dump(FILES.variations[name]) for name in FILES.tested_effects},
     script:
-        "../scripts/effects_speed.py"
+        "../scripts/run_effects_speed.py"
 
 
 rule robustness:
@@ -189,4 +189,4 @@ rule robustness:
         effects=FILES.tested_effects,
         device=CONFIG.training.device,
     script:
-        "../scripts/robustness.py"
+        "../scripts/run_robustness.py"

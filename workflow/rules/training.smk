@@ -29,7 +29,7 @@ rule pretrain:
         network=dump(CONFIG.network),
         seed=lambda w: seed_of(CONFIG.seed, "pretrain", w.backbone),
     script:
-        "../scripts/pretrain.py"
+        "../scripts/run_pretrain.py"
 
 
 # Scored where it is trained, which saves starting a process.
@@ -72,4 +72,4 @@ rule train:
         every=lambda w: FILES.common_test_set(w.scene)[1],
         camera=dump(CONFIG.network_camera),
     script:
-        "../scripts/train.py"
+        "../scripts/run_train.py"
