@@ -21,8 +21,9 @@ from synfeal.config.dataset import CameraConfig, DatasetConfig
 from synfeal.config.options import SCENE, dataset_config, options_named, render_configs
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.pose_table import PoseTable
-from synfeal.dataset.sequence_listing import COLOR
-from synfeal.dataset.split_frames import read_split_frames
+from synfeal.dataset.sequence_listing import COLOR, DEPTH, RIGHT_COLOR, RIGHT_DEPTH
+from synfeal.dataset.split_frames import SplitFrames, read_split_frames
+from synfeal.geometry.poses import moved_right
 from synfeal.mesh import load
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.triangles import merge_vertices
@@ -56,8 +57,8 @@ def load_mesh(path: AnyPath, up_axis: str = "auto", unit_m: float = 1.0) -> Text
 class Renderer:
     """Renderer of unlit images of a mesh; a context manager.
 
-    Keywords: ``camera``, ``width``, ``height``, ``fov``, ``backend``, ``supersampling``,
-    ``background``.
+    Keywords: ``camera``, ``width``, ``height``, ``fov``, ``projection``, ``fisheye_k``,
+    ``backend``, ``supersampling``, ``background``.
     """
 
     def __init__(self, mesh: TexturedMesh, **options: Any) -> None:
@@ -73,8 +74,8 @@ class Renderer:
         """Render colours and depth from a camera pose (4, 4).
 
         Returns:
-            Colours (H, W, 3), uint8, and depth (H, W) in metres along the optical axis, infinite
-            where no surface is seen.
+            Colours (H, W, 3), uint8, and depth (H, W) in metres along the optical axis (along the
+            ray with ``projection``), infinite where no surface is seen.
         """
         return self._opened.render_rgbd(world_from_cam)
 
@@ -133,6 +134,8 @@ class Split:
 
     poses: PoseTable  # their poses as a table; ``poses.path`` tells which straight path each is on
     images: list[FrameFile]  # files of the colour images; ``read_bytes()`` gives what one holds
+    depths: tuple[FrameFile, ...] = ()  # files of the depth images, if there are any
+    right: Split | None = None  # the second camera of stereo pairs, if they are
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -156,17 +159,28 @@ class Dataset:
 def open_dataset(path: AnyPath) -> Dataset:
     """Open a data set: read its poses and camera, and list its images without reading them."""
     path = Path(path)
-    splits = {split: _split(path, split) for split in ("train", "test")}
-    return Dataset(path, camera_of_dataset(path, None).config, splits["train"], splits["test"])
+    camera = camera_of_dataset(path, None).config
+    train, test = (_split(path, split, camera.stereo_baseline_m) for split in ("train", "test"))
+    return Dataset(path, camera, train, test)
 
 
-def _split(path: Path, split: str) -> Split:
+def _split(path: Path, split: str, baseline_m: float | None) -> Split:
     listed = read_split_frames(path, split)
     if not listed.frames:
         nothing = np.empty(0, np.int64)
         return Split(PoseTable(nothing, nothing, np.empty((0, 3)), np.empty((0, 4))), [])
     poses = read_poses(path, split) if listed.poses is None else listed.poses
-    return Split(poses, listed.files(COLOR))
+    right = None
+    if baseline_m is not None:
+        moved = poses.with_poses(moved_right(poses.world_from_cam, baseline_m))
+        right = Split(moved, listed.files(RIGHT_COLOR), _depths(listed, RIGHT_DEPTH))
+    return Split(poses, listed.files(COLOR), _depths(listed, DEPTH), right)
+
+
+def _depths(listed: SplitFrames, kind: str) -> tuple[FrameFile, ...]:
+    """The depth images of one camera; none where there are no such files at all."""
+    there = any(sequence.numbers[kind] for sequence in listed.sequences)
+    return tuple(listed.files(kind)) if there else ()
 
 
 def validate(path: AnyPath, camera: AnyPath | None = None, every_pair: bool = False) -> list[str]:

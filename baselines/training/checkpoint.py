@@ -92,7 +92,7 @@ class ModelDescription(Strict):
 
 
 def frame_camera(frames: Path) -> FrameCamera | None:
-    """The camera of packed frames by the record beside them; None where there is no record.
+    """The camera of packed frames by the record beside them; None without one of a perspective one.
 
     Raises:
         InputError: the record is damaged.
@@ -102,6 +102,8 @@ def frame_camera(frames: Path) -> FrameCamera | None:
         return None
     try:
         camera = read_json(record)["camera"]
+        if camera.get("projection") is not None:
+            return None
         return FrameCamera.model_validate({key: camera[key] for key in FrameCamera.model_fields})
     except (OSError, ValueError, TypeError, LookupError) as error:
         raise InputError(

@@ -191,9 +191,14 @@ def _scene_of(folder: Path) -> str:
     return str(name or folder.resolve().name)
 
 
-def _manifest_camera(folder: Path) -> FrameCamera:
-    """The camera that the manifest of a data set names."""
+def _manifest_camera(folder: Path) -> FrameCamera | None:
+    """The perspective camera that the manifest of a data set names; None of a fisheye or panorama.
+
+    A network learns from those as they are; nothing is turned or resampled.
+    """
     camera = camera_of_dataset(folder, None).config
+    if camera.projection is not None:
+        return None
     fx, fy, cx, cy = camera.intrinsics
     return FrameCamera(
         width=camera.width,

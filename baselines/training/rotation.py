@@ -86,7 +86,7 @@ def random_rotation(
         return None
     camera = frame_camera(frames)
     if camera is None or any(camera.distortion):
-        reason = "says nothing of the camera" if camera is None else "names a lens with distortion"
+        reason = "names no perspective camera" if camera is None else "names a lens with distortion"
         raise InputError(
             f"{frames.with_suffix('.json')}: {reason}; images can only be rotated through a known "
             "pinhole camera, so set training.augmentation to 0"

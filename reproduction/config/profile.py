@@ -78,6 +78,12 @@ class Config(DatasetConfig):
             raise ValueError(f"datasets: '{unknown[0]}' is not one of {sorted(self.scenes)}")
         if self.pretraining.source == "rooms" and not self.rooms:
             raise ValueError("pretraining.source: rooms needs scenes with `builder: random_room`")
+        estimated = self.groundtruth_camera
+        if estimated.projection is not None or estimated.stereo_baseline_m is not None:
+            raise ValueError(
+                "groundtruth_camera: labels are estimated from single perspective images; leave out"
+                " projection and stereo_baseline_m"
+            )
         camera = self.network_camera
         least = self.network.input_px + (self.network.view == "square")
         if min(camera.width, camera.height) < least:

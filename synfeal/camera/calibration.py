@@ -11,10 +11,10 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from json import JSONDecodeError
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import yaml
 
@@ -30,6 +30,8 @@ COEFFICIENTS = (
 SIZE = ("image_size", "imageSize")
 # What the models of ROS are called whose first five coefficients are OpenCV's.
 MODELS = ("plumb_bob", "rational_polynomial")
+# The same for OpenCV's fisheye model; Kalibr and ROS say equidistant.
+FISHEYE_MODELS = ("fisheye", "equidistant", "kannala_brandt")
 
 # COLMAP's camera models: the names of their parameters in order.
 COLMAP_MODELS = {
@@ -40,6 +42,13 @@ COLMAP_MODELS = {
     "OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"),
     "FULL_OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
 }
+COLMAP_FISHEYE = {
+    "SIMPLE_FISHEYE": ("f", "cx", "cy"),
+    "FISHEYE": ("fx", "fy", "cx", "cy"),
+    "SIMPLE_RADIAL_FISHEYE": ("f", "cx", "cy", "k1"),
+    "RADIAL_FISHEYE": ("f", "cx", "cy", "k1", "k2"),
+    "OPENCV_FISHEYE": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
+}
 
 UNKNOWN = (
     "is no calibration file: OpenCV's or ROS's end in .yaml, .yml or .json, COLMAP's is cameras.txt"
@@ -48,7 +57,12 @@ BINARY = (
     "COLMAP's binary format is not read; convert the folder it is in: colmap model_converter"
     " --input_path IN --output_path OUT --output_type TXT, and take OUT/cameras.txt"
 )
+PANORAMA = (
+    "MODEL: EQUIRECTANGULAR has no calibration; leave the file out and give the projection"
+    " equirectangular"
+)
 Distortion = tuple[float, float, float, float, float]
+PINHOLE: Distortion = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -66,6 +80,8 @@ class Calibration:
     cx: float  # principal point from the left edge, pixels: the first pixel's centre is at 0.5
     cy: float  # principal point from the top edge, pixels
     distortion: Distortion  # k1, k2, p1, p2, k3
+    projection: Literal["fisheye"] | None = None  # None: perspective
+    fisheye_k: tuple[float, float, float, float] | None = None  # of a fisheye: k1, k2, k3, k4
 
     def __post_init__(self) -> None:
         for name in ("fx", "fy"):
@@ -99,8 +115,15 @@ class Calibration:
                 f" {width}x{height}; {width}x{kept} keeps the aspect ratio"
             )
         x, y = width / self.width, height / self.height
-        scaled = (x * self.fx, y * self.fy, x * self.cx, y * self.cy)
-        return Calibration(width, height, *scaled, self.distortion)
+        return replace(
+            self,
+            width=width,
+            height=height,
+            fx=x * self.fx,
+            fy=y * self.fy,
+            cx=x * self.cx,
+            cy=y * self.cy,
+        )
 
 
 class _Loader(PlainLoader):
@@ -111,13 +134,27 @@ _MATRIX_TAG = "tag:yaml.org,2002:opencv-matrix"
 _Loader.add_constructor(_MATRIX_TAG, _Loader.construct_yaml_map)  # type: ignore[type-var]
 
 
-def read_calibration(path: Path) -> Calibration:
-    """The camera in a file; the format goes by the ending: .yaml, .yml, .json or .txt.
+def read_calibration(path: Path, with_fisheye: bool = False) -> Calibration:
+    """Read the camera in a file; the format goes by the ending: .yaml, .yml, .json or .txt.
+
+    Args:
+        path: The file.
+        with_fisheye: Take a fisheye camera, too; others refuse it.
 
     Raises:
         InputError: the file is missing, is of another format, or holds no camera that can be used;
             the message names file and field.
     """
+    calibration = _read(path)
+    if calibration.projection is not None and not with_fisheye:
+        raise InputError(
+            f"{path}: is a fisheye camera, and a perspective one is needed; undistort the images"
+            " first"
+        )
+    return calibration
+
+
+def _read(path: Path) -> Calibration:
     suffix = path.suffix.lower()
     try:
         if suffix not in (".yaml", ".yml", ".json", ".txt"):
@@ -146,8 +183,13 @@ def _from_record(values: Any) -> Calibration | None:
     if not isinstance(camera, Mapping):
         return None
     camera = camera.get("color", camera)
-    if not isinstance(camera, Mapping) or "fx" not in camera:
+    if not isinstance(camera, Mapping):
         return None
+    if camera.get("projection") == "equirectangular":
+        raise ValueError(PANORAMA.replace("MODEL: EQUIRECTANGULAR", "camera: a panorama"))
+    if "fx" not in camera:
+        return None
+    is_fisheye = camera.get("projection") == "fisheye"
     fx, fy, cx, cy = (_numbers(camera, (name,), (1,))[0] for name in ("fx", "fy", "cx", "cy"))
     return Calibration(
         *_size(camera, ("width", "height")),
@@ -156,6 +198,8 @@ def _from_record(values: Any) -> Calibration | None:
         cx=cx,
         cy=cy,
         distortion=_five("distortion", _numbers(camera, ("distortion",), (5,))),
+        projection="fisheye" if is_fisheye else None,
+        fisheye_k=_four(camera, ("fisheye_k",)) if "fisheye_k" in camera else None,
     )
 
 
@@ -164,9 +208,10 @@ def _from_mapping(values: Any) -> Calibration:
     if not isinstance(values, Mapping):
         raise ValueError(f"must hold a mapping of keys, found {_shortened(values)}")
     model = values.get("distortion_model", MODELS[0])
-    if model not in MODELS:
+    if model not in (*MODELS, *FISHEYE_MODELS):
         raise ValueError(
-            f"distortion_model: {_shortened(model)} is not supported, only {' and '.join(MODELS)}"
+            f"distortion_model: {_shortened(model)} is not supported, only"
+            f" {', '.join((*MODELS, *FISHEYE_MODELS))}"
         )
     fx, skew, cx, zero, fy, cy, *last = matrix = _numbers(values, MATRIX, (9,))
     if (skew, zero, *last) != (0.0, 0.0, 0.0, 0.0, 1.0):
@@ -174,8 +219,17 @@ def _from_mapping(values: Any) -> Calibration:
             f"{MATRIX[0]}: must be fx 0 cx, 0 fy cy, 0 0 1 without skew, found {matrix}"
         )
     size = _size(values)
+    if model in FISHEYE_MODELS:
+        fisheye_k = _four(values, COEFFICIENTS)
+        return Calibration(*size, fx, fy, cx + 0.5, cy + 0.5, PINHOLE, "fisheye", fisheye_k)
     distortion = _five(COEFFICIENTS[0], _numbers(values, COEFFICIENTS, (4, 5, 8, 12, 14)))
     return Calibration(*size, fx, fy, cx + 0.5, cy + 0.5, distortion)
+
+
+def _four(values: Mapping[str, Any], names: Sequence[str]) -> tuple[float, float, float, float]:
+    """k1, k2, k3 and k4 of a fisheye."""
+    k1, k2, k3, k4 = _numbers(values, names, (4,))
+    return k1, k2, k3, k4
 
 
 def _size(
@@ -245,18 +299,23 @@ def _from_colmap(text: str) -> Calibration:
     if not rows or len(rows[0]) < 4:
         raise ValueError("must hold one line with CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]")
     _, model, width, height, *parameters = rows[0]
-    if model not in COLMAP_MODELS:
-        raise ValueError(
-            f"MODEL: {_shortened(model)} is not supported, only {', '.join(COLMAP_MODELS)}"
-        )
-    names = COLMAP_MODELS[model]
+    if model == "EQUIRECTANGULAR":
+        raise ValueError(PANORAMA)
+    known = COLMAP_MODELS | COLMAP_FISHEYE
+    if model not in known:
+        raise ValueError(f"MODEL: {_shortened(model)} is not supported, only {', '.join(known)}")
+    names = known[model]
     values = {"WIDTH": width, "HEIGHT": height, "PARAMS": parameters}
     size = _size(values, ("WIDTH", "HEIGHT"))
     held = dict(zip(names, _numbers(values, ("PARAMS",), (len(names),)), strict=True))
+    fx, fy = (held[name if name in held else "f"] for name in ("fx", "fy"))
+    pinhole = (fx, fy, held["cx"], held["cy"])
+    if model in COLMAP_FISHEYE:
+        k1, k2, k3, k4 = (held.get(name, 0.0) for name in ("k1", "k2", "k3", "k4"))
+        return Calibration(*size, *pinhole, PINHOLE, "fisheye", (k1, k2, k3, k4))
     coefficients = COLMAP_MODELS["FULL_OPENCV"][4:]
     distortion = _five("PARAMS", [held.get(name, 0.0) for name in coefficients])
-    fx, fy = (held[name if name in held else "f"] for name in ("fx", "fy"))
-    return Calibration(*size, fx, fy, held["cx"], held["cy"], distortion)
+    return Calibration(*size, *pinhole, distortion)
 
 
 def _shortened(value: Any) -> str:

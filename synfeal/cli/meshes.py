@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
+from synfeal.camera.projection import Projection
 from synfeal.cli.options import MESH_OPTIONS, command, option, options_among
 from synfeal.config.collection import CollectionConfig
 from synfeal.config.dataset import RenderConfig
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 BACKENDS = get_args(RenderConfig.model_fields["backend"].annotation)
 DETAILS = get_args(RenderConfig.model_fields["detail"].annotation)
+PROJECTIONS = get_args(Projection)
 MODES = get_args(CollectionConfig.model_fields["mode"].annotation)
 RANGE: dict[str, Any] = {"type": float, "nargs": 2, "metavar": ("FROM", "TO")}
 FILE: dict[str, Any] = {"type": Path, "metavar": "FILE"}
@@ -92,9 +94,27 @@ RGBD_OPTIONS = (
     option("--margin", "of --like: added to the box, metres (0.2)", type=float),
     option("--angle-margin", "of --like: added to the angles, degrees (10)", type=float),
     option("--camera", "calibration: OpenCV or ROS .yaml or .json, COLMAP cameras.txt", **FILE),
+    option(
+        "--projection",
+        "a lens in place of a perspective camera; depth is then along the ray (docs/cameras.md)",
+        choices=PROJECTIONS,
+    ),
+    option(
+        "--fisheye-k",
+        "coefficients of a fisheye, as OpenCV (0 0 0 0)",
+        type=float,
+        nargs=4,
+        metavar=("K1", "K2", "K3", "K4"),
+    ),
+    option(
+        "--stereo",
+        "draw a second camera this far to the right, too, metres",
+        type=float,
+        metavar="BASELINE_M",
+    ),
     option("--width", "image width, pixels (640, or that of --camera)", type=int),
     option("--height", "image height, pixels (480, or that of --camera)", type=int),
-    option("--fov", "horizontal field of view, degrees (60)", type=float),
+    option("--fov", "horizontal field of view, degrees (60; fisheye 180)", type=float),
     option("--backend", "renderer (auto)", choices=BACKENDS),
     option("--supersampling", "N x N samples per pixel, 1 - 4 (2)", type=int, metavar="N"),
     option(
@@ -142,7 +162,8 @@ def collect(arguments: argparse.Namespace) -> None:
             raise InputError(f"--{name.replace('_', '-')}: goes with --like SEQUENCE")
     config = dataset_config(options, arguments.out)
     if camera is not None:
-        config = config.model_copy(update={"network_camera": camera})
+        pair = {"stereo_baseline_m": config.network_camera.stereo_baseline_m}
+        config = config.model_copy(update={"network_camera": camera.model_copy(update=pair)})
     from synfeal.collection.run import CollectJob, configuration_text, with_backend
     from synfeal.collection.run import collect as run_collection
 
@@ -188,7 +209,7 @@ def _like_options(
     chosen = {**options, **taken, **given}
     if not arguments.print_config:
         print(like_text(like, arguments.like))
-    if "camera" in given or "fov" in given:
+    if given.keys() & {"camera", "fov", "projection"}:
         return chosen, None
     if like.camera is None:
         raise InputError(

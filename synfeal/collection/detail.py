@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.camera.projection import pixels_per_radian
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.render_sequence import resolved
@@ -127,7 +128,7 @@ def choose_detail(
     Args:
         mesh: The full mesh, world frame.
         camera: The camera of the frames. Its distortion moves pixels and does not change how large
-            they are, so it is left out of the comparison.
+            they are, so it is left out of the comparison, as is that of a fisheye or a panorama.
         poses: ``world_from_cam`` (N, 4, 4) of the frames; :data:`VIEWS` of them are compared.
         render: Backend and samples of the frames.
     """
@@ -247,13 +248,16 @@ class _Judge:
 
 def middle_of(camera: CameraConfig) -> CameraConfig:
     """The middle of a camera's image, at most :data:`LARGEST_VIEW_PX`, as a pinhole."""
-    fx, fy, cx, cy = camera.intrinsics
+    if camera.projection is None:
+        fx, fy, cx, cy = camera.intrinsics
+    else:
+        fx, fy = pixels_per_radian(camera)
+        cx, cy = camera.width / 2.0, camera.height / 2.0
     width, height = (
         min(side, most)
         for side, most in zip((camera.width, camera.height), LARGEST_VIEW_PX, strict=True)
     )
     left, top = (camera.width - width) // 2, (camera.height - height) // 2
     window = {"width": width, "height": height, "cx": cx - left, "cy": cy - top}
-    return camera.model_copy(
-        update={**window, "fx": fx, "fy": fy, "distortion": (0.0, 0.0, 0.0, 0.0, 0.0)}
-    )
+    plain = {"distortion": (0.0, 0.0, 0.0, 0.0, 0.0), "projection": None, "fisheye_k": None}
+    return camera.model_copy(update={**window, "fx": fx, "fy": fy, **plain})

@@ -29,6 +29,7 @@ from synfeal.dataset.sevenscenes import Split, sequences_of
 from synfeal.dataset.world import read_scan_record, rigid_motion_of, write_sequence_from_world
 from synfeal.effects.scene import crowd_of
 from synfeal.errors import InputError
+from synfeal.geometry.poses import moved_right
 from synfeal.mesh.checks import shows_one_colour
 from synfeal.mesh.load import is_y_up
 from synfeal.mesh.model import TexturedMesh
@@ -80,6 +81,22 @@ def refuse_blank(
                 "%s: %.0f %% of the pixels of the %s frames will be empty: cameras look through"
                 " holes or past the mesh; another --box may help (synfeal inspect suggests one)",
                 *(name, 100 * share, split),
+            )
+
+
+def warn_of_walls(
+    caster: RayCaster, plans: Mapping[Split, PoseTable], baseline_m: float, name: str
+) -> None:
+    """Warn of frames between whose left and right camera there is a surface."""
+    for split, plan in plans.items():
+        left = plan.world_from_cam
+        right = moved_right(left, baseline_m)
+        blocked = int(np.sum(~caster.sees(left[:, :3, 3], right[:, :3, 3])))
+        if blocked:
+            log.warning(
+                "%s: in %d of %d %s frames a surface is between the two cameras; give"
+                " --min-clearance %g",
+                *(name, blocked, len(plan), split, baseline_m),
             )
 
 
@@ -197,7 +214,10 @@ def _plan(job: CollectJob, scene: Path, part: Path) -> dict[Split, PoseTable]:
             rng = generator_of(config.seed, "plan", name, split)
             asked = (settings, config.collection, job.counts[split], rng, split)
             plans[split] = plan_mesh(mesh, str(collision), *asked)
-        refuse_blank(RayCaster(*mesh), plans, camera, str(settings.path))
+        caster = RayCaster(*mesh)
+        refuse_blank(caster, plans, camera, str(settings.path))
+        if camera.stereo_baseline_m is not None:
+            warn_of_walls(caster, plans, camera.stereo_baseline_m, str(settings.path))
         for split, plan in plans.items():
             write_pose_table(part / f"{split}.csv", plan)
         covered = {s: scene_coverage(collision, settings, plans[s], camera) for s in splits}
@@ -257,6 +277,9 @@ TRAINED = """\
 UNTRAINED = """\
 # There are no test frames: for localizers to be trained and tested too, give --test-frames.
 """
+WIDE = """\
+# Localizers are trained and compared on perspective images; on these: synfeal train.
+"""
 
 
 def with_backend(config: DatasetConfig) -> DatasetConfig:
@@ -274,11 +297,12 @@ def configuration_text(job: CollectJob) -> str:
     # The side of packed frames, which the workflow makes for networks, has to fit into the image.
     input_px = job.packed_px or max(LEAST_INPUT_PX, min(64, camera.width - 1, camera.height - 1))
     values |= {"datasets": [job.scene], "network": {"input_px": input_px}}
-    is_tested = job.counts["test"] > 0
+    is_tested = job.counts["test"] > 0 and camera.projection is None
     if is_tested:
         (size,) = job.config.scenes[job.scene].sizes
         values["experiments"] = [{"table": "table4_size", "scene": job.scene, "size": size}]
         values["training"] = {"samples_seen": {size: SAMPLES_SEEN}}
-    header = HEADER + (TRAINED if is_tested else UNTRAINED)
+    untrained = UNTRAINED if camera.projection is None else WIDE
+    header = HEADER + (TRAINED if is_tested else untrained)
     named = {"root": job.config.root, "scene": job.scene}
     return header.format(**named) + yaml.safe_dump(values, sort_keys=False)

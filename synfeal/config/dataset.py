@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from synfeal.camera.calibration import read_calibration
-from synfeal.camera.projection import Intrinsics, refuse_fold
+from synfeal.camera.fisheye import EQUIDISTANT, largest_angle_rad, radius_of_angle
+from synfeal.camera.projection import Intrinsics, Projection, refuse_fold
 from synfeal.config.collection import (
     Channel,
     CollectionConfig,
@@ -31,8 +34,10 @@ class CameraConfig(Strict):
 
     With a field of view alone pixels are square and the principal point is the image centre. A
     calibration is replaced by its numbers when it is read, so a file that changes or moves later
-    changes nothing.
+    changes nothing. Panoramas have no intrinsics; they are twice as wide as high.
     """
+
+    unless_none = ("projection", "fisheye_k", "stereo_baseline_m")
 
     calibration: Path | None = Field(
         None,
@@ -42,7 +47,9 @@ class CameraConfig(Strict):
     )
     width: int = Field(640, ge=16, le=8192, description="pixels")
     height: int = Field(480, ge=16, le=8192, description="pixels")
-    horizontal_fov_deg: float = Field(60.0, gt=1, lt=170, description="without fx: field of view")
+    horizontal_fov_deg: float = Field(
+        60.0, gt=1, le=360, description="without fx: field of view; perspective cameras: below 170"
+    )
     fx: Positive | None = Field(None, description="focal length, pixels")
     fy: Positive | None = Field(None, description="focal length, pixels")
     cx: Finite | None = Field(None, description="principal point, pixels")
@@ -50,15 +57,29 @@ class CameraConfig(Strict):
     distortion: tuple[Finite, Finite, Finite, Finite, Finite] = Field(
         (0.0, 0.0, 0.0, 0.0, 0.0), description="k1, k2, p1, p2, k3 (Brown-Conrady, as OpenCV)"
     )
+    projection: Projection | None = Field(
+        None,
+        description="null: perspective, with `distortion`; `fisheye`: Kannala-Brandt;"
+        " `equirectangular`: a panorama of 360 x 180 degrees. Depth of the last two is along the"
+        " ray",
+    )
+    fisheye_k: tuple[Finite, Finite, Finite, Finite] | None = Field(
+        None, description="fisheye: k1, k2, k3, k4, as OpenCV; null: equidistant"
+    )
+    stereo_baseline_m: Positive | None = Field(
+        None, description="draw a second camera this far to the right, too"
+    )
     near_m: Positive = Field(0.05, description="near clip plane")
     far_m: Positive = Field(100.0, description="far clip plane")
 
     @model_validator(mode="before")
     @classmethod
-    def _read_calibration(cls, values: Any) -> Any:
-        if not isinstance(values, dict) or values.get("calibration") is None:
+    def _complete(cls, values: Any) -> Any:
+        if not isinstance(values, dict):
             return values
-        return _calibrated(values)
+        if values.get("calibration") is not None:
+            values = _calibrated(values)
+        return {**_usual_view(values), **values}
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -67,27 +88,85 @@ class CameraConfig(Strict):
         intrinsics = (self.fx, self.fy, self.cx, self.cy)
         if None in intrinsics and intrinsics != (None,) * 4:
             raise ValueError("fx: fx, fy, cx and cy are given together or not at all")
+        if self.projection is not None and any(self.distortion):
+            raise ValueError("distortion: is that of perspective cameras; leave it out")
+        if self.fisheye_k is not None and self.projection != "fisheye":
+            raise ValueError("fisheye_k: goes with the projection fisheye")
+        if self.projection == "equirectangular":
+            self._check_panorama()
+        elif self.projection is None and self.fx is None and self.horizontal_fov_deg >= 170:
+            raise ValueError(
+                "horizontal_fov_deg: must be below 170, or the projection fisheye or"
+                " equirectangular"
+            )
+        elif self.projection == "fisheye" and self.fx is None:
+            widest_deg = 2.0 * math.degrees(largest_angle_rad(self.fisheye_k or EQUIDISTANT))
+            if self.horizontal_fov_deg > widest_deg:
+                raise ValueError(
+                    f"horizontal_fov_deg: with these fisheye_k at most {widest_deg:.1f}, where the"
+                    " lens folds over"
+                )
         if any(self.distortion):
             refuse_fold(self)
         return self
 
+    def _check_panorama(self) -> None:
+        if self.width != 2 * self.height:
+            raise ValueError(
+                f"width: an equirectangular image is twice as wide as high, found {self.width} x"
+                f" {self.height}; give one of the two"
+            )
+        if self.fx is not None or self.horizontal_fov_deg != 360.0:
+            name = "horizontal_fov_deg" if self.fx is None else "fx"
+            raise ValueError(f"{name}: an equirectangular image shows all directions; leave it out")
+
     @property
     def intrinsics(self) -> Intrinsics:
-        """Those given, or those of the field of view."""
+        """Those given, or those of the field of view.
+
+        Raises:
+            ValueError: the camera is equirectangular and has none.
+        """
+        if self.projection == "equirectangular":
+            raise ValueError("an equirectangular camera has no focal length")
         given = (self.fx, self.fy, self.cx, self.cy)
-        if None in given:
+        if None not in given:
+            return Intrinsics(*map(float, given))  # type: ignore[arg-type]
+        if self.projection is None:
             return Intrinsics.of_view(self.width, self.height, self.horizontal_fov_deg)
-        return Intrinsics(*map(float, given))  # type: ignore[arg-type]
+        half_rad = np.array(math.radians(self.horizontal_fov_deg) / 2.0)
+        edge = float(radius_of_angle(half_rad, self.fisheye_k or EQUIDISTANT))
+        focal = self.width / 2.0 / edge
+        return Intrinsics(focal, focal, self.width / 2.0, self.height / 2.0)
 
     @property
     def record(self) -> dict[str, Any]:
         """With its intrinsics, ready for JSON."""
-        return {**self.model_dump(mode="json"), **self.intrinsics._asdict()}
+        values = self.model_dump(mode="json")
+        if self.projection == "equirectangular":
+            return {key: value for key, value in values.items() if key not in Intrinsics._fields}
+        return {**values, **self.intrinsics._asdict()}
+
+
+def _usual_view(values: dict[str, Any]) -> dict[str, Any]:
+    """Field of view and sides of a projection where they are not given."""
+    if values.get("projection") == "fisheye":
+        return {"horizontal_fov_deg": 180.0}
+    if values.get("projection") != "equirectangular":
+        return {}
+    sides = {"width": 1024, "height": 512}
+    width, height = values.get("width"), values.get("height")
+    if isinstance(width, int) and height is None:
+        sides["height"] = width // 2
+    if isinstance(height, int) and width is None:
+        sides["width"] = 2 * height
+    return {"horizontal_fov_deg": 360.0, **sides}
 
 
 def _calibrated(values: dict[str, Any]) -> dict[str, Any]:
     """A camera's values with those of its calibration in place of the path."""
-    fixed = ("horizontal_fov_deg", "fx", "fy", "cx", "cy", "distortion")
+    lens = ("fx", "fy", "cx", "cy", "distortion", "projection", "fisheye_k")
+    fixed = ("horizontal_fov_deg", *lens)
     for name in fixed:
         if values.get(name) is not None:
             raise ValueError(f"calibration: {name} comes from the file; leave one of the two out")
@@ -99,7 +178,7 @@ def _calibrated(values: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(path, str | Path):
         raise ValueError(f"calibration: must be a path, found {path!r}")
     try:
-        calibration = read_calibration(Path(path)).scaled(*sides)
+        calibration = read_calibration(Path(path), with_fisheye=True).scaled(*sides)
     except (InputError, ValueError) as error:
         raise ValueError(f"calibration: {error}") from error
     kept = {name: value for name, value in values.items() if name not in fixed}
@@ -152,6 +231,11 @@ class DatasetConfig(Strict):
     @model_validator(mode="after")
     def _check_effects(self) -> Self:
         if self.render.effects is not None:
+            if self.network_camera.stereo_baseline_m is not None:
+                raise ValueError(
+                    "network_camera.stereo_baseline_m: effects are of one camera; leave out the"
+                    " effects, or draw the pair without"
+                )
             refuse_long_exposure(self.render.effects, self.collection, "render.effects")
             light = self.render.effects.light
             if light and light.states and any(s.source == "mesh" for s in self.scenes.values()):

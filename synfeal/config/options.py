@@ -6,6 +6,7 @@ option of ``synfeal collect``, as an argument of :func:`synfeal.collect`, or as 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -44,6 +45,9 @@ KEYS: Mapping[str, str] = {
     "width": "network_camera.width",
     "height": "network_camera.height",
     "fov": "network_camera.horizontal_fov_deg",
+    "projection": "network_camera.projection",
+    "fisheye_k": "network_camera.fisheye_k",
+    "stereo": "network_camera.stereo_baseline_m",
     "depth": "network_depth",
     "backend": "render.backend",
     "supersampling": "render.supersampling",
@@ -71,6 +75,10 @@ def dataset_config(options: Mapping[str, Any], out: Path | None = None) -> Datas
     if values.get("collection", {}).get("repeat") is not None:
         values["collection"]["repeat"] = Path(values["collection"]["repeat"]).absolute()
     values.setdefault("collection", {})["collision_agreement"] = None
+    baseline_m = options.get("stereo")
+    is_length = isinstance(baseline_m, int | float) and 0 < baseline_m < math.inf
+    if is_length and options.get("min_clearance") is None:
+        scene["min_clearance_m"] = baseline_m  # so that no wall is between the two cameras
     profile = re.sub(r"[^a-z0-9]+", "_", out.absolute().name.lower()) if out else ""
     values |= {"profile": profile.strip("_")[:64] or "mine", "scale": 1.0}
     with options_named():
@@ -89,6 +97,8 @@ def render_configs(options: Mapping[str, Any]) -> tuple[CameraConfig, RenderConf
     """The camera and how it draws, of the options that say so."""
     if options.get("effects") is not None:
         raise InputError("effects: act on the frames of paths; use collect for them")
+    if options.get("stereo") is not None:
+        raise InputError("stereo: a renderer is one camera; render from both poses")
     values = _nested(options)
     with options_named():
         camera = _checked(CameraConfig, values.pop("network_camera", {}), "network_camera")

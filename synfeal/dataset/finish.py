@@ -7,16 +7,20 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from synfeal.config.dataset import CameraConfig, DatasetConfig, RenderConfig
 from synfeal.config.effects import EffectsConfig
 from synfeal.dataset.frame_files import frame_file, sequence_at, sequence_names
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.pose_table import read_frames, read_pose_table, write_pose_table
 from synfeal.dataset.preview import write_contact_sheet
+from synfeal.dataset.sequence_listing import RIGHT_COLOR, RIGHT_DEPTH
 from synfeal.dataset.sevenscenes import Sequence as Shard
 from synfeal.dataset.sevenscenes import Split, frame_paths, sequences_of, write_splits
 from synfeal.effects.apply import effects_table, objects_table
 from synfeal.effects.scene import crowd_of
+from synfeal.geometry.poses import moved_right
 from synfeal.records.files import file_sha256, read_json, write_json
 from synfeal.records.provenance import frame_versions
 from synfeal.records.tables import write_frame
@@ -111,9 +115,11 @@ def write_manifest(
     record = camera.record
     if camera.fx is not None:  # which replaced the field of view
         del record["horizontal_fov_deg"]
+    along = "optical axis" if camera.projection is None else "ray"
     manifest = {
-        "format": "7-Scenes; depth along the optical axis, millimetres, 65535 invalid",
+        "format": f"7-Scenes; depth along the {along}, millimetres, 65535 invalid",
         "camera": record,
+        **_stereo(camera),
         "frames": {
             split: sum(len(s) for s in sequences if s.split == split) for split in ("train", "test")
         },
@@ -130,6 +136,21 @@ def write_manifest(
         **extra,
     }
     write_json(directory / MANIFEST, manifest)
+
+
+def _stereo(camera: CameraConfig) -> dict[str, Any]:
+    """How the right camera of a pair lies in the left one, whose poses the frames have."""
+    if camera.stereo_baseline_m is None:
+        return {}
+    left_from_right = moved_right(np.eye(4), camera.stereo_baseline_m).tolist()
+    return {
+        "stereo": {
+            "baseline_m": camera.stereo_baseline_m,
+            "left_from_right": left_from_right,
+            "poses": "world_from_cam @ left_from_right",
+            "files": [RIGHT_COLOR, RIGHT_DEPTH],
+        }
+    }
 
 
 def sequence_sha256(sequence: Path) -> str:

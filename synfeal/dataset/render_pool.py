@@ -44,8 +44,15 @@ class Studio:
     ) -> float:
         """Render a sequence; seconds it took."""
         began, (out, poses) = time.perf_counter(), task
-        effects = effects_of(self.camera, self.render)
-        write_sequence(renderer, poses, out, self.with_depth, on_frame, effects)
+        write_sequence(
+            renderer,
+            poses,
+            out,
+            self.with_depth,
+            on_frame,
+            effects_of(self.camera, self.render),
+            self.camera.stereo_baseline_m,
+        )
         return time.perf_counter() - began
 
 

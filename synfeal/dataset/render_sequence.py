@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +22,11 @@ from synfeal.config.effects import EffectsConfig
 from synfeal.dataset.frame_files import encode_png, is_archive, write_archive
 from synfeal.dataset.packed import View, fit_frame, new_packed
 from synfeal.dataset.pose_table import PoseTable, read_frames
+from synfeal.dataset.sequence_listing import COLOR, DEPTH, POSE, RIGHT_COLOR, RIGHT_DEPTH
 from synfeal.dataset.sevenscenes import depth_mm_of, pose_text
 from synfeal.effects.apply import Frame, varied_frames
 from synfeal.effects.scene import SceneRenderer, open_scene
+from synfeal.geometry.poses import moved_right
 from synfeal.records.files import (
     atomic_directory,
     refuse_existing,
@@ -31,7 +34,6 @@ from synfeal.records.files import (
     write_json,
     writing_to,
 )
-from synfeal.render.base import Depth, Rgb
 from synfeal.render.choose import fastest_working, graphics
 
 
@@ -74,8 +76,15 @@ def render_sequence(
         open_scene(mesh, camera, render, detail) as renderer,
         Progress(len(poses), out_frames.name) as progress,
     ):
-        effects = effects_of(camera, render)
-        write_sequence(renderer, poses, out_frames, with_depth, progress.update, effects)
+        write_sequence(
+            renderer,
+            poses,
+            out_frames,
+            with_depth,
+            progress.update,
+            effects_of(camera, render),
+            camera.stereo_baseline_m,
+        )
     progress.part_done(out_frames.name, len(poses), time.perf_counter() - began)
 
 
@@ -90,19 +99,35 @@ def write_sequence(
     with_depth: bool,
     on_frame: Callable[[], object] = lambda: None,
     effects: Effects | None = None,
+    stereo_baseline_m: float | None = None,
 ) -> None:
     """Render every pose of the table; files are written while the next frames are rendered.
 
     The directory they are written to gets its name when they are whole, so they need no temporary
-    ones. ``on_frame`` is called for each frame that is whole.
+    ones.
+
+    Args:
+        renderer: Draws the frames.
+        poses: Their poses.
+        out: Directory or archive to write.
+        with_depth: Write depth images, too.
+        on_frame: Called for each frame that is whole.
+        effects: What is added to ideal frames, if anything.
+        stereo_baseline_m: Distance to a second camera on the right that is drawn, too; None draws
+            none.
     """
     with _new_sequence(out) as directory, ThreadPoolExecutor(THREADS) as threads:
         waiting: deque[Future[None]] = deque()
         frames = drawn(renderer, poses, with_depth, effects)
+        to_right: Iterator[Frame | None] = repeat(None, len(poses))
+        if stereo_baseline_m is not None:
+            moved = poses.with_poses(moved_right(poses.world_from_cam, stereo_baseline_m))
+            to_right = drawn(renderer, moved, with_depth, None)
         try:
-            for number, (pose, frame) in enumerate(zip(poses.world_from_cam, frames, strict=True)):
+            every = zip(poses.world_from_cam, frames, to_right, strict=True)
+            for number, (pose, frame, right) in enumerate(every):
                 stem = directory / f"frame-{number:06d}"
-                waiting.append(threads.submit(_write_frame, stem, pose, *frame))
+                waiting.append(threads.submit(_write_frame, stem, pose, frame, right))
                 while len(waiting) > (MOST_WAITING if number + 1 < len(poses) else 0):
                     waiting.popleft().result()
                     on_frame()
@@ -111,13 +136,20 @@ def write_sequence(
 
 
 def _write_frame(
-    stem: Path, world_from_cam: NDArray[np.float64], rgb: Rgb, depth_m: Depth | None
+    stem: Path, world_from_cam: NDArray[np.float64], frame: Frame, right: Frame | None
 ) -> None:
-    """Write ``<stem>.color.png``, ``.pose.txt`` and, with depth, ``.depth.png``."""
+    """Write ``<stem>.color.png``, ``.pose.txt``, with depth ``.depth.png``; of a pair both."""
+    stem.with_suffix(f".{POSE}").write_bytes(pose_text(world_from_cam).encode())
+    _write_images(stem, frame, COLOR, DEPTH)
+    if right is not None:
+        _write_images(stem, right, RIGHT_COLOR, RIGHT_DEPTH)
+
+
+def _write_images(stem: Path, frame: Frame, color_kind: str, depth_kind: str) -> None:
+    rgb, depth_m = frame
     if depth_m is not None:
-        stem.with_suffix(".depth.png").write_bytes(encode_png(depth_mm_of(depth_m)))
-    stem.with_suffix(".pose.txt").write_bytes(pose_text(world_from_cam).encode())
-    stem.with_suffix(".color.png").write_bytes(encode_png(rgb))
+        stem.with_suffix(f".{depth_kind}").write_bytes(encode_png(depth_mm_of(depth_m)))
+    stem.with_suffix(f".{color_kind}").write_bytes(encode_png(rgb))
 
 
 def drawn(

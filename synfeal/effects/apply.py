@@ -191,9 +191,9 @@ class _Path:
 
     @cached_property
     def _rays_cam(self) -> NDArray[np.float32]:
-        """Of all pixels (H, W, 3), 1 m along the optical axis."""
+        """Of all pixels (H, W, 3), at depth 1 m; 0 where a lens shows nothing."""
         size = self.camera.width, self.camera.height
-        return cell_directions(self.camera, *size).astype(np.float32)
+        return np.nan_to_num(cell_directions(self.camera, *size)).astype(np.float32)
 
     def _taken(self, light: Light, row: int) -> Rgb:
         """What the camera makes of light (H, W, 3) that reaches its sensor."""

@@ -19,7 +19,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.camera.projection import cell_directions, cell_pixels, pixels_of_normalised
+from synfeal.camera.projection import (
+    cell_directions,
+    cell_pixels,
+    pixel_offset,
+    pixels_of_points,
+)
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
@@ -43,12 +48,15 @@ BLOCK = 2000  # frames at once: bounds memory
 
 
 def _directions(camera: CameraConfig) -> Array:
-    """Camera coordinates (48, 3), z = 1, of the points that the cells' middles show."""
-    return cell_directions(camera, *CELLS).reshape(-1, 3)
+    """Return the points (48, 3) at depth 1 that the cells' middles show.
+
+    Where a fisheye shows nothing, a direction in which nothing is looked for: depth there is none.
+    """
+    return np.nan_to_num(cell_directions(camera, *CELLS).reshape(-1, 3), nan=1.0)
 
 
 def cell_depth_m(caster: RayCaster, camera: CameraConfig, world_from_cam: Array) -> Array:
-    """Depth (N, 48) along the optical axis of poses (N, 4, 4), metres; ``inf`` where nothing is."""
+    """Depth (N, 48) of the cells from poses (N, 4, 4), metres; ``inf`` where nothing is."""
     direction = _directions(camera)
     length = np.linalg.norm(direction, axis=1)
     parts = []
@@ -96,11 +104,10 @@ def _moved(estimate_from_reference: Array, depth_m: Array, camera: CameraConfig)
     points = _directions(camera) * np.where(seen, depth_m, 1.0)[..., None]
     points = np.einsum("nij,nkj->nki", estimate_from_reference[:, :3, :3], points)
     points += estimate_from_reference[:, None, :3, 3]
-    ahead = points[..., 2] > 0
-    normalised = points[..., :2] / np.where(ahead, points[..., 2], 1.0)[..., None]
-    offset = pixels_of_normalised(camera, normalised) - cell_pixels(camera, *CELLS).reshape(-1, 2)
+    cells = cell_pixels(camera, *CELLS).reshape(-1, 2)
+    offset = pixel_offset(camera, cells, pixels_of_points(camera, points))
     share = np.linalg.norm(offset, axis=-1) / np.hypot(camera.width, camera.height)
-    share = np.where(ahead, np.fmin(share, 1.0), 1.0)  # fmin: a lens may fold over far outside
+    share = np.fmin(share, 1.0)  # of a point that the camera cannot show, 1
     with np.errstate(invalid="ignore"):
         return np.asarray((share * seen).sum(axis=1) / seen.sum(axis=1))
 

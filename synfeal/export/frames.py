@@ -14,11 +14,14 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.sevenscenes import INVALID_MM, SPLIT_FILES
 from synfeal.errors import InputError
+from synfeal.geometry.poses import moved_right
 from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.frames import check_names, kinds_of, read_poses
 from synfeal.validation.listing import (
     COLOR,
     DEPTH,
+    RIGHT_COLOR,
+    RIGHT_DEPTH,
     Frame,
     frames_of,
     list_sequences,
@@ -28,6 +31,7 @@ from synfeal.validation.listing import (
 from synfeal.validation.manifest import check_splits, read_splits
 from synfeal.validation.poses import check_rigid, check_tables, rigid_bound
 
+RIGHT = "-right"
 # Links or copies the image of a frame; without a target it only counts the frame as written.
 Place = Callable[[FrameFile, Path | None], None]
 
@@ -39,21 +43,27 @@ class ExportFrame:
     frame: Frame  # its files
     world_from_cam: NDArray[np.float64]  # (4, 4)
     split: str | None  # ``train`` or ``test``; None where the data set has no splits
+    is_right: bool = False  # whether it is that of the right camera of a stereo pair
 
     @property
     def sequence(self) -> str:
-        """Name of the sequence."""
-        return self.frame.sequence.stem
+        """Name of the sequence; right images are a sequence of their own, ``seq-01-right``."""
+        return self.frame.sequence.stem + RIGHT * self.is_right
 
     @property
     def color(self) -> FrameFile:
         """The colour image."""
-        return self.frame.path(COLOR)
+        return self.frame.path(RIGHT_COLOR if self.is_right else COLOR)
 
     @property
     def depth(self) -> FrameFile:
         """The depth image, which need not exist."""
-        return self.frame.path(DEPTH)
+        return self.frame.path(RIGHT_DEPTH if self.is_right else DEPTH)
+
+    @property
+    def stem(self) -> str:
+        """``frame-000000``, the same for both images of a stereo pair."""
+        return f"frame-{self.frame.number:06d}"
 
 
 @dataclass(frozen=True)
@@ -102,6 +112,16 @@ def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
         ExportFrame(frame, poses[frame], split_of.get(frame.sequence))
         for frame in frames_of(sequences)
     )
+    if camera.config.stereo_baseline_m is not None and RIGHT_COLOR in kinds_of(sequences):
+        frames += tuple(
+            ExportFrame(
+                left.frame,
+                moved_right(left.world_from_cam, camera.config.stereo_baseline_m),
+                left.split,
+                is_right=True,
+            )
+            for left in frames
+        )
     height, width = read_color(frames[0].color).shape[:2]
     if (width, height) != (camera.config.width, camera.config.height):
         raise InputError(
@@ -121,9 +141,18 @@ def need_splits(data: ExportSet) -> None:
             )
 
 
+def need_perspective(data: ExportSet, program: str) -> None:
+    """Refuse a fisheye or a panorama where a format has no such camera."""
+    if data.camera.projection is not None:
+        raise InputError(
+            f"{data.path}: {program} knows perspective cameras, and this one is"
+            f" {data.camera.projection}; export to colmap or nerfstudio"
+        )
+
+
 def frame_name(frame: ExportFrame) -> str:
     """What an image is called below ``images``."""
-    return f"{frame.sequence}/{frame.color.name}"
+    return f"{frame.sequence}/{frame.stem}.{COLOR}"
 
 
 def write_lines(path: Path, lines: Iterable[str]) -> None:

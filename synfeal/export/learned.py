@@ -14,7 +14,9 @@ columns ``scene,split,seq,img_path,t1,t2,t3,q1,q2,q3,q4``, poses ``world_from_ca
 Nerfstudio. Source: its documentation, "Data conventions", and its data
 parser: cameras are x right, y up, z backward; the world has z up; the centre of the first pixel is
 at (0.5, 0.5); depth is in millimetres along the optical axis, 0 where there is none; the three
-lists of file names go together and evaluation during training reads ``val_filenames``.
+lists of file names go together and evaluation during training reads ``val_filenames``. Rays of
+``OPENCV_FISHEYE`` and ``EQUIRECTANGULAR`` are of unit length there, so that depth is along the ray;
+the focal length of a panorama is its height.
 """
 
 from __future__ import annotations
@@ -25,7 +27,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from synfeal.camera.fisheye import EQUIDISTANT
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.sequence_listing import DEPTH
 from synfeal.dataset.sevenscenes import pose_text
 from synfeal.errors import InputError
 from synfeal.export.frames import (
@@ -33,6 +37,7 @@ from synfeal.export.frames import (
     ExportSet,
     Place,
     frame_name,
+    need_perspective,
     need_splits,
     rewrite_depth,
     write_lines,
@@ -44,6 +49,7 @@ from synfeal.records.files import write_json
 def export_ace(data: ExportSet, out: Path, place: Place) -> None:
     """Write the splits; ACE knows one focal length and no distortion."""
     need_splits(data)
+    need_perspective(data, "ACE")
     camera = data.camera.intrinsics
     if any(data.camera.distortion) or abs(camera.fx - camera.fy) > 1e-5 * camera.fx:
         raise InputError(
@@ -61,7 +67,7 @@ def export_ace(data: ExportSet, out: Path, place: Place) -> None:
 
 
 def _stem(frame: ExportFrame) -> str:
-    return f"{frame.sequence}-{frame.color.name.removesuffix('.color.png')}"
+    return f"{frame.sequence}-{frame.stem}"
 
 
 COLUMNS = ("scene", "split", "seq", "img_path", "t1", "t2", "t3", "q1", "q2", "q3", "q4")
@@ -93,7 +99,7 @@ def export_nerfstudio(data: ExportSet, out: Path, place: Place) -> None:
         entry = {"file_path": _image(frame), "transform_matrix": world_from_gl.tolist()}
         place(frame.color, out / _image(frame))
         if data.has_depth:
-            entry["depth_file_path"] = f"depth/{frame.sequence}/{frame.depth.name}"
+            entry["depth_file_path"] = f"depth/{frame.sequence}/{frame.stem}.{DEPTH}"
             rewrite_depth(frame.depth, out / entry["depth_file_path"])
         frames.append(entry)
     splits = {}
@@ -108,6 +114,15 @@ def _image(frame: ExportFrame) -> str:
 
 
 def _camera(camera: CameraConfig) -> dict[str, Any]:
-    names = ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-    numbers = dict(zip(names, (*camera.intrinsics, *camera.distortion), strict=True))
-    return {"camera_model": "OPENCV", "w": camera.width, "h": camera.height, **numbers}
+    size = {"w": camera.width, "h": camera.height}
+    if camera.projection == "equirectangular":
+        focal = {"fl_x": camera.height, "fl_y": camera.height}
+        middle = {"cx": camera.width / 2.0, "cy": camera.height / 2.0}
+        return {"camera_model": "EQUIRECTANGULAR", **size, **focal, **middle}
+    pinhole = dict(zip(("fl_x", "fl_y", "cx", "cy"), camera.intrinsics, strict=True))
+    if camera.projection == "fisheye":
+        radial = camera.fisheye_k or EQUIDISTANT
+        lens = dict(zip(("k1", "k2", "k3", "k4"), radial, strict=True))
+        return {"camera_model": "OPENCV_FISHEYE", **size, **pinhole, **lens}
+    distortion = dict(zip(("k1", "k2", "p1", "p2", "k3"), camera.distortion, strict=True))
+    return {"camera_model": "OPENCV", **size, **pinhole, **distortion}

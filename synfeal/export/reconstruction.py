@@ -21,19 +21,30 @@ import logging
 import shutil
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from PIL import Image
+
+from synfeal.camera.fisheye import EQUIDISTANT
+from synfeal.camera.projection import cell_directions
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.export.frames import (
+    RIGHT,
     ExportFrame,
     ExportSet,
     Place,
     frame_name,
+    need_perspective,
     need_splits,
     rewrite_depth,
     write_lines,
 )
 from synfeal.geometry.poses import inverse, quat_wxyz_of
+from synfeal.records.files import write_json
+
+log = logging.getLogger("synfeal")
 
 
 def export_colmap(data: ExportSet, out: Path, place: Place) -> None:
@@ -43,9 +54,59 @@ def export_colmap(data: ExportSet, out: Path, place: Place) -> None:
     write_model(model, data.camera, data.frames)
     for frame in data.frames:
         place(frame.color, out / "images" / frame_name(frame))
+    _write_mask(data.camera, out / MASK)
+    if any(frame.is_right for frame in data.frames):
+        write_json(out / "rig_config.json", _rigs(data))
     if data.has_splits:
         for split in ("train", "test"):
             write_lines(out / f"{split}.txt", [frame_name(frame) for frame in data.of_split(split)])
+
+
+def _rigs(data: ExportSet) -> list[dict[str, Any]]:
+    """The stereo pairs as ``colmap rig_configurator`` reads them, a rig for each sequence."""
+    assert data.camera.stereo_baseline_m is not None
+    sequences = dict.fromkeys(frame.sequence for frame in data.frames if not frame.is_right)
+    right_from_left_m = [-data.camera.stereo_baseline_m, 0.0, 0.0]
+    return [
+        {
+            "cameras": [
+                {"image_prefix": f"{name}/", "ref_sensor": True},
+                {
+                    "image_prefix": f"{name}{RIGHT}/",
+                    "cam_from_rig_rotation": [1.0, 0.0, 0.0, 0.0],
+                    "cam_from_rig_translation": right_from_left_m,
+                },
+            ]
+        }
+        for name in sequences
+    ]
+
+
+MASK = "camera_mask.png"
+LARGEST_ANGLE_DEG = 89.0
+
+
+def _write_mask(camera: CameraConfig, path: Path) -> None:
+    """Write a mask of the pixels that COLMAP's fisheye model holds for, if not for all.
+
+    Its formulas are in x / z and y / z, so that it takes a pixel which looks sideways or backwards
+    for one that looks ahead.
+    """
+    if camera.projection != "fisheye":
+        return
+    ray = cell_directions(camera, camera.width, camera.height)
+    with np.errstate(invalid="ignore"):
+        good = ray[..., 2] > np.cos(np.radians(LARGEST_ANGLE_DEG))
+    if good.all():
+        return
+    Image.fromarray(np.where(good, 255, 0).astype(np.uint8)).save(path)
+    log.warning(
+        "%.0f %% of the pixels look farther from the axis than %g degrees, where COLMAP's fisheye"
+        " models end; %s leaves them out (--ImageReader.camera_mask_path)",
+        100.0 * float(np.mean(~good)),
+        LARGEST_ANGLE_DEG,
+        MASK,
+    )
 
 
 def write_model(folder: Path, camera: CameraConfig, frames: Iterable[ExportFrame]) -> None:
@@ -64,6 +125,12 @@ def write_model(folder: Path, camera: CameraConfig, frames: Iterable[ExportFrame
 
 def camera_line(camera: CameraConfig) -> str:
     """The simplest of COLMAP's models that holds the camera."""
+    if camera.projection == "equirectangular":
+        size = f"{camera.width} {camera.height}"
+        return f"1 EQUIRECTANGULAR {size} {_numbers([camera.width, camera.height])}"
+    if camera.projection == "fisheye":
+        lens = [*camera.intrinsics, *(camera.fisheye_k or EQUIDISTANT)]
+        return f"1 OPENCV_FISHEYE {camera.width} {camera.height} {_numbers(lens)}"
     *first, k3 = camera.distortion
     parameters: list[float] = list(camera.intrinsics)
     if not any(camera.distortion):
@@ -82,6 +149,8 @@ def _numbers(values: list[float]) -> str:
 def export_hloc(data: ExportSet, out: Path, place: Place) -> None:
     """Write ``images/``, ``model/``, ``sfm_reference/`` and the lists."""
     need_splits(data)
+    if data.camera.projection == "equirectangular":
+        need_perspective(data, "hloc")
     for frame in data.frames:
         place(frame.color, out / "images" / frame_name(frame))
     _write_binary(out / "model", data, data.frames)
@@ -110,12 +179,12 @@ FRAMES_PER_S = 30.0
 UNITS_PER_M = 5000
 MOST_M = 65535 / UNITS_PER_M
 
-log = logging.getLogger("synfeal")
 Lists = dict[str, list[str]]
 
 
 def export_tum(data: ExportSet, out: Path, place: Place) -> None:
     """Write ``seq-XX/{rgb.txt,depth.txt,groundtruth.txt,rgb/,depth/}``; warns of lost depths."""
+    need_perspective(data, "TUM's format")
     lists: dict[str, Lists] = {}
     lost = 0.0
     for frame in data.frames:

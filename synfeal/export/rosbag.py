@@ -21,7 +21,7 @@ import numpy as np
 
 from synfeal.dataset.sevenscenes import INVALID_MM, SPLIT_FILES
 from synfeal.errors import InputError
-from synfeal.export.frames import ExportFrame, ExportSet, Place
+from synfeal.export.frames import ExportFrame, ExportSet, Place, need_perspective
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.validation.listing import read_color, read_depth_mm
 
@@ -39,8 +39,9 @@ def export_rosbag(data: ExportSet, out: Path, place: Place) -> None:
     """Write ``seq-XX/{metadata.yaml,seq-XX.db3}`` and the files that list the splits.
 
     Raises:
-        InputError: The package rosbags is not there.
+        InputError: The package rosbags is not there, or the camera is a fisheye or a panorama.
     """
+    need_perspective(data, "a bag's depth image (REP 118)")
     try:
         from rosbags.typesys import Stores, get_typestore
     except ImportError:

@@ -56,6 +56,18 @@ def relative(world_from_a: ArrayLike, world_from_b: ArrayLike) -> Array:
     return pose_matrix(rotation_t @ b[..., :3, :3], offset)
 
 
+def moved_right(world_from_cam: ArrayLike, distance_m: float) -> Array:
+    """Return poses (..., 4, 4) moved along their own x axis: those of a stereo pair's right camera.
+
+    Args:
+        world_from_cam: Poses (..., 4, 4).
+        distance_m: Distance, metres.
+    """
+    moved = np.array(world_from_cam, dtype=np.float64)
+    moved[..., :3, 3] += distance_m * moved[..., :3, 0]
+    return moved
+
+
 def interpolate(pose_a: ArrayLike, pose_b: ArrayLike, fraction: ArrayLike) -> Array:
     """Interpolate poses (N, 4, 4) at fractions (N,) from a to b.
 

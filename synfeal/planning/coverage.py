@@ -11,8 +11,12 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from synfeal.camera.distortion import fold_radius
-from synfeal.camera.projection import cell_directions, pixels_of_normalised
+from synfeal.camera.projection import (
+    cell_directions,
+    depth_of_points,
+    is_shown,
+    pixels_of_points,
+)
 from synfeal.config.collection import SceneConfig
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
@@ -108,12 +112,8 @@ def in_image(camera: CameraConfig, world_from_cam: Array, points_m: Array) -> ND
     offset = points_m - world_from_cam[:3, 3]
     at = offset @ world_from_cam[:3, :3]
     reached = np.einsum("ni,ni->n", at, at) <= FARTHEST_M**2
-    inside: NDArray[np.bool_] = reached & (at[:, 2] > camera.near_m)
-    normalised = at[inside, :2] / at[inside, 2:]
-    pixel = pixels_of_normalised(camera, normalised)
-    within = ((pixel >= 0.0) & (pixel <= [camera.width, camera.height])).all(axis=1)
-    # Beyond its fold a lens model maps what is far outside back into the image.
-    inside[inside] = within & (np.linalg.norm(normalised, axis=1) < fold_radius(camera.distortion))
+    inside: NDArray[np.bool_] = reached & (depth_of_points(camera, at) > camera.near_m)
+    inside[inside] = is_shown(camera, pixels_of_points(camera, at[inside]))
     return inside
 
 
@@ -142,13 +142,15 @@ def empty_pixels(caster: RayCaster, plan: PoseTable, camera: CameraConfig) -> Em
 
 def empty_shares(caster: RayCaster, world_from_cam: Array, camera: CameraConfig) -> Array:
     """Share (N,) of the pixels that show nothing, from each of the poses (N, 4, 4)."""
-    ray = cell_directions(camera, COLUMNS, ROWS).reshape(-1, 3)  # one metre along the axis
+    ray = cell_directions(camera, COLUMNS, ROWS).reshape(-1, 3)  # at depth 1
+    n_rays = len(ray)
+    ray = ray[np.isfinite(ray).all(axis=1)]  # a fisheye may show nothing in its corners
     shares = np.empty(len(world_from_cam))
     for index, pose in enumerate(world_from_cam):
         direction = ray @ pose[:3, :3].T
         start = pose[:3, 3] + camera.near_m * direction
         depth_m = camera.near_m + caster.first_hit_m(start, direction) / np.linalg.norm(ray, axis=1)
-        shares[index] = np.mean(depth_m > camera.far_m)
+        shares[index] = 1.0 - np.sum(depth_m <= camera.far_m) / n_rays
     return shares
 
 

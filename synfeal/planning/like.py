@@ -147,6 +147,11 @@ def resized(camera: CameraConfig, width: int | None, height: int | None) -> Came
     Raises:
         InputError: The two sides would not keep the aspect ratio.
     """
+    if camera.projection is not None:
+        raise InputError(
+            f"--like: its camera is {camera.projection}; give --camera FILE, or --projection and"
+            " --fov"
+        )
     fx, fy, cx, cy = camera.intrinsics
     lens = Calibration(camera.width, camera.height, fx, fy, cx, cy, camera.distortion)
     try:

@@ -48,6 +48,11 @@ def open_renderer(
     Raises:
         InputError: the backend named in ``render`` does not work on this machine, or none does.
     """
+    if camera.projection is not None:
+        from synfeal.render.cube import CubeRenderer  # loads SciPy: only when needed
+
+        background = (render or RenderConfig()).background_rgb
+        return CubeRenderer(lambda face: open_renderer(mesh, face, render), camera, background)
     if any(camera.distortion):
         from synfeal.render.distorted import DistortedRenderer  # loads SciPy: only when needed
 

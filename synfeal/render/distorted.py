@@ -9,7 +9,6 @@ a plane, so it is interpolated there and exact; elsewhere the nearest pixel's is
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +20,12 @@ from synfeal.errors import InputError
 from synfeal.render.base import Depth, Renderer, Rgb
 
 Array = NDArray[np.float64]
+# Rows of an image and an offset, pixels, to points (rows, W, 2) of a drawn image.
+Locate = Callable[[range, tuple[float, float]], Array]
 
-_OVERSAMPLING = 2.0
-_MARGIN_PX = 3  # around the pixels that are read: neighbours, and differences between them
-_LONGEST_SIDE_PX = 8192  # what CameraConfig and OpenGL allow
+OVERSAMPLING = 2.0
+MARGIN_PX = 3  # around the pixels that are read: neighbours, and differences between them
+LONGEST_SIDE_PX = 8192  # what CameraConfig and OpenGL allow
 # Points within a pixel whose mean is its colour, pixels from its centre.
 _POINTS = [(x, y) for y in (-0.25, 0.25) for x in (-0.25, 0.25)]
 _BAND = 64  # rows of the image that are mapped at a time
@@ -39,8 +40,12 @@ class DistortedRenderer(Renderer):
         """Open the inner renderer with the camera that :func:`covering_camera` gives."""
         self._shape = (camera.height, camera.width)
         pinhole = covering_camera(camera)
-        self._colour = _colour_matrix(camera, pinhole)
-        self._depth_taps = _taps(_seen_at(camera, pinhole, range(camera.height)), pinhole.width)
+        self._colour = colour_matrix(
+            lambda rows, offset: _seen_at(camera, pinhole, rows, offset),
+            size=self._shape,
+            drawn_size=(pinhole.height, pinhole.width),
+        )
+        self._depth_taps = taps(_seen_at(camera, pinhole, range(camera.height)), pinhole.width)
         self._inner = open_pinhole(pinhole)
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
@@ -78,15 +83,15 @@ def covering_camera(camera: CameraConfig) -> CameraConfig:
     edge = normalised_of_pixels(camera, np.concatenate(sides))
     fx, fy, _, _ = camera.intrinsics
     extent = np.ptp(edge, axis=0) * [fx, fy]
-    scale = min(_OVERSAMPLING, (_LONGEST_SIDE_PX - 2 * _MARGIN_PX - 2) / extent.max())
+    scale = min(OVERSAMPLING, (LONGEST_SIDE_PX - 2 * MARGIN_PX - 2) / extent.max())
     if scale < 1.0:
         raise InputError(
             f"distortion: the lens sees so much that a pinhole needs {extent.max():.0f} pixels for"
-            f" it, more than {_LONGEST_SIDE_PX}; give a smaller width"
+            f" it, more than {LONGEST_SIDE_PX}; give a smaller width"
         )
     focal = np.array([fx, fy]) * scale
-    low = np.floor(edge.min(axis=0) * focal) - _MARGIN_PX
-    width, height = np.ceil(edge.max(axis=0) * focal - low) + _MARGIN_PX
+    low = np.floor(edge.min(axis=0) * focal) - MARGIN_PX
+    width, height = np.ceil(edge.max(axis=0) * focal - low) + MARGIN_PX
     lens = dict(zip(("fx", "fy", "cx", "cy"), (*focal, *-low), strict=True))
     size = {"width": max(16, int(width)), "height": max(16, int(height))}
     return camera.model_copy(update={**lens, **size, "distortion": (0.0,) * 5})
@@ -122,33 +127,57 @@ def _seen_at(
     camera: CameraConfig, pinhole: CameraConfig, rows: range, offset: tuple[float, float] = (0, 0)
 ) -> Array:
     """Where rows of the image lie in the pinhole image: (rows, W, 2)."""
-    column, row = np.meshgrid(np.arange(camera.width) + 0.5, np.array(rows) + 0.5)
-    normalised = normalised_of_pixels(camera, np.stack([column, row], axis=-1) + offset)
+    normalised = normalised_of_pixels(camera, pixels_of_rows(camera, rows, offset))
     fx, fy, cx, cy = pinhole.intrinsics
     return normalised * [fx, fy] + [cx, cy]
 
 
-def _taps(pixel: Array, width: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Neighbours (..., 4) of points (..., 2) in a flat image of ``width``, and their weights."""
+def pixels_of_rows(camera: CameraConfig, rows: range, offset: tuple[float, float]) -> Array:
+    """Centres of the pixels of some rows, moved by ``offset``: (rows, W, 2), column and row."""
+    column, row = np.meshgrid(np.arange(camera.width) + 0.5, np.array(rows) + 0.5)
+    return np.stack([column, row], axis=-1) + offset
+
+
+def taps(pixel: Array, width: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Neighbours (..., 4) of points (..., 2) in a flat image of ``width``, and their weights.
+
+    Of a point that is NaN all weights are 0.
+    """
+    shown = np.isfinite(pixel).all(axis=-1, keepdims=True)
+    pixel = np.where(shown, pixel, 0.5)
     corner = np.floor(pixel - 0.5)
     x, y = np.moveaxis(pixel - 0.5 - corner, -1, 0)
     first = corner[..., 1] * width + corner[..., 0]
     index = np.stack([first, first + 1, first + width, first + width + 1], axis=-1)
     weight = np.stack([(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y], axis=-1)
-    return index.astype(np.int32), weight.astype(np.float32)
+    return index.astype(np.int32), (weight * shown).astype(np.float32)
 
 
-def _colour_matrix(camera: CameraConfig, pinhole: CameraConfig) -> Any:
-    """The sparse matrix that makes the pixels of the image from those of the pinhole image."""
+def colour_matrix(
+    locate: Locate, size: tuple[int, int], drawn_size: tuple[int, int]
+) -> sparse.csr_matrix:
+    """Build the matrix that makes the pixels of an image from those of a drawn one.
+
+    Each is the mean of 2x2 points, read bilinearly.
+
+    Args:
+        locate: Gives where rows of the image, moved by an offset in pixels, lie in the drawn one.
+        size: Height and width of the image.
+        drawn_size: Height and width of the drawn image.
+
+    Returns:
+        Weights (pixels, drawn pixels); rows add up to less than 1 where points are NaN.
+    """
+    height, width = size
     per_row = 4 * len(_POINTS)
-    shape = (camera.height, camera.width, per_row)
-    index, weight = np.empty(shape, np.int32), np.empty(shape, np.float32)
-    for start in range(0, camera.height, _BAND):
-        rows = range(start, min(start + _BAND, camera.height))
+    index = np.empty((height, width, per_row), np.int32)
+    weight = np.empty((height, width, per_row), np.float32)
+    for start in range(0, height, _BAND):
+        rows = range(start, min(start + _BAND, height))
         for number, point in enumerate(_POINTS):
             at = np.s_[start : rows.stop, :, 4 * number : 4 * number + 4]
-            index[at], weight[at] = _taps(_seen_at(camera, pinhole, rows, point), pinhole.width)
+            index[at], weight[at] = taps(locate(rows, point), drawn_size[1])
     ends = np.arange(0, index.size + 1, per_row)
-    size = (camera.height * camera.width, pinhole.height * pinhole.width)
+    shape = (height * width, drawn_size[0] * drawn_size[1])
     values = weight.reshape(-1) / len(_POINTS)
-    return sparse.csr_matrix((values, index.reshape(-1), ends), shape=size)
+    return sparse.csr_matrix((values, index.reshape(-1), ends), shape=shape)

@@ -197,16 +197,27 @@ def _one(
         raise InputError(f"--{kind}-focal: comes from --{kind}-camera too; leave one of them out")
     if file is not None:
         try:
-            return CameraConfig.model_validate(
+            camera = CameraConfig.model_validate(
                 {"calibration": file, "width": size[0], "height": size[1]}
             )
         except ValidationError as error:
             raise InputError(f"--{kind}-camera: {describe(error)}") from error
+        _refuse_wide(camera, f"--{kind}-camera: {file}")
+        return camera
     if focal_px is not None:
         if not 0 < focal_px < 1e5:
             raise InputError(f"--{kind}-focal: must be above 0 pixels, found {focal_px:g}")
         return pinhole(*size, focal_px)
     return None
+
+
+def _refuse_wide(camera: CameraConfig, name: str) -> None:
+    """Refuse a fisheye or a panorama: depth is fused as that of a perspective camera."""
+    if camera.projection is not None:
+        raise InputError(
+            f"{name}: is a camera of projection {camera.projection}, and a perspective one is"
+            " needed; undistort the images first"
+        )
 
 
 def _of_manifest(sequence: Path) -> RgbdCamera | None:
@@ -217,6 +228,7 @@ def _of_manifest(sequence: Path) -> RgbdCamera | None:
     with read_as(path, "a manifest"):
         values = read_json(path)
         camera = CameraConfig.model_validate(values.get("camera", values))
+    _refuse_wide(camera, str(path))
     return RgbdCamera(camera, camera, np.eye(4), MILLIMETRES, MANIFEST)
 
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from statistics import median_low
 
@@ -16,13 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from synfeal.camera.projection import normalised_of_pixels, pixels_of_normalised
+from synfeal.camera.projection import horizontal_fov_rad, normalised_of_pixels, pixels_of_normalised
 from synfeal.config.dataset import CameraConfig
 from synfeal.errors import InputError
-from synfeal.geometry.poses import pose_error
-from synfeal.validation.camera import KnownCamera, Lens
+from synfeal.geometry.poses import moved_right, pose_error
+from synfeal.validation.camera import KnownCamera, Lens, lens_of
 from synfeal.validation.frames import Poses
-from synfeal.validation.listing import COLOR, DEPTH, Check, Frame, read_color, read_depth_mm
+from synfeal.validation.listing import (
+    COLOR,
+    DEPTH,
+    RIGHT_COLOR,
+    RIGHT_DEPTH,
+    Check,
+    Frame,
+    read_color,
+    read_depth_mm,
+)
 from synfeal.validation.poses import GAPS
 from synfeal.validation.reprojection import Residual, View, camera_normal, compare
 
@@ -62,6 +71,14 @@ MEASURES = (
 )
 
 
+def measures_of(lens: Lens) -> tuple[Measure, ...]:
+    """Return the measures, described as they are taken through a lens."""
+    if lens.share == 0.5:
+        return MEASURES
+    depth, *others = MEASURES
+    return (replace(depth, what=f"difference in depth of {lens.share:.0%} of the points"), *others)
+
+
 @dataclass(frozen=True)
 class Pair:
     """Two frames of a sequence and their residual, None where they share too little."""
@@ -80,8 +97,10 @@ def check_consistency(
     """Compare every pair; one check for each measure and one for the camera."""
     config = camera.depth
     step = max(1, round(math.sqrt(config.width * config.height / GRID_PIXELS)))
-    lens = Lens(config, step)
-    moved = [Lens(config, step, tuple(row)) for row in np.diag(DELTA).tolist()]
+    lens = lens_of(config, step)
+    has_intrinsics = config.projection != "equirectangular"
+    moves = np.diag(DELTA).tolist() if has_intrinsics else []
+    moved = [lens_of(config, step, tuple(row)) for row in moves]
     view = lru_cache(GAPS[-1] + 2)(lambda frame: _view(frame, poses[frame], camera))
     compared: list[Pair] = []
     system = np.zeros((len(DELTA), len(DELTA) + 1))
@@ -91,27 +110,81 @@ def check_consistency(
             residual = compare(view_a, view_b, lens)
             if residual and residual.overlap < MIN_OVERLAP:
                 residual = None
-            if residual and not residual.hidden:
+            if moved and residual and not residual.hidden:
                 system += camera_normal(view_a, view_b, lens, moved, DELTA)
         compared.append(Pair(a, b, residual))
         on_pair()
     checks = [_overlap_check(compared, poses, config)]
-    checks += [measure_check(measure, compared) for measure in MEASURES]
-    checks.append(_camera_check(system, camera))
+    checks += [measure_check(measure, compared) for measure in measures_of(lens)]
+    if has_intrinsics:
+        checks.append(_camera_check(system, camera))
     if not camera.assumed:
         return checks
     why = "not judged, the camera is assumed"
     return [Check(check.name, f"{check.text}; {why}", skipped=True) for check in checks]
 
 
-def _view(frame: Frame, world_from_cam: NDArray[np.float64], camera: KnownCamera) -> View | None:
+def check_stereo(
+    frames: Sequence[Frame],
+    poses: Poses,
+    camera: KnownCamera,
+    on_frame: Callable[[], object],
+) -> Check:
+    """Compare the two images of stereo pairs as any two frames are.
+
+    Args:
+        frames: Frames to look at.
+        poses: Poses of the left camera.
+        camera: The camera, which says how far apart the two are.
+        on_frame: Called for each frame.
+    """
+    baseline_m = camera.config.stereo_baseline_m
+    assert baseline_m is not None
+    config = camera.config
+    lens = lens_of(config, max(1, round(math.sqrt(config.width * config.height / GRID_PIXELS))))
+    worst = {measure.field: 0.0 for measure in MEASURES}
+    failures = []
+    n_compared = 0
+    for frame in frames:
+        on_frame()
+        left = _view(frame, poses[frame], camera)
+        moved = moved_right(poses[frame], baseline_m)
+        right = _view(frame, moved, camera, color=RIGHT_COLOR, depth=RIGHT_DEPTH)
+        residual = compare(left, right, lens) if left and right else None
+        if residual is None or residual.hidden:
+            continue
+        n_compared += 1
+        for measure in measures_of(lens):
+            value = getattr(residual, measure.field)
+            if residual.overlap < measure.min_overlap or not math.isfinite(value):
+                continue
+            worst[measure.field] = max(worst[measure.field], value)
+            if value > measure.bound:
+                failures.append(
+                    f"{frame.path(RIGHT_COLOR)}: {measure.what} from the left image is"
+                    f" {value:.2g}{measure.unit}, bound {measure.bound:g}; is the pair"
+                    f" {baseline_m:g} m apart?"
+                )
+    # An edge may hide from one of two right images what the other sees.
+    wrong = tuple(failures) if 2 * len({f.partition(":")[0] for f in failures}) > n_compared else ()
+    said = f"depth {worst['depth']:.2g}, shift {worst['shift_px']:.2g} px at worst"
+    return Check("stereo", f"{n_compared} pairs {baseline_m:g} m apart, {said}", wrong)
+
+
+def _view(
+    frame: Frame,
+    world_from_cam: NDArray[np.float64],
+    camera: KnownCamera,
+    color: str = COLOR,
+    depth: str = DEPTH,
+) -> View | None:
     """The frame, None if it cannot be read or has another size: other checks say so.
 
     Colours are those of the pixels of depth, whichever camera took them.
     """
     try:
-        depth_mm = read_depth_mm(frame.path(DEPTH))
-        grey = read_color(frame.path(COLOR)).astype(np.float32) @ LUMA
+        depth_mm = read_depth_mm(frame.path(depth))
+        grey = read_color(frame.path(color)).astype(np.float32) @ LUMA
     except InputError:
         return None
     if grey.shape != (camera.config.height, camera.config.width):
@@ -166,7 +239,7 @@ def _overlap_check(pairs: list[Pair], poses: Poses, camera: CameraConfig) -> Che
 
 def _are_neighbours(pair: Pair, poses: Poses, camera: CameraConfig) -> bool:
     step_m, turn_rad = pose_error(poses[pair.a], poses[pair.b])
-    view_rad = 2.0 * math.atan(camera.width / 2.0 / camera.intrinsics.fx)
+    view_rad = horizontal_fov_rad(camera)
     return bool(step_m <= SMALL_STEP_M and turn_rad <= SMALL_TURN * view_rad)
 
 

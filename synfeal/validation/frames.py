@@ -16,6 +16,8 @@ from synfeal.validation.listing import (
     COLOR,
     DEPTH,
     POSE,
+    RIGHT_COLOR,
+    RIGHT_DEPTH,
     Check,
     Frame,
     Pixels,
@@ -36,9 +38,13 @@ MOST = {"of one colour": 0.05, "more than half empty": 0.25}
 
 
 def kinds_of(sequences: Iterable[SequenceListing]) -> tuple[str, ...]:
-    """The kinds of file every frame must have: depth only if any frame has it."""
-    with_depth = any(sequence.numbers[DEPTH] for sequence in sequences)
-    return (COLOR, DEPTH, POSE) if with_depth else (COLOR, POSE)
+    """The kinds of file every frame must have: depth and right images only if any frame has."""
+    listed = list(sequences)
+    return tuple(
+        kind
+        for kind in (COLOR, DEPTH, POSE, RIGHT_COLOR, RIGHT_DEPTH)
+        if kind in (COLOR, POSE) or any(sequence.numbers[kind] for sequence in listed)
+    )
 
 
 def check_names(sequences: Sequence[SequenceListing]) -> Check:
@@ -76,7 +82,12 @@ def check_images(
     sensor, does not tell what is empty.
     """
     size = (camera.width, camera.height) if camera else None
-    readers: dict[str, Callable[[FrameFile], Pixels]] = {COLOR: read_color, DEPTH: read_depth_mm}
+    readers: dict[str, Callable[[FrameFile], Pixels]] = {
+        COLOR: read_color,
+        DEPTH: read_depth_mm,
+        RIGHT_COLOR: read_color,
+        RIGHT_DEPTH: read_depth_mm,
+    }
     failures: list[str] = []
     blank: dict[str, list[Frame]] = {what: [] for what in MOST}
     n_frames = n_images = 0

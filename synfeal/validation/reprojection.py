@@ -61,7 +61,9 @@ class Residual:
     overlap: float  # share of the pixels of a with depth that b sees, hidden ones included
     # whether so many of them are behind what b sees that all that follows is NaN
     hidden: bool = True
-    depth: float = math.nan  # median difference in depth, in multiples of what may differ there
+    # difference in depth of a share of the points, half of perspective images, in multiples of what
+    # may differ there
+    depth: float = math.nan
     in_front: float = math.nan  # share of points that lie in front of what b sees, which cannot be
     grey: float = math.nan  # median difference of grey levels
     # by how much b's image must be moved, turned and zoomed to explain the differences of grey
@@ -98,7 +100,7 @@ def compare(a: View, b: View, lens: Lens) -> Residual | None:
     return Residual(
         overlap,
         hidden=False,
-        depth=float(np.median(difference_m / seen.tolerance_m[visible])),
+        depth=float(np.quantile(difference_m / seen.tolerance_m[visible], lens.share)),
         in_front=float(np.mean(ratio[visible] * OCCLUSION_RATIO < 1.0)),
         grey=float(np.median(np.abs(grey_error))),
         shift_px=_shift_px(grey_error, seen.gradient[visible], lens.places[visible]),
@@ -110,9 +112,9 @@ def _look(a: View, b: View, lens: Lens) -> _Seen:
     depth = a.depth_m[lens.rows, lens.columns].astype(np.float64)
     b_from_a = relative(b.world_from_cam, a.world_from_cam)
     known = np.isfinite(depth)
-    points = np.where(known, depth, 0.0)[:, None] * lens.rays
+    points = np.where(known, depth, np.nan)[:, None] * lens.rays
     points = points @ b_from_a[:3, :3].T + b_from_a[:3, 3]
-    pixels = np.where(known[:, None], lens.project(points), np.nan) - 0.5
+    pixels = lens.project(points) - 0.5
     height, width = b.depth_m.shape
     with np.errstate(invalid="ignore"):
         mask = np.all((pixels >= 0.0) & (pixels < [width - 1, height - 1]), axis=1)
@@ -127,10 +129,10 @@ def _look(a: View, b: View, lens: Lens) -> _Seen:
         seen[magnified <= 0.0] = np.nan
         v00, v01, v10, v11 = 1.0 / _corners(b.depth_m, corner)
         off_plane = seen**2 * np.abs(v00 + v11 - v01 - v10) / 2.0
-    tolerance = ROUNDING_M * (1.0 + np.abs(magnified)) + off_plane
+    tolerance = ROUNDING_M * (1.0 + np.abs(magnified)) + off_plane + lens.curvature * seen
     tolerance += POSE_ROUNDING * max(np.abs(v.world_from_cam[:3, 3]).max() for v in (a, b))
     grey, gradient = _interpolate(b.grey, corner, fraction)
-    return _Seen(mask, points[:, 2], seen, tolerance, grey, gradient)
+    return _Seen(mask, lens.depth_of(points), seen, tolerance, grey, gradient)
 
 
 def _magnification(
@@ -141,15 +143,11 @@ def _magnification(
     Of ``inverse`` (N,) depth in b, which changes by ``slope`` (N, 2) from pixel to pixel; points
     and rays at depth 1 in a are in the frame of b.
 
-    On a plane ``normal @ point = offset`` the inverse of depth is linear in x / z and y / z, with
-    ``normal / offset`` as its coefficients. Moved along the ray of a, the plane is met in b nearer
-    or farther by ``normal @ ray_of_a / normal @ ray_of_b``. Below 0, a sees the surface from its
-    other side: it can only be another one, behind a thin wall.
+    Moved along the ray of a, the plane ``normal @ point = 1`` is met in b nearer or farther by
+    ``normal @ ray_of_a / normal @ ray_of_b``. Below 0, a sees the surface from its other side: it
+    can only be another one, behind a thin wall.
     """
-    along = slope * lens.focal_px
-    place = points[:, :2] / points[:, 2:]
-    constant = inverse - np.einsum("ni,ni->n", along, place)
-    normal = np.column_stack([along, constant])
+    normal = lens.normals(points, inverse, slope)
     return np.asarray(np.einsum("ni,ni->n", normal, rays_of_a) / inverse)
 
 

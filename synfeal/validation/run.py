@@ -9,9 +9,17 @@ from tqdm import tqdm
 
 from synfeal.errors import InputError
 from synfeal.validation.camera import KnownCamera, camera_of_dataset
-from synfeal.validation.consistency import check_consistency
+from synfeal.validation.consistency import check_consistency, check_stereo
 from synfeal.validation.frames import Poses, check_images, check_names, kinds_of, read_poses
-from synfeal.validation.listing import DEPTH, Check, SequenceListing, frames_of, list_sequences
+from synfeal.validation.listing import (
+    DEPTH,
+    RIGHT_COLOR,
+    RIGHT_DEPTH,
+    Check,
+    SequenceListing,
+    frames_of,
+    list_sequences,
+)
 from synfeal.validation.manifest import check_manifest, check_splits, read_splits
 from synfeal.validation.poses import (
     check_leaks,
@@ -21,6 +29,8 @@ from synfeal.validation.poses import (
     rigid_bound,
     rigid_poses,
 )
+
+STEREO_PAIRS = 100  # of a large set are compared
 
 
 def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[Check]:
@@ -60,7 +70,32 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
         ]
     if camera is None:
         return [*checks, Check("camera", "unknown", camera_failures)]
-    return checks + _geometry(sequences, rigid_poses(poses, bound), camera, every_pair)
+    rigid = rigid_poses(poses, bound)
+    checks += _geometry(sequences, rigid, camera, every_pair)
+    return checks + _stereo(sequences, rigid, camera, every_pair)
+
+
+def _stereo(
+    sequences: Sequence[SequenceListing], poses: Poses, camera: KnownCamera, every_pair: bool
+) -> list[Check]:
+    """Check the right images of stereo pairs; nothing where there are none and none are due."""
+    kinds = kinds_of(sequences)
+    baseline_m = camera.config.stereo_baseline_m
+    if baseline_m is None and RIGHT_COLOR not in kinds:
+        return []
+    if baseline_m is None:
+        failure = f"{camera.source}: camera: says no stereo_baseline_m, but there are right images"
+        return [Check("stereo", "how far apart the pairs are is not known", (failure,))]
+    if RIGHT_COLOR not in kinds:
+        first = frames_of(sequences)[0].path(RIGHT_COLOR)
+        return [Check("stereo", "no right images", (f"{first}: missing, as are all others",))]
+    if DEPTH not in kinds or RIGHT_DEPTH not in kinds:
+        return [Check("stereo", "no depth images: pairs cannot be compared", skipped=True)]
+    frames = list(poses)
+    step = 1 if every_pair else max(1, len(frames) // STEREO_PAIRS)
+    chosen = frames[::step]
+    with tqdm(total=len(chosen), unit="pair", desc="stereo", leave=False, disable=None) as progress:
+        return [check_stereo(chosen, poses, camera, progress.update)]
 
 
 def _geometry(

@@ -121,7 +121,7 @@ def test_no_angles_or_no_pinhole_camera(tmp_path):
     frames, record = tmp_path / "train.npy", tmp_path / "train.json"
     turned = AugmentationConfig(roll_deg=5.0)
     assert random_rotation(frames, NETWORK, AugmentationConfig(), 0) is None
-    with pytest.raises(InputError, match=r"train\.json: says nothing of the camera"):
+    with pytest.raises(InputError, match=r"train\.json: names no perspective camera"):
         random_rotation(frames, NETWORK, turned, 0)
     camera = frame_camera(CAMERA).model_dump()
     record.write_text(json.dumps({"camera": camera | {"distortion": [0.1, 0, 0, 0, 0]}}))

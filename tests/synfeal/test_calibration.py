@@ -130,7 +130,8 @@ def test_scaling_keeps_every_ray():
 @pytest.mark.parametrize(
     ("name", "old", "new", "words"),
     [
-        ("ros.yaml", "plumb_bob", "equidistant", ["distortion_model", "'equidistant'"]),
+        ("ros.yaml", "plumb_bob", "omnidirectional", ["distortion_model", "'omnidirectional'"]),
+        ("ros.yaml", "plumb_bob", "equidistant", ["distortion_coefficients", "4 numbers, found 5"]),
         ("ros.yaml", "image_width: 640", "", ["image_width", "missing"]),
         ("ros.yaml", "[5e2, 0,", "[-500, 0,", ["fx", "positive", "-500"]),
         ("ros.yaml", "[5e2, 0,", "[500, 2,", ["camera_matrix", "without skew"]),
@@ -140,7 +141,9 @@ def test_scaling_keeps_every_ray():
         ("ros.yaml", "width: 640", "width: 640.5", ["image_width", "whole number", "640.5"]),
         ("ros.yaml", "width: 640", "width: true", ["image_width", "must hold numbers"]),
         ("old.yml", "!!opencv-matrix", "!!python/object:os.system", ["cannot be read"]),
-        ("cameras.txt", "FULL_OPENCV", "OPENCV_FISHEYE", ["MODEL", "OPENCV_FISHEYE", "PINHOLE"]),
+        ("cameras.txt", "FULL_OPENCV", "FOV", ["MODEL", "'FOV'", "PINHOLE"]),
+        ("cameras.txt", "FULL_OPENCV", "OPENCV_FISHEYE", ["PARAMS", "8 numbers, found 12"]),
+        ("cameras.txt", "FULL_OPENCV", "EQUIRECTANGULAR", ["EQUIRECTANGULAR", "projection"]),
         ("cameras.txt", "FULL_OPENCV", "PINHOLE", ["PARAMS", "4 numbers, found 12"]),
         ("cameras.txt", "0 0 0\n", "0 0 0.1\n", ["PARAMS", "0.1"]),
         ("cameras.txt", COLMAP, "", ["one line with CAMERA_ID"]),

@@ -1,0 +1,161 @@
+"""Images of cameras that look further round than a plane: faces of a cube, resampled.
+
+As for a lens (:mod:`synfeal.render.distorted`): the faces have twice the resolution of the image's
+middle, and each pixel is the mean of 2x2 points, read bilinearly. Far beyond 90 degrees from its
+axis a fisheye shows less at a time, and more sharply than it is drawn. Depth is along the ray; each
+face's own, along its axis, is read as that of a lens is, so it is exact on planes. Only faces that
+the camera sees are drawn. The clip planes are those of the faces: as near and as far along their
+axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.camera.projection import pixels_per_radian, rays_of_pixels
+from synfeal.config.dataset import CameraConfig
+from synfeal.errors import InputError
+from synfeal.render.base import Depth, Renderer, Rgb
+from synfeal.render.distorted import (
+    LONGEST_SIDE_PX,
+    MARGIN_PX,
+    OVERSAMPLING,
+    colour_matrix,
+    pixels_of_rows,
+    resampled_depth,
+    taps,
+)
+
+Array = NDArray[np.float64]
+
+# Axes of the faces (6, 3, 3) in the camera's frame, as columns: right, down and outwards.
+CAM_FROM_FACE: Array = np.stack(
+    [
+        [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]],  # ahead
+        [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],  # right
+        [[-1, 0, 0], [0, 1, 0], [0, 0, -1]],  # behind
+        [[0, 0, -1], [0, 1, 0], [1, 0, 0]],  # left
+        [[1, 0, 0], [0, 0, -1], [0, 1, 0]],  # up
+        [[1, 0, 0], [0, 0, 1], [0, -1, 0]],  # down
+    ]
+)
+
+
+class CubeRenderer(Renderer):
+    """Implements :class:`synfeal.render.base.Renderer` around one of perspective images.
+
+    What the lens does not show has the colour of the background and no depth.
+    """
+
+    def __init__(
+        self,
+        open_pinhole: Callable[[CameraConfig], Renderer],
+        camera: CameraConfig,
+        background_rgb: tuple[int, int, int],
+    ) -> None:
+        """Open the inner renderer with the camera that :func:`face_camera` gives."""
+        self._shape = (camera.height, camera.width)
+        face = face_camera(camera)
+        rays = rays_of_pixels(camera, pixels_of_rows(camera, range(camera.height), (0.0, 0.0)))
+        faces = _faces_of(rays)
+        # Corners of pixels may lie on a face that no centre does; the nearest that is drawn has
+        # them in its margin.
+        self._drawn = np.unique(faces[faces >= 0])
+        self._cam_from_face = CAM_FROM_FACE[self._drawn]
+        size = (len(self._drawn) * face.height, face.width)
+        self._colour = colour_matrix(
+            lambda rows, offset: self._located(
+                face, rays_of_pixels(camera, pixels_of_rows(camera, rows, offset))
+            ),
+            size=self._shape,
+            drawn_size=size,
+        )
+        unseen = 1.0 - np.asarray(self._colour.sum(axis=1), np.float32).reshape(-1, 1)
+        self._behind = unseen * np.array(background_rgb, np.float32)
+        self._depth_taps = taps(self._located(face, rays), face.width)
+        self._slant = self._slant_of(rays)
+        self._inner = open_pinhole(face)
+
+    def render(self, world_from_cam: Array) -> Rgb:
+        """Colours (H, W, 3) seen from a pose (4, 4)."""
+        return self._resampled(
+            np.stack([self._inner.render(pose) for pose in self._poses(world_from_cam)])
+        )
+
+    def render_rgbd(self, world_from_cam: Array) -> tuple[Rgb, Depth]:
+        """Colours (H, W, 3) and depth (H, W): metres along the ray, inf for nothing."""
+        seen = [self._inner.render_rgbd(pose) for pose in self._poses(world_from_cam)]
+        rgb, depth_m = (np.stack(images) for images in zip(*seen, strict=True))
+        return self._resampled(rgb), self._distance(depth_m)
+
+    def render_depth(self, world_from_cam: Array) -> Depth:
+        """Depth (H, W) alone: metres along the ray, inf for nothing."""
+        return self._distance(
+            np.stack([self._inner.render_depth(pose) for pose in self._poses(world_from_cam)])
+        )
+
+    def close(self) -> None:
+        """Close the inner renderer."""
+        self._inner.close()
+
+    def _poses(self, world_from_cam: Array) -> list[Array]:
+        """Poses of the faces that are drawn."""
+        poses = np.repeat(np.asarray(world_from_cam, np.float64)[None], len(self._drawn), axis=0)
+        poses[:, :3, :3] = poses[:, :3, :3] @ self._cam_from_face
+        return list(poses)
+
+    def _located(self, face: CameraConfig, rays: Array) -> Array:
+        """Where rays (..., 3) lie in the drawn faces (..., 2), one below the other."""
+        towards = np.einsum("...i,fij->...fj", rays, self._cam_from_face)
+        slot = np.where(np.isnan(towards[..., 2]), -np.inf, towards[..., 2]).argmax(axis=-1)
+        own = np.take_along_axis(towards, slot[..., None, None], axis=-2)[..., 0, :]
+        fx, fy, cx, cy = face.intrinsics
+        place = own[..., :2] / own[..., 2:] * [fx, fy] + [cx, cy]
+        place[..., 1] += slot * face.height
+        return np.asarray(place)
+
+    def _slant_of(self, rays: Array) -> NDArray[np.float32]:
+        """Distance along each ray (H, W) for depth 1 of its face; infinite where there is none."""
+        towards = np.einsum("...i,fi->...f", rays, self._cam_from_face[:, :, 2]).max(axis=-1)
+        with np.errstate(divide="ignore"):
+            return np.asarray(1.0 / np.nan_to_num(towards, nan=0.0), np.float32)
+
+    def _resampled(self, faces_rgb: NDArray[np.uint8]) -> Rgb:
+        mean = self._colour @ faces_rgb.reshape(-1, 3).astype(np.float32) + self._behind
+        pixels: Rgb = np.rint(mean).astype(np.uint8).reshape(*self._shape, 3)
+        return pixels
+
+    def _distance(self, faces_m: NDArray[np.float32]) -> Depth:
+        stacked = faces_m.reshape(-1, faces_m.shape[-1])
+        depth_m = resampled_depth(stacked, *self._depth_taps)
+        return np.where(np.isfinite(self._slant), depth_m * self._slant, np.float32(np.inf))
+
+
+def face_camera(camera: CameraConfig) -> CameraConfig:
+    """Return the camera of a face: a little over 90 degrees, at least the image's resolution.
+
+    Raises:
+        InputError: a face would exceed 8192 pixels.
+    """
+    finest = max(pixels_per_radian(camera))
+    scale = min(OVERSAMPLING, (LONGEST_SIDE_PX / 2 - MARGIN_PX) / finest)
+    if scale < 1.0:
+        raise InputError(
+            f"camera: faces of a cube with the {finest:.0f} pixels per radian of the image have"
+            f" more than {LONGEST_SIDE_PX} pixels a side; give a smaller width"
+        )
+    focal = finest * scale
+    side = max(16, 2 * (int(np.ceil(focal)) + MARGIN_PX))
+    lens = {"fx": focal, "fy": focal, "cx": side / 2.0, "cy": side / 2.0}
+    plain = {"projection": None, "fisheye_k": None, "stereo_baseline_m": None}
+    return camera.model_copy(update={"width": side, "height": side, **lens, **plain})
+
+
+def _faces_of(rays: Array) -> NDArray[np.int64]:
+    """Face (...) that each ray (..., 3) meets, -1 where a ray is NaN."""
+    towards = rays @ CAM_FROM_FACE[:, :, 2].T
+    shown = np.isfinite(towards).all(axis=-1)
+    return np.where(shown, np.nan_to_num(towards, nan=0.0).argmax(axis=-1), -1)
