@@ -59,7 +59,7 @@ LOCALIZE_OPTIONS = (
 
 
 def photograph_camera(arguments: argparse.Namespace) -> PhotographCamera:
-    """The camera of photographs by :data:`CALIBRATION_OPTIONS`.
+    """Read the camera of photographs by :data:`CALIBRATION_OPTIONS`.
 
     Raises:
         InputError: The calibration cannot be used.

@@ -43,7 +43,7 @@ class Batch:
 
 
 def batches_of(n_frames: int, batch_frames: int) -> list[Batch]:
-    """Batches of a split: batch b holds frames b*B to (b+1)*B, both included, cut at the end.
+    """Cut a split into batches: batch b holds frames b*B to (b+1)*B, both included, cut at the end.
 
     Every batch adds at most ``batch_frames`` frames to the one it shares with the batch before, and
     every batch has at least two frames. A split of one frame has no batch: its pose is the anchor.
@@ -89,7 +89,7 @@ class BatchTrajectory:
 
 
 def failed_trajectory(n_frames: int) -> BatchTrajectory:
-    """The result of a method that found nothing in ``n_frames`` frames."""
+    """Return the result of a method that found nothing in ``n_frames`` frames."""
     return BatchTrajectory(np.tile(np.eye(4), (n_frames, 1, 1)), np.zeros(n_frames, dtype=bool))
 
 
@@ -118,7 +118,7 @@ def read_trajectory(path: Path) -> BatchTrajectory:
 
 
 def read_image(path: FrameFile, camera: CameraConfig, mode: str | None = None) -> NDArray[Any]:
-    """An image of the camera's size as an array, converted to ``mode`` if one is given.
+    """Read an image of the camera's size as an array, converted to ``mode`` if one is given.
 
     Raises:
         InputError: it is missing, cannot be read, or has another size.

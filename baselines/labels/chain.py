@@ -85,7 +85,7 @@ class BatchRecord:
 
 
 def summary_of(records: Sequence[BatchRecord]) -> dict[str, Any]:
-    """Totals of a split and one record per batch, as plain values."""
+    """Summarise a split: totals and one record per batch, as plain values."""
     return {
         "batches": len(records),
         "assisted": sum(record.assisted for record in records),
@@ -102,7 +102,7 @@ def chain_batches(
     cfg: GroundTruthConfig,
     anchored: bool = False,
 ) -> tuple[PoseTable, list[BatchRecord]]:
-    """Labels of a whole split from its batches, and what assistance they needed.
+    """Compute the labels of a whole split from its batches, and what assistance they needed.
 
     Args:
         batches: All batches of the split in order, from ``batches_of(len(truth), ...)``.
@@ -172,7 +172,7 @@ def chain_unassisted(
 
 
 def fill_gaps(trajectory: BatchTrajectory) -> Array:
-    """Poses (n, 4, 4) of all frames: interpolated between known ones, held after the last.
+    """Return poses (n, 4, 4) of all frames: interpolated between known ones, held after the last.
 
     The first frame is the identity by definition, registered or not.
     """

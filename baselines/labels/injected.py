@@ -85,7 +85,7 @@ def displaced(table: PoseTable, shift_m: Array, rotvec_rad: Array) -> PoseTable:
 
 
 def unit_vectors(count: int, rng: np.random.Generator) -> Array:
-    """Vectors (count, 3) uniform on the sphere: normal variates have no preferred direction."""
+    """Draw unit vectors (count, 3), uniform: normal variates have no preferred direction."""
     vectors = rng.standard_normal((count, 3))
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True), dtype=np.float64)
 

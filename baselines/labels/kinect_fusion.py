@@ -76,7 +76,7 @@ class FusedModel:
         self._reserve(seen, first_from_cam)
 
     def show(self, first_from_cam: Array) -> Depth:
-        """Depth (H, W) of the model from a pose (4, 4), inf where there is no surface.
+        """Render the depth (H, W) of the model from a pose (4, 4), inf where there is no surface.
 
         Open3D shows the surface half a voxel further along each axis than it was fused (measured);
         the camera is moved with it.
@@ -132,7 +132,7 @@ class FusedModel:
         self._cast(o3d.core.Tensor.from_numpy(repeated), matrix, first_from_cam, (16, 16), 1)
 
     def track(self, frame: RgbdFrame, last: Array, min_fitness: float) -> Array | None:
-        """Pose (4, 4) of a frame near the last one (4, 4), or None when it is lost."""
+        """Find the pose (4, 4) of a frame near the last one (4, 4), or None when it is lost."""
         if not self._grid.hashmap().size():
             return None
         shown_m = self.show(last)

@@ -48,24 +48,24 @@ class RelativeError:
 
 
 def absolute_errors(labels: PoseTable, truth: PoseTable) -> PoseErrors:
-    """Position error in metres (N,) and orientation error in degrees (N,) of every label."""
+    """Compute position errors in metres (N,) and orientation errors in degrees (N,) of labels."""
     position_m, orientation_rad = pose_error(labels.world_from_cam, truth.world_from_cam)
     return position_m, np.degrees(orientation_rad)
 
 
 def spread(errors: Array) -> Spread:
-    """Median, root mean square and maximum of errors (N,)."""
+    """Compute the median, root mean square and maximum of errors (N,)."""
     return Spread(float(np.median(errors)), float(np.sqrt(np.mean(errors**2))), float(errors.max()))
 
 
 def share_within(errors: PoseErrors, limit_m: float, limit_deg: float) -> float:
-    """Share of frames whose position and orientation are both off by at most the limits."""
+    """Compute the share of frames whose position and orientation are both within the limits."""
     position_m, orientation_deg = errors
     return float(np.mean((position_m <= limit_m) & (orientation_deg <= limit_deg)))
 
 
 def relative_error(sequences: Sequence[Pair], frames: int) -> RelativeError | None:
-    """Error of the motion from each frame to the one ``frames`` further on in its sequence.
+    """Compute the error of the motion from each frame to the one ``frames`` further on its path.
 
     With labels P and true poses Q it is that of ``inverse(inverse(Q_i) Q_j) inverse(P_i) P_j``.
     None when no sequence has more frames than that.

@@ -30,17 +30,17 @@ _SMALLEST = PoseGraph(np.stack([np.eye(4)] * 2), (Edge(0, 1, np.eye(4), np.eye(6
 
 
 def frame_methods() -> list[str]:
-    """Methods that the rule ``estimate`` runs."""
+    """List the methods that the rule ``estimate`` runs."""
     return [name for name, method in METHODS.items() if method.works_on == "frames"]
 
 
 def graph_methods() -> list[str]:
-    """Methods that the rule ``posegraph`` runs."""
+    """List the methods that the rule ``posegraph`` runs."""
     return [name for name, method in METHODS.items() if method.works_on == "graph"]
 
 
 def stages_of(name: str) -> tuple[str, ...]:
-    """Folders below ``groundtruth/<scene>/<size>`` with what the method took, in its order."""
+    """List the folders below ``groundtruth/<scene>/<size>`` of the stages of a method."""
     return ("rgbd", name) if METHODS[name].works_on == "graph" else (name,)
 
 

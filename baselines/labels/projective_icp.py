@@ -62,7 +62,7 @@ def _surface(depth_m: Depth, smooth_m: Depth, camera: CameraConfig, stride: int)
 def register(
     shown: list[Surface], seen: list[Surface], camera: CameraConfig
 ) -> tuple[Array, float]:
-    """Motion ``shown_from_seen`` (4, 4) of a frame to the surface expected, both by level.
+    """Find the motion ``shown_from_seen`` (4, 4) of a frame to the surface expected, both by level.
 
     It starts without motion. Beside it is how well the matched surfaces constrain it: 0 where some
     motion leaves them in place, and then the motion means nothing.

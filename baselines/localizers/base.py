@@ -80,7 +80,7 @@ class Localizer(nn.Module):
     def loss(
         self, predictions: list[PosePrediction], position_m: Tensor, quat_wxyz: Tensor
     ) -> Tensor:
-        """Loss of the main prediction plus 0.3 times that of each auxiliary one."""
+        """Compute the loss of the main prediction plus 0.3 times that of each auxiliary one."""
         main, *auxiliary = (self.criterion(p, position_m, quat_wxyz) for p in predictions)
         return torch.as_tensor(main + AUXILIARY_WEIGHT * sum(auxiliary))
 
@@ -100,7 +100,7 @@ class Localizer(nn.Module):
 
 
 def beta_loss(name: str, hyper: LocalizerConfig) -> BetaLoss:
-    """The loss with a fixed weight.
+    """Make the loss with a fixed weight.
 
     Raises:
         InputError: the configuration gives no ``beta``.
@@ -111,5 +111,5 @@ def beta_loss(name: str, hyper: LocalizerConfig) -> BetaLoss:
 
 
 def learned_loss(hyper: LocalizerConfig) -> LearnedWeightLoss:
-    """The loss with learned weights."""
+    """Make the loss with learned weights."""
     return LearnedWeightLoss(hyper.s_position, hyper.s_orientation)

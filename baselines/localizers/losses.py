@@ -17,13 +17,13 @@ class PosePrediction(NamedTuple):
 
 
 def position_distance(predicted_m: Tensor, true_m: Tensor) -> Tensor:
-    """Mean Euclidean distance of positions (B, 3). The gradient at distance 0 is 0, not NaN."""
+    """Compute the mean distance of positions (B, 3); its gradient at distance 0 is 0, not NaN."""
     distance: Tensor = torch.linalg.vector_norm(predicted_m - true_m, dim=1)
     return distance.mean()
 
 
 def quat_distance(predicted_wxyz: Tensor, true_wxyz: Tensor) -> Tensor:
-    """Mean distance of rotations as unit quaternions, the same for ``q`` and ``-q``.
+    """Compute the mean distance of rotations as unit quaternions, the same for ``q`` and ``-q``.
 
     ``min(|p - q|, |p + q|)`` with ``p`` the prediction (B, 4) and ``q`` a unit quaternion (B, 4).
     For a unit ``p`` it is ``2 sin(angle / 4)``: near 0 half of the angle, in radians. Like PoseNet
@@ -33,19 +33,19 @@ def quat_distance(predicted_wxyz: Tensor, true_wxyz: Tensor) -> Tensor:
 
 
 def quat_chords(a_wxyz: Tensor, b_wxyz: Tensor) -> Tensor:
-    """``min(|a - b|, |a + b|)`` (B,) of quaternions (B, 4)."""
+    """Compute ``min(|a - b|, |a + b|)`` (B,) of quaternions (B, 4)."""
     same = torch.linalg.vector_norm(a_wxyz - b_wxyz, dim=1)
     opposite = torch.linalg.vector_norm(a_wxyz + b_wxyz, dim=1)
     return torch.minimum(same, opposite)
 
 
 def position_mean_square(predicted_m: Tensor, true_m: Tensor) -> Tensor:
-    """Mean squared difference of the coordinates of positions (B, 3)."""
+    """Compute the mean squared difference of the coordinates of positions (B, 3)."""
     return nn.functional.mse_loss(predicted_m, true_m)
 
 
 def quat_mean_square(predicted_wxyz: Tensor, true_wxyz: Tensor) -> Tensor:
-    """Mean squared difference of unit quaternions (B, 4); ``q`` and ``-q`` are far apart.
+    """Compute the mean squared difference of unit quaternions (B, 4); ``q`` and ``-q`` differ.
 
     The prediction is brought to unit length first.
     """
@@ -78,7 +78,7 @@ class PoseLoss(nn.Module):
     def distances(
         self, prediction: PosePrediction, position_m: Tensor, quat_wxyz: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """Distances of predictions, in float32, to positions (B, 3) and unit quaternions (B, 4)."""
+        """Compute distances to positions (B, 3) and unit quaternions (B, 4), in float32."""
         position, orientation = DISTANCES[self.distance]
         return (
             position(prediction.position_m.float(), position_m),

@@ -34,7 +34,7 @@ PRIOR_M = 0.1
     group="adjusted",
 )
 def adjusted(evidence: Evidence) -> Array:
-    """Poses (N, 4, 4) against points triangulated after bundle adjustment moved training poses.
+    """Find poses (N, 4, 4) against points triangulated from bundle-adjusted training poses.
 
     Images say nothing of where the world is: the adjusted model is put where its camera centres fit
     the labels best (Umeyama), so that errors of single labels average out.
@@ -65,7 +65,7 @@ def placed_on(poses: Array, labels: Array, usable: Rows | None = None) -> Array:
 
 
 def adjust(tracks: Tracks, world_from_cam: Array, point_m: Array, camera: pycolmap.Camera) -> Array:
-    """Poses (N, 4, 4) that, with points moved along, fit the images best.
+    """Find poses (N, 4, 4) that, with points moved along, fit the images best.
 
     Poses and points (T, 3) are where it starts; points that are not used are NaN, and the poses of
     frames that see none of the others stay. The camera, without distortion, is not moved.
@@ -99,7 +99,7 @@ def errors_px(
 
 
 def longest(tracks: Tracks, usable: NDArray[np.bool_], n_frames: int) -> Rows:
-    """The usable tracks with the most observations, enough for all frames."""
+    """Select the usable tracks with the most observations, enough for all frames."""
     length = np.bincount(tracks.track, minlength=tracks.count) * usable
     order = np.argsort(-length, kind="stable")[: POINTS_PER_FRAME * n_frames]
     return np.sort(order[length[order] > 0])

@@ -25,7 +25,7 @@ def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
 
 
 def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
-    """The arrays of these names.
+    """Read the arrays of these names.
 
     Raises:
         InputError: the file cannot be read or lacks one of them.
@@ -80,7 +80,7 @@ QUERIES = 500  # looked up at a time
 
 
 def read_described(path: Path, n_train: int, n_test: int, test: str = "test") -> Described:
-    """The first vectors of each split by descriptor: smaller data sets are prefixes of larger ones.
+    """Read the first vectors of each split by descriptor: smaller sets are prefixes of larger ones.
 
     ``test`` names the test frames, where there are several of the same poses.
 
@@ -93,7 +93,7 @@ def read_described(path: Path, n_train: int, n_test: int, test: str = "test") ->
 
 
 def most_alike(train: Vectors, test: Vectors, count: int) -> NDArray[np.int64]:
-    """Rows (N, count) of the training vectors (M, D) nearest to unit vectors (N, D), best first.
+    """Find rows (N, count) of training vectors (M, D) nearest to unit vectors (N, D), best first.
 
     Where M < count, all of them.
     """

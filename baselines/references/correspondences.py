@@ -42,7 +42,7 @@ class Correspondences(ByFrame):
 def match_test_frames(
     train: Features, test: Features, retrieved: NDArray[np.int64]
 ) -> Correspondences:
-    """Matches of each test frame with the training frames ``retrieved`` (N, k) for it."""
+    """Find the matches of each test frame with the training frames ``retrieved`` (N, k) for it."""
     slopes, features, counts = [], [], [0]
     for query, rows in enumerate(tqdm(retrieved, "matching", unit="frame", mininterval=5)):
         roots, slope, count = test.roots(query), test.slope[test.of(query)], 0
@@ -60,7 +60,7 @@ def match_test_frames(
 def mutual_matches(
     own: NDArray[np.float32], other: NDArray[np.float32], ratio: float = RATIO
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Indices of unit descriptors (a, D) and (b, D) that are each other's nearest, ratio-tested."""
+    """Match unit descriptors (a, D) and (b, D): each other's nearest that pass the ratio test."""
     if len(own) == 0 or len(other) < 2:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     alike = own @ other.T
@@ -118,7 +118,7 @@ class Tracks(Stored):
         return int(self.track.max(initial=-1)) + 1
 
     def seen_by(self, frames: Rows) -> Tracks:
-        """The same points without the observations of other frames than these.
+        """Return the same points without the observations of other frames than these.
 
         A point that fewer than two of them see shows no feature any more.
         """
@@ -142,7 +142,7 @@ def write_tracks(descriptors: Path, train: Path, out_tracks: Path) -> None:
 
 
 def frame_pairs(alike: Rows) -> Rows:
-    """Pairs (P, 2) of frames, i < j, each once: neighbours in looks (N, k), and in time."""
+    """List pairs (P, 2) of frames, i < j, each once: neighbours in looks (N, k), and in time."""
     count = len(alike)
     frame = np.arange(count)
     looks = np.column_stack([np.repeat(frame, alike.shape[1]), alike.ravel()])
@@ -152,7 +152,7 @@ def frame_pairs(alike: Rows) -> Rows:
 
 
 def find_tracks(features: Features, pairs: Rows) -> Tracks:
-    """Tracks of the matches of pairs (P, 2) of frames that a rigid motion explains."""
+    """Find the tracks of the matches of pairs (P, 2) of frames that a rigid motion explains."""
     cv2.setNumThreads(1)
     edges = []
     for i, j in tqdm(pairs, "matching", unit="pair", mininterval=5):
@@ -175,7 +175,7 @@ def rigid(slope_i: NDArray[np.float64], slope_j: NDArray[np.float64]) -> NDArray
 
 
 def join_matches(features: Features, matches: Rows) -> Tracks:
-    """Tracks of matches (E, 2) between features; one that a frame sees twice is dropped."""
+    """Form tracks of matches (E, 2) between features; one that a frame sees twice is dropped."""
     total = len(features.slope)
     graph = coo_matrix((np.ones(len(matches), bool), matches.T), shape=(total, total))
     _, component = connected_components(graph, directed=False)

@@ -40,7 +40,7 @@ CELLS_PER_SIDE = 16
 
 
 def thumbnails(frames: Frames) -> Vectors:
-    """Copies of 8 x 8 pixels of frames (N, S, S, 3) as unit vectors (N, 192) without their mean."""
+    """Shrink frames (N, S, S, 3) to 8 x 8 pixels, as unit vectors (N, 192) without their mean."""
     side = (THUMBNAIL_PX, THUMBNAIL_PX)
     small = [cv2.resize(f, side, interpolation=cv2.INTER_AREA).ravel() for f in frames]
     vectors = np.array(small, dtype=np.float32)
@@ -48,13 +48,13 @@ def thumbnails(frames: Frames) -> Vectors:
 
 
 def unit(vectors: NDArray[np.floating]) -> Vectors:
-    """Vectors (N, D) at length 1; one of zeros stays what it is."""
+    """Scale vectors (N, D) to length 1; one of zeros stays as it is."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.asarray(vectors / np.maximum(length, 1e-12), dtype=np.float32)
 
 
 def dense_sift(frames: Frames) -> Tensor:
-    """RootSIFT descriptors (N, G, 128) on a grid over frames (N, S, S, 3), upright.
+    """Compute RootSIFT descriptors (N, G, 128) on a grid over frames (N, S, S, 3), upright.
 
     Cells are S / 16 pixels wide and the grid's step is one cell. The roots of a descriptor of
     L1 norm 1 make Euclidean distances those of Hellinger (Arandjelović and Zisserman, CVPR 2012).
@@ -104,7 +104,7 @@ class Vlad:
 
     @classmethod
     def learn(cls, frames: Frames, seed: int) -> Vlad:
-        """Vocabulary and axes of training frames (N, S, S, 3), at most 2,000 of them drawn.
+        """Learn vocabulary and axes from training frames (N, S, S, 3), at most 2,000 of them drawn.
 
         Dividing by the root of a singular value halves what full whitening does; on 1,500 frames it
         was the best of none, half and full.
@@ -125,13 +125,13 @@ class Vlad:
         return cls(words, mean, scaled.astype(np.float32))
 
     def describe(self, frames: Frames) -> Vectors:
-        """Unit vectors (N, D) of frames (N, S, S, 3)."""
+        """Compute the unit vectors (N, D) of frames (N, S, S, 3)."""
         sums = (residuals(dense_sift(part).numpy(), self.words) for part in parts_of(frames))
         return np.concatenate([unit((part - self.mean) @ self.axes) for part in sums])
 
 
 def residuals(sifts: Vectors, words: Tensor) -> Vectors:
-    """VLAD (N, W * 128) of descriptors (N, G, 128): their residuals from the nearest of W words."""
+    """Compute VLAD (N, W * 128) of descriptors (N, G, 128): residuals from their nearest words."""
     parts = torch.from_numpy(np.ascontiguousarray(sifts))
     nearest = (2 * parts @ words.T - words.square().sum(dim=1)).argmax(dim=2)
     belongs = nnf.one_hot(nearest, len(words)).float()  # (N, G, W)
@@ -140,7 +140,7 @@ def residuals(sifts: Vectors, words: Tensor) -> Vectors:
 
 
 def parts_of(values: NDArray[T]) -> Iterator[NDArray[T]]:
-    """``CHUNK`` rows after the other."""
+    """Yield rows, ``CHUNK`` at a time."""
     return (values[start : start + CHUNK] for start in range(0, len(values), CHUNK))
 
 

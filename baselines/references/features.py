@@ -56,12 +56,12 @@ class Features(ByFrame):
         return np.column_stack([self.slope, np.ones(len(self.slope))]) * self.depth_m[:, None]
 
     def roots(self, frame: int) -> NDArray[np.float32]:
-        """RootSIFT descriptors (k, 128) of a frame (Arandjelović and Zisserman, CVPR 2012)."""
+        """Compute RootSIFT (k, 128) of a frame (Arandjelović and Zisserman, CVPR 2012)."""
         return roots_of(self.descriptor[self.of(frame)])
 
 
 def roots_of(descriptor: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """RootSIFT descriptors (k, 128) of SIFT descriptors (k, 128)."""
+    """Compute the RootSIFT descriptors (k, 128) of SIFT descriptors (k, 128)."""
     values = descriptor.astype(np.float32)
     roots = np.sqrt(values / np.maximum(values.sum(axis=1, keepdims=True), 1))
     return np.asarray(roots, dtype=np.float32)
@@ -70,7 +70,7 @@ def roots_of(descriptor: NDArray[np.uint8]) -> NDArray[np.float32]:
 def files_of_split(
     sequences: Sequence[Path], split: str, n_frames: int
 ) -> tuple[list[FrameFile], list[FrameFile] | None]:
-    """Colour and depth images of the first frames; of a test set no depth: none may be used.
+    """List colour and depth images of the first frames; no depth of a test set: none may be used.
 
     Raises:
         InputError: a sequence cannot be read or has no such file.
@@ -107,7 +107,7 @@ def features_of(
     camera: CameraConfig,
     cfg: ReferencesConfig,
 ) -> Features:
-    """Features of grey images (H, W), with their depth (H, W) where there is one."""
+    """Extract features of grey images (H, W), with their depth (H, W) where there is one."""
     cv2.setNumThreads(1)
     sift = cv2.SIFT.create(
         cfg.max_features, contrastThreshold=cfg.contrast, enable_precise_upscale=True

@@ -125,12 +125,12 @@ class Finder:
         return Answer(best.world_from_cam, best.support, self._focal_ratio(best))
 
     def alike(self, photograph: Photograph) -> Rows:
-        """Frames of the map that look most alike, best first."""
+        """List the frames of the map that look most alike, best first."""
         vector = self._place.vlad.describe(photograph.view[None])
         return most_alike(self._place.vectors, vector, RETRIEVED).ravel()
 
     def nearest(self, world_from_cam: Array) -> Rows:
-        """Frames of the map that were taken nearest to a pose (4, 4), best first."""
+        """List the frames of the map that were taken nearest to a pose (4, 4), best first."""
         place_m, quat_wxyz = self._place.world_from_cam[:, :3, 3], self._place.quat_wxyz
         distance_m = np.linalg.norm(place_m - world_from_cam[:3, 3], axis=1)
         cosine = np.abs(quat_wxyz @ quat_wxyz_from_matrix(world_from_cam[:3, :3]))

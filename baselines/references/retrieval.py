@@ -16,7 +16,7 @@ METRES_PER_RADIAN = 1.0
 
 
 def nearest_label(evidence: Evidence, descriptor: str) -> NDArray[np.float64]:
-    """Labels (N, 4, 4) of the training images nearest to the test images."""
+    """Return the labels (N, 4, 4) of the training images nearest to the test images."""
     train, test = evidence.descriptors[descriptor]
     usable = evidence.train.usable_rows
     return evidence.train.world_from_cam[usable[most_alike(train[usable], test, 1)[:, 0]]]
@@ -51,7 +51,7 @@ def by_vlad(evidence: Evidence) -> NDArray[np.float64]:
     group="images",
 )
 def nearest_pose(evidence: Evidence) -> NDArray[np.float64]:
-    """The label of the training frame whose true pose is nearest to the test frame's true pose.
+    """Return the labels (N, 4, 4) of the training frames nearest to the test frames by true pose.
 
     An oracle: the best that copying a training pose can do.
     """

@@ -104,7 +104,7 @@ def robustness_table(
     labels: Path,
     device: Literal["auto", "cpu", "cuda"] = "auto",
 ) -> pd.DataFrame:
-    """Median errors by training set, method and effects, with 95 % limits over whole paths.
+    """Compute median errors by training set, method and effects, with 95 % limits over whole paths.
 
     Args:
         models: Checkpoints of localizers, by training set and name.

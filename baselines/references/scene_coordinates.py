@@ -100,7 +100,7 @@ class CoordinateNetwork(nn.Module):
 
 
 def distance_m(found: Tensor, wanted: Tensor) -> Tensor:
-    """Mean distance between points (B, 3, R, C), where the wanted one is known."""
+    """Compute the mean distance between points (B, 3, R, C), where the wanted one is known."""
     known = wanted.isfinite().all(dim=1)
     off = torch.where(known[:, None], found - wanted, 0.0)
     mean: Tensor = torch.linalg.vector_norm(off, dim=1)[known].mean()
@@ -120,7 +120,7 @@ LOGGED = 50  # steps
     group="coordinates",
 )
 def by_coordinates(evidence: Evidence) -> Array:
-    """Poses (N, 4, 4) of the test frames, NaN where none is found."""
+    """Find the poses (N, 4, 4) of the test frames, NaN where none is found."""
     device = open_device("auto")
     train, test = evidence.views
     usable = evidence.train.usable_rows
@@ -135,7 +135,7 @@ def by_coordinates(evidence: Evidence) -> Array:
 
 
 def world_points(views: Views, world_from_cam: Array) -> NDArray[np.float32]:
-    """Points (N, 3, R, C) of the cells in the world of the labels; not finite without depth."""
+    """Compute the cells' points (N, 3, R, C) in the labels' world; not finite without depth."""
     with np.errstate(invalid="ignore"):  # no depth
         turned = np.einsum("nij,nrcj->nirc", world_from_cam[:, :3, :3], views.point_m)
     return np.asarray(turned + world_from_cam[:, :3, 3, None, None], dtype=np.float32)
@@ -180,7 +180,7 @@ def learn(
 def predict(
     network: CoordinateNetwork, views: Views, statistics: ImageStatistics, device: torch.device
 ) -> Array:
-    """Points (N, R, C, 3) of the cells of every image."""
+    """Predict the points (N, R, C, 3) of the cells of every image."""
     images = torch.from_numpy(views.images).permute(0, 3, 1, 2)
     parts = torch.split(images, BATCH)
     found = torch.cat([_answer(network, part, statistics, device).cpu() for part in parts])
@@ -197,7 +197,7 @@ def _answer(
 
 
 def poses_of(views: Views, points: Array, evidence: Evidence) -> Array:
-    """Poses (N, 4, 4) from points (N, R, C, 3) of the cells; NaN where none is found."""
+    """Find poses (N, 4, 4) from points (N, R, C, 3) of the cells; NaN where none is found."""
     camera = pinhole(evidence.camera)
     pixel = views.slope.reshape(-1, 2) * camera.params[:2]
     error_px = MAX_ERROR_OF_WIDTH * camera.width

@@ -37,7 +37,7 @@ MIN_INLIERS = 8
     group="structure",
 )
 def on_depth(evidence: Evidence) -> Array:
-    """Poses (N, 4, 4) against features lifted by the training frames' depth; NaN where none."""
+    """Find poses (N, 4, 4) against features lifted by training depth; NaN where none is found."""
     places = lifted(evidence.correspondences, evidence.train)
     return localize(evidence.correspondences, places, evidence.camera, evidence.seed)
 
@@ -55,7 +55,7 @@ def lifted(matches: Correspondences, train: PoseTable) -> Array:
 
 
 def localize(matches: Correspondences, point_m: Array, seen_by: CameraConfig, seed: int) -> Array:
-    """Poses (N, 4, 4) of the test frames, NaN where none is found.
+    """Find the poses (N, 4, 4) of the test frames, NaN where none is found.
 
     ``point_m`` (C, 3) is where the training feature of each match lies in the world; not finite
     where that is not known.
@@ -74,7 +74,7 @@ def absolute_pose(
     seed: int,
     max_error_px: float = MAX_ERROR_PX,
 ) -> Array:
-    """``world_from_cam`` (4, 4) from points (n, 3) and where they are seen (n, 2), or NaN."""
+    """Find ``world_from_cam`` (4, 4) from points (n, 3) and where they are seen (n, 2), or NaN."""
     found = supported_pose(pixel, point_m, camera, seed, max_error_px)
     return np.full((4, 4), np.nan) if found is None else found.world_from_cam
 
@@ -150,7 +150,7 @@ def refined_focal_px(
 
 
 def pinhole(camera: CameraConfig) -> pycolmap.Camera:
-    """A camera without distortion and with its principal point at (0, 0)."""
+    """Return a camera without distortion and with its principal point at (0, 0)."""
     fx, fy, _, _ = camera.intrinsics
     size = {"width": camera.width, "height": camera.height}
     return pycolmap.Camera(model="PINHOLE", params=[fx, fy, 0.0, 0.0], **size)
@@ -168,12 +168,12 @@ SCALE_RAD = 0.007
     group="structure",
 )
 def triangulated(evidence: Evidence) -> Array:
-    """Poses (N, 4, 4) against points triangulated from the labels; NaN where none is found."""
+    """Find poses (N, 4, 4) against points triangulated from the labels; NaN where none is found."""
     return on_points(evidence, triangulate(evidence.tracks, evidence.train.world_from_cam))
 
 
 def on_points(evidence: Evidence, point_m: Array) -> Array:
-    """Poses of the test frames against the points (T, 3) of the tracks."""
+    """Find the poses of the test frames against the points (T, 3) of the tracks."""
     track = evidence.tracks.of_feature[evidence.correspondences.feature]
     places = np.full((len(track), 3), np.nan)
     places[track >= 0] = point_m[track[track >= 0]]
@@ -181,7 +181,7 @@ def on_points(evidence: Evidence, point_m: Array) -> Array:
 
 
 def triangulate(tracks: Tracks, world_from_cam: Array) -> Array:
-    """Points (T, 3) nearest to the rays of their tracks; NaN behind a camera or at no angle.
+    """Compute points (T, 3) nearest to their tracks' rays; NaN behind a camera or at no angle.
 
     Least squares of the distances to the rays from the frames' poses (N, 4, 4), reweighted by the
     angle under which the point is missed; a single wrong match then loses its say.

@@ -92,7 +92,7 @@ class ModelDescription(Strict):
 
 
 def frame_camera(frames: Path) -> FrameCamera | None:
-    """The camera of packed frames by the record beside them; None without one of a perspective one.
+    """Read the camera of packed frames by the record beside them; None where it is no pinhole.
 
     Raises:
         InputError: the record is damaged.

@@ -30,7 +30,7 @@ class ImageStatistics:
     deviation: Tensor
 
     def normalise(self, images: Tensor) -> Tensor:
-        """Float images (B, 3, H, W) of uint8 ones; the memory layout is kept."""
+        """Return float images (B, 3, H, W) of uint8 ones; the memory layout is kept."""
         return images.to(torch.float32, copy=True).sub_(self.mean).div_(self.deviation)
 
 
@@ -64,12 +64,12 @@ class LabelledFrames:
         return len(self.rows)
 
     def batch(self, chosen: Tensor) -> Batch:
-        """The frames of the part with these indices (B,)."""
+        """Return the frames of the part with these indices (B,)."""
         rows = self.rows[chosen]
         return Batch(self.images[rows], self.position_m[chosen], self.quat_wxyz[chosen])
 
     def part(self, mask: NDArray[np.bool_]) -> LabelledFrames:
-        """The frames of the part where ``mask`` (M,) is true; no image is copied."""
+        """Select the frames of the part where ``mask`` (M,) is true; no image is copied."""
         kept = torch.from_numpy(np.flatnonzero(mask)).to(self.rows.device)
         return LabelledFrames(
             self.images,
@@ -83,7 +83,7 @@ class LabelledFrames:
 def read_images(
     path: Path, count: int, input_px: int, device: torch.device, every: int = 1
 ) -> Tensor:
-    """The first ``count`` frames of a packed file as (count, 3, px, px) uint8, channels last.
+    """Read the first ``count`` frames of a packed file as (count, 3, px, px) uint8, channels last.
 
     With ``every`` above 1 the first of each so many frames, ``count`` of them.
 
@@ -116,7 +116,7 @@ def read_images(
 def read_labelled_frames(
     frames: Path, labels: Path, input_px: int, device: torch.device
 ) -> LabelledFrames:
-    """Every labelled frame with its pose; ``frames`` may hold more, for larger sets.
+    """Read every labelled frame with its pose; ``frames`` may hold more, for larger sets.
 
     Frames whose labels were filled in, because no method registered them, are left out.
 
@@ -138,7 +138,7 @@ def read_labelled_frames(
 
 
 def image_statistics(images: Tensor) -> ImageStatistics:
-    """Statistics over all pixels of images (N, 3, H, W) uint8."""
+    """Compute the statistics over all pixels of images (N, 3, H, W) uint8."""
     total = torch.zeros(3, dtype=torch.float64, device=images.device)
     squares = torch.zeros_like(total)
     for chunk in torch.split(images, CHUNK):
@@ -165,7 +165,7 @@ class BatchOrder:
         self._pending = torch.empty(0, dtype=torch.long)
 
     def next_batch(self) -> Tensor:
-        """Indices (batch_size,) of the next batch."""
+        """Return the indices (batch_size,) of the next batch."""
         while len(self._pending) < self._batch_size:
             epoch = torch.arange(self._n_frames)
             if self._shuffled:

@@ -12,7 +12,7 @@ Precision = Literal["float32", "bfloat16"]
 
 
 def open_device(wanted: Literal["auto", "cpu", "cuda"]) -> torch.device:
-    """The device to work on; ``auto`` takes the GPU if there is one.
+    """Return the device to work on; ``auto`` takes the GPU if there is one.
 
     On the CPU one thread is used: two runs side by side are faster than one on two threads,
     and one thread adds up in one order, so the same seed gives the same network. Denormal numbers
@@ -33,7 +33,7 @@ def open_device(wanted: Literal["auto", "cpu", "cuda"]) -> torch.device:
 
 
 def precision_on(device: torch.device, wanted: Literal["auto", "float32", "bfloat16"]) -> Precision:
-    """The precision networks compute in; ``auto`` is bfloat16 where the device multiplies in it.
+    """Choose the precision of networks; ``auto`` is bfloat16 where the device multiplies in it.
 
     Those are GPUs, and processors with AVX512-BF16 or AMX, where a step takes 0.6 to 0.9 times as
     long; elsewhere it would be emulated.
@@ -46,5 +46,5 @@ def precision_on(device: torch.device, wanted: Literal["auto", "float32", "bfloa
 
 
 def autocast(device: torch.device, precision: Precision) -> torch.autocast:
-    """A context in which networks compute in this precision; weights stay in float32."""
+    """Return a context in which networks compute in this precision; weights stay in float32."""
     return torch.autocast(device.type, torch.bfloat16, enabled=precision == "bfloat16")

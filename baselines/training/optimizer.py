@@ -55,7 +55,7 @@ class Muon(Untraced):
 
     @torch.no_grad()
     def step(self, closure: Callable[[], float] | None = None) -> None:  # type: ignore[override]
-        """One step for every parameter that has a gradient."""
+        """Take one step for every parameter that has a gradient."""
         for index, group in enumerate(self.param_groups):
             parameters = [p for p in group["params"] if p.grad is not None]
             if not parameters:
@@ -210,7 +210,7 @@ class Optimisation:
         return float(self._schedulers[-1].get_last_lr()[-1])
 
     def step(self, loss: Tensor) -> None:
-        """One step down the gradient of ``loss``."""
+        """Take one step down the gradient of ``loss``."""
         for optimizer in self._optimizers:
             optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]

@@ -60,7 +60,7 @@ def predict_poses(
 def predict(
     trained: TrainedLocalizer, images: Tensor
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Positions (N, 3) and unit quaternions (N, 4), w >= 0, for images (N, 3, H, W) uint8.
+    """Predict positions (N, 3) and unit quaternions (N, 4), w >= 0, for images (N, 3, H, W) uint8.
 
     Both have :data:`DECIMALS` decimals.
 
@@ -87,7 +87,7 @@ def normalised_quat_wxyz(quat_wxyz: Tensor) -> Tensor:
 
 
 def predict_ms(trained: TrainedLocalizer, images: Tensor) -> float:
-    """Median milliseconds of predicting images (N, 3, H, W) at once."""
+    """Measure the median milliseconds of predicting images (N, 3, H, W) at once."""
     return median_ms(lambda: predict(trained, images))
 
 

@@ -74,7 +74,7 @@ class RoomsNetwork(Localizer):
     def loss(  # type: ignore[override]
         self, features: Tensor, place: Tensor, quat_wxyz: Tensor
     ) -> Tensor:
-        """Loss of features (B, n) at places (B, 4): a position in metres, and in which room."""
+        """Compute the loss of features (B, n) at places (B, 4): position in metres, room."""
         prediction = self.heads(features.float(), place[:, 3].long())
         loss: Tensor = self.criterion(prediction, place[:, :3], quat_wxyz)
         return loss

@@ -26,7 +26,7 @@ PARAMETERS_MB_PER_PX = 0.05
 
 
 def training_mb(n_frames: int, network: NetworkConfig, batch_size: int) -> int:
-    """Most memory in MB that training any localizer takes, training and test frames included.
+    """Estimate the peak memory in MB of training any localizer, training and test frames included.
 
     They are held as they are, packed; layers grow with the width, parameters with its square.
     """
@@ -57,7 +57,7 @@ def _sha256(path: Path) -> str:
 
 
 def read_training_record(path: Path) -> dict[str, Any]:
-    """The record of a run.
+    """Read the record of a run.
 
     Raises:
         InputError: it is missing or damaged.

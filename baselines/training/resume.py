@@ -143,7 +143,7 @@ def stop_signals() -> Iterator[Callable[[], bool]]:
 
 
 def digest(*values: object) -> str:
-    """SHA-256 of tensors and mappings by what they hold, of anything else by its ``repr``."""
+    """Compute the SHA-256 of tensors and mappings by content, of the rest by its ``repr``."""
     total = hashlib.sha256()
     for value in values:
         _add(total, value)

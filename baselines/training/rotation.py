@@ -50,7 +50,7 @@ class RandomRotation:
         return self.rotated(images, rotvec_rad), quat_product(quat_wxyz, quat_of(rotvec_rad))
 
     def rotated(self, images: Tensor, old_from_new_rad: Tensor) -> Tensor:
-        """Images (B, 3, S, S) after rotations about the camera's axes, as rotation vectors (B, 3).
+        """Rotate the camera of images (B, 3, S, S) about its axes by rotation vectors (B, 3).
 
         A positive turn about y looks further right, one about x further up, one about z rolls the
         camera clockwise.
@@ -95,7 +95,7 @@ def random_rotation(
 
 
 def packed_intrinsics(camera: FrameCamera, network: NetworkConfig) -> Intrinsics:
-    """Intrinsics, in pixels, of frames of ``camera`` as they are packed for ``network``."""
+    """Return the intrinsics in pixels of frames of ``camera`` as packed for ``network``."""
     crop = crop_of((camera.width, camera.height), network.input_px, network.view)
     x, y = crop.width / camera.width, crop.height / camera.height
     return Intrinsics(
@@ -104,7 +104,7 @@ def packed_intrinsics(camera: FrameCamera, network: NetworkConfig) -> Intrinsics
 
 
 def rotation_of(rotvec_rad: Tensor) -> Tensor:
-    """Rotation matrices (B, 3, 3) of rotation vectors (B, 3)."""
+    """Compute the rotation matrices (B, 3, 3) of rotation vectors (B, 3)."""
     x, y, z = rotvec_rad.unbind(1)
     o = torch.zeros_like(x)
     skew = torch.stack([o, -z, y, z, o, -x, -y, x, o], dim=1).view(-1, 3, 3)
@@ -113,7 +113,7 @@ def rotation_of(rotvec_rad: Tensor) -> Tensor:
 
 
 def quat_of(rotvec_rad: Tensor) -> Tensor:
-    """Unit quaternions wxyz (B, 4) of rotation vectors (B, 3); exact at zero."""
+    """Compute the unit quaternions wxyz (B, 4) of rotation vectors (B, 3); exact at zero."""
     angle_rad = torch.linalg.vector_norm(rotvec_rad, dim=1, keepdim=True)
     # sin(a / 2) / a as sinc, which is 1 at 0; torch's has pi in its argument.
     vector = 0.5 * torch.sinc(angle_rad / (2 * math.pi)) * rotvec_rad
@@ -121,7 +121,7 @@ def quat_of(rotvec_rad: Tensor) -> Tensor:
 
 
 def quat_product(a_wxyz: Tensor, b_wxyz: Tensor) -> Tensor:
-    """Hamilton product (B, 4): the rotation ``b`` first, then ``a``."""
+    """Compute the Hamilton product (B, 4): the rotation ``b`` first, then ``a``."""
     aw, av = a_wxyz[:, :1], a_wxyz[:, 1:]
     bw, bv = b_wxyz[:, :1], b_wxyz[:, 1:]
     scalar = aw * bw - (av * bv).sum(1, keepdim=True)

@@ -108,7 +108,7 @@ class Material(NamedTuple):
     held_out: LabelledFrames | None
 
     def fingerprints(self) -> list[object]:
-        """All that a run depends on beside its settings; of its images, samples."""
+        """List everything a run depends on beside its settings; of its images, samples."""
         learned = self.learned
         values: list[object] = [torch.__version__, self.localizer.state_dict()]
         values += [self.statistics.mean, self.statistics.deviation, learned.images.device.type]

@@ -129,7 +129,7 @@ def _both_scores(poses: PoseTable, labels: PoseTable, truth: PoseTable) -> dict[
 
 
 def read_predictions(path: Path) -> PoseTable:
-    """A pose table whose poses may be ``nan``, unlike labels."""
+    """Read a pose table whose poses may be ``nan``, unlike labels."""
     values = read_numbers(path, HEADER, "table of predictions", finite=False)
     if not len(values):
         raise InputError(f"{path}: has no rows; predict again")

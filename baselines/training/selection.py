@@ -75,7 +75,7 @@ class Selection:
         return frozenset(-(-steps * k // count) for k in range(1, count + 1))
 
     def evaluate(self) -> HeldOutErrors:
-        """Errors on the held-out frames now; keeps the weights if there were no better ones.
+        """Compute the errors on the held-out frames; keep the weights if there were no better ones.
 
         With ``averaged`` no weights are kept.
         """
@@ -112,7 +112,7 @@ class Selection:
 def held_out_errors(
     localizer: Localizer, frames: LabelledFrames, statistics: ImageStatistics, precision: Precision
 ) -> HeldOutErrors:
-    """Errors of the main predictions, by the labels the frames carry; training mode afterwards."""
+    """Compute errors of the main predictions against labels; leave the network training."""
     localizer.eval()
     device = frames.images.device
     predictions: list[PosePrediction] = []
@@ -235,7 +235,7 @@ class Progress:
 
 
 def kept_errors(rows: list[HistoryRow]) -> HeldOutErrors | None:
-    """Errors on held-out frames at the end of a run that kept no earlier weights.
+    """Return the errors on held-out frames at the end of a run that kept no earlier weights.
 
     None where nothing was held out.
     """

@@ -42,7 +42,7 @@ class Adam(Untraced, torch.optim.Adam):
 
     @torch.no_grad()
     def step(self, closure: Callable[[], float] | None = None) -> None:  # type: ignore[override]
-        """One step for every parameter that has a gradient."""
+        """Take one step for every parameter that has a gradient."""
         unwrap(torch.optim.Adam.step)(self, closure)
 
 
@@ -51,5 +51,5 @@ class AdamW(Untraced, torch.optim.AdamW):
 
     @torch.no_grad()
     def step(self, closure: Callable[[], float] | None = None) -> None:  # type: ignore[override]
-        """One step for every parameter that has a gradient."""
+        """Take one step for every parameter that has a gradient."""
         unwrap(torch.optim.AdamW.step)(self, closure)

@@ -65,7 +65,7 @@ class PoseGraph:
 
 
 def edge_residuals(graph: PoseGraph, first_from_cam: Array) -> Array:
-    """Residuals (n_edges, 6) at poses (n, 4, 4): translation in metres, rotation vector in radians.
+    """Compute residuals (n_edges, 6) at poses (n, 4, 4): translation (m), rotation vector (rad).
 
     They are those of ``inverse(measured) @ predicted``, zero where the poses agree with the edge.
     """
@@ -98,7 +98,7 @@ def check_connected(graph: PoseGraph) -> None:
 
 
 def swapped_blocks(information: Array) -> Array:
-    """The (6, 6) matrix with translation and rotation exchanged; its own inverse."""
+    """Return the (6, 6) matrix with translation and rotation exchanged; its own inverse."""
     order = [3, 4, 5, 0, 1, 2]
     return information[np.ix_(order, order)]
 

@@ -26,7 +26,7 @@ _RELATIVE_CHANGE = 1e-9
 
 
 def factors_of(graph: PoseGraph) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
-    """The graph as gtsam's factors, the first pose fixed, and its initial values."""
+    """Return the graph as gtsam's factors, the first pose fixed, and its initial values."""
     factors, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
     for node, pose in enumerate(graph.first_from_cam):
         values.insert(node, gtsam.Pose3(pose))

@@ -103,7 +103,7 @@ def optimise_toro(graph: PoseGraph, iterations: int, epsilon: float) -> Array:
 
 
 def spanning_tree(graph: PoseGraph) -> NDArray[np.int64]:
-    """Parent (n,) of every node: the lowest-numbered neighbour; the root, node 0, is its own.
+    """Find the parent (n,) of every node: its lowest-numbered neighbour; the root's is itself.
 
     Raises:
         ValueError: a node has no edge to a lower-numbered one.

@@ -25,7 +25,7 @@ _BLOCK, _MAX_STEP = 8, 0.1
 def depth_agreement(
     depth_i_m: Depth, depth_j_m: Depth, i_from_j: Array, camera: CameraConfig, max_rmse_m: float
 ) -> tuple[float, float]:
-    """Overlap and residual of two depth images (H, W) under a motion (4, 4).
+    """Compute the overlap and residual of two depth images (H, W) under a motion (4, 4).
 
     A point of image j agrees when its depth differs by at most twice ``max_rmse_m`` from the one
     measured there in image i.
@@ -64,7 +64,7 @@ def matched_depths(
 
 
 def points_of(depth_m: Depth, camera: CameraConfig, stride: int, first: float = 0.5) -> Array:
-    """Points (h, w, 3) in camera coordinates, not finite where there is no depth.
+    """Compute points (h, w, 3) in camera coordinates, not finite where there is no depth.
 
     ``depth_m`` is every ``stride``-th row and column of the camera's image, the first at ``first``.
     """
@@ -76,7 +76,7 @@ def points_of(depth_m: Depth, camera: CameraConfig, stride: int, first: float = 
 
 
 def normals_of(point_m: Array) -> Array:
-    """Normals (h - 2, w - 2, 3) of points (h, w, 3), from the neighbours to all sides.
+    """Compute normals (h - 2, w - 2, 3) of points (h, w, 3), from the neighbours to all sides.
 
     They are nan where those neighbours are not on one surface.
     """
@@ -147,7 +147,7 @@ def register(
     cfg: RgbdConfig,
     method: str = "point-to-plane",
 ) -> Array | None:
-    """Motion ``i_from_j`` (4, 4) near a starting point (4, 4), or None where there is none.
+    """Find the motion ``i_from_j`` (4, 4) near a starting point (4, 4), or None if there is none.
 
     By Open3D's own loop over scales, which knows all its methods.
     """
@@ -189,7 +189,7 @@ class DenseOdometry:
         return constraint(frame.depth_m, self.camera) >= MIN_CONSTRAINT
 
     def overlap(self, i: RgbdFrame, j: RgbdFrame, i_from_j: Array) -> float:
-        """Share of the points of j that agree with i under a motion (4, 4), 0 if rejected."""
+        """Compute the share of points of j that agree with i under a motion (4, 4); 0: rejected."""
         max_rmse_m = self.cfg.max_rmse_m
         fitness, rmse_m = depth_agreement(i.depth_m, j.depth_m, i_from_j, self.camera, max_rmse_m)
         return fitness if fitness >= self.cfg.min_fitness and rmse_m <= max_rmse_m else 0.0

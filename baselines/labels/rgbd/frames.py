@@ -183,12 +183,12 @@ def read_frame(
 
 
 def open3d_depth(depth_m: NDArray[np.float32]) -> o3d.t.geometry.Image:
-    """Depth (H, W) for Open3D, which takes 0 where nothing was measured."""
+    """Return the depth (H, W) for Open3D, which takes 0 where nothing was measured."""
     return open3d_image(np.where(np.isfinite(depth_m), depth_m, np.float32(0)))
 
 
 def open3d_image(pixels: NDArray[Any]) -> o3d.t.geometry.Image:
-    """An array (H, W) or (H, W, C) as an Open3D image."""
+    """Return an array (H, W) or (H, W, C) as an Open3D image."""
     return o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(np.ascontiguousarray(pixels)))
 
 

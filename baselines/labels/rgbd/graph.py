@@ -74,7 +74,7 @@ def rgbd_graph(
     cfg: RgbdConfig,
     seed: int = 0,
 ) -> tuple[PoseGraph, Facts]:
-    """Pose graph of one batch: an edge per neighbouring pair and the accepted loop closures.
+    """Build the pose graph of one batch: an edge per neighbouring pair, accepted loop closures.
 
     Args:
         color_paths: Colour images in order.

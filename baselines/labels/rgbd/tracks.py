@@ -65,7 +65,7 @@ class FeatureOdometry:
         self._estimation.ransac.random_seed = 0
 
     def features(self, grey: NDArray[np.uint8], depth_m: NDArray[np.float32]) -> FrameFeatures:
-        """Features of a grey image (H, W) with depth (H, W) along the optical axis, inf = none."""
+        """Extract features of a grey image (H, W) with depth (H, W) in metres, inf for none."""
         keypoints, descriptors = self._extractor.extract_from_uint8_array(grey)
         pixel = pycolmap.keypoints_to_matrix(keypoints)[:, :2].astype(np.float64).reshape(-1, 2)
         column, row = np.floor(pixel).astype(int).T
@@ -77,7 +77,7 @@ class FeatureOdometry:
         return FrameFeatures(keypoints, descriptors, pixel, point_m)
 
     def motion(self, i: FrameFeatures, j: FrameFeatures) -> tuple[Array, int] | None:
-        """``i_from_j`` (4, 4) and its inliers, or None when no pose is found."""
+        """Find ``i_from_j`` (4, 4) and its inliers, or None when no pose is found."""
         if min(len(i.pixel), len(j.pixel)) < _MIN_MATCHES:
             return None
         found = self._matcher.match(i.keypoints, i.descriptors, j.keypoints, j.descriptors)
@@ -108,7 +108,7 @@ class View:
 
     @cached_property
     def features(self) -> FrameFeatures:
-        """Features of the colour image."""
+        """Extract features of the colour image."""
         grey = np.asarray(Image.fromarray(self.frame.color).convert("L"))
         return self.by_features.features(grey, self.frame.depth_m)
 
@@ -118,13 +118,13 @@ class View:
         return self.dense.constrained(self.frame)
 
     def from_features(self, other: View, min_inliers: int) -> Array | None:
-        """Motion ``self_from_other`` (4, 4) by features alone, or None."""
+        """Find the motion ``self_from_other`` (4, 4) by features alone, or None."""
         found = self.by_features.motion(self.features, other.features)
         return found[0] if found and found[1] >= min_inliers else None
 
 
 def neighbour(i: View, j: View, previous: Array) -> tuple[Array, bool]:
-    """Motion ``i_from_j`` (4, 4) between neighbours and whether it was accepted.
+    """Find the motion ``i_from_j`` (4, 4) between neighbours and whether it was accepted.
 
     ``previous`` is the motion (4, 4) of the pair before.
     """
@@ -157,7 +157,7 @@ def _by_features(i: View, j: View, previous: Array) -> tuple[Array, bool]:
 
 
 def closure(i: View, j: View, predicted: Array | None) -> Array | None:
-    """Motion ``i_from_j`` (4, 4) between keyframes, i the earlier one, or None.
+    """Find the motion ``i_from_j`` (4, 4) between keyframes, i the earlier one, or None.
 
     ``predicted`` is the motion by odometry, None where that was interrupted between them.
     """
@@ -176,7 +176,7 @@ _LOOP_MAX_DEG, _LOOP_MAX_M = 45.0, 2.0
 
 
 def loop_candidates(first_from_cam: Array, keyframe_every: int) -> list[tuple[int, int]]:
-    """Pairs of keyframes, i < j - 1, whose views may overlap by their poses (n, 4, 4)."""
+    """List pairs of keyframes, i < j - 1, whose views may overlap by their poses (n, 4, 4)."""
     keyframes = np.arange(0, len(first_from_cam), keyframe_every)
     position_m, axis = first_from_cam[keyframes, :3, 3], first_from_cam[keyframes, :3, 2]
     distance_m = np.linalg.norm(position_m[:, None] - position_m, axis=-1)

@@ -48,7 +48,7 @@ Array = NDArray[np.float64]
 
 
 def match_features(database: Path, cfg: SfmConfig, seed: int) -> None:
-    """Verified matches between frames near in time; ``seed`` is that of RANSAC."""
+    """Write verified matches between frames near in time; ``seed`` is that of RANSAC."""
     pairing = pycolmap.SequentialPairingOptions(
         overlap=cfg.overlap, quadratic_overlap=cfg.quadratic_overlap, num_threads=1
     )

@@ -92,6 +92,6 @@ def _extract(
 
 
 def colmap_parameters(camera: CameraConfig) -> list[float]:
-    """Parameters of COLMAP's PINHOLE or, where there is distortion, FULL_OPENCV."""
+    """Return the parameters of COLMAP's PINHOLE or, where there is distortion, FULL_OPENCV."""
     pinhole = list(camera.intrinsics)
     return [*pinhole, *camera.distortion, 0.0, 0.0, 0.0] if any(camera.distortion) else pinhole

@@ -128,7 +128,7 @@ def fit_first_camera(model_from_cam: Array, true_world_from_cam: Array) -> Simil
 
 
 def metric_scale(true_position_m: Array, position: Array) -> float:
-    """Metres per unit of the model, from camera centres (n, 3) of the same frames.
+    """Estimate metres per unit of the model from camera centres (n, 3), (n, 3) of the same frames.
 
     The published code takes the mean ratio of true to estimated distances from the first frame over
     its first 44 frames, leaving out those under 5 cm; the median is as simple and bears a wrong

@@ -65,7 +65,7 @@ class Mapping:
 
 
 def read_matches(images: Path, database: Path) -> Matches:
-    """Matches of the images in a directory, from their database."""
+    """Read the matches of the images in a directory, from their database."""
     with pycolmap.Database.open(database) as opened:
         ids = [image.image_id for image in sorted(opened.read_all_images(), key=lambda i: i.name)]
         cache = pycolmap.DatabaseCache.create(opened, pycolmap.DatabaseCacheOptions())
@@ -75,7 +75,7 @@ def read_matches(images: Path, database: Path) -> Matches:
 
 
 def map_matches(matches: Matches, work_dir: Path, cfg: SfmConfig, seed: int) -> Mapping:
-    """The best model that the mapper ``cfg.mapper`` finds; ``work_dir`` is a new directory."""
+    """Map a batch by ``cfg.mapper`` and return its best model; ``work_dir`` is a new directory."""
     work_dir.mkdir()
     if not matches.matched_points:
         return Mapping(None, 0, 0, 0.0)
@@ -90,7 +90,7 @@ def map_matches(matches: Matches, work_dir: Path, cfg: SfmConfig, seed: int) -> 
 def camera_poses(
     model: pycolmap.Reconstruction | None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Registered frames (m,) in order and their ``model_from_cam`` (m, 4, 4); m = 0 without one."""
+    """Return registered frames (m,) and their ``model_from_cam`` (m, 4, 4); m = 0 without model."""
     images = [] if model is None else [i for i in model.images.values() if i.has_pose]
     images.sort(key=lambda image: str(image.name))
     frames = np.array([int(Path(image.name).stem) for image in images], dtype=np.int64)
@@ -146,7 +146,7 @@ _MAX_MODELS = 5  # of one start, where the batch falls into pieces
 def incremental_options(
     cfg: SfmConfig, seed: int, max_seconds: int
 ) -> pycolmap.IncrementalPipelineOptions:
-    """Options of the incremental mapper, which stops after ``max_seconds``."""
+    """Return the options of the incremental mapper, which stops after ``max_seconds``."""
     options = pycolmap.IncrementalPipelineOptions(
         num_threads=1,
         random_seed=seed,
@@ -173,7 +173,7 @@ def incremental_options(
 
 
 def global_options(cfg: SfmConfig, seed: int) -> pycolmap.GlobalPipelineOptions:
-    """Options of the global mapper: all rotations at once, then all positions, then adjustment."""
+    """Return options of the global mapper: all rotations, then all positions, then adjustment."""
     options = pycolmap.GlobalPipelineOptions(
         num_threads=1, random_seed=seed, min_num_matches=cfg.min_num_inliers, min_model_size=2
     )
@@ -236,7 +236,7 @@ def refine_model(model: pycolmap.Reconstruction) -> None:
 def adjustment_of(
     model: pycolmap.Reconstruction, steps: int
 ) -> tuple[pycolmap.BundleAdjustmentConfig, pycolmap.BundleAdjustmentOptions]:
-    """Adjustment of all poses and points; intrinsics are known, one thread makes it repeatable."""
+    """Prepare the adjustment of all poses and points; one thread makes it repeatable."""
     config = pycolmap.BundleAdjustmentConfig()
     for image_id in model.reg_image_ids():
         config.add_image(image_id)

@@ -115,14 +115,14 @@ def match_retrieved(
 
 
 def matching_options(cfg: SfmConfig) -> pycolmap.FeatureMatchingOptions:
-    """Options of all matching: one thread makes it repeatable."""
+    """Return the options of all matching: one thread makes it repeatable."""
     return pycolmap.FeatureMatchingOptions(
         num_threads=1, use_gpu=False, guided_matching=cfg.guided_matching
     )
 
 
 def verification_options(cfg: SfmConfig, seed: int) -> pycolmap.TwoViewGeometryOptions:
-    """Options of the geometric verification; ``seed`` is that of RANSAC."""
+    """Return the options of the geometric verification; ``seed`` is that of RANSAC."""
     verification = pycolmap.TwoViewGeometryOptions(min_num_inliers=cfg.min_num_inliers)
     verification.ransac.random_seed = seed
     return verification

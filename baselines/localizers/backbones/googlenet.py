@@ -106,7 +106,7 @@ def side_by_side(layers: Sequence[ConvBn], maps: Tensor) -> Sequence[Tensor]:
 
 
 def running_statistics(norm: nn.BatchNorm2d) -> tuple[Tensor, Tensor]:
-    """Mean and variance (n,) that a layer keeps for evaluation."""
+    """Return the mean and variance (n,) that a layer keeps for evaluation."""
     assert norm.running_mean is not None
     assert norm.running_var is not None
     return norm.running_mean, norm.running_var
@@ -144,7 +144,7 @@ class InceptionBackbone(nn.Module):
         return self.maps_of(torch.addcmul(self.input_shift, images, self.input_scale))
 
     def maps_of(self, images: Tensor) -> InceptionMaps:
-        """Feature maps of images (B, 3, H, W) scaled as the official weights expect them."""
+        """Compute the maps of images (B, 3, H, W) scaled as the official weights expect them."""
         raise NotImplementedError
 
 
@@ -208,7 +208,7 @@ class GoogLeNet(InceptionBackbone):
         self.n_out = n
 
     def maps_of(self, images: Tensor) -> InceptionMaps:
-        """Feature maps of images (B, 3, H, W) in [-1, 1]."""
+        """Compute feature maps of images (B, 3, H, W) in [-1, 1]."""
         # Pooling before the ReLU is the same as after it, and leaves it a quarter of the pixels.
         maps = torch.relu_(self.pool3(self.conv1.normalised(images)))
         maps = torch.relu_(self.pool3(self.conv3.normalised(self.conv2(maps))))

@@ -87,7 +87,7 @@ BLOCKS = {
 
 
 def branches_of(block: str) -> list[Branch]:
-    """The branches of a block that is written as above."""
+    """Build the branches of a block that is written as above."""
     branches = []
     for line in block.strip().splitlines():
         steps = [[step.split() for step in part.split("&")] for part in line.split(",")]

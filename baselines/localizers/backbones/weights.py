@@ -34,12 +34,12 @@ CLASSIFIERS = ("fc.", "aux1.", "aux2.", "AuxLogits.")
 
 
 def build_inception(name: InceptionName, width: float) -> InceptionBackbone:
-    """The backbone of PoseNet, PoseLSTM and PoseNet2, randomly initialised."""
+    """Build the backbone of PoseNet, PoseLSTM and PoseNet2, randomly initialised."""
     return GoogLeNet(width) if name == "googlenet" else InceptionV3(width)
 
 
 def build_backbone(name: BackboneName, width: float) -> Backbone:
-    """A backbone without its classifier, randomly initialised."""
+    """Build a backbone without its classifier, randomly initialised."""
     return ResNet34(width) if name == "resnet34" else build_inception(name, width)
 
 
