@@ -79,7 +79,7 @@ def photograph_camera(arguments: argparse.Namespace) -> PhotographCamera:
         metavar="DATASET",
     ),
     option("--out", "directory of the model", type=Path, required=True, metavar="DIR"),
-    option("--localizer", "which of the five (posenet2)", choices=MODELS, default="posenet2"),
+    option("--localizer", "which one (posenet2)", choices=MODELS, default="posenet2"),
     option("--images", "images to show in all (30000)", type=int, metavar="N"),
     option("--minutes", "or about how long to learn", type=float, metavar="M"),
     option(

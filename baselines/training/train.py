@@ -15,6 +15,7 @@ from baselines.config.learning import (
     ModelName,
     NetworkConfig,
     TrainingConfig,
+    hyper_of,
 )
 from baselines.localizers.backbones.shipped import shipped_weights_path
 from baselines.localizers.registry import backbone_of
@@ -57,6 +58,11 @@ DEFAULT_IMAGES = 30_000
 MODEL, HISTORY, RECORD = "model.pt", "history.csv", "training.json"
 # What lies there while a run is under way, and what a kill may leave.
 TEMPORARY = ("frames.npy", "frames.json", "labels.csv", "resume.pt", "budget.json")
+
+
+def recipe_of(localizer: ModelName) -> LocalizerConfig:
+    """Return hyper-parameters to train a localizer by; of one without a recipe its defaults."""
+    return RECIPES.get(localizer) or hyper_of(localizer)(learning_rate=RATE)
 
 
 @dataclass(frozen=True)
@@ -247,7 +253,7 @@ def _job_of(job: TrainJob, packed: PackedFrames) -> Job:
     run = Job(
         name=job.localizer,
         network=NETWORK,
-        hyper=RECIPES[job.localizer],
+        hyper=recipe_of(job.localizer),
         training=training,
         samples_seen=job.images or BATCH,
         seed=job.seed,

@@ -103,6 +103,7 @@ from baselines.references.evidence import Evidence
 from baselines.references.run import answer_and_score
 from baselines.training.checkpoint import read_checkpoint
 from baselines.training.predict import predict_poses
+from baselines.training.train import RATE, recipe_of
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.geometry.poses import pose_error
@@ -114,6 +115,7 @@ frames, labels = write_split(folder, "train", 40, 0)
 truth = read_pose_table(labels)
 
 hyper = hyper_of("direct")(learning_rate=2e-3, s_orientation=-1.0, pull=2.0)
+assert recipe_of("direct") == hyper_of("direct")(learning_rate=RATE)
 model, _ = train((frames, labels), folder, name="direct", hyper=hyper)
 trained = read_checkpoint(model, CPU)
 assert trained.description.localizer == "direct"
