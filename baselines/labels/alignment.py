@@ -29,7 +29,7 @@ def fit(labels: Array, truth: Array, alignment: Alignment) -> Similarity:
     Args:
         labels: ``world_from_cam`` (N, 4, 4) to be moved.
         truth: ``world_from_cam`` (N, 4, 4) of the same frames.
-        alignment: Whether it may be scaled. Labels that do not move keep their scale.
+        alignment: Motions allowed, with or without scale. Labels that do not move keep their scale.
 
     Returns:
         The map of the labels' world to the true one.
@@ -50,7 +50,7 @@ def aligned_errors(
 
     Args:
         pairs: Labels and true poses of each sequence.
-        alignment: How labels may be moved.
+        alignment: Motions of the labels that are allowed.
 
     Returns:
         Position errors in metres (N,) and orientation errors in degrees (N,) of all frames.

@@ -34,7 +34,7 @@ def load_saved(path: Path, device: torch.device | str = "cpu") -> Any:
 
     Args:
         path: File that ``torch.save`` wrote.
-        device: Where the tensors go.
+        device: Device of the tensors.
 
     Raises:
         ValueError: The file is damaged, of another kind, or holds more than plain values.

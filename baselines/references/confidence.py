@@ -77,7 +77,7 @@ def support_of(
     """Count what speaks for a pose.
 
     Args:
-        pixel: Where the photograph shows each match (m, 2), in pixels of an image of ``size``.
+        pixel: Positions (m, 2) of the matches in the photograph, in pixels of an image of ``size``.
         own: Feature of the photograph that each match (m,) is of.
         inlier: Matches (m,) that agree with the pose.
         size: Width and height of the image, pixels.

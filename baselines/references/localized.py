@@ -86,7 +86,7 @@ def localize_in_map(
         world: Whose coordinates ``world_from_cam`` is written in, where the place was scanned from
             a sequence that has its own.
         least_confidence: Poses with less are not written.
-        seed: Of RANSAC's samples, the same for every photograph.
+        seed: Seed of RANSAC's samples, the same for every photograph.
 
     Raises:
         InputError: The map or a photograph cannot be used, nothing says what a photograph's focal

@@ -150,8 +150,8 @@ def read_map_frames(folder: Path, choice: FrameChoice, cameras: CameraOptions) -
     Args:
         folder: A data set of ``synfeal collect`` with depth, of which training frames are taken, or
             a posed sequence of photographs with depth.
-        choice: Which of the frames.
-        cameras: What is known of the cameras beside what the data set says.
+        choice: Choice among the frames.
+        cameras: Cameras given beside what the data set says.
 
     Raises:
         InputError: There is no such folder, a frame lacks a file, or a calibration cannot be used.

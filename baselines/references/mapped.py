@@ -72,7 +72,7 @@ class StructureMap:
         vectors: Unit vectors (N, D) to retrieve frames by.
         vlad: Describes a photograph by such a vector.
         sequence_from_world: Rigid motion (4, 4) to the world of the scanned sequence, if any.
-        record: What ``map.json`` says beside these.
+        record: Further entries of ``map.json``.
     """
 
     names: tuple[str, ...]
@@ -110,7 +110,7 @@ def detect(sift: Any, grey: NDArray[np.uint8]) -> tuple[Array, NDArray[np.uint8]
     """Find features of an image.
 
     Args:
-        sift: What :func:`detector` returns.
+        sift: Detector, as :func:`detector` returns it.
         grey: Grey values (H, W).
 
     Returns:
@@ -130,7 +130,7 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
     Args:
         frames: The frames.
         out: Folder to write, which must not exist.
-        seed: Of the vocabulary.
+        seed: Seed of the vocabulary.
 
     Raises:
         InputError: An image cannot be read, there are too few features, or ``out`` exists.

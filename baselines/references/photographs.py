@@ -81,7 +81,7 @@ class Finder:
 
     Args:
         place: The map.
-        seed: Of RANSAC's samples.
+        seed: Seed of RANSAC's samples.
     """
 
     def __init__(self, place: StructureMap, seed: int = 0) -> None:

@@ -74,9 +74,9 @@ def score_answers(
     Args:
         answers: Poses of the test frames, NaN where there is none.
         files: Labels and true poses by name: ``train``, ``test``, ``test_truth``.
-        folder: Where the files are written.
+        folder: Folder of the files.
         info: Further keys of the metrics.
-        facts: What the answers took.
+        facts: Times and memory that the answers took.
     """
     predictions = folder / "predictions.csv"
     write_pose_table(predictions, answers)
@@ -150,7 +150,7 @@ def run_external(
         files: Packed frames and labels by name: ``train_frames``, ``train``, ``test_frames``,
             ``test``.
         named: Values of further placeholders.
-        folder: Where the answers are written.
+        folder: Folder of the answers.
 
     Returns:
         Path of the answers.

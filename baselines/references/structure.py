@@ -101,10 +101,10 @@ def supported_pose(
     """Estimate a pose by P3P in LO-RANSAC, refined on its inliers.
 
     Args:
-        pixel: Where points are seen (n, 2), from the principal point.
+        pixel: Pixels (n, 2) that show the points, from the principal point.
         point_m: Points (n, 3) in the world.
         camera: Camera without distortion.
-        seed: Of the samples.
+        seed: Seed of the samples.
         max_error_px: Largest reprojection error of an inlier.
 
     Returns:
@@ -131,7 +131,7 @@ def refined_focal_px(
     """Refine a pose together with the focal length.
 
     Args:
-        pixel: Where points are seen (n, 2), from the principal point.
+        pixel: Pixels (n, 2) that show the points, from the principal point.
         point_m: Points (n, 3) in the world; some may be wrong matches.
         world_from_cam: Pose (4, 4) to start from.
         camera: Camera without distortion, whose focal length along x is where that starts.

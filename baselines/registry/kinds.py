@@ -29,7 +29,7 @@ class Kind:
         name: Name in configurations and paths; lower-case letters and digits.
         title: Name in tables and figures.
         rank: Place in tables and figures; those that are declared elsewhere come last.
-        place: Where the class or function is, ``module:name``; filled in by the registry.
+        place: Place of the class or function, ``module:name``; filled in by the registry.
         room: Folder of this package whose modules may declare methods of the kind.
     """
 

@@ -32,8 +32,8 @@ class WeightAverage:
     """Sums the weights of a network after some of the last steps of a run.
 
     Args:
-        network: What is trained, with its buffers.
-        steps: Of the whole run.
+        network: Network in training, with its buffers.
+        steps: Steps of the whole run.
     """
 
     def __init__(self, network: nn.Module, steps: int) -> None:

@@ -92,7 +92,7 @@ class ModelDescription(Strict):
 
 
 def frame_camera(frames: Path) -> FrameCamera | None:
-    """Read the camera of packed frames by the record beside them; None where it is no pinhole.
+    """Read the perspective camera of packed frames from the record beside them, if there is one.
 
     Raises:
         InputError: the record is damaged.

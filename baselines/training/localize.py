@@ -52,14 +52,14 @@ class Localized(NamedTuple):
     """Result of localizing pictures by a trained model.
 
     Attributes:
-        description: Of the localizer.
-        device: Where it ran, ``cpu`` or ``cuda``.
+        description: Description of the localizer.
+        device: Device it ran on, ``cpu`` or ``cuda``.
         n_images: Pictures.
         n_failed: Those whose pose is not finite.
         n_beyond: Those whose pose lies far outside of the training positions.
         n_unlike: Those that are unlike the training frames; None where the model cannot tell.
         n_resampled: Those that were brought to the training camera.
-        calibration: What told the camera of these.
+        calibration: Source of the camera of these.
         outside: Largest share of the training view that one of these does not show.
         world: Whose coordinates poses are in, where the two differ.
         read_ms: Median time to read and shrink a picture.
@@ -103,7 +103,7 @@ def localize(
         model: Checkpoint.
         named: Pictures, and directories that stand for their pictures.
         out: File to write; it appears when all are done.
-        device: Where to run.
+        device: Device to run on.
         camera: Camera of the pictures; without one they are taken to show what training frames do.
         world: Whose coordinates ``world_from_cam`` is written in, where the place was scanned from
             a sequence that has its own; else they are those of the training labels. A pose that is
@@ -151,7 +151,7 @@ def localize(
 
 
 class Seen(NamedTuple):
-    """How far answers lie outside of what a localizer has seen.
+    """Distance of answers from what a localizer has seen.
 
     Attributes:
         typicality: Share (N,) of frames of the place that are at least as unlike those of other
@@ -183,7 +183,7 @@ def _seen(trained: TrainedLocalizer, position_m: Array, features: Tensor) -> See
     Args:
         trained: Localizer.
         position_m: Its answers (N, 3) in the world of the training labels.
-        features: Of the pictures (N, F).
+        features: Features of the pictures (N, F).
     """
     unknown, calibration = np.full(len(position_m), np.nan), trained.calibration
     typical = unknown if calibration is None else typicality(calibration, features).round(DECIMALS)
@@ -269,7 +269,7 @@ def _write(
         pictures: The pictures (N).
         poses: Positions and quaternions (N, 7).
         good: Poses (N,) that are finite.
-        seen: How far they lie outside of what the model has seen.
+        seen: Their distance from what the model has seen.
     """
     frame = pd.DataFrame(poses, columns=list(EARLIER_HEADER[1:]))
     frame.insert(0, HEADER[0], pd.Series([str(path) for path in pictures], dtype=object))
@@ -308,7 +308,7 @@ def read_picture(path: Path, input_px: int, view: View = "square") -> NDArray[np
     Args:
         path: PNG or JPEG.
         input_px: Side of the network's image.
-        view: What of the picture it shows.
+        view: Part of the picture that it shows.
 
     Returns:
         Pixels (input_px, input_px, 3), made by the function that packs training frames.
@@ -349,15 +349,15 @@ class PictureReader:
     """Reads pictures as the network is to see them.
 
     Args:
-        description: Of the localizer: what its training frames were.
-        camera: Of the pictures.
+        description: Description of the localizer, with the camera of its training frames.
+        camera: Camera of the pictures.
         model: The checkpoint, for messages.
 
     Attributes:
-        read_s: How long each picture took, seconds.
+        read_s: Seconds that each picture took.
         resampled: Pictures that were brought to the training camera.
         outside: Largest share of the training view that one of these does not show.
-        source: What tells the camera of pictures; None where nothing does.
+        source: Source of the camera of pictures; None where there is none.
 
     Raises:
         InputError: A calibration is given for a model that does not know its own camera.

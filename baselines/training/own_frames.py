@@ -66,7 +66,7 @@ class OwnFrames:
     """Training frames of one data set.
 
     Attributes:
-        folder: Where it lies.
+        folder: Folder of the data set.
         color: Image of each frame.
         world_from_cam: Poses (N, 4, 4) in the data set's own world.
         path: Index (N,) of the path of each frame, from 0: what is held out as a whole.

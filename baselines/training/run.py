@@ -196,7 +196,7 @@ def step_seconds(job: Job, frames: Path, labels: Path, weights: Path | None) -> 
         job: The run; how many images it shows does not matter.
         frames: Packed frames.
         labels: Pose table.
-        weights: What the backbone starts from.
+        weights: State dict that the backbone starts from.
 
     Returns:
         Seconds, the mean of a few steps after two that are not timed.

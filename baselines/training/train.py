@@ -72,16 +72,16 @@ class TrainJob:
     Attributes:
         datasets: Data sets of ``synfeal collect`` or sequences of photographs, one or more.
         out: Directory of the model.
-        localizer: Which of the five.
+        localizer: Name of the localizer.
         images: Images to show in all; None to go by ``minutes``.
-        minutes: How long to learn, about.
+        minutes: Approximate length of the training, minutes.
         ranges: Frames to take of photographs; none: all.
         photographs: Camera of photographs.
         held_out: Share of the paths that are not learned from and tell the error.
         randomisation: Ranges of light, lens and sensor; None to show images as they are.
         rotations: Rotations of images; they need a known camera without distortion.
-        device: Where to train.
-        seed: Of all that is drawn.
+        device: Device to train on.
+        seed: Seed of all that is drawn.
     """
 
     datasets: Sequence[Path]
@@ -107,7 +107,7 @@ class TrainedModel(NamedTuple):
         n_frames: Frames of all data sets.
         n_paths: Paths they are of.
         errors: On the frames of held-out paths; None where nothing was held out.
-        finished_before: Whether the same run had ended before, so that nothing was done.
+        finished_before: The same run had ended before, so nothing was done.
     """
 
     model: Path

@@ -40,7 +40,7 @@ OUTSIDE = 0.05
 
 
 class Calibration(NamedTuple):
-    """What a localizer has seen, and how far from that new frames of the same place are.
+    """Features that a localizer has seen, and distances of new frames of the same place to them.
 
     Attributes:
         features: Features (M, F) of training frames, unit length, float16.
@@ -63,7 +63,7 @@ def calibrate(
 
     Args:
         localizer: Trained network; it is in evaluation mode afterwards.
-        statistics: Of the images it was trained on.
+        statistics: Statistics of the images that it was trained on.
         learned: Frames it was trained on.
         held_out: Frames of paths that were not learned from, if any.
         randomise: Light, lens and sensor that training frames were shown under: both kinds of
@@ -134,9 +134,9 @@ def nearest_distance(
     """Cosine distance (B,) to the nearest of other frames.
 
     Args:
-        features: Of frames (B, F), unit length.
-        seen: Of the others (M, F), unit length.
-        paths: Of which path each of both is (B,), (M,): those of one path are not compared; None
+        features: Features of frames (B, F), unit length.
+        seen: Features of the others (M, F), unit length.
+        paths: Path of each of both (B,), (M,): those of one path are not compared; None
             to compare all.
     """
     seen = seen.float()
@@ -154,8 +154,8 @@ def typicality(calibration: Calibration, features: Tensor) -> Array:
     """Share (B,) of frames of the place that are at least as far from those of other paths.
 
     Args:
-        calibration: Of the localizer.
-        features: Of pictures (B, F), unit length.
+        calibration: Calibration of the localizer.
+        features: Features of pictures (B, F), unit length.
 
     Returns:
         Between 1 / (Q + 1), for what is farther than all Q frames, and 1; ``nan`` where features

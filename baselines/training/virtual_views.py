@@ -108,7 +108,7 @@ def paired_rotations_rad(turns: AugmentationConfig, pairs: int) -> Tensor:
 
     Args:
         turns: Largest rotations about the camera's axes.
-        pairs: How many there are beside none, each with its opposite, so that their mean is none.
+        pairs: Number of rotations beside none, each with its opposite: their mean is none.
 
     Returns:
         Rotation vectors (1 + 2 pairs, 3), radians; the first is zero.

@@ -58,7 +58,7 @@ def placed(model_from_cam: Array, true_world_from_cam: Array, gauge: Gauge) -> A
     Args:
         model_from_cam: Poses (N, 4, 4) of the registered frames in the model, in order of time.
         true_world_from_cam: Their true poses (N, 4, 4), of which the gauge uses the first.
-        gauge: What it takes from them; see the module.
+        gauge: True poses that it takes; see the module.
 
     Returns:
         ``world_from_cam`` (N, 4, 4), metres; None where there are fewer than two frames or they

@@ -98,7 +98,7 @@ def match_retrieved(
         names: Names of the images in the database, in the order of the frames.
         pairs: Pairs of frames.
         cfg: Matching options.
-        seed: Of RANSAC.
+        seed: Seed of RANSAC.
     """
     if not pairs:
         return
