@@ -9,7 +9,7 @@ run_job(
     snakemake.log[0],
     write_claims,
     design=snakemake.params.design,
-    root=Path(snakemake.output.csv).parents[0],
+    root=Path(snakemake.output.csv).parent,
     seed=snakemake.params.seed,
     out_csv=snakemake.output.csv,
 )

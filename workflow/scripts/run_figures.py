@@ -9,6 +9,6 @@ run_job(
     snakemake.log[0],
     write_figures,
     design=snakemake.params.design,
-    root=Path(snakemake.output.dir).parents[0],
+    root=Path(snakemake.output.dir).parent,
     out_dir=snakemake.output.dir,
 )

@@ -9,7 +9,7 @@ run_job(
     snakemake.log[0],
     write_report,
     design=snakemake.params.design,
-    root=Path(snakemake.output.html).parents[0],
+    root=Path(snakemake.output.html).parent,
     out_html=snakemake.output.html,
     with_robustness=snakemake.params.with_robustness,
 )

@@ -9,6 +9,6 @@ run_job(
     snakemake.log[0],
     write_summary,
     design=snakemake.params.design,
-    root=Path(snakemake.output.md).parents[0],
+    root=Path(snakemake.output.md).parent,
     out_md=snakemake.output.md,
 )
