@@ -65,7 +65,8 @@ class Localizer(nn.Module):
 
     Attributes:
         kind: Declaration of the class.
-        backbone: Part that may start from pretrained weights.
+        backbone: Part that may start from pretrained weights. It returns maps (B, C, h, w) or
+            features (B, F), or several of them with the last ones last.
         criterion: Loss of one prediction; its parameters, if any, are trained with the network.
     """
 

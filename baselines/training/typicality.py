@@ -121,8 +121,10 @@ def features_of(localizer: Localizer, images: Tensor) -> Tensor:
     Returns:
         Features (B, F) of unit length, on the processor.
     """
-    pooled = localizer.backbone(images)[-1].mean((2, 3)).float()
-    return nn.functional.normalize(pooled, dim=1).cpu()
+    maps = localizer.backbone(images)
+    last: Tensor = maps if isinstance(maps, Tensor) else maps[-1]
+    pooled = last.flatten(start_dim=2).mean(2) if last.dim() > 2 else last
+    return nn.functional.normalize(pooled.float(), dim=1).cpu()
 
 
 Paths = NDArray[np.int64]

@@ -133,6 +133,27 @@ def test_features_are_the_pooled_last_maps_of_any_localizer(name):
     np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
+class Averaging(torch.nn.Module):
+    """A backbone of another package, which returns maps or features and nothing beside them."""
+
+    def __init__(self, keeps_maps):
+        super().__init__()
+        self.keeps_maps = keeps_maps
+
+    def forward(self, images):
+        return images if self.keeps_maps else images.mean((2, 3))
+
+
+@pytest.mark.parametrize("keeps_maps", [True, False])
+def test_a_backbone_may_return_one_tensor(keeps_maps):
+    trained = untrained()
+    images = trained.statistics.normalise(labelled(foreign_images(7)).images)
+    trained.network.backbone = Averaging(keeps_maps)
+    colour = images.mean((2, 3))
+    expected = colour / colour.norm(dim=1, keepdim=True)
+    np.testing.assert_allclose(features_of(trained.network, images), expected, atol=1e-6)
+
+
 def test_frames_of_the_place_are_called_outside_as_often_as_stated_and_others_nearly_always(
     calibrated, place
 ):
