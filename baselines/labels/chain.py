@@ -276,11 +276,23 @@ def write_label_set(
     By ``truth_used`` batches are anchored or not.
     """
     anchored = truth_used == TruthUsed.POSES
-    train = train_truth, out_train, out_train_unassisted
-    test = test_truth, out_test, out_test_unassisted
     records = {
-        "train": chain_split(train_batches, *train, groundtruth, anchored),
-        "test": chain_split(test_batches, *test, groundtruth, anchored),
+        "train": chain_split(
+            trajectories=train_batches,
+            truth=train_truth,
+            labels=out_train,
+            unassisted=out_train_unassisted,
+            cfg=groundtruth,
+            anchored=anchored,
+        ),
+        "test": chain_split(
+            trajectories=test_batches,
+            truth=test_truth,
+            labels=out_test,
+            unassisted=out_test_unassisted,
+            cfg=groundtruth,
+            anchored=anchored,
+        ),
     }
     write_assistance(out_assistance, reconstructed, records, truth_used)
     write_json(out_record, {"parameters": estimation})

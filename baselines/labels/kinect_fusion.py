@@ -193,8 +193,8 @@ def kinect_fusion_batch(
     poses = np.tile(np.eye(4), (len(depth_paths), 1, 1))
     registered = np.zeros(len(depth_paths), dtype=bool)
     last, lost = np.eye(4), 0
-    for index, paths in enumerate(zip(color_paths, depth_paths, strict=True)):
-        frame = read_frame(*paths, camera, cfg, seed)
+    for index, (color, depth) in enumerate(zip(color_paths, depth_paths, strict=True)):
+        frame = read_frame(color, depth, camera, cfg, seed)
         least = _FOUND_FITNESS if lost else cfg.min_fitness
         pose = np.eye(4) if index == 0 else None
         if index and lost < _MAX_LOST:

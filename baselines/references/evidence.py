@@ -47,8 +47,9 @@ class Evidence:
     @cached_property
     def descriptors(self) -> Described:
         """Global descriptors of the training and test images, by name, unit length."""
-        counts = len(self.train), len(self.test_frames)
-        return read_described(self.files["descriptors"], *counts)
+        return read_described(
+            self.files["descriptors"], n_train=len(self.train), n_test=len(self.test_frames)
+        )
 
     @cached_property
     def correspondences(self) -> Correspondences:

@@ -55,13 +55,15 @@ def nearest_pose(evidence: Evidence) -> NDArray[np.float64]:
 
     An oracle: the best that copying a training pose can do.
     """
-    truth = (read_pose_table(evidence.files[f"{split}_truth"]) for split in ("train", "test"))
-    rows = nearest_rows(*truth)
+    rows = nearest_rows(
+        train=read_pose_table(evidence.files["train_truth"]),
+        test=read_pose_table(evidence.files["test_truth"]),
+    )
     return evidence.train.world_from_cam[rows]
 
 
 def nearest_rows(train: PoseTable, test: PoseTable) -> NDArray[np.int64]:
-    """For every test pose (N,) the training pose at the least metres plus radians."""
+    """Find the training pose at the least metres plus radians from each test pose (N,)."""
     squares = np.square(train.position_m).sum(axis=1)
     found = []
     for start in range(0, len(test), CHUNK):

@@ -328,9 +328,29 @@ def train_and_predict(
     training = TrainingConfig(**run["training"], samples_seen={})
     network, hyper = NetworkConfig(**run["network"]), hyper_of(model)(**run["localizer"])
     job = Job(model, network, hyper, training, run["samples_seen"], run["seed"])
-    test = test_frames, test_labels
-    train_localizer(job, frames, labels, out_model, out_history, weights=weights, test=test)
+    train_localizer(
+        job=job,
+        frames=frames,
+        labels=labels,
+        out_model=out_model,
+        out_history=out_history,
+        weights=weights,
+        test=(test_frames, test_labels),
+    )
     write_training_record(out_record, run, inputs)
-    predict_poses(out_model, *test, out_predictions, training.device)
+    predict_poses(
+        model=out_model,
+        frames=test_frames,
+        labels_like=test_labels,
+        out=out_predictions,
+        device=training.device,
+    )
     if common and out_common:
-        predict_poses(out_model, test_frames, common, out_common, training.device, every)
+        predict_poses(
+            model=out_model,
+            frames=test_frames,
+            labels_like=common,
+            out=out_common,
+            device=training.device,
+            every=every,
+        )

@@ -39,8 +39,16 @@ def write_scores(
     out_common_errors: Path,
 ) -> None:
     """Score a training run: :func:`score_run` and :func:`score_common`."""
-    files = predictions, labels, truth, train_labels, out_errors, out_metrics
-    score_run(*files, wildcards, (depth, camera))
+    score_run(
+        predictions=predictions,
+        labels=labels,
+        truth=truth,
+        train_labels=train_labels,
+        out_errors=out_errors,
+        out_metrics=out_metrics,
+        info=wildcards,
+        depth=(depth, camera),
+    )
     score_common(common, common_truth, out_common_errors)
 
 

@@ -118,8 +118,8 @@ def _odometry(
     poses, edges, guesses, motion = [np.eye(4)], [], [0], np.eye(4)
     keyframes: dict[int, View] = {}
     before: View | None = None
-    for j, paths in enumerate(zip(color_paths, depth_paths, strict=True)):
-        view = View(read_frame(*paths, camera, cfg, seed), dense, by_features)
+    for j, (color, depth) in enumerate(zip(color_paths, depth_paths, strict=True)):
+        view = View(read_frame(color, depth, camera, cfg, seed), dense, by_features)
         if before is not None:
             motion, accepted = neighbour(before, view, motion)
             poses.append(poses[-1] @ motion)
