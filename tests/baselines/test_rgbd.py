@@ -1,4 +1,5 @@
 import numpy as np
+import open3d as o3d
 import pytest
 from PIL import Image
 
@@ -245,3 +246,22 @@ def test_a_principal_point_off_the_centre_costs_nothing_only_when_it_is_known(me
     assert np.isfinite(wrong).all()
     right_m = errors(method(paths, off)[0], poses)[0]
     assert not known.all() or errors(wrong, poses)[0].max() > 2 * right_m.max()
+
+
+def test_only_a_motion_that_nothing_constrains_is_none(monkeypatch):
+    """Open3D reports each of its errors as a RuntimeError."""
+
+    def fail(**given):
+        raise RuntimeError("[Open3D Error] out of memory")
+
+    shape = (30, 40, 3)
+    flat = frames.Surface(
+        points=o3d.core.Tensor(np.full(shape, np.nan, np.float32)),
+        normals=o3d.core.Tensor(np.full(shape, np.nan, np.float32)),
+        intrinsics=o3d.core.Tensor(np.diag([50.0, 50.0, 1.0])),
+    )
+    surfaces = {stage.stride: flat for stage in frames.STAGES}
+    assert frames.align(surfaces, surfaces, np.eye(4), 0.1) is None
+    monkeypatch.setattr(o3d.t.pipelines.odometry, "compute_odometry_result_point_to_plane", fail)
+    with pytest.raises(RuntimeError, match="out of memory"):
+        frames.align(surfaces, surfaces, np.eye(4), 0.1)
