@@ -1,1 +1,1 @@
-"""Where textbook formulas lose their digits: ours beside them, both against exact answers."""
+"""Cases in which textbook formulas lose their digits, with stored reference values."""

@@ -21,7 +21,6 @@ TIMED = {
     "scenes/*/render_speed.csv": "times of frames",
     "scenes/*/collision_curve.csv": "times of rays",
     "tables/speed_vs_error.csv": "times",
-    "tables/hard_cases.csv": "times of every case",
     "groundtruth/*.json": "what stages of a batch took",
     "figures/speed_vs_error*": "shows times",
 }
