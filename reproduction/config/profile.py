@@ -32,10 +32,11 @@ class RenderSpeedConfig(Strict):
 
     poses: Count = Field(6, description="views of each scene; half as many at the larger sizes")
     sizes: int = Field(
-        3,
+        2,
         ge=1,
-        le=3,
-        description="how many of network_camera, groundtruth_camera and 640 × 480, smallest first",
+        le=2,
+        description="how many of network_camera and, with estimated labels, groundtruth_camera,"
+        " smallest first",
     )
 
 

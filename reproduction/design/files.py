@@ -169,6 +169,15 @@ class Files:
             return None
         return f"{self.root}/scenes/{scene}/detail_{camera}.{kind}"
 
+    def cameras(self, scene: str) -> list[str]:
+        """Cameras that frames of a scene are rendered through."""
+        return ["network", *(["groundtruth"] if scene in self.labelled_scenes else [])]
+
+    def details(self, scene: str, kind: str) -> list[str]:
+        """Levels of detail of these cameras, as :meth:`detail` names them; none where all is drawn."""
+        found = [self.detail(scene, camera, kind) for camera in self.cameras(scene)]
+        return [path for path in found if path is not None]
+
     # Labels
 
     def batches(self, scene: str, size: str, split: str) -> list[Batch]:

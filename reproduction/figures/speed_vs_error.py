@@ -178,13 +178,18 @@ def render_figure(rows: pd.DataFrame) -> Figure:
 
 
 def draw_panel(axes: Axes, rows: pd.DataFrame) -> None:
-    """The full mesh joined by backend, less detail joined to the choice, which is ringed.
+    """The full mesh joined by backend, less detail joined to it; what is used is ringed.
 
     ``rows`` are the variants of one scene and one size of the image; one of them is chosen.
     """
     chosen = rows[rows["chosen"] == 1].iloc[0]
-    rows = rows.assign(ms=1e3 * rows["seconds_per_item"], left_out=left_out(rows, chosen["faces"]))
+    full_faces = rows["faces"].max()
+    rows = rows.assign(ms=1e3 * rows["seconds_per_item"], left_out=left_out(rows, full_faces))
     ring = 1e3 * chosen["seconds_per_item"], chosen["error"]
+    same = (rows["backend"] == chosen["backend"]) & (
+        rows["supersampling"] == chosen["supersampling"]
+    )
+    full_used = rows[same & (rows["left_out"] == "")].iloc[0]
     for backend, full in rows[rows["left_out"] == ""].groupby("backend", sort=False):
         full = full.sort_values("supersampling", kind="stable")
         colour = COLOURS[str(backend)]
@@ -192,12 +197,15 @@ def draw_panel(axes: Axes, rows: pd.DataFrame) -> None:
         for row in full.itertuples():
             _mark(axes, row, colour)
     for kind, colour in DETAIL_COLOURS.items():
-        less = rows[rows["left_out"] == kind]
-        points = [ring, *zip(less["ms"], less["error"], strict=True)]
+        less = rows[(rows["left_out"] == kind) & (rows["chosen"] == 0)]
+        points = [(full_used["ms"], full_used["error"]), *zip(less["ms"], less["error"], strict=True)]
         axes.plot(*zip(*points, strict=True), color=colour, linewidth=0.9, linestyle=":", zorder=2)
         for row, side in zip(less.itertuples(), ("left", "right"), strict=False):
             _mark(axes, row, colour, filled=False)
-            _name(axes, row, chosen["faces"], side)
+            _name(axes, row, full_faces, side)
+    if _is_less(chosen, full_faces):
+        style = _face(MARKERS[chosen["supersampling"]], COLOURS[chosen["backend"]], filled=False)
+        axes.plot(*ring, linestyle="", markersize=5, **style)
     axes.plot(*ring, **USED)
     set_log(axes, "x", "y")
     axes.margins(0.12)
@@ -219,6 +227,11 @@ def _name(axes: Axes, row: Any, full_faces: float, align: str) -> None:
     axes.annotate(text, place, offset, textcoords="offset points", fontsize=7, ha=align)
 
 
+def _is_less(row: Any, full_faces: float) -> bool:
+    """Tell whether a variant draws less than the full mesh."""
+    return bool(row["faces"] != full_faces or row["texture_scale"] != 1.0)
+
+
 def left_out(rows: pd.DataFrame, faces: float) -> pd.Series[str]:
     """What detail of the mesh a variant leaves out; nothing for the full mesh."""
     found = (rows["faces"] != faces).map({True: FACES, False: ""})
@@ -233,7 +246,7 @@ def _face(marker: str, colour: str, filled: bool) -> Style:
 def _legend(rows: pd.DataFrame) -> list[Line2D]:
     handles = [Line2D([], [], color=COLOURS[name], label=name) for name in rows["backend"].unique()]
     for kind, colour in DETAIL_COLOURS.items():
-        handles.append(Line2D([], [], color=colour, linestyle=":", label=f"used, with {kind}"))
+        handles.append(Line2D([], [], color=colour, linestyle=":", label=f"with {kind}"))
     for samples in sorted(rows["supersampling"].unique()):
         label = f"{samples:.0f} × {samples:.0f} samples"
         style = _face(MARKERS[samples], "0.4", True)

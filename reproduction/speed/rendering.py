@@ -14,13 +14,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from reproduction.config.profile import RenderSpeedConfig
-from reproduction.speed.collection import PAPER_CAMERA
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.render_sequence import resolved
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.triangles import with_fewer_faces, with_smaller_textures
+from synfeal.records.files import read_json
 from synfeal.records.tables import COUNT, NUMBER, TEXT, frame_of, write_frame
 from synfeal.records.timing import seconds_of
 from synfeal.render import choose, open_renderer
@@ -62,69 +62,121 @@ class Variant:
         return open_renderer(self.mesh, camera, self.render)
 
 
+@dataclass(frozen=True)
+class MeasuredCamera:
+    """A camera in use, and what its colours are drawn of.
+
+    Attributes:
+        camera: Camera of the profile.
+        detail: Mesh with less detail that the level of detail chose; None for the full mesh.
+        texture_scale: Side of its textures over that of the scene's own.
+    """
+
+    camera: CameraConfig
+    detail: TexturedMesh | None = None
+    texture_scale: float = 1.0
+
+
 def write_render_speed(
-    mesh: Path,  # in the world frame
-    plan: Path,  # table of poses
-    network_camera: CameraConfig,  # of the profile; see :func:`measured_cameras`
-    groundtruth_camera: CameraConfig,  # likewise
-    render_speed: RenderSpeedConfig,  # how many sizes, and views through the smallest
-    render: RenderConfig,  # what the profile renders with
-    out_speed: Path,  # one row per camera and variant, columns :data:`SCHEMA`
+    mesh: Path,
+    plan: Path,
+    cameras: Sequence[CameraConfig],
+    details: Sequence[Path],
+    records: Sequence[Path],
+    render_speed: RenderSpeedConfig,
+    render: RenderConfig,
+    out_speed: Path,
 ) -> None:
-    """Measure on poses spread evenly over a plan, and write the rows; times differ between runs."""
+    """Measure on poses spread evenly over a plan, and write the rows; times differ between runs.
+
+    Args:
+        mesh: Full mesh of the scene, world frame.
+        plan: Pose table.
+        cameras: Cameras that frames of the scene are rendered through.
+        details: Meshes that the colours of each camera are drawn of; none where all draw the full
+            mesh.
+        records: Records of these levels of detail.
+        render_speed: Number of sizes, and of views through the smallest.
+        render: What the profile renders with.
+        out_speed: One row per camera and variant, columns :data:`SCHEMA`.
+    """
     every = read_pose_table(plan).world_from_cam
     count = min(render_speed.poses, len(every))
     poses = every[np.linspace(0, len(every) - 1, count).astype(int)]
-    cameras = measured_cameras(network_camera, groundtruth_camera, render_speed.sizes)
-    rows = measure_speed(load_mesh(mesh), cameras, poses, resolved(render))
+    measured = [MeasuredCamera(camera) for camera in cameras]
+    if details:
+        measured = [
+            MeasuredCamera(
+                camera=camera,
+                detail=load_mesh(detail),
+                texture_scale=read_json(record)["texture_scale"],
+            )
+            for camera, detail, record in zip(cameras, details, records, strict=True)
+        ]
+    smallest = smallest_first(measured)[: render_speed.sizes]
+    rows = measure_speed(load_mesh(mesh), smallest, poses, resolved(render))
     write_frame(out_speed, rows, float_format=None)
 
 
-def measured_cameras(
-    network: CameraConfig, groundtruth: CameraConfig, count: int
-) -> list[CameraConfig]:
-    """The first ``count`` sizes of the profile's two cameras and the paper's, smallest first.
+def smallest_first(cameras: Sequence[MeasuredCamera]) -> list[MeasuredCamera]:
+    """Order cameras by size, each size once.
 
     Images with more than 1024 pixels along a side are too large for the reference and left out.
     """
-    by_size = {(c.width, c.height): c for c in (PAPER_CAMERA, groundtruth, network)}
+    by_size = {(c.camera.width, c.camera.height): c for c in reversed(cameras)}
     fitting = [size for size in by_size if max(size) <= LARGEST_PX]
-    return [by_size[size] for size in sorted(fitting, key=np.prod)[:count]]
+    return [by_size[size] for size in sorted(fitting, key=np.prod)]
 
 
 def measure_speed(
-    mesh: TexturedMesh, cameras: Sequence[CameraConfig], poses: Poses, render: RenderConfig
+    mesh: TexturedMesh, cameras: Sequence[MeasuredCamera], poses: Poses, render: RenderConfig
 ) -> pd.DataFrame:
-    """Every variant through every camera, the chosen one of each camera first: ``SCHEMA``.
+    """Measure every variant through every camera.
 
     Backends that take seconds per frame draw through the first camera, the smallest, alone; the
-    larger ones take every other pose (P, 4, 4). ``render`` names its backend.
+    larger ones take every other pose.
+
+    Args:
+        mesh: The full mesh, world frame.
+        cameras: Cameras in use, smallest first.
+        poses: ``world_from_cam`` (P, 4, 4).
+        render: Settings in use, which name their backend.
+
+    Returns:
+        Rows with the columns of :data:`SCHEMA`. The first of each camera is the full mesh with the
+        settings in use; the chosen one is what the pipeline draws.
     """
-    chosen = Variant(mesh, render)
-    details = less_detailed(chosen)
+    full = Variant(mesh, render)
+    details = less_detailed(full)
     rows = []
-    for index, camera in enumerate(cameras):
-        others = [*other_settings(chosen, with_slow=index == 0), *details]
-        rows += measure_camera(chosen, others, camera, poses if index == 0 else poses[::2])
+    for index, used in enumerate(cameras):
+        chosen = full
+        others = [*other_settings(full, with_slow=index == 0), *details]
+        if used.detail is not None:
+            chosen = Variant(used.detail, render, used.texture_scale)
+            others.insert(0, chosen)
+        camera = used.camera
+        seen = poses if index == 0 else poses[::2]
+        rows += measure_camera(full, others, camera, seen, chosen)
         log.info("%dx%d: %d variants measured", camera.width, camera.height, len(others) + 1)
     return frame_of(rows, SCHEMA)
 
 
-def other_settings(chosen: Variant, with_slow: bool) -> list[Variant]:
-    """The full mesh with all backends that work here and numbers of samples but the chosen."""
+def other_settings(full: Variant, with_slow: bool) -> list[Variant]:
+    """The full mesh with all backends that work here and numbers of samples but those in use."""
     names = [
         name
         for name in choose.BACKENDS
-        if (with_slow or name in ("opengl", "pyrender", chosen.render.backend))
+        if (with_slow or name in ("opengl", "pyrender", full.render.backend))
         and choose.why_not(name) is None
     ]
     settings = [RenderConfig(backend=n, supersampling=k) for n in names for k in SUPERSAMPLING[n]]
-    return [Variant(chosen.mesh, render) for render in settings if render != chosen.render]
+    return [Variant(full.mesh, render) for render in settings if render != full.render]
 
 
-def less_detailed(chosen: Variant) -> list[Variant]:
-    """The chosen settings with smaller textures, and with fewer triangles."""
-    mesh, render = chosen.mesh, chosen.render
+def less_detailed(full: Variant) -> list[Variant]:
+    """The settings in use with smaller textures, and with fewer triangles."""
+    mesh, render = full.mesh, full.render
     variants = [Variant(with_smaller_textures(mesh, k), render, 1.0 / k) for k in FACTORS]
     if importlib.util.find_spec("meshoptimizer") is None:
         log.warning(
@@ -136,22 +188,26 @@ def less_detailed(chosen: Variant) -> list[Variant]:
 
 
 def measure_camera(
-    chosen: Variant, others: Sequence[Variant], camera: CameraConfig, poses: Poses
+    full: Variant,
+    others: Sequence[Variant],
+    camera: CameraConfig,
+    poses: Poses,
+    chosen: Variant,
 ) -> list[dict[str, object]]:
-    """Each variant beside the chosen one, in turns with it.
+    """Measure each variant beside the full mesh with the settings in use, in turns with it.
 
     What else the machine does slows both: their ratio is free of that, and is applied to the median
-    of all times of the chosen one.
+    of all times of the full mesh.
     """
-    truth = truth_of(chosen, camera, poses)
+    truth = truth_of(full, camera, poses)
     beside = []
-    with chosen.opened(camera) as yardstick:
+    with full.opened(camera) as yardstick:
         errors = [errors_of(yardstick, poses, truth)]
         for variant in others:
             with variant.opened(camera) as renderer:
                 errors.append(errors_of(renderer, poses, truth))
                 beside.append(seconds_in_turns([yardstick, renderer], poses))
-    chosen_ms = 1e3 * float(np.median([seconds[:, 0] for seconds in beside]))
+    full_ms = 1e3 * float(np.median([seconds[:, 0] for seconds in beside]))
     ratios = [1.0, *(float(np.median(seconds[:, 1] / seconds[:, 0])) for seconds in beside)]
     return [
         {
@@ -160,18 +216,18 @@ def measure_camera(
             "supersampling": variant.render.supersampling,
             "texture_scale": variant.texture_scale,
             "faces": variant.mesh.n_faces,
-            "ms_per_frame": round(chosen_ms * ratio, 4),
+            "ms_per_frame": round(full_ms * ratio, 4),
             **wrong,
             "chosen": int(variant is chosen),
         }
-        for variant, ratio, wrong in zip([chosen, *others], ratios, errors, strict=True)
+        for variant, ratio, wrong in zip([full, *others], ratios, errors, strict=True)
     ]
 
 
-def truth_of(chosen: Variant, camera: CameraConfig, poses: Poses) -> Truth:
-    """Colours by 64 samples of the chosen backend, and depth by rays against the full mesh."""
-    mesh = chosen.mesh
-    plain = chosen.render.model_copy(update={"supersampling": 1})
+def truth_of(full: Variant, camera: CameraConfig, poses: Poses) -> Truth:
+    """Colours by 64 samples of the backend in use, and depth by rays against the full mesh."""
+    mesh = full.mesh
+    plain = full.render.model_copy(update={"supersampling": 1})
     views = reference_images(lambda large: open_renderer(mesh, large, plain), camera, poses)
     # Depth needs no texture but those that cut something out.
     bare = [p if p.alpha_cutoff is not None else replace(p, texture=None) for p in mesh.parts]

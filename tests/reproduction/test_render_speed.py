@@ -9,13 +9,15 @@ from reproduction.config.profile import RenderSpeedConfig
 from reproduction.figures import speed_vs_error as figures
 from reproduction.figures.sources import Results
 from reproduction.speed import rendering as speed
-from reproduction.speed.rendering import SCHEMA
+from reproduction.speed.rendering import SCHEMA, MeasuredCamera
 from reproduction.tables.speed_vs_error import speeds_of
 from synfeal.config.dataset import RenderConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.geometry.rotations import quat_wxyz_from_matrix
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.save import save_glb
+from synfeal.mesh.triangles import with_smaller_textures
+from synfeal.records.files import write_json
 from synfeal.records.tables import frame_of, read_frame, rows_of, write_frame
 from synfeal.render import choose
 from tests.support.report_results import design_of, read
@@ -35,17 +37,15 @@ def room():
     return TexturedMesh((*parts[:6], *(part for part in parts if part.name == "ball")))
 
 
-def sizes(cameras):
-    return [(camera.width, camera.height) for camera in cameras]
+def test_sizes_in_use_are_measured_smallest_first_and_once():
+    def sizes(*cameras):
+        found = speed.smallest_first([MeasuredCamera(camera) for camera in cameras])
+        return [(used.camera.width, used.camera.height) for used in found]
 
-
-def test_the_profiles_sizes_and_the_papers_are_measured_smallest_first_and_once():
-    small, paper = camera_of(width=128, height=96), camera_of(width=640, height=480, far_m=9.0)
-    assert sizes(speed.measured_cameras(small, LARGE, 3)) == [(80, 60), (128, 96), (640, 480)]
-    assert sizes(speed.measured_cameras(small, LARGE, 1)) == [(80, 60)]
-    assert speed.measured_cameras(paper, paper, 3) == [paper]  # the profile's own lens
-    wide = camera_of(width=1025, height=16)
-    assert sizes(speed.measured_cameras(small, wide, 3)) == [(128, 96), (640, 480)]
+    small = camera_of(width=128, height=96)
+    assert sizes(small, LARGE) == [(80, 60), (128, 96)]
+    assert sizes(small, small) == [(128, 96)]
+    assert sizes(small, camera_of(width=1025, height=16)) == [(128, 96)]
 
 
 def test_errors_of_colour_and_of_depth_where_both_hit_in_closed_form():
@@ -65,7 +65,8 @@ def test_errors_of_colour_and_of_depth_where_both_hit_in_closed_form():
 @pytest.fixture(scope="module")
 def lines():
     render = RenderConfig.model_validate({"backend": BACKENDS[0], "supersampling": 2})
-    return rows_of(speed.measure_speed(room(), [SMALL, LARGE], room_poses(3, seed=1), render))
+    cameras = [MeasuredCamera(SMALL, with_smaller_textures(room(), 2), 0.5), MeasuredCamera(LARGE)]
+    return rows_of(speed.measure_speed(room(), cameras, room_poses(3, seed=1), render))
 
 
 def drawn_by(lines, camera, name):
@@ -83,7 +84,8 @@ def drawn_by(lines, camera, name):
 def test_every_working_backend_is_measured_and_one_variant_is_chosen(lines):
     for camera in (SMALL, LARGE):
         (used,) = (row for row in lines if row.chosen and row.width == camera.width)
-        assert (used.backend, used.supersampling, used.texture_scale) == (BACKENDS[0], 2, 1.0)
+        scale = 0.5 if camera is SMALL else 1.0  # what the level of detail left
+        assert (used.backend, used.supersampling, used.texture_scale) == (BACKENDS[0], 2, scale)
         for name in BACKENDS:
             counts = [line.supersampling for line in drawn_by(lines, camera, name)]
             slow = name == "raycast" and name != BACKENDS[0]
@@ -117,11 +119,22 @@ def test_a_scene_is_measured_from_its_files(tmp_path):
     write_pose_table(tmp_path / "test.csv", plan)
     out = tmp_path / "render_speed.csv"
     measured = RenderSpeedConfig(poses=2, sizes=1)
-    files = tmp_path / "mesh.glb", tmp_path / "test.csv"
-    speed.write_render_speed(*files, SMALL, SMALL, measured, RenderConfig(), out)
+    save_glb(tmp_path / "detail.glb", with_smaller_textures(room(), 4))
+    write_json(tmp_path / "detail.json", {"texture_scale": 0.25})
+    speed.write_render_speed(
+        mesh=tmp_path / "mesh.glb",
+        plan=tmp_path / "test.csv",
+        cameras=[SMALL],
+        details=[tmp_path / "detail.glb"],
+        records=[tmp_path / "detail.json"],
+        render_speed=measured,
+        render=RenderConfig(),
+        out_speed=out,
+    )
     found = read_frame(out, SCHEMA)
     assert found.backend[0] == choose.fastest_working()
-    assert list(found.chosen) == [1] + [0] * (len(found) - 1)
+    assert list(found.chosen) == [0, 1] + [0] * (len(found) - 2)
+    assert list(found.texture_scale[:2]) == [1.0, 0.25]
     write_frame(tmp_path / "again.csv", found, float_format=None)
     assert (tmp_path / "again.csv").read_bytes() == out.read_bytes()
 

@@ -192,6 +192,8 @@ rule render_speed:
     input:
         mesh=rules.scene.output.mesh,
         plan=f"{ROOT}/plans/{{scene}}/test.csv",
+        details=lambda w: FILES.details(w.scene, "glb"),
+        records=lambda w: FILES.details(w.scene, "json"),
     output:
         speed=f"{ROOT}/scenes/{{scene}}/render_speed.csv",
     log:
@@ -203,8 +205,9 @@ rule render_speed:
     resources:
         mem_mb=grown(3000),
     params:
-        network_camera=dump(CONFIG.network_camera),
-        groundtruth_camera=dump(CONFIG.groundtruth_camera),
+        cameras=lambda w: [
+            dump(getattr(CONFIG, f"{name}_camera")) for name in FILES.cameras(w.scene)
+        ],
         render_speed=dump(CONFIG.render_speed),
         render=dump(CONFIG.render),
     script:

@@ -1,4 +1,4 @@
-"""Examine all cases and write one row for each; only the times differ between runs."""
+"""Run our functions on all hard cases and write one row for each."""
 
 from reproduction.hard_cases.table import write_hard_cases
 from reproduction.runs.job import run_job
