@@ -174,7 +174,7 @@ class Files:
         return ["network", *(["groundtruth"] if scene in self.labelled_scenes else [])]
 
     def details(self, scene: str, kind: str) -> list[str]:
-        """Levels of detail of these cameras, as :meth:`detail` names them; none where all is drawn."""
+        """Levels of detail of these cameras; none where the full mesh is drawn."""
         found = [self.detail(scene, camera, kind) for camera in self.cameras(scene)]
         return [path for path in found if path is not None]
 

@@ -198,7 +198,10 @@ def draw_panel(axes: Axes, rows: pd.DataFrame) -> None:
             _mark(axes, row, colour)
     for kind, colour in DETAIL_COLOURS.items():
         less = rows[(rows["left_out"] == kind) & (rows["chosen"] == 0)]
-        points = [(full_used["ms"], full_used["error"]), *zip(less["ms"], less["error"], strict=True)]
+        points = [
+            (full_used["ms"], full_used["error"]),
+            *zip(less["ms"], less["error"], strict=True),
+        ]
         axes.plot(*zip(*points, strict=True), color=colour, linewidth=0.9, linestyle=":", zorder=2)
         for row, side in zip(less.itertuples(), ("left", "right"), strict=False):
             _mark(axes, row, colour, filled=False)
