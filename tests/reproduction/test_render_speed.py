@@ -188,3 +188,20 @@ def test_rows_and_figure_say_what_each_variant_is(made_up):
     np.testing.assert_allclose(opengl.get_xydata(), [[4.0, 5.0], [8.0, 2.0]])
     np.testing.assert_allclose(textures.get_xydata(), [[8.0, 2.0], [7.0, 3.0]])
     assert {text.get_text() for text in small.texts} == {"1/4", "25%"}
+
+
+def test_the_level_of_detail_in_use_is_ringed_and_ladders_begin_at_the_full_mesh(tmp_path):
+    used = {"texture_scale": 0.25, "faces": 130, "ms_per_frame": 3.0, "mean_abs_error": 2.2}
+    lines = [line | {"chosen": 0} for line in MADE_UP[:5]]
+    path = tmp_path / "scenes" / "large_room" / "render_speed.csv"
+    write_frame(path, frame_of([*lines, LINE | used], SCHEMA), float_format=None)
+    rows = speeds_of("render", ["large_room"], tmp_path)
+    assert list(rows.variant[rows.chosen == 1]) == [
+        "128x96, opengl 2x2, textures 1/4, 13% of faces"
+    ]
+    (axes,) = figures.render_figure(rows).axes
+    (ring,) = (line for line in axes.lines if line.get_markersize() > 10)
+    np.testing.assert_allclose(ring.get_xydata(), [(3.0, 2.2)])
+    ladders = [line.get_xydata() for line in axes.lines if line.get_linestyle() == ":"]
+    np.testing.assert_allclose(ladders[0], [[8.0, 2.0], [7.0, 3.0]])
+    np.testing.assert_allclose(ladders[1], [[8.0, 2.0], [6.0, 2.5]])
