@@ -44,7 +44,7 @@ publish: $(INSTALLED)  ## track what PROFILE's run made (results/published), and
 archive: $(INSTALLED)  ## PROFILE's report, figures, and all that its tables are made from, in one file
 	mkdir -p build
 	tar --create --gzip --file build/results-$(PROFILE).tar.gz --directory results \
-	  --owner 0 --group 0 --sort name --exclude '.*' \
+	  --owner 0 --group 0 --sort name --ignore-failed-read --exclude '.*' \
 	  $(addprefix --exclude=,*.glb *.ply *.pt *.npz *.g2o errors.csv common_errors.csv) \
 	  $(addprefix $(PROFILE)/,report.html summary.md claims.csv provenance.json benchmarks.csv) \
 	  $(addprefix $(PROFILE)/,benchmarks tables figures labels groundtruth runs references scenes)
