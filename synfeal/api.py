@@ -25,6 +25,7 @@ from synfeal.dataset.sequence_listing import COLOR, DEPTH, RIGHT_COLOR, RIGHT_DE
 from synfeal.dataset.split_frames import SplitFrames, read_split_frames
 from synfeal.geometry.poses import moved_right
 from synfeal.mesh import load
+from synfeal.mesh.ambient import with_ambient_light
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.triangles import merge_vertices
 from synfeal.planning.plan import plan_mesh
@@ -58,12 +59,13 @@ class Renderer:
     """Renderer of unlit images of a mesh; a context manager.
 
     Keywords: ``camera``, ``width``, ``height``, ``fov``, ``projection``, ``fisheye_k``,
-    ``backend``, ``supersampling``, ``background``.
+    ``backend``, ``supersampling``, ``background``, ``shade``.
     """
 
     def __init__(self, mesh: TexturedMesh, **options: Any) -> None:
         camera, render = render_configs(options)
-        self._opened = open_renderer(mesh, camera, render)
+        lit = with_ambient_light(mesh) if render.shade == "ambient" else mesh
+        self._opened = open_renderer(lit, camera, render)
         self.camera: CameraConfig = camera
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from synfeal.camera.projection import Projection
 from synfeal.cli.options import MESH_OPTIONS, command, option, options_among
 from synfeal.config.collection import CollectionConfig
-from synfeal.config.dataset import RenderConfig
+from synfeal.config.dataset import RenderConfig, Shade
 from synfeal.config.options import KEYS, dataset_config, options_named, scene_config
 from synfeal.errors import InputError
 from synfeal.records.files import read_json
@@ -21,10 +21,12 @@ DIRECTIONS = ("world_from_cam", "cam_from_world")
 MARGIN_M, MARGIN_DEG = 0.2, 10.0  # of --like
 
 if TYPE_CHECKING:
+    from synfeal.collection.run import CollectJob
     from synfeal.config.dataset import CameraConfig
     from synfeal.planning.like import Like
 
 BACKENDS = get_args(RenderConfig.model_fields["backend"].annotation)
+SHADES = get_args(Shade)
 DETAILS = get_args(RenderConfig.model_fields["detail"].annotation)
 PROJECTIONS = get_args(Projection)
 MODES = get_args(CollectionConfig.model_fields["mode"].annotation)
@@ -72,6 +74,7 @@ RGBD_OPTIONS = (
     ),
     option("--min-clearance", "least distance of cameras from surfaces, metres (0)", type=float),
     option("--min-path", "metres; shorter paths are drawn again (1.5)", type=float),
+    option("--test-paths", "paths that test frames are of, at least (8)", type=int, metavar="N"),
     option("--mode", "where cameras go (path)", choices=MODES),
     option(
         "--poses",
@@ -119,6 +122,12 @@ RGBD_OPTIONS = (
     option("--supersampling", "N x N samples per pixel, 1 - 4 (2)", type=int, metavar="N"),
     option(
         "--detail", "full: draw all of the mesh, whatever the resolution (auto)", choices=DETAILS
+    ),
+    option(
+        "--shade",
+        "light for meshes without texture: a lamp at the camera, or ambient light baked into the"
+        " mesh (none)",
+        choices=SHADES,
     ),
     option(
         "--background",
@@ -173,8 +182,24 @@ def collect(arguments: argparse.Namespace) -> None:
         return
     with options_named():
         run_collection(job, arguments.workers)
-    print(f"{job.out}: {job.counts['train']} training and {job.counts['test']} test frames")
+    print(f"{job.out}: {frames_text(job)}")
     print(coverage_text(read_json(job.out / "coverage.json")["train"]))
+
+
+def frames_text(job: CollectJob) -> str:
+    """Say how many frames a data set has, and on how many straight paths they lie, if any."""
+    from synfeal.collection.run import SPLITS, n_paths
+    from synfeal.dataset.pose_table import read_pose_table
+
+    texts = []
+    for split, name in zip(SPLITS, ("training", "test"), strict=True):
+        count = job.counts[split]
+        text = f"{count} {name} frames"
+        if job.config.collection.mode == "path" and count:
+            paths = n_paths(read_pose_table(job.out / f"{split}.csv"))
+            text += f" on {paths} {'path' if paths == 1 else 'paths'}"
+        texts.append(text)
+    return " and ".join(texts)
 
 
 def _like_options(

@@ -12,10 +12,13 @@ from trimesh.util import append_faces
 
 from synfeal.collection.collision import Rung, collision_mesh, write_curve
 from synfeal.config.collection import ClutterConfig, SceneConfig
+from synfeal.config.dataset import Shade
 from synfeal.config.load import check_mesh_file
 from synfeal.dataset.finish import CLUTTER
 from synfeal.effects.scene import CARTONS, carton_files
 from synfeal.errors import InputError
+from synfeal.mesh.ambient import with_ambient_light
+from synfeal.mesh.checks import refuse_colourless
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.properties import mesh_properties
@@ -31,7 +34,12 @@ from synfeal.records.provenance import generator_of
 
 
 def prepare_scene(
-    name: str, scene: SceneConfig, collision_agreement: float | None, seed: int, out_mesh: Path
+    name: str,
+    scene: SceneConfig,
+    collision_agreement: float | None,
+    seed: int,
+    out_mesh: Path,
+    shade: Shade | None = None,
 ) -> None:
     """Write what later stages read of a scene: ``out_mesh`` (``mesh.glb``, world frame).
 
@@ -43,7 +51,7 @@ def prepare_scene(
             sampling box; or no pose in that box has a free view.
     """
     out_dir = out_mesh.parent
-    mesh, n_faces = prepare_mesh(name, scene, collision_agreement, seed, out_dir)
+    mesh, n_faces = prepare_mesh(name, scene, collision_agreement, seed, out_dir, shade)
     properties = {
         **{"scene": name, "source": scene.source, "collision_faces": n_faces},
         "origin": scene.builder if scene.source == "procedural" else str(scene.path),
@@ -54,16 +62,31 @@ def prepare_scene(
 
 
 def prepare_mesh(
-    name: str, scene: SceneConfig, collision_agreement: float | None, seed: int, out_dir: Path
+    name: str,
+    scene: SceneConfig,
+    collision_agreement: float | None,
+    seed: int,
+    out_dir: Path,
+    shade: Shade | None = None,
 ) -> tuple[TexturedMesh, int]:
     """Write ``collision.ply``, ``collision_curve.csv``, ``clutter.json``, and ``mesh.glb`` last.
 
-    Without ``collision_agreement`` the collision mesh is the mesh itself, and the curve is empty.
+    Args:
+        name: Name of the scene.
+        scene: Its settings.
+        collision_agreement: Decisions in which the collision mesh must agree with the mesh; None
+            takes the mesh itself, and the curve is empty.
+        seed: Root of all random numbers.
+        out_dir: Directory to write to.
+        shade: Light that frames are drawn with, which meshes without colours need; ``ambient`` is
+            in the colours of ``mesh.glb``.
 
     Returns:
-        The mesh, and how many faces its collision mesh has.
+        The mesh in its own colours, and how many faces its collision mesh has.
     """
     mesh = build_or_load(scene, seed, name)
+    if shade is None:
+        refuse_colourless(mesh, f"scenes.{name}.path: {scene.path}")
     box = sampling_box_of(scene, mesh.bounds_m, f"scenes.{name}")
     curve: list[Rung] = []
     if collision_agreement is None:
@@ -82,7 +105,7 @@ def prepare_mesh(
     write_json(out_dir / CLUTTER, places)
     save_collision_mesh(out_dir / "collision.ply", collision)
     write_curve(out_dir / "collision_curve.csv", curve)
-    save_glb(out_dir / "mesh.glb", mesh)
+    save_glb(out_dir / "mesh.glb", with_ambient_light(mesh) if shade == "ambient" else mesh)
     return mesh, len(collision.faces)
 
 

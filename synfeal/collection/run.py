@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 import synfeal
 from synfeal.collection.detail import write_detail
 from synfeal.collection.prepare import prepare_mesh, save_cartons
-from synfeal.config.dataset import CameraConfig, DatasetConfig
+from synfeal.config.collection import SceneConfig
+from synfeal.config.dataset import CameraConfig, DatasetConfig, Shade
 from synfeal.dataset.finish import MANIFEST, finish_dataset, origin_of
 from synfeal.dataset.frame_files import SUFFIX
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
@@ -42,17 +43,21 @@ from synfeal.records.lock import WORK, clean_up, growing, place_of
 from synfeal.records.provenance import generator_of
 
 WARN_ABOVE = 0.1  # of all pixels: more than windows let through
+SEES_MOST = 0.9  # of a view that meets the mesh
 REFUSE_ABOVE = 0.95  # of all pixels: nobody wants a data set of the background
 
 log = logging.getLogger("synfeal")
 
 
-def refuse_invisible(mesh: TexturedMesh, camera: CameraConfig, name: str) -> None:
-    """Check that the mesh has colours and reaches beyond the near plane of a camera in it."""
-    if shows_one_colour(mesh):
+def refuse_invisible(
+    mesh: TexturedMesh, camera: CameraConfig, name: str, shade: Shade | None = None
+) -> None:
+    """Check that the mesh shows something and reaches beyond the near plane of a camera in it."""
+    if shade is None and shows_one_colour(mesh):
         raise InputError(
             f"{name}: is of one colour, and so would be every image; put its texture files (of an"
-            " OBJ also the .mtl) where it names them, or export it with its texture"
+            " OBJ also the .mtl) where it names them, export it with its texture, or set"
+            " render.shade to headlight, which shows its shape"
         )
     diagonal_m = float(np.linalg.norm(mesh.bounds_m[1] - mesh.bounds_m[0]))
     if diagonal_m <= camera.near_m:
@@ -63,9 +68,10 @@ def refuse_invisible(mesh: TexturedMesh, camera: CameraConfig, name: str) -> Non
 
 
 def refuse_blank(
-    caster: RayCaster, plans: Mapping[Split, PoseTable], camera: CameraConfig, name: str
+    caster: RayCaster, plans: Mapping[Split, PoseTable], camera: CameraConfig, scene: SceneConfig
 ) -> None:
     """Warn of plans whose images would show little; refuse those that would show nothing."""
+    name = scene.path
     for split, plan in plans.items():
         share = empty_pixels(caster, plan, camera).share
         if share > REFUSE_ABOVE:
@@ -73,14 +79,13 @@ def refuse_blank(
             raise InputError(
                 f"{name}: {share:.0%} of the pixels of the {split} frames would be empty: the"
                 f" mesh spans {size_m} m, and cameras see nothing farther than far_m"
-                f" ({camera.far_m:g} m) or outside; give --unit-m or --box"
-                " (synfeal inspect suggests them)"
+                f" ({camera.far_m:g} m) or outside; {_way_in(scene)}"
             )
         if share > WARN_ABOVE:
             log.warning(
                 "%s: %.0f %% of the pixels of the %s frames will be empty: cameras look through"
-                " holes or past the mesh; another --box may help (synfeal inspect suggests one)",
-                *(name, 100 * share, split),
+                " holes or past the mesh; %s",
+                *(name, 100 * share, split, _way_to_see_more(scene)),
             )
 
 
@@ -98,6 +103,41 @@ def warn_of_walls(
                 " --min-clearance %g",
                 *(name, blocked, len(plan), split, baseline_m),
             )
+
+
+def _way_in(scene: SceneConfig) -> str:
+    if scene.sampling_box is None:
+        return "give --unit-m or --box (synfeal inspect suggests them)"
+    return "give another --unit-m, or a --box inside the mesh"
+
+
+def _way_to_see_more(scene: SceneConfig) -> str:
+    """Name what has not been tried yet."""
+    if scene.sampling_box is None:
+        return "a --box keeps them inside (synfeal inspect suggests one)"
+    if (scene.min_seen or 0.0) < SEES_MOST:
+        return f"--min-seen {SEES_MOST:g} refuses views of that"
+    return "narrower bounds of --pitch, or a mesh with fewer holes, show less of that"
+
+
+FEW_PATHS = 5
+
+
+def warn_of_few_paths(plan: PoseTable, split: Split) -> None:
+    """Say where the frames of a split, planned in mode ``path``, lie on few straight paths."""
+    paths = n_paths(plan)
+    if paths < FEW_PATHS:
+        log.warning(
+            "the %d %s frames lie on %s: they show little of the scene; more frames, a larger"
+            " --spacing or --mode random show more",
+            *(len(plan), {"train": "training", "test": "test"}[split]),
+            "one straight path" if paths == 1 else f"{paths} straight paths",
+        )
+
+
+def n_paths(plan: PoseTable) -> int:
+    """Count the paths that frames of a plan lie on."""
+    return len(np.unique(plan.path))
 
 
 SPLITS: tuple[Split, ...] = ("train", "test")
@@ -193,8 +233,9 @@ def _prepare(job: CollectJob, scene: Path) -> None:
     if not (scene / "mesh.glb").is_file():
         config, settings = job.config, job.config.scenes[job.scene]
         agreement = config.collection.collision_agreement
-        mesh, _ = prepare_mesh(job.scene, settings, agreement, config.seed, scene)
-        refuse_invisible(mesh, config.network_camera, str(settings.path))
+        shade = config.render.shade
+        mesh, _ = prepare_mesh(job.scene, settings, agreement, config.seed, scene, shade)
+        refuse_invisible(mesh, config.network_camera, str(settings.path), shade)
     effects = job.config.render.effects
     if effects and effects.clutter:
         if not effects.clutter.files:
@@ -215,10 +256,12 @@ def _plan(job: CollectJob, scene: Path, part: Path) -> dict[Split, PoseTable]:
             asked = (settings, config.collection, job.counts[split], rng, split)
             plans[split] = plan_mesh(mesh, str(collision), *asked)
         caster = RayCaster(*mesh)
-        refuse_blank(caster, plans, camera, str(settings.path))
+        refuse_blank(caster, plans, camera, settings)
         if camera.stereo_baseline_m is not None:
             warn_of_walls(caster, plans, camera.stereo_baseline_m, str(settings.path))
         for split, plan in plans.items():
+            if config.collection.mode == "path":
+                warn_of_few_paths(plan, split)
             write_pose_table(part / f"{split}.csv", plan)
         covered = {s: scene_coverage(collision, settings, plans[s], camera) for s in splits}
         write_json(coverage, covered)

@@ -171,6 +171,8 @@ class SceneConfig(Strict):
 class CollectionConfig(Strict):
     """How the camera moves (section 3 of the paper)."""
 
+    unless_none = ("test_paths",)
+
     mode: Literal["path", "random", "repeat"] = Field(
         "path",
         description="`path`: the paper's; `random`: independent poses; `repeat`: those of another"
@@ -186,6 +188,11 @@ class CollectionConfig(Strict):
         0.03, ge=1e-4, le=1e4, description="distance between frames (the paper's other d)"
     )
     min_path_m: NonNegative = Field(1.5, description="shorter paths are drawn again")
+    test_paths: Annotated[int, Field(ge=1, le=10**6)] | None = Field(
+        None,
+        description="mode `path`: least number of paths that test frames are of, each cut short;"
+        " null: whole paths, as in the paper, of which few frames show one or two",
+    )
     max_tries: int = Field(2000, ge=1, le=10**6, description="rounds until a scene is too narrow")
     interpolation: Literal["rpy", "slerp"] = Field(
         "rpy", description="`rpy`: the paper's, angle by angle, each the short way"

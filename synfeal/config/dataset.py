@@ -185,10 +185,13 @@ def _calibrated(values: dict[str, Any]) -> dict[str, Any]:
     return {**kept, **asdict(calibration), "calibration": None}
 
 
+Shade = Literal["headlight", "ambient"]
+
+
 class RenderConfig(Strict):
     """How images are drawn."""
 
-    unless_none = ("effects",)
+    unless_none = ("effects", "shade")
 
     backend: Literal["auto", "opengl", "pyrender", "raycast"] = Field(
         "auto", description="`auto`: the fastest that works here"
@@ -201,6 +204,11 @@ class RenderConfig(Strict):
     )
     background_rgb: tuple[Channel, Channel, Channel] = Field((0, 0, 0), description="where empty")
     effects: EffectsConfig | None = Field(None, description="added to frames (docs/variation.md)")
+    shade: Shade | None = Field(
+        None,
+        description="light for meshes without texture: `headlight`, a lamp at the camera;"
+        " `ambient`, from everywhere, darker in corners (docs/collecting.md)",
+    )
 
     @property
     def draws_full_mesh(self) -> bool:

@@ -41,6 +41,7 @@ KEYS: Mapping[str, str] = {
     "poses": "collection.repeat",
     "spacing": "collection.frame_spacing_m",
     "min_path": "collection.min_path_m",
+    "test_paths": "collection.test_paths",
     "camera": "network_camera.calibration",
     "width": "network_camera.width",
     "height": "network_camera.height",
@@ -52,12 +53,14 @@ KEYS: Mapping[str, str] = {
     "backend": "render.backend",
     "supersampling": "render.supersampling",
     "detail": "render.detail",
+    "shade": "render.shade",
     "background": "render.background_rgb",
     "effects": "render.effects",
     "sequence_frames": "shard_frames",
     "archive": "archive_sequences",
     "seed": "seed",
 }
+TEST_PATHS = 8  # that the test frames of a collection are of, unless the options say otherwise
 FURTHER_BOXES = f"scenes.{SCENE}.further_boxes"
 
 
@@ -75,6 +78,7 @@ def dataset_config(options: Mapping[str, Any], out: Path | None = None) -> Datas
     if values.get("collection", {}).get("repeat") is not None:
         values["collection"]["repeat"] = Path(values["collection"]["repeat"]).absolute()
     values.setdefault("collection", {})["collision_agreement"] = None
+    values["collection"].setdefault("test_paths", TEST_PATHS)
     baseline_m = options.get("stereo")
     is_length = isinstance(baseline_m, int | float) and 0 < baseline_m < math.inf
     if is_length and options.get("min_clearance") is None:

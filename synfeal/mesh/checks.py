@@ -26,7 +26,7 @@ ROUNDING = 4 * np.finfo(np.float64).eps
 
 
 def check_mesh(mesh: TexturedMesh, path: Path) -> None:
-    """Faces, finite coordinates and some colour."""
+    """Check for faces and finite coordinates."""
     if not mesh.parts:
         raise InputError(f"{path}: holds no faces; export the scene as a triangle mesh")
     for part in mesh.parts:
@@ -36,11 +36,15 @@ def check_mesh(mesh: TexturedMesh, path: Path) -> None:
                 f"{path}: part '{part.name}' has {bad.sum()} vertices that are NaN or infinite;"
                 " repair the mesh"
             )
+
+
+def refuse_colourless(mesh: TexturedMesh, name: str) -> None:
+    """Check for a texture, colours of vertices, or materials of several colours."""
     painted = any(p.texture is not None or p.vertex_rgb is not None for p in mesh.parts)
     if not painted and len({part.base_color.tobytes() for part in mesh.parts}) == 1:
         raise InputError(
-            f"{path}: has neither a texture nor vertex colours; images would be of one colour."
-            " Export it with its texture"
+            f"{name}: has neither a texture nor vertex colours; images would be of one colour."
+            " Export it with its texture, or set render.shade to headlight, which shows its shape"
         )
 
 

@@ -43,8 +43,8 @@ def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> Text
 
     Raises:
         InputError: the file is missing, empty, of an unknown kind, unreadable, without faces, with
-            coordinates that are not finite, without any colour, or stored in a way that is not
-            read, such as Draco.
+            coordinates that are not finite, or stored in a way that is not read, such as
+            Draco.
     """
     path = Path(path)
     checks.refuse_file(path)

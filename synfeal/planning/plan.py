@@ -90,9 +90,11 @@ def plan_split(
 ) -> PoseTable:
     """Poses of ``n_frames`` frames of a split, as ``collection.mode`` says.
 
-    ``path``: connected straight paths; the last may be cut short. ``random``: independent
-    admissible poses, each a path of its own. ``repeat``: the poses of an earlier data set. Every
-    box has paths of its own, and frames in proportion to its volume in every prefix of the plan.
+    ``path``: connected straight paths; the last may be cut short, and all of the test split where
+    ``collection.test_paths`` asks for more paths than whole ones would give. ``random``:
+    independent admissible poses, each a path of its own. ``repeat``: the poses of an earlier data
+    set. Every box has paths of its own, and frames in proportion to its volume in every prefix of
+    the plan.
 
     Raises:
         InputError: no frames wanted; no admissible pose found, which says what to relax; or the
@@ -112,7 +114,10 @@ def plan_split(
     if collection.mode == "random":
         vectors = _independent(spaces, _Turns(boxes), collection, n_frames)
         return _table(list(poses_of(vectors)[:, None]), n_frames)
-    return _table(_paths(spaces, _Turns(boxes), collection, n_frames), n_frames)
+    longest = None
+    if split == "test" and collection.test_paths is not None:
+        longest = max(1, n_frames // collection.test_paths)
+    return _table(_paths(spaces, _Turns(boxes), collection, n_frames, longest), n_frames)
 
 
 def _independent(
@@ -129,14 +134,30 @@ def _independent(
 
 
 def _paths(
-    spaces: Sequence[PoseSpace], turns: _Turns, collection: CollectionConfig, n_frames: int
+    spaces: Sequence[PoseSpace],
+    turns: _Turns,
+    collection: CollectionConfig,
+    n_frames: int,
+    longest: int | None,
 ) -> list[Array]:
-    """Poses (n, 4, 4) of paths that have at least ``n_frames`` between them, space after space."""
+    """Plan paths, space after space.
+
+    Args:
+        spaces: Where they lie.
+        turns: Decides which space the next path is in.
+        collection: How the camera moves.
+        n_frames: Least number of frames of all paths together.
+        longest: Frames of a path that are kept, its first ones; None keeps all. The next path
+            begins where the whole one ended.
+
+    Returns:
+        Poses (n, 4, 4) of each path.
+    """
     walks = [_walk(space, collection) for space in spaces]
     paths: list[Array] = []
     while turns.total < n_frames:
         index = turns.next(0)
-        paths.append(next(walks[index]))
+        paths.append(next(walks[index])[:longest])
         turns.made[index] += len(paths[-1])
     return paths
 

@@ -75,6 +75,20 @@ def thresholded(part: MeshPart) -> NDArray[np.uint8]:
     return rgba
 
 
+# Of a lamp's light, what shows of a surface that is seen edge-on: the lamp is no point.
+EDGE_ON_SHARE = 0.3
+
+
+def floor_share(render: RenderConfig) -> float:
+    """Return the least share of its colour that a surface shows, however it is turned.
+
+    ``render.shade: headlight`` is a lamp at the camera that does not fade with distance. A surface
+    whose normal and whose line of sight have a cosine c shows ``s + (1 - s) |c|`` of its colour,
+    where s is this share; without such a lamp it is 1. Normals are those of the triangles.
+    """
+    return EDGE_ON_SHARE if render.shade == "headlight" else 1.0
+
+
 SAMPLES_PER_AXIS = 8  # of a pixel, of reference images
 
 

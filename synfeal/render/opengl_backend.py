@@ -26,7 +26,7 @@ from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import TexturedMesh
-from synfeal.render.base import DEFAULTS, Depth, Renderer, Rgb, pieces
+from synfeal.render.base import DEFAULTS, Depth, Renderer, Rgb, floor_share, pieces
 from synfeal.render.opengl_part import DevicePart, program_of
 
 # Named in full: searching for them starts a compiler or ldconfig, which a container may lack.
@@ -90,7 +90,7 @@ class OpenglRenderer(Renderer):
         with self._context:
             self._open_images(render.supersampling)
             self._parts = [
-                DevicePart(self._context, piece, self._centre_m)
+                DevicePart(self._context, piece, self._centre_m, floor_share(render))
                 for part in mesh.parts
                 if part.is_drawn
                 for piece in pieces(part)
@@ -118,13 +118,13 @@ class OpenglRenderer(Renderer):
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         """Colours (H, W, 3) seen from a pose (4, 4)."""
         with self._context:
-            return self._draw_colour(self._clip_from_mesh(world_from_cam))
+            return self._draw_colour(world_from_cam)
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
         """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
-        clip_from_mesh = self._clip_from_mesh(world_from_cam)
         with self._context:
-            return self._draw_colour(clip_from_mesh), self._draw_depth(clip_from_mesh)
+            rgb = self._draw_colour(world_from_cam)
+            return rgb, self._draw_depth(self._clip_from_mesh(world_from_cam))
 
     def render_depth(self, world_from_cam: NDArray[np.float64]) -> Depth:
         """Depth (H, W) alone: metres along the optical axis, inf for nothing."""
@@ -136,9 +136,12 @@ class OpenglRenderer(Renderer):
         centred[:3, 3] -= self._centre_m
         return np.asarray(self._clip_from_cam @ inverse(centred))
 
-    def _draw_colour(self, clip_from_mesh: NDArray[np.float64]) -> Rgb:
+    def _draw_colour(self, world_from_cam: NDArray[np.float64]) -> Rgb:
+        clip_from_mesh = self._clip_from_mesh(world_from_cam)
+        camera_m = np.asarray(world_from_cam)[:3, 3] - self._centre_m
         self._begin(self._sample_target, *self._background)
         for part in self._parts:
+            part.light_from(camera_m)
             part.draw(part.colour, clip_from_mesh)
         self._mean_target.use()
         self._context.enable_only(moderngl.NOTHING)

@@ -98,7 +98,21 @@ def program_of(context: Any, vertex: str, fragment: str, features: Collection[st
 class DevicePart:
     """A part's buffers, with one way to draw its colours and one its depth."""
 
-    def __init__(self, context: Any, part: MeshPart, centre_m: NDArray[np.float64]) -> None:
+    def __init__(
+        self,
+        context: Any,
+        part: MeshPart,
+        centre_m: NDArray[np.float64],
+        floor_share: float = 1.0,
+    ) -> None:
+        """Upload a part.
+
+        Args:
+            context: moderngl's context, which is current.
+            part: World frame.
+            centre_m: Origin (3,) of the coordinates on the device, world, metres.
+            floor_share: See :func:`synfeal.render.base.floor_share`.
+        """
         self._context = context
         vertices_m = part.vertices_m - centre_m
         self._chunks = chunks_of(vertices_m, part.faces)
@@ -117,7 +131,11 @@ class DevicePart:
         features = ["TEXTURED"] * bool(uv) + ["COLOURED"] * bool(rgb)
         if pixels is not None and pixels.shape[2] == 4:
             features.append("CUT_OUT")
-        self.colour = self._program("colour.frag", features, [position, *uv, *rgb])
+        self._has_headlight = floor_share < 1.0
+        lit = [*features, "HEADLIGHT"] if self._has_headlight else features
+        self.colour = self._program("colour.frag", lit, [position, *uv, *rgb])
+        if self._has_headlight:
+            self.colour.program["floor_share"].value = floor_share
         self.colour.program["base_rgb"].value = tuple(part.base_color[:3] / 255.0)
         if uv:
             self.colour.program["level_bias"].value = LEVEL_BIAS
@@ -131,6 +149,11 @@ class DevicePart:
         """A vertex array that draws the part's triangles with a program of its own."""
         program = program_of(self._context, "part.vert", fragment, features)
         return self._context.vertex_array(program, attributes, self._index)
+
+    def light_from(self, camera_m: Floats) -> None:
+        """Put the headlight, if there is one, at a camera (3,), relative to the centre."""
+        if self._has_headlight:
+            self.colour.program["camera"].value = tuple(camera_m.tolist())
 
     def draw(self, triangles: Any, clip_from_mesh: NDArray[np.float64]) -> None:
         """Draw ``colour``, or ``depth`` along the optical axis, into the framebuffer in use."""

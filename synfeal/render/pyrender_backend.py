@@ -21,7 +21,16 @@ from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.render.base import DEFAULTS, SHADERS, Depth, Renderer, Rgb, pieces, thresholded
+from synfeal.render.base import (
+    DEFAULTS,
+    SHADERS,
+    Depth,
+    Renderer,
+    Rgb,
+    floor_share,
+    pieces,
+    thresholded,
+)
 
 os.environ["PYOPENGL_PLATFORM"] = "egl"
 np.__dict__.setdefault("infty", np.inf)  # gone in NumPy 2, used by pyrender
@@ -63,6 +72,7 @@ class PyrenderRenderer(Renderer):
     ) -> None:
         """Prepare the mesh, which is uploaded by the first render."""
         self._supersampling = render.supersampling
+        self._floor_share = floor_share(render)
         self._platform, self._colour, self._depth = _context()
         self._size = (camera.width, camera.height)
         self._intrinsics = camera.intrinsics
@@ -102,6 +112,7 @@ class PyrenderRenderer(Renderer):
         self._scene.bg_color = background
         self._platform.make_current()
         one_pass.viewport_width, one_pass.viewport_height = (factor * n for n in self._size)
+        one_pass.floor_share = self._floor_share
         for name, value in zip(("fx", "fy", "cx", "cy"), self._intrinsics, strict=True):
             setattr(self._camera.camera, name, factor * value)
         flags = pyrender.RenderFlags
@@ -164,6 +175,7 @@ class _Pass(pyrender.Renderer):  # type: ignore[misc]  # pyrender is untyped
         super().__init__(16, 16)
         self._program_cache = ShaderProgramCache(str(SHADERS))
         self._uploaded, self._level_bias = uploaded, level_bias
+        self.floor_share = 1.0
         self._formats = (storage, GL.GL_DEPTH_COMPONENT32F)
         self._read_as, self._dtype = read_as, dtype
         self._outputs = [GL.GL_NONE] * output + [GL.GL_COLOR_ATTACHMENT0]
@@ -204,6 +216,7 @@ class _Pass(pyrender.Renderer):  # type: ignore[misc]  # pyrender is untyped
         self, primitive: Any, pose: NDArray[Any], program: Any, flags: int
     ) -> None:
         program.set_uniform("level_bias", self._level_bias)
+        program.set_uniform("floor_share", self.floor_share)
         super()._bind_and_draw_primitive(primitive, pose, program, flags)
 
     def _read_main_framebuffer(self, scene: Any, flags: int) -> NDArray[Any]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.mesh.model import TexturedMesh
-from synfeal.render.base import DEFAULTS, Depth, Renderer, Rgb
+from synfeal.render.base import DEFAULTS, Depth, Renderer, Rgb, floor_share
 from synfeal.render.raycast_triangles import Floats, Points, TexturedTriangles, View
 
 Look = Callable[[View, Floats], NDArray[Any]]
@@ -29,6 +29,7 @@ class RaycastRenderer(Renderer):
     ) -> None:
         """Prepare triangles and textures."""
         self._triangles = TexturedTriangles(mesh)
+        self._floor_share = floor_share(render)
         self._camera = camera
         steps = (np.arange(render.supersampling) + 0.5) / render.supersampling
         self._samples_px: Floats = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
@@ -85,5 +86,8 @@ class RaycastRenderer(Renderer):
         hit, points = self._points(view, rays)
         rgb = np.tile(self._background, (len(rays), 1))
         rgb[hit] = self._triangles.rgb(view, points)
+        if self._floor_share < 1.0:
+            cosine = self._triangles.view_cosines(points)[:, None]
+            rgb[hit] *= self._floor_share + (1.0 - self._floor_share) * cosine
         samples = rgb.reshape(len(self._samples_px), -1, 3)
         return np.asarray(np.round(samples.mean(axis=0)), np.uint8)

@@ -116,6 +116,12 @@ class TexturedTriangles:
             tint = tint * np.clip(points.values[:, 2:], 0.0, 1.0)
         return self._texel(view, points)[:, :3] * tint.astype(np.float32)
 
+    def view_cosines(self, points: Points) -> Floats:
+        """Return cosines (N,), 0 to 1, between lines of sight and the normals of triangles."""
+        normals = self._rows[points.face, 0, :3]
+        along = np.einsum("nj,nj->n", normals, points.rays)
+        return np.asarray(np.abs(along) / np.linalg.norm(points.rays, axis=1))
+
     def _texel(self, view: View, points: Points) -> Rgba:
         uv, uv_per_px = points.values[:, :2], self._uv_per_px(view, points)
         return self._textures.rgba(self._texture_of[self._part_of[points.face]], uv, uv_per_px)

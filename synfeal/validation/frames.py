@@ -34,7 +34,13 @@ SAME = 2  # grey levels
 ONE_COLOUR = 0.95  # of a frame's pixels
 # Share of the frames: a camera may come close to a plain wall, and rooms without a ceiling have
 # empty frames, of which collect says how many.
-MOST = {"of one colour": 0.05, "more than half empty": 0.25}
+ONE_COLOUR_FRAMES, EMPTY_FRAMES = "of one colour", "more than half empty"
+MOST = {ONE_COLOUR_FRAMES: 0.05, EMPTY_FRAMES: 0.25}
+REMEDIES = {
+    ONE_COLOUR_FRAMES: "look at preview.png; synfeal collect --min-clearance keeps cameras off"
+    " walls, --shade lights a mesh of plain colours",
+    EMPTY_FRAMES: "look at preview.png; synfeal collect --min-seen 0.9 refuses views past the mesh",
+}
 
 
 def kinds_of(sequences: Iterable[SequenceListing]) -> tuple[str, ...]:
@@ -118,10 +124,10 @@ def check_images(
                         )
             if COLOR in images:
                 n_frames += 1
-                if _is_of_one_colour(images[COLOR]):
-                    blank["of one colour"].append(frame)
+                if is_of_one_colour(images[COLOR]):
+                    blank[ONE_COLOUR_FRAMES].append(frame)
                 if _is_mostly_empty(images[COLOR], images.get(DEPTH) if camera else None):
-                    blank["more than half empty"].append(frame)
+                    blank[EMPTY_FRAMES].append(frame)
             on_frame()
     text = f"{n_images} images decoded" + (f", {size[0]} x {size[1]}" if size else "")
     return [Check("images", text, tuple(failures)), _content(n_frames, blank)]
@@ -141,12 +147,13 @@ def _content(n_frames: int, blank: Mapping[str, list[Frame]]) -> Check:
         if len(frames) > MOST[what] * n_frames:
             failures.append(
                 f"{frames[0].path(COLOR)}: is {what}, as are {len(frames)} of {n_frames} frames;"
-                " look at preview.png, and at synfeal inspect of the mesh"
+                f" {REMEDIES[what]}"
             )
     return Check("content", f"of {n_frames} frames {', '.join(said)}", tuple(failures))
 
 
-def _is_of_one_colour(rgb: Pixels) -> bool:
+def is_of_one_colour(rgb: Pixels) -> bool:
+    """Check whether nearly all pixels of an image (H, W, 3) have about the same colour."""
     rgb = rgb[::EVERY, ::EVERY]
     usual = np.median(rgb.reshape(-1, 3), axis=0)
     return bool(np.mean((np.abs(rgb - usual) <= SAME).all(axis=2)) >= ONE_COLOUR)

@@ -69,6 +69,17 @@ def _differences(
         yield f"{listing.path}: cannot be read ({why(error)})"
 
 
+def has_headlight(dataset: Path) -> bool:
+    """Check whether the manifest, if there is one, says that a lamp moved with the camera."""
+    if not (dataset / MANIFEST).exists():
+        return False
+    try:
+        render = read_manifest(dataset).get("render")
+    except InputError:  # the check of the manifest says so
+        return False
+    return isinstance(render, dict) and render.get("shade") == "headlight"
+
+
 def read_manifest(dataset: Path) -> dict[str, Any]:
     """The manifest as it stands.
 

@@ -80,4 +80,38 @@ def test_collect_always_says_how_many_pixels_are_empty(mesh, warns, tmp_path, ca
     share = json.loads((out / "coverage.json").read_text())["train"]["empty_pixels"]["share"]
     assert (share > 0.1) == warns
     assert f"empty pixels: {share:.1%}" in capsys.readouterr().out
-    assert any("will be empty" in line for line in caplog.messages) == warns
+    said = [line for line in caplog.messages if "will be empty" in line]
+    assert bool(said) == warns
+    assert all("--box" in line for line in said)
+
+
+def test_what_helps_against_empty_pixels_is_not_what_was_given(tmp_path, caplog, monkeypatch):
+    monkeypatch.setattr("synfeal.collection.run.WARN_ABOVE", 0.005)
+    path, box = save(tmp_path / "room.glb", open_room()), ["-2.5", "2.5", "-2", "2", "-0.5", "0.5"]
+    for more, remedy in (([], "--min-seen 0.9"), (["--min-seen", "0.9"], "--pitch")):
+        caplog.clear()
+        command = ["collect", "--mesh", str(path), "--box", *box, *SMALL, *more]
+        assert main([*command, "--out", str(tmp_path / f"set{len(more)}")]) == 0
+        said = [line for line in caplog.messages if "will be empty" in line]
+        assert all(remedy in line and "synfeal inspect" not in line for line in said)
+        assert said or more
+
+
+@pytest.mark.parametrize(
+    ("frames", "words"),
+    [
+        (("--frames", "20"), ["20 training frames lie on one straight path", "--spacing"]),
+        (("--frames", "60", "--spacing", "0.8"), []),
+        (("--frames", "20", "--mode", "random"), []),
+    ],
+)
+def test_few_paths_are_said_before_they_are_rendered(frames, words, tmp_path, capsys, caplog):
+    path, out = save(tmp_path / "room.glb", box_room()), tmp_path / "set"
+    size = ("--width", "32", "--height", "24", "--test-frames", "16")
+    assert main(["collect", "--mesh", str(path), "--out", str(out), *frames, *size]) == 0
+    said = [line for line in caplog.messages if "straight path" in line]
+    assert bool(said) == bool(words)
+    assert all(word in said[0] for word in words)
+    assert not any("test frames" in line for line in said)
+    shown = capsys.readouterr().out
+    assert ("16 test frames on 8 paths" in shown) == ("random" not in frames)

@@ -199,7 +199,6 @@ HEADER_ONLY = b'{"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"attri
         ("nan.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "NaN or infinite"),
         ("index.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot be read"),
         ("word.obj", b"v 0 0 0\nv 1 zero 0\nv 0 1 0\nf 1 2 3\n", "cannot be read"),
-        ("plain.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "neither a texture nor"),
     ],
 )
 def test_unusable_files_are_one_line(tmp_path, name, content, message):

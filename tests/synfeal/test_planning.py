@@ -66,6 +66,26 @@ def test_plan_has_the_frames_asked_for_on_free_connected_paths(furnished):
         plan_split(furnished, ROOM, SCENE, collection, 0, np.random.default_rng(0))
 
 
+@pytest.mark.parametrize("n_frames", [5, 8, 60, 400])
+def test_test_frames_are_the_first_of_paths_that_whole_ones_would_be(furnished, n_frames):
+    """Each path is that of the plan without a bound, cut short: so none is planned differently."""
+    whole = CollectionConfig(max_tries=300, frame_spacing_m=0.05, min_path_m=1.0)
+    spread = whole.model_copy(update={"test_paths": 8})
+
+    def planned(collection, count, split="test"):
+        rng = np.random.default_rng(3)
+        return plan_split(furnished, ROOM, SCENE, collection, count, rng, split)
+
+    table, full = planned(spread, n_frames), planned(whole, 4000)
+    assert len(table) == n_frames
+    assert len(np.unique(table.path)) >= min(8, n_frames)
+    for path in np.unique(table.path):
+        own, first = table.path == path, full.position_m[full.path == path]
+        np.testing.assert_array_equal(table.position_m[own], first[: own.sum()])
+    train = planned(spread, n_frames, "train")
+    np.testing.assert_array_equal(train.position_m, full.position_m[:n_frames])
+
+
 def round_by_round(caster, k, n_frames, rng):
     """Positions (n_frames, 3) planned as the paper describes it, without any look-ahead."""
     bounds = pose_bounds(ROOM, Angles())

@@ -24,6 +24,7 @@ rule scene:
         | {"path": file_of(input.mesh)},
         collision_agreement=CONFIG.collection.collision_agreement,
         seed=CONFIG.seed,
+        shade=CONFIG.render.shade,
     script:
         "../scripts/run_scene.py"
 

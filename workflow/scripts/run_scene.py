@@ -10,5 +10,6 @@ run_job(
     scene=snakemake.params.scene,
     collision_agreement=snakemake.params.collision_agreement,
     seed=snakemake.params.seed,
+    shade=snakemake.params.shade,
     out_mesh=snakemake.output.mesh,
 )

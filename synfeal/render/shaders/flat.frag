@@ -8,6 +8,9 @@ struct Material {
 };
 uniform Material material;
 uniform float level_bias;  // added to the mip level
+// Share of a lamp's light where a surface is seen edge-on; 1 without a lamp.
+uniform float floor_share;
+in vec3 from_camera;
 #ifdef TEXCOORD_0_LOC
 in vec2 uv_0;
 #endif
@@ -20,6 +23,12 @@ layout(location = 1) out vec4 depth_m;
 void main()
 {
     colour = material.base_color_factor;
+    if (floor_share < 1.0) {
+        vec3 normal = cross(dFdx(from_camera), dFdy(from_camera));
+        float cosine = abs(dot(normal, from_camera));
+        cosine /= max(length(normal) * length(from_camera), 1e-30);
+        colour.rgb *= mix(floor_share, 1.0, min(cosine, 1.0));
+    }
 #ifdef HAS_BASE_COLOR_TEX
     vec4 texel = texture(material.base_color_texture, uv_0, level_bias);
     if (texel.a < 0.5)

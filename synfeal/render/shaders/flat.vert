@@ -12,10 +12,13 @@ out vec4 color_multiplier;
 uniform mat4 M;
 uniform mat4 V;
 uniform mat4 P;
+out vec3 from_camera;
 
 void main()
 {
-    gl_Position = P * (V * (M * vec4(position, 1.0)));
+    vec4 in_camera = V * (M * vec4(position, 1.0));
+    from_camera = in_camera.xyz;
+    gl_Position = P * in_camera;
 #ifdef TEXCOORD_0_LOC
     uv_0 = texcoord_0;
 #endif

@@ -1,4 +1,4 @@
-// With TEXTURED, COLOURED, or both.
+// With TEXTURED, COLOURED, or both; HEADLIGHT for a lamp at the camera.
 uniform mat4 clip_from_mesh;
 in vec3 position;
 #ifdef TEXTURED
@@ -9,7 +9,14 @@ out vec2 uv;
 in vec3 corner_rgb;
 out vec3 rgb;
 #endif
+#ifdef HEADLIGHT
+uniform vec3 camera;  // where it is, in the mesh's frame
+out vec3 from_camera;
+#endif
 void main() {
+#ifdef HEADLIGHT
+    from_camera = position - camera;
+#endif
 #ifdef TEXTURED
     uv = corner_uv;
 #endif
