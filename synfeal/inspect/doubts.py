@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from synfeal.config.collection import SceneConfig
 from synfeal.inspect.freespace import FreeSpace, survey, viewpoint
-from synfeal.inspect.suggest import Suggestion, suggest
-from synfeal.inspect.surface import SurfacePoints, triangle_areas_m2
+from synfeal.inspect.suggest import MAX_OF_ONE_COLOUR, MAX_PLAIN, Suggestion, suggest
+from synfeal.inspect.surface import SurfacePoints, area_by_colour, triangle_areas_m2
 from synfeal.mesh.checks import shows_one_colour
 from synfeal.mesh.load import is_y_up, load_mesh
 from synfeal.mesh.model import TexturedMesh
@@ -27,8 +27,7 @@ ALIGNED_COS = np.cos(np.deg2rad(15.0))
 FLOOR_BIN_M = 0.1
 FLOOR_RATIO = 1.5
 MIN_ENCLOSURE = 0.9
-MAX_PLAIN = 0.5
-MAX_EMPTY = 0.1
+MIN_COVERED = 0.6
 MAX_ELSEWHERE = 0.1
 
 
@@ -63,8 +62,8 @@ def doubts_of(extents_m: Array, floors_m2: Array, space: FreeSpace) -> list[str]
         ),
         (
             can_stand and space.elsewhere > MAX_ELSEWHERE,
-            f"{space.elsewhere:.0%} of the places to stand are in other rooms or on other floors,"
-            " which cannot be seen from the suggested box; give --box to look at one of them",
+            f"{space.elsewhere:.0%} of the places to stand are in small rooms or nooks, which the"
+            " suggested boxes leave out",
         ),
     )
 
@@ -74,24 +73,36 @@ def _that_hold(*doubts: tuple[bool, str]) -> list[str]:
 
 
 def colour_doubts(mesh: TexturedMesh, area_m2: dict[str, float]) -> list[str]:
-    """Whether there is anything to see; ``area_m2`` is the surface by what colours it."""
-    of_one, plain = shows_one_colour(mesh), area_m2["plain"] / max(sum(area_m2.values()), 1e-12)
+    """Return doubts that there is anything to see.
+
+    Args:
+        mesh: World frame.
+        area_m2: Its surface by what colours it.
+    """
+    plain, of_one = plain_share(area_m2), shows_one_colour(mesh)
+    light = "; the command below lights it (--shade), which shows its shape"
     return _that_hold(
         (
             of_one,
-            "the mesh is of one colour, and collect refuses it; put its texture files (of an OBJ"
-            " also the .mtl) where it names them",
+            "the mesh is of one colour; if it should have a texture, put its files (of an OBJ also"
+            f" the .mtl) where it names them{light}",
         ),
         (
             not of_one and plain > MAX_PLAIN,
-            f"{plain:.0%} of the surface has one plain colour: little to localize by",
+            f"{plain:.0%} of the surface has one plain colour: little to localize by{light}",
         ),
     )
 
 
+def plain_share(area_m2: dict[str, float]) -> float:
+    """Return the share of a surface, given by what colours it, that has plain colours."""
+    return area_m2["plain"] / max(sum(area_m2.values()), 1e-12)
+
+
 def suggestion_doubts(suggestion: Suggestion) -> list[str]:
-    """What planning the suggested command once has shown."""
-    empty = suggestion.empty
+    """Return doubts about the data set that the suggested command makes."""
+    empty, scene = suggestion.empty, suggestion.scene
+    asked = f", although --min-seen {scene.min_seen:g} refuses the worst" if scene.min_seen else ""
     return _that_hold(
         (
             suggestion.is_narrow,
@@ -99,10 +110,20 @@ def suggestion_doubts(suggestion: Suggestion) -> list[str]:
             " ones (--min-path) and nearer views (--min-view-distance)",
         ),
         (
-            empty.share > MAX_EMPTY,
+            suggestion.covered < MIN_COVERED,
+            f"the suggested boxes hold {suggestion.covered:.0%} of the places for cameras; the rest"
+            " is too narrow or too scattered for paths",
+        ),
+        (
+            not empty.is_little,
             f"{empty.share:.0%} of the pixels that the command below makes will be empty, and"
             f" {empty.mostly_empty_frames:.0%} of its frames more than half: cameras look out where"
-            " the mesh is open; pitch bounds or a smaller --box show less of that",
+            f" the mesh is open{asked}",
+        ),
+        (
+            suggestion.one_colour > MAX_OF_ONE_COLOUR,
+            f"{suggestion.one_colour:.0%} of its frames will be of one colour: there is little to"
+            " see on these walls",
         ),
     )
 
@@ -196,16 +217,19 @@ class Inspection:
         surface = SurfacePoints.of(mesh, generator_of(0, "inspect"))
         caster = RayCaster(*mesh.merged())
         found = survey(caster, surface.position_m, box_m)
-        space, suggestion = suggest(caster, found, scene)
+        area_m2 = area_by_colour(mesh)
+        plain = 1.0 if shows_one_colour(mesh) else plain_share(area_m2)
+        space, suggestion = suggest(mesh, caster, found, scene, plain)
         return cls(scene, mesh, tuple(assumed), surface, caster, box_m, space, suggestion)
 
     @property
-    def suggested_m(self) -> Array | None:
-        """The suggested box (2, 3)."""
-        return None if self.suggestion is None else self.suggestion.box_m
+    def suggested_m(self) -> Array:
+        """The suggested boxes (B, 2, 3), the largest first."""
+        return np.empty((0, 2, 3)) if self.suggestion is None else self.suggestion.boxes_m
 
     @property
     def viewpoint_m(self) -> Array:
         """Where the pictures are taken from, (3,): in the free space if there is any."""
-        found_m = viewpoint(self.space, self.suggested_m)
+        boxes_m = self.suggested_m
+        found_m = viewpoint(self.space, boxes_m[0] if len(boxes_m) else None)
         return self.mesh.bounds_m.mean(axis=0) if found_m is None else found_m

@@ -20,8 +20,8 @@ from synfeal.inspect.doubts import (
     suggestion_doubts,
 )
 from synfeal.inspect.freespace import DEFINITION, FreeSpace
-from synfeal.inspect.suggest import N_FRAMES
-from synfeal.inspect.surface import triangle_areas_m2
+from synfeal.inspect.suggest import COUNTS
+from synfeal.inspect.surface import area_by_colour, colour_of, triangle_areas_m2
 from synfeal.mesh.gltf import slug_of, title_of
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.properties import mesh_properties, mesh_topology
@@ -38,15 +38,22 @@ def facts_of(found: Inspection) -> dict[str, Any]:
     """Numbers, findings and doubts, ready for JSON."""
     scene, mesh, space, suggestion = found.scene, found.mesh, found.space, found.suggestion
     title = title_of(Path(str(scene.path)))
-    detail, collect, box = detail_of(mesh), None, None
+    detail, collect = detail_of(mesh), None
     area_m2, surface = detail["area_m2"], found.surface
     floors_m2 = floor_areas_m2(surface.normal, surface.position_m, sum(area_m2.values()))
     topology = mesh_topology(*merge_vertices(*mesh.merged()))
     lengths = topology.pop("hole_lengths_m")
     if suggestion is not None:  # the command, and what planning it once showed
-        box = dict(zip("xyz", suggestion.box_m.T.tolist(), strict=True))
-        command = suggestion.command(f"{slug_of(title)}-frames")
-        collect = {"command": command, "frames": N_FRAMES, "empty_pixels": asdict(suggestion.empty)}
+        collect = {
+            "command": suggestion.command(f"{slug_of(title)}-frames"),
+            "frames": COUNTS,
+            "covered": suggestion.covered,
+            "empty_pixels": asdict(suggestion.empty),
+            "of_one_colour": suggestion.one_colour,
+            "shade": suggestion.shade,
+            "min_seen": suggestion.scene.min_seen,
+            "min_clearance_m": suggestion.scene.min_clearance_m,
+        }
     return {
         "title": title,
         "mesh": {
@@ -68,7 +75,9 @@ def facts_of(found: Inspection) -> dict[str, Any]:
             **{key: getattr(space, key) for key in ("share", "enclosure", "floor_m", "elsewhere")},
         },
         "back_faces_share": back_face_share(mesh, found.caster, space),
-        "suggested_sampling_box": box,
+        "suggested_sampling_boxes": [
+            dict(zip("xyz", box_m.T.tolist(), strict=True)) for box_m in found.suggested_m
+        ],
         "collect": collect,
         "doubts": [
             *found.assumed,
@@ -86,23 +95,17 @@ def _part(part: MeshPart) -> dict[str, Any]:
         "name": part.name,
         "faces": len(part.faces),
         "area_m2": _area_m2([part]),
-        "colour": _colour(part),
+        "colour": colour_of(part),
         "texture_px": texture,
         "alpha_cutoff": part.alpha_cutoff,
     }
-
-
-def _colour(part: MeshPart) -> str:
-    if part.texture is not None:
-        return "texture"
-    return "plain" if part.vertex_rgb is None else "vertices"
 
 
 def _material_key(part: MeshPart) -> tuple[str, str, bytes, float | None]:
     """Equal for parts that are drawn alike."""
     texels = b"" if part.texture is None else part.texture.tobytes()
     texture = hashlib.sha256(texels).hexdigest()
-    return _colour(part), texture, part.base_color.tobytes(), part.alpha_cutoff
+    return colour_of(part), texture, part.base_color.tobytes(), part.alpha_cutoff
 
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -116,19 +119,15 @@ def detail_of(mesh: TexturedMesh) -> dict[str, Any]:
     root of vertices per square metre over all parts coloured by their vertices. None where there
     are no such parts.
     """
-    textured, by_vertex, plain = (
-        [part for part in mesh.parts if _colour(part) == colour]
-        for colour in ("texture", "vertices", "plain")
+    textured, by_vertex = (
+        [part for part in mesh.parts if colour_of(part) == colour]
+        for colour in ("texture", "vertices")
     )
     vertex_m2, per_m = _area_m2(by_vertex), None
     if vertex_m2 > 0.0:
         per_m = float(np.sqrt(sum(len(np.unique(part.faces)) for part in by_vertex) / vertex_m2))
     return {
-        "area_m2": {
-            "textured": _area_m2(textured),
-            "coloured_by_vertex": vertex_m2,
-            "plain": _area_m2(plain),
-        },
+        "area_m2": area_by_colour(mesh),
         "texels_per_m": texels_per_m(textured),
         "coloured_vertices_per_m": per_m,
     }

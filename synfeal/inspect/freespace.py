@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,9 @@ CAMERA_HEIGHT_M = (0.8, 2.0)  # hand-held cameras, above the floor
 FLOOR_BIN_M = 0.05
 N_PLACES = 400  # that are tested for seeing each other
 N_HUBS = 100  # of these, to tell what else belongs to their space
+LEAST_GROUP = 0.1  # of the places: smaller groups are nooks, and the insides of things
+LEAST_FLOOR = 0.15  # of the places to stand of a space
+FLOORS_APART_M = 0.5
 
 DEFINITION = (
     f"Of {N_RAYS} rays from a point, spread evenly from level to {MAX_ELEVATION_DEG:.0f} degrees"
@@ -62,6 +66,8 @@ class FreeSpace:
     # places to stand as enclosed as these that cannot be seen from here, as a share of all of them:
     # other floors, other rooms
     elsewhere: float = 0.0
+    # heights at which many of the places to stand find a surface below, the most frequent first
+    floors_m: tuple[float, ...] = ()
 
     @property
     def share(self) -> float:
@@ -98,32 +104,68 @@ def survey(caster: RayCaster, surface_m: Array, box_m: Array) -> Survey:
 
 
 def find_free_space(caster: RayCaster, found: Survey, slack: float = SLACK) -> FreeSpace:
-    """The largest space in which cameras see each other; see ``DEFINITION``.
+    """Find the largest space in which cameras see each other; see :func:`find_free_spaces`."""
+    return find_free_spaces(caster, found, slack)[0]
 
-    ``slack`` is by how much less enclosed a point may be than the best places to stand.
+
+def find_free_spaces(caster: RayCaster, found: Survey, slack: float = SLACK) -> list[FreeSpace]:
+    """Find the spaces in which cameras see each other; see ``DEFINITION``.
+
+    Args:
+        caster: Rays against the mesh.
+        found: What rays tell of a grid of points.
+        slack: By how much less enclosed a point may be than the best places to stand.
+
+    Returns:
+        Spaces that hold at least a tenth of the places to stand, the largest first; an empty one
+        where there is no place to stand.
     """
-    shape = tuple(len(axis) for axis in found.axes_m)
-    nothing = np.zeros(shape, dtype=np.bool_)
     if not found.is_stand.any():
-        return FreeSpace(found.axes_m, nothing, nothing, 0.0, None)
+        nothing = np.zeros(tuple(len(axis) for axis in found.axes_m), dtype=np.bool_)
+        return [FreeSpace(found.axes_m, nothing, nothing, 0.0, None)]
     best = float(np.quantile(found.enclosure[found.is_stand], 0.95))
     is_enclosed = found.enclosure >= max(best - slack, MIN_ENCLOSURE)
-    # Some of the places of the largest group that see each other.
+    # Some of the places, in groups that see each other.
     stands_m = found.points_m[found.is_stand & is_enclosed]
     places_m = np.random.default_rng(0).permutation(stands_m)[:N_PLACES]
     group = seeing_groups(caster, places_m)
-    largest_m = places_m[group == np.bincount(group).argmax()]
+    counts = np.bincount(group)
+    by_size = np.argsort(-counts, kind="stable")
+    large = [index for index in by_size if counts[index] >= LEAST_GROUP * len(places_m)]
+    large = large or [by_size[0]]
+    elsewhere = 1.0 - sum(int(counts[index]) for index in large) / len(places_m)
+    return [
+        _space_seen_from(caster, found, is_enclosed, places_m[group == index], elsewhere)
+        for index in large
+    ]
+
+
+def _space_seen_from(
+    caster: RayCaster, found: Survey, is_enclosed: Mask, places_m: Array, elsewhere: float
+) -> FreeSpace:
+    """The space of one group of places (P, 3); ``elsewhere`` are those of no group."""
+    shape = tuple(len(axis) for axis in found.axes_m)
     is_free = is_enclosed.copy()
-    space = ConnectedSpace(caster, largest_m[:N_HUBS])
+    space = ConnectedSpace(caster, places_m[:N_HUBS])
     is_free[is_enclosed] = space.contains(found.points_m[is_enclosed])
-    floors_m = _floors_m(caster, found.points_m[is_free & found.is_stand])
+    floors_m = _frequent(_floors_m(caster, found.points_m[is_free & found.is_stand]))
     return FreeSpace(
         axes_m=found.axes_m,
         is_free=is_free.reshape(shape),
         is_clear=(is_free & found.is_clear).reshape(shape),
         enclosure=float(np.median(found.enclosure[is_free])),
-        floor_m=_most_frequent(floors_m),
-        elsewhere=1.0 - len(largest_m) / len(places_m),
+        floor_m=floors_m[0] if floors_m else None,
+        elsewhere=elsewhere,
+        floors_m=floors_m,
+    )
+
+
+def together(spaces: Sequence[FreeSpace]) -> FreeSpace:
+    """Return the free points of several spaces as one; all else is that of the first, largest."""
+    return replace(
+        spaces[0],
+        is_free=np.logical_or.reduce([space.is_free for space in spaces]),
+        is_clear=np.logical_or.reduce([space.is_clear for space in spaces]),
     )
 
 
@@ -173,10 +215,17 @@ def _floors_m(caster: RayCaster, points: Array) -> Array:
     )
 
 
-def _most_frequent(heights_m: Array) -> float | None:
-    """The middle of the heights (N,) that most of them are near."""
+def _frequent(heights_m: Array) -> tuple[float, ...]:
+    """The middles of the heights (N,) that many of them are near, the most frequent first."""
     heights_m = heights_m[np.isfinite(heights_m)]
-    if not len(heights_m):
-        return None
-    bins = np.round(heights_m / FLOOR_BIN_M)
-    return float(np.median(heights_m[bins == mode(bins).mode]))
+    least = LEAST_FLOOR * len(heights_m)
+    found: list[float] = []
+    while len(heights_m):
+        bins = np.round(heights_m / FLOOR_BIN_M)
+        floor_m = float(np.median(heights_m[bins == mode(bins).mode]))
+        is_near = np.abs(heights_m - floor_m) < FLOORS_APART_M
+        if found and is_near.sum() < least:
+            break
+        found.append(floor_m)
+        heights_m = heights_m[~is_near]
+    return tuple(found)

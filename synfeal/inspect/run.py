@@ -62,7 +62,7 @@ def inspect_mesh(scene: SceneConfig, out: Path, unit_is_given: bool = True) -> s
     found = Inspection.of(scene, unit_is_given or scene.sampling_box is not None)
     facts = facts_of(found)
     picture = picture_png(facts, found)
-    edges = [] if found.suggested_m is None else box_lines(found.suggested_m)
+    edges = [edge for box_m in found.suggested_m for edge in box_lines(box_m)]
     heading = heading_from_opening(found.caster, found.viewpoint_m)
     drawing = viewer_mesh(found.mesh, found.surface).scene(
         [(edge, BOX_RGB) for edge in edges], heading
@@ -105,8 +105,8 @@ def picture_png(facts: Facts, found: Inspection) -> bytes:
     It is cut at mid-height of the suggested box, if there is one.
     """
     (_, _, low), (_, _, high) = found.mesh.bounds_m.tolist()
-    box_m, position_m = found.suggested_m, found.viewpoint_m
-    cut_m = low + 0.6 * (high - low) if box_m is None else float(box_m[:, 2].mean())
+    boxes_m, position_m = found.suggested_m, found.viewpoint_m
+    cut_m = float(boxes_m[0, :, 2].mean()) if len(boxes_m) else low + 0.6 * (high - low)
     values = facts["properties"]
     size = " × ".join(f"{extent:.2f}" for extent in values["extents_m"])
     caption = (
@@ -118,7 +118,7 @@ def picture_png(facts: Facts, found: Inspection) -> bytes:
     text(0.02, 0.96, facts["title"], fontsize=17, weight="bold")
     text(0.02, 0.92, caption, fontsize=11, color="0.35")
     views = inside_views(found.mesh, position_m)
-    _draw_top(figure, top_view(found.mesh, cut_m), cut_m, box_m, position_m)
+    _draw_top(figure, top_view(found.mesh, cut_m), cut_m, boxes_m, position_m)
     for index, (yaw, view) in enumerate(zip(LOOKS_ALONG, views, strict=True)):
         left, bottom = 0.45 + 0.272 * (index % 2), 0.50 - 0.43 * (index // 2)
         axes = figure.add_axes((left, bottom, 0.265, 0.36))
@@ -134,19 +134,18 @@ def picture_png(facts: Facts, found: Inspection) -> bytes:
 
 
 def _draw_top(
-    figure: Figure, top: TopView, cut_m: float, box_m: Array | None, position_m: Array
+    figure: Figure, top: TopView, cut_m: float, boxes_m: Array, position_m: Array
 ) -> None:
     axes = figure.add_axes((0.045, 0.07, 0.385, 0.79))
     axes.imshow(top.rgb, extent=top.extent_m, interpolation="antialiased")
     axes.set_title(f"From above, cut at z = {cut_m:.2f} m", fontsize=11, loc="left")
     axes.set(xlabel="x (m)", ylabel="y (m)", anchor="N")
-    if box_m is not None:
-        (x0, y0, z0), (x1, y1, z1) = box_m
+    for number, ((x0, y0, z0), (x1, y1, z1)) in enumerate(boxes_m):
         frame = Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, edgecolor=BOX_COLOUR, linewidth=2)
         frame.set_linestyle("--")
         frame.set_path_effects([withStroke(linewidth=4, foreground="white")])
         axes.add_patch(frame)
-        text = f"suggested sampling box, z {z0:.2f} to {z1:.2f} m"
+        text = f"box {number + 1}, z {z0:.2f} to {z1:.2f} m"
         axes.annotate(text, (x0, y1), (0, 4), va="bottom", fontsize=9, color=BOX_COLOUR, **POINTS)
     reach = 0.05 * max(top.extent_m[1] - top.extent_m[0], top.extent_m[3] - top.extent_m[2])
     _draw_position(axes, position_m, reach)

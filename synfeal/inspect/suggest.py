@@ -1,152 +1,321 @@
-"""A sampling box that works, and the command that collects in it: planned once, not rendered."""
+"""The command that collects a first data set: planned and looked at once, nothing is written.
+
+What is suggested has been tried: paths were planned in its boxes as ``synfeal collect`` plans them,
+rays counted what of the images would be empty, and some of the images were drawn.
+"""
 
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.collection import Box, CollectionConfig, SceneConfig
-from synfeal.config.dataset import CameraConfig
-from synfeal.config.options import SCENE
+from synfeal.config.dataset import CameraConfig, RenderConfig, Shade
+from synfeal.config.options import SCENE, TEST_PATHS
+from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.sevenscenes import Split
 from synfeal.errors import InputError
-from synfeal.inspect.freespace import (
-    CAMERA_HEIGHT_M,
-    SLACK,
-    FreeSpace,
-    Survey,
-    find_free_space,
-    step_m_of,
-)
+from synfeal.inspect.boxes import share_inside, suggest_boxes
+from synfeal.inspect.freespace import SLACK, FreeSpace, Survey, find_free_spaces, together
+from synfeal.mesh.ambient import with_ambient_light
+from synfeal.mesh.clearance import Clearance
+from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
-from synfeal.planning.coverage import EmptyPixels, empty_pixels
-from synfeal.planning.plan import plan_split
+from synfeal.planning.coverage import MOSTLY, empty_shares
+from synfeal.planning.plan import box_array, plan_split
 from synfeal.records.provenance import generator_of
+from synfeal.render import open_renderer
+from synfeal.validation.frames import is_of_one_colour
 
 Array = NDArray[np.float64]
 
-N_FRAMES = 300
+COUNTS: dict[Split, int] = {"train": 300, "test": 60}
+SPACING_M = 0.1  # so that as many frames show all of a place
 SLACKS = (SLACK, 2 * SLACK, 1.0)  # the last leaves out only what is outside
 NARROW_M = 0.6  # least path and view in a space too narrow for the defaults
+CLEARANCES_M = (0.2, 0.0)
+MIN_SEEN = (None, 0.7, 0.9, 0.97)
+MAX_EMPTY = 0.1  # of the pixels: more than windows let through
+MAX_MOSTLY_EMPTY = 0.1  # of the frames; a data set with a quarter of them is invalid
+ENOUGH_BOXES = 0.75  # of what the boxes hold, in which paths were found
+TRIAL_FRAMES, TRIAL_TRIES = 30, 300  # to tell whether there are paths in a box
+N_LOOKED_AT = 80  # frames that are drawn
+LOOK_CAMERA = CameraConfig(width=160, height=120)
+MAX_PLAIN = 0.5  # of the surface
+MAX_OF_ONE_COLOUR = 0.02  # of the frames; a data set with a twentieth of them is invalid
+
+
+@dataclass(frozen=True)
+class Emptiness:
+    """How much of the images would show nothing.
+
+    Attributes:
+        share: Of all pixels.
+        mostly_empty_frames: Share of the frames of which more than half is empty.
+    """
+
+    share: float
+    mostly_empty_frames: float
+
+    @property
+    def is_little(self) -> bool:
+        """Check whether a data set may be so."""
+        return self.share <= MAX_EMPTY and self.mostly_empty_frames <= MAX_MOSTLY_EMPTY
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """What was planned, and what came of it."""
+    """What was planned, and what came of it.
 
-    scene: SceneConfig  # with the sampling box
-    # how the camera moves; the defaults unless the space is too narrow for them
+    Attributes:
+        scene: With the boxes that cameras may be in, and what is asked of poses.
+        collection: How the camera moves.
+        shade: Light that the frames need, if any.
+        empty: What of the images would show nothing.
+        one_colour: Share of the frames that would be of one colour.
+        covered: Share of the places for cameras that the boxes hold.
+        world_from_cam: Poses (N, 4, 4) of the frames, training and test.
+    """
+
+    scene: SceneConfig
     collection: CollectionConfig
-    empty: EmptyPixels  # how much of the images would show nothing
-    box_m: Array  # (2, 3) the sampling box
+    empty: Emptiness
+    covered: float
+    world_from_cam: Array
+    shade: Shade | None = None
+    one_colour: float = 0.0
+
+    @property
+    def boxes_m(self) -> Array:
+        """Return the sampling boxes (B, 2, 3), the largest first."""
+        assert self.scene.sampling_box is not None
+        boxes = (self.scene.sampling_box, *self.scene.further_boxes)
+        return np.stack([box_array(box) for box in boxes])
 
     @property
     def is_narrow(self) -> bool:
-        """Whether no path of the default length was found."""
-        return self.collection != CollectionConfig()
+        """Check whether the defaults would leave out much, or all, of the space."""
+        return self.collection.min_path_m == NARROW_M
 
     def command(self, out: str) -> str:
-        """The complete line that collects what was planned, ready for a shell."""
+        """Return the complete line that collects what was planned, ready for a shell."""
         scene, words = self.scene, ["synfeal", "collect", "--mesh", str(self.scene.path)]
         if scene.up_axis != "auto":
             words += ["--up-axis", scene.up_axis]
         if scene.unit_m != 1.0:
             words += ["--unit-m", f"{scene.unit_m:g}"]
-        words += ["--box", *(f"{value:z.2f}" for value in self.box_m.T.ravel())]
+        for box_m in self.boxes_m:
+            words += ["--box", *(f"{value:z.2f}" for value in box_m.T.ravel())]
         if self.is_narrow:
             words += ["--min-path", f"{self.collection.min_path_m:g}"]
             words += ["--min-view-distance", f"{scene.min_view_distance_m:g}"]
-        return shlex.join([*words, "--frames", str(N_FRAMES), "--depth", "--out", out])
+        if scene.min_clearance_m:
+            words += ["--min-clearance", f"{scene.min_clearance_m:g}"]
+        if scene.min_seen:
+            words += ["--min-seen", f"{scene.min_seen:g}"]
+        if self.shade:
+            words += ["--shade", self.shade]
+        words += ["--spacing", f"{self.collection.frame_spacing_m:g}"]
+        words += ["--frames", str(COUNTS["train"]), "--test-frames", str(COUNTS["test"])]
+        return shlex.join([*words, "--depth", "--out", out])
 
 
 def suggest(
-    caster: RayCaster, found: Survey, scene: SceneConfig
+    mesh: TexturedMesh, caster: RayCaster, found: Survey, scene: SceneConfig, plain: float
 ) -> tuple[FreeSpace, Suggestion | None]:
-    """The free space of a mesh, and the first box in it that paths can be planned in.
+    """Find the free space of a mesh and a collection in it whose images show something.
 
-    Boxes are tried in the most enclosed part of the space first, then in more of it, then with
-    shorter paths. What is planned is what ``synfeal collect`` plans.
+    Args:
+        mesh: World frame.
+        caster: Rays against it.
+        found: What rays tell of points in it.
+        scene: Its settings; boxes, and what is asked of poses, are replaced.
+        plain: Share of its surface that has one plain colour, or no colour.
+
+    Returns:
+        The free space, and a collection in it; None if no path was found. What is only just inside
+        is considered where nothing better is.
     """
-    spaces = [find_free_space(caster, found, slack) for slack in SLACKS]
-    narrow = CollectionConfig(min_path_m=NARROW_M)
-    near = scene.model_copy(update={"min_view_distance_m": NARROW_M})
-    for each, collection in ((scene, CollectionConfig()), (near, narrow)):
-        for space in spaces:
-            box_m = suggest_box(space)
-            if box_m is None:
-                continue
-            x, y, z = ((low, high) for low, high in box_m.T.tolist())
-            boxed = each.model_copy(update={"sampling_box": Box(x=x, y=y, z=z)})
-            rng = generator_of(0, "plan", SCENE, "train")
-            try:
-                plan = plan_split(caster, box_m, boxed, collection, N_FRAMES, rng)
-            except InputError:
-                continue
-            empty = empty_pixels(caster, plan, CameraConfig())
-            return space, Suggestion(boxed, collection, empty, box_m)
-    return spaces[0], None
+    places = [_Places.of(find_free_spaces(caster, found, slack)) for slack in SLACKS]
+    for some in (places[:-1], places[-1:]):
+        best = _best_covering(_attempts(mesh, caster, scene, some))
+        if best is not None:
+            return best[0], lit(mesh, best[1], plain)
+    return places[0].space, None
 
 
-Mask = NDArray[np.bool_]
-Corner = tuple[int, int, int]
+def _best_covering(
+    attempts: Iterator[tuple[_Planner, _Places]],
+) -> tuple[FreeSpace, Suggestion] | None:
+    """The first attempt with paths in most of its boxes; of none, the one that covers most."""
+    best: tuple[FreeSpace, Suggestion] | None = None
+    for planner, where in attempts:
+        suggestion = planner.suggestion(where)
+        if suggestion is None or (best and suggestion.covered <= best[1].covered):
+            continue
+        best = (where.space, suggestion)
+        if suggestion.covered >= ENOUGH_BOXES * where.share_inside(where.boxes_m):
+            break
+    return best
 
-# A layer of points is worth adding to a box if more than 2/3 of it are wanted. A bound on the whole
-# box instead would let it grow into the walls until the bound is used up.
-UNWANTED_WEIGHT = 2.0
 
+@dataclass(frozen=True)
+class _Places:
+    """Where cameras may be, as far as the mesh tells.
 
-def largest_box(is_wanted: Mask) -> tuple[Corner, Corner]:
-    """First and last indices, both included, of the box with the greatest worth.
-
-    Worth is the number of wanted points less twice the number of others; at least one of (X, Y, Z)
-    is wanted. Every pair of limits along x and z is tried; along y the best run of layers is found
-    in one pass (Kadane).
+    Attributes:
+        space: The free space.
+        boxes_m: Boxes (B, 2, 3) that hold most of it at camera heights, the largest first.
+        points_m: Points (N, 3) that they are to hold.
     """
-    worth = np.where(is_wanted, 1.0, -UNWANTED_WEIGHT)
-    best: tuple[float, Corner, Corner] = (-np.inf, (0, 0, 0), (0, 0, 0))
-    for z0, z1 in _pairs(worth.shape[2]):
-        layer = worth[:, :, z0 : z1 + 1].sum(axis=2)
-        value, (x0, y0), (x1, y1) = _best_rectangle(layer)
-        if value > best[0]:
-            best = (value, (x0, y0, z0), (x1, y1, z1))
-    return best[1], best[2]
+
+    space: FreeSpace
+    boxes_m: Array
+    points_m: Array
+
+    @classmethod
+    def of(cls, spaces: list[FreeSpace]) -> Self:
+        """Find boxes in some spaces."""
+        boxes_m, points_m = suggest_boxes(spaces)
+        return cls(together(spaces), boxes_m, points_m)
+
+    def share_inside(self, boxes_m: Array) -> float:
+        """Return the share of the points that some boxes hold."""
+        return share_inside(self.points_m, boxes_m) if len(boxes_m) else 0.0
 
 
-def _best_rectangle(worth: NDArray[np.float64]) -> tuple[float, tuple[int, int], tuple[int, int]]:
-    """Greatest sum over a rectangle of (X, Y), with its first and last indices."""
-    sums = np.vstack([np.zeros(worth.shape[1]), np.cumsum(worth, axis=0)])
-    pairs = np.array(_pairs(worth.shape[0]))
-    strips = sums[pairs[:, 1] + 1] - sums[pairs[:, 0]]
-    until = np.cumsum(np.pad(strips, ((0, 0), (1, 0))), axis=1)
-    gains = until[:, 1:] - np.minimum.accumulate(until[:, :-1], axis=1)
-    y1, pair = (int(index) for index in np.unravel_index(gains.T.argmax(), gains.T.shape))
-    (x0, x1), before = pairs[pair].tolist(), until[pair, : y1 + 1]
-    y0 = int(np.flatnonzero(before == before.min())[-1])  # of several the shortest run
-    return float(gains[pair, y1]), (x0, y0), (x1, y1)
+def _attempts(
+    mesh: TexturedMesh, caster: RayCaster, scene: SceneConfig, places: Sequence[_Places]
+) -> Iterator[tuple[_Planner, _Places]]:
+    """Yield ways to collect, the best first, each with where it is to be tried.
 
-
-def _pairs(count: int) -> list[tuple[int, int]]:
-    """All (first, last) with first <= last < count."""
-    return [(first, last) for first in range(count) for last in range(first, count)]
-
-
-def suggest_box(space: FreeSpace) -> Array | None:
-    """A box (2, 3) at camera heights to sample in: as large as can be while mostly clear.
-
-    None if no clear point lies 0.8 to 2.0 m above the floor.
+    Paths of the default length come before shorter ones, the most enclosed part of the space before
+    more of it, and cameras that keep off surfaces before others.
     """
-    if space.floor_m is None:
+    keeping = {
+        clearance_m: Clearance(*mesh.merged(), clearance_m) if clearance_m else None
+        for clearance_m in CLEARANCES_M
+    }
+    for narrow in (False, True):
+        asked = {"min_path_m": NARROW_M} if narrow else {}
+        collection = CollectionConfig(frame_spacing_m=SPACING_M, test_paths=TEST_PATHS, **asked)
+        for where in places:
+            for clearance_m, clearance in keeping.items():
+                update: dict[str, object] = {"min_clearance_m": clearance_m}
+                if narrow:
+                    update["min_view_distance_m"] = NARROW_M
+                own = scene.model_copy(update=update)
+                yield _Planner(caster, own, collection, clearance), where
+
+
+@dataclass(frozen=True)
+class _Planner:
+    """Plans as ``synfeal collect`` does, in boxes that are tried."""
+
+    caster: RayCaster
+    scene: SceneConfig
+    collection: CollectionConfig
+    clearance: Clearance | None
+
+    def with_paths(self, boxes_m: Array) -> Array:
+        """Return those of some boxes (B, 2, 3) in which there are paths."""
+        quick = self.collection.model_copy(update={"max_tries": TRIAL_TRIES})
+        trial = replace(self, collection=quick)
+        plans = [trial.plan(box_m[None], "train", TRIAL_FRAMES) for box_m in boxes_m]
+        kept: Array = boxes_m[np.array([plan is not None for plan in plans], dtype=np.bool_)]
+        return kept
+
+    def suggestion(self, where: _Places) -> Suggestion | None:
+        """Return the collection in as many boxes as paths are found in; None where in none."""
+        boxes_m = self.with_paths(where.boxes_m)
+        while len(boxes_m):
+            found = self._least_empty(boxes_m, where.share_inside(boxes_m))
+            if found is not None:
+                return found
+            boxes_m = boxes_m[:-1]  # long walks may end in a dead end where short ones did not
         return None
-    z_m = space.axes_m[2] - space.floor_m
-    at_height = (z_m >= CAMERA_HEIGHT_M[0]) & (z_m <= CAMERA_HEIGHT_M[1])
-    is_candidate = space.is_clear & at_height
-    if not is_candidate.any():
-        return None
-    lower, upper = largest_box(is_candidate)
-    limits = [
-        (axis[first] - step_m_of(axis) / 4.0, axis[last] + step_m_of(axis) / 4.0)
-        for axis, first, last in zip(space.axes_m, lower, upper, strict=True)
-    ]
-    return np.round(np.array(limits, np.float64).T, 2)
+
+    def _least_empty(self, boxes_m: Array, covered: float) -> Suggestion | None:
+        """Ask that poses see as much of the mesh as is needed; None without a plan."""
+        best: Suggestion | None = None
+        for min_seen in MIN_SEEN:
+            scene = self.scene.model_copy(update={"min_seen": min_seen})
+            asking = replace(self, scene=scene)
+            plans = [asking.plan(boxes_m, split, count) for split, count in COUNTS.items()]
+            if any(plan is None for plan in plans):
+                break
+            poses = np.concatenate([plan.world_from_cam for plan in plans if plan is not None])
+            empty = self.emptiness(poses)
+            if best is None or empty.share < best.empty.share:
+                best = Suggestion(
+                    scene=with_boxes(scene, boxes_m),
+                    collection=self.collection,
+                    empty=empty,
+                    covered=covered,
+                    world_from_cam=poses,
+                )
+            if empty.is_little:
+                break
+        return best
+
+    def emptiness(self, world_from_cam: Array) -> Emptiness:
+        """Measure what of the images of poses (N, 4, 4) is empty."""
+        shares = empty_shares(self.caster, world_from_cam, CameraConfig())
+        return Emptiness(
+            share=round(float(shares.mean()), 6),
+            mostly_empty_frames=round(float(np.mean(shares > MOSTLY)), 6),
+        )
+
+    def plan(self, boxes_m: Array, split: Split, n_frames: int) -> PoseTable | None:
+        """Plan a split in boxes (B, 2, 3); None where no path is found."""
+        rng = generator_of(0, "plan", SCENE, split)
+        try:
+            return plan_split(
+                caster=self.caster,
+                boxes=boxes_m,
+                scene=self.scene,
+                collection=self.collection,
+                n_frames=n_frames,
+                rng=rng,
+                split=split,
+                clearance=self.clearance,
+            )
+        except InputError:
+            return None
+
+
+def with_boxes(scene: SceneConfig, boxes_m: Array) -> SceneConfig:
+    """Return a scene with sampling boxes (B, 2, 3)."""
+    first, *others = (Box(x=x, y=y, z=z) for x, y, z in boxes_m.swapaxes(1, 2).tolist())
+    return scene.model_copy(update={"sampling_box": first, "further_boxes": tuple(others)})
+
+
+def lit(mesh: TexturedMesh, suggestion: Suggestion, plain: float) -> Suggestion:
+    """Return a suggestion with the light that its frames need to show something.
+
+    A mesh of mostly plain colours gets ambient light, which belongs to the place, and the lamp at
+    the camera only where frames would still be of one colour.
+    """
+    shades: list[Shade | None] = ["ambient", "headlight"]
+    if plain <= MAX_PLAIN:
+        shades.insert(0, None)
+    tried = []
+    for shade in shades:
+        share = one_colour_share(mesh, suggestion.world_from_cam, shade)
+        tried.append(replace(suggestion, shade=shade, one_colour=share))
+        if share <= MAX_OF_ONE_COLOUR:
+            break
+    return min(tried, key=lambda each: each.one_colour)
+
+
+def one_colour_share(mesh: TexturedMesh, poses: Array, shade: Shade | None) -> float:
+    """Draw some of the frames of poses (N, 4, 4), small, and measure the share of one colour."""
+    shown = with_ambient_light(mesh) if shade == "ambient" else mesh
+    index = np.linspace(0, len(poses) - 1, min(N_LOOKED_AT, len(poses))).round().astype(int)
+    with open_renderer(shown, LOOK_CAMERA, RenderConfig(shade=shade)) as renderer:
+        return float(np.mean([is_of_one_colour(renderer.render(pose)) for pose in poses[index]]))

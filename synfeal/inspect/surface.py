@@ -84,6 +84,22 @@ def nearest_texels(texture: NDArray[np.uint8], uv: Array) -> NDArray[np.uint8]:
     return np.asarray(texture[row, column])
 
 
+def colour_of(part: MeshPart) -> str:
+    """Return what colours a part: ``texture``, ``vertices``, or ``plain`` for one colour."""
+    if part.texture is not None:
+        return "texture"
+    return "plain" if part.vertex_rgb is None else "vertices"
+
+
+def area_by_colour(mesh: TexturedMesh) -> dict[str, float]:
+    """Return the surface in square metres by what colours it."""
+    named = {"texture": "textured", "vertices": "coloured_by_vertex", "plain": "plain"}
+    area_m2 = dict.fromkeys(named.values(), 0.0)
+    for part in mesh.parts:
+        area_m2[named[colour_of(part)]] += float(triangle_areas_m2(part).sum())
+    return area_m2
+
+
 MAX_FACES = 60_000
 SIMPLIFY_ABOVE = 30_000  # the rest of the budget goes to splitting what large triangles remain
 NORMAL_M = 0.1  # how far apart two colours seem that face opposite ways, halved

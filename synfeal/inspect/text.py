@@ -56,9 +56,13 @@ def how_to_go_on(facts: Facts) -> str:
     collect = facts["collect"]
     if collect is None:
         return "\n".join([*lines, "No command is suggested: no box was found to plan paths in."])
-    empty = collect["empty_pixels"]["share"]
-    said = f"A first data set, planned once: {collect['frames']} frames, {empty:.1%} empty pixels"
-    return "\n".join([*lines, f"{said}:", "", collect["command"]])
+    frames, empty = collect["frames"], collect["empty_pixels"]["share"]
+    said = (
+        f"A first data set, planned once: {frames['train']} training and {frames['test']} test"
+        f" frames, {empty:.1%} empty pixels, {collect['of_one_colour']:.0%} of the frames of one"
+        " colour:"
+    )
+    return "\n".join([*lines, said, "", collect["command"]])
 
 
 def _aligned(label: str, value: str, width: int) -> list[str]:
@@ -71,11 +75,8 @@ def _aligned(label: str, value: str, width: int) -> list[str]:
 
 def snippet(facts: Facts) -> str:
     """A scene in YAML, ready to paste under ``scenes:``."""
-    mesh, box = facts["mesh"], facts["suggested_sampling_box"]
-    sampling_box = "# sampling_box: no suggestion; see the free space"
-    if box is not None:
-        inner = ", ".join(f"{axis}: [{low:z.2f}, {high:z.2f}]" for axis, (low, high) in box.items())
-        sampling_box = f"sampling_box: {{{inner}}}"
+    mesh = facts["mesh"]
+    suggested = "\n".join(f"    {line}" for line in _suggested_lines(facts))
     return f"""\
   {slug_of(facts["title"])}:
     source: mesh
@@ -83,7 +84,29 @@ def snippet(facts: Facts) -> str:
     sha256: {mesh["sha256"]}
     up_axis: {mesh["up_axis"]}
     unit_m: {mesh["unit_m"]:g}
-    {sampling_box}"""
+{suggested}"""
+
+
+def _suggested_lines(facts: Facts) -> list[str]:
+    """Lines of a scene in YAML that say where cameras go."""
+    collect, boxes = facts["collect"], facts["suggested_sampling_boxes"]
+    if collect is None:
+        return ["# sampling_box: no suggestion; see the free space"]
+    first, *others = (
+        "{"
+        + ", ".join(f"{axis}: [{low:z.2f}, {high:z.2f}]" for axis, (low, high) in box.items())
+        + "}"
+        for box in boxes
+    )
+    lines = [f"sampling_box: {first}"]
+    if others:
+        lines += ["further_boxes:", *(f"  - {box}" for box in others)]
+    for key in ("min_clearance_m", "min_seen"):
+        if collect[key]:
+            lines.append(f"{key}: {collect[key]:g}")
+    if collect["shade"]:
+        lines.append(f"# and, beside scenes: render: {{shade: {collect['shade']}}}")
+    return lines
 
 
 def _mesh_rows(facts: Facts) -> Rows:
@@ -142,15 +165,25 @@ def _topology_rows(topology: Facts) -> Rows:
 
 
 def _space_rows(facts: Facts) -> Rows:
-    space, box = facts["free_space"], facts["suggested_sampling_box"]
+    space, boxes = facts["free_space"], facts["suggested_sampling_boxes"]
     floor = "not found" if space["floor_m"] is None else f"z = {space['floor_m']:z.2f} m"
     return [
         ("share of the box", f"{space['share']:.1%} ({space['volume_m3']:.1f} m^3)"),
         ("enclosed, median", f"{space['enclosure']:.0%} over free points"),
         ("floor", floor),
-        ("suggested sampling box", "none" if box is None else _limits(box.items())),
+        *(
+            (f"suggested box {number}", _limits(box.items()))
+            for number, box in enumerate(boxes, start=1)
+        ),
+        ("in suggested boxes", _covered_text(facts["collect"])),
         ("definition", space["definition"]),
     ]
+
+
+def _covered_text(collect: Facts | None) -> str:
+    if collect is None:
+        return "none: no box was found to plan paths in"
+    return f"{collect['covered']:.0%} of the places for cameras"
 
 
 def _part_rows(parts: Sequence[Facts]) -> Rows:

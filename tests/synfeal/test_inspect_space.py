@@ -8,10 +8,22 @@ import pytest
 import trimesh
 
 from synfeal.errors import InputError
+from synfeal.inspect.boxes import (
+    UNWANTED_WEIGHT,
+    largest_box,
+    share_inside,
+    suggest_box,
+    suggest_boxes,
+)
 from synfeal.inspect.doubts import colour_doubts, doubts_of, floor_areas_m2
 from synfeal.inspect.facts import detail_of, texels_per_m
-from synfeal.inspect.freespace import FreeSpace, find_free_space, survey, viewpoint
-from synfeal.inspect.suggest import UNWANTED_WEIGHT, largest_box, suggest_box
+from synfeal.inspect.freespace import (
+    FreeSpace,
+    find_free_space,
+    find_free_spaces,
+    survey,
+    viewpoint,
+)
 from synfeal.inspect.surface import SurfacePoints, nearest_texels
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
@@ -81,11 +93,67 @@ def test_cameras_go_neither_into_a_cupboard_nor_around_low_furniture():
     np.testing.assert_allclose(box[:, :2], [[-2.7, -1.7], [2.7, 1.7]], atol=0.2)
 
 
+def two_rooms(door):
+    """Rooms of 4 x 4 and 3 x 4 m behind each other, with a doorway of 1 m between or without."""
+    walls = box_at((7.2, 4.0, 2.6), (0.0, 0.0, 1.3))
+    if not door:
+        return [walls, box_at((0.2, 4.0, 2.6), (0.5, 0.0, 1.3))]
+    sides = [box_at((0.2, 1.5, 2.6), (0.5, sign * 1.25, 1.3)) for sign in (-1, 1)]
+    return [walls, *sides]
+
+
+def storeys():
+    """Two floors of 6 x 4 m, the upper one at 2.8 m, and no stairs."""
+    rooms = [box_at((6.0, 4.0, 2.6), (0.0, 0.0, 1.3 + z)) for z in (0.0, 2.8)]
+    return [*rooms, box_at((2.0, 1.0, 0.7), (0.0, 0.0, 0.35))]
+
+
+def spaces_of(meshes):
+    mesh = trimesh.util.concatenate(meshes)
+    surface, _ = trimesh.sample.sample_surface(mesh, 60_000, seed=0)
+    caster = RayCaster(mesh.vertices, mesh.faces)
+    return find_free_spaces(caster, survey(caster, np.asarray(surface), np.asarray(mesh.bounds)))
+
+
+@pytest.mark.parametrize(
+    ("meshes", "n_spaces", "inside"),
+    [
+        (two_rooms(door=True), 1, [(-2.0, 0.0, 1.4), (2.0, 0.0, 1.4)]),
+        (two_rooms(door=False), 2, [(-2.0, 0.0, 1.4), (2.0, 0.0, 1.4)]),
+        (storeys(), 2, [(-2.0, 0.0, 1.4), (-2.0, 0.0, 4.2)]),
+    ],
+    ids=["a doorway", "a closed door", "two storeys"],
+)
+def test_boxes_hold_every_room(meshes, n_spaces, inside):
+    spaces = spaces_of(meshes)
+    assert len(spaces) == n_spaces
+    assert spaces[0].elsewhere < 0.05
+    boxes, points = suggest_boxes(spaces)
+    assert 2 <= len(boxes) <= 6
+    for place in np.array(inside):
+        assert ((place >= boxes[:, 0]) & (place <= boxes[:, 1])).all(axis=1).any()
+    assert share_inside(points, boxes) > 0.85
+    assert share_inside(points, boxes[:1]) < 0.7
+    sizes = np.prod(np.ptp(boxes, axis=1), axis=1)
+    assert sizes.argmax() == 0
+    caster = RayCaster(*trimesh_of(meshes))
+    for low, high in boxes:  # two thirds of a box or more are free
+        drawn = np.random.default_rng(0).uniform(low, high, (2000, 3))
+        assert (np.abs(caster.first_hit_m(drawn, np.eye(3)[[2] * 2000])) > 0.1).mean() > 2 / 3
+
+
+def trimesh_of(meshes):
+    whole = trimesh.util.concatenate(meshes)
+    return whole.vertices, whole.faces
+
+
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("shape", [(5, 4, 3), (2, 9, 1), (1, 12, 1)])
 def test_largest_box_against_trying_them_all(shape, seed):
-    wanted = np.random.default_rng(seed).random(shape) < 0.75
-    worth = np.where(wanted, 1.0, -UNWANTED_WEIGHT)
+    rng = np.random.default_rng(seed)
+    wanted = rng.random(shape) < 0.75
+    neutral = ~wanted & (rng.random(shape) < 0.3 * (seed % 2))
+    worth = np.where(wanted, 1.0, np.where(neutral, 0.0, -UNWANTED_WEIGHT))
 
     def worth_of(lower, upper):
         slices = tuple(slice(a, b + 1) for a, b in zip(lower, upper, strict=True))
@@ -95,7 +163,7 @@ def test_largest_box_against_trying_them_all(shape, seed):
     best = max(
         worth_of((a, c, e), (b, d, f)) for (a, b), (c, d), (e, f) in itertools.product(*limits)
     )
-    assert worth_of(*largest_box(wanted)) == best
+    assert worth_of(*largest_box(wanted, neutral)) == best
 
 
 UNIT_UV = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

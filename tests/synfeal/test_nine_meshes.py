@@ -1,4 +1,4 @@
-"""Meshes of different origin: inspect, the command it prints, validate; nobody helps."""
+"""Meshes of different origin: inspect, the command it prints, validate, evaluate; nobody helps."""
 
 import contextlib
 import json
@@ -23,6 +23,15 @@ from synfeal.mesh.save import save_glb
 from synfeal.planning.coverage import empty_shares
 from synfeal.planning.path import poses_of
 from synfeal.planning.space import pose_bounds, sample_poses
+from tests.support.bare_places import (
+    CELLA,
+    ROOMS,
+    SCANNED,
+    TEMPLE_FLOOR_M,
+    write_apartment,
+    write_scan,
+    write_temple,
+)
 from tests.support.mesh_conversions import write_coloured_ply, write_obj_scene
 from tests.support.small_room import SIDES, TWO, paint
 
@@ -36,14 +45,16 @@ class Varied:
 
     Attributes:
         path: the file.
-        inside_m: (2, 3) the room in the world, metres, z up: where people walk, a little off walls.
+        rooms_m: (R, 2, 3) its rooms in the world, metres, z up: where people walk, a little off
+            walls. Cameras must be in them, and in all of them but ``rooms_left_out``.
         unit_m, up_axis: what the command must find out.
     """
 
     path: Path
-    inside_m: NDArray[np.float64]
+    rooms_m: NDArray[np.float64]
     unit_m: float = 1.0
     up_axis: str = "auto"
+    rooms_left_out: int = 0
 
 
 PAINTS = [paint(np.random.default_rng(seed), (2.0, 8.0, 24.0)) for seed in range(5)]
@@ -137,7 +148,8 @@ def two_floors(folder):
     parts += block((0, 0, 2.5), (4.8, 5, 2.8)) + block((4.8, 0, 2.5), (6, 2, 2.8), 1)
     parts += block((4.8, 4.5, 2.5), (6, 5, 2.8), 2) + furniture(0.5, 0.5)
     save_glb(folder / "two_floors.glb", TexturedMesh(tuple(parts)))
-    return Varied(folder / "two_floors.glb", inside((0, 0, 0), (6, 5, 2.5)))
+    rooms = [inside((0, 0, 0), (6, 5, 2.5)), inside((0, 0, 2.8), (6, 3.5, 5.2))]
+    return Varied(folder / "two_floors.glb", np.concatenate(rooms))
 
 
 def outside(folder):
@@ -158,7 +170,24 @@ def outside(folder):
 def inside(low, high):
     """A room less 30 cm at its walls, at the heights of cameras in hands."""
     z = low[2] + np.array([0.8, 2.0])
-    return np.array([[low[0] + 0.3, low[1] + 0.3, z[0]], [high[0] - 0.3, high[1] - 0.3, z[1]]])
+    return np.array([[[low[0] + 0.3, low[1] + 0.3, z[0]], [high[0] - 0.3, high[1] - 0.3, z[1]]]])
+
+
+def plain_apartment(folder):
+    """Four rooms on a hall without any texture or light; the hall is narrow."""
+    rooms = [inside((x0, y0, 0.0), (x1, y1, 2.6)) for x0, x1, y0, y1 in ROOMS]
+    return Varied(write_apartment(folder), np.concatenate(rooms), rooms_left_out=1)
+
+
+def temple_without_its_texture(folder):
+    """The room behind its columns is what is enclosed."""
+    x0, x1, y0, y1 = CELLA
+    return Varied(write_temple(folder), inside((x0, y0, TEMPLE_FLOOR_M), (x1, y1, 4.6)))
+
+
+def scanned(folder):
+    """Vertex colours, holes, three quarters of a ceiling and a third of a wall missing."""
+    return Varied(write_scan(folder), inside(*SCANNED))
 
 
 MESHES = {
@@ -168,11 +197,17 @@ MESHES = {
     "nested": nested,
     "two_floors": two_floors,
     "outside": outside,
+    "plain_apartment": plain_apartment,
+    "temple": temple_without_its_texture,
+    "scan": scanned,
 }
 
 
 # What is said last counts: the printed command with fewer, smaller frames, farther apart.
-SMALLER = ["--frames", "40", "--spacing", "0.25", "--width", "96", "--height", "72"]
+SMALLER = [
+    *("--frames", "40", "--test-frames", "16", "--spacing", "0.25"),
+    *("--width", "96", "--height", "72"),
+]
 
 
 def explained_by_holes(mesh, n_paths):
@@ -181,8 +216,9 @@ def explained_by_holes(mesh, n_paths):
     With three standard errors of a set of that many paths, the frames of each being alike.
     """
     loaded = load_mesh(mesh.path, mesh.up_axis, mesh.unit_m)
-    bounds = pose_bounds(mesh.inside_m, Angles())
-    poses = poses_of(sample_poses(bounds, 1000, np.random.default_rng(0)))
+    rng, count = np.random.default_rng(0), 1000 // len(mesh.rooms_m)
+    vectors = [sample_poses(pose_bounds(room_m, Angles()), count, rng) for room_m in mesh.rooms_m]
+    poses = poses_of(np.concatenate(vectors))
     shares = empty_shares(RayCaster(*loaded.merged()), poses, CameraConfig())
     return float(shares.mean() + 3.0 * shares.std() / np.sqrt(n_paths))
 
@@ -197,9 +233,15 @@ def test_from_a_mesh_to_a_data_set_without_help(make, tmp_path, capsys):
         assert main([*command[1:], *SMALLER]) == 0
         out = tmp_path / command[command.index("--out") + 1]
         assert main(["validate", str(out)]) == 0
+        capsys.readouterr()
+        assert main(["evaluate", str(out), str(out / "test.csv")]) == 0
+    assert "16 frames" in capsys.readouterr().out
+    assert len(set(read_pose_table(out / "test.csv").path.tolist())) >= 8
     table = read_pose_table(out / "train.csv")
     positions = table.position_m
-    assert (positions > mesh.inside_m[0] - 0.15).all()
-    assert (positions < mesh.inside_m[1] + 0.15).all()
+    low, high = np.moveaxis(mesh.rooms_m, 1, 0)[:, :, None]
+    is_in = ((positions > low - 0.15) & (positions < high + 0.15)).all(axis=2)  # (R, N)
+    assert is_in.any(axis=0).all()
+    assert np.sum(~is_in.any(axis=1)) <= mesh.rooms_left_out
     empty = json.loads((out / "coverage.json").read_text())["train"]["empty_pixels"]["share"]
     assert empty <= explained_by_holes(mesh, int(table.path[-1]) + 1)
