@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Self
+from typing import IO, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.errors import InputError, why
 from synfeal.records.files import atomic_path
+
+# np.savez writes the second for headers beyond 64 KB only.
+HEADERS = {
+    (1, 0): np.lib.format.read_array_header_1_0,
+    (2, 0): np.lib.format.read_array_header_2_0,
+}
 
 Vectors = NDArray[np.float32]
 Described = dict[str, tuple[Vectors, Vectors]]
@@ -32,12 +39,33 @@ def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
     """
     try:
         # A file that it opens itself, np.load leaves open where it is damaged.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            return {name: stored[name] for name in names}
+        with path.open("rb") as file:
+            _check_claims(file)
+            with np.load(file, allow_pickle=False) as stored:
+                return {name: stored[name] for name in names}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(
             f"{path}: cannot be read as arrays ({why(error)}); make it again"
         ) from error
+
+
+def _check_claims(file: IO[bytes]) -> None:
+    """Check that members are as large as the file says, and their arrays no larger.
+
+    Raises:
+        ValueError: One claims more, for which NumPy would take the memory first.
+    """
+    with zipfile.ZipFile(file) as members:
+        for info in members.infolist():
+            if info.file_size != info.compress_size:
+                raise ValueError(f"{info.filename} is compressed")
+            with members.open(info) as member:
+                version = np.lib.format.read_magic(member)
+                read_header = HEADERS[version]
+                shape, _, dtype = read_header(member)
+                if math.prod(shape) * dtype.itemsize > info.file_size:
+                    raise ValueError(f"{info.filename} claims an array of {shape}")
+    file.seek(0)
 
 
 class Stored:

@@ -25,7 +25,7 @@ from baselines.training.typicality import OUTSIDE, features_of, typicality
 from baselines.training.virtual_views import VirtualViews
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.photograph import PhotographCamera, Source
-from synfeal.dataset.frame_files import IMAGE_DAMAGE
+from synfeal.dataset.frame_files import IMAGE_DAMAGE, opened_image
 from synfeal.dataset.packed import View, fit_frame
 from synfeal.dataset.pose_table import COLUMNS, SEEN
 from synfeal.dataset.render_sequence import Progress
@@ -40,6 +40,7 @@ World = Literal["sequence", "mesh"]
 LEAST_MARGIN_M = 0.5
 # Pairs of virtual rotations: twice as many change errors by less than their seeds do.
 DEFAULT_TURNS = 8
+MOST_PIXELS = 2**27  # of a photograph: beyond what any camera takes
 
 log = logging.getLogger(__name__)
 
@@ -329,7 +330,7 @@ def open_picture(path: Path) -> Image.Image:
         InputError: The file is damaged, or is no picture of eight bits per channel.
     """
     try:
-        with Image.open(path, formats=("PNG", "JPEG")) as image:
+        with opened_image(path.read_bytes(), ("PNG", "JPEG"), MOST_PIXELS) as image:
             if image.mode not in MODES:
                 problem = f"holds pixels of mode {image.mode}, such as depth, not 8-bit colours"
             elif max(image.size) > MAX_ASPECT * min(image.size):

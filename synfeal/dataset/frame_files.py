@@ -17,6 +17,7 @@ from __future__ import annotations
 import io
 import os
 import struct
+import warnings
 import zipfile
 import zlib
 from collections import Counter
@@ -37,6 +38,7 @@ from synfeal.records.files import atomic_path
 SUFFIX = ".zip"
 MOST_OPEN = 16  # archives; each holds a file descriptor
 MOST_BYTES = 2**28  # of a member; no frame is that large, but a damaged archive may say so
+MOST_PIXELS = 8192**2  # of a frame, as of a camera
 # The earliest time the format knows: archives of the same frames are the same bytes.
 EPOCH = (1980, 1, 1, 0, 0, 0)
 UNIX, PLAIN_FILE = 3, 0o100644
@@ -221,11 +223,26 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
+@contextmanager
+def opened_image(
+    content: bytes, formats: tuple[str, ...] | None = None, most_pixels: int = MOST_PIXELS
+) -> Iterator[Image.Image]:
+    """An image that is not decoded yet.
+
+    Raises:
+        ValueError: It claims more pixels than a frame may have; memory for them is not taken.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our bound is lower
+        image = Image.open(io.BytesIO(content), formats=formats)
+    with image:
+        if image.width * image.height > most_pixels:
+            raise ValueError(f"{image.width} x {image.height} pixels are too many; make it smaller")
+        yield image
+
+
 def read_image(path: FrameFile, mode: str | None = None) -> Image.Image:
     """A decoded image, converted to ``mode`` if one is given."""
-    with (
-        read_as(path, "an image", *IMAGE_DAMAGE),
-        Image.open(io.BytesIO(path.read_bytes())) as image,
-    ):
+    with read_as(path, "an image", *IMAGE_DAMAGE), opened_image(path.read_bytes()) as image:
         image.load()
         return image.convert(mode) if mode else image.copy()

@@ -33,6 +33,7 @@ from synfeal.dataset.frame_files import (
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import interpolate, pose_from_quat
+from synfeal.records.files import lies_in
 
 COLOR_SUFFIXES = ("png", "jpg", "jpeg")
 FRAME = re.compile(r"frame-(\d+)\.(color\.(?:png|jpg|jpeg)|depth\.png|pose\.txt)")
@@ -300,6 +301,11 @@ def _read_list(path: Path, name: str) -> tuple[Array, list[Path]]:
         with read_as(f"{path / name}: line {number}", "a time stamp and a file"):
             stamp, file = row  # ValueError where there are not two
             stamps.append(float(stamp))
+        if not lies_in(path / file, path):
+            raise InputError(
+                f"{path / name}: line {number} names '{file}', which leads out of the sequence's"
+                " folder and is not read; copy it there"
+            )
         files.append(path / file)
     if not files:
         raise InputError(f"{path / name}: lists no images")

@@ -122,7 +122,8 @@ def write_cell_depth(path: Path, depth_m: Array) -> None:
 def read_cell_depth(path: Path, n_frames: int) -> Array:
     """Depths (n_frames, 48) of the first frames of a file of as many or more; ``inf`` for none."""
     with read_as(path, "depths", OSError, ValueError, EOFError, remedy="; make it again"):
-        depth_mm = np.load(path, allow_pickle=False)
+        # A map is refused where the header claims more than the file holds; an array is not.
+        depth_mm = np.load(path, mmap_mode="r", allow_pickle=False)
     if depth_mm.dtype != np.uint16 or depth_mm.shape[1:] != (CELLS[0] * CELLS[1],):
         raise InputError(f"{path}: does not hold depths of {CELLS[0]} x {CELLS[1]} cells")
     if len(depth_mm) < n_frames:

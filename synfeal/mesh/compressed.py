@@ -11,6 +11,7 @@ from __future__ import annotations
 import base64
 import copy
 import io
+import struct
 from collections.abc import Callable
 from functools import partial
 from importlib.util import find_spec
@@ -32,6 +33,7 @@ from synfeal.mesh.gltf import (
     primitives_of,
     stand_alone,
 )
+from synfeal.mesh.materials import MAX_PIXELS
 
 LIBRARIES = dict.fromkeys(MESHOPT, "meshoptimizer")
 LIBRARIES |= {DRACO: "DracoPy", BASISU: "opengl_basisu"}
@@ -40,7 +42,11 @@ DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", UINT32: "<u4", FLO
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 INDICES = {"TRIANGLES": "buffer", "INDICES": "sequence"}  # meshoptimizer's names
 FILTERS = {"OCTAHEDRAL": "oct", "QUATERNION": "quat", "EXPONENTIAL": "exp"}
-MOST_BYTES = 2**33  # of one decoded view: what says it holds more is damaged
+# Of a decoded view for each byte of its data: meshoptimizer stores a block of 256 vertices, 4 bytes
+# each, in no less than one.
+MOST_GAIN = 1024
+
+KTX2_SIDES = 20  # where width and height stand in its header
 
 Values = NDArray[Any]
 
@@ -197,8 +203,8 @@ def decode_meshopt(data: bytes, stored: Json) -> bytes:
     import meshoptimizer as meshopt
 
     count, stride, mode = stored["count"], stored["byteStride"], stored["mode"]
-    if not 0 <= count * stride <= MOST_BYTES:
-        raise ValueError(f"a view of {count} x {stride} bytes")
+    if not 0 <= count * stride <= MOST_GAIN * (len(data) + 1):
+        raise ValueError(f"{len(data)} bytes claim to hold {count} x {stride}")
     if mode != "ATTRIBUTES":
         decode = getattr(meshopt, f"decode_index_{INDICES[mode]}")
         index = np.asarray(decode(count, 4, data))  # of two bytes it would put two into one number
@@ -221,6 +227,9 @@ def png_of_ktx2(content: bytes) -> bytes:
     """A KTX2 texture of Basis Universal (ETC1S or UASTC) as PNG, its largest level."""
     import opengl_basisu
 
+    width, height = struct.unpack_from("<II", content, KTX2_SIDES)
+    if width * height > MAX_PIXELS:
+        raise ValueError(f"a texture of {width} x {height} pixels is too large to be read")
     texture = opengl_basisu.open(content)
     rgba = np.asarray(texture.transcode(opengl_basisu.Target.RGBA8).data)
     pixels = rgba if texture.has_alpha else np.ascontiguousarray(rgba[..., :3])

@@ -6,26 +6,24 @@ import io
 import json
 import logging
 from dataclasses import replace
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any, Literal
-from urllib.parse import unquote
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
-from PIL import Image
-from trimesh.resolvers import FilePathResolver
 
 from synfeal.errors import InputError, why
 from synfeal.mesh import checks
+from synfeal.mesh.claims import check_accessors, check_instances, check_ply
 from synfeal.mesh.compressed import decoded
-from synfeal.mesh.gltf import BIN_URI, DECODED_URI, Gltf, base_color_file, read_gltf, simplified
+from synfeal.mesh.gltf import Gltf, read_gltf, simplified
 from synfeal.mesh.materials import BaseMaterial, MaterialReader, large_images_allowed
 from synfeal.mesh.model import Findings, MeshPart, TexturedMesh
+from synfeal.mesh.references import ReferenceResolver, report_missing
 
 UpAxis = Literal["auto", "y", "z"]
 GLTF_SUFFIXES = (".glb", ".gltf")
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tga", ".tif", ".tiff")
 
 # Rotates y-up files: their y becomes the world's z, their z points towards the viewer (-y).
 WORLD_FROM_Y_UP: NDArray[np.float64] = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
@@ -43,11 +41,13 @@ def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> Text
 
     Raises:
         InputError: the file is missing, empty, of an unknown kind, unreadable, without faces, with
-            coordinates that are not finite, or stored in a way that is not read, such as
-            Draco.
+            coordinates that are not finite, stored in a way that is not read, such as Draco,
+            claims more than it holds, or refers to a file outside of its folder.
     """
     path = Path(path)
     checks.refuse_file(path)
+    if path.suffix.lower() == ".ply":
+        check_ply(path)
     findings = Findings(path)
     gltf = read_gltf(path) if path.suffix.lower() in GLTF_SUFFIXES else None
     try:
@@ -72,15 +72,18 @@ def _read_parts(
 ) -> tuple[MeshPart, ...]:
     """All parts that can be seen, in the order of the file's geometry, then of its nodes."""
     if gltf is not None:
-        gltf = decoded(gltf, RecordingResolver(path).get)
+        gltf = decoded(gltf, ReferenceResolver(path).get)
         checks.refuse_extensions(path, gltf.header)
-    materials = MaterialReader(None if gltf is None else gltf.header, findings)
+        check_accessors(path, gltf.header)
+    materials = MaterialReader(None if gltf is None else gltf.header, findings, path)
     with large_images_allowed():
         scene = _read_scene(path, gltf, findings)
         order = {name: index for index, name in enumerate(scene.geometry)}
         nodes = sorted(
             scene.graph.nodes_geometry, key=lambda node: (order[scene.graph[node][1]], node)
         )
+        drawn = [scene.geometry[scene.graph[node][1]] for node in nodes]
+        check_instances(path, sum(len(getattr(geometry, "faces", ())) for geometry in drawn))
         parts = []
         for node in nodes:
             file_from_part, name = scene.graph[node]
@@ -100,7 +103,7 @@ def _read_parts(
 
 def _read_scene(path: Path, gltf: Gltf | None, findings: Findings) -> Any:
     """The file as a trimesh scene, without merging or reordering vertices."""
-    resolver = RecordingResolver(path, gltf)
+    resolver = ReferenceResolver(path, gltf)
     # It prints tracebacks of what the findings name.
     logging.getLogger("trimesh").setLevel(logging.ERROR)
     try:
@@ -110,6 +113,7 @@ def _read_scene(path: Path, gltf: Gltf | None, findings: Findings) -> Any:
         kind = None if gltf is None else "gltf"
         return trimesh.load_scene(source, kind, resolver=resolver, process=False)
     finally:
+        resolver.raise_refusal()
         report_missing(resolver.missing, findings, gltf)
         for name in dict.fromkeys(resolver.unreadable):
             findings.warn(f"'{name}' cannot be read as an image; base colours are used instead")
@@ -154,75 +158,3 @@ def _with_material(part: MeshPart, uv: Any, material: BaseMaterial, findings: Fi
         return part
     coordinates = material.transformed(np.asarray(uv, dtype=np.float64)[:, :2])
     return replace(part, uv=coordinates, texture=material.texture)
-
-
-class RecordingResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is untyped
-    """Reads the files a mesh refers to and remembers those that cannot be read.
-
-    trimesh passes over missing textures silently; a grey scene should not surprise its user.
-    """
-
-    def __init__(self, source: Path, gltf: Gltf | None = None) -> None:
-        super().__init__(str(source), allow_anywhere=True)  # a user's own file, often ../textures
-        self.missing: list[str] = []
-        self.unreadable: list[str] = []
-        self._held = {} if gltf is None else {BIN_URI: gltf.binary, DECODED_URI: gltf.decoded}
-
-    def get(self, name: str) -> bytes:
-        """Bytes of a file the mesh refers to.
-
-        Raises:
-            FileNotFoundError: it is nowhere it could be meant to be.
-        """
-        if name in self._held:
-            return self._held[name]
-        for candidate in _spellings(str(name)):
-            path = Path(self.parent) / candidate
-            if path.is_file():
-                return self._checked(str(name), path.read_bytes())
-        self.missing.append(str(name))
-        raise FileNotFoundError(f"'{name}' is missing")
-
-    def _checked(self, name: str, content: bytes) -> bytes:
-        """The content, its name remembered if it should be an image and is none."""
-        if PurePosixPath(name).suffix.lower() in IMAGE_SUFFIXES:
-            try:
-                Image.open(io.BytesIO(content)).close()
-            except (OSError, SyntaxError, ValueError):
-                self.unreadable.append(name)
-        return content
-
-
-def _spellings(name: str) -> dict[str, None]:
-    """Paths a reference can mean: as written, percent-encoded, from Windows, without its folder.
-
-    Exporters write the absolute path of the artist's disk; the file then lies beside the mesh. An
-    MTL may put options before the name.
-    """
-    plain = name.split()[-1] if name.lstrip().startswith("-") else name.strip().strip('"')
-    slashes = unquote(plain).replace("\\", "/")
-    return dict.fromkeys([name, plain, unquote(plain), slashes, PurePosixPath(slashes).name])
-
-
-def report_missing(missing: list[str], findings: Findings, gltf: Gltf | None) -> None:
-    """A warning per missing file, and one finding for those that no unlit render needs."""
-    users: dict[str | None, list[str]] = {}
-    header = {} if gltf is None else gltf.header
-    for material in header.get("materials", []):
-        file = base_color_file(header, material)
-        users.setdefault(file, []).append(f"'{material.get('name', 'unnamed')}'")
-    unused = []
-    for name in dict.fromkeys(missing):
-        if gltf is None:
-            findings.warn(f"'{name}' is missing; base colours are used instead")
-        elif name in users:
-            findings.warn(
-                f"texture '{name}' of material {', '.join(users[name])} is missing; its base colour"
-                " is used"
-            )
-        else:
-            unused.append(f"'{name}'")
-    if unused:
-        findings.note(
-            f"{len(unused)} missing textures hold no colour and are not needed: {', '.join(unused)}"
-        )

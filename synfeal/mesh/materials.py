@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from PIL import Image
 from trimesh.visual.color import linear_to_srgb, srgb_to_linear, to_float
 
 from synfeal.errors import why
+from synfeal.mesh.claims import check_textures
 from synfeal.mesh.gltf import Json, base_color
 from synfeal.mesh.model import WHITE, Findings
 
@@ -29,7 +31,7 @@ BLEND_CUTOFF = 0.5
 GLTF_DEFAULT_CUTOFF = 0.5
 SRGB_ATTRIBUTE = "_SRGB"  # beside glTF's linear colours: the display colours, exact in 8 bits
 MAX_SIDE_PX = 16_384  # GL_MAX_TEXTURE_SIZE of Mesa's software renderer and of most GPUs
-MAX_PIXELS = 2**30  # 3 GB when decoded: what is larger is not decoded at all
+MAX_PIXELS = 2**28  # a square of that side, 1 GB when decoded: what is larger is not decoded
 
 
 @dataclass(frozen=True)
@@ -56,10 +58,12 @@ class BaseMaterial:
 class MaterialReader:
     """Reduces the materials of one file, each once, however many parts share it."""
 
-    def __init__(self, header: Json | None, findings: Findings) -> None:
+    def __init__(self, header: Json | None, findings: Findings, path: Path) -> None:
         """Take the JSON of a glTF, whose colours and factors are linear, or None."""
         self._header = header
         self._findings = findings
+        self._path = path
+        self._n_pixels = 0
         self._known: dict[int, BaseMaterial] = {}
 
     def read(self, material: Any) -> BaseMaterial:
@@ -88,7 +92,7 @@ class MaterialReader:
         described = dict(enumerate((self._header or {}).get("materials", []))).get(index, {})
         owner = f"material '{described.get('name', 'unnamed')}'"
         colour = base_color(described)
-        texture = decode(material.baseColorTexture, owner, self._findings)
+        texture = self._decoded(material.baseColorTexture, owner)
         base = srgb_from_linear(colour.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0]))
         mode = described.get("alphaMode", "OPAQUE")
         cutoff = BLEND_CUTOFF if mode == "BLEND" else None
@@ -106,7 +110,7 @@ class MaterialReader:
     def _from_mtl(self, material: Any) -> BaseMaterial:
         """An MTL or PLY material: alpha counts where ``map_d`` or ``d`` say so."""
         owner = f"material '{material.name or 'unnamed'}'"
-        texture = decode(material.image, owner, self._findings)
+        texture = self._decoded(material.image, owner)
         # MTL writes Kd next to map_Kd without meaning the product; many exporters leave Kd at 0.
         base = np.array(material.diffuse, np.uint8) if material.image is None else WHITE.copy()
         extra = {key.lower(): value for key, value in material.kwargs.items()}
@@ -116,6 +120,13 @@ class MaterialReader:
             return BaseMaterial(None if texture is None else texture[..., :3], base)
         self._note_cutoff(owner, True, BLEND_CUTOFF)
         return BaseMaterial(texture, base, BLEND_CUTOFF)
+
+    def _decoded(self, image: Image.Image | None, owner: str) -> Pixels | None:
+        """The texture, if it fits into memory beside those before it."""
+        if image is not None and image.width * image.height <= MAX_PIXELS:
+            self._n_pixels += image.width * image.height
+            check_textures(self._path, self._n_pixels)
+        return decode(image, owner, self._findings)
 
     def _note_cutoff(self, owner: str, is_blended: bool, cutoff: float) -> None:
         kind = "blended transparency becomes an alpha test" if is_blended else "alpha-tested"
@@ -230,4 +241,5 @@ def to_rgb(image: Image.Image) -> Pixels:
         grey = np.clip(np.round(np.asarray(image, dtype=np.float64) * scale), 0, 255)
         return np.repeat(grey.astype(np.uint8)[..., None], 3, axis=2)
     has_alpha = image.mode in ("LA", "PA", "La", "RGBA", "RGBa") or "transparency" in image.info
-    return np.asarray(image.convert("RGBA" if has_alpha else "RGB"))
+    mode = "RGBA" if has_alpha else "RGB"
+    return np.asarray(image if image.mode == mode else image.convert(mode))

@@ -106,6 +106,11 @@ def file_sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+def lies_in(path: Path, folder: Path) -> bool:
+    """Check whether a path leads to a place in a folder, links followed."""
+    return path.resolve().is_relative_to(folder.resolve())
+
+
 def refuse_existing(path: Path) -> None:
     """Refuse to write where there is something already."""
     if path.is_symlink() and not path.exists():

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from synfeal.dataset.frame_files import IMAGE_DAMAGE, SUFFIX, FrameFile, sequence_at
+from synfeal.dataset.frame_files import IMAGE_DAMAGE, SUFFIX, FrameFile, opened_image, sequence_at
 from synfeal.dataset.sequence_listing import (
     COLOR,
     DEPTH,
@@ -112,7 +112,7 @@ def _decoded(path: FrameFile) -> Image.Image:
     """A PNG with every checksum verified and every row decoded."""
     try:
         content = path.read_bytes()
-        with Image.open(io.BytesIO(content), formats=["PNG"]) as image:
+        with opened_image(content, ("PNG",)) as image:
             image.verify()
         decoded = Image.open(io.BytesIO(content), formats=["PNG"])
         decoded.load()

@@ -1,0 +1,103 @@
+"""Sizes that a mesh file states of itself, checked before memory is taken for them.
+
+A few bytes of a header can ask for gigabytes: values that are stored nowhere, parts drawn a
+thousand times, textures of one colour and enormous size.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from synfeal.errors import InputError
+from synfeal.mesh.gltf import Json, listed
+
+ITEM_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # by componentType
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+# Values that glTF takes as 0 because nothing is stored: bases of morph targets, little else.
+MOST_UNSTORED_BYTES = 2**28
+MOST_FACES = 10**8  # of all instances together; they take 5 GB
+
+
+def check_accessors(path: Path, header: Json) -> None:
+    """Check that the values of a glTF are stored, but for a few.
+
+    Args:
+        path: The file, for the message.
+        header: Its JSON, with everything decoded.
+
+    Raises:
+        InputError: It claims more values than it holds.
+    """
+    unstored = 0
+    for index, accessor in enumerate(listed(header, "accessors")):
+        count = accessor["count"]
+        row = ITEM_BYTES[accessor["componentType"]] * WIDTHS[accessor["type"]]
+        if "bufferView" not in accessor:
+            unstored += abs(count) * row
+            continue
+        view = header["bufferViews"][accessor["bufferView"]]
+        stride = view.get("byteStride", row)
+        reach = accessor.get("byteOffset", 0) + (count - 1) * stride + row
+        if not (count >= 0 and stride >= row and reach <= view["byteLength"]):
+            raise InputError(
+                f"{path}: accessor {index} claims {count} values, more than its buffer"
+                " view holds; export it again"
+            )
+    if unstored > MOST_UNSTORED_BYTES:
+        raise InputError(
+            f"{path}: claims {unstored / 1e9:.1f} GB of values that it does not store; export it"
+            " again without morph targets"
+        )
+
+
+def check_ply(path: Path) -> None:
+    """Check that a PLY of text has as many rows as its header says.
+
+    Those of a binary one are counted by the parser.
+
+    Raises:
+        InputError: It is cut short.
+    """
+    claimed, is_text = 0, False
+    with path.open("rb") as file:
+        for line in file:
+            words = line.split()
+            if words[:1] == [b"end_header"]:
+                break
+            is_text |= words[:2] == [b"format", b"ascii"]
+            if words[:1] == [b"element"] and len(words) == 3 and words[2].isdigit():
+                claimed += int(words[2])
+        held = sum(not line.isspace() for line in file) if is_text else claimed
+    if held < claimed:
+        raise InputError(
+            f"{path}: ends after {held} of {claimed} rows of vertices and faces; download or export"
+            " it again"
+        )
+
+
+def check_instances(path: Path, n_faces: int) -> None:
+    """Check that all parts of a file together have a number of faces that memory can hold.
+
+    Raises:
+        InputError: They have more.
+    """
+    if n_faces > MOST_FACES:
+        raise InputError(
+            f"{path}: draws {n_faces} faces, its instances counted; at most {MOST_FACES} are read."
+            " Simplify it, or export fewer copies"
+        )
+
+
+def check_textures(path: Path, n_pixels: int) -> None:
+    """Check that the decoded textures of a file fit the memory of this machine.
+
+    Raises:
+        InputError: They do not.
+    """
+    needed, there = 4 * n_pixels, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if needed > there:
+        raise InputError(
+            f"{path}: its textures take {needed / 1e9:.1f} GB when decoded, this machine has"
+            f" {there / 1e9:.1f} GB; make them smaller"
+        )
