@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from synfeal.collection.run import CollectJob, with_backend
 from synfeal.collection.run import collect as run_collection
@@ -21,9 +21,11 @@ from synfeal.config.dataset import CameraConfig, DatasetConfig
 from synfeal.config.options import SCENE, dataset_config, options_named, render_configs
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.posed_sequence import refuse_non_rigid
 from synfeal.dataset.sequence_listing import COLOR, DEPTH, RIGHT_COLOR, RIGHT_DEPTH
 from synfeal.dataset.split_frames import SplitFrames, read_split_frames
-from synfeal.geometry.poses import moved_right
+from synfeal.errors import InputError, read_as
+from synfeal.geometry.poses import FARTHEST_M, moved_right
 from synfeal.mesh import load
 from synfeal.mesh.ambient import with_ambient_light
 from synfeal.mesh.model import TexturedMesh
@@ -69,8 +71,12 @@ class Renderer:
         self.camera: CameraConfig = camera
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
-        """Return colours (H, W, 3), uint8, seen from a camera pose (4, 4)."""
-        return self._opened.render(world_from_cam)
+        """Return colours (H, W, 3), uint8, seen from a camera pose (4, 4).
+
+        Raises:
+            InputError: It is no rotation and position.
+        """
+        return self._opened.render(_rigid(world_from_cam))
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
         """Render colours and depth from a camera pose (4, 4).
@@ -78,14 +84,29 @@ class Renderer:
         Returns:
             Colours (H, W, 3), uint8, and depth (H, W) in metres along the optical axis (along the
             ray with ``projection``), infinite where no surface is seen.
+
+        Raises:
+            InputError: It is no rotation and position.
         """
-        return self._opened.render_rgbd(world_from_cam)
+        return self._opened.render_rgbd(_rigid(world_from_cam))
 
     def __enter__(self) -> Renderer:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._opened.close()
+
+
+def _rigid(world_from_cam: ArrayLike) -> NDArray[np.float64]:
+    """The pose (4, 4) of a camera, checked."""
+    with read_as("world_from_cam", "a pose", ValueError, TypeError):
+        pose = np.asarray(world_from_cam, np.float64)
+    if pose.shape != (4, 4):
+        raise InputError(f"world_from_cam: must be of shape (4, 4), found {pose.shape}")
+    if not (np.abs(pose) <= FARTHEST_M).all():  # of NaN as well
+        raise InputError("world_from_cam: must hold finite numbers, its position in metres")
+    refuse_non_rigid(pose, "world_from_cam")
+    return pose
 
 
 def plan(mesh: AnyPath, frames: int, **options: Any) -> PoseTable:

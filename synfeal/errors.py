@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 import sys
-from collections.abc import Callable, Iterator
+import threading
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from types import FrameType
+from typing import Any
 
 LONGEST = 900  # characters of a message
 
@@ -40,10 +45,13 @@ def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
 
     That is an :class:`InputError`, too little memory, and what the system refuses: a full or
     read-only disk, a name that is too long, links that lead in a circle. Ctrl-C is 130, with what
-    it leaves behind: ``if_interrupted``, unless the ``KeyboardInterrupt`` says it itself.
+    it leaves behind: ``if_interrupted``, unless the ``KeyboardInterrupt`` says it itself. SIGTERM
+    is taken as Ctrl-C, and is 143.
     """
+    ended: list[int] = []
     try:
-        action()
+        with _terminated_as_interrupted(ended):
+            action()
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
@@ -60,9 +68,36 @@ def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
         print(f"error: {line}", file=sys.stderr)
         return 1
     except KeyboardInterrupt as interrupt:
-        print(f"error: interrupted; {str(interrupt) or if_interrupted}", file=sys.stderr)
-        return 130
+        what, status = ("terminated", 143) if ended else ("interrupted", 130)
+        print(f"error: {what}; {str(interrupt) or if_interrupted}", file=sys.stderr)
+        return status
     return 0
+
+
+@contextmanager
+def _terminated_as_interrupted(ended: list[int]) -> Iterator[None]:
+    """Raise ``KeyboardInterrupt`` on SIGTERM, so that what is unfinished is removed.
+
+    Args:
+        ended: Takes the signal that came.
+    """
+    is_ours = threading.current_thread() is threading.main_thread()
+    if not is_ours or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield  # handlers can be set from the main thread only; that of a caller stays
+        return
+    process = os.getpid()
+
+    def end(number: int, _: FrameType | None) -> None:
+        if os.getpid() != process:  # a forked child, which has nothing to say
+            os._exit(128 + number)
+        ended.append(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 @contextmanager
@@ -83,6 +118,51 @@ def read_as(path: object, what: str, *damage: type[Exception], remedy: str = "")
         yield
     except kinds as error:
         raise InputError(f"{path}: cannot be read as {what} ({why(error)}){remedy}") from error
+
+
+# What Pydantic says of a value, by its name for the error.
+WORDINGS = {
+    "greater_than": "must be above {gt}",
+    "greater_than_equal": "must be {ge} or more",
+    "less_than": "must be below {lt}",
+    "less_than_equal": "must be {le} or less",
+    **dict.fromkeys(
+        ("int_type", "int_parsing", "int_from_float", "int_parsing_size"), "must be a whole number"
+    ),
+    **dict.fromkeys(("float_type", "float_parsing"), "must be a number"),
+    "finite_number": "must be a finite number",
+    **dict.fromkeys(("bool_type", "bool_parsing"), "must be true or false"),
+    **dict.fromkeys(("string_type", "string_sub_type"), "must be text"),
+    "string_pattern_mismatch": "must match {pattern}",
+    "string_too_long": "must have at most {max_length} characters",
+    "string_too_short": "must have at least {min_length} characters",
+    "literal_error": "must be {expected}",
+    **dict.fromkeys(("list_type", "tuple_type"), "must be a list"),
+    "too_short": "must hold at least {min_length} values",
+    "too_long": "must hold at most {max_length} values",
+    **dict.fromkeys(
+        ("dict_type", "mapping_type", "model_type", "model_attributes_type"),
+        "must hold a mapping of keys",
+    ),
+    "path_type": "must be a path",
+    "none_required": "must be left out",
+    "invalid_key": "keys must be text",
+}
+
+
+def wording(problem: Mapping[str, Any]) -> str:
+    """Say what Pydantic found wrong with a value in the words of this project.
+
+    Args:
+        problem: An entry of ``ValidationError.errors()``.
+    """
+    context = {
+        name: f"{value:g}" if isinstance(value, float) else value
+        for name, value in problem.get("ctx", {}).items()
+    }
+    own = WORDINGS.get(problem["type"])
+    said: str = problem["msg"] if own is None else own.format_map(context)
+    return said.removeprefix("Value error, ")
 
 
 def why(error: BaseException) -> str:
@@ -109,7 +189,7 @@ def why(error: BaseException) -> str:
     if hasattr(error, "errors"):  # of pydantic
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
-        said = f"{key}: {first['msg']}" if key else first["msg"]
+        said = f"{key}: {wording(first)}" if key else wording(first)
     said = OBJECT.sub("", str(said).strip().partition("\n")[0])
     said = TOKEN.sub(r"\1", NO_NUMBER.sub(r"\2 is no number", said))
     if said.startswith("but "):  # the second half of a sentence of YAML's

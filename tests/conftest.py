@@ -7,7 +7,10 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from synfeal.records import progress
+
 # No test is about time, and the machine may be busy.
+progress.EVERY_S = float("inf")
 settings.register_profile("calm", deadline=None)
 settings.load_profile("calm")
 

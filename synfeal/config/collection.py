@@ -62,9 +62,9 @@ class Strict(BaseModel):
             parts = list(value.values())
         for part in parts:
             if isinstance(part, bool) and annotation is not bool:
-                raise PydanticCustomError("no_number", "Input should not be true or false")
+                raise PydanticCustomError("no_number", "must not be true or false")
             if isinstance(part, str | Path) and "\0" in str(part):
-                raise PydanticCustomError("no_text", "Input should not hold the character NUL")
+                raise PydanticCustomError("no_text", "must not hold the character NUL")
         return value
 
 
@@ -101,6 +101,10 @@ class Angles(Strict):
     def _check(self) -> Self:
         if not -90 < self.pitch_deg[0] < self.pitch_deg[1] < 90:
             raise ValueError("pitch_deg: must lie within -90 and 90, where yaw and roll differ")
+        for name in ("roll_deg", "yaw_deg"):
+            low, high = getattr(self, name)
+            if low < -360 or high > 720 or high - low > 360:
+                raise ValueError(f"{name}: must span at most a full turn, within -360 and 720")
         return self
 
 

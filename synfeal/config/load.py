@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from synfeal.errors import InputError, read_as
+from synfeal.errors import InputError, read_as, wording
 from synfeal.records.files import PlainLoader
 
 
@@ -38,10 +38,12 @@ def describe(error: ValidationError) -> str:
     """The first problem in one line: dotted key, what is wrong, what was found, what is allowed."""
     first = error.errors()[0]
     key = ".".join(str(part) or "''" for part in first["loc"] if "[" not in str(part))
+    if first["type"] == "missing" and isinstance(first["loc"][-1], int):  # of a list
+        key, _, place = key.rpartition(".")
+        return f"{key}: must hold at least {int(place) + 1} values"
     if first["type"] == "missing":
         return f"{key}: missing; it has no default"
-    own = {"path_type": "must be a path", "model_type": "must hold a mapping of keys"}
-    message = own.get(first["type"], first["msg"].removeprefix("Value error, "))
+    message = wording(first)
     if first["type"] == "value_error":
         return f"{key}.{message}" if key else message
     more = len(error.errors()) - 1

@@ -90,8 +90,8 @@ def dataset_config(options: Mapping[str, Any], out: Path | None = None) -> Datas
 
 
 def scene_config(options: Mapping[str, Any]) -> SceneConfig:
-    """The scene alone, without sizes: of a command that collects nothing."""
-    check_mesh_file(Path(options["mesh"]), "--mesh")
+    """The scene alone, without sizes: of a command that collects nothing, with MESH first."""
+    check_mesh_file(Path(options["mesh"]), "MESH")
     scene = _nested(options)["scenes"][SCENE]
     with options_named():
         return _checked(SceneConfig, {"source": "mesh", **scene}, f"scenes.{SCENE}")
@@ -132,7 +132,9 @@ def in_words_of_options(message: str) -> str:
         name = own.rpartition(".")[2]
         words = [own, name] if "_" in name and name != option else [own]
         for word in words:
-            message = re.sub(rf"(?<![\w./-]){re.escape(word)}(?![\w/])", _flag(option), message)
+            # A key at the top is the whole of its name only where the message begins with it.
+            start = r"(?<![\w./-])" if {*"._"} & {*word} else "^"
+            message = re.sub(rf"{start}{re.escape(word)}(?![\w/])", _flag(option), message)
     message = re.sub(r"(?<![\w./-])(unit_m|up_axis)(?![\w./])", lambda m: _flag(m[0]), message)
     return re.sub(rf"scenes\.{SCENE}(: |\.)", "", message)
 

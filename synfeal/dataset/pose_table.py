@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.errors import InputError
-from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
+from synfeal.geometry.poses import FARTHEST_M, pose_from_quat, quat_wxyz_of
 from synfeal.records.tables import read_numbers, write_numbers
 
 COLUMNS = ("frame", "path", "tx", "ty", "tz", "qw", "qx", "qy", "qz")
@@ -29,6 +29,7 @@ SUPPORT = ("status", "inliers", "confidence")
 # Further columns of poses that a network gave: whether it has seen the like of a picture.
 SEEN = ("status", "typicality", "outside_m")
 UNIT_TOLERANCE = 1e-2
+FARTHEST_GUESS_M = 1e100  # of a network that diverged; its square can still be computed with
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,7 @@ def read_pose_table(path: Path, any_frames: bool = False) -> PoseTable:
     """
     values = read_numbers(path, HEADER, "pose table", passed_over=IMAGE, optional=REGISTERED)
     frame, straight_path = whole_numbers(values[:, :2], path).T
+    check_places(values[:, 2:5], path, np.arange(len(values)) + 2, FARTHEST_GUESS_M)
     check_unit(values[:, 5:9], path, np.arange(len(values)) + 2)
     off = np.flatnonzero(frame != np.arange(len(frame)))
     if len(off) and not any_frames:
@@ -144,6 +146,23 @@ def whole_numbers(values: NDArray[np.float64], path: Path) -> NDArray[np.int64]:
         row = int(np.argmin(good)) + 2
         raise InputError(f"{path}: row {row} must begin with whole numbers, 0 or above")
     return values.astype(np.int64)
+
+
+def check_places(
+    position_m: NDArray[np.float64],
+    path: Path,
+    line_of: NDArray[np.int64],
+    farthest_m: float = FARTHEST_M,
+) -> None:
+    """Refuse positions (N, 3) that no camera can have; what is not finite passes."""
+    distance_m = np.abs(position_m).max(axis=1, initial=0.0)
+    off = (distance_m > farthest_m) & np.isfinite(distance_m)
+    if off.any():
+        bad = int(np.argmax(off))
+        raise InputError(
+            f"{path}: line {line_of[bad]} holds a position of {distance_m[bad]:.3g} m, which is no"
+            " place; repair the line"
+        )
 
 
 def check_unit(quat_wxyz: NDArray[np.float64], path: Path, line_of: NDArray[np.int64]) -> None:

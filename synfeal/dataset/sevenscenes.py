@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from synfeal.dataset.frame_files import FrameFile, frame_file, read_image, sequence_at
 from synfeal.dataset.sequence_listing import gap_in, list_sequence
 from synfeal.errors import InputError, read_as
+from synfeal.geometry.poses import FARTHEST_M
 from synfeal.records.files import atomic_path
 
 INVALID_MM = 65535
@@ -55,6 +56,8 @@ def read_pose(path: FrameFile) -> NDArray[np.float64]:
         pose = np.array(rows, np.float64)
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise InputError(f"{path}: a pose is four rows of four finite numbers")
+    if np.abs(pose).max() > FARTHEST_M:
+        raise InputError(f"{path}: holds {np.abs(pose).max():.3g}, which is no place in metres")
     return pose
 
 

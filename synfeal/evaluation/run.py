@@ -9,7 +9,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import PoseTable
@@ -21,7 +20,8 @@ from synfeal.evaluation.frames import ScoredFrames, match, read_scored_frames
 from synfeal.evaluation.metrics import MEANS, ORIENTATION, POSITION, Metrics, pose_errors, summary
 from synfeal.evaluation.reference import match_reference, met_in_time, read_reference
 from synfeal.evaluation.reprojection import dcre, dcre_summary, depth_of_images
-from synfeal.geometry.poses import quat_wxyz_of, umeyama_sim3
+from synfeal.geometry.poses import FARTHEST_M, quat_wxyz_of, umeyama_sim3
+from synfeal.records.progress import Progress
 from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.listing import DEPTH
 
@@ -76,6 +76,8 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
     Raises:
         InputError: One of the files cannot be used.
     """
+    if not 0 < settings.rate_hz < np.inf:
+        raise InputError(f"--rate: must be above 0 frames a second, found {settings.rate_hz:g}")
     frames = _scored(dataset, settings)
     estimates = read_estimates(poses, settings.file_format)
     if frames.frame_key == "time":
@@ -143,6 +145,14 @@ def _taken(
 
     These are not a number where there is none.
     """
+    with np.errstate(invalid="ignore"):
+        far = (np.abs(estimates.translation) > FARTHEST_M) & np.isfinite(estimates.translation)
+    if far.any():
+        bad = int(np.argmax(far.any(axis=1)))
+        raise InputError(
+            f"{path}: {estimates.places[bad]}: a position of"
+            f" {np.abs(estimates.translation[bad]).max():.3g} m is no place; leave the line out"
+        )
     there = row >= 0
     if not convention and settings.align == "none":
         checked_convention(path, estimates, row[there], frames.world_from_cam[there])
@@ -200,10 +210,12 @@ def _depth(frames: ScoredFrames, camera: CameraConfig) -> Array | None:
     paths = [frame.path(DEPTH) for frame in frames.frames]
     if not all(path.is_file() for path in paths):
         return None
-    read = depth_of_images(paths, camera)
-    return np.stack(
-        list(tqdm(read, total=len(paths), unit="frame", desc="depth", leave=False, disable=None))
-    )
+    found = []
+    with Progress(len(paths), "frame", "depth") as progress:
+        for depth_m in depth_of_images(paths, camera):
+            found.append(depth_m)
+            progress.update()
+    return np.stack(found)
 
 
 def _metrics(errors: Mapping[str, Array], ends: Iterable[str], frames: ScoredFrames) -> Metrics:

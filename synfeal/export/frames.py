@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset.frame_files import FrameFile
+from synfeal.dataset.frame_files import FrameFile, encode_png
 from synfeal.dataset.sevenscenes import INVALID_MM, SPLIT_FILES
 from synfeal.errors import InputError
 from synfeal.geometry.poses import moved_right
@@ -172,7 +171,6 @@ def rewrite_depth(source: FrameFile, target: Path, units_per_m: int = 1000) -> f
     units = np.round(depth_mm.astype(np.float64) * (units_per_m / 1000.0))
     fits = known & (units <= 65535)
     target.parent.mkdir(parents=True, exist_ok=True)
-    image = Image.fromarray(np.where(fits, units, 0).astype(np.uint16))
-    image.save(target, compress_level=1)  # others take several times as long
+    target.write_bytes(encode_png(np.where(fits, units, 0).astype(np.uint16)))
     n_known = int(np.count_nonzero(known))
     return 1.0 - int(np.count_nonzero(fits)) / max(n_known, 1)

@@ -9,13 +9,18 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
+
 from synfeal.errors import InputError
+from synfeal.geometry.poses import FARTHEST_M
 from synfeal.mesh.gltf import Json, listed
+from synfeal.mesh.model import MeshPart, TexturedMesh
 
 ITEM_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # by componentType
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 # Values that glTF takes as 0 because nothing is stored: bases of morph targets, little else.
 MOST_UNSTORED_BYTES = 2**28
+SHORTEST_M = 1e-3  # of a mesh; vertices 0.01 mm apart are one
 MOST_FACES = 10**8  # of all instances together; they take 5 GB
 
 
@@ -73,6 +78,33 @@ def check_ply(path: Path) -> None:
         raise InputError(
             f"{path}: ends after {held} of {claimed} rows of vertices and faces; download or export"
             " it again"
+        )
+
+
+def check_extent(path: Path, part: MeshPart) -> None:
+    """Check that no vertex of a part is so far away that nothing else could be told apart.
+
+    Raises:
+        InputError: One is.
+    """
+    farthest_m = float(np.abs(part.vertices_m).max(initial=0.0))
+    if FARTHEST_M < farthest_m < np.inf:  # what is not finite is said elsewhere
+        raise InputError(
+            f"{path}: part '{part.name}' has a vertex {farthest_m:.3g} m from the origin; remove"
+            " it, or give the unit of the file with unit_m"
+        )
+
+
+def check_size(path: Path, mesh: TexturedMesh) -> None:
+    """Check that a mesh is larger than what is taken for one point.
+
+    Raises:
+        InputError: It is smaller.
+    """
+    longest_m = float(np.ptp(mesh.bounds_m, axis=0).max())
+    if longest_m < SHORTEST_M:
+        raise InputError(
+            f"{path}: is {longest_m:.3g} m long; give the unit of the file with unit_m"
         )
 
 

@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 
 from synfeal.errors import InputError, why
 from synfeal.mesh import checks
-from synfeal.mesh.claims import check_accessors, check_instances, check_ply
+from synfeal.mesh.claims import (
+    check_accessors,
+    check_extent,
+    check_instances,
+    check_ply,
+    check_size,
+)
 from synfeal.mesh.compressed import decoded
 from synfeal.mesh.gltf import Gltf, read_gltf, simplified
 from synfeal.mesh.materials import BaseMaterial, MaterialReader, large_images_allowed
@@ -59,6 +65,7 @@ def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> Text
         raise InputError(f"{path}: cannot be read as a mesh ({why(error)})") from error
     mesh = TexturedMesh(parts, findings.sentences)
     checks.check_mesh(mesh, path)
+    check_size(path, mesh)
     return mesh
 
 
@@ -93,7 +100,9 @@ def _read_parts(
                 own = rest if prefix.isdigit() and rest else name
                 part = _part(own, geometry, materials, findings)
                 checks.check_indices(part, path)
-                parts.append(_placed(part, file_from_part, world_from_file))
+                placed = _placed(part, file_from_part, world_from_file)
+                check_extent(path, placed)
+                parts.append(placed)
     kept = [part for part in (checks.repaired(part, findings) for part in parts) if len(part.faces)]
     for part in kept:
         if not part.is_drawn:

@@ -105,6 +105,12 @@ def plan_split(
     if collection.repeat is not None:
         return repeated_poses(collection.repeat, split, n_frames, caster.bounds_m)
     boxes = np.reshape(boxes, (-1, 2, 3))
+    longest_m = float(np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1).max())
+    if collection.mode == "path" and collection.frame_spacing_m > longest_m:
+        raise InputError(
+            f"plan: frame_spacing_m ({collection.frame_spacing_m:g} m) is longer than any path in"
+            f" sampling_box ({longest_m:.3g} m across); lower it"
+        )
     # One generator for each box, so that none shifts another's numbers.
     generators = [rng] if len(boxes) == 1 else rng.spawn(len(boxes))
     spaces = [

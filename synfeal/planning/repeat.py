@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.dataset.frame_files import FrameFile
-from synfeal.dataset.pose_table import PoseTable, check_unit, read_pose_table
+from synfeal.dataset.pose_table import PoseTable, check_places, check_unit, read_pose_table
 from synfeal.dataset.sequence_listing import POSE, list_sequence
 from synfeal.dataset.sevenscenes import SPLIT_FILES, read_pose, read_split
 from synfeal.errors import InputError, read_as
@@ -74,6 +74,7 @@ def read_poses(source: Path, split: str) -> PoseTable:
 def _read_table(path: Path) -> PoseTable:
     """A pose table of one's own, numbered anew: nothing is paired with its rows."""
     table = read_pose_table(path, any_frames=True)
+    check_places(table.position_m, path, np.arange(len(table)) + 2)
     return PoseTable(np.arange(len(table)), table.path, table.position_m, table.quat_wxyz)
 
 
@@ -109,6 +110,7 @@ def _read_tum(path: Path) -> PoseTable:
     values = np.array([_tum_row(path, number, line) for number, line in rows.items()])
     values = values.reshape(-1, 8)
     quat = values[:, [7, 4, 5, 6]]
+    check_places(values[:, 1:4], path, np.array(list(rows)))
     check_unit(quat, path, np.array(list(rows)))
     index = np.arange(len(values))
     return PoseTable(index, np.zeros_like(index), values[:, 1:4], canonical_quat_wxyz(quat))
@@ -120,6 +122,10 @@ def _tum_row(path: Path, number: int, line: list[str]) -> list[float]:
         values = [float(cell) for cell in line]
     except ValueError:
         values = []
+        if "," in "".join(line):
+            raise InputError(
+                f"{path}: line {number} has commas; {TUM_ROW} are separated by blanks"
+            ) from None
     if len(values) != 8 or not np.isfinite(values).all():
         raise InputError(f"{path}: line {number} must hold eight finite numbers: {TUM_ROW}")
     return values

@@ -42,6 +42,8 @@ SMALL_STEP_M = 0.3
 SMALL_TURN = 0.25  # of the field of view
 # From much nearer or farther, a texture is drawn at another level of detail.
 COLOUR_OVERLAP = 0.6
+VIEWS_BYTES = 2**29  # of frames that are kept decoded; a pixel of one takes 13
+CAMERA_PAIRS = 200  # from which the camera is judged, evenly spread over more
 
 LUMA = np.array([0.299, 0.587, 0.114], np.float32)
 # What is moved to see how the depths follow: principal point, pixels, and log of the focal length.
@@ -101,8 +103,10 @@ def check_consistency(
     has_intrinsics = config.projection != "equirectangular"
     moves = np.diag(DELTA).tolist() if has_intrinsics else []
     moved = [lens_of(config, step, tuple(row)) for row in moves]
-    view = lru_cache(GAPS[-1] + 2)(lambda frame: _view(frame, poses[frame], camera))
-    compared: list[Pair] = []
+    n_views = max(GAPS[-1] + 2, VIEWS_BYTES // (13 * config.width * config.height))
+    view = lru_cache(n_views)(lambda frame: _view(frame, poses[frame], camera))
+    pairs, compared = list(pairs), list[Pair]()
+    every = max(1, math.ceil(len(pairs) / CAMERA_PAIRS))
     system = np.zeros((len(DELTA), len(DELTA) + 1))
     for a, b in pairs:
         view_a, view_b, residual = view(a), view(b), None
@@ -110,7 +114,8 @@ def check_consistency(
             residual = compare(view_a, view_b, lens)
             if residual and residual.overlap < MIN_OVERLAP:
                 residual = None
-            if moved and residual and not residual.hidden:
+            is_judged = bool(moved) and len(compared) % every == 0
+            if is_judged and residual and not residual.hidden:
                 system += camera_normal(view_a, view_b, lens, moved, DELTA)
         compared.append(Pair(a, b, residual))
         on_pair()

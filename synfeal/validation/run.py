@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from tqdm import tqdm
-
 from synfeal.errors import InputError
+from synfeal.records.progress import Progress
 from synfeal.validation.camera import KnownCamera, camera_of_dataset
 from synfeal.validation.consistency import check_consistency, check_stereo
 from synfeal.validation.frames import Poses, check_images, check_names, kinds_of, read_poses
@@ -61,9 +60,7 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
     size = None if camera is None or camera.assumed else camera.config
     poses, pose_failures = read_poses(sequences)
     bound = rigid_bound(dataset)
-    with tqdm(
-        total=2 * n_frames, unit="frame", desc="validate", leave=False, disable=None
-    ) as progress:
+    with Progress(2 * n_frames, "frame", "validate") as progress:
         checks = [
             check_names(sequences),
             *check_images(sequences, size, progress.update),
@@ -123,7 +120,7 @@ def _geometry(
     pairs = choose_pairs(sequences, rigid, every_pair)
     if not pairs:
         return [Check("pairs", "no two frames of a sequence to compare", skipped=True)]
-    with tqdm(total=len(pairs), unit="pair", desc="compare", leave=False, disable=None) as progress:
+    with Progress(len(pairs), "pair", "compare") as progress:
         return check_consistency(pairs, rigid, camera, progress.update)
 
 
