@@ -19,6 +19,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from synfeal.geometry.poses import FARTHEST_M
+
 # Names of directories below the results.
 Slug = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_]*$", max_length=64)]
 SizeName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$", max_length=64)]
@@ -88,6 +90,13 @@ class Box(Strict):
     x: Interval = Field(description="bounds, metres")
     y: Interval = Field(description="bounds, metres")
     z: Interval = Field(description="bounds, metres")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for name in ("x", "y", "z"):
+            if max(map(abs, getattr(self, name))) > FARTHEST_M:
+                raise ValueError(f"{name}: must lie within {FARTHEST_M:g} m of the origin")
+        return self
 
 
 class Angles(Strict):

@@ -234,7 +234,7 @@ def decode_png(content: bytes) -> Pixels | None:
     In half the time that Pillow takes. None for damaged files and for those of other programs,
     which Pillow reads or says what is wrong with them.
     """
-    if len(content) < _START or not content.startswith(SIGNATURE):
+    if len(content) < _START + 8 or not content.startswith(SIGNATURE):
         return None
     width, height, bits, colours, *others = _HEADER.unpack_from(content, len(SIGNATURE) + 8)
     kind = {(8, RGB): (3, np.uint8), (16, GREY): (1, np.uint16)}.get((bits, colours))

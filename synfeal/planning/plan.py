@@ -21,6 +21,7 @@ from synfeal.planning.repeat import repeated_poses
 from synfeal.planning.space import PoseSpace, sample_start
 
 Array = NDArray[np.float64]
+MOST_OF_PATH = 10**6  # frames: the whole path is planned, however few of it are asked for
 
 
 def write_plan(
@@ -110,6 +111,12 @@ def plan_split(
         raise InputError(
             f"plan: frame_spacing_m ({collection.frame_spacing_m:g} m) is longer than any path in"
             f" sampling_box ({longest_m:.3g} m across); lower it"
+        )
+    if collection.mode == "path" and longest_m / collection.frame_spacing_m > MOST_OF_PATH:
+        raise InputError(
+            f"plan: a path across sampling_box ({longest_m:.3g} m) would have more than"
+            f" {MOST_OF_PATH} frames; raise frame_spacing_m ({collection.frame_spacing_m:g} m), or"
+            " give another unit_m"
         )
     # One generator for each box, so that none shifts another's numbers.
     generators = [rng] if len(boxes) == 1 else rng.spawn(len(boxes))

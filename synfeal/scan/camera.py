@@ -178,10 +178,12 @@ def rgbd_camera(
     elif color is not None or depth is not None:
         base = replace(base, color=color or base.color, depth=depth or base.depth, source="options")
     if options.depth_from_color is not None:
+        if not np.isfinite(options.depth_from_color).all():
+            raise InputError("--depth-from-color: must be six finite numbers")
         turn = Rotation.from_rotvec(options.depth_from_color[:3], degrees=True).as_matrix()
         base = replace(base, depth_from_color=pose_matrix(turn, options.depth_from_color[3:]))
     if options.depth_units_per_m is not None:
-        if not options.depth_units_per_m > 0:
+        if not 0 < options.depth_units_per_m < np.inf:
             raise InputError(f"--depth-scale: must be above 0, found {options.depth_units_per_m:g}")
         base = replace(base, depth_units_per_m=options.depth_units_per_m)
     _check_size(base.color, color_size, "colour", "--color-camera")

@@ -89,12 +89,16 @@ def fuse(
             view = (matrix, cam_from_world, 1.0, max_depth_m, TRUNCATION_VOXELS)
             grid.integrate(grid.compute_unique_block_coordinates(image, *view), image, *view)
         on_frame()
-    mesh = grid.extract_triangle_mesh(MIN_WEIGHT)
+    nothing = InputError(
+        f"scan: no surface within {max_depth_m:g} m is seen by two frames; give a smaller --stride,"
+        " a larger --max-depth, or --depth-scale if depth is not in millimetres"
+    )
+    try:
+        mesh = grid.extract_triangle_mesh(MIN_WEIGHT)
+    except RuntimeError as error:  # Open3D's for a grid without any vertex
+        raise nothing from error
     if "indices" not in mesh.triangle or not len(mesh.triangle["indices"]):
-        raise InputError(
-            f"scan: no surface within {max_depth_m:g} m is seen by two frames; give a larger"
-            " --max-depth, or --depth-scale if depth is not in millimetres"
-        )
+        raise nothing
     legacy = mesh.to_legacy()
     legacy.compute_vertex_normals()
     return Surface(
