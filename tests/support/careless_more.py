@@ -231,7 +231,7 @@ COMMANDS = (
     ("plan --cores 1 2 --gpus 1 2 3", "--gpus"),
     ("plan --cores many", "--cores"),
     ("plan --gpu-tflops inf", "--gpu-tflops"),
-    ("plan --compare absent", "absent"),
+    ("plan --measured empty --compare absent", "empty|absent"),
     ("plan --profile photos/a.png", "photos/a.png"),
     ("run --profile absent", "absent"),
     ("run --cores 1.5", "--cores"),
