@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from baselines.cli.training import photograph_camera
 from synfeal.cli.meshes import RGBD_OPTIONS
 from synfeal.cli.options import command, option
+from synfeal.errors import InputError
 
 if TYPE_CHECKING:
     from baselines.references.localized import LocalizedInMap
@@ -57,6 +58,8 @@ def map(arguments: argparse.Namespace) -> None:  # noqa: A001 (the name of the c
     from baselines.references.map_frames import FrameChoice, read_map_frames
     from baselines.references.mapped import build_map
 
+    if arguments.seed < 0:
+        raise InputError(f"--seed: must be 0 or above, found {arguments.seed}")
     start, stop = arguments.frames or (0, None)
     choice = FrameChoice(start, stop, every=arguments.every, most=arguments.most)
     frames = read_map_frames(arguments.dataset, choice, camera_options(arguments))

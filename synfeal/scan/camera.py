@@ -186,8 +186,8 @@ def rgbd_camera(
         if not 0 < options.depth_units_per_m < np.inf:
             raise InputError(f"--depth-scale: must be above 0, found {options.depth_units_per_m:g}")
         base = replace(base, depth_units_per_m=options.depth_units_per_m)
-    _check_size(base.color, color_size, "colour", "--color-camera")
-    _check_size(base.depth, depth_size, "depth", "--depth-camera")
+    _check_size(sequence, base.color, color_size, "color")
+    _check_size(sequence, base.depth, depth_size, "depth")
     return base
 
 
@@ -234,9 +234,11 @@ def _of_manifest(sequence: Path) -> RgbdCamera | None:
     return RgbdCamera(camera, camera, np.eye(4), MILLIMETRES, MANIFEST)
 
 
-def _check_size(camera: CameraConfig, size: tuple[int, int], kind: str, flag: str) -> None:
+def _check_size(sequence: Path, camera: CameraConfig, size: tuple[int, int], kind: str) -> None:
+    """Check that a camera is that of the first image of a kind."""
     if (camera.width, camera.height) != size:
         raise InputError(
-            f"{flag}: is of {camera.width}x{camera.height} pixels, the {kind} images are"
-            f" {size[0]}x{size[1]}; give the calibration of these images"
+            f"{sequence}: the first {kind} image is of {size[0]}x{size[1]} pixels, its camera of"
+            f" {camera.width}x{camera.height}; give the calibration of these images with"
+            f" --{kind}-camera"
         )

@@ -47,7 +47,7 @@ COMMANDS = (
     (f"{COLLECT} --min-seen nan", "--min-seen"),
     (f"{COLLECT} --unit-m 1e-9", "--unit-m"),
     (f"{COLLECT} --unit-m 1e-4", "room.glb"),
-    (f"{COLLECT} --unit-m 1e6", "room.glb"),
+    (f"{COLLECT} --unit-m 1e6", "--unit-m"),
     (f"{COLLECT} --seed 1.5", "--seed"),
     (f"{COLLECT} --seed 0x10", "--seed"),
     (f"{COLLECT} --workers two", "--workers"),
