@@ -58,8 +58,8 @@ def map(arguments: argparse.Namespace) -> None:  # noqa: A001 (the name of the c
     from baselines.references.map_frames import FrameChoice, read_map_frames
     from baselines.references.mapped import build_map
 
-    if arguments.seed < 0:
-        raise InputError(f"--seed: must be 0 or above, found {arguments.seed}")
+    if not 0 <= arguments.seed < 2**63:
+        raise InputError(f"--seed: must be 0 to 2^63 - 1, found {arguments.seed}")
     start, stop = arguments.frames or (0, None)
     choice = FrameChoice(start, stop, every=arguments.every, most=arguments.most)
     frames = read_map_frames(arguments.dataset, choice, camera_options(arguments))

@@ -117,8 +117,8 @@ def train(arguments: argparse.Namespace) -> None:
 
     if arguments.images is not None and arguments.minutes is not None:
         raise InputError("--minutes: --images says how long already; give one of the two")
-    if arguments.seed < 0:
-        raise InputError(f"--seed: must be 0 or above, found {arguments.seed}")
+    if not 0 <= arguments.seed < 2**63:
+        raise InputError(f"--seed: must be 0 to 2^63 - 1, found {arguments.seed}")
     default = None if arguments.minutes is not None else DEFAULT_IMAGES
     job = TrainJob(
         datasets=tuple(arguments.datasets),

@@ -133,11 +133,17 @@ def train(job: TrainJob) -> TrainedModel:
     if (job.out / RECORD).exists():
         return _finished(job, settings)
     sets = [read_own_frames(folder, job.ranges) for folder in job.datasets]
+    is_new = not job.out.exists()
     job.out.mkdir(parents=True, exist_ok=True)
-    with writing_to(job.out, lambda: "run the same command again when that is mended"):
-        packed = pack_own_frames(sets, job.photographs, NETWORK, job.out)
-        run = _job_of(job, packed)
-        return _trained(job, run, sets, packed, settings)
+    try:
+        with writing_to(job.out, lambda: "run the same command again when that is mended"):
+            packed = pack_own_frames(sets, job.photographs, NETWORK, job.out)
+            run = _job_of(job, packed)
+            return _trained(job, run, sets, packed, settings)
+    except InputError:
+        if is_new and not any(job.out.iterdir()):
+            job.out.rmdir()
+        raise
 
 
 def _trained(

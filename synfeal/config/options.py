@@ -121,6 +121,8 @@ def _checked(model: type[Model], values: Any, key: str) -> Model:
 
 def in_words_of_options(message: str) -> str:
     """Rewrite a message about configuration keys as one about options."""
+    lens = r"\bnetwork_camera\.(fx|fy|cx|cy|distortion)\b"  # which come from the calibration
+    message = re.sub(lens, r"--camera: \1", message)
     key, _, rest = message.partition(": ")
     below = {**KEYS, "further box": FURTHER_BOXES}
     for option, own in sorted(below.items(), key=lambda item: -len(item[1])):

@@ -194,7 +194,7 @@ COMMANDS = (
     ("localize model.pt photos --focal nan --out new.csv", "--focal"),
     ("localize model.pt photos --camera absent --out new.csv", "absent"),
     ("localize model.pt photos --camera camera.json --focal 9 --out new.csv", "--focal"),
-    ("localize model.pt photos --camera wide.json --out new.csv", "wide.json"),
+    ("localize model.pt photos --camera wide.json --out new.csv", "wide.json|model.pt"),
     ("localize model.pt photos --device tpu --out new.csv", "--device"),
     ("localize model.pt photos --world moon --out new.csv", "--world"),
     ("localize model.pt photos --out photos/a.png", "photos/a.png"),
@@ -315,17 +315,17 @@ MESHES = {
         }
     ),
 }
-# A command for each kind of file; the file's name stands for {}.
+# A command for each kind of file, whose name stands for {}; it or one of the words is said.
 FILES = (
-    (f"{COLLECT} --camera {{}}", CAMERAS),
-    ("validate set --camera {}", CAMERAS),
-    ("localize model.pt photos --out new.csv --camera {}", CAMERAS),
-    (f"{COLLECT} --effects {{}}", EFFECTS),
-    (f"{COLLECT} --clutter {{}}", CLUTTERS),
-    (f"{REPEAT} {{}}", TRAJECTORIES),
-    ("evaluate set {}", TRAJECTORIES),
-    ("inspect {} --out new", MESHES),
-    ("collect --mesh {} --frames 2 --out new", MESHES),
+    (f"{COLLECT} --camera {{}}", CAMERAS, "--camera"),
+    ("validate set --camera {}", CAMERAS, "camera"),
+    ("localize model.pt photos --out new.csv --camera {}", CAMERAS, "model.pt"),
+    (f"{COLLECT} --effects {{}}", EFFECTS, "--effects"),
+    (f"{COLLECT} --clutter {{}}", CLUTTERS, "--clutter|absent.glb"),
+    (f"{REPEAT} {{}}", TRAJECTORIES, "--poses"),
+    ("evaluate set {}", TRAJECTORIES, "--convention"),
+    ("inspect {} --out new", MESHES, "MESH"),
+    ("collect --mesh {} --frames 2 --out new", MESHES, "--mesh"),
 )
 
 

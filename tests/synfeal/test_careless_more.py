@@ -44,10 +44,10 @@ def test_what_is_typed_carelessly_ends_in_one_line(commands, folder, monkeypatch
     assert not found, "\n".join(found)
 
 
-@pytest.mark.parametrize(("command", "files"), FILES, ids=[command[:40] for command, _ in FILES])
-def test_a_careless_file_is_named(command, files, folder, monkeypatch, capfd):
+@pytest.mark.parametrize(("command", "files", "words"), FILES, ids=[row[0][:40] for row in FILES])
+def test_a_careless_file_is_named(command, files, words, folder, monkeypatch, capfd):
     monkeypatch.chdir(folder)
-    commands = [(command.format(name), name) for name in files]
+    commands = [(command.format(name), f"{name}|{words}") for name in files]
     found = problems_of(commands, folder, capfd)
     assert not found, "\n".join(found)
 
@@ -63,6 +63,10 @@ def test_a_damaged_set_is_named_by_every_command(damage, folder, monkeypatch, ca
 
 
 def test_there_are_two_hundred_of_them():
-    counts = (len(COMMANDS), sum(len(f) for _, f in FILES), sum(map(len, DAMAGES.values())))
+    counts = (
+        len(COMMANDS),
+        sum(len(files) for _, files, _ in FILES),
+        sum(map(len, DAMAGES.values())),
+    )
     assert sum(counts) >= 200
     assert len({typed for typed, _ in COMMANDS}) == len(COMMANDS)
