@@ -107,7 +107,7 @@ def _stereo(
     frames = list(poses)
     step = 1 if every_pair else max(1, len(frames) // STEREO_PAIRS)
     chosen = frames[::step]
-    with tqdm(total=len(chosen), unit="pair", desc="stereo", leave=False, disable=None) as progress:
+    with Progress(len(chosen), "pair", "stereo") as progress:
         return [check_stereo(chosen, poses, camera, progress.update)]
 
 
