@@ -66,7 +66,7 @@ def test_a_renderer_takes_poses_of_few_digits_and_lists(renderer):
         ({"width": 20.5}, "width: must be a whole number, found 20.5"),
         ({"width": "wide"}, "width: must be a whole number, found 'wide'"),
         ({"horizontal_fov_deg": 1.0}, "horizontal_fov_deg: must be above 1, found 1.0"),
-        ({"horizontal_fov_deg": 170}, "horizontal_fov_deg: must be below 170, found 170"),
+        ({"horizontal_fov_deg": 361}, "horizontal_fov_deg: must be 360 or less, found 361"),
         ({"cx": float("nan")}, "cx: must be a finite number, found nan"),
         ({"near_m": "near"}, "near_m: must be a number, found 'near'"),
         ({"distortion": [1, 2, 3]}, "distortion: must hold at least 4 values"),
