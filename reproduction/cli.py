@@ -76,7 +76,7 @@ def plan(arguments: argparse.Namespace) -> None:
 
 
 def _machines(arguments: argparse.Namespace) -> list[Machine]:
-    """What to plan for: as many numbers of GPUs as of cores, or one for all."""
+    """Return the machines to plan for: as many numbers of GPUs as of cores, or one for all."""
     from reproduction.plan.laws import Machine
 
     cores, gpus = arguments.cores or [os.cpu_count() or 1], arguments.gpus

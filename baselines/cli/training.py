@@ -223,7 +223,10 @@ def warn_of_unlike(model: Path, done: Localized) -> None:
             "%d of %d pictures are unlike the frames that %s was trained on%s (column typicality:"
             " 0.05 or less, as of 5 %% of pictures of that place); do not trust their poses if they"
             " are of another place",
-            *(done.n_unlike, done.n_images, model, f" in '{scene}'" if scene else ""),
+            done.n_unlike,
+            done.n_images,
+            model,
+            f" in '{scene}'" if scene else "",
         )
 
 

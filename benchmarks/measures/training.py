@@ -85,11 +85,20 @@ def run(case: Case, seed: int) -> dict[str, float]:
         test_frames, test_labels = _test_set(case, Path(folder))
         wall_s, cpu_s = time.perf_counter(), time.process_time()
         job = Job(
-            *(case.model, case.network, case.localizers[case.model], case.training),
-            *(case.samples_seen, seed_of(seed, "train"), case.exchanged),
+            case.model,
+            case.network,
+            case.localizers[case.model],
+            case.training,
+            case.samples_seen,
+            seed_of(seed, "train"),
+            case.exchanged,
         )
         train_localizer(
-            *(job, case.train_frames, case.train_labels, model, Path(folder) / "history.csv"),
+            job,
+            case.train_frames,
+            case.train_labels,
+            model,
+            Path(folder) / "history.csv",
             weights=case.start,
             test=(test_frames, test_labels),
         )

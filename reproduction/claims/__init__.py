@@ -1,1 +1,1 @@
-"""What the text of the paper claims, and whether this run bears it out, by rules fixed in code."""
+"""Claims of the paper's text, and whether this run bears them out, by rules fixed in code."""

@@ -1,4 +1,4 @@
-"""What a run left behind, as the tests of the claims need it: a median error per cell, resampled.
+"""Evidence for the tests of the claims: a median error per cell of a run, resampled.
 
 Errors are read on one of two test sets. A cell's *own* is what the tables show, labelled by the
 cell's method. The *common* one of a scene has frames from all paths of its largest test set, the
@@ -158,7 +158,7 @@ class Evidence:
 
     @cached_property
     def layout(self) -> Layout:
-        """Where the parts of every sample of this evidence are."""
+        """Return where the parts of every sample of this evidence are."""
         return Layout(RESAMPLES, tuple(self.groups.values()))
 
     def _medians(self, path: Path, test: TestSet) -> list[Array]:
@@ -192,7 +192,7 @@ class Evidence:
         return self._tests[key]
 
     def not_learnt(self, cells: Iterable[Cell]) -> list[str]:
-        """Which cells, trained on true labels, are not clearly better than the mean pose."""
+        """List cells, trained on true labels, that are not clearly better than the mean pose."""
         found = []
         for cell in cells:
             constant = self.test_set(cell.scene, cell.size).constant

@@ -180,7 +180,7 @@ def _increase(evidence: Evidence, labels: Sequence[str]) -> Array:
 
 
 def _dose_text(evidence: Evidence, rivals: Sequence[str], cells: Sequence[Cell]) -> str:
-    """How exact the labels compared are, against how exact localizers trained on the truth are.
+    """Say how exact the compared labels are, beside localizers trained on the truth.
 
     Labels that are ten times as exact as a localizer cannot move its errors by much.
     """

@@ -67,7 +67,7 @@ def _bare(path: Path) -> str:
 
 
 def _is_text(node: ast.AST) -> TypeGuard[ast.Expr]:
-    """Whether a statement is a string alone, as docstrings are."""
+    """Tell whether a statement is a string alone, as docstrings are."""
     if not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)):
         return False
     return isinstance(node.value.value, str)

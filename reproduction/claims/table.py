@@ -68,7 +68,7 @@ def claims_markdown(rows: Sequence[Row]) -> str:
 
 
 def verdict_counts(rows: Sequence[Row], score: str) -> dict[str, Counter[str]]:
-    """How many claims of each group got which verdict under a score."""
+    """Count the claims of each group by verdict, under a score."""
     groups = {claim.id: claim.group for claim in published_claims()}
     return {
         group: Counter(row[f"verdict_{score}"] for row in rows if groups[row["id"]] == group)
@@ -98,14 +98,14 @@ def _row(claim: Claim, evidence: Evidence) -> dict[str, str]:
 
 
 def _sensitivity(outcome: Outcome) -> str:
-    """Which other thresholds would turn a verdict, and into what."""
+    """List other thresholds that would change a verdict, and to what."""
     if outcome.verdict in (Verdict.NOT_TESTABLE, Verdict.NOT_LEARNT, Verdict.BY_CONSTRUCTION):
         return ""
     return "; ".join(f"{name}: {other}" for name, other in outcome.turned.items()) or "none"
 
 
 def _limits_of(seeds: Sequence[int]) -> str:
-    """What the limits of a claim cover, given the numbers of repetitions of its cells."""
+    """Say what the limits of a claim cover, given the repetitions of its cells."""
     if not seeds:
         return ""  # no localizer was asked
     borrowed = "paths, and seeds as in the published runs"

@@ -151,7 +151,7 @@ def _log_ratio(evidence: Evidence, model: str) -> Array:
 
 
 def images_ratio(new: Array, old: Array) -> Array:
-    """How far apart two learning curves are along the images, as a logarithm (B,).
+    """Measure the distance of two learning curves along the images, as a logarithm (B,).
 
     Errors fall about as a power of the images shown. Lines of one slope, the mean of both, are put
     through the logarithms of errors and images; not a number where they do not fall.

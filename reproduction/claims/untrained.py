@@ -68,7 +68,7 @@ def few_assisted(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def few_verdict(counts: Mapping[str, tuple[int, int]], thresholds: Thresholds = RULE) -> Verdict:
-    """Whether few batches of every method are assisted.
+    """Decide whether few batches of every method are assisted.
 
     Args:
         counts: by method, assisted batches and all.
@@ -149,7 +149,7 @@ def kinectfusion_fails(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def _turned(verdict: Callable[[Thresholds], Verdict]) -> dict[str, Verdict]:
-    """What other thresholds turn the verdict into."""
+    """List verdicts under other thresholds."""
     others = {name: verdict(other) for name, other in ALTERNATIVES.items()}
     return {name: other for name, other in others.items() if other != verdict(RULE)}
 

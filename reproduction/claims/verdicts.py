@@ -56,7 +56,7 @@ from synfeal.records.tables import read_records
 
 
 class Verdict(StrEnum):
-    """What a run makes of a claim; :func:`verdict_of` has the rules."""
+    """Judgement of a claim by a run; :func:`verdict_of` has the rules."""
 
     HOLDS = "holds"
     SMALLER = "same direction but smaller"
@@ -109,7 +109,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run says about a claim, under one of the two scores."""
+    """Findings of a run about a claim, under one of the two scores."""
 
     verdict: Verdict  # decided by the rule of the claim's test
     measured: str = ""  # the statistic, as text
@@ -301,7 +301,7 @@ def compared(low: float, high: float, number: float) -> Verdict:
 
 
 def _parts_text(conditions: Sequence[Condition], parts: Sequence[Verdict]) -> str:
-    """How the conditions came out: by name, or how many of them where they have none."""
+    """List the outcomes of the conditions by name, or count them where they have none."""
     if len(conditions) <= 2:
         texts = [f"{c.name}: {part}" for c, part in zip(conditions, parts, strict=True)]
         return ", ".join(texts)

@@ -1,4 +1,4 @@
-"""What ``synfeal compare`` does and says: in the terminal, and as files."""
+"""The command ``synfeal compare``: output in the terminal, and files."""
 
 from __future__ import annotations
 

@@ -30,8 +30,20 @@ TOLERANCE = 1e-6
 # Of runs, by what their intervals say.
 VERDICTS = {"better": "better", "worse": "worse", "unseen": "no difference seen"}
 ORDER = (
-    *(*KEY, "measure", "a", "b", "difference", "low", "high", "change_percent", "verdict"),
-    *("sd_a", "sd_b", "se_seeds", "test_frames", "test_labels"),
+    *KEY,
+    "measure",
+    "a",
+    "b",
+    "difference",
+    "low",
+    "high",
+    "change_percent",
+    "verdict",
+    "sd_a",
+    "sd_b",
+    "se_seeds",
+    "test_frames",
+    "test_labels",
     *(f"{count}_{tree}" for count in ("n_test", "n_paths", "n_seeds", "failed") for tree in "ab"),
 )
 
@@ -57,7 +69,7 @@ class Comparison:
 
 
 def one_yardstick(run: pd.DataFrame) -> bool:
-    """Whether the labels of a run are the true poses, so that both scores are the same numbers."""
+    """Tell whether a run's labels are the true poses, so that both scores agree."""
     values = run.set_index("measure")[["a", "b", "low", "high", "sd_a", "sd_b"]]
     labels, truth = (values.loc[[f"{m}{end}" for m in MEASURES[:2]]] for end in ("", "_true"))
     return labels.reset_index(drop=True).equals(truth.reset_index(drop=True))
@@ -141,7 +153,7 @@ def _compare_run(
 
 
 def _sameness(path_a: Path, path_b: Path, count: int) -> Sameness:
-    """Whether the first ``count`` poses of two tables are the same."""
+    """Tell whether the first ``count`` poses of two tables are the same."""
     if not (path_a.exists() and path_b.exists()):
         return "unknown"
     tables = read_pose_table(path_a), read_pose_table(path_b)

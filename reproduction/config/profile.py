@@ -28,7 +28,7 @@ from synfeal.config.effects import RobustnessConfig
 
 
 class RenderSpeedConfig(Strict):
-    """How speed and error of rendering are measured, for `speed_vs_error.csv`."""
+    """Measurement of the speed and error of rendering, for `speed_vs_error.csv`."""
 
     poses: Count = Field(6, description="views of each scene; half as many at the larger sizes")
     sizes: int = Field(

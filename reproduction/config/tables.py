@@ -34,7 +34,7 @@ Repetitions = dict[Literal["default", TableName], Count]
 
 
 class RepeatedTraining(TrainingConfig):
-    """How all localizers are trained, and how often."""
+    """Training of all localizers, and its repetitions."""
 
     repetitions: Repetitions = Field(
         {"default": 1},

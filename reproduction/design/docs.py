@@ -149,7 +149,7 @@ def joined(rows: Iterator[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
 
 
 def setting_rows(folder: Path) -> Iterator[tuple[str, ...]]:
-    """What the shipped profiles set for the keys that tell them apart."""
+    """Tabulate the keys that tell the shipped profiles apart."""
     base = read_yaml(folder / "config.yaml")
     others = {name: folder / f"{name}.yaml" for name in PROFILES if name != DEFAULT_PROFILE}
     merged = {name: merge(base, read_yaml(path)) for name, path in others.items()}

@@ -75,7 +75,7 @@ class Experiment(Strict):
 
     @property
     def estimated(self) -> bool:
-        """Whether a method re-estimated the labels."""
+        """True where a method re-estimated the labels."""
         return self.labels not in ("synfeal", *INJECTED)
 
     @property
@@ -107,7 +107,7 @@ class Run:
 
     @property
     def start(self) -> Start:
-        """Where its weights come from."""
+        """Origin of the first weights."""
         return split_init(self.init)[0]
 
     @property
@@ -133,7 +133,7 @@ class Run:
 
 
 def split_init(init: str) -> tuple[Start, str]:
-    """Where an ``init`` starts from, and how it ends, a key of ``SHARES``."""
+    """Split ``init`` into the start of the weights and its ending, a key of ``SHARES``."""
     start, _, part = init.partition("-")
     return cast(Start, start), part
 
@@ -185,7 +185,7 @@ def _given_rows(config: Config) -> Iterator[tuple[str, Mapping[str, Any]]]:
 
 
 def _problem(row: Experiment, config: Config) -> str:
-    """Why a profile cannot run a row; nothing where it can."""
+    """Say why a profile cannot run a row; nothing where it can."""
     if row.scene not in config.scenes:
         return f"scene '{row.scene}': allowed: {sorted(config.scenes)}"
     if row.scene in config.rooms:

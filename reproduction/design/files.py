@@ -286,7 +286,7 @@ class Files:
         return pattern.format(**data_set) if pattern else None
 
     def reference_files(self, folder: str, names: Iterable[str]) -> list[str]:
-        """What reference methods write in the folder of one data set."""
+        """List the files that reference methods write in the folder of one data set."""
         return [f"{folder}/{name}/{file}" for name in names for file in REFERENCE_FILES]
 
     # Robustness: test frames with effects
@@ -317,7 +317,7 @@ class Files:
 
     @property
     def has_robustness(self) -> bool:
-        """Whether the robustness table has rows: effects, and runs on its data set."""
+        """Tell whether the robustness table has rows: effects, and runs on its data set."""
         robust = self.config.robustness
         if not (robust.made and self.tested_effects):
             return False
@@ -326,7 +326,7 @@ class Files:
 
     @property
     def has_robust_structure(self) -> bool:
-        """Whether frames with depth are rendered of its data set."""
+        """Tell whether frames with depth are rendered of its data set."""
         robust = self.config.robustness
         return has_structure(self.design.rows, robust.scene, robust.size)
 

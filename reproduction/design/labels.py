@@ -1,4 +1,4 @@
-"""What the design asks of the label methods."""
+"""Demands of the design on the label methods."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which reference methods answer for which data set of the design."""
+"""Reference methods that answer for each data set of the design."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def data_sets(rows: Iterable[Experiment]) -> list[DataSet]:
 
 
 def has_structure(rows: Iterable[Experiment], scene: str, size: str) -> bool:
-    """Whether frames with depth are rendered for a size: some label set is estimated from them."""
+    """Tell whether frames with depth are rendered of a size, to estimate labels from."""
     return any((r.scene, r.size) == (scene, size) and r.labels in METHODS for r in rows)
 
 

@@ -1,4 +1,4 @@
-"""What a training run of the design depends on."""
+"""Inputs and settings that a training run of the design depends on."""
 
 from __future__ import annotations
 

@@ -83,7 +83,8 @@ def _draw_curves(axes: Axes, errors: Mapping[str, Array]) -> None:
         error, percent = cumulative(values)
         marked = [int(share * (len(error) - 1)) for share in MARKED_AT]
         axes.plot(
-            *(error, percent),
+            error,
+            percent,
             label=TITLES[model],
             drawstyle="steps-post",
             linewidth=1.4,

@@ -94,7 +94,8 @@ def draw_label_error(results: Results) -> Figure | None:
     figure = Figure(figsize=(11.0, 5.6 + 0.25 * n_methods), layout="constrained")
     figure.suptitle(f"{data.title}: {counted(*counts)}")
     panels = figure.subplots(
-        *(3, 2),
+        3,
+        2,
         sharex="col",
         sharey="row",
         width_ratios=[max(count, 0.3 * sum(counts)) for count in counts],
@@ -123,7 +124,8 @@ def _draw_errors(position: Axes, orientation: Axes, methods: Mapping[str, Labell
             # Marks on every so many frames, on others for each line.
             step = max(len(methods), len(part.labels) // MARKS)
             axes.plot(
-                *(part.labels.frame, part.errors[which]),
+                part.labels.frame,
+                part.errors[which],
                 label=SOURCES[method],
                 linewidth=1.1,
                 markersize=4,
@@ -143,7 +145,8 @@ def _draw_batches(axes: Axes, methods: Mapping[str, LabelledSplit]) -> None:
             face = {"facecolor": colour if batch["assisted"] else "white"}
             span = (batch["start"], batch["stop"] - 1 - batch["start"])
             axes.broken_barh(
-                *([span], (place - 0.35, 0.7)),
+                [span],
+                (place - 0.35, 0.7),
                 **(LOST if batch["lost"] else face),
                 edgecolor="black",
                 linewidth=0.8,

@@ -65,7 +65,7 @@ FLOOR_SHARE = 0.02  # of the surface lies below the floor's height: holes dig, a
 
 @dataclass(frozen=True)
 class Plan:
-    """What of a scene a plan shows."""
+    """Part of a scene that a plan shows."""
 
     corners_m: Array  # (N, 3, 2) triangles from above, world x and y
     bounds_m: Array  # (2, 2) lower and upper corner of the whole mesh, world x and y
@@ -79,7 +79,7 @@ def read_plan(results: Results, scene: str) -> Plan:
 
 
 def plan_of(mesh: Triangles, top_m: float) -> Plan:
-    """What of a mesh lies between the floor and ``top_m``; triangles that pass either are cut."""
+    """Cut a mesh between the floor and ``top_m``; triangles that pass either are cut."""
     bottom_m = floor_m(mesh.vertices_m[mesh.faces]) + ABOVE_FLOOR_M
     vertices, faces = mesh
     for normal_z, height_m in ((1.0, bottom_m), (-1.0, top_m)):

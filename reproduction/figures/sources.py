@@ -1,4 +1,4 @@
-"""What figures are drawn from: a profile's design and its result files."""
+"""Sources of figures: a profile's design and its result files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What speed costs: the variants a stage could choose among, the best of them, and the choice."""
+"""Speed against error: the variants a stage could choose among, the best of them, the choice."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from synfeal.records.tables import rows_of
 
 
 def pareto_front(seconds: ArrayLike, errors: ArrayLike) -> NDArray[np.bool_]:
-    """Which of N variants (costs and errors (N,), less is better) no other one dominates.
+    """Mark those of N variants (costs and errors (N,), less is better) that no other dominates.
 
     A variant dominates another when it is at least as good in both and better in one; of equal
     variants none dominates the other.
@@ -55,7 +55,7 @@ RING: Style = {"marker": "o", "markerfacecolor": "none", "markersize": 13, "line
 
 
 def of_stage(stage: str, figure: Callable[[pd.DataFrame], Figure]) -> Draw:
-    """What draws the rows of a stage of ``speed_vs_error.csv``; nothing where there are none."""
+    """Return the drawing of a stage's rows of ``speed_vs_error.csv``; None where there are none."""
 
     def draw(results: Results) -> Figure | None:
         rows = results.speeds(stage)
@@ -87,7 +87,8 @@ def _draw_meshes(axes: Axes, rows: pd.DataFrame, style: Style) -> None:
     axes.plot(speed[~front], error[~front], linestyle="", markersize=4, alpha=0.6, **open_marks)
     scene = scene_title(rows["scene"].iloc[0])
     axes.plot(
-        *(speed[front][order], error[front][order]),
+        speed[front][order],
+        error[front][order],
         label=f"{scene}: Pareto front (open: dominated)",
         linewidth=1.2,
         markersize=5,
@@ -236,7 +237,7 @@ def _is_less(row: Any, full_faces: float) -> bool:
 
 
 def left_out(rows: pd.DataFrame, faces: float) -> pd.Series[str]:
-    """What detail of the mesh a variant leaves out; nothing for the full mesh."""
+    """Name the detail of the mesh that a variant leaves out; nothing for the full mesh."""
     found = (rows["faces"] != faces).map({True: FACES, False: ""})
     return found.mask(rows["texture_scale"] != 1.0, TEXTURES)
 

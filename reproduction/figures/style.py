@@ -1,4 +1,4 @@
-"""How figures look: colours safe for the colour-blind; markers and dashes say the same in grey."""
+"""Style of figures: colours safe for the colour-blind; markers and dashes repeat them in grey."""
 
 from __future__ import annotations
 

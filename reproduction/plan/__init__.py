@@ -1,1 +1,1 @@
-"""What a run costs before it is started, from the measurements of one that was run."""
+"""Cost of a run before it is started, from the measurements of one that was run."""

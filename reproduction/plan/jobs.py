@@ -1,4 +1,4 @@
-"""How large a job is, from the name of its measurement and the configuration.
+"""Size of a job, from the name of its measurement and the configuration.
 
 Which jobs there are is Snakemake's to say (``dry_run.py``, or the measurements of a run). A job is
 named like the file below ``<root>/benchmarks`` that its measurement is written to.
@@ -45,7 +45,7 @@ class Profile(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """How the jobs of a stage are named, and what they count."""
+    """Names of the jobs of a stage, and the units they count."""
 
     parts: str | None = None  # of a job's name; None where all jobs are alike, whatever their names
     unit: str = ""  # of the size

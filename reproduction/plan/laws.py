@@ -1,4 +1,4 @@
-"""What jobs cost as a function of their size, from jobs that were measured; by stage and by table.
+"""Cost of jobs as a function of their size, from measured jobs; by stage and by table.
 
 Costs are columns: seconds of the processor ``cpu_``, of a GPU ``gpu_`` and from start to end
 ``wall_``, each ``low``, ``mid`` (expected) and ``high``.
@@ -132,7 +132,7 @@ STAGE, ALONE, OWN, RUN = "stage", "table alone", "table", "run"
 
 @dataclass(frozen=True)
 class Machine:
-    """What a run is planned for."""
+    """Machine that a run is planned for."""
 
     cores: int  # jobs at a time
     gpus: int  # training runs at a time; 0 trains on the processor
@@ -164,7 +164,7 @@ def job_costs(jobs: pd.DataFrame, laws: pd.DataFrame, machine: Machine) -> pd.Da
 
 
 def summed(costs: pd.DataFrame, machine: Machine) -> dict[str, Any]:
-    """What some jobs take together, stage after stage, with all of them off the same way."""
+    """Add up jobs stage after stage, assuming fully correlated errors."""
     walls = []  # from the start of each stage to its end
     for _, stage in costs.groupby("stage", sort=False):
         on_gpu = stage["gpu_mid"].gt(0).any()
@@ -180,7 +180,7 @@ def summed(costs: pd.DataFrame, machine: Machine) -> dict[str, Any]:
 
 
 def wall_seconds(seconds: Iterable[float], slots: int) -> float:
-    """When the last of some jobs ends if the longest waiting one starts on the first free slot."""
+    """Schedule jobs, longest first, on free slots: seconds until the last one ends."""
     ends = [0.0] * slots
     for job in sorted(seconds, reverse=True):
         heapq.heappushpop(ends, ends[0] + job)

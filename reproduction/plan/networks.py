@@ -1,4 +1,4 @@
-"""What one image costs a network, counted on tensors without data."""
+"""Cost of one image for a network, counted on tensors without data."""
 
 from __future__ import annotations
 

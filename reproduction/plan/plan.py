@@ -32,7 +32,7 @@ Comparisons = dict[tuple[str, str], pd.DataFrame]
 
 @dataclass(frozen=True)
 class Plan:
-    """What a run of a profile costs on a machine."""
+    """Cost of a run of a profile on a machine."""
 
     profile: str  # its name
     machine: Machine  # what it is planned for
@@ -47,7 +47,7 @@ def plan_of(
     machines: Sequence[Machine],
     time_steps: bool = False,
 ) -> list[Plan]:
-    """What a run of a profile costs on each machine, stage by stage and table by table.
+    """Plan a run of a profile on each machine, stage by stage and table by table.
 
     It is predicted from the results of ``measured`` runs, and with ``time_steps`` from some
     training steps that are timed here, on the GPU if there is one.
@@ -80,7 +80,7 @@ def plan_of(
 
 
 def compare_runs(measured: Sequence[Path], compared: Path, time_steps: bool = False) -> Comparisons:
-    """What the measured runs predict for another beside what it took, and the other way round.
+    """Compare predictions from measured runs with the cost of another, and the other way round.
 
     With ``time_steps`` training steps of the run that is predicted are timed here, on a core.
     """

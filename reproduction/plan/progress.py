@@ -1,4 +1,4 @@
-"""What a run is going to do, and how long it still takes."""
+"""Remaining work of a run, and the time it takes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MEASURED = Path("results/published/mini")
 
 @dataclass(frozen=True)
 class RunPlan:
-    """What the workflow tells of a run at its start."""
+    """Announcement of the workflow at the start of a run."""
 
     root: Path  # results of the profile
     # Seconds each job that is to run may take, by ``stage/name`` as in ``<root>/benchmarks``.

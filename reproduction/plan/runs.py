@@ -36,7 +36,7 @@ def read_profile(name: str) -> Profile:
 
 
 def is_default(path: Path) -> bool:
-    """Whether it is the file that all others go over; links may form a circle."""
+    """Tell whether a file is the one that all others extend; links may form a circle."""
     return os.path.realpath(path) == os.path.realpath(DEFAULT)
 
 

@@ -1,4 +1,4 @@
-"""What a training step takes on this machine, timed: a small measured run tells next to nothing.
+"""Timing of training steps on this machine: a small measured run tells next to nothing.
 
 In ``smoke`` a run is all start: its steps are a fiftieth of it, and what they take is lost in
 what a start takes now and then. Some steps of every network tell it in a minute.
@@ -27,7 +27,7 @@ STEPS = 4
 
 @dataclass(frozen=True)
 class StepRates:
-    """How fast networks are trained."""
+    """Speed of training, by network."""
 
     rates: tuple[float, float]  # seconds of a training run per layer and step, and per TFLOP
     on_gpu: bool  # seconds from start to end on a GPU, else of processor time

@@ -83,7 +83,7 @@ def _table_table(plan: Plan) -> str:
 
 
 def _notes(plan: Plan) -> Iterator[str]:
-    """What the numbers rest on."""
+    """List what the numbers rest on."""
     machine = plan.machine
     yield f"measured    {plan.origin}"
     yield (

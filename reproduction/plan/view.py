@@ -52,7 +52,7 @@ class FirstScores:
         return label(run)
 
     def complete(self, row: str) -> bool:
-        """Whether every run of a row has its scores."""
+        """True where every run of a row has its scores."""
         return len(self._scores.get(row, {})) == self._expected[row]
 
     def cells(self, row: str) -> list[str]:

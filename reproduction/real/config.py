@@ -19,7 +19,7 @@ MapOf = Literal["rendered", "photographs"]
 
 
 class Tried(Strict):
-    """What is tried on the photographs of one direction."""
+    """Rows, localizers and maps tried on the photographs of one direction."""
 
     trained_on: tuple[Training, ...] = Field((), description="rows of the table")
     localizers: tuple[ModelName, ...] = Field((), description="that are trained for each row")

@@ -1,4 +1,4 @@
-"""What is made: scans of parts of a scene, runs of localizers on each, maps."""
+"""Design of the profile ``real``: scans of parts of a scene, localizers and maps of each."""
 
 from __future__ import annotations
 
@@ -167,5 +167,5 @@ def _is_all(part: Part, config: RealConfig) -> bool:
 
 
 def folder(config: RealConfig, part: Part) -> Path:
-    """Where the files of a part lie."""
+    """Folder of the files of a part."""
     return config.results / part.name

@@ -86,7 +86,8 @@ def _line(panel: Axes, group: pd.DataFrame, measure: str, trained_on: str) -> No
     x, y = group.amount, group[measure]
     low, high = y - group[f"{measure}_low"], group[f"{measure}_high"] - y
     panel.errorbar(
-        *(x, y),
+        x,
+        y,
         yerr=[low.clip(lower=0), high.clip(lower=0)],
         label=f"learned from {ROWS[trained_on]}",
         capsize=2,
@@ -96,7 +97,8 @@ def _line(panel: Axes, group: pd.DataFrame, measure: str, trained_on: str) -> No
     )
     single = group[group.n_seeds == 1]
     panel.plot(
-        *(single.amount, single[measure]),
+        single.amount,
+        single[measure],
         color=style["color"],
         marker=style["marker"],
         markerfacecolor="white",
@@ -116,7 +118,8 @@ def draw_cover(bins: pd.DataFrame) -> Figure:
             style = STYLES[str(trained_on)] | {"color": DIRECTION_FILLS[str(direction)]}
             ordered = group.sort_values("share")
             panel.plot(
-                *(100 * ordered.share, ordered[measure]),
+                100 * ordered.share,
+                ordered[measure],
                 label=f"{direction}: {ROWS[str(trained_on)]}",
                 markersize=4,
                 **style,

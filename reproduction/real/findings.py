@@ -1,4 +1,4 @@
-"""What was found on real photographs, in sentences and as a table for pages."""
+"""Findings on real photographs, in sentences and as a table for pages."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HEADLINE = "posenet2"
 
 
 def real_findings(root: Path) -> str:
-    """What a published run found, a sentence each."""
+    """Say what a published run found, a sentence each."""
     table = read_real(root / "tables" / f"{NAME}.csv")
     return "\n".join(f"- {sentence}" for sentence in sentences(table))
 
@@ -32,7 +32,7 @@ def real_table(root: Path) -> str:
 
 
 def sentences(table: pd.DataFrame) -> Iterator[str]:
-    """What a table says: by direction, by localizer, by source of labels."""
+    """Put a table into sentences: by direction, by localizer, by source of labels."""
     given = table[table.labels == GIVEN]
     main = given.direction.iloc[0]
     for direction in given.direction.unique():
@@ -107,7 +107,7 @@ def _structure(table: pd.DataFrame) -> Iterator[str]:
 
 
 def _labels(table: pd.DataFrame) -> Iterator[str]:
-    """How much the source of labels changes, in training and in testing."""
+    """Say how much the source of labels changes, in training and in testing."""
     by_sfm = table[table.labels == SFM]
     for row in rows_of(by_sfm[by_sfm.method.isin([*TITLES, "structure"])]):
         given = _one(table[table.labels == GIVEN], row.trained_on, row.method)

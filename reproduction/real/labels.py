@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Gauge:
-    """How one world lies in another.
+    """Motion and scale from one world to another.
 
     Attributes:
         to_from_other: Rigid motion (4, 4).
@@ -109,7 +109,7 @@ def of_depth_camera(world_from_color: Array, depth_from_color: Array) -> Array:
 
 
 def label_difference(given: Array, other: Array, gauge: Gauge) -> dict[str, Any]:
-    """How far labels (N, 4, 4) from two sources are apart in one world, ready for JSON."""
+    """Measure how far labels (N, 4, 4) from two sources are apart, ready for JSON."""
     position_m, angle_rad = pose_error(gauge.to_from_other @ other, given)
     angle_deg = np.degrees(angle_rad)
     return {

@@ -1,4 +1,4 @@
-"""Which photographs of a scene are scanned, and which are localized.
+"""Division of a scene's photographs into scanned and localized ones.
 
 Where all sequences of the official split are there, it is used. Else the photographs there are, in
 order, are halved (``forward``: scan the first half; ``reverse``: the second) or cut into ten blocks

@@ -1,1 +1,1 @@
-"""What a person reads: page, document, summary, published pages."""
+"""Pages that a person reads: report, summary, published pages."""

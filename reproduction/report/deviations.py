@@ -1,4 +1,4 @@
-"""How much training runs differ from seed to seed, from published tables with several of them.
+"""Spread of training runs over seeds, from published tables with several of them.
 
 A profile with one training run per cell borrows these deviations where a verdict is given.
 """
@@ -18,7 +18,10 @@ from reproduction.tables.cells import schema_of
 from synfeal.records.tables import frame_of, read_frame
 
 TABLES = (
-    *("table2_ground_truth", "table3_inconsistencies", "table4_size", "table5_from_scratch"),
+    "table2_ground_truth",
+    "table3_inconsistencies",
+    "table4_size",
+    "table5_from_scratch",
     "table7_images_shown",
 )
 

@@ -1,4 +1,4 @@
-"""What a run found, in plain words, most important first: each number with its 95 % limits.
+"""Findings of a run in plain words, most important first: each number with its 95 % limits.
 
 Every finding says whether errors are against the labels of the test set, as in the paper, or
 against the true poses. A run that lacks the rows of a finding has one finding less.
@@ -71,7 +71,7 @@ def can_tell(root: Path) -> bool:
 
 
 def findings(root: Path) -> list[Finding]:
-    """What published results, or a finished run, have to say, most important first."""
+    """List the findings of published results, or of a finished run, most important first."""
     found = (finding(root) for finding in FINDINGS)
     return [finding for finding in found if finding is not None]
 
@@ -191,7 +191,7 @@ def shared_errors_stay(root: Path) -> Finding | None:
 
 
 def half_the_images(root: Path) -> tuple[Interval, Interval, float, float]:
-    """What twice the images alone change at the small size, and their share of the size's effect.
+    """Compare twice the images alone, at the small size, with the size's whole effect.
 
     Shares are of logarithms, in which effects that follow one another add up.
     """
@@ -297,8 +297,13 @@ def paired_changes(root: Path, claim: str, part: str = "") -> tuple[Interval, In
 
 # Tables that the findings rest on.
 NEEDED = (
-    *("table2_ground_truth", "table3_inconsistencies", "table4_size", "table6_label_errors"),
-    *("table7_images_shown", "references", "label_error"),
+    "table2_ground_truth",
+    "table3_inconsistencies",
+    "table4_size",
+    "table6_label_errors",
+    "table7_images_shown",
+    "references",
+    "label_error",
 )
 # A run on photographs (`real`) has the first finding of all: whether a rendered scan localizes
 # photographs. Its function goes to the front of this list.
@@ -326,7 +331,7 @@ def sentences(root: Path, link: str = "") -> list[str]:
 
 
 def verdict_sentence(root: Path) -> str:
-    """How the paper's claims fared against the truth, group by group."""
+    """Say how the paper's claims fared against the truth, group by group."""
     groups = counts_now(read_published(root), root)
     parts = []
     for group, title in GROUPS.items():

@@ -127,7 +127,7 @@ def picture(drawn: Sequence[Panel]) -> bytes:
 
 
 def is_drawn_from(png: Path, drawn: Sequence[Panel]) -> bool:
-    """Whether a picture there is shows these panels."""
+    """Tell whether an existing picture shows these panels."""
     if not png.is_file():
         return False
     with Image.open(png) as image:

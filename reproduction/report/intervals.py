@@ -29,7 +29,7 @@ class Interval(NamedTuple):
     high: float
 
     def holds(self, number: float) -> bool:
-        """Whether a number lies within the limits."""
+        """Tell whether a number lies within the limits."""
         return self.low <= number <= self.high
 
     def __truediv__(self, other: Interval) -> Interval:

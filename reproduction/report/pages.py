@@ -66,7 +66,7 @@ def headline() -> str:
 
 
 def findings(root: Path, top: str = "", claims_page: str = "docs/results.md") -> str:
-    """What the run found, most important first, and what its limits are.
+    """Say what the run found, most important first, and how far its limits reach.
 
     Args:
         root: published results.
@@ -79,7 +79,7 @@ def findings(root: Path, top: str = "", claims_page: str = "docs/results.md") ->
 
 
 def origin(root: Path) -> str:
-    """Which run the numbers are of."""
+    """Name the run that the numbers are of."""
     record = read_result(root / "provenance.json", ("commit", "machine", "stages"), "publish again")
     cells = read_table(root, "table4_size")
     first, seeds = cells.iloc[0], sorted(set(cells.n_seeds))
@@ -147,7 +147,7 @@ def claims(root: Path) -> str:
 
 
 def difficulty(folder: Path = RESULTS / "benchmarks" / "scene_difficulty") -> str:
-    """How hard the scenes are for localisation, one line per scene that was measured."""
+    """Say how hard the scenes are for localization, a line for each that was measured."""
     names = sorted(path.name.removesuffix("-sift.csv") for path in folder.glob("*-sift.csv"))
     return markdown_table(pd.DataFrame([_difficulty(folder, name) for name in names]))
 

@@ -51,7 +51,7 @@ def publish(root: Path, target: Path, pages: Iterable[Path]) -> None:
 
 
 def _records(root: Path) -> list[Path]:
-    """What a run of everything leaves beside its tables; nothing for a run of labels alone."""
+    """List the records of a run of everything; nothing for a run of labels alone."""
     missing = [name for name in FINISHED if not (root / name).is_file()]
     if len(missing) == len(FINISHED):
         return []

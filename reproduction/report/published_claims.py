@@ -69,13 +69,13 @@ def rows_now(rows: Sequence[Row], root: Path) -> list[dict[str, str]]:
 
 
 def counts_now(rows: Sequence[Row], root: Path) -> dict[str, Counter[str]]:
-    """How many claims of each group got which verdict against the truth."""
+    """Count the claims of each group by verdict against the truth."""
     found = verdict_counts(rows_now(rows, root), "true")
     return {group: found[group] for group in GROUPS}
 
 
 def rules_note(rows: Sequence[Row], root: Path) -> str:
-    """Which rules the verdicts of a page were made by."""
+    """Name the rules that the verdicts of a page were made by."""
     tag = rules_of(rows)
     anew = sorted(judged_now(rows, root), key=lambda claim: int(claim[1:]))
     note = f"Verdicts were made by the rules of {tag}"

@@ -55,7 +55,7 @@ def write_summary(design: Design, root: Path, out_md: Path) -> None:
 
 
 def run_sentences(cells: Mapping[str, pd.DataFrame]) -> list[str]:
-    """How many cells of the tables have a score, which have none, and what Table 4 says."""
+    """Say how many cells have a score, which have none, and what Table 4 says."""
     failed = [
         f"{name} {cell.scene} {cell.size} {cell.label_id} {cell.model}"
         for name, found in cells.items()
@@ -71,7 +71,7 @@ POSITION, ORIENTATION = "position_m_true", "orientation_deg_true"
 
 
 def alive_sentences(cells: pd.DataFrame) -> list[str]:
-    """What the cells of Table 4 say about each scene, by the errors against the true poses."""
+    """Say what the cells of Table 4 show about each scene, by errors against the true poses."""
     scenes = cells.groupby("scene", sort=False)
     return [text for scene, found in scenes for text in _sentences(scene_title(str(scene)), found)]
 

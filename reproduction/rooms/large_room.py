@@ -72,7 +72,7 @@ BIN_M = [(0.11, 0.05), (0.14, 0.35), (0.15, 0.35), (0.11, 0.0)]
 
 
 def ingredients(seed: int) -> tuple[np.random.Generator, Item, Lighting, Scanner]:
-    """What it is scanned from; nothing that has a volume sticks out of the room."""
+    """Surfaces and objects to scan; nothing that has a volume sticks out of the room."""
     rng = generator_of("scene", "large_room", seed)
     make = Maker(rng)
     boards = (make.on_wall(*board, 320) for board in BOARDS)

@@ -42,7 +42,7 @@ class Wall(NamedTuple):
 
 
 def ingredients(seed: int) -> tuple[Generator, Item, Lighting, Scanner]:
-    """What is scanned: a furnished room of 12 to 50 square metres with its corner at the origin."""
+    """Furnish a room of 12 to 50 square metres with its corner at the origin."""
     rng = generator_of("scene", "random_room", seed)
     size = (rng.uniform(3.4, 6.5), rng.uniform(3.6, 7.5), rng.uniform(2.4, 3.6))
     make, walls, lower = Maker(rng), _walls(size[0], size[1]), (0.0, 0.0, 0.0)
@@ -71,12 +71,14 @@ def _palette(rng: Generator, count: int) -> tuple[Colour, ...]:
 
 
 def _surface(rng: Generator) -> Painter:
-    """What covers a wall, a floor or a ceiling."""
+    """Draw the material of a wall, a floor or a ceiling."""
     palette, colour, other = _palette(rng, int(rng.integers(1, 5))), _colour(rng), _colour(rng)
     blocks = (rng.uniform(0.1, 0.9), rng.uniform(0.06, 0.3))
     masonry = materials.masonry(palette, block_m=blocks, joint=_colour(rng))
     choices: list[Painter] = [
-        *(masonry, masonry, materials.plaster(colour)),
+        masonry,
+        masonry,
+        materials.plaster(colour),
         materials.damask(colour, motif=other, pitch_m=rng.uniform(0.15, 0.5)),
         materials.wood(colour, contrast=rng.uniform(0.1, 0.3)),
         materials.marble(colour, vein=other, scale_m=rng.uniform(0.2, 0.8)),
@@ -95,7 +97,7 @@ def _shell(make: Maker, size: Size, walls: tuple[Wall, ...]) -> Item:
 
 
 def _along(make: Maker, wall: Wall, high_m: float) -> list[Item]:
-    """What stands along a wall and hangs above it, from its left end to its right one."""
+    """Place things along a wall and above it, from its left end to its right one."""
     rng, things = make.rng, list[Item]()
     at = rng.uniform(*GAP_M)
     while True:

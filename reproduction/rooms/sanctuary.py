@@ -87,7 +87,7 @@ STATUES: tuple[tuple[float, float, Colour], ...] = (  # x, y and robe
 
 
 def ingredients(seed: int) -> tuple[np.random.Generator, Item, Lighting, Scanner]:
-    """What it is scanned from."""
+    """Surfaces and objects to scan."""
     rng = generator_of("scene", "sanctuary", seed)
     parts = (_shell, _side_walls, _portal_wall, _altar, _pews, _columns, _statues, _chandelier)
     everything = joined(part(Maker(rng)) for part in parts)

@@ -1,4 +1,4 @@
-"""What a laser scanner makes of a clean surface: uneven triangles, rounded edges, noise, holes."""
+"""Artefacts of a laser scan of a clean surface: uneven triangles, rounded edges, noise, holes."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ LIFT_M = 0.01  # rays start this far in front of their surface
 
 @dataclass(frozen=True)
 class Scanner:
-    """How a scene is scanned."""
+    """Settings of a scan."""
 
     cell_m: float  # side of the cells the surface is divided into
     stations_m: Points  # (S, 3) where the scanner stood; what none of them sees becomes a hole
@@ -222,7 +222,7 @@ def displacement(rng: np.random.Generator, points_m: Points) -> Points:
 
 
 def seen_faces(points_m: Points, faces: Faces, stations_m: Points) -> NDArray[np.bool_]:
-    """Which faces (F,) a station sees, from either side, or touch one that is seen."""
+    """Mark faces (F,) that a station sees, from either side, or that touch one that is seen."""
     caster = RayCaster(points_m, faces)
     corners = points_m[faces]
     normals = cross(corners)

@@ -1,4 +1,4 @@
-"""What every batch job does around its work: keep a log, and say one line a person can act on."""
+"""Frame of every batch job: it keeps a log, and fails in one line a person can act on."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def write_measured(jobs: pd.DataFrame, root: Path) -> None:
 
 
 def last_look_s(wall_s: float) -> float:
-    """When Snakemake last looked at a job that ran for ``wall_s``."""
+    """Return when Snakemake last looked at a job that ran for ``wall_s``."""
     if wall_s < SHORT_UNTIL_S:
         return SHORT_S * floor(wall_s / SHORT_S)
     return SHORT_UNTIL_S + LONG_S * floor((wall_s - SHORT_UNTIL_S) / LONG_S)

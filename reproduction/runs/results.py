@@ -41,7 +41,7 @@ def read_result(path: Path, needed: Iterable[str], remedy: str, shape: Any = Non
 
 
 def shaped(path: Path, value: Any, shape: Any, remedy: str) -> Any:
-    """What a result file holds, or a part of it, as the model or type it is read as."""
+    """Read a result file, or a part of it, as a model or type."""
     try:
         return ADAPTER_OF(shape).validate_json(json.dumps(value), strict=True)
     except ValidationError as error:

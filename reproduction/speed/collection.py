@@ -1,4 +1,4 @@
-"""How fast frames are made on the machine at hand: collected, and with effects on them."""
+"""Speed of making frames on the machine at hand: collecting, and effects on them."""
 
 from __future__ import annotations
 

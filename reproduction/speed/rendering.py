@@ -1,4 +1,4 @@
-"""How fast frames are drawn and how wrong they are: by backend, samples, and detail of the mesh."""
+"""Speed and error of drawing: by backend, samples, and detail of the mesh."""
 
 from __future__ import annotations
 
@@ -238,7 +238,7 @@ def truth_of(full: Variant, camera: CameraConfig, poses: Poses) -> Truth:
 
 
 def errors_of(renderer: Renderer, poses: Poses, truth: Truth) -> dict[str, float]:
-    """How far the views of a renderer are from the truth; it has drawn each once afterwards."""
+    """Measure how far a renderer's views are from the truth; afterwards each was drawn once."""
     views = [renderer.render_rgbd(pose) for pose in poses]
     rgb, depth_m = (np.stack(images) for images in zip(*views, strict=True))
     return colour_errors(rgb, truth[0]) | depth_errors(depth_m, truth[1])

@@ -57,7 +57,7 @@ class Group(NamedTuple):
 
     @property
     def n_rows(self) -> int:
-        """How many seed rows they take."""
+        """Number of seed rows they take."""
         return 2 if self.borrowed else self.n_seeds
 
 
@@ -70,7 +70,7 @@ class Borrowed(NamedTuple):
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the parts of a sample are."""
+    """Places of the parts of a sample."""
 
     resamples: int  # of the test paths
     groups: tuple[Group, ...] = ()  # in the order of their seed rows

@@ -1,4 +1,4 @@
-"""How often the ground-truth methods needed assistance, beside the counts of section 4.1."""
+"""Frequency of assistance to ground-truth methods, beside the counts of section 4.1."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def assistance_record(
 
 
 def batch_records(root: Path, scene: str, size: str, method: str, split: str) -> Records:
-    """What happened to each batch of a split, in order."""
+    """Record what happened to each batch of a split, in order."""
     path = root / "labels" / scene / size / method / "assistance.json"
     remedy = "chain these labels again"
     splits = read_result(path, ["splits"], remedy)["splits"]

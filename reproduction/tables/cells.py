@@ -53,7 +53,7 @@ SCHEMA = {
 
 
 def key_of(row: Experiment, model: str) -> Key:
-    """What has to agree for a published value to be the counterpart of a cell."""
+    """Return what must agree for a published value to be the counterpart of a cell."""
     noise = (row.noise_m, row.noise_deg)
     return (row.block, row.scene, row.size, row.labels, *noise, row.init, model)
 

@@ -66,7 +66,7 @@ class SideTable:
 
 @dataclass(frozen=True)
 class Cell:
-    """What a column shows of a row."""
+    """Content of one cell: what a column shows of a row."""
 
     text: str
     small: str = ""

@@ -1,4 +1,4 @@
-"""How good re-estimated labels are, with and without assistance, and what they cost."""
+"""Errors of re-estimated labels, with and without assistance, and their cost."""
 
 from __future__ import annotations
 

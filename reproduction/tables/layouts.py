@@ -1,4 +1,4 @@
-"""How the tables call things: titles, headings, captions, labels of rows."""
+"""Wording of the tables: titles, headings, captions, labels of rows."""
 
 from __future__ import annotations
 

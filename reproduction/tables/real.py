@@ -79,7 +79,7 @@ def read_real(path: Path) -> pd.DataFrame:
 
 
 def block_title(direction: str, labels: str) -> str:
-    """What a block of the table is of."""
+    """Title a block of the table by its direction and labels."""
     return DIRECTIONS[direction] + (WITH_SFM if labels == "sfm" else "")
 
 
@@ -98,7 +98,8 @@ def side_table(table: pd.DataFrame) -> SideTable:
         times_limits=[_between(row, "times_position", "{:.1f}") for row in rows_of(table)],
     )
     columns = [
-        *(Column("Scan", "block"), Column("Learned from", "trained_on")),
+        Column("Scan", "block"),
+        Column("Learned from", "trained_on"),
         Column("Method", "method"),
         Column("Position", "position_m", text="position_text", small="position_limits"),
         Column(
@@ -137,7 +138,7 @@ def _median(value: float, form: str) -> str:
 
 
 def remark_on(table: pd.DataFrame) -> str:
-    """What limits are over, and how many photographs there are."""
+    """Say what limits are over, and how many photographs there are."""
     first = table.iloc[0]
     length = first.n_test / first.n_blocks
     return (

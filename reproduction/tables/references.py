@@ -123,7 +123,9 @@ def side_table(table: pd.DataFrame) -> SideTable:
     rows = by_method(pd.concat([cells, best, _cost(table)]), LINES)
     followed = rows.against.map({"labels": "labels", "true poses": "true", "": ""})
     columns = [
-        *(Column("Data set", "data_set"), Column("Labels", "labels"), Column("Against", "against")),
+        Column("Data set", "data_set"),
+        Column("Labels", "labels"),
+        Column("Against", "against"),
         *method_columns(titles_in(table[table.kind != LOCALIZER]) | titles_in(best)),
         *method_columns(titles_in(table[table.kind == LOCALIZER]), on_paper=False),
     ]
@@ -182,7 +184,7 @@ def crossing_findings(table: pd.DataFrame) -> list[str]:
 
 
 def crossing_finding(table: pd.DataFrame) -> str:
-    """Where structure-based poses stop being the better ones, from noise in both parts of a pose.
+    """Say from which noise, in both parts of a pose, structure stops being better.
 
     A sentence on the rows of ``references.csv`` of one scene and size; empty where the design has
     no noise in both, or no structure.

@@ -76,7 +76,8 @@ def side_table(table: pd.DataFrame) -> SideTable:
         text=texts[0].str.cat(texts[1], ", ").where(table.position_m.notna(), "failed"),
     )
     columns = [
-        *(Column("Training frames", "trained_on"), Column("Test frames", "effects")),
+        Column("Training frames", "trained_on"),
+        Column("Test frames", "effects"),
         *method_columns({name: METHODS[name] for name in table.method.unique()}),
     ]
     rows = by_method(cells, ["trained_on", "effects"])
@@ -89,7 +90,7 @@ def printed(value: float, digits: int) -> str:
 
 
 def remark_on(table: pd.DataFrame) -> str:
-    """How many of the test frames structure-based poses are tested on, and on which map."""
+    """Say on how many test frames structure is tested, and on which map."""
     counts = table.groupby(table.method == STRUCTURE).n_test.max()
     if True not in counts:
         return ""

@@ -69,7 +69,7 @@ class Sheet:
 
 @dataclass(frozen=True)
 class _Format:
-    """How a language writes a number, the mark of a footnote, and a cell of a line."""
+    """Notation of a language for numbers, marks of footnotes, and cells of a line."""
 
     value: Callable[[Value, str], str]
     mark: Callable[[str], str]

@@ -1,4 +1,4 @@
-"""What speed costs: the variants a stage could choose among, how fast and how wrong each is."""
+"""Speed and error of the variants that a stage could choose among."""
 
 from __future__ import annotations
 
@@ -231,7 +231,7 @@ CAPTION = (
 
 
 def side_table(table: pd.DataFrame) -> SideTable:
-    """What each stage could choose among, how fast and how wrong each is."""
+    """Tabulate each stage's variants, how fast and how wrong each is."""
     used, style = (table.chosen.map({1: text, 0: ""}) for text in ("✓", "used"))
     rows = table.assign(scene=table.scene.map(scene_title), used=used, style=style)
     return SideTable(NAME, CAPTION, COLUMNS, rows)

@@ -96,12 +96,12 @@ def sheet_of(name: str, cells: pd.DataFrame) -> Sheet:
 
 
 def one_run_remarks(cells: pd.DataFrame) -> list[str]:
-    """What has to be said where limits do not cover training runs."""
+    """Remark where limits do not cover training runs."""
     return [ONE_RUN] if bool((cells.limits_of == PATHS).any()) else []
 
 
 def _order(name: str, row: Any) -> object:
-    """What the page sorts a row by: its noise, label or number of frames."""
+    """Return the key a row is sorted by on the page: its noise, label or number of frames."""
     if row.block:
         return f"{1000 * row.noise_m + row.noise_deg:g}"
     return row_label(name, row) if name == "table2_ground_truth" else row.n_train
@@ -177,7 +177,7 @@ def _mark_best(numbers: Mapping[tuple[int, str, str], list[Value]]) -> None:
 
 
 def _where(cells: pd.DataFrame) -> str:
-    """Which scene, and how many frames where that is the same for the whole table."""
+    """Name the scene, and the number of frames where the whole table has one."""
     titles = list(dict.fromkeys(map(scene_title, cells.scene)))
     where = f"Scene: {titles[0]}" if len(titles) == 1 else f"Scenes: {', '.join(titles)}"
     counts = cells[["n_train", "n_test"]].drop_duplicates()

@@ -1,4 +1,4 @@
-"""What scoring against noisy labels does by itself, without any harm to a network.
+"""Effect of scoring against noisy labels alone, without any harm to a network.
 
 Labels with independent noise are a worse yardstick: the error against them is that against the
 truth, with the noise of the test label added. Whoever compares the errors of a network trained on

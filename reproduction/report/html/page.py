@@ -91,7 +91,13 @@ REAL_CAPTIONS = {
 }
 # Modules of the tables that follow tables 1 to 7.
 SIDE_TABLES: Sequence[Any] = (
-    *(references, recall, robustness, assistance, label_error, speed_vs_error, hard_cases),
+    references,
+    recall,
+    robustness,
+    assistance,
+    label_error,
+    speed_vs_error,
+    hard_cases,
 )
 
 

@@ -39,7 +39,7 @@ def write_provenance(
 
 
 def stages_of(jobs: pd.DataFrame) -> list[dict[str, Any]]:
-    """What the jobs of each stage took together, the longest stage first.
+    """Add up the jobs of each stage, the longest stage first.
 
     ``seconds`` are of all ``jobs``; ``peak_mb`` is None where all were too short to measure.
     """
@@ -114,7 +114,8 @@ def read_origin(path: Path) -> Record:
 def origin_html(record: Record) -> Markup:
     """Facts, and the stages as a table."""
     columns = [
-        *(Column("Stage", "stage"), Column("Jobs", "jobs", "{:,.0f}")),
+        Column("Stage", "stage"),
+        Column("Jobs", "jobs", "{:,.0f}"),
         Column("All jobs", "seconds", text="all"),
         Column("Median job", "median_seconds", text="median"),
         Column("Peak memory (MB)", "peak_mb", "{:,.0f}"),
@@ -129,7 +130,7 @@ def origin_html(record: Record) -> Markup:
 
 
 def cost_sentence(record: Record) -> str:
-    """How much was computed, and on what."""
+    """Say how much was computed, and on what."""
     seconds = sum(stage["seconds"] for stage in record["stages"])
     jobs = sum(stage["jobs"] for stage in record["stages"])
     machine = record["machine"]

@@ -151,7 +151,7 @@ def claims_table(claims: Claims) -> Markup:
 
 
 def verdict_table(claims: Claims) -> Markup:
-    """How many claims of each group got which verdict, under either score."""
+    """Tabulate the claims of each group by verdict, under either score."""
     counts = {score: verdict_counts(claims, score) for score in SCORES}
     found = {claim[f"verdict_{score}"] for claim in claims for score in SCORES}
     return render(
