@@ -29,7 +29,7 @@ CAMERA_HEIGHT_M = (0.8, 2.0)  # hand-held cameras, above the floor
 FLOOR_BIN_M = 0.05
 N_PLACES = 400  # that are tested for seeing each other
 N_HUBS = 100  # of these, to tell what else belongs to their space
-LEAST_GROUP = 0.1  # of the places: smaller groups are nooks, and the insides of things
+LEAST_GROUP = 0.2  # of the places: smaller groups are nooks, and the insides of things
 LEAST_FLOOR = 0.15  # of the places to stand of a space
 FLOORS_APART_M = 0.5
 
@@ -117,7 +117,7 @@ def find_free_spaces(caster: RayCaster, found: Survey, slack: float = SLACK) -> 
         slack: By how much less enclosed a point may be than the best places to stand.
 
     Returns:
-        Spaces that hold at least a tenth of the places to stand, the largest first; an empty one
+        Spaces that hold at least a fifth of the places to stand, the largest first; an empty one
         where there is no place to stand.
     """
     if not found.is_stand.any():
