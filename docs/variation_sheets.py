@@ -19,6 +19,7 @@ from synfeal.dataset.render_sequence import drawn
 from synfeal.effects.scene import SceneRenderer, open_scene
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
+from synfeal.render.surface import Layers
 
 CAMERA, RENDER = CameraConfig(width=320, height=240), RenderConfig(backend="opengl")
 SHOWN = (3, 10, 30, 47)  # paths of the test set, their second frame
@@ -61,8 +62,8 @@ def path_rows(root: Path, plan: PoseTable) -> list:
         for path in PATHS:
             first = int(np.flatnonzero(plan.path == path)[0])
             poses = plan.between(first, first + 10)
-            frames = list(drawn(renderer, poses, False, (CAMERA, effects)))
-            sheet.append(np.hstack([rgb for rgb, _ in frames[::3]]))
+            frames = list(drawn(renderer, poses, Layers(), (CAMERA, effects)))
+            sheet.append(np.hstack([frame.rgb for frame in frames[::3]]))
     return sheet
 
 
@@ -77,7 +78,7 @@ def row_of(mesh: TexturedMesh, poses: list[PoseTable], title: str, effects: Effe
     switched = effects and effects.light and effects.light.states
     shares = shares_of_the_room() if switched else None
     with SceneRenderer(mesh, CAMERA, RENDER, shares) as renderer:
-        frames = [rgb for pose in poses for rgb, _ in drawn(renderer, pose, False, through)]
+        frames = [f.rgb for pose in poses for f in drawn(renderer, pose, Layers(), through)]
     row = Image.new("RGB", (CAMERA.width * len(frames), CAMERA.height + TITLE_PX))
     row.paste(Image.fromarray(np.hstack(frames)), (0, TITLE_PX))
     ImageDraw.Draw(row).text((4, 1), title, "white")

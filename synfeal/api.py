@@ -7,7 +7,9 @@ invalid option raises an :class:`synfeal.errors.InputError` that names it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,14 +22,24 @@ from synfeal.config.collection import SceneConfig
 from synfeal.config.dataset import CameraConfig, DatasetConfig
 from synfeal.config.options import SCENE, dataset_config, options_named, render_configs
 from synfeal.dataset.frame_files import FrameFile
+from synfeal.dataset.layer_files import read_instances, read_mask, read_normals
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.posed_sequence import refuse_non_rigid
-from synfeal.dataset.sequence_listing import COLOR, DEPTH, RIGHT_COLOR, RIGHT_DEPTH
+from synfeal.dataset.sequence_listing import (
+    COLOR,
+    DEPTH,
+    MASK,
+    NORMAL,
+    RIGHT_COLOR,
+    RIGHT_DEPTH,
+)
+from synfeal.dataset.sevenscenes import read_depth_m
 from synfeal.dataset.split_frames import SplitFrames, read_split_frames
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import FARTHEST_M, moved_right
 from synfeal.mesh import load
 from synfeal.mesh.ambient import with_ambient_light
+from synfeal.mesh.instances import Instance, number_instances
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.triangles import merge_vertices
 from synfeal.planning.plan import plan_mesh
@@ -35,6 +47,7 @@ from synfeal.planning.repeat import read_poses
 from synfeal.records.provenance import generator_of
 from synfeal.render import open_renderer
 from synfeal.render.base import Depth, Rgb
+from synfeal.render.surface import Normals, Surface, SurfaceTable
 from synfeal.validation.camera import camera_of_dataset
 
 if TYPE_CHECKING:
@@ -67,7 +80,7 @@ class Renderer:
     def __init__(self, mesh: TexturedMesh, **options: Any) -> None:
         camera, render = render_configs(options)
         lit = with_ambient_light(mesh) if render.shade == "ambient" else mesh
-        self._opened = open_renderer(lit, camera, render)
+        self._mesh, self._opened = mesh, open_renderer(lit, camera, render)
         self.camera: CameraConfig = camera
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
@@ -89,6 +102,23 @@ class Renderer:
             InputError: It is no rotation and position.
         """
         return self._opened.render_rgbd(_rigid(world_from_cam))
+
+    def render_surface(self, world_from_cam: NDArray[np.float64]) -> Surface:
+        """Render normals and masks from a camera pose (4, 4).
+
+        Returns:
+            Unit normals (H, W, 3) in the frame of the camera, which they face, 0 0 0 where no
+            surface is seen; numbers (H, W) of the parts of the mesh, counted from 1, 0 for none.
+
+        Raises:
+            InputError: It is no rotation and position.
+        """
+        pose = _rigid(world_from_cam)
+        return self._surfaces.look_up(self._opened.render_faces(pose), pose)
+
+    @cached_property
+    def _surfaces(self) -> SurfaceTable:
+        return SurfaceTable(self._mesh, self.camera, number_instances(self._mesh))
 
     def __enter__(self) -> Renderer:
         return self
@@ -159,6 +189,8 @@ class Split:
     images: list[FrameFile]  # files of the colour images; ``read_bytes()`` gives what one holds
     depths: tuple[FrameFile, ...] = ()  # files of the depth images, if there are any
     right: Split | None = None  # the second camera of stereo pairs, if they are
+    normals: tuple[FrameFile, ...] = ()  # files of normals, if there are any
+    masks: tuple[FrameFile, ...] = ()  # files of masks, if there are any
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -167,6 +199,24 @@ class Split:
     def world_from_cam(self) -> NDArray[np.float64]:
         """Return camera poses (N, 4, 4)."""
         return self.poses.world_from_cam
+
+    def depth_m(self, row: int) -> Depth:
+        """Read depth (H, W) of a frame in metres, infinite where there is none."""
+        return read_depth_m(_file_at(self.depths, row, "depth"))
+
+    def normals_cam(self, row: int) -> Normals:
+        """Read unit normals (H, W, 3) in the frame of the camera, 0 0 0 where there is nothing."""
+        return read_normals(_file_at(self.normals, row, "normals"))
+
+    def mask(self, row: int) -> NDArray[np.uint16]:
+        """Read the numbers (H, W) of instances, 0 where there is nothing."""
+        return read_mask(_file_at(self.masks, row, "masks"))
+
+
+def _file_at(files: tuple[FrameFile, ...], row: int, what: str) -> FrameFile:
+    if not files:
+        raise InputError(f"{what}: the data set has none; collect it with --{what}")
+    return files[row]
 
 
 @dataclass(frozen=True)
@@ -177,6 +227,10 @@ class Dataset:
     camera: CameraConfig  # that of 7-Scenes if the data set does not record one
     train: Split
     test: Split
+
+    def instances(self) -> Mapping[int, Instance]:
+        """Read what the values of masks stand for."""
+        return read_instances(self.path)
 
 
 def open_dataset(path: AnyPath) -> Dataset:
@@ -196,12 +250,13 @@ def _split(path: Path, split: str, baseline_m: float | None) -> Split:
     right = None
     if baseline_m is not None:
         moved = poses.with_poses(moved_right(poses.world_from_cam, baseline_m))
-        right = Split(moved, listed.files(RIGHT_COLOR), _depths(listed, RIGHT_DEPTH))
-    return Split(poses, listed.files(COLOR), _depths(listed, DEPTH), right)
+        right = Split(moved, listed.files(RIGHT_COLOR), _layer(listed, RIGHT_DEPTH))
+    depths, normals, masks = (_layer(listed, kind) for kind in (DEPTH, NORMAL, MASK))
+    return Split(poses, listed.files(COLOR), depths, right, normals, masks)
 
 
-def _depths(listed: SplitFrames, kind: str) -> tuple[FrameFile, ...]:
-    """The depth images of one camera; none where there are no such files at all."""
+def _layer(listed: SplitFrames, kind: str) -> tuple[FrameFile, ...]:
+    """The images of one kind; none where there are no such files at all."""
     there = any(sequence.numbers[kind] for sequence in listed.sequences)
     return tuple(listed.files(kind)) if there else ()
 

@@ -33,6 +33,7 @@ from synfeal.dataset.render_sequence import drawn, effects_of
 from synfeal.effects.scene import open_scene
 from synfeal.evaluation.metrics import pose_errors, summary
 from synfeal.records.tables import COUNT, MAYBE, TEXT, frame_of
+from synfeal.render.surface import Layers
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -83,7 +84,7 @@ def write_varied(
         places = tqdm(rows.tolist(), "drawing", unit="frame", mininterval=5)
         poses = (plan.between(row, row + 1) for row in places)
         added = effects_of(camera, render)  # of each frame as a part of its path
-        views = (next(drawn(renderer, pose, False, added))[0] for pose in poses)
+        views = (next(drawn(renderer, pose, Layers(), added)).rgb for pose in poses)
         greys = (np.asarray(Image.fromarray(rgb).convert("L")) for rgb in views)
         test = features_of(greys, None, camera, references)
     train = read_pose_table(files["labels"])

@@ -25,6 +25,7 @@ from synfeal.records.files import write_json
 from synfeal.records.provenance import CPU_INFO, processor_name
 from synfeal.records.tables import COUNT, NUMBER, TEXT, frame_of, write_frame
 from synfeal.records.timing import seconds_of
+from synfeal.render.surface import Layers
 
 PAPER_CAMERA = CameraConfig(width=640, height=480)  # what the published code renders
 FRAMES, PARTS = 100, 4
@@ -56,7 +57,7 @@ def write_collection_speed(
     ):
         parts = enumerate(np.array_split(np.arange(FRAMES), PARTS))
         seconds = seconds_of(
-            partial(write_sequence, renderer, plan.at(rows), Path(folder, f"seq-{part}"), False)
+            partial(write_sequence, renderer, plan.at(rows), Path(folder, f"seq-{part}"), Layers())
             for part, rows in parts
         )
     write_json(
@@ -104,7 +105,7 @@ def seconds_of_effects(
     with open_scene(mesh, camera, opened) as renderer:
         through: dict[str, Effects | None] = {CLEAN: None}
         through |= {name: (camera, each) for name, each in effects.items()}
-        frames = [drawn(renderer, poses, False, each) for each in through.values()]
+        frames = [drawn(renderer, poses, Layers(), each) for each in through.values()]
         works = [partial(_compress_next, each) for each in frames]
         rows = [seconds_of(works, of_processor=True) for _ in range(len(poses))]
     return dict(zip(through, np.mean(rows[1:], axis=0).tolist(), strict=True))

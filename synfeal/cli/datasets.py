@@ -20,6 +20,7 @@ POSE_FORMATS = (
     "7scenes", "tum", "kitti", "euroc", "colmap", "hloc", "pgt", "ace", "ace0", "csv",
 )
 # fmt: on
+LAYERS = ("color", "depth", "normals", "masks")
 FILES = ("scores.csv", "errors.csv", "errors.png")
 DATASET = option("dataset", "directory of seq-01 or seq-01.zip", type=Path, metavar="DATASET")
 CAMERA = option("--camera", "calibration file (manifest.json)", type=Path, metavar="FILE")
@@ -39,6 +40,7 @@ CAMERA = option("--camera", "calibration file (manifest.json)", type=Path, metav
     option("--frames", "frames to show, from the first (120)", type=int, default=120),
     option("--fps", "frames a second, at most 50 (12)", type=float, default=12.0),
     option("--split", "(train)", choices=("train", "test"), default="train"),
+    option("--show", "layers to show side by side (color)", nargs="+", choices=LAYERS),
 )
 def preview(arguments: argparse.Namespace) -> None:
     """Writes a GIF or MP4 of the first frames of a data set.
@@ -48,7 +50,14 @@ def preview(arguments: argparse.Namespace) -> None:
     from synfeal.dataset.preview import write_preview
 
     out = arguments.out or arguments.datasets[0] / "preview.gif"
-    shown = write_preview(arguments.datasets, out, arguments.frames, arguments.fps, arguments.split)
+    shown = write_preview(
+        arguments.datasets,
+        out,
+        arguments.frames,
+        arguments.fps,
+        arguments.split,
+        arguments.show or ("color",),
+    )
     print(f"{out}: {shown} frames")
 
 

@@ -60,6 +60,8 @@ RGBD_OPTIONS = (
     option("--out", "directory to create", type=Path, required=True),
     option("--test-frames", "test frames (0)", type=int, default=0),
     option("--depth", "write depth images too", action="store_true"),
+    option("--normals", "write surface normals too (docs/layers.md)", action="store_true"),
+    option("--masks", "write masks of parts and objects too", action="store_true"),
     option("--seed", "root of all random numbers (0)", type=int),
     *MESH_OPTIONS,
     option("--spacing", "metres between frames (0.03)", type=float),

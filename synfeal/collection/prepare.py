@@ -14,7 +14,6 @@ from synfeal.collection.collision import Rung, collision_mesh, write_curve
 from synfeal.config.collection import ClutterConfig, SceneConfig
 from synfeal.config.dataset import Shade
 from synfeal.config.load import check_mesh_file
-from synfeal.dataset.finish import CLUTTER
 from synfeal.effects.scene import CARTONS, carton_files
 from synfeal.errors import InputError
 from synfeal.mesh.ambient import with_ambient_light
@@ -23,7 +22,7 @@ from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.properties import mesh_properties
 from synfeal.mesh.save import save_glb
-from synfeal.mesh.standing import refuse_larger, standing
+from synfeal.mesh.standing import CLUTTER, refuse_larger, standing
 from synfeal.mesh.triangles import Triangles, merge_vertices, save_collision_mesh
 from synfeal.objects import materials
 from synfeal.objects.canvas import VIVID, pick

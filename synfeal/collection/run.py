@@ -21,8 +21,10 @@ from synfeal.collection.detail import write_detail
 from synfeal.collection.prepare import prepare_mesh, save_cartons
 from synfeal.config.collection import SceneConfig
 from synfeal.config.dataset import CameraConfig, DatasetConfig, Shade
+from synfeal.config.effects import MOST_PATH_OBJECTS
 from synfeal.dataset.finish import MANIFEST, finish_dataset, origin_of
 from synfeal.dataset.frame_files import SUFFIX
+from synfeal.dataset.layer_files import refuse_many_instances
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.render_pool import Studio, render_sequences
 from synfeal.dataset.render_sequence import Progress, resolved
@@ -41,6 +43,7 @@ from synfeal.planning.plan import plan_mesh
 from synfeal.records.files import write_json
 from synfeal.records.lock import WORK, clean_up, growing, place_of
 from synfeal.records.provenance import generator_of
+from synfeal.render.surface import Layers
 
 WARN_ABOVE = 0.1  # of all pixels: more than windows let through
 SEES_MOST = 0.9  # of a view that meets the mesh
@@ -236,6 +239,8 @@ def _prepare(job: CollectJob, scene: Path) -> None:
         shade = config.render.shade
         mesh, _ = prepare_mesh(job.scene, settings, agreement, config.seed, scene, shade)
         refuse_invisible(mesh, config.network_camera, str(settings.path), shade)
+        if config.network_masks:
+            refuse_many_instances(mesh, MOST_PATH_OBJECTS, str(settings.path))
     effects = job.config.render.effects
     if effects and effects.clutter:
         if not effects.clutter.files:
@@ -299,7 +304,8 @@ def _render(
     ]
     missing = [(out, poses) for out, poses in tasks if not out.exists()]
     n_frames, n_missing = (sum(len(poses) for _, poses in some) for some in (tasks, missing))
-    studio = Studio(mesh, config.network_camera, config.render, config.network_depth, detail)
+    layers = Layers(config.network_depth, config.network_normals, config.network_masks)
+    studio = Studio(mesh, config.network_camera, config.render, layers, detail)
     with Progress(n_frames, "collect", n_frames - n_missing) as progress:
         render_sequences(studio, missing, workers, progress)
 

@@ -234,6 +234,8 @@ class DatasetConfig(Strict):
     collection: CollectionConfig = part(CollectionConfig, "camera movement")
     network_camera: CameraConfig = part(CameraConfig, "camera of the localizers' frames")
     network_depth: bool = Field(False, description="write its depth images too")
+    network_normals: bool = Field(False, description="write normals of surfaces too")
+    network_masks: bool = Field(False, description="write masks of parts and objects too")
     render: RenderConfig = part(RenderConfig, "how frames are drawn")
 
     @model_validator(mode="after")

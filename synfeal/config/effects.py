@@ -20,6 +20,7 @@ from synfeal.config.collection import (
 )
 
 Kelvin = Annotated[float, Field(ge=2000, le=25000)]
+MOST_PATH_OBJECTS = 100
 Stops = Annotated[float, Field(ge=-10, le=10)]
 
 
@@ -75,7 +76,7 @@ class NoiseConfig(Strict):
 class PathObjectsConfig(Strict):
     """Objects that stand about, differently along every path, none in the way of the camera."""
 
-    count: int = Field(8, ge=1, le=100, description="how many, where they fit")
+    count: int = Field(8, ge=1, le=MOST_PATH_OBJECTS, description="how many, where they fit")
     files: tuple[Path, ...] = Field((), description="meshes in metres, used in turn; none: cartons")
 
 

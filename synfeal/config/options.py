@@ -50,6 +50,8 @@ KEYS: Mapping[str, str] = {
     "fisheye_k": "network_camera.fisheye_k",
     "stereo": "network_camera.stereo_baseline_m",
     "depth": "network_depth",
+    "normals": "network_normals",
+    "masks": "network_masks",
     "backend": "render.backend",
     "supersampling": "render.supersampling",
     "detail": "render.detail",

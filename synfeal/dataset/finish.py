@@ -12,22 +12,30 @@ import numpy as np
 from synfeal.config.dataset import CameraConfig, DatasetConfig, RenderConfig
 from synfeal.config.effects import EffectsConfig
 from synfeal.dataset.frame_files import frame_file, sequence_at, sequence_names
+from synfeal.dataset.layer_files import ENCODING, MASKS, write_instances
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.pose_table import read_frames, read_pose_table, write_pose_table
 from synfeal.dataset.preview import write_contact_sheet
-from synfeal.dataset.sequence_listing import RIGHT_COLOR, RIGHT_DEPTH
+from synfeal.dataset.sequence_listing import (
+    MASK,
+    NORMAL,
+    RIGHT_COLOR,
+    RIGHT_DEPTH,
+    list_sequence,
+)
 from synfeal.dataset.sevenscenes import Sequence as Shard
 from synfeal.dataset.sevenscenes import Split, frame_paths, sequences_of, write_splits
 from synfeal.effects.apply import effects_table, objects_table
 from synfeal.effects.scene import crowd_of
 from synfeal.geometry.poses import moved_right
+from synfeal.mesh.load import load_mesh
+from synfeal.mesh.standing import CLUTTER
 from synfeal.records.files import file_sha256, read_json, write_json
 from synfeal.records.provenance import frame_versions
 from synfeal.records.tables import write_frame
 from synfeal.render.choose import graphics
 
 MANIFEST = "manifest.json"
-CLUTTER = "clutter.json"  # beside the mesh: which objects stand about in it, and where
 
 
 def finish_dataset(
@@ -68,10 +76,25 @@ def finish_dataset(
     about["graphics"] = drawn_by
     if detail is not None:
         about["detail"] = read_json(detail)
+    about |= _write_layers(directory, list(paths.values()), origin, mesh)
     clutter = mesh.with_name(CLUTTER)
     if places := read_json(clutter) if clutter.is_file() else []:
         about["clutter"] = places
     write_manifest(directory, sequences, camera, about)
+
+
+def _write_layers(
+    directory: Path, sequences: Sequence[Path], origin: Mapping[str, Any], mesh: Path
+) -> dict[str, Any]:
+    """Write the table of instances where there are masks; encodings of layers for the manifest."""
+    held = list_sequence(sequences[0]).numbers
+    kinds = {"normals": NORMAL, "masks": MASK}
+    encoded = {name: ENCODING[name] for name, kind in kinds.items() if held[kind]}
+    if held[MASK]:
+        effects = origin["render"].get("effects") or {}
+        along_paths = effects.get("clutter") is not None
+        write_instances(mesh, load_mesh(mesh), directory / MASKS, along_paths)
+    return {"layers": encoded} if encoded else {}
 
 
 def _write_effects(directory: Path, origin: Mapping[str, Any], mesh: Path) -> dict[str, Any]:

@@ -6,13 +6,14 @@ import importlib.util
 import math
 import shutil
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from PIL import Image, ImageDraw
 
 from synfeal.dataset.frame_files import FrameFile, read_image
-from synfeal.dataset.sequence_listing import COLOR
+from synfeal.dataset.layer_pictures import PICTURES
 from synfeal.dataset.sevenscenes import Split
 from synfeal.dataset.split_frames import read_split_frames
 from synfeal.errors import InputError
@@ -22,9 +23,25 @@ TILE_WIDTH_PX, TITLE_PX = 320, 16
 
 
 def write_preview(
-    datasets: Sequence[Path], out: Path, n_frames: int, fps: float, split: Split = "train"
+    datasets: Sequence[Path],
+    out: Path,
+    n_frames: int,
+    fps: float,
+    split: Split = "train",
+    show: Sequence[str] = ("color",),
 ) -> int:
-    """Write a GIF or MP4 of the first frames of data sets, each under its name; how many it shows.
+    """Write a GIF or MP4 of the first frames of data sets, side by side under their names.
+
+    Args:
+        datasets: Data sets.
+        out: File to write; its ending decides the format.
+        n_frames: Frames to show, at most.
+        fps: Frames a second.
+        split: Which frames.
+        show: Layers to show of each data set, keys of :data:`PICTURES`.
+
+    Returns:
+        Number of frames shown.
 
     Raises:
         InputError: a data set has no such frames, a number is out of its bounds, or there is no
@@ -39,9 +56,18 @@ def write_preview(
         raise InputError(f"--out: {out}: a preview is a GIF or MP4; end its name in .gif or .mp4")
     if write is _write_mp4:
         encoder()  # missing, it is to be missed before any frame is read
-    columns = [read_split_frames(dataset, split).files(COLOR) for dataset in datasets]
-    names = [dataset.resolve().name for dataset in datasets]
-    pictures = list(_rows([frames[:n_frames] for frames in columns], names))
+    columns = []
+    for dataset in datasets:
+        frames = read_split_frames(dataset, split)
+        for layer in show:
+            kind, picture = PICTURES[layer]
+            if layer != "color" and not any(s.numbers[kind] for s in frames.sequences):
+                raise InputError(
+                    f"--show: {dataset} has no {layer}; collect it with --{layer}, or leave it out"
+                )
+            name = dataset.resolve().name + (f" {layer}" if len(show) > 1 else "")
+            columns.append(Column(name, frames.files(kind)[:n_frames], picture))
+    pictures = list(_rows(columns))
     if not pictures:
         raise InputError(f"{datasets[0]}: has no {split} frames; choose the other --split")
     with atomic_path(out) as temporary:
@@ -91,10 +117,20 @@ BIT_EXACT = ("-threads", "1", "-fflags", "+bitexact", "-flags:v", "+bitexact")  
 WRITERS = {".gif": _write_gif, ".mp4": _write_mp4}
 
 
-def _rows(columns: Sequence[Sequence[FrameFile]], names: Sequence[str]) -> Iterator[Image.Image]:
+class Column(NamedTuple):
+    """What is shown in one place, moment after moment."""
+
+    name: str
+    files: Sequence[FrameFile]
+    picture: Callable[[FrameFile], Image.Image]
+
+
+def _rows(columns: Sequence[Column]) -> Iterator[Image.Image]:
     """The frames of all data sets at one moment, until the shortest ends."""
-    for moment in zip(*columns, strict=False):
-        tiles = [_tile(read_image(file, "RGB"), TILE_WIDTH_PX) for file in moment]
+    names = [column.name for column in columns]
+    for moment in zip(*(column.files for column in columns), strict=False):
+        pictures = (column.picture(file) for column, file in zip(columns, moment, strict=True))
+        tiles = [_tile(picture, TILE_WIDTH_PX) for picture in pictures]
         height = max(tile.height for tile in tiles)
         row = Image.new("RGB", (TILE_WIDTH_PX * len(tiles), height + TITLE_PX))
         for index, (tile, name) in enumerate(zip(tiles, names, strict=True)):

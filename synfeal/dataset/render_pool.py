@@ -20,6 +20,7 @@ from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.render_sequence import Progress, effects_of, write_sequence
 from synfeal.effects.scene import SceneRenderer, open_scene
 from synfeal.errors import InputError
+from synfeal.render.surface import Layers
 
 POLL_S = 0.2
 Task = tuple[Path, PoseTable]  # `seq-01` or `seq-01.zip`, and its poses
@@ -32,7 +33,7 @@ class Studio:
     mesh: Path
     camera: CameraConfig
     render: RenderConfig
-    with_depth: bool
+    layers: Layers  # what is written beside colours
     detail: Path | None = None  # what colours are drawn of, if not of ``mesh``
 
     def open(self) -> SceneRenderer:
@@ -48,7 +49,7 @@ class Studio:
             renderer,
             poses,
             out,
-            self.with_depth,
+            self.layers,
             on_frame,
             effects_of(self.camera, self.render),
             self.camera.stereo_baseline_m,

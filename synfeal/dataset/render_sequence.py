@@ -20,9 +20,18 @@ from tqdm import tqdm
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.config.effects import EffectsConfig
 from synfeal.dataset.frame_files import encode_png, is_archive, write_archive
+from synfeal.dataset.layer_files import mask_pixels, normal_pixels
 from synfeal.dataset.packed import View, fit_frame, new_packed
 from synfeal.dataset.pose_table import PoseTable, read_frames
-from synfeal.dataset.sequence_listing import COLOR, DEPTH, POSE, RIGHT_COLOR, RIGHT_DEPTH
+from synfeal.dataset.sequence_listing import (
+    COLOR,
+    DEPTH,
+    MASK,
+    NORMAL,
+    POSE,
+    RIGHT_COLOR,
+    RIGHT_DEPTH,
+)
 from synfeal.dataset.sevenscenes import depth_mm_of, pose_text
 from synfeal.effects.apply import Frame, varied_frames
 from synfeal.effects.scene import SceneRenderer, open_scene
@@ -35,6 +44,7 @@ from synfeal.records.files import (
     writing_to,
 )
 from synfeal.render.choose import fastest_working, graphics
+from synfeal.render.surface import Layers
 
 
 class Progress(tqdm):  # type: ignore[type-arg]
@@ -65,6 +75,8 @@ def render_sequence(
     render: RenderConfig,  # backend and effects
     out_frames: Path,  # a directory, or an archive if its name ends in ``.zip``
     detail: Path | None = None,  # what colours are drawn of, if not of ``mesh``
+    with_normals: bool = False,
+    with_masks: bool = False,
 ) -> None:
     """Render poses of a table into a new sequence, which appears when it is complete.
 
@@ -80,7 +92,7 @@ def render_sequence(
             renderer,
             poses,
             out_frames,
-            with_depth,
+            Layers(depth=with_depth, normals=with_normals, masks=with_masks),
             progress.update,
             effects_of(camera, render),
             camera.stereo_baseline_m,
@@ -96,7 +108,7 @@ def write_sequence(
     renderer: SceneRenderer,
     poses: PoseTable,
     out: Path,
-    with_depth: bool,
+    layers: Layers,
     on_frame: Callable[[], object] = lambda: None,
     effects: Effects | None = None,
     stereo_baseline_m: float | None = None,
@@ -110,7 +122,7 @@ def write_sequence(
         renderer: Draws the frames.
         poses: Their poses.
         out: Directory or archive to write.
-        with_depth: Write depth images, too.
+        layers: What is written beside colours; of the right camera of pairs, depth alone.
         on_frame: Called for each frame that is whole.
         effects: What is added to ideal frames, if anything.
         stereo_baseline_m: Distance to a second camera on the right that is drawn, too; None draws
@@ -118,11 +130,11 @@ def write_sequence(
     """
     with _new_sequence(out) as directory, ThreadPoolExecutor(THREADS) as threads:
         waiting: deque[Future[None]] = deque()
-        frames = drawn(renderer, poses, with_depth, effects)
+        frames = drawn(renderer, poses, layers, effects)
         to_right: Iterator[Frame | None] = repeat(None, len(poses))
         if stereo_baseline_m is not None:
             moved = poses.with_poses(moved_right(poses.world_from_cam, stereo_baseline_m))
-            to_right = drawn(renderer, moved, with_depth, None)
+            to_right = drawn(renderer, moved, Layers(depth=layers.depth), None)
         try:
             every = zip(poses.world_from_cam, frames, to_right, strict=True)
             for number, (pose, frame, right) in enumerate(every):
@@ -138,34 +150,46 @@ def write_sequence(
 def _write_frame(
     stem: Path, world_from_cam: NDArray[np.float64], frame: Frame, right: Frame | None
 ) -> None:
-    """Write ``<stem>.color.png``, ``.pose.txt``, with depth ``.depth.png``; of a pair both."""
+    """Write ``<stem>.color.png``, ``.pose.txt``, and the layers of the frame; of a pair both."""
     stem.with_suffix(f".{POSE}").write_bytes(pose_text(world_from_cam).encode())
     _write_images(stem, frame, COLOR, DEPTH)
+    if frame.normals_cam is not None:
+        pixels = normal_pixels(frame.normals_cam)
+        stem.with_suffix(f".{NORMAL}").write_bytes(encode_png(pixels))
+    if frame.ids is not None:
+        stem.with_suffix(f".{MASK}").write_bytes(encode_png(mask_pixels(frame.ids)))
     if right is not None:
         _write_images(stem, right, RIGHT_COLOR, RIGHT_DEPTH)
 
 
 def _write_images(stem: Path, frame: Frame, color_kind: str, depth_kind: str) -> None:
-    rgb, depth_m = frame
-    if depth_m is not None:
-        stem.with_suffix(f".{depth_kind}").write_bytes(encode_png(depth_mm_of(depth_m)))
-    stem.with_suffix(f".{color_kind}").write_bytes(encode_png(rgb))
+    if frame.depth_m is not None:
+        stem.with_suffix(f".{depth_kind}").write_bytes(encode_png(depth_mm_of(frame.depth_m)))
+    stem.with_suffix(f".{color_kind}").write_bytes(encode_png(frame.rgb))
 
 
 def drawn(
-    renderer: SceneRenderer, poses: PoseTable, with_depth: bool, effects: Effects | None
+    renderer: SceneRenderer, poses: PoseTable, layers: Layers, effects: Effects | None
 ) -> Iterator[Frame]:
-    """Colours, and depth if it is asked for, of every pose: all frames of data sets come from here.
+    """Draw a frame of every pose: all frames of data sets come from here.
 
-    ``effects`` are added to ideal frames, through their camera; None draws them ideal.
+    Args:
+        renderer: Renderer of the scene.
+        poses: Poses, whole paths or parts of them.
+        layers: What is wanted beside colours.
+        effects: What is added to ideal frames, through their camera; None draws them ideal.
     """
     if effects is None:
         for pose in poses.world_from_cam:
-            yield renderer.render_rgbd(pose) if with_depth else (renderer.render(pose), None)
+            if layers.depth:
+                frame = Frame(*renderer.render_rgbd(pose))
+            else:
+                frame = Frame(renderer.render(pose))
+            yield frame.with_surface(layers, renderer, pose)
         return
     whole = poses.whole or poses
     begin = int(np.searchsorted(whole.frame, poses.frame[0]))
-    yield from varied_frames(renderer, *effects, whole, begin, begin + len(poses), with_depth)
+    yield from varied_frames(renderer, *effects, whole, begin, begin + len(poses), layers)
 
 
 def effects_of(camera: CameraConfig, render: RenderConfig | None) -> Effects | None:
@@ -220,9 +244,9 @@ def render_packed(
         Progress(len(poses), out_frames.stem) as progress,
     ):
         began = time.perf_counter()
-        frames = drawn(renderer, poses, False, effects_of(camera, chosen))
-        for index, (rgb, _) in enumerate(frames):
-            packed[index] = fit_frame(Image.fromarray(rgb), input_px, view)
+        frames = drawn(renderer, poses, Layers(), effects_of(camera, chosen))
+        for index, frame in enumerate(frames):
+            packed[index] = fit_frame(Image.fromarray(frame.rgb), input_px, view)
             progress.update()
         record = {"frames": len(poses), **graphics(chosen.backend)}
         write_json(out_frames.with_suffix(".json"), record)

@@ -20,15 +20,18 @@ COLOR, DEPTH, POSE = "color.png", "depth.png", "pose.txt"
 # Of the right camera of a stereo pair; its pose follows from that of the frame (manifest.json).
 RIGHT_COLOR, RIGHT_DEPTH = "right.color.png", "right.depth.png"
 RIGHT_OF = {COLOR: RIGHT_COLOR, DEPTH: RIGHT_DEPTH}
-KINDS = (COLOR, DEPTH, POSE, RIGHT_COLOR, RIGHT_DEPTH)
+NORMAL, MASK = "normal.png", "mask.png"
+KINDS = (COLOR, DEPTH, NORMAL, MASK, POSE, RIGHT_COLOR, RIGHT_DEPTH)
 
 # Exactly what `frame-{number:06d}` writes: 10 and 0000010 would be the same frame as 000010.
 _FRAME = re.compile(
-    r"frame-([0-9]{6}|[1-9][0-9]{6,15})\.((?:right\.)?(?:color|depth)\.png|pose\.txt)"
+    r"frame-([0-9]{6}|[1-9][0-9]{6,15})\.((?:(?:right\.)?(?:color|depth)|normal|mask)\.png|pose\.txt)"
 )
 # Other programs' colour images, which may stand in place of ours but not beside them.
 _OTHER_COLOR = re.compile(r"frame-([0-9]{6}|[1-9][0-9]{6,15})\.color\.[A-Za-z]+")
-_LIKE_A_FRAME = re.compile(r"frame-.*\.(color\.[A-Za-z]+|depth\.png|pose\.txt)", re.DOTALL)
+_LIKE_A_FRAME = re.compile(
+    r"frame-.*\.(color\.[A-Za-z]+|(depth|normal|mask)\.png|pose\.txt)", re.DOTALL
+)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ from synfeal.effects.scene import Crowd, SceneRenderer
 from synfeal.geometry.poses import interpolate
 from synfeal.records.provenance import generator_of
 from synfeal.render.base import Depth, Rgb
+from synfeal.render.surface import Ids, Layers, Normals
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,7 +44,34 @@ EFFECTS = (
 )
 # The middle of an object's bottom in the world, and its size before it is turned, metres.
 PLACE = ("x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m")
-Frame = tuple[Rgb, Depth | None]
+
+
+class Frame(NamedTuple):
+    """A frame, and the layers of it that were asked for.
+
+    Attributes:
+        rgb: Colours (H, W, 3).
+        depth_m: Depth (H, W), metres along the optical axis, inf for nothing.
+        normals_cam: Unit normals (H, W, 3) in the frame of the camera, 0 0 0 for nothing.
+        ids: Numbers (H, W) of instances, 0 for nothing.
+    """
+
+    rgb: Rgb
+    depth_m: Depth | None = None
+    normals_cam: Normals | None = None
+    ids: Ids | None = None
+
+    def with_surface(
+        self, layers: Layers, renderer: SceneRenderer, world_from_cam: NDArray[np.float64]
+    ) -> Frame:
+        """Add the layers of the surface that are asked for; it is looked at only if any is."""
+        if not layers.of_surface:
+            return self
+        seen = renderer.surface(world_from_cam)
+        return self._replace(
+            normals_cam=seen.normals_cam if layers.normals else None,
+            ids=seen.ids if layers.masks else None,
+        )
 
 
 class Poses(Protocol):
@@ -98,7 +126,7 @@ def varied_frames(
     poses: Poses,  # whole paths
     begin: int,  # first row that is asked for
     end: int,  # row after the last
-    with_depth: bool,  # whether depth is asked for; it is that of the middle of the exposure
+    layers: Layers,  # what is asked for besides; it is that of the middle of the exposure
 ) -> Iterator[Frame]:
     """Draw the rows ``begin`` to ``end`` (exclusive) of ``poses`` with effects."""
     for first, last in paths_of(poses):
@@ -111,7 +139,7 @@ def varied_frames(
             with world as drawer:
                 light = path_light(own, poses, first)
                 path = _Path(drawer, camera, own, light, poses, first, last)
-                yield from path.frames(max(begin, first), min(end, last), with_depth)
+                yield from path.frames(max(begin, first), min(end, last), layers)
 
 
 @dataclass(frozen=True)
@@ -130,17 +158,19 @@ class _Path:
     def _world_from_cam(self) -> NDArray[np.float64]:
         return self.poses.world_from_cam
 
-    def frames(self, begin: int, end: int, with_depth: bool) -> Iterator[Frame]:
+    def frames(self, begin: int, end: int, layers: Layers) -> Iterator[Frame]:
         """The frames of some rows, with those before them for auto-exposure alone."""
         exposure = self.config.exposure
         meter = AutoExposure(exposure) if exposure else None
         lags = exposure is not None and exposure.time_constant_s is not None
         for row in range(self.first if lags else begin, end):
-            seen, depth_m = self._seen(row, with_depth)
+            seen, depth_m = self._seen(row, layers.depth)
             if meter is not None:
                 seen *= np.float32(2.0 ** meter.next_ev(seen, self._seconds(row)))
             if row >= begin:
-                yield self._taken(seen, row), depth_m
+                frame = Frame(self._taken(seen, row), depth_m)
+                pose = self._world_from_cam[row]
+                yield frame.with_surface(layers, self.renderer, pose)
 
     def _seen(self, row: int, with_depth: bool) -> tuple[Light, Depth | None]:
         """Light (H, W, 3) that reaches the sensor, and depth where it is needed."""
@@ -224,7 +254,10 @@ def effects_table(config: EffectsConfig, poses: Poses) -> pd.DataFrame:
 
 
 def objects_table(config: EffectsConfig, poses: Poses, crowd: Crowd) -> pd.DataFrame:
-    """What stands along each path and where, as columns; one row an object."""
+    """Tell what stands along each path and where, one row an object.
+
+    Its columns ``id`` are the values of masks along the path.
+    """
     import pandas as pd
 
     rows = []
@@ -232,8 +265,9 @@ def objects_table(config: EffectsConfig, poses: Poses, crowd: Crowd) -> pd.DataF
         if path_effects(config, poses, first).clutter is None:
             continue
         rng = _generator("clutter", config, poses, first)
-        for _, place in crowd.along(poses.position_m[first:last], rng):
+        standing = crowd.along(poses.position_m[first:last], rng)
+        for number, (_, place) in enumerate(standing, crowd.first_id):
             corners = dict(zip(PLACE, [*place["position_m"], *place["size_m"]], strict=True))
-            about = {"name": place["name"], **corners, "yaw_deg": place["yaw_deg"]}
+            about = {"id": number, "name": place["name"], **corners, "yaw_deg": place["yaw_deg"]}
             rows.append({"path": poses.path[first], **about})
-    return pd.DataFrame(rows, columns=["path", "name", *PLACE, "yaw_deg"])
+    return pd.DataFrame(rows, columns=["path", "id", "name", *PLACE, "yaw_deg"])

@@ -19,11 +19,14 @@ from numpy.typing import NDArray
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.effects.light import GROUPS, Light
 from synfeal.errors import InputError
+from synfeal.mesh.instances import number_instances
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
-from synfeal.mesh.standing import Standing, refuse_larger, standing
+from synfeal.mesh.standing import CLUTTER, Standing, refuse_larger, standing
+from synfeal.records.files import read_json
 from synfeal.render import open_renderer
-from synfeal.render.base import Depth, Renderer, Rgb
+from synfeal.render.base import Depth, Faces, Renderer, Rgb
+from synfeal.render.surface import Surface, SurfaceTable
 
 Array = NDArray[np.float64]
 REACH_M = 3.0  # from a path, sideways
@@ -43,6 +46,12 @@ class Crowd:
     mesh: TexturedMesh
     kinds: Sequence[tuple[str, TexturedMesh]]  # the objects by name, in turn
     count: int  # how many stand along a path, if there is place for them
+    placed: tuple[str, ...] = ()  # names of the objects that stand in the scene for all paths
+
+    @property
+    def first_id(self) -> int:
+        """The first number of objects along a path, after those of the scene itself."""
+        return len(number_instances(self.mesh, self.placed).listed) + 1
 
     @cached_property
     def _corners(self) -> Array:
@@ -62,6 +71,12 @@ class Crowd:
         return [each for each in found if each is not None]
 
 
+def placed_objects(mesh: Path) -> tuple[str, ...]:
+    """Read which objects stand in the scene of a mesh, in the order of their numbers."""
+    path = mesh.with_name(CLUTTER)
+    return tuple(place["name"] for place in read_json(path)) if path.is_file() else ()
+
+
 def crowd_of(mesh: Path, render: RenderConfig) -> Crowd | None:
     """What may stand about in a scene, if anything does.
 
@@ -76,7 +91,7 @@ def crowd_of(mesh: Path, render: RenderConfig) -> Crowd | None:
     for name, kind in kinds:
         size_m = np.ptp(kind.bounds_m, axis=0)
         refuse_larger(size_m, scene, f"render.effects.clutter.files: {name}")
-    return Crowd(scene, kinds, settings.count)
+    return Crowd(scene, kinds, settings.count, placed_objects(mesh))
 
 
 class SceneRenderer(Renderer):
@@ -91,9 +106,10 @@ class SceneRenderer(Renderer):
         crowd: Crowd | None = None,
         # gives what depth is taken of, where ``mesh`` has less detail
         full: Callable[[], TexturedMesh] | None = None,
+        placed: Sequence[str] = (),  # names of the objects that are in the full mesh
     ) -> None:
         self._camera, self._render, self._crowd = camera, render, crowd
-        self._mesh, self._full = mesh, full
+        self._mesh, self._full, self._placed = mesh, full, placed
         self._ideal = open_renderer(mesh, camera, render)
         even = render.model_copy(update={"background_rgb": (255 // len(GROUPS),) * 3})
         held = (shares or {}).items()
@@ -108,6 +124,20 @@ class SceneRenderer(Renderer):
         if self._full is None:
             return self._ideal.render_rgbd(world_from_cam)
         return self._ideal.render(world_from_cam), self._solid.render_depth(world_from_cam)
+
+    def render_faces(self, world_from_cam: Array) -> Faces:
+        """Index (H, W) of the triangle of the full mesh that each pixel shows, -1 for nothing."""
+        renderer = self._ideal if self._full is None else self._solid
+        return renderer.render_faces(world_from_cam)
+
+    def surface(self, world_from_cam: Array) -> Surface:
+        """Normals and instances of the scene alone."""
+        return self._surface_table.look_up(self.render_faces(world_from_cam), world_from_cam)
+
+    @cached_property
+    def _surface_table(self) -> SurfaceTable:
+        mesh = self._mesh if self._full is None else self._full()
+        return SurfaceTable(mesh, self._camera, number_instances(mesh, self._placed))
 
     @cached_property
     def _solid(self) -> Renderer:
@@ -131,11 +161,14 @@ class SceneRenderer(Renderer):
     def along(self, path_m: Array, rng: np.random.Generator) -> SceneRenderer:
         """A renderer of the scene with what stands along a path (P, 3)."""
         assert self._crowd is not None, "opened without `clutter`"
-        objects = [part for parts, _ in self._crowd.along(path_m, rng) for part in parts]
+        n_placed, objects, names = len(self._crowd.placed), [], list(self._crowd.placed)
+        for number, (parts, place) in enumerate(self._crowd.along(path_m, rng), n_placed):
+            objects += [replace(part, name=f"object-{number}") for part in parts]
+            names.append(place["name"])
         both = TexturedMesh((*self._mesh.parts, *objects))
         solid = TexturedMesh((*self._crowd.mesh.parts, *objects))
         full = None if self._full is None else lambda: solid
-        return SceneRenderer(both, self._camera, self._render, full=full)
+        return SceneRenderer(both, self._camera, self._render, full=full, placed=names)
 
     def close(self) -> None:
         """Give the memory of all meshes back."""
@@ -177,5 +210,7 @@ def open_scene(
         return crowd.mesh if crowd else load_mesh(mesh)
 
     if detail is None or render.draws_full_mesh:
-        return SceneRenderer(full(), camera, render, shares, crowd)
-    return SceneRenderer(load_mesh(detail), camera, render, crowd=crowd, full=full)
+        return SceneRenderer(full(), camera, render, shares, crowd, placed=placed_objects(mesh))
+    return SceneRenderer(
+        load_mesh(detail), camera, render, crowd=crowd, full=full, placed=placed_objects(mesh)
+    )

@@ -20,6 +20,7 @@ from synfeal.mesh.rays import RayCaster
 
 Array = NDArray[np.float64]
 Standing = tuple[list[MeshPart], dict[str, Any]]  # an object, and where it stands, for manifests
+CLUTTER = "clutter.json"  # beside the mesh: which objects stand about in it, and where
 CLEARANCE_M = 0.002  # between an object and what it stands on
 FLAT_M = 0.008  # what it stands on may differ by at the corners
 PATH_CLEARANCE_M = 0.25  # between an object and a camera that passes

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
-from synfeal.mesh.model import MeshPart
+from synfeal.mesh.model import MeshPart, TexturedMesh
 
 Rgb = NDArray[np.uint8]
 Depth = NDArray[np.float32]
+Faces = NDArray[np.int32]
 DEFAULTS = RenderConfig()
 SHADERS = Path(__file__).parent / "shaders"
 # Mesa's software renderer silently draws nonsense from a buffer of 2^24 vertices on.
@@ -38,6 +39,13 @@ class Renderer(Protocol):
         """Depth (H, W) as :meth:`render_rgbd` gives it, without colours where that is cheaper."""
         return self.render_rgbd(world_from_cam)[1]
 
+    def render_faces(self, world_from_cam: NDArray[np.float64]) -> Faces:
+        """Index (H, W) of the triangle at the centre of each pixel, -1 for nothing.
+
+        Triangles are counted through all parts of the mesh, as :meth:`TexturedMesh.merged` does.
+        """
+        ...
+
     def close(self) -> None:
         """Give the mesh's memory back; the renderer must not be used afterwards."""
         ...
@@ -57,6 +65,26 @@ def pieces(part: MeshPart, most_vertices: int = MOST_VERTICES) -> Iterator[MeshP
     step = max(1, most_vertices // 3)
     for start in range(0, len(part.faces), step):
         yield part.over(part.faces[start : start + step])
+
+
+def drawn_pieces(mesh: TexturedMesh) -> Iterator[tuple[MeshPart, int]]:
+    """The drawn parts of a mesh in pieces, each with the index of its first triangle."""
+    first = 0
+    for part in mesh.parts:
+        start = first
+        for piece in pieces(part) if part.is_drawn else ():
+            yield piece, start
+            start += len(piece.faces)
+        first += len(part.faces)
+
+
+def faces_of_halves(halves: NDArray[np.float32]) -> Faces:
+    """Indices (H, W), -1 for nothing, of numbers from 1 that shaders wrote as two halves (H, W, 2).
+
+    Single precision holds whole numbers up to 2^24, and meshes have more triangles.
+    """
+    high, low = np.moveaxis(halves, -1, 0).astype(np.int32)
+    return np.asarray((high << 16) + low - 1, np.int32)
 
 
 def thresholded(part: MeshPart) -> NDArray[np.uint8]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from synfeal.camera.projection import pixels_per_radian, rays_of_pixels
 from synfeal.config.dataset import CameraConfig
 from synfeal.errors import InputError
-from synfeal.render.base import Depth, Renderer, Rgb
+from synfeal.render.base import Depth, Faces, Renderer, Rgb
 from synfeal.render.distorted import (
     LONGEST_SIDE_PX,
     MARGIN_PX,
@@ -96,6 +96,13 @@ class CubeRenderer(Renderer):
         return self._distance(
             np.stack([self._inner.render_depth(pose) for pose in self._poses(world_from_cam)])
         )
+
+    def render_faces(self, world_from_cam: Array) -> Faces:
+        """Index (H, W) of the triangle that the nearest pixel of a cube's face shows, or -1."""
+        index, weight = self._depth_taps
+        nearest = np.take_along_axis(index, weight.argmax(axis=-1)[..., None], axis=-1)[..., 0]
+        drawn = np.stack([self._inner.render_faces(pose) for pose in self._poses(world_from_cam)])
+        return np.where(np.isfinite(self._slant), drawn.reshape(-1)[nearest], np.int32(-1))
 
     def close(self) -> None:
         """Close the inner renderer."""

@@ -15,6 +15,7 @@ from __future__ import annotations
 import ctypes
 import functools
 from collections.abc import Callable
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -26,7 +27,16 @@ from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import TexturedMesh
-from synfeal.render.base import DEFAULTS, Depth, Renderer, Rgb, floor_share, pieces
+from synfeal.render.base import (
+    DEFAULTS,
+    Depth,
+    Faces,
+    Renderer,
+    Rgb,
+    drawn_pieces,
+    faces_of_halves,
+    floor_share,
+)
 from synfeal.render.opengl_part import DevicePart, program_of
 
 # Named in full: searching for them starts a compiler or ldconfig, which a container may lack.
@@ -89,12 +99,14 @@ class OpenglRenderer(Renderer):
         self._background = [level / 255.0 for level in render.background_rgb]
         with self._context:
             self._open_images(render.supersampling)
+            drawn = list(drawn_pieces(mesh))
             self._parts = [
                 DevicePart(self._context, piece, self._centre_m, floor_share(render))
-                for part in mesh.parts
-                if part.is_drawn
-                for piece in pieces(part)
+                for piece, _ in drawn
             ]
+        # Index in the mesh of each triangle by its number on the device, and of nothing, the last.
+        own = [first + part.order for part, (_, first) in zip(self._parts, drawn, strict=True)]
+        self._face_of_number = np.concatenate([*own, [-1]]).astype(np.int32)
 
     def _open_images(self, supersampling: int) -> None:
         """Make the images that are drawn into: samples, their means, and depth."""
@@ -130,6 +142,26 @@ class OpenglRenderer(Renderer):
         """Depth (H, W) alone: metres along the optical axis, inf for nothing."""
         with self._context:
             return self._draw_depth(self._clip_from_mesh(world_from_cam))
+
+    def render_faces(self, world_from_cam: NDArray[np.float64]) -> Faces:
+        """Index (H, W) of the triangle at the centre of each pixel, -1 for nothing."""
+        clip_from_mesh = self._clip_from_mesh(world_from_cam)
+        halves = np.empty((*self._size[::-1], 2), np.float32)
+        with self._context:
+            self._begin(self._face_target)
+            first_face = 0
+            for part in self._parts:
+                part.draw(part.faces, clip_from_mesh, first_face)
+                first_face += len(part.order)
+            self._finish()
+            self._face_target.read_into(halves, components=2, dtype="f4", alignment=1)
+        return self._face_of_number[faces_of_halves(halves)]
+
+    @cached_property
+    def _face_target(self) -> Any:
+        """What numbers of triangles are drawn into, which few ask for."""
+        halves = self._context.renderbuffer(self._size, 2, dtype="f4")
+        return self._context.framebuffer([halves], self._context.depth_renderbuffer(self._size))
 
     def _clip_from_mesh(self, world_from_cam: NDArray[np.float64]) -> NDArray[np.float64]:
         centred = np.array(world_from_cam, np.float64)
@@ -171,6 +203,7 @@ class OpenglRenderer(Renderer):
         """Give the mesh's memory back; the renderer must not be used afterwards."""
         del self._parts, self._mean, self._samples
         del self._sample_target, self._mean_target, self._depth_target
+        self.__dict__.pop("_face_target", None)
         with self._context:
             self._context.gc()
 

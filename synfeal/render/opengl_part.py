@@ -7,6 +7,7 @@ surfaces shows. Front-to-back order was measured too and gains nothing on llvmpi
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import moderngl
@@ -36,13 +37,15 @@ class Chunks(NamedTuple):
 
     vertices: NDArray[np.int64]  # (V,) which vertices are used, in the order of their first use
     faces: NDArray[np.int64]  # (F, 3) indices into ``vertices``
+    order: NDArray[np.int64]  # (F,) where each face stood before they were sorted
     lower_m: Floats  # (C, 3) lower corners of the boxes
     upper_m: Floats  # (C, 3) upper corners
 
 
 def chunks_of(vertices_m: Floats, faces: NDArray[np.int64]) -> Chunks:
     """Sort faces (F, 3) along a space-filling curve and box them."""
-    faces = faces[np.argsort(_morton_codes(vertices_m[faces].mean(axis=1)), kind="stable")]
+    order = np.argsort(_morton_codes(vertices_m[faces].mean(axis=1)), kind="stable")
+    faces = faces[order]
     used, first, inverse = np.unique(faces, return_index=True, return_inverse=True)
     by_first_use = np.argsort(first)
     rank = np.empty_like(by_first_use)
@@ -53,6 +56,7 @@ def chunks_of(vertices_m: Floats, faces: NDArray[np.int64]) -> Chunks:
     return Chunks(
         vertices=used[by_first_use],
         faces=rank[inverse.reshape(-1, 3)],
+        order=order,
         lower_m=np.minimum.reduceat(corners.min(axis=1), starts) - margin,
         upper_m=np.maximum.reduceat(corners.max(axis=1), starts) + margin,
     )
@@ -96,7 +100,7 @@ def program_of(context: Any, vertex: str, fragment: str, features: Collection[st
 
 
 class DevicePart:
-    """A part's buffers, with one way to draw its colours and one its depth."""
+    """A part's buffers, with one way each to draw its colours, depth and numbers of triangles."""
 
     def __init__(
         self,
@@ -139,8 +143,19 @@ class DevicePart:
         self.colour.program["base_rgb"].value = tuple(part.base_color[:3] / 255.0)
         if uv:
             self.colour.program["level_bias"].value = LEVEL_BIAS
-        cut_out = ["TEXTURED", "CUT_OUT"] if "CUT_OUT" in features else []
-        self.depth = self._program("depth.frag", cut_out, [position, *(uv if cut_out else [])])
+        self._cut_out = ["TEXTURED", "CUT_OUT"] if "CUT_OUT" in features else []
+        self._solid = [position, *(uv if self._cut_out else [])]
+        self.depth = self._program("depth.frag", self._cut_out, self._solid)
+
+    @property
+    def order(self) -> NDArray[np.int64]:
+        """Index in the part (F,) of each triangle, in the order in which they are numbered."""
+        return self._chunks.order
+
+    @cached_property
+    def faces(self) -> Any:
+        """Numbers of triangles, which few ask for."""
+        return self._program("faces.frag", self._cut_out, self._solid)
 
     def _attribute(self, values: NDArray[Any], layout: str, name: str) -> tuple[Any, str, str]:
         return self._context.buffer(np.ascontiguousarray(values)), layout, name
@@ -155,13 +170,23 @@ class DevicePart:
         if self._has_headlight:
             self.colour.program["camera"].value = tuple(camera_m.tolist())
 
-    def draw(self, triangles: Any, clip_from_mesh: NDArray[np.float64]) -> None:
-        """Draw ``colour``, or ``depth`` along the optical axis, into the framebuffer in use."""
+    def draw(
+        self, triangles: Any, clip_from_mesh: NDArray[np.float64], first_face: int | None = None
+    ) -> None:
+        """Draw into the framebuffer in use.
+
+        Args:
+            triangles: ``colour``, ``depth`` along the optical axis, or ``faces``.
+            clip_from_mesh: Projection (4, 4).
+            first_face: With ``faces``, the number of the part's first triangle.
+        """
         by_columns = clip_from_mesh.astype(np.float32).tobytes(order="F")
         triangles.program["clip_from_mesh"].write(by_columns)
         if self._texture is not None:
             self._texture.use(0)
         for first, count in visible_runs(self._chunks, clip_from_mesh):
+            if first_face is not None:  # OpenGL counts from the beginning of each run
+                triangles.program["first_face"].value = first_face + first // 3
             triangles.render(moderngl.TRIANGLES, vertices=count, first=first)
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import functools
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -25,10 +26,12 @@ from synfeal.render.base import (
     DEFAULTS,
     SHADERS,
     Depth,
+    Faces,
     Renderer,
     Rgb,
+    drawn_pieces,
+    faces_of_halves,
     floor_share,
-    pieces,
     thresholded,
 )
 
@@ -47,8 +50,8 @@ COLOUR_BIAS, DEPTH_BIAS = -0.5, -100.0
 
 
 @functools.cache
-def _context() -> tuple[Any, _Pass, _Pass]:
-    """The one OpenGL context of this process, and its passes for colour and depth.
+def _context() -> tuple[Any, _Pass, _Pass, _Pass]:
+    """The one OpenGL context of this process, and its passes for colour, depth and triangles.
 
     Deleting one terminates the EGL display all others share, so it is made once and kept.
     """
@@ -60,8 +63,13 @@ def _context() -> tuple[Any, _Pass, _Pass]:
     GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
     uploaded: set[Any] = set()
     rgb, depth = (GL.GL_RGB, GL.GL_UNSIGNED_BYTE), (GL.GL_RED, GL.GL_FLOAT)
-    colours = _Pass(uploaded, 0, COLOUR_BIAS, GL.GL_RGBA8, rgb, np.uint8)
-    return platform, colours, _Pass(uploaded, 1, DEPTH_BIAS, GL.GL_R32F, depth, np.float32)
+    halves = (GL.GL_RGB, GL.GL_FLOAT)  # two channels, which the bindings cannot read alone
+    return (
+        platform,
+        _Pass(uploaded, 0, COLOUR_BIAS, GL.GL_RGBA8, rgb, np.uint8),
+        _Pass(uploaded, 1, DEPTH_BIAS, GL.GL_R32F, depth, np.float32),
+        _Pass(uploaded, 2, DEPTH_BIAS, GL.GL_RG32F, halves, np.float32),
+    )
 
 
 class PyrenderRenderer(Renderer):
@@ -73,15 +81,17 @@ class PyrenderRenderer(Renderer):
         """Prepare the mesh, which is uploaded by the first render."""
         self._supersampling = render.supersampling
         self._floor_share = floor_share(render)
-        self._platform, self._colour, self._depth = _context()
+        self._platform, self._colour, self._depth, self._faces = _context()
         self._size = (camera.width, camera.height)
         self._intrinsics = camera.intrinsics
         self._background = np.array([*render.background_rgb, 0]) / 255.0
         self._scene = pyrender.Scene()
         # Vertex buffers hold single precision: exact around the scene's own centre, wherever it is.
         self._centre_m = mesh.bounds_m.mean(axis=0)
-        parts = [piece for part in mesh.parts if part.is_drawn for piece in pieces(part)]
-        self._scene.add(pyrender.Mesh([_primitive(part, self._centre_m) for part in parts]))
+        drawn = list(drawn_pieces(mesh))
+        primitives = [_primitive(part, self._centre_m) for part, _ in drawn]
+        self._first_face = dict(zip(primitives, (first for _, first in drawn), strict=True))
+        self._scene.add(pyrender.Mesh(primitives))
         self._camera = self._scene.add(
             pyrender.IntrinsicsCamera(*self._intrinsics, znear=camera.near_m, zfar=camera.far_m)
         )
@@ -101,6 +111,12 @@ class PyrenderRenderer(Renderer):
         self._look_from(world_from_cam)
         depth_m = self._drawn(self._depth, 1, np.zeros(4))[..., 0]
         return np.where(depth_m > 0.0, depth_m, np.float32(np.inf))
+
+    def render_faces(self, world_from_cam: NDArray[np.float64]) -> Faces:
+        """Index (H, W) of the triangle at the centre of each pixel, -1 for nothing."""
+        self._look_from(world_from_cam)
+        self._faces.first_face = self._first_face
+        return faces_of_halves(self._drawn(self._faces, 1, np.zeros(4))[..., :2])
 
     def _look_from(self, world_from_cam: NDArray[np.float64]) -> None:
         centred = np.array(world_from_cam, np.float64)
@@ -178,6 +194,7 @@ class _Pass(pyrender.Renderer):  # type: ignore[misc]  # pyrender is untyped
         self.floor_share = 1.0
         self._formats = (storage, GL.GL_DEPTH_COMPONENT32F)
         self._read_as, self._dtype = read_as, dtype
+        self.first_face: Mapping[Any, int] = {}  # index of the first triangle, by primitive
         self._outputs = [GL.GL_NONE] * output + [GL.GL_COLOR_ATTACHMENT0]
         self._main_fb_dims: tuple[Any, Any]
         self._main_fb_ms = GL.glGenFramebuffers(1)
@@ -217,6 +234,7 @@ class _Pass(pyrender.Renderer):  # type: ignore[misc]  # pyrender is untyped
     ) -> None:
         program.set_uniform("level_bias", self._level_bias)
         program.set_uniform("floor_share", self.floor_share)
+        program.set_uniform("first_face", self.first_face.get(primitive, 0))
         super()._bind_and_draw_primitive(primitive, pose, program, flags)
 
     def _read_main_framebuffer(self, scene: Any, flags: int) -> NDArray[Any]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.mesh.model import TexturedMesh
-from synfeal.render.base import DEFAULTS, Depth, Renderer, Rgb, floor_share
+from synfeal.render.base import DEFAULTS, Depth, Faces, Renderer, Rgb, floor_share
 from synfeal.render.raycast_triangles import Floats, Points, TexturedTriangles, View
 
 Look = Callable[[View, Floats], NDArray[Any]]
@@ -45,6 +45,10 @@ class RaycastRenderer(Renderer):
         rgb = self.render(world_from_cam)
         # Whether the very centre is cut out.
         return rgb, self._image(self._depth, world_from_cam, np.full((1, 2), 0.5), 0.0)
+
+    def render_faces(self, world_from_cam: NDArray[np.float64]) -> Faces:
+        """Index (H, W) of the triangle at the centre of each pixel, -1 for nothing."""
+        return self._image(self._faces, world_from_cam, np.full((1, 2), 0.5), 0.0)
 
     def close(self) -> None:
         """Drop triangles and textures."""
@@ -81,6 +85,9 @@ class RaycastRenderer(Renderer):
         depth_m = np.full(len(rays), np.inf, np.float32)
         depth_m[hit] = points.depth_m
         return depth_m
+
+    def _faces(self, view: View, rays: Floats) -> Faces:
+        return self._triangles.face_of_mesh[self._triangles.first_drawn(view, rays)[0]]
 
     def _colours(self, view: View, rays: Floats) -> Rgb:
         hit, points = self._points(view, rays)

@@ -60,6 +60,9 @@ class TexturedTriangles:
         self._caster = RayCaster(vertices - self.centre_m, faces)
         self._rows = _rows(parts, self.centre_m)
         self._part_of = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
+        drawn = np.concatenate([np.full(len(p.faces), p.is_drawn) for p in mesh.parts])
+        # Index in the mesh of each triangle, and of nothing, the last.
+        self.face_of_mesh = np.append(np.flatnonzero(drawn), -1).astype(np.int32)
         self._tint = np.array([part.base_color[:3] / 255.0 for part in parts])
         textures, self._texture_of = _textures(parts)
         self._has_cutouts = np.array([a.shape[2] == 4 for a in textures])[self._texture_of]

@@ -15,6 +15,8 @@ from synfeal.errors import InputError
 from synfeal.validation.listing import (
     COLOR,
     DEPTH,
+    MASK,
+    NORMAL,
     POSE,
     RIGHT_COLOR,
     RIGHT_DEPTH,
@@ -44,11 +46,11 @@ REMEDIES = {
 
 
 def kinds_of(sequences: Iterable[SequenceListing]) -> tuple[str, ...]:
-    """The kinds of file every frame must have: depth and right images only if any frame has."""
+    """The kinds of file every frame must have: layers and right images only if any has."""
     listed = list(sequences)
     return tuple(
         kind
-        for kind in (COLOR, DEPTH, POSE, RIGHT_COLOR, RIGHT_DEPTH)
+        for kind in (COLOR, DEPTH, NORMAL, MASK, POSE, RIGHT_COLOR, RIGHT_DEPTH)
         if kind in (COLOR, POSE) or any(sequence.numbers[kind] for sequence in listed)
     )
 

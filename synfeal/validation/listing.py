@@ -22,6 +22,8 @@ from synfeal.dataset.frame_files import (
 from synfeal.dataset.sequence_listing import (
     COLOR,
     DEPTH,
+    MASK,
+    NORMAL,
     POSE,
     RIGHT_COLOR,
     RIGHT_DEPTH,
@@ -36,6 +38,8 @@ from synfeal.errors import InputError, why
 __all__ = [
     "COLOR",
     "DEPTH",
+    "MASK",
+    "NORMAL",
     "POSE",
     "RIGHT_COLOR",
     "RIGHT_DEPTH",

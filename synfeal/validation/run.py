@@ -10,8 +10,11 @@ from synfeal.records.progress import Progress
 from synfeal.validation.camera import KnownCamera, camera_of_dataset
 from synfeal.validation.consistency import check_consistency, check_stereo
 from synfeal.validation.frames import Poses, check_images, check_names, kinds_of, read_poses
+from synfeal.validation.layers import check_layers
 from synfeal.validation.listing import (
     DEPTH,
+    MASK,
+    NORMAL,
     RIGHT_COLOR,
     RIGHT_DEPTH,
     Check,
@@ -60,10 +63,12 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
     size = None if camera is None or camera.assumed else camera.config
     poses, pose_failures = read_poses(sequences)
     bound = rigid_bound(dataset)
-    with Progress(2 * n_frames, "frame", "validate") as progress:
+    n_layers = len({NORMAL, MASK} & set(kinds_of(sequences)))
+    with Progress((2 + n_layers) * n_frames, "frame", "validate") as progress:
         checks = [
             check_names(sequences),
             *check_images(sequences, size, progress.update),
+            *check_layers(dataset, sequences, size, progress.update),
             check_rigid(poses, pose_failures, bound),
             check_tables(dataset, poses, splits),
             check_splits(dataset, sequences, splits, split_failures),

@@ -20,6 +20,7 @@ from synfeal.dataset.frame_files import ArchivedFile, foreign_members, frame_fil
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.render_sequence import write_sequence
 from synfeal.dataset.sevenscenes import frame_paths, read_depth_m, read_pose, read_split
+from synfeal.render.surface import Layers
 from tests.support.collected import collect, tree_of
 from tests.support.damaged_sets import CAMERA
 from tests.synfeal.test_dataset import FakeRenderer, poses_of
@@ -167,11 +168,11 @@ def test_a_member_that_says_it_is_huge_is_not_read(packed, monkeypatch):
 def test_a_sequence_is_rendered_into_an_archive_or_not_at_all(tmp_path):
     poses = poses_of(3)
     for out in (tmp_path / "plain" / "seq-01", tmp_path / "packed" / "seq-01.zip"):
-        write_sequence(FakeRenderer(), poses, out, True)
+        write_sequence(FakeRenderer(), poses, out, Layers(depth=True))
     assert [path.name for path in (tmp_path / "packed").iterdir()] == ["seq-01.zip"]
     assert tree_of(unpacked(tmp_path / "packed")) == tree_of(tmp_path / "plain")
     with pytest.raises(RuntimeError, match="on fire"):
-        write_sequence(FakeRenderer(2), poses, tmp_path / "none" / "seq-01.zip", True)
+        write_sequence(FakeRenderer(2), poses, tmp_path / "none" / "seq-01.zip", Layers(depth=True))
     assert list((tmp_path / "none").iterdir()) == []
 
 

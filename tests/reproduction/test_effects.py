@@ -24,6 +24,7 @@ from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.save import save_glb
 from synfeal.objects.patches import Item, Patch, level, upright
 from synfeal.records.files import file_sha256, read_json
+from synfeal.render.surface import Layers
 from tests.support.collected import collect, save_room
 
 CAMERA = CameraConfig(width=120, height=16, horizontal_fov_deg=60.0)
@@ -63,7 +64,7 @@ class Wall:
 
 def frames(renderer, poses, **effects):
     config = EffectsConfig.model_validate(effects)
-    return [rgb for rgb, _ in drawn(renderer, poses, False, (CAMERA, config))]
+    return [frame.rgb for frame in drawn(renderer, poses, Layers(), (CAMERA, config))]
 
 
 def test_every_level_survives_the_way_to_light_and_back():
@@ -168,8 +169,8 @@ def test_lights_add_up_in_linear_light(tmp_path):
         settings = {"light": {"states": [state]}}
         render = RenderConfig.model_validate({"backend": "raycast", "effects": settings})
         with open_scene(tmp_path / "mesh.glb", CAMERA, render) as renderer:
-            ((rgb, _),) = drawn(renderer, poses, False, effects_of(CAMERA, render))
-        return effects.light_of(rgb)
+            (frame,) = drawn(renderer, poses, Layers(), effects_of(CAMERA, render))
+        return effects.light_of(frame.rgb)
 
     whole, lamp, day = (light(state) for state in ("all", "lamps", "daylight"))
     # Half a level of 8 bits in each, where a level is at most a hundredth of white.
@@ -209,7 +210,7 @@ def test_without_effects_nothing_is_recorded_or_drawn_anew():
         "background_rgb",
     }
     wall, poses = Wall(), along_x(4)
-    ideal = [rgb for rgb, _ in drawn(wall, poses, False, None)]
+    ideal = [frame.rgb for frame in drawn(wall, poses, Layers(), None)]
     assert wall.drawn == 4
     np.testing.assert_array_equal(ideal, [wall.render(pose) for pose in poses.world_from_cam])
     np.testing.assert_array_equal(frames(wall, poses, light={}), ideal)

@@ -27,6 +27,7 @@ from synfeal.mesh.load import load_mesh
 from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.records.files import atomic_directory
+from synfeal.render.surface import Layers
 from synfeal.validation.listing import list_sequences
 from synfeal.validation.manifest import check_manifest
 from tests.support.collected import painted
@@ -134,7 +135,7 @@ class Remembering:
 
 def test_only_some_frames_wait_to_be_written(tmp_path):
     renderer = Remembering()
-    write_sequence(renderer, poses_of(300), tmp_path / "seq-01", False)
+    write_sequence(renderer, poses_of(300), tmp_path / "seq-01", Layers())
     assert renderer.most <= MOST_WAITING + 2
     for index in (0, 100, 299):
         with Image.open(tmp_path / "seq-01" / f"frame-{index:06d}.color.png") as frame:
@@ -143,7 +144,7 @@ def test_only_some_frames_wait_to_be_written(tmp_path):
 
 def test_nothing_is_left_half_written_overwritten_or_taken_for_frames(tmp_path):
     with pytest.raises(RuntimeError, match="on fire"):
-        write_sequence(FakeRenderer(2), poses_of(5), tmp_path / "seq-01", True)
+        write_sequence(FakeRenderer(2), poses_of(5), tmp_path / "seq-01", Layers(depth=True))
     assert list(tmp_path.iterdir()) == []
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.txt").write_text("years of work")

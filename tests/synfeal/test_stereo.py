@@ -21,6 +21,7 @@ from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.save import save_glb
+from synfeal.render.surface import Layers
 from synfeal.validation.listing import read_color
 from tests.support.collected import collect, refused, save_room
 from tests.support.small_room import facing_quad, furnished_room, paint
@@ -60,7 +61,9 @@ def test_a_plane_is_moved_by_whole_pixels_as_its_disparity_says(tmp_path):
     camera = CameraConfig(width=120, height=80, fx=100, fy=100, cx=60, cy=40)
     table = PoseTable(np.arange(1), np.zeros(1, int), np.zeros((1, 3)), quat_wxyz_of(AHEAD[None]))
     with SceneRenderer(plane, camera, synfeal.config.dataset.RenderConfig()) as renderer:
-        write_sequence(renderer, table, tmp_path / "seq-01", True, stereo_baseline_m=0.1)
+        write_sequence(
+            renderer, table, tmp_path / "seq-01", Layers(depth=True), stereo_baseline_m=0.1
+        )
     left = read_color(tmp_path / "seq-01/frame-000000.color.png").astype(int)
     right = read_color(tmp_path / "seq-01/frame-000000.right.color.png").astype(int)
     assert left.std() > 10

@@ -12,6 +12,8 @@ run_job(
     start=snakemake.params.start,
     stop=snakemake.params.stop,
     with_depth=snakemake.params.with_depth,
+    with_normals=snakemake.params.with_normals,
+    with_masks=snakemake.params.with_masks,
     render=snakemake.params.render,
     out_frames=snakemake.output.frames,
     detail=snakemake.input.detail or None,

@@ -1,5 +1,6 @@
 #version 330 core
-// Colour, or depth along the optical axis in metres: whichever is drawn to.
+// Colour, depth along the optical axis in metres, or the number of the triangle, from 1, as two
+// halves: whichever is drawn to.
 struct Material {
     vec4 base_color_factor;
 #ifdef HAS_BASE_COLOR_TEX
@@ -11,6 +12,7 @@ uniform float level_bias;  // added to the mip level
 // Share of a lamp's light where a surface is seen edge-on; 1 without a lamp.
 uniform float floor_share;
 in vec3 from_camera;
+uniform int first_face;
 #ifdef TEXCOORD_0_LOC
 in vec2 uv_0;
 #endif
@@ -19,6 +21,7 @@ in vec4 color_multiplier;
 #endif
 layout(location = 0) out vec4 colour;
 layout(location = 1) out vec4 depth_m;
+layout(location = 2) out vec4 halves;
 
 void main()
 {
@@ -39,4 +42,6 @@ void main()
     colour.rgb *= color_multiplier.rgb;
 #endif
     depth_m = vec4(1.0 / gl_FragCoord.w);
+    int number = first_face + gl_PrimitiveID + 1;
+    halves = vec4(number >> 16, number & 65535, 0, 0);
 }

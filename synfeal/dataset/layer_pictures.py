@@ -1,0 +1,46 @@
+"""Layers of frames as pictures to look at."""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from synfeal.dataset.frame_files import FrameFile, read_image
+from synfeal.dataset.layer_files import read_mask
+from synfeal.dataset.sequence_listing import COLOR, DEPTH, MASK, NORMAL
+from synfeal.dataset.sevenscenes import read_depth_m
+
+GOLDEN_RATIO = 0.618034  # neighbours in number get hues far apart
+
+
+def depth_picture(depth_m: NDArray[np.float32]) -> Image.Image:
+    """Show depth (H, W) in grey: white at the camera, half as bright at 2 m, black for nothing."""
+    return Image.fromarray((510.0 / (2.0 + depth_m)).astype(np.uint8)).convert("RGB")
+
+
+def mask_picture(ids: NDArray[np.integer]) -> Image.Image:
+    """Show instances (H, W) each in a colour of its own, black for nothing."""
+    numbers, index = np.unique(ids, return_inverse=True)
+    palette = [
+        colorsys.hsv_to_rgb(number * GOLDEN_RATIO % 1.0, 0.65, 0.95) if number else (0.0, 0.0, 0.0)
+        for number in numbers.tolist()
+    ]
+    colours = (255.0 * np.array(palette)).astype(np.uint8)
+    return Image.fromarray(colours[index.reshape(ids.shape)])
+
+
+def _image(file: FrameFile) -> Image.Image:
+    return read_image(file, "RGB")
+
+
+# By the names of ``synfeal preview --show``: kind of file, and its picture.
+PICTURES: Mapping[str, tuple[str, Callable[[FrameFile], Image.Image]]] = {
+    "color": (COLOR, _image),
+    "depth": (DEPTH, lambda file: depth_picture(read_depth_m(file))),
+    "normals": (NORMAL, _image),
+    "masks": (MASK, lambda file: mask_picture(read_mask(file))),
+}
