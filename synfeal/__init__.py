@@ -12,6 +12,7 @@ From one textured 3D mesh to a 7-Scenes data set with exact poses::
     data = synfeal.open_dataset("mydata")
     print(data.test.world_from_cam.shape, synfeal.validate("mydata"))
     print(synfeal.evaluate("mydata", "poses.csv").metrics)
+    print(synfeal.find_pairs("mydata", "mydata-pairs", per_frame=20))
 
 Keywords are the options of ``synfeal collect``. ``docs/architecture.md`` says what is where.
 """
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
         Renderer,
         collect,
         evaluate,
+        find_pairs,
         load_mesh,
         open_dataset,
         plan,
@@ -39,6 +41,7 @@ __all__ = [
     "Renderer",
     "collect",
     "evaluate",
+    "find_pairs",
     "load_mesh",
     "open_dataset",
     "plan",

@@ -8,7 +8,7 @@ invalid option raises an :class:`synfeal.errors.InputError` that names it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,6 +51,8 @@ from synfeal.render.surface import Normals, Surface, SurfaceTable
 from synfeal.validation.camera import camera_of_dataset
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from synfeal.evaluation.run import Evaluation
 
 AnyPath = str | Path
@@ -259,6 +261,23 @@ def _layer(listed: SplitFrames, kind: str) -> tuple[FrameFile, ...]:
     """The images of one kind; none where there are no such files at all."""
     there = any(sequence.numbers[kind] for sequence in listed.sequences)
     return tuple(listed.files(kind)) if there else ()
+
+
+def find_pairs(path: AnyPath, out: AnyPath, **settings: Any) -> pd.DataFrame:
+    """Compare the frames of a data set, as ``synfeal pairs`` does, and return the table of pairs.
+
+    Args:
+        path: Data set with depth.
+        out: Directory to create.
+        settings: Fields of :class:`synfeal.pairs.run.PairsJob` and of
+            :class:`synfeal.pairs.choose.Choice`: ``among``, ``per_frame`` and so on.
+    """
+    from synfeal.pairs.choose import Choice
+    from synfeal.pairs.run import PairsJob
+    from synfeal.pairs.run import find_pairs as find
+
+    bounds = {f.name: settings.pop(f.name) for f in fields(Choice) if f.name in settings}
+    return find(PairsJob(Path(path), Path(out), choice=Choice(**bounds), **settings)).table
 
 
 def validate(path: AnyPath, camera: AnyPath | None = None, every_pair: bool = False) -> list[str]:

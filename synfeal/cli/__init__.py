@@ -33,6 +33,7 @@ OWN_COMMANDS: tuple[Command, ...] = (
     datasets.preview,
     datasets.validate,
     datasets.export,
+    datasets.pairs,
     datasets.evaluate,
 )
 # Installed packages that work on data sets add theirs here: an entry point names a module whose

@@ -101,6 +101,69 @@ def export(arguments: argparse.Namespace) -> None:
 
 
 @command(
+    "which frames see the same surfaces, and optical flow between them",
+    "synfeal pairs mydata --per-frame 20 --max-overlap 0.8 --flow",
+    DATASET,
+    option("--out", "directory to create (DATASET-pairs)", type=Path, metavar="FOLDER"),
+    option(
+        "--among",
+        "frames that are paired: of each split with one another, of one split, or all (each)",
+        choices=("each", "train", "test", "all"),
+        default="each",
+    ),
+    option("--every", "take every N-th frame of each sequence (1)", type=int, default=1),
+    option("--min-overlap", "least overlap of a pair, 0 - 1 (0.1)", type=float, default=0.1),
+    option("--max-overlap", "greatest overlap of a pair, 0 - 1 (1)", type=float, default=1.0),
+    option("--per-frame", "most pairs of a frame, those that overlap most (all)", type=int),
+    option(
+        "--tolerance",
+        "relative difference of depth up to which a point is visible (0.01)",
+        type=float,
+        default=0.01,
+    ),
+    option(
+        "--grid",
+        "points of a frame that are looked for in the others (32 24)",
+        type=int,
+        nargs=2,
+        default=(32, 24),
+        metavar=("COLUMNS", "ROWS"),
+    ),
+    option("--flow", "write optical flow of each pair, both ways", action="store_true"),
+    CAMERA,
+)
+def pairs(arguments: argparse.Namespace) -> None:
+    """Compares all frames of a data set by depth and poses: a table of overlaps, and flow.
+
+    Nothing is rendered.
+    """
+    from synfeal.pairs.choose import Choice
+    from synfeal.pairs.run import PairsJob, find_pairs
+
+    dataset: Path = arguments.dataset
+    job = PairsJob(
+        dataset=dataset,
+        out=arguments.out or dataset.resolve().with_name(f"{dataset.resolve().name}-pairs"),
+        among=arguments.among,
+        choice=Choice(
+            min_overlap=arguments.min_overlap,
+            max_overlap=arguments.max_overlap,
+            per_frame=arguments.per_frame,
+        ),
+        every=arguments.every,
+        tolerance=arguments.tolerance,
+        grid=tuple(arguments.grid),
+        flow=arguments.flow,
+        camera_file=arguments.camera,
+    )
+    found = find_pairs(job)
+    print(
+        f"{job.out}: {len(found.table)} of {found.compared} pairs of {found.frames} frames"
+        + ", with flow" * job.flow
+    )
+
+
+@command(
     "how good are these poses? yours or another program's",
     "synfeal evaluate mydata results_ace.txt --out scores",
     option(

@@ -1,0 +1,210 @@
+"""What normals, masks, overlaps and flow cost, and how many pixels agree with Open3D's rays.
+
+Writes a CSV, a row for each mesh and size of image::
+
+    python -m benchmarks.layers results/mini/scenes/large_room/mesh.glb scan.glb
+
+Frames are drawn from random free places; times are milliseconds of the processor, all threads
+together, median over frames. A pixel is *clear* if Open3D's rays 0.02 pixels to the left, right,
+above and below of its centre meet the same triangle as the one through it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from synfeal.camera.projection import cell_pixels, rays_of_pixels
+from synfeal.config.dataset import CameraConfig, RenderConfig
+from synfeal.dataset.layer_files import mask_pixels, normal_pixels, normals_of_pixels
+from synfeal.errors import exit_status
+from synfeal.geometry.poses import pose_matrix
+from synfeal.geometry.rotations import rotation_from_rpy
+from synfeal.mesh.instances import number_instances
+from synfeal.mesh.load import load_mesh
+from synfeal.mesh.model import TexturedMesh
+from synfeal.pairs.correspondence import TOLERANCE, DepthImage, State, points_of_pixels
+from synfeal.pairs.flow import flow_between
+from synfeal.pairs.overlap import GRID, grid_points, overlaps_with
+from synfeal.records.tables import write_frame
+from synfeal.render import open_renderer
+from synfeal.render.surface import SurfaceTable
+
+N_FRAMES = 6
+MARGIN_PX = 0.02
+
+Array = NDArray[np.float64]
+
+
+def free_poses(mesh: TexturedMesh, count: int, rng: np.random.Generator) -> Array:
+    """Poses (N, 4, 4) in the middle half of the bounds of a mesh that look all round.
+
+    Two and two are near each other: 3 % of the diagonal and 15 degrees apart.
+    """
+    lower, upper = mesh.bounds_m
+    diagonal_m = float(np.linalg.norm(upper - lower))
+    place = rng.uniform(0.25, 0.75, (count // 2, 3)) * (upper - lower) + lower
+    rpy = rng.uniform([-0.2, -0.3, 0.0], [0.2, 0.3, 2 * np.pi], (count // 2, 3))
+    way = rng.standard_normal((count // 2, 3))
+    moved = place + 0.03 * diagonal_m * way / np.linalg.norm(way, axis=1, keepdims=True)
+    both = [(rpy, place), (rpy + np.array([0.02, 0.05, 0.25]), moved)]
+    poses = [pose_matrix(rotation_from_rpy(angles), position) for angles, position in both]
+    return np.stack(poses, axis=1).reshape(-1, 4, 4)
+
+
+class Open3dRays:
+    """First hits by Open3D's ray-casting scene."""
+
+    def __init__(self, mesh: TexturedMesh) -> None:
+        """Build it; ids are those of ``mesh.merged()``."""
+        import open3d as o3d
+
+        self._tensor = o3d.core.Tensor.from_numpy
+        self._centre_m = mesh.bounds_m.mean(axis=0)
+        vertices_m, faces = mesh.merged()
+        self._scene = o3d.t.geometry.RaycastingScene()
+        self._scene.add_triangles(
+            self._tensor((vertices_m - self._centre_m).astype(np.float32)),
+            self._tensor(faces.astype(np.uint32)),
+        )
+
+    def faces(self, camera: CameraConfig, pose: Array, step_px: tuple[float, float]) -> Any:
+        """Triangles (H, W), -1 for none, seen a step from the centres of the pixels."""
+        pixel = cell_pixels(camera, camera.width, camera.height) + step_px
+        rays = rays_of_pixels(camera, pixel) @ pose[:3, :3].T
+        face = self._cast(pose[:3, 3], rays)["primitive_ids"].numpy()
+        return np.where(face == 2**32 - 1, -1, face.astype(np.int64))
+
+    def reached(self, origin_m: Array, point_m: Array) -> Any:
+        """How far (N,) the ways to points (N, 3) are free, 1 where all of the way is."""
+        return self._cast(origin_m, point_m - origin_m)["t_hit"].numpy()
+
+    def _cast(self, origin_m: Array, rays: Array) -> Any:
+        origin = np.broadcast_to(origin_m - self._centre_m, rays.shape)
+        both = np.concatenate([origin, rays], axis=-1).astype(np.float32)
+        return self._scene.cast_rays(self._tensor(both))
+
+
+def measure(path: Path, camera: CameraConfig) -> dict[str, object]:
+    """One row of the table."""
+    mesh = load_mesh(path)
+    poses = free_poses(mesh, N_FRAMES, np.random.default_rng(0))
+    rays = Open3dRays(mesh)
+    table = SurfaceTable(mesh, camera, number_instances(mesh))
+    times: dict[str, list[float]] = {}
+    clear, agree, angles, stored_angles, depths = [], [], [], [], []
+    with open_renderer(mesh, camera, RenderConfig(backend="opengl")) as renderer:
+        renderer.render_faces(poses[0])
+        for pose in poses:
+            timed(times, "colour", partial(renderer.render, pose))
+            depths.append(timed(times, "depth", partial(renderer.render_depth, pose)))
+            found = timed(times, "faces", partial(renderer.render_faces, pose))
+            seen = timed(times, "look_up", partial(table.look_up, found, pose))
+            true = rays.faces(camera, pose, (0.0, 0.0))
+            around = [(-MARGIN_PX, 0), (MARGIN_PX, 0), (0, -MARGIN_PX), (0, MARGIN_PX)]
+            is_clear = np.all([rays.faces(camera, pose, s) == true for s in around], axis=0)
+            clear.append(is_clear)
+            agree.append(found == true)
+            expected = table.look_up(true.astype(np.int32), pose).normals_cam
+            angles.append(angle_deg(seen.normals_cam, expected)[is_clear])
+            pixels = normal_pixels(seen.normals_cam)
+            mask_pixels(seen.ids)
+            stored_angles.append(angle_deg(normals_of_pixels(pixels), expected)[is_clear])
+    medians = {f"{name}_ms": float(np.median(each)) for name, each in times.items()}
+    return {
+        "mesh": path.parent.name if path.stem == "mesh" else path.stem,
+        "faces": mesh.n_faces,
+        "parts": len(mesh.parts),
+        "width": camera.width,
+        "height": camera.height,
+        **medians,
+        "clear_share": np.mean(clear),
+        "agree_share": np.mean(agree),
+        "agree_share_clear": np.mean(np.array(agree)[np.array(clear)]),
+        "normal_error_deg": float(np.median(np.concatenate(angles))),
+        "normal_error_deg_p999": float(np.quantile(np.concatenate(angles), 0.999)),
+        "stored_error_deg": float(np.quantile(np.concatenate(stored_angles), 0.99)),
+        **pair_values(camera, depths, poses, rays),
+    }
+
+
+def pair_values(
+    camera: CameraConfig, depths: Sequence[NDArray[np.float32]], poses: Array, rays: Open3dRays
+) -> dict[str, float]:
+    """Times of an overlap and of a flow, and shares of the pixels whose state is that of rays."""
+    times: dict[str, list[float]] = {}
+    points = grid_points(camera, depths.__getitem__, poses, GRID, lambda: None)
+    rows = np.arange(len(depths)).repeat(20)
+    pixel = cell_pixels(camera, camera.width, camera.height)
+    agree, visible = [], []
+    for index, depth_m in enumerate(depths):
+        other = index + 1 - 2 * (index % 2)
+        image = DepthImage(depth_m)
+        compare = partial(overlaps_with, points, rows, camera, image, poses[index], TOLERANCE)
+        timed(times, "overlap", compare)
+        flow = partial(
+            flow_between,
+            camera=camera,
+            depth_a_m=depth_m,
+            world_from_a=poses[index],
+            depth_b_m=depths[other],
+            world_from_b=poses[other],
+        )
+        state = timed(times, "flow", flow).state
+        inside = (state == State.VISIBLE) | (state == State.HIDDEN)
+        point_m = points_of_pixels(camera, pixel, depth_m, poses[index])[inside]
+        is_visible = rays.reached(poses[other][:3, 3], point_m) > 1.0 - TOLERANCE
+        agree.append((state[inside] == State.VISIBLE) == is_visible)
+        visible.append(is_visible)
+    return {
+        "overlap_ms_per_pair": float(np.median(times["overlap"])) / len(rows),
+        "flow_ms_per_pair": float(np.median(times["flow"])),
+        "visible_share": float(np.mean(np.concatenate(visible))),
+        "state_agree_share": float(np.mean(np.concatenate(agree))),
+    }
+
+
+def timed(times: dict[str, list[float]], name: str, work: Callable[[], Any]) -> Any:
+    """What ``work`` gives; its processor time, milliseconds, is added to ``times``."""
+    began = time.process_time()
+    value = work()
+    times.setdefault(name, []).append(1e3 * (time.process_time() - began))
+    return value
+
+
+def angle_deg(a: NDArray[np.float32], b: NDArray[np.float32]) -> Array:
+    """Angles (H, W) between vectors (H, W, 3); 0 between zeros."""
+    sine = np.linalg.norm(np.cross(a.astype(float), b.astype(float)), axis=-1)
+    return np.asarray(np.degrees(np.arctan2(sine, np.einsum("hwi,hwi->hw", a, b))))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure meshes at sizes."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.layers", description=__doc__)
+    parser.add_argument("meshes", nargs="+", type=Path)
+    parser.add_argument("--sizes", nargs="+", default=["320x240", "640x480"], metavar="WxH")
+    parser.add_argument("--out", type=Path, default=Path("results/benchmarks/layers.csv"))
+    options = parser.parse_args(arguments)
+
+    def run() -> None:
+        rows = []
+        for path in options.meshes:
+            for size in options.sizes:
+                width, height = map(int, size.split("x"))
+                rows.append(measure(path, CameraConfig(width=width, height=height)))
+                write_frame(options.out, pd.DataFrame(rows), "%.5g")
+
+    return exit_status(run, "rows that were measured are kept")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Which frames of a data set see the same surfaces, and where: from depth and poses."""

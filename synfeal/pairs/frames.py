@@ -1,0 +1,111 @@
+"""The frames of a data set whose depth says what they see: from our own sets and 7-Scenes."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.sevenscenes import SPLIT_FILES
+from synfeal.errors import InputError
+from synfeal.validation.camera import camera_of_dataset
+from synfeal.validation.frames import check_names, kinds_of, read_poses
+from synfeal.validation.listing import COLOR, DEPTH, Frame, list_sequences, read_depth_mm
+from synfeal.validation.manifest import check_splits, read_splits
+from synfeal.validation.poses import check_rigid, rigid_bound
+
+log = logging.getLogger("synfeal")
+
+
+@dataclass(frozen=True)
+class DepthFrames:
+    """Frames with depth and poses.
+
+    Attributes:
+        frames: Their files.
+        splits: ``train`` or ``test`` of each; empty where the data set has no splits.
+        world_from_cam: Poses (N, 4, 4).
+        camera: Camera of the depth images.
+        is_color: Whether it is that of the colour images, too.
+    """
+
+    frames: tuple[Frame, ...]
+    splits: tuple[str, ...]
+    world_from_cam: NDArray[np.float64]
+    camera: CameraConfig
+    is_color: bool
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    def image(self, index: int) -> str:
+        """Return the name of a colour image in the data set."""
+        return f"{self.frames[index].name}.{COLOR}"
+
+    def depth_m(self, index: int) -> NDArray[np.float32]:
+        """Read depth (H, W) of a frame in metres, inf for nothing.
+
+        Raises:
+            InputError: The image is missing, damaged, or of another size than the camera.
+        """
+        path = self.frames[index].path(DEPTH)
+        depth_mm = read_depth_mm(path)
+        height, width = depth_mm.shape
+        if (width, height) != (self.camera.width, self.camera.height):
+            raise InputError(
+                f"{path}: is {width} x {height}, the camera {self.camera.width} x"
+                f" {self.camera.height}; give the camera of these images with --camera"
+            )
+        known = (depth_mm > 0) & (depth_mm < 65535)
+        return np.where(known, depth_mm.astype(np.float32) / 1000.0, np.float32(np.inf))
+
+
+def read_depth_frames(
+    dataset: Path, splits: Sequence[str], camera_file: Path | None, every: int
+) -> DepthFrames:
+    """List the frames of a data set; depth is read later.
+
+    Args:
+        dataset: Its directory.
+        splits: Of which splits, if the data set has any.
+        camera_file: A calibration in place of the manifest's camera.
+        every: Take every such frame of each sequence.
+
+    Raises:
+        InputError: A frame lacks a file, poses are not rigid, splits are contradictory, or there
+            is no depth.
+    """
+    sequences = list_sequences(dataset)
+    if DEPTH not in kinds_of(sequences):
+        raise InputError(f"{dataset}: has no depth images; collect it with --depth")
+    camera = camera_of_dataset(dataset, camera_file)
+    if camera.assumed:
+        log.warning("%s: says nothing of its camera; that of 7-Scenes is assumed", dataset)
+    poses, unreadable = read_poses(sequences)
+    problems = check_names(sequences).failures
+    problems += check_rigid(poses, unreadable, rigid_bound(dataset)).failures
+    split_of: dict[Path, str] = {}
+    if any((dataset / name).exists() for name in SPLIT_FILES.values()):
+        listed, split_failures = read_splits(dataset, sequences)
+        problems += check_splits(dataset, sequences, listed, split_failures).failures
+        split_of = {s.path: split for split, own in listed.items() for s in own}
+    if problems:
+        raise InputError(f"{problems[0]}; synfeal validate says more")
+    frames = tuple(
+        frame
+        for sequence in sequences
+        if not split_of or split_of[sequence.path] in splits
+        for frame in sequence.frames[::every]
+    )
+    return DepthFrames(
+        frames=frames,
+        splits=tuple(split_of.get(frame.sequence, "") for frame in frames),
+        world_from_cam=np.array([poses[frame] for frame in frames]).reshape(-1, 4, 4),
+        camera=camera.depth,
+        is_color=camera.of_depth is None,
+    )
