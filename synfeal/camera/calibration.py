@@ -24,8 +24,13 @@ from synfeal.records.files import PlainLoader
 # Names under which the same thing is found; the first is the one that messages give.
 MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "mtx")
 COEFFICIENTS = (
-    *("distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs"),
-    *("dist_coeff", "D", "dist"),
+    "distortion_coefficients",
+    "Distortion_Coefficients",
+    "distCoeffs",
+    "dist_coeffs",
+    "dist_coeff",
+    "D",
+    "dist",
 )
 SIZE = ("image_size", "imageSize")
 # What the models of ROS are called whose first five coefficients are OpenCV's.
@@ -204,7 +209,7 @@ def _from_record(values: Any) -> Calibration | None:
 
 
 def _from_mapping(values: Any) -> Calibration:
-    """What OpenCV and ROS write, as plain values."""
+    """Read what OpenCV and ROS write from plain values."""
     if not isinstance(values, Mapping):
         raise ValueError(f"must hold a mapping of keys, found {_shortened(values)}")
     model = values.get("distortion_model", MODELS[0])

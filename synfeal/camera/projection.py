@@ -1,4 +1,4 @@
-"""Where the pixels of a camera look, and where it shows points: every camera model is here.
+"""Projection: from pixels to rays and from points to pixels, for every camera model.
 
 Depth is what a model's depth images hold (:func:`depth_of_points`): along the optical axis of a
 perspective camera, along the ray of one that may see behind itself. :func:`rays_of_pixels` gives

@@ -247,7 +247,7 @@ def _like_options(
 
 
 def like_text(like: Like, sequence: Path) -> str:
-    """What is taken from a trajectory, margins included."""
+    """Describe what is taken from a trajectory, margins included."""
     x0, x1, y0, y1, z0, z1 = like.box
     angles = ", ".join(
         f"{name} {low:.0f} to {high:.0f}"
@@ -264,7 +264,7 @@ def like_text(like: Like, sequence: Path) -> str:
 
 
 def coverage_text(coverage: Mapping[str, Any]) -> str:
-    """What the training frames cover and how much of them is empty, from ``coverage.json``."""
+    """Describe from ``coverage.json`` what training frames cover and how much of them is empty."""
     space, surface, empty = coverage["free_space"], coverage["surface"], coverage["empty_pixels"]
     pixels = (
         f"empty pixels: {empty['share']:.1%}, {empty['worst_frame_share']:.0%} of the emptiest"
@@ -384,7 +384,7 @@ def scan(arguments: argparse.Namespace) -> None:
 
 
 def scan_text(out: Path, record: Mapping[str, Any]) -> str:
-    """What was made of how many frames, and how near it comes to photographs."""
+    """Describe what was made of how many frames, and how near it comes to photographs."""
     color, photographs = record["camera"]["color"], record["photographs"]
     agreement, disagreement = record["depth_agreement"], record["color_disagreement"]
     depth = "not compared" if agreement is None else f"{agreement:.0%} agree"

@@ -1,4 +1,4 @@
-"""What the commands share: how they and their options are declared, and options of a mesh."""
+"""Declaration of commands and their options, and the options of a mesh that several share."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ log = logging.getLogger("synfeal")
 
 @dataclass(frozen=True)
 class Rung:
-    """What one face count was measured to cost and to be worth; a line of the curve."""
+    """Measured cost and agreement of one face count; a line of the curve."""
 
     faces: int  # triangles of the mesh
     agreement: float  # share of decisions equal to the full mesh's
@@ -80,8 +80,10 @@ def collision_mesh(
     chosen = next(trial for trial in trials if trial.rung.chosen)
     log.info(
         "collision mesh: %d of %d faces, %.2f %% of %d decisions agree",
-        *(chosen.rung.faces, len(full.faces)),
-        *(100 * chosen.rung.agreement, len(questions.candidates)),
+        chosen.rung.faces,
+        len(full.faces),
+        100 * chosen.rung.agreement,
+        len(questions.candidates),
     )
     return chosen.mesh, curve
 

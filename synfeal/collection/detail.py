@@ -78,11 +78,11 @@ class Detail:
 
     @property
     def is_full(self) -> bool:
-        """Whether nothing could be left out."""
+        """True where nothing is left out."""
         return self.chosen is self.full
 
     def record(self, render: RenderConfig) -> dict[str, Any]:
-        """What a manifest says of it, ready for JSON."""
+        """Return the level of detail as a manifest states it, ready for JSON."""
         return {
             "faces": self.chosen.mesh.n_faces,
             "full_faces": self.full.mesh.n_faces,
@@ -157,8 +157,13 @@ def choose_detail(
     chosen = min((level for level in tried if level.error_levels <= granted), key=weighed)
     log.info(
         "level of detail at %dx%d: %d of %d faces, textures 1/%d, error %.2f levels (full: %.2f)",
-        *(camera.width, camera.height, chosen.mesh.n_faces, mesh.n_faces),
-        *(chosen.texture_factor, chosen.error_levels, full.error_levels),
+        camera.width,
+        camera.height,
+        chosen.mesh.n_faces,
+        mesh.n_faces,
+        chosen.texture_factor,
+        chosen.error_levels,
+        full.error_levels,
     )
     return Detail(chosen=chosen, full=full, tried=tuple(tried))
 
@@ -205,7 +210,7 @@ def _smaller_textures(mesh: TexturedMesh, judge: _Judge) -> Iterator[Level]:
 
 
 def _simplifies() -> bool:
-    """Whether the package that takes triangles away is there; says so where it is not."""
+    """Tell whether the package that simplifies meshes is installed; log where it is not."""
     if importlib.util.find_spec("meshoptimizer") is not None:
         return True
     log.warning(
@@ -217,7 +222,7 @@ def _simplifies() -> bool:
 
 @dataclass(frozen=True)
 class _Judge:
-    """What views should show, and how they are drawn."""
+    """Compares drawings of views with reference images of them."""
 
     camera: CameraConfig  # a pinhole
     poses: Poses

@@ -88,7 +88,10 @@ def refuse_blank(
             log.warning(
                 "%s: %.0f %% of the pixels of the %s frames will be empty: cameras look through"
                 " holes or past the mesh; %s",
-                *(name, 100 * share, split, _way_to_see_more(scene)),
+                name,
+                100 * share,
+                split,
+                _way_to_see_more(scene),
             )
 
 
@@ -104,7 +107,11 @@ def warn_of_walls(
             log.warning(
                 "%s: in %d of %d %s frames a surface is between the two cameras; give"
                 " --min-clearance %g",
-                *(name, blocked, len(plan), split, baseline_m),
+                name,
+                blocked,
+                len(plan),
+                split,
+                baseline_m,
             )
 
 
@@ -133,7 +140,8 @@ def warn_of_few_paths(plan: PoseTable, split: Split) -> None:
         log.warning(
             "the %d %s frames lie on %s: they show little of the scene; more frames, a larger"
             " --spacing or --mode random show more",
-            *(len(plan), {"train": "training", "test": "test"}[split]),
+            len(plan),
+            {"train": "training", "test": "test"}[split],
             "one straight path" if paths == 1 else f"{paths} straight paths",
         )
 
@@ -148,7 +156,7 @@ SPLITS: tuple[Split, ...] = ("train", "test")
 
 @dataclass(frozen=True)
 class CollectJob:
-    """What to collect."""
+    """A collection: mesh, settings and where to write the data set."""
 
     config: DatasetConfig  # settings with one scene, of one size
     packed_px: int | None  # side of packed frames that are written too, pixels, if any

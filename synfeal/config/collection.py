@@ -182,7 +182,7 @@ class SceneConfig(Strict):
 
 
 class CollectionConfig(Strict):
-    """How the camera moves (section 3 of the paper)."""
+    """Movement of the camera (section 3 of the paper)."""
 
     unless_none = ("test_paths",)
 

@@ -189,7 +189,7 @@ Shade = Literal["headlight", "ambient"]
 
 
 class RenderConfig(Strict):
-    """How images are drawn."""
+    """Settings of the renderer."""
 
     unless_none = ("effects", "shade")
 

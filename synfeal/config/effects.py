@@ -1,4 +1,4 @@
-"""What a camera and its world add to ideal frames, and what localizers are tested on besides."""
+"""Settings of the effects of camera and world on ideal frames, and of robustness tests."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class MotionBlurConfig(Strict):
 
 
 class ExposureConfig(Strict):
-    """How much light makes a pixel white."""
+    """Amount of light that makes a pixel white."""
 
     ev: Stops = Field(0.0, description="compensation, stops: 1 doubles the light")
     time_constant_s: Positive | None = Field(None, description="lag of auto-exposure; null: none")
@@ -81,7 +81,7 @@ class PathObjectsConfig(Strict):
 
 
 class EffectsConfig(Strict):
-    """What is added to ideal frames, in the order of the keys; what is absent is not added."""
+    """Effects on ideal frames, applied in the order of the keys; absent ones are left out."""
 
     unless_none = ("clutter",)
 

@@ -34,7 +34,7 @@ OffsetRange = Annotated[
 
 
 class UnseenConfig(Strict):
-    """What a scan has not seen is one colour in renderings, and anything at all in photographs.
+    """Fill of pixels that a scan has not seen: empty in renderings, anything in photographs.
 
     Empty pixels are told by their level, so a mesh is to be drawn on black, as it is by default.
     """

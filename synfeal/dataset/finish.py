@@ -121,7 +121,7 @@ def _write_effects(directory: Path, origin: Mapping[str, Any], mesh: Path) -> di
 
 
 def origin_of(config: DatasetConfig, scene: str) -> dict[str, Any]:
-    """Where a data set comes from, for its manifest: the settings, less what names files."""
+    """Return the settings a data set came from, less file names, for its manifest."""
     kept = config.scenes[scene].model_dump(mode="json", exclude={"sizes", "path", "sha256"})
     return {
         "scene": {"name": scene, **kept},
@@ -162,7 +162,7 @@ def write_manifest(
 
 
 def _stereo(camera: CameraConfig) -> dict[str, Any]:
-    """How the right camera of a pair lies in the left one, whose poses the frames have."""
+    """State the right camera of a pair in the frame of the left one, whose poses frames have."""
     if camera.stereo_baseline_m is None:
         return {}
     left_from_right = moved_right(np.eye(4), camera.stereo_baseline_m).tolist()

@@ -45,8 +45,13 @@ EPOCH = (1980, 1, 1, 0, 0, 0)
 UNIX, PLAIN_FILE = 3, 0o100644
 # What zipfile raises on damaged or encrypted archives.
 ARCHIVE_DAMAGE = (
-    *(zipfile.BadZipFile, zlib.error, EOFError, ValueError),
-    *(NotImplementedError, RuntimeError, OverflowError),
+    zipfile.BadZipFile,
+    zlib.error,
+    EOFError,
+    ValueError,
+    NotImplementedError,
+    RuntimeError,
+    OverflowError,
 )
 
 
@@ -71,7 +76,7 @@ class ArchivedFile:
         return PurePath(self.name).suffix
 
     def read_bytes(self) -> bytes:
-        """What it holds, its checksum verified.
+        """Read the member and verify its checksum.
 
         Raises:
             OSError: it is missing (``FileNotFoundError``), or the archive is damaged.
@@ -91,7 +96,7 @@ class ArchivedFile:
         return self.read_bytes().decode(encoding)
 
     def is_file(self) -> bool:
-        """Whether the archive holds it."""
+        """Tell whether the archive holds the member."""
         return self.archive.is_file() and self.name in sequence_names(self.archive)
 
 
@@ -100,7 +105,7 @@ FrameFile = Path | ArchivedFile
 
 
 def is_archive(sequence: Path) -> bool:
-    """Whether a sequence is named as an archive; its directory has no suffix."""
+    """Tell whether a sequence is named as an archive; a directory has no suffix."""
     return sequence.suffix == SUFFIX
 
 
@@ -137,7 +142,7 @@ def foreign_members(archive: Path) -> list[str]:
 
 
 def _is_plain(name: str, prefix: str) -> bool:
-    """Whether a member is ``seq-01/`` or a file right in it."""
+    """Tell whether a member is ``seq-01/`` or a file directly in it."""
     rest = name.removeprefix(prefix)
     return name.startswith(prefix) and rest not in (".", "..") and not set(rest) & set("/\\")
 
@@ -189,7 +194,12 @@ LEVEL = 1
 
 # What Pillow raises on damaged files, decompression bombs included.
 IMAGE_DAMAGE = (
-    *(OSError, SyntaxError, ValueError, EOFError, struct.error, MemoryError),
+    OSError,
+    SyntaxError,
+    ValueError,
+    EOFError,
+    struct.error,
+    MemoryError,
     Image.DecompressionBombError,
 )
 

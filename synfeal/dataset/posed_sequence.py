@@ -71,7 +71,7 @@ class PosedFrames:
 
     @property
     def has_depth(self) -> bool:
-        """Whether every frame has a depth image."""
+        """True where every frame has a depth image."""
         return all(file is not None for file in self.depth)
 
     def __getitem__(self, frames: slice) -> PosedFrames:
@@ -207,7 +207,9 @@ def _read_frames(entries: Sequence[_Entry]) -> PosedFrames:
             raise InputError(f"{lost.file('pose')}: is not finite, and neither is any other pose")
         log.warning(
             "%s: is not finite; left out, and so are %d others of %d frames",
-            *(lost.file("pose"), len(entries) - len(kept) - 1, len(entries)),
+            lost.file("pose"),
+            len(entries) - len(kept) - 1,
+            len(entries),
         )
     return PosedFrames(
         names=tuple(entries[index].name for index in kept),
@@ -271,7 +273,9 @@ def _read_tum(path: Path) -> PosedFrames:
     if len(kept) < len(color):
         log.warning(
             "%s: %d of %d photographs have no pose or depth near in time and are left out",
-            *(path, len(color) - len(kept), len(color)),
+            path,
+            len(color) - len(kept),
+            len(color),
         )
     fraction = (color_s - pose_s[after - 1]) / (pose_s[after] - pose_s[after - 1])
     between = [interpolate(poses[after[i] - 1], poses[after[i]], fraction[i])[0] for i in kept]

@@ -118,7 +118,7 @@ WRITERS = {".gif": _write_gif, ".mp4": _write_mp4}
 
 
 class Column(NamedTuple):
-    """What is shown in one place, moment after moment."""
+    """Pictures shown in one place, moment after moment."""
 
     name: str
     files: Sequence[FrameFile]

@@ -28,7 +28,7 @@ Task = tuple[Path, PoseTable]  # `seq-01` or `seq-01.zip`, and its poses
 
 @dataclass(frozen=True)
 class Studio:
-    """What is rendered, and how."""
+    """Everything that workers need to render frames."""
 
     mesh: Path
     camera: CameraConfig

@@ -193,7 +193,7 @@ def drawn(
 
 
 def effects_of(camera: CameraConfig, render: RenderConfig | None) -> Effects | None:
-    """What :func:`drawn` takes."""
+    """Return the effects that :func:`drawn` takes."""
     return (camera, render.effects) if render and render.effects else None
 
 

@@ -147,5 +147,5 @@ def gap_in(sequence: SequenceListing) -> Frame | None:
 
 
 def is_sequence(path: Path) -> bool:
-    """Whether a path is a sequence in one of its two forms."""
+    """Tell whether a path is a sequence, as a folder or as an archive."""
     return path.is_dir() or is_archive(path)

@@ -1,1 +1,1 @@
-"""What a camera and a changing world add to ideal frames: light, movement, exposure, noise."""
+"""Effects of the camera and a changing world on ideal frames: light, movement, exposure, noise."""

@@ -39,7 +39,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
 EFFECTS = (
-    *("light", "motion_blur", "exposure", "noise", "white_balance_k", "jpeg_quality"),
+    "light",
+    "motion_blur",
+    "exposure",
+    "noise",
+    "white_balance_k",
+    "jpeg_quality",
     "clutter",  # last: what was drawn before there was it stays the same
 )
 # The middle of an object's bottom in the world, and its size before it is turned, metres.
@@ -95,7 +100,7 @@ class Poses(Protocol):
 
 
 def path_effects(config: EffectsConfig, poses: Poses, first: int) -> EffectsConfig:
-    """What acts on the path that begins at row ``first``."""
+    """Return the effects on the path that begins at row ``first``."""
     rng = _generator("path", config, poses, first)
     acts = dict(zip(EFFECTS, rng.random(len(EFFECTS)) < config.share, strict=True))
     return config.model_copy(update={name: None for name in EFFECTS if not acts[name]})
@@ -214,7 +219,7 @@ class _Path:
         return float(step_m) / self.config.speed_m_s
 
     def _points_m(self, pose: NDArray[np.float64], depth_m: Depth) -> NDArray[np.float32]:
-        """Where pixels look (H, W, 3); beyond the far plane nothing is."""
+        """Return the points (H, W, 3) that pixels see; beyond the far plane nothing is."""
         ray = self._rays_cam @ pose[:3, :3].T.astype(np.float32)
         near = np.minimum(depth_m, np.float32(self.camera.far_m))[..., None]
         return np.asarray(pose[:3, 3].astype(np.float32) + near * ray)
@@ -226,7 +231,7 @@ class _Path:
         return np.nan_to_num(cell_directions(self.camera, *size)).astype(np.float32)
 
     def _taken(self, light: Light, row: int) -> Rgb:
-        """What the camera makes of light (H, W, 3) that reaches its sensor."""
+        """Take a picture of light (H, W, 3) that reaches the sensor."""
         config = self.config
         if config.noise is not None:
             rng = _generator("noise", config, self.poses, row)
@@ -238,7 +243,7 @@ class _Path:
 
 
 def effects_table(config: EffectsConfig, poses: Poses) -> pd.DataFrame:
-    """What acts on each path and in which light, as columns; one row a path."""
+    """Tabulate the effects and the light of each path; one row a path."""
     import pandas as pd  # takes time to load
 
     rows = []

@@ -48,13 +48,13 @@ def light_of(rgb: Rgb) -> Light:
 
 
 def rgb_of(light: Light) -> Rgb:
-    """What files hold (...) of light (...); what is beyond white is white."""
+    """Encode light (...) as files hold it; everything beyond white is white."""
     step = np.clip(light * np.float32(STEPS) + np.float32(0.5), 0, STEPS).astype(np.uint16)
     return np.asarray(np.take(_LEVEL, step))
 
 
 def channel_gains(temperature_k: float) -> Light:
-    """What light of a colour temperature does to red, green and blue (3,) beside that of 6500 K.
+    """Return gains (3,) on red, green and blue of a colour temperature, relative to 6500 K.
 
     The Planckian locus by Kim et al.'s cubic splines (US patent 7,024,034), 1667 to 25,000 K.
     """
@@ -80,7 +80,7 @@ def _planckian(temperature_k: float) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class LightState:
-    """What the light of a path is."""
+    """Light of one path."""
 
     ev: float  # brightness beside the scene's own, stops
     temperature_k: float  # colour temperature; the scene's own is 6500

@@ -35,7 +35,7 @@ CARTONS = 8  # beside the mesh of a scene, where no files are named
 
 
 def carton_files(mesh: Path) -> tuple[Path, ...]:
-    """Where the built-in objects of a scene lie."""
+    """Return the files of the built-in objects of a scene."""
     return tuple(mesh.with_name(f"carton_{number}.glb") for number in range(CARTONS))
 
 
@@ -59,7 +59,7 @@ class Crowd:
         return np.asarray(vertices[faces])
 
     def along(self, path_m: Array, rng: np.random.Generator) -> list[Standing]:
-        """What stands along a path of camera centres (P, 3); none touches another."""
+        """Place objects along a path of camera centres (P, 3); none touches another."""
         bounds_m = np.array([path_m.min(axis=0), path_m.max(axis=0)])
         bounds_m[:, :2] += np.array([[-REACH_M], [REACH_M]])
         widest_m = max(float(np.ptp(kind.bounds_m, axis=0).max()) for _, kind in self.kinds)
@@ -78,7 +78,7 @@ def placed_objects(mesh: Path) -> tuple[str, ...]:
 
 
 def crowd_of(mesh: Path, render: RenderConfig) -> Crowd | None:
-    """What may stand about in a scene, if anything does.
+    """Return the objects that may stand about in a scene, if there are any.
 
     Raises:
         InputError: a file cannot be read, or an object is larger than the scene.

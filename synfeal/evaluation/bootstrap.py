@@ -29,7 +29,7 @@ FEWEST_PATHS = 10
 
 
 def path_counts(n_paths: int, rng: np.random.Generator, resamples: int = RESAMPLES) -> Counts:
-    """How often each path occurs (1 + resamples, n_paths): once in the first row, then as drawn."""
+    """Count each path's draws (1 + resamples, n_paths): once in the first row, then resampled."""
     drawn = rng.multinomial(n_paths, np.full(n_paths, 1 / n_paths), size=resamples)
     return np.concatenate([np.ones((1, n_paths), dtype=np.int64), drawn])
 

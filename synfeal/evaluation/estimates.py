@@ -28,7 +28,7 @@ KITTI = "KITTI poses"
 
 
 class Convention(NamedTuple):
-    """What a pose maps, and the order of its quaternion."""
+    """Direction of a pose, and the order of its quaternion."""
 
     direction: Direction
     order: Order

@@ -1,4 +1,4 @@
-"""Which file formats poses are read from, and how each is told.
+"""Readers of pose files, and how each format is told from its content.
 
 - 7-Scenes: ``seq-XX/frame-XXXXXX.pose.txt``, four rows of ``world_from_cam``.
 - TUM RGB-D ("File Formats"): ``timestamp tx ty tz qx qy qz qw``, ``world_from_cam``.

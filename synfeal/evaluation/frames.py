@@ -59,7 +59,7 @@ class ScoredFrames:
 
     @property
     def title(self) -> str:
-        """What is scored, for messages."""
+        """Name of the scored frames, for messages."""
         return self.split if self.frame_key else f"{self.split} split"
 
     def at(self, chosen: NDArray[np.int64]) -> ScoredFrames:
@@ -111,7 +111,7 @@ def read_scored_frames(dataset: Path, split: str) -> ScoredFrames:
 
 
 def _is_unsplit(dataset: Path) -> bool:
-    """Whether a folder holds frames, and nothing says which are for training."""
+    """Tell whether a folder holds frames, and nothing says which are for training."""
     told = (MANIFEST, *SPLIT_FILES.values())
     if not dataset.is_dir() or any(os.path.lexists(dataset / name) for name in told):
         return False

@@ -1,4 +1,4 @@
-"""What is printed of the errors of poses: medians, means, and the share of frames within bounds.
+"""Scores of poses: medians, means, and the share of frames within bounds.
 
 A frame counts as localized within a bound when its position *and* its orientation error are below
 it, as in hloc and ACE. 95 % limits come from a bootstrap over whole paths
@@ -59,8 +59,12 @@ class Bound:
 # twentieth of the paper's frames stands (medians of 0.5 to 1.3 m and 13 to 40 degrees): of the
 # stricter ones next to nothing is left there, and 5 m holds a whole room.
 BOUNDS = (
-    *(Bound(0.05, 5), Bound(0.10, 5), Bound(0.25, 2), Bound(0.50, 5)),
-    *(Bound(0.50, 15), Bound(5.0, 10)),
+    Bound(0.05, 5),
+    Bound(0.10, 5),
+    Bound(0.25, 2),
+    Bound(0.50, 5),
+    Bound(0.50, 15),
+    Bound(5.0, 10),
 )
 
 
@@ -75,7 +79,7 @@ def pose_errors(predicted: PoseTable, reference: PoseTable) -> dict[str, Array]:
 
 
 def is_pose(predicted: PoseTable) -> NDArray[np.bool_]:
-    """Which predictions (N,) are finite and have a quaternion of unit length.
+    """Mark predictions (N,) that are finite and have a quaternion of unit length.
 
     Another length is not normalised: a quaternion of zeros, say, has no direction to be brought to.
     """
@@ -86,7 +90,7 @@ def is_pose(predicted: PoseTable) -> NDArray[np.bool_]:
 
 
 def within(errors: Mapping[str, Array], bound: Bound, end: str = "") -> NDArray[np.bool_]:
-    """Which frames (N,) are localized within a bound."""
+    """Mark frames (N,) that are localized within a bound."""
     position, orientation = errors[POSITION + end], errors[ORIENTATION + end]
     return np.asarray((position < bound.position_m) & (orientation < bound.orientation_deg))
 

@@ -175,7 +175,7 @@ def pairs_in_time(
 
 
 def _nearest(among_s: Array, times_s: Array) -> NDArray[np.int64]:
-    """Which of ``among_s`` (N,) is nearest to each of ``times_s`` (M,)."""
+    """Return the index (M,) among ``among_s`` (N,) that is nearest to each of ``times_s`` (M,)."""
     order = np.argsort(among_s, kind="stable")
     ordered_s = among_s[order]
     if len(ordered_s) == 1:

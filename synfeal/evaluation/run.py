@@ -33,7 +33,7 @@ DATASET, LABELS = "", "_labels"
 
 
 class Settings(NamedTuple):
-    """What a person may choose."""
+    """Choices a person has when poses are scored."""
 
     split: str = "test"  # ``test``, ``train`` or ``all``
     align: Align = "none"  # whether estimates are first moved onto the yardstick, as a whole
@@ -46,7 +46,7 @@ class Settings(NamedTuple):
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What was found."""
+    """Errors, scores and the frames and poses they are of."""
 
     frames: ScoredFrames  # what was scored
     estimates: Estimates  # what was read
@@ -126,7 +126,7 @@ def _matched(
 def _camera_and_depth(
     dataset: Path, frames: ScoredFrames, settings: Settings
 ) -> tuple[CameraConfig | None, Array | None]:
-    """What the reprojection error takes; a file of poses has neither."""
+    """Read camera and depth for the reprojection error; a file of poses has neither."""
     if frames.frame_key is not None:
         return None, None
     camera = camera_of_dataset(dataset, settings.camera).config

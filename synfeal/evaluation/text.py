@@ -1,4 +1,4 @@
-"""What ``synfeal evaluate`` prints and draws."""
+"""Printed scores, tables and the drawing of ``synfeal evaluate``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every exporter starts from: the frames of a data set, with poses, splits and camera."""
+"""Frames of a data set with poses, splits and camera: the input of every exporter."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def need_perspective(data: ExportSet, program: str) -> None:
 
 
 def frame_name(frame: ExportFrame) -> str:
-    """What an image is called below ``images``."""
+    """Return the name of an image below ``images``."""
     return f"{frame.sequence}/{frame.stem}.{COLOR}"
 
 

@@ -1,4 +1,4 @@
-"""What is learned from: ACE's scenes, tables of MS-Transformer, Nerfstudio's ``transforms.json``.
+"""Formats to learn from: ACE's scenes, MS-Transformer's tables, Nerfstudio's ``transforms.json``.
 
 ACE: ``{train,test}/{rgb,poses,calibration}``, one file of each for a frame. Source: ``dataset.py``
 and ``datasets/setup_7scenes.py`` of nianticlabs/ace: files of a folder go together by their order;

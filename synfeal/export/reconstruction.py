@@ -207,7 +207,8 @@ def export_tum(data: ExportSet, out: Path, place: Place) -> None:
     if lost:
         log.warning(
             "%.2f%% of the depths are beyond %.1f m, more than TUM's images hold: now 0",
-            *(100 * lost / len(data.frames), MOST_M),
+            100 * lost / len(data.frames),
+            MOST_M,
         )
 
 

@@ -198,7 +198,7 @@ def _load(scene: SceneConfig) -> TexturedMesh:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What is known of a mesh."""
+    """Findings about a mesh."""
 
     scene: SceneConfig  # path, axis and unit as they were taken
     mesh: TexturedMesh
@@ -229,7 +229,7 @@ class Inspection:
 
     @property
     def viewpoint_m(self) -> Array:
-        """Where the pictures are taken from, (3,): in the free space if there is any."""
+        """Place (3,) the pictures are taken from: in the free space if there is any."""
         boxes_m = self.suggested_m
         found_m = viewpoint(self.space, boxes_m[0] if len(boxes_m) else None)
         return self.mesh.bounds_m.mean(axis=0) if found_m is None else found_m

@@ -1,4 +1,4 @@
-"""Where a camera can be: the free space of a mesh, and a box in it to sample poses from."""
+"""Free space of a mesh where a camera can be, and a box in it to sample poses from."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ DEFINITION = (
 
 @dataclass(frozen=True)
 class Survey:
-    """What rays tell of a regular grid of points in a box; nothing is decided yet."""
+    """Measurements by rays at a regular grid of points in a box; nothing is decided yet."""
 
     axes_m: tuple[Array, Array, Array]  # coordinates along x, y and z
     points_m: Array  # (N, 3) all points, x slowest

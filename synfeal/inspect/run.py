@@ -184,7 +184,7 @@ class TopView(NamedTuple):
 
 
 def inside_views(mesh: TexturedMesh, position_m: Array) -> list[Rgb]:
-    """What a level camera at (3,) sees at each of ``LOOKS_ALONG``."""
+    """Draw what a level camera at (3,) sees at each of ``LOOKS_ALONG``."""
     with open_renderer(mesh, VIEW_CAMERA) as renderer:
         turns = rotation_from_rpy([[0.0, 0.0, math.radians(yaw)] for yaw in LOOKS_ALONG])
         return [renderer.render(pose_matrix(turn, position_m)) for turn in turns]

@@ -52,7 +52,7 @@ MAX_OF_ONE_COLOUR = 0.02  # of the frames; a data set with a twentieth of them i
 
 @dataclass(frozen=True)
 class Emptiness:
-    """How much of the images would show nothing.
+    """Shares of the images that would show nothing.
 
     Attributes:
         share: Of all pixels.
@@ -70,7 +70,7 @@ class Emptiness:
 
 @dataclass(frozen=True)
 class Suggestion:
-    """What was planned, and what came of it.
+    """A planned collection, and its outcome.
 
     Attributes:
         scene: With the boxes that cameras may be in, and what is asked of poses.
@@ -166,7 +166,7 @@ def _best_covering(
 
 @dataclass(frozen=True)
 class _Places:
-    """Where cameras may be, as far as the mesh tells.
+    """Places where cameras may be, as far as the mesh tells.
 
     Attributes:
         space: The free space.

@@ -111,7 +111,7 @@ STEPS = 32_000  # int16 on either side of the middle
 
 @dataclass(frozen=True)
 class ViewerMesh:
-    """What :file:`viewer.js` draws."""
+    """Mesh as :file:`viewer.js` draws it."""
 
     # (V, 3) int16; metres are ``offset_m + step_m * positions``, world, z up
     positions: NDArray[np.int16]

@@ -1,4 +1,4 @@
-"""What a file and its mesh must fulfil before hours are spent on them, and what is taken out.
+"""Checks of a file and its mesh before hours are spent on them, and repairs.
 
 Files that would load into something wrong are refused by name, with what to do instead. What can
 neither be seen nor hit is removed; each removal is a finding. Open edges, non-manifold edges,
@@ -101,8 +101,11 @@ SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
 
 # Required extensions that change nothing here, or that are read.
 READ = {
-    *("EXT_texture_webp", "KHR_lights_punctual", "KHR_mesh_quantization"),
-    *("KHR_texture_transform", "KHR_xmp_json_ld"),
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    "KHR_xmp_json_ld",
 }
 TRANSFORM = "with glTF-Transform (npm install --global @gltf-transform/cli):"
 REMEDIES = {

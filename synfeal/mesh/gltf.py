@@ -111,7 +111,7 @@ def simplified(gltf: Gltf) -> Json:
 
 
 def base_color(material: Json) -> Json:
-    """What stands for ``pbrMetallicRoughness``, reduced to colour: texture and factor, if any.
+    """Reduce ``pbrMetallicRoughness`` to colour: texture and factor, if any.
 
     Of the older specular-glossiness materials it is the diffuse colour.
     """
@@ -173,7 +173,7 @@ def stand_alone(header: Json) -> list[str]:
 
 
 def listed(header: Json, key: str) -> list[Json]:
-    """What stands under a key, if anything."""
+    """Return the entries under a key; none where it is missing."""
     found: list[Json] = header.get(key, [])
     return found
 

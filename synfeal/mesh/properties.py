@@ -1,4 +1,4 @@
-"""How large a scene is (Table 1), and how its triangles hang together."""
+"""Size of a scene (Table 1), and connectivity of its triangles."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ Indices = NDArray[np.int64]
 
 
 def mesh_topology(vertices_m: Vertices, faces: Indices) -> dict[str, Any]:
-    """What edges say about triangles (F, 3) over vertices (V, 3) in metres, seam copies merged.
+    """Analyse the edges of triangles (F, 3) over vertices (V, 3) in metres, seam copies merged.
 
     Copies of a vertex along a texture seam would show as a hole: merge them first, with
     :func:`synfeal.mesh.triangles.merge_vertices`. ``enclosed_volume_m3`` is signed, negative where
@@ -80,7 +80,7 @@ def _counted(pairs: Indices, n_vertices: int) -> tuple[Indices, Indices]:
 
 
 def _group(edges: Indices) -> tuple[int, Indices]:
-    """How many groups the vertices that edges (E, 2) join make, and the group (E,) of each edge."""
+    """Join vertices along edges (E, 2): number of groups, and the group (E,) of each edge."""
     used, index = np.unique(edges, return_inverse=True)
     ends = index.reshape(-1, 2)
     graph = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(used),) * 2)

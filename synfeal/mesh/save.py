@@ -62,7 +62,7 @@ def save_glb(path: Path, mesh: TexturedMesh) -> None:
 
 
 def storage_grid(bounds_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Where the origin of the stored coordinates lies, (3,), and the grid they are rounded to.
+    """Choose the origin (3,) of the stored coordinates, and the grid they are rounded to.
 
     Coordinates are stored as float32, which is worth 6 cm a thousand kilometres from the origin.
     So a mesh is stored around its own centre, in nodes that move it there in float64. Coordinates

@@ -68,7 +68,7 @@ def refuse_larger(size_m: Array, mesh: TexturedMesh, what: str) -> None:
 
 
 class Ground:
-    """What objects stand on, and must not touch."""
+    """Surface that objects stand on, and must not touch."""
 
     def __init__(self, corners: Array, path_m: Array | None) -> None:
         """Take what :func:`standing` takes."""
@@ -83,7 +83,7 @@ class Ground:
     def place(
         self, kind: TexturedMesh, bounds_m: Array, rng: np.random.Generator, tries: int
     ) -> tuple[Array, float] | None:
-        """Where an object can stand (3,), and how it is turned; None after so many tries.
+        """Find a place (3,) and a heading for an object; None after so many tries.
 
         It is let down from a random place between the corners ``bounds_m`` (2, 3).
         """
@@ -112,7 +112,7 @@ def _about_z(yaw_rad: float) -> Array:
 
 
 def meets_box(corners: Array, centre_m: Array, half: Array, yaw_rad: float) -> NDArray[np.bool_]:
-    """Which triangles (N, 3, 3) meet a box that is turned about z, its inside included: (N,)."""
+    """Mark triangles (N, 3, 3) that meet a box turned about z, its inside included: (N,)."""
     corners = (corners - centre_m) @ _about_z(yaw_rad)
     meets = ((corners.min(axis=1) <= half) & (corners.max(axis=1) >= -half)).all(axis=1)
     near = corners[meets]

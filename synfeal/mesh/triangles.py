@@ -1,4 +1,4 @@
-"""What rays are cast against, and less of a mesh: fewer triangles, smaller textures."""
+"""Triangles that rays are cast against, and simplification: fewer of them, smaller textures."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Which frames of a data set see the same surfaces, and where: from depth and poses."""
+"""Pairs of frames that see the same surfaces, and flow between them: from depth and poses."""

@@ -1,4 +1,4 @@
-"""Which pairs are kept."""
+"""Choice of the pairs that are kept."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where points that one frame shows lie in another, and whether that one shows them, too.
+"""Correspondences: places in one frame of points that another shows, and their visibility.
 
 A point is *visible* in a frame if it projects into the image and its depth there is that of the
 depth image, up to a relative tolerance (and 2 mm, for depth is stored in millimetres). It is
@@ -33,7 +33,7 @@ EDGE = 0.1
 
 
 class State(IntEnum):
-    """What becomes of a pixel of one frame in another frame."""
+    """Fate of a pixel of one frame in another frame."""
 
     NO_DEPTH = 0
     VISIBLE = 1

@@ -42,7 +42,7 @@ MOST_FRAMES = 20_000  # of which all pairs are compared: 1.6 GB of overlaps
 
 @dataclass(frozen=True)
 class PairsJob:
-    """What to compare, and what to write.
+    """A comparison of frames, and the files to write.
 
     Attributes:
         dataset: Data set with depth.
@@ -244,7 +244,7 @@ def _write_flows(
 
 
 def _record(job: PairsJob, n_frames: int, compared: int, kept: int) -> dict[str, Any]:
-    """What was done, for a reader of the directory."""
+    """Return the record of what was done, for a reader of the directory."""
     return {
         "dataset": job.dataset.resolve().name,
         "frames": n_frames,

@@ -1,1 +1,1 @@
-"""Where the camera goes: one module per part of section 3 of the paper."""
+"""Planning of camera poses: one module per part of section 3 of the paper."""

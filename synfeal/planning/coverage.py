@@ -1,4 +1,4 @@
-"""What a plan covers: how much of the free space, of the surface, and how much of nothing."""
+"""Coverage of a plan: how much of the free space, of the surface, and how much of nothing."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def visible_points(caster: RayCaster, places_m: Array, points_m: Array) -> Array
 
 
 def has_line(caster: RayCaster, place_m: Array, points_m: Array) -> NDArray[np.bool_]:
-    """Whether nothing is between a place (3,) and surface points (N, 3), (N,)."""
+    """Mark surface points (N, 3) with nothing between them and a place (3,): (N,)."""
     towards = place_m - points_m
     length_m = np.linalg.norm(towards, axis=1, keepdims=True)
     lifted = points_m + towards * np.minimum(LIFT_M / np.maximum(length_m, LIFT_M), 1.0)
@@ -108,7 +108,7 @@ def has_line(caster: RayCaster, place_m: Array, points_m: Array) -> NDArray[np.b
 
 
 def in_image(camera: CameraConfig, world_from_cam: Array, points_m: Array) -> NDArray[np.bool_]:
-    """Whether points (N, 3) are projected into the image of a pose (4, 4), within reach, (N,)."""
+    """Mark points (N, 3) that a pose (4, 4) projects into the image, within reach: (N,)."""
     offset = points_m - world_from_cam[:3, 3]
     at = offset @ world_from_cam[:3, :3]
     reached = np.einsum("ni,ni->n", at, at) <= FARTHEST_M**2
@@ -157,7 +157,7 @@ def empty_shares(caster: RayCaster, world_from_cam: Array, camera: CameraConfig)
 def plan_coverage(
     mesh: Triangles, boxes_m: Array, scene: SceneConfig, plan: PoseTable, camera: CameraConfig
 ) -> dict[str, object]:
-    """What a plan covers, as the content of ``coverage.json``; see ``DEFINITIONS``.
+    """Measure a plan's coverage, as the content of ``coverage.json``; see ``DEFINITIONS``.
 
     ``mesh`` is the scene or its collision mesh, ``boxes_m`` (B, 2, 3) or (2, 3) the corners of the
     spaces that camera centres are sampled in.
@@ -194,7 +194,7 @@ def plan_coverage(
 def scene_coverage(
     collision: Path, scene: SceneConfig, plan: PoseTable, camera: CameraConfig
 ) -> dict[str, object]:
-    """What a plan covers of the scene of a collision mesh; see :func:`plan_coverage`."""
+    """Measure a plan's coverage of a collision mesh; see :func:`plan_coverage`."""
     mesh = load_collision_mesh(collision)
     mesh_bounds = np.stack([mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)])
     boxes = sampling_boxes_of(scene, mesh_bounds, str(collision))
@@ -204,7 +204,7 @@ def scene_coverage(
 def free_space_coverage(
     space: ConnectedSpace, boxes_m: Array, plan: PoseTable
 ) -> dict[str, float | None]:
-    """Which voxels of the connected space in the boxes (B, 2, 3) have cameras near them.
+    """Mark voxels of the connected space in the boxes (B, 2, 3) that have cameras near them.
 
     See ``DEFINITIONS``.
     """

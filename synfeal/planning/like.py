@@ -1,4 +1,4 @@
-"""Where a person took photographs, as the bounds of a collection: box, headings, tilt and roll.
+"""Bounds of a collection after a person's photographs: box, headings, tilt and roll.
 
 What a localizer has to know is how the scene looks from where photographs will be taken. The
 photographs of a scan tell: the box that their camera centres fill and the angles they were held at,
@@ -36,7 +36,7 @@ FULL_TURN_DEG, STEEPEST_DEG = 330.0, 89.0
 
 @dataclass(frozen=True)
 class Like:
-    """What a collection takes from a trajectory.
+    """Bounds that a collection takes from a trajectory.
 
     Attributes:
         box: x0, x1, y0, y1, z0, z1 of camera centres in the mesh's world, metres.

@@ -176,7 +176,7 @@ def _paths(
 
 
 class _Turns:
-    """Which box the next frames come from: the one that lacks most of its share by volume."""
+    """Chooses the box of the next frames: the one that lacks most of its share by volume."""
 
     def __init__(self, boxes: Array) -> None:
         volume = np.prod(boxes[:, 1] - boxes[:, 0], axis=1)

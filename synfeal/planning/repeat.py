@@ -40,7 +40,10 @@ def repeated_poses(
         where = ", ".join(f"{value:.2f}" for value in table.position_m[np.argmin(inside)])
         log.warning(
             "%s: %d of %d poses lie outside the mesh, the first at (%s) m; check unit_m, up_axis",
-            *(source, np.sum(~inside), n_frames, where),
+            source,
+            np.sum(~inside),
+            n_frames,
+            where,
         )
     return table
 

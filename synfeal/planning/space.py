@@ -1,4 +1,4 @@
-"""Which poses there are in a mesh, and which are admissible: sections 3.1 and 3.2 of the paper.
+"""Candidate poses in a mesh, and the admissible ones: sections 3.1 and 3.2 of the paper.
 
 And the space the scene is about, which free lines connect: where the first path starts, and what is
 asked of it.
@@ -51,7 +51,7 @@ def view_directions(poses: PoseVectors) -> Array:
 def has_free_view(
     caster: RayCaster, poses: PoseVectors, min_view_distance_m: float
 ) -> NDArray[np.bool_]:
-    """Whether what each pose (N, 6) looks at is farther than the paper's ``d``, (N,).
+    """Mark poses (N, 6) with a free view, far enough and of enough: (N,).
 
     Clarification of the paper: a view ray that hits nothing has an infinite length and would pass
     ``R > d``. It looks out through a hole of the mesh, at an image without information, which is
@@ -88,7 +88,7 @@ def seen_shares(caster: RayCaster, poses: PoseVectors) -> Array:
 def admissible(
     caster: RayCaster, start: Array, poses: PoseVectors, min_view_distance_m: float
 ) -> NDArray[np.bool_]:
-    """Which candidates (N, 6) a free line from ``start`` reaches and have a free view, (N,).
+    """Mark candidates (N, 6) with a free view that a free line from ``start`` reaches: (N,).
 
     ``start`` is one pose vector (6,) for all of them or one for each (N, 6).
     This is the set X_a of section 3.2: ``R(p_i, p_c) > |p_i - p_c|`` and ``R(p_c, p_c) > d``.
@@ -168,7 +168,7 @@ class PoseSpace:
         return sample_poses(self.bounds, count, self.rng)
 
     def has_free_view(self, poses: PoseVectors) -> NDArray[np.bool_]:
-        """Which poses (N, 6) look far enough, at enough, and stand clear of surfaces, (N,)."""
+        """Mark poses (N, 6) with a free view, far enough and of enough: (N,)."""
         good = has_free_view(self.caster, poses, self.min_view_distance_m)
         if self.min_seen > 0.0:
             good[good] = seen_shares(self.caster, poses[good]) >= self.min_seen
@@ -235,7 +235,7 @@ class ConnectedSpace:
     hubs_m: Array  # (H, 3) places connected to each other by free lines of sight
 
     def contains(self, points_m: Array) -> NDArray[np.bool_]:
-        """Whether a free line joins each point (N, 3) to one of the hubs, (N,)."""
+        """Mark points (N, 3) that a free line joins to one of the hubs: (N,)."""
         found = np.zeros(len(points_m), dtype=np.bool_)
         for hub in self.hubs_m:
             left = np.flatnonzero(~found)
@@ -271,7 +271,7 @@ class Questions:
         return RAYS_EACH * len(self.candidates)
 
     def answers(self, caster: RayCaster) -> NDArray[np.bool_]:
-        """Which candidates (N,) are admissible in the mesh of ``caster``."""
+        """Mark candidates (N,) that are admissible in the mesh of ``caster``."""
         return admissible(caster, self.starts, self.candidates, self.min_view_distance_m)
 
 

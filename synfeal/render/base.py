@@ -1,4 +1,4 @@
-"""What the rest of the project knows of a renderer, what backends share, what they are to draw."""
+"""The interface of renderers, what backends share, and what they are given to draw."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def reference_images(
     camera: CameraConfig,  # at most 1024 pixels wide and high
     poses: Iterable[NDArray[np.float64]],  # ``world_from_cam``
 ) -> Iterator[NDArray[np.float32]]:
-    """What images should be: means over 64 points of each pixel, (H, W, 3) in 0 to 255, unrounded.
+    """Render the ideal: means over 64 points of each pixel, (H, W, 3) in 0 to 255, unrounded.
 
     The 64 pinhole images whose principal points differ by eighths of a pixel are, interleaved, one
     image with eight times the pixels along each axis. It is drawn as that one image, so that a

@@ -1,4 +1,4 @@
-"""Which backend draws: the one named, or the fastest that works on this machine.
+"""Choice of the backend: the one named, or the fastest that works on this machine.
 
 A backend works when it draws a red square red; libraries that load and draw nothing do not count.
 """
@@ -87,7 +87,7 @@ def fastest_working() -> str:
 
 @functools.cache
 def why_not(name: str) -> str | None:
-    """Why a backend does not draw on this machine and what to install, or None if it does."""
+    """Say why a backend does not draw on this machine and what to install; None if it does."""
     try:
         with BACKENDS[name](_red_square(), CameraConfig(width=16, height=16), RenderConfig()) as r:
             rgb, depth_m = r.render_rgbd(_FACING)

@@ -115,7 +115,7 @@ class CubeRenderer(Renderer):
         return list(poses)
 
     def _located(self, face: CameraConfig, rays: Array) -> Array:
-        """Where rays (..., 3) lie in the drawn faces (..., 2), one below the other."""
+        """Locate rays (..., 3) in the drawn faces (..., 2), one below the other."""
         towards = np.einsum("...i,fij->...fj", rays, self._cam_from_face)
         slot = np.where(np.isnan(towards[..., 2]), -np.inf, towards[..., 2]).argmax(axis=-1)
         own = np.take_along_axis(towards, slot[..., None, None], axis=-2)[..., 0, :]

@@ -121,7 +121,7 @@ def resampled_depth(
 
 
 def _bent(inverse: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """Where (h, w) inverse depth is not that of a plane: at edges, creases and beside nothing."""
+    """Mark (h, w) inverse depth that is not of a plane: edges, creases and beside nothing."""
     bent = np.zeros(inverse.shape, bool)
     for axis in (0, 1):
         values, into = np.moveaxis(inverse, axis, 0), np.moveaxis(bent, axis, 0)
@@ -133,7 +133,7 @@ def _bent(inverse: NDArray[np.floating]) -> NDArray[np.bool_]:
 def _seen_at(
     camera: CameraConfig, pinhole: CameraConfig, rows: range, offset: tuple[float, float] = (0, 0)
 ) -> Array:
-    """Where rows of the image lie in the pinhole image: (rows, W, 2)."""
+    """Return the places (rows, W, 2) in the pinhole image that rows of the image show."""
     normalised = normalised_of_pixels(camera, pixels_of_rows(camera, rows, offset))
     fx, fy, cx, cy = pinhole.intrinsics
     return normalised * [fx, fy] + [cx, cy]

@@ -159,7 +159,7 @@ class OpenglRenderer(Renderer):
 
     @cached_property
     def _face_target(self) -> Any:
-        """What numbers of triangles are drawn into, which few ask for."""
+        """Create the target that numbers of triangles are drawn into; few callers ask for it."""
         halves = self._context.renderbuffer(self._size, 2, dtype="f4")
         return self._context.framebuffer([halves], self._context.depth_renderbuffer(self._size))
 

@@ -124,7 +124,7 @@ class PyrenderRenderer(Renderer):
         self._scene.set_pose(self._camera, centred @ CAM_FROM_GL)
 
     def _drawn(self, one_pass: _Pass, factor: int, background: NDArray[np.float64]) -> Any:
-        """What a pass makes of the scene, ``factor`` times as large as the image (H, W, C)."""
+        """Draw a pass of the scene, ``factor`` times as large as the image (H, W, C)."""
         self._scene.bg_color = background
         self._platform.make_current()
         one_pass.viewport_width, one_pass.viewport_height = (factor * n for n in self._size)
@@ -238,7 +238,7 @@ class _Pass(pyrender.Renderer):  # type: ignore[misc]  # pyrender is untyped
         super()._bind_and_draw_primitive(primitive, pose, program, flags)
 
     def _read_main_framebuffer(self, scene: Any, flags: int) -> NDArray[Any]:
-        """What was drawn (H, W, C)."""
+        """Read the image that was drawn (H, W, C)."""
         GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self._main_fb_ms)
         content = GL.glReadPixels(0, 0, *self._main_fb_dims, *self._read_as)
         pixels: NDArray[Any] = np.frombuffer(content, self._dtype)

@@ -55,7 +55,7 @@ class RaycastRenderer(Renderer):
         del self._triangles
 
     def _image(self, look: Look, pose: Floats, samples_px: Floats, step_px: float) -> NDArray[Any]:
-        """What ``look`` sees along the rays through ``samples_px`` (S, 2) of each pixel.
+        """Draw what ``look`` sees along the rays through ``samples_px`` (S, 2) of each pixel.
 
         Rays are (S * P, 3): in the world, of unit length along the optical axis, the first sample
         of all pixels before the second.
@@ -75,7 +75,7 @@ class RaycastRenderer(Renderer):
         return np.concatenate(tiles).reshape(height, width, *tiles[0].shape[1:])
 
     def _points(self, view: View, rays: Floats) -> tuple[NDArray[np.intp], Points]:
-        """Which rays hit something, and what."""
+        """Find the rays that hit something, and what they hit."""
         face, about_m = self._triangles.first_drawn(view, rays)
         hit = np.flatnonzero(face >= 0)
         return hit, self._triangles.points(view, rays[hit], face[hit], about_m[hit])

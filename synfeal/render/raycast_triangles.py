@@ -32,7 +32,7 @@ MOST_LAYERS = 64  # that a ray passes before it counts as lost
 
 
 class View(NamedTuple):
-    """Where from and how finely the triangles are looked at, in their frame."""
+    """Viewpoint and pixel size of a look at triangles, in their frame."""
 
     origin_m: Floats  # (3,) position of the camera
     per_px: Floats  # (2, 3) how rays change from pixel to pixel along x and y
@@ -89,7 +89,7 @@ class TexturedTriangles:
         return face, depth_m
 
     def points(self, view: View, rays: Floats, face: Faces, depth_m: Floats) -> Points:
-        """Where ``rays`` (N, 3) meet the triangles ``face`` (N,): exactly, given ``depth_m``."""
+        """Intersect ``rays`` (N, 3) with triangles ``face`` (N,): exactly, given ``depth_m``."""
         rows = self._rows[face]
         constant = np.einsum("nkj,j->nk", rows, np.append(view.origin_m, 1.0))
         slope = np.einsum("nkj,nj->nk", rows[:, :, :3], rays)
@@ -101,7 +101,7 @@ class TexturedTriangles:
         return Points(rays, face, depth_m, values)
 
     def _uv_per_px(self, view: View, points: Points) -> Floats:
-        """How u and v change along x and y, (N, 4): du/dx, dv/dx, du/dy, dv/dy."""
+        """Return derivatives (N, 4) of u and v along x and y: du/dx, dv/dx, du/dy, dv/dy."""
         gradient, depth_m = self._rows[points.face, :3, :3], points.depth_m
         slope = np.einsum("nkj,nj->nk", gradient, points.rays)
         slope[slope[:, 0] == 0.0, 0] = np.inf
@@ -130,7 +130,7 @@ class TexturedTriangles:
         return self._textures.rgba(self._texture_of[self._part_of[points.face]], uv, uv_per_px)
 
     def _is_cut_out(self, face: Faces) -> NDArray[np.bool_]:
-        """Whether a face was hit and has holes in its texture."""
+        """Mark rays that hit a face whose texture has a hole there."""
         return np.asarray((face >= 0) & self._has_cutouts[self._part_of[face]], np.bool_)
 
     def _first_hits(self, view: View, rays: Floats, start_m: Floats) -> tuple[Faces, Floats]:

@@ -35,7 +35,7 @@ class Layers(NamedTuple):
 
 
 class Surface(NamedTuple):
-    """What the pixels of a frame show.
+    """Surface that the pixels of a frame show.
 
     Attributes:
         normals_cam: Unit normals (H, W, 3) in the frame of the camera; 0 0 0 for nothing.

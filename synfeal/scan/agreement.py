@@ -122,7 +122,7 @@ def agreement(
 
 @dataclass(frozen=True)
 class DepthAgreement:
-    """How well depth and poses agree.
+    """Agreement of depth images with poses.
 
     Attributes:
         share: See :func:`agreement`; NaN where the frames do not overlap.

@@ -25,7 +25,7 @@ MILLIMETRES = 1000.0
 
 @dataclass(frozen=True)
 class RgbdCamera:
-    """What turns the images of an RGB-D sensor into coloured points.
+    """Turns the images of an RGB-D sensor into coloured points.
 
     The poses of a sequence are taken to be those of its *photographs*: a rendering from a pose of
     the sequence is comparable with the photograph of that name. Where they were estimated from
@@ -104,11 +104,13 @@ PRESETS: Mapping[str, RgbdCamera] = {
     "7scenes": _known((pinhole(640, 480, 525.0), pinhole(640, 480, 585.0)), 1000.0, "7scenes"),
     "tum-fr1": _known(
         _tum(517.3, 516.5, 318.6, 255.3, 0.2624, -0.9531, -0.0054, 0.0026, 1.1633),
-        *(5000.0, "tum-fr1"),
+        5000.0,
+        "tum-fr1",
     ),
     "tum-fr2": _known(
         _tum(520.9, 521.0, 325.1, 249.7, 0.2312, -0.7849, -0.0033, -0.0001, 0.9172),
-        *(5000.0, "tum-fr2"),
+        5000.0,
+        "tum-fr2",
     ),
     "tum-fr3": _known(_tum(535.4, 539.2, 320.1, 247.6), 5000.0, "tum-fr3"),
 }
@@ -116,7 +118,7 @@ PRESETS: Mapping[str, RgbdCamera] = {
 
 @dataclass(frozen=True)
 class CameraOptions:
-    """What a person says of the cameras; None where nothing is said.
+    """Statements of a person about the cameras; None where nothing is said.
 
     Attributes:
         preset: Name of a known sensor, see :data:`PRESETS`.

@@ -144,7 +144,7 @@ class ColorFit:
 
     @property
     def is_better(self) -> bool:
-        """Whether the fitted calibration is worth using."""
+        """True where the fitted calibration is worth using."""
         return self.fitted_disagreement < (1.0 - MIN_GAIN) * self.given_disagreement
 
     @property

@@ -1,4 +1,4 @@
-"""Which way is up in a fused surface: rooms are made of level planes and plumb ones.
+"""The vertical of a fused surface: rooms are made of level planes and plumb ones.
 
 Floor, tables and ceiling have normals along gravity, walls across it. The direction that most of
 the surface agrees with in this way is up; of the several that a box-shaped room offers, the one
@@ -31,7 +31,7 @@ REMEDY = "give --gravity X Y Z, the way things fall in the world of the poses, o
 
 @dataclass(frozen=True)
 class Gravity:
-    """Which way is up, and how much of the surface says so.
+    """The direction up, and how much of the surface supports it.
 
     Attributes:
         up: Unit vector (3,) in the world of the sequence.

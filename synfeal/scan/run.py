@@ -42,7 +42,7 @@ log = logging.getLogger("synfeal")
 
 @dataclass(frozen=True)
 class ScanJob:
-    """What to scan.
+    """A sequence to fuse, settings, and where to write the mesh.
 
     Attributes:
         sequence: Posed RGB-D frames, see :mod:`synfeal.dataset.posed_sequence`.
@@ -97,7 +97,7 @@ class ScanJob:
 
 @dataclass(frozen=True)
 class Scan:
-    """What was made.
+    """A fused mesh and the measures of its quality.
 
     Attributes:
         mesh: In its world, z up, metres.
@@ -203,7 +203,7 @@ def _camera(job: ScanJob, frames: PosedFrames) -> RgbdCamera:
 
 
 def _world(job: ScanJob, surface: Surface, frames: PosedFrames) -> tuple[Gravity | None, Array]:
-    """How gravity was found, if it was, and ``sequence_from_world`` (4, 4)."""
+    """Return how gravity was found, if it was, and ``sequence_from_world`` (4, 4)."""
     if job.gravity == "keep":
         return None, np.eye(4)
     if job.gravity == "find":
@@ -240,7 +240,8 @@ def _tell(
         log.warning(
             "scan: covers %.0f %% of what photographs show; give more --frames or a larger"
             " --max-depth (%g m)",
-            *(100 * covered, job.max_depth_m),
+            100 * covered,
+            job.max_depth_m,
         )
 
 
@@ -253,7 +254,7 @@ def _record(
     gravity: Gravity | None,
     compared: list[Comparison],
 ) -> dict[str, Any]:
-    """What ``scan.json`` says but for the mesh itself."""
+    """Return the content of ``scan.json``, less the mesh itself."""
     found = None
     if gravity is not None:
         found = {"up": gravity.up.tolist(), "level": gravity.level, "plumb": gravity.plumb}

@@ -1,4 +1,4 @@
-"""Which points of a surface a frame sees, and what its photograph shows there."""
+"""Points of a surface that a frame sees, and the colours of its photograph there."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def project(local_m: Floats, camera: CameraConfig, intrinsics: Intrinsics | None
 
 
 def within(pixel: Floats, width: int, height: int, margin_px: float) -> NDArray[np.bool_]:
-    """Which pixels (M, 2) lie in an image, (M,); NaN does not."""
+    """Mark pixels (M, 2) that lie in an image: (M,); NaN does not."""
     x, y = pixel[:, 0], pixel[:, 1]
     return (x >= margin_px) & (x < width - margin_px) & (y >= margin_px) & (y < height - margin_px)
 

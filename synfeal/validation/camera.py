@@ -1,4 +1,4 @@
-"""Which camera took the frames, and its pixels as rays by other code than the renderers'."""
+"""Camera of the frames, and rays through its pixels by other code than the renderers'."""
 
 from __future__ import annotations
 

@@ -249,7 +249,7 @@ def _are_neighbours(pair: Pair, poses: Poses, camera: CameraConfig) -> bool:
 
 
 def measure_check(measure: Measure, pairs: list[Pair]) -> Check:
-    """Whether each frame agrees with most of those it is compared with."""
+    """Check that each frame agrees with most of those it is compared with."""
     values = [
         (pair, value)
         for pair in pairs
@@ -292,7 +292,7 @@ def _blame(measure: Measure, wrong: list[tuple[Pair, float]], total: int) -> str
 
 
 def _camera_check(system: NDArray[np.float64], camera: KnownCamera) -> Check:
-    """Which change of the camera would make depths agree best; for the right camera none."""
+    """Find the change of the camera that would make depths agree best; none for the right one."""
     normal = system[:, :-1]
     # A bound's worth of change must move the depths noticeably, against what may differ.
     weakest = np.linalg.eigvalsh(normal * np.outer(CAMERA_BOUNDS, CAMERA_BOUNDS))[0]

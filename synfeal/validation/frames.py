@@ -143,7 +143,7 @@ def _median_m(depth_mm: Pixels) -> float:
 
 
 def _content(n_frames: int, blank: Mapping[str, list[Frame]]) -> Check:
-    """Whether too many frames were blank."""
+    """Check that not too many frames are blank."""
     failures, said = [], []
     for what, frames in blank.items():
         said.append(f"{len(frames)} {what} (bound {MOST[what]:.0%})")

@@ -197,7 +197,7 @@ def _mask_failures(
     camera: CameraConfig | None,
     seen: set[int],
 ) -> list[str]:
-    """What is wrong with one mask; adds the ids that it shows to ``seen``."""
+    """List faults of one mask; adds the ids that it shows to ``seen``."""
     path = frame.path(MASK)
     ids = read_mask(path)
     if camera is not None and ids.shape != (camera.height, camera.width):

@@ -1,4 +1,4 @@
-"""Which files a data set holds, reading one completely, and the outcome of a check."""
+"""Files of a data set, reading one completely, and the outcome of a check."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def read_depth_mm(path: FrameFile) -> NDArray[np.uint16]:
 
 
 def _content(path: FrameFile) -> bytes:
-    """What a file holds."""
+    """Read the content of a file."""
     try:
         return path.read_bytes()
     except FileNotFoundError as error:

@@ -1,4 +1,4 @@
-"""What the manifest and the split files say of the sequences is so."""
+"""Checks of the manifest and the split files against the sequences."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def check_manifest(
     splits: Mapping[str, list[SequenceListing]],
     on_frame: Callable[[], object],
 ) -> Check:
-    """What the manifest says of each sequence is so."""
+    """Check that the manifest's statements about each sequence are true."""
     path = dataset / MANIFEST
     if not path.exists():
         return Check("manifest", f"no {MANIFEST}: nothing says what was written", skipped=True)

@@ -27,7 +27,7 @@ TABLE_RATIO = 1e-10
 
 
 def rigid_bound(dataset: Path) -> float:
-    """How far from rigid the poses of a data set may be: less where it is one of ours."""
+    """Return how far from rigid the poses of a data set may be: less where it is one of ours."""
     ours = os.path.lexists(dataset / MANIFEST)
     return ORTHONORMAL_BOUND if ours else FOREIGN_ORTHONORMAL_BOUND
 
@@ -53,7 +53,7 @@ def check_rigid(poses: Poses, unreadable: tuple[str, ...], bound: float) -> Chec
 
 
 def rigid_defects(pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far poses (N, 4, 4) are from rigid, (N, 3): orthonormality, determinant, last row."""
+    """Measure defects (N, 3) of poses (N, 4, 4): orthonormality, determinant, last row."""
     with np.errstate(over="ignore", invalid="ignore"):
         rotation = pose[:, :3, :3]
         gram = np.swapaxes(rotation, 1, 2) @ rotation

@@ -61,7 +61,7 @@ class View:
 
 @dataclass(frozen=True)
 class Residual:
-    """How far a pair of frames is from agreement; medians over the pixels both see."""
+    """Disagreement of a pair of frames; medians over the pixels both see."""
 
     overlap: float  # share of the pixels of a with depth that b sees, hidden ones included
     # whether so many of them are behind what b sees that all that follows is NaN
