@@ -154,4 +154,7 @@ onstart:
 
 onsuccess:
     if Path(ROOT, "report.html").exists():
+        from reproduction.report.summary import findings_in
+
+        print(*findings_in(Path(ROOT, "summary.md")), sep="\n")
         print(f"Report: {ROOT}/report.html (one page; open it in a browser)")

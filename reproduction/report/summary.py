@@ -21,6 +21,7 @@ from synfeal.records.tables import read_frame, rows_of
 
 SIDE_TABLES: Sequence[Any] = (references, recall, robustness)  # a run may lack some
 ALIVE = "table4_size"
+FOUND = "## Do the localizers localize?"
 INTRO = """\
 # Results of profile `{profile}`
 
@@ -46,12 +47,28 @@ def write_summary(design: Design, root: Path, out_md: Path) -> None:
             sheets.append(side_sheet(module.side_table(table)))
     parts = [
         INTRO.format(profile=root.name),
-        "## Do the localizers localize?\n",
+        f"{FOUND}\n",
         "".join(f"- {finding}\n" for finding in findings),
         "## Tables\n",
         *map(sheet_markdown, sheets),
     ]
     write_text(out_md, "\n".join(parts))
+
+
+def findings_in(summary: Path) -> list[str]:
+    """Read back the findings that a summary begins with.
+
+    Args:
+        summary: Page by :func:`write_summary`; none where it is missing.
+
+    Returns:
+        Its findings, a line each.
+    """
+    if not summary.is_file():
+        return []
+    _, _, after = summary.read_text(encoding="utf-8").partition(f"{FOUND}\n")
+    section, _, _ = after.partition("\n## ")
+    return [line for line in section.splitlines() if line]
 
 
 def run_sentences(cells: Mapping[str, pd.DataFrame]) -> list[str]:

@@ -7,7 +7,7 @@ import pytest
 
 from baselines.config.learning import MODELS
 from reproduction.report.document import write_document
-from reproduction.report.summary import alive_sentences, write_summary
+from reproduction.report.summary import alive_sentences, findings_in, write_summary
 from reproduction.tables.assistance import write_assistance_table
 from reproduction.tables.cells import read_cells
 from reproduction.tables.sheet import (
@@ -71,6 +71,8 @@ def test_the_summary_shows_every_table_and_what_was_measured(results):
     out = results / "summary.md"
     write_summary(design_of(shipped_design()), results, out)
     page = out.read_text()
+    assert findings_in(out)[0] == "- 220 of 220 table cells have a score."
+    assert all(line.startswith("- ") for line in findings_in(out))
     assert page.count("| PoseNet2ResNet |") == 6
     assert "220 of 220 table cells have a score." in page
     # 1 m at 300 frames falls with the root: 0.27 m at 4,000, less for later models; half is 0.5 m.
