@@ -36,7 +36,8 @@ from synfeal.dataset.sequence_listing import (
 from synfeal.dataset.sevenscenes import read_depth_m
 from synfeal.dataset.split_frames import SplitFrames, read_split_frames
 from synfeal.errors import InputError, read_as
-from synfeal.geometry.poses import FARTHEST_M, moved_right
+from synfeal.geometry.limits import FARTHEST_M
+from synfeal.geometry.poses import moved_right
 from synfeal.mesh import load
 from synfeal.mesh.ambient import with_ambient_light
 from synfeal.mesh.instances import Instance, number_instances

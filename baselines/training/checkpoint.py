@@ -102,7 +102,7 @@ def frame_camera(frames: Path) -> FrameCamera | None:
         return None
     try:
         camera = read_json(record)["camera"]
-        if camera.get("projection") is not None:
+        if isinstance(camera, dict) and camera.get("projection") is not None:
             return None
         return FrameCamera.model_validate({key: camera[key] for key in FrameCamera.model_fields})
     except (OSError, ValueError, TypeError, LookupError) as error:

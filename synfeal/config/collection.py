@@ -19,7 +19,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from synfeal.geometry.poses import FARTHEST_M
+from synfeal.geometry.limits import FARTHEST_M
 
 # Names of directories below the results.
 Slug = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_]*$", max_length=64)]

@@ -136,8 +136,9 @@ def in_words_of_options(message: str) -> str:
         name = own.rpartition(".")[2]
         words = [own, name] if "_" in name and name != option else [own]
         for word in words:
-            # A key at the top is the whole of its name only where the message begins with it.
-            start = r"(?<![\w./-])" if {*"._"} & {*word} else "^"
+            # A key at the top is the whole of its name only where the message begins with it, or
+            # says in brackets what it was.
+            start = r"(?<![\w./-])" if {*"._"} & {*word} else r"(?:^|(?<=\())"
             message = re.sub(rf"{start}{re.escape(word)}(?![\w/])", _flag(option), message)
     message = re.sub(r"(?<![\w./-])(unit_m|up_axis)(?![\w./])", lambda m: _flag(m[0]), message)
     return re.sub(rf"scenes\.{SCENE}(: |\.)", "", message)

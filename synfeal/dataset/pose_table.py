@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.errors import InputError
-from synfeal.geometry.poses import FARTHEST_M, pose_from_quat, quat_wxyz_of
+from synfeal.geometry.limits import FARTHEST_M
+from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
 from synfeal.records.tables import read_numbers, write_numbers
 
 COLUMNS = ("frame", "path", "tx", "ty", "tz", "qw", "qx", "qy", "qz")

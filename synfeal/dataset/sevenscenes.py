@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from synfeal.dataset.frame_files import FrameFile, frame_file, read_image, sequence_at
 from synfeal.dataset.sequence_listing import gap_in, list_sequence
 from synfeal.errors import InputError, read_as
-from synfeal.geometry.poses import FARTHEST_M
+from synfeal.geometry.limits import FARTHEST_M
 from synfeal.records.files import atomic_path
 
 INVALID_MM = 65535

@@ -20,7 +20,8 @@ from synfeal.evaluation.frames import ScoredFrames, match, read_scored_frames
 from synfeal.evaluation.metrics import MEANS, ORIENTATION, POSITION, Metrics, pose_errors, summary
 from synfeal.evaluation.reference import match_reference, met_in_time, read_reference
 from synfeal.evaluation.reprojection import dcre, dcre_summary, depth_of_images
-from synfeal.geometry.poses import FARTHEST_M, quat_wxyz_of, umeyama_sim3
+from synfeal.geometry.limits import FARTHEST_M
+from synfeal.geometry.poses import quat_wxyz_of, umeyama_sim3
 from synfeal.records.progress import Progress
 from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.listing import DEPTH

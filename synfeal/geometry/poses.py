@@ -16,8 +16,6 @@ from synfeal.geometry.rotations import (
     slerp_quat_wxyz,
 )
 
-FARTHEST_M = 1e9  # no place is farther from the origin of its world; squares of it do not overflow
-
 
 def pose_matrix(rotation: ArrayLike, position_m: ArrayLike) -> Array:
     """Build poses (..., 4, 4) from rotations (..., 3, 3) and positions (..., 3)."""

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from synfeal.errors import InputError
-from synfeal.geometry.poses import FARTHEST_M
+from synfeal.geometry.limits import FARTHEST_M
 from synfeal.mesh.gltf import Json, listed
 from synfeal.mesh.model import MeshPart, TexturedMesh
 

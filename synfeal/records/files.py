@@ -108,7 +108,8 @@ def file_sha256(path: Path) -> str:
 
 def lies_in(path: Path, folder: Path) -> bool:
     """Check whether a path leads to a place in a folder, links followed."""
-    return path.resolve().is_relative_to(folder.resolve())
+    # Not Path.resolve, which raises where links form a circle.
+    return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
 
 
 def refuse_existing(path: Path) -> None:

@@ -264,7 +264,7 @@ def test_a_sequence_that_cannot_be_used_is_told_in_one_line(
         (["--focal", -1], "--focal: must be a positive number"),
         (["--camera", "absent.yaml"], "absent.yaml: cannot be read as a calibration"),
         (["--randomisation", "absent.yaml"], "absent.yaml: cannot be read as YAML"),
-        (["--seed", -1], "--seed: must be 0 or above"),
+        (["--seed", -1], "--seed: must be 0 to 2^63 - 1"),
     ],
 )
 def test_options_that_cannot_be_meant_are_told_in_one_line(

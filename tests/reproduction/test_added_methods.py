@@ -154,7 +154,7 @@ def test_hyper_parameters_of_its_own_are_checked(installed, tmp_path):
     code = "import sys; from pathlib import Path; from reproduction.config.load import load_config"
     run = python(installed, f"{code}; load_config(Path(sys.argv[1]))", profile)
     line = run.stderr.splitlines()[-1]
-    assert re.search(r"InputError: .*localizers\.direct\.pull: .*greater than 0", line)
+    assert re.search(r"InputError: .*localizers\.direct\.pull: must be above 0", line)
 
 
 DECLARED = "from baselines.registry.kinds import LabelError\n{}\ndef error(table): ...\n"

@@ -130,7 +130,7 @@ CASES = {
                 ("table4_size,,large_room,6k,synfeal,0,0,imagenet", "init", "'scratch'"),
                 ("table4_size,,large_room,6k,synfeal,0.1,0,pretrained", "labels", "`noise`"),
                 ("table4_size,,large_room,6k,noise,0,0,pretrained", "labels", "above 0"),
-                ("table4_size,,large_room,6k,noise,-1,0,pretrained", "noise_m", "greater than"),
+                ("table4_size,,large_room,6k,noise,-1,0,pretrained", "noise_m", "0 or more"),
                 ("table3_inconsistencies,both,large_room,6k,noise,0.1000001,0,scratch",
                  "at most six digits"),
                 ("table4_size,both,large_room,6k,synfeal,0,0,pretrained", "block", "table 3"),
