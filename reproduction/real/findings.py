@@ -54,11 +54,15 @@ def _direction(table: pd.DataFrame, direction: str) -> Iterator[str]:
     if rendered is None or photographs is None:
         return
     times = f"{rendered.times_position:.1f} times as exact ({_limits(rendered)})"
+    seeds = (
+        f"Worst of {rendered.n_seeds} seeds: {rendered.position_m_worst:.3f} m."
+        if rendered.n_seeds > 1
+        else "One seed."
+    )
     yield (
         f"{DIRECTIONS[direction]}: {TITLES[HEADLINE]} that has seen nothing but renderings of the"
         f" scan is at {_pose(rendered)} on {rendered.n_test:,} photographs, the same network"
-        f" trained on the scan's photographs at {_pose(photographs)}: {times}. Worst of"
-        f" {rendered.n_seeds} seeds: {rendered.position_m_worst:.3f} m."
+        f" trained on the scan's photographs at {_pose(photographs)}: {times}. {seeds}"
     )
 
 
