@@ -1,4 +1,4 @@
-"""Why structure from motion loses frames of a batch: a picture of what it had to see.
+"""Frames that structure from motion loses in a batch: a picture of what it had to see.
 
     python -m benchmarks.batch_trace results/benchmarks/sfm_trace --scene large_room --batch 18 \
         --trajectory before=before.csv --trajectory after=after.csv

@@ -1,4 +1,4 @@
-"""What a least clearance of cameras changes: how near they come, and how much there is to see.
+"""Effect of a least clearance of cameras: how near they come, and how much there is to see.
 
     python -m benchmarks.clearance results/benchmarks/clearance.csv --profile night --every 50
 

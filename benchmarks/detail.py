@@ -1,4 +1,4 @@
-"""What levels of detail save a frame, and how far their images are from the truth.
+"""Savings of levels of detail per frame, and the distance of their images from the truth.
 
 Writes ``<out>.csv``, a row for each scene, size of image and way to draw, and ``<out>.png``::
 
@@ -137,7 +137,7 @@ def draw(path: Path, table: pd.DataFrame) -> None:
 
 
 def shipped_level(rows: pd.DataFrame) -> str:
-    """What is drawn of a scene at a size: the level chosen, where it is not the full mesh."""
+    """Return the level chosen for a scene at a size, where it is not the full mesh."""
     return "chosen" if "chosen" in set(rows["level"]) else "full"
 
 

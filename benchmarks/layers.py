@@ -1,4 +1,4 @@
-"""What normals, masks, overlaps and flow cost, and how many pixels agree with Open3D's rays.
+"""Cost of normals, masks, overlaps and flow, and agreement of their pixels with Open3D's rays.
 
 Writes a CSV, a row for each mesh and size of image::
 
@@ -85,7 +85,7 @@ class Open3dRays:
         return np.where(face == 2**32 - 1, -1, face.astype(np.int64))
 
     def reached(self, origin_m: Array, point_m: Array) -> Any:
-        """How far (N,) the ways to points (N, 3) are free, 1 where all of the way is."""
+        """Return the free share (N,) of the ways to points (N, 3), 1 where all of the way is."""
         return self._cast(origin_m, point_m - origin_m)["t_hit"].numpy()
 
     def _cast(self, origin_m: Array, rays: Array) -> Any:
@@ -174,7 +174,7 @@ def pair_values(
 
 
 def timed(times: dict[str, list[float]], name: str, work: Callable[[], Any]) -> Any:
-    """What ``work`` gives; its processor time, milliseconds, is added to ``times``."""
+    """Run ``work`` and return its result; add its processor time, milliseconds, to ``times``."""
     began = time.process_time()
     value = work()
     times.setdefault(name, []).append(1e3 * (time.process_time() - began))

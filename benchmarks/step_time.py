@@ -1,4 +1,4 @@
-"""What a training step takes, in this tree and in another one, measured by turns.
+"""Duration of a training step, in this tree and in another one, measured by turns.
 
     python -m benchmarks.step_time --before ../another-checkout --out steps.csv
 

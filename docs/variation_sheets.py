@@ -87,7 +87,7 @@ def row_of(mesh: TexturedMesh, poses: list[PoseTable], title: str, effects: Effe
 
 @cache
 def shares_of_the_room() -> dict[str, TexturedMesh]:
-    """How much of its light comes from where."""
+    """Measure how much of a room's light comes from each source."""
     return light_shares(*large_room.ingredients(0))
 
 

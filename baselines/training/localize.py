@@ -178,16 +178,18 @@ class Seen(NamedTuple):
         return words.astype(object)
 
 
-def _seen(trained: TrainedLocalizer, position_m: Array, features: Tensor) -> Seen:
+def _seen(trained: TrainedLocalizer, position_m: Array, features: Tensor | None) -> Seen:
     """Compare pictures and answers with what was learned from.
 
     Args:
         trained: Localizer.
         position_m: Its answers (N, 3) in the world of the training labels.
-        features: Features of the pictures (N, F).
+        features: Features of the pictures (N, F); None where the model has no calibration.
     """
     unknown, calibration = np.full(len(position_m), np.nan), trained.calibration
-    typical = unknown if calibration is None else typicality(calibration, features).round(DECIMALS)
+    typical = unknown
+    if calibration is not None and features is not None:
+        typical = typicality(calibration, features).round(DECIMALS)
     if trained.description.bounds_m is None:
         return Seen(typical, unknown, np.zeros(len(position_m), bool))
     low, high = np.array(trained.description.bounds_m)
@@ -213,10 +215,12 @@ def _predict_all(
     views: VirtualViews,
     pictures: Sequence[Path],
     reader: PictureReader,
-) -> tuple[Array, Array, Tensor]:
-    """Positions (N, 3), quaternions (N, 4) and features (N, F).
+) -> tuple[Array, Array, Tensor | None]:
+    """Predict in batches, as a test set is predicted in.
 
-    In batches as a test set is predicted in.
+    Returns:
+        Positions (N, 3), quaternions (N, 4), and features (N, F) of the pictures; no features where
+        the model has no calibration to compare them with.
     """
     poses, features = [], []
     with Progress(len(pictures), "localize") as progress:
@@ -225,14 +229,19 @@ def _predict_all(
             batch = pictures[start : start + BATCH]
             images = _batch(trained, batch, reader)
             poses.append(views.predict(images))
-            normalised = trained.statistics.normalise(images)
-            features.append(features_of(trained.network, normalised))
+            if trained.calibration is not None:
+                normalised = trained.statistics.normalise(images)
+                features.append(features_of(trained.network, normalised))
             progress.update(len(batch))
             if len(pictures) > BATCH:
                 name = f"picture {start + len(batch)} of {len(pictures)}"
                 progress.part_done(name, len(batch), time.perf_counter() - began)
     position_m, quat_wxyz = zip(*poses, strict=True)
-    return np.concatenate(position_m), np.concatenate(quat_wxyz), torch.cat(features)
+    return (
+        np.concatenate(position_m),
+        np.concatenate(quat_wxyz),
+        torch.cat(features) if features else None,
+    )
 
 
 def _batch(trained: TrainedLocalizer, pictures: Sequence[Path], reader: PictureReader) -> Tensor:

@@ -96,7 +96,7 @@ class VirtualViews:
         return position_m.view(shape).numpy(), quat_wxyz.view(shape).numpy()
 
     def _turned(self, normalised: Tensor, rotvec_rad: Tensor) -> Tensor:
-        """Render what the camera sees after one rotation (3,) about its axes."""
+        """Resample images to what the camera sees after one rotation (3,) about its axes."""
         if self._turn is None or not rotvec_rad.any():
             return normalised
         rotvecs_rad = rotvec_rad.to(normalised.device).expand(len(normalised), 3)

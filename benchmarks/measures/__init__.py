@@ -1,4 +1,4 @@
-"""What benchmarks measure, by name; a module is loaded when asked for: not all libraries mix."""
+"""Measures by name; a module is loaded when asked for, because not all libraries mix."""
 
 from __future__ import annotations
 

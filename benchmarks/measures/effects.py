@@ -1,4 +1,4 @@
-"""What effects cost a frame, as multiples of an ideal one."""
+"""Cost of effects per frame, as multiples of an ideal one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from synfeal.dataset.pose_table import read_frames
 
 
 class Case(Strict):
-    """What is drawn."""
+    """Scene, camera and effects to draw."""
 
     mesh: Path = Field(description="mesh.glb of a scene")
     plan: Path = Field(description="pose table")

@@ -29,7 +29,7 @@ PROTOCOL = TypeAdapter(Protocol)
 
 
 class Case(Strict):
-    """What is trained on what."""
+    """Localizer to train, and the frames and labels it learns from."""
 
     model: ModelName = Field(description="the localizer")
     train_frames: Path = Field(description="packed frames to learn from")

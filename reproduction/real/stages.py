@@ -28,7 +28,6 @@ from reproduction.real.split import (
     write_frames,
     write_truth,
 )
-from synfeal.camera.calibration import read_calibration
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.dataset.finish import MANIFEST
 from synfeal.dataset.frame_files import FrameFile, read_image
@@ -40,10 +39,12 @@ from synfeal.dataset.sevenscenes import SPLIT_FILES, frame_paths, read_split
 from synfeal.dataset.world import WORLD, read_scan_record, rigid_motion_of
 from synfeal.geometry.poses import inverse, quat_wxyz_of
 from synfeal.mesh.load import load_mesh
+from synfeal.planning.like import resized
 from synfeal.records.files import atomic_directory, read_json, write_json, write_text
 from synfeal.records.tables import write_numbers
 from synfeal.render.choose import open_renderer
 from synfeal.scan.picture import compare, write_picture
+from synfeal.validation.camera import camera_of_dataset
 
 Array = NDArray[np.float64]
 POSES = ",".join((IMAGE, *COLUMNS[2:]))
@@ -229,17 +230,8 @@ def write_comparison(scan: Path, test: Path, out_picture: Path) -> None:
 
 def scan_camera(scan: Path, width: int | None) -> CameraConfig:
     """The camera of the photographs that a scan was made of, for images of some width."""
-    lens = read_calibration(scan.with_suffix(".json"))
-    small = lens.scaled(width, None) if width is not None else lens
-    return CameraConfig(
-        width=small.width,
-        height=small.height,
-        fx=small.fx,
-        fy=small.fy,
-        cx=small.cx,
-        cy=small.cy,
-        distortion=small.distortion,
-    )
+    camera = camera_of_dataset(scan.parent, scan.with_suffix(".json")).config
+    return camera if width is None else resized(camera, width, None)
 
 
 def _in_scan(scan: Path, photographs: PosedFrames) -> Array:
