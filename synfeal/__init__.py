@@ -50,7 +50,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """The functions of :mod:`synfeal.api`, loaded when the first of them is asked for."""
+    """Load the functions of :mod:`synfeal.api` when the first of them is asked for."""
     if name not in __all__:
         raise AttributeError(f"module 'synfeal' has no attribute '{name}'")
     return getattr(import_module("synfeal.api"), name)

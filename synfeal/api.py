@@ -131,7 +131,7 @@ class Renderer:
 
 
 def _rigid(world_from_cam: ArrayLike) -> NDArray[np.float64]:
-    """The pose (4, 4) of a camera, checked."""
+    """Check a camera's pose (4, 4) and return it as an array."""
     with read_as("world_from_cam", "a pose", ValueError, TypeError):
         pose = np.asarray(world_from_cam, np.float64)
     if pose.shape != (4, 4):
@@ -259,7 +259,7 @@ def _split(path: Path, split: str, baseline_m: float | None) -> Split:
 
 
 def _layer(listed: SplitFrames, kind: str) -> tuple[FrameFile, ...]:
-    """The images of one kind; none where there are no such files at all."""
+    """List the images of one kind; empty where the data set has none at all."""
     there = any(sequence.numbers[kind] for sequence in listed.sequences)
     return tuple(listed.files(kind)) if there else ()
 

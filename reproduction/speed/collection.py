@@ -34,18 +34,27 @@ EFFECTS_SCHEMA = {"effects": TEXT, "width": COUNT, "height": COUNT, "cpu_s_per_f
 
 
 def write_collection_speed(
-    mesh: Path,  # textured, in the world frame
-    collision: Path,  # mesh that rays are cast against
-    scene: SceneConfig,  # its sampling box
-    collection: CollectionConfig,  # how paths are planned
-    render: RenderConfig,  # how frames are drawn
-    seed: int,  # of the plan
-    # ``width``, ``height``, ``frames_per_s`` of each part, ``processor``, ``cores``
+    mesh: Path,
+    collision: Path,
+    scene: SceneConfig,
+    collection: CollectionConfig,
+    render: RenderConfig,
+    seed: int,
     out_speed: Path,
 ) -> None:
     """Collect 100 frames of 640 x 480 in four parts and write how fast each was.
 
     A frame is a PNG file and its pose. The mesh is loaded once before, as in a job of any length.
+
+    Args:
+        mesh: Textured mesh in the world frame.
+        collision: Mesh that rays are cast against.
+        scene: Sampling box of the scene.
+        collection: How paths are planned.
+        render: How frames are drawn.
+        seed: Seed of the plan.
+        out_speed: File to write: ``width``, ``height``, ``frames_per_s`` of each part,
+            ``processor``, ``cores``.
     """
     began = time.perf_counter()
     asked = (scene, collection, FRAMES, np.random.default_rng(seed), "train")

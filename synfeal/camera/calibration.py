@@ -102,7 +102,7 @@ class Calibration:
                 )
 
     def scaled(self, width: int | None, height: int | None) -> Calibration:
-        """The same lens with an image of another size, in pixels, as when the image is resized.
+        """Return the same lens for images that are resized to another size in pixels.
 
         A side that is None follows from the other.
 
@@ -180,9 +180,9 @@ def _read(path: Path) -> Calibration:
 
 
 def _from_record(values: Any) -> Calibration | None:
-    """The camera in a record of our own, None in other files.
+    """Read the camera from a record of our own, or return None for any other JSON file.
 
-    That of the photographs in the JSON of a scan, that of the frames in a manifest.
+    It is that of the photographs in the record of a scan, that of the frames in a manifest.
     """
     camera = values.get("camera") if isinstance(values, Mapping) else None
     if not isinstance(camera, Mapping):
@@ -232,7 +232,7 @@ def _from_mapping(values: Any) -> Calibration:
 
 
 def _four(values: Mapping[str, Any], names: Sequence[str]) -> tuple[float, float, float, float]:
-    """k1, k2, k3 and k4 of a fisheye."""
+    """Read the coefficients k1, k2, k3 and k4 of a fisheye lens."""
     k1, k2, k3, k4 = _numbers(values, names, (4,))
     return k1, k2, k3, k4
 
@@ -240,7 +240,7 @@ def _four(values: Mapping[str, Any], names: Sequence[str]) -> tuple[float, float
 def _size(
     values: Mapping[str, Any], names: Sequence[str] = ("image_width", "image_height")
 ) -> tuple[int, int]:
-    """Whole pixels along both sides: of two names, or of one that stands for both."""
+    """Read the width and height in pixels from two names, or from one name that holds both."""
     if any(name in values for name in SIZE):
         names, held = (SIZE[0], SIZE[0]), _numbers(values, SIZE, (2,))
     else:
@@ -252,7 +252,7 @@ def _size(
 
 
 def _numbers(values: Mapping[str, Any], names: Sequence[str], counts: Sequence[int]) -> list[float]:
-    """The numbers under the first of ``names`` that is there: a list of one of ``counts``."""
+    """Read the numbers under the first of ``names`` that is there, as many as one of ``counts``."""
     name = next((name for name in names if name in values), None)
     if name is None:
         raise ValueError(f"{names[0]}: missing")
@@ -272,7 +272,7 @@ def _numbers(values: Mapping[str, Any], names: Sequence[str], counts: Sequence[i
 
 
 def _flattened(held: Any) -> Iterator[float]:
-    """Numbers of nested lists in order; YAML reads some numbers, such as 1e5, as text."""
+    """Yield the numbers of nested lists in order; YAML reads some numbers, such as 1e5, as text."""
     if isinstance(held, list):
         for item in held:
             yield from _flattened(item)
@@ -283,7 +283,7 @@ def _flattened(held: Any) -> Iterator[float]:
 
 
 def _five(name: str, found: Sequence[float]) -> Distortion:
-    """The first five coefficients, k1, k2, p1, p2 and k3; the others must be 0."""
+    """Return the first five coefficients, k1, k2, p1, p2 and k3; refuse others that are not 0."""
     if any(found[5:]):
         raise ValueError(
             f"{name}: only k1, k2, p1, p2 and k3 are supported, and {list(found[5:])} are not 0;"
@@ -294,7 +294,7 @@ def _five(name: str, found: Sequence[float]) -> Distortion:
 
 
 def _from_colmap(text: str) -> Calibration:
-    """COLMAP's table of cameras: CAMERA_ID MODEL WIDTH HEIGHT PARAMS[], which holds one."""
+    """Read a COLMAP table of one camera: CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]."""
     rows = [line.split() for line in text.splitlines() if not line.lstrip().startswith("#")]
     rows = [row for row in rows if row]
     if len(rows) > 1:

@@ -35,11 +35,18 @@ def distort(point: Array, coefficients: Coefficients) -> Array:
 
 
 def undistort(point: Array, coefficients: Coefficients) -> Array:
-    """The inverse of :func:`distort`, to 1e-12: points (..., 2), NaN where there is none.
+    """Invert :func:`distort` to within 1e-12.
 
-    Its domain is what the disc within :func:`fold_radius` maps to; further out, points that a
-    pinhole shows further from the centre a lens shows nearer to it, and images fold over. The
-    radial part alone is inverted from a table, and Newton's method takes it from there.
+    The domain is the image of the disc within :func:`fold_radius`. Beyond it a lens shows points
+    nearer to the centre although a pinhole would show them further out, so images fold over. The
+    radial part alone is inverted by a table, which is where Newton's method starts.
+
+    Args:
+        point: Distorted normalised image coordinates (..., 2), x / z and y / z.
+        coefficients: k1, k2, p1, p2 and k3.
+
+    Returns:
+        Normalised image coordinates (..., 2) of a pinhole; NaN outside the domain.
     """
     point = np.asarray(point, np.float64)
     limit = fold_radius(coefficients)
@@ -61,7 +68,7 @@ def undistort(point: Array, coefficients: Coefficients) -> Array:
 
 
 def fold_radius(coefficients: Coefficients) -> float:
-    """The smallest radius at which the radial part stops growing; inf where it never does."""
+    """Return the least radius at which the radial part stops growing; inf where it never does."""
     k1, k2, _, _, k3 = coefficients
     # The radial part's slope 1 + 3 k1 t + 5 k2 t² + 7 k3 t³ as a polynomial in 1 / t.
     roots = np.roots([1.0, 3.0 * k1, 5.0 * k2, 7.0 * k3])
@@ -70,7 +77,7 @@ def fold_radius(coefficients: Coefficients) -> float:
 
 
 def _map(point: Array, coefficients: Coefficients) -> tuple[Array, Array]:
-    """Distorted points (..., 2) and the Jacobian (..., 2, 2) there."""
+    """Distort points and return them (..., 2) with the Jacobian (..., 2, 2) of the mapping."""
     k1, k2, p1, p2, k3 = coefficients
     x, y = point[..., 0], point[..., 1]
     t = x * x + y * y
@@ -91,7 +98,7 @@ def _map(point: Array, coefficients: Coefficients) -> tuple[Array, Array]:
 
 
 def _radial_inverse(point: Array, coefficients: Coefficients, limit: float) -> Array:
-    """Points whose radial part alone maps to ``point``, or the nearest within the fold."""
+    """Return points whose radial part alone maps to ``point``, or the nearest within the fold."""
     k1, k2, _, _, k3 = coefficients
     target = np.hypot(point[..., 0], point[..., 1])
 
@@ -115,7 +122,7 @@ def _determinant(matrix: Array) -> Array:
 
 
 def _solve(matrix: Array, right: Array) -> Array:
-    """Solutions (..., 2) of 2x2 systems."""
+    """Solve 2x2 systems and return their solutions (..., 2)."""
     x = matrix[..., 1, 1] * right[..., 0] - matrix[..., 0, 1] * right[..., 1]
     y = matrix[..., 0, 0] * right[..., 1] - matrix[..., 1, 0] * right[..., 0]
     return np.stack([x, y], axis=-1) / _determinant(matrix)[..., None]

@@ -74,7 +74,7 @@ def largest_angle_rad(coefficients: Coefficients) -> float:
 
 
 def _slope(angle_rad: Array, coefficients: Coefficients) -> Array:
-    """Derivative of the radius (...), kept off zero: at the largest angle it vanishes."""
+    """Return the derivative (...) of the radius, kept off the zero it has at the largest angle."""
     k1, k2, k3, k4 = coefficients
     t = np.square(angle_rad)
     slope = 1.0 + t * (3.0 * k1 + t * (5.0 * k2 + t * (7.0 * k3 + t * 9.0 * k4)))

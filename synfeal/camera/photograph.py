@@ -60,7 +60,7 @@ class PhotographCamera:
         return "exif" if self.exif else None
 
     def of(self, image: Image.Image, name: object) -> Calibration | None:
-        """Intrinsics for one photograph.
+        """Return the intrinsics of one photograph.
 
         Args:
             image: The photograph, upright.
@@ -87,7 +87,7 @@ class PhotographCamera:
 
 
 def exif_focal_px(image: Image.Image) -> float | None:
-    """Focal length in pixels from EXIF's ``FocalLengthIn35mmFilm``, None where there is none.
+    """Read the focal length in pixels from EXIF's ``FocalLengthIn35mmFilm``; None without one.
 
     It is the focal length that gives the same diagonal angle on film of 36 mm x 24 mm (CIPA
     DCG-001), so pixels per millimetre follow from the diagonal. Where EXIF's own size of the image
@@ -108,7 +108,7 @@ def exif_focal_px(image: Image.Image) -> float | None:
 
 
 def _number(value: object) -> float | None:
-    """A positive number, or None: files hold zeros and text where a camera knew nothing."""
+    """Return a positive number, or None: files hold zeros and text where a camera knew nothing."""
     try:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, ZeroDivisionError):
@@ -117,7 +117,7 @@ def _number(value: object) -> float | None:
 
 
 def _centred(width: int, height: int, focal_px: float) -> Calibration:
-    """A pinhole camera with square pixels and the principal point in the middle."""
+    """Return a pinhole camera with square pixels and its principal point in the image's centre."""
     return Calibration(
         width=width,
         height=height,

@@ -33,7 +33,7 @@ class Intrinsics(NamedTuple):
     cy: float
 
     def matrix(self, centre_shift_px: float = 0.0) -> Array:
-        """The camera matrix (3, 3), with a shift of the principal point.
+        """Return the camera matrix (3, 3), with a shift of the principal point.
 
         It is 0 where the centre of the first pixel is at (0.5, 0.5), as here and in COLMAP; -0.5
         where it is at (0, 0), as in OpenCV and Open3D.
@@ -43,7 +43,7 @@ class Intrinsics(NamedTuple):
 
     @classmethod
     def of_view(cls, width: int, height: int, horizontal_fov_deg: float) -> Self:
-        """Square pixels, the principal point in the middle of the image."""
+        """Build intrinsics with square pixels and the principal point in the image's centre."""
         focal = width / 2.0 / math.tan(math.radians(horizontal_fov_deg) / 2.0)
         return cls(focal, focal, width / 2.0, height / 2.0)
 
@@ -192,9 +192,14 @@ def _lengths(vector: Array) -> Array:
 
 
 def normalised_of_pixels(camera: Camera, pixel: Array) -> Array:
-    """Normalised image coordinates (..., 2), x / z and y / z, of ``pixel`` (..., 2): column, row.
+    """Map pixels of a perspective camera to normalised image coordinates, without distortion.
 
-    Of a perspective camera. NaN where the lens folds over before it reaches the pixel.
+    Args:
+        camera: The camera.
+        pixel: Column and row (..., 2), pixels.
+
+    Returns:
+        x / z and y / z (..., 2); NaN where the lens folds over before it reaches the pixel.
     """
     fx, fy, cx, cy = camera.intrinsics
     return undistort((pixel - [cx, cy]) / [fx, fy], camera.distortion)
@@ -207,7 +212,7 @@ def pixels_of_normalised(camera: Camera, normalised: Array) -> Array:
 
 
 def cell_pixels(camera: Camera, columns: int, rows: int) -> Array:
-    """Middles (rows, columns, 2) of equal cells of an image: column and row, pixels."""
+    """Return the centres (rows, columns, 2) of equal cells of an image: column and row, pixels."""
     x = (np.arange(columns) + 0.5) * camera.width / columns
     y = (np.arange(rows) + 0.5) * camera.height / rows
     return np.stack(np.meshgrid(x, y), axis=-1)

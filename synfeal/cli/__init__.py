@@ -22,7 +22,7 @@ class OneLineParser(argparse.ArgumentParser):
         super().__init__(allow_abbrev=False, **settings)
 
     def error(self, message: str) -> NoReturn:
-        """End with the message."""
+        """End the program with the message."""
         self.exit(2, f"error: {message}; see {self.prog} --help\n")
 
 
@@ -67,7 +67,7 @@ def build_parser(commands: Sequence[Command]) -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point: 0, 1 for what a person can fix, 2 for wrong usage, 130 after Ctrl-C."""
+    """Run a command; return 0, 1 for what a person can fix, 2 for wrong usage, 130 after Ctrl-C."""
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
     commands = all_commands()
     every = tuple(option for command in commands for option in command.options)

@@ -207,7 +207,7 @@ def frames_text(job: CollectJob) -> str:
 def _like_options(
     arguments: argparse.Namespace, options: dict[str, Any]
 ) -> tuple[dict[str, Any], CameraConfig | None]:
-    """Options with those of ``--like`` where nothing is given, and its camera if it is to be used.
+    """Fill options that are not given from ``--like``, with its camera where that is to be used.
 
     Says what is taken.
     """

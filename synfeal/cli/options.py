@@ -27,12 +27,12 @@ class Command(NamedTuple):
 
 
 def option(flag: str, text: str, **details: Any) -> Option:
-    """A flag, or the name of what stands without one, and its help; ``details`` are argparse's."""
+    """Define a flag, or a positional argument, and its help; ``details`` go to argparse."""
     return flag, {"help": text, **details}
 
 
 def command(summary: str, example: str, *options: Option) -> Callable[[Action], Command]:
-    """Makes a command of a function, which gives its name and, in its docstring, what it does."""
+    """Make a command of a function, whose name and docstring become its name and description."""
 
     def of(action: Action) -> Command:
         description = " ".join((action.__doc__ or "").split())
@@ -57,12 +57,12 @@ MESH_OPTIONS = (
 
 
 def options_among(arguments: argparse.Namespace, names: Collection[str]) -> dict[str, Any]:
-    """The options of these names that the command has, by name."""
+    """Return those of the named options that the command has, by name."""
     return {name: value for name, value in vars(arguments).items() if name in names}
 
 
 def numbers_apart(arguments: Sequence[str], options: Sequence[Option]) -> Iterator[str]:
-    """Arguments as argparse reads negative numbers of all forms, and ``--box=0 1 ...`` too.
+    """Yield arguments so that argparse reads negative numbers of all forms, and ``--box=0 1 ...``.
 
     It takes ``-1e0`` for an option; a blank before it makes it a value.
     """

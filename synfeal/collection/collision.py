@@ -61,17 +61,25 @@ class Trial:
 
 
 def collision_mesh(
-    mesh: TexturedMesh,  # the scene
-    scene: SceneConfig,  # angle bounds and least view distance of its poses
-    # (2, 3) lower and upper corner of the space camera centres are sampled in
+    mesh: TexturedMesh,
+    scene: SceneConfig,
     box_m: NDArray[np.float64],
-    min_agreement: float,  # least share of decisions that must be those of the full mesh
-    # draws the questions, see :func:`synfeal.planning.space.draw_questions`
+    min_agreement: float,
     rng: np.random.Generator,
 ) -> tuple[Triangles, list[Rung]]:
-    """The smallest mesh on which a planner decides as on ``mesh``, and how it was chosen.
+    """Find the smallest mesh on which a planner decides as on ``mesh``, and record the search.
 
     Alpha-tested surfaces block as a whole: a camera does not fly through foliage.
+
+    Args:
+        mesh: Mesh of the scene.
+        scene: Angle bounds and least view distance of its poses.
+        box_m: Lower and upper corner (2, 3) of the sampling box, world, metres.
+        min_agreement: Least share of decisions, 0 to 1, that must equal those on the full mesh.
+        rng: Draws the questions, see :func:`synfeal.planning.space.draw_questions`.
+
+    Returns:
+        The collision mesh, and the rungs of the search from the full mesh down.
     """
     full = merge_vertices(*mesh.merged())
     questions = draw_questions(RayCaster(*full), scene, box_m, rng)
@@ -89,7 +97,7 @@ def collision_mesh(
 
 
 def search(full: Triangles, questions: Questions, min_agreement: float) -> list[Trial]:
-    """All meshes measured, from the largest (``full`` itself) down; one is marked as chosen."""
+    """Measure meshes from ``full`` down to the smallest, and mark the one that is chosen."""
     reference = RayCaster(*full)
     trials = [measure(full, reference, questions, 0.0)]
     for n_faces in ladder(len(full.faces)):
@@ -109,7 +117,7 @@ def search(full: Triangles, questions: Questions, min_agreement: float) -> list[
 
 
 def ladder(n_faces: int) -> list[int]:
-    """Face counts below ``n_faces``, each twice the next, from the largest down."""
+    """List face counts below ``n_faces`` from the largest down, each twice the next."""
     counts = [SMALLEST]
     while 2 * counts[-1] < n_faces:
         counts.append(2 * counts[-1])
@@ -152,7 +160,7 @@ def measure(mesh: Triangles, reference: RayCaster, questions: Questions, build_s
 
 
 def rays_per_s(questions: Questions, *casters: RayCaster) -> list[int]:
-    """Speed of several casters at the same questions, asked in turns: what else runs slows all."""
+    """Time casters at the same questions in turns, so that other load slows all of them alike."""
     works = [partial(questions.answers, caster) for caster in casters]
     seconds = np.array([seconds_of(works) for _ in range(N_TIMINGS)])
     return [round(questions.n_rays / median) for median in np.median(seconds, axis=0)]

@@ -169,7 +169,7 @@ def choose_detail(
 
 
 def _fewer_faces(mesh: TexturedMesh, textured: Level, judge: _Judge) -> Iterator[Level]:
-    """The mesh with the textures chosen and fewer and fewer triangles."""
+    """Yield the mesh with the textures chosen and fewer and fewer triangles."""
     least = mesh.n_faces
     for factor in FACE_FACTORS:
         reduced = with_fewer_faces(textured.mesh, mesh.n_faces // factor)
@@ -180,7 +180,7 @@ def _fewer_faces(mesh: TexturedMesh, textured: Level, judge: _Judge) -> Iterator
 
 
 def _baked(mesh: TexturedMesh, textured: Level, judge: _Judge) -> Iterator[Level]:
-    """The same, the colours of vertices baked into textures; nothing where there are none."""
+    """Yield the same with vertex colours baked into textures; nothing without vertex colours."""
     if not any(_has_colours_alone(part) for part in mesh.parts):
         return
     for factor in BAKED_FACTORS:
@@ -202,7 +202,7 @@ def _has_colours_alone(part: MeshPart) -> bool:
 
 
 def _smaller_textures(mesh: TexturedMesh, judge: _Judge) -> Iterator[Level]:
-    """The mesh with textures of a half, a quarter and so on; nothing where it has none."""
+    """Yield the mesh with textures of a half, a quarter and so on; nothing without textures."""
     if any(part.texture is not None for part in mesh.parts):
         for factor in TEXTURE_FACTORS:
             mesh = with_smaller_textures(mesh, 2)
@@ -252,7 +252,7 @@ class _Judge:
 
 
 def middle_of(camera: CameraConfig) -> CameraConfig:
-    """The middle of a camera's image, at most :data:`LARGEST_VIEW_PX`, as a pinhole."""
+    """Crop a camera to the centre of its image, at most :data:`LARGEST_VIEW_PX`, as a pinhole."""
     if camera.projection is None:
         fx, fy, cx, cy = camera.intrinsics
     else:

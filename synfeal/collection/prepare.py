@@ -129,7 +129,7 @@ def build_scene(builder: str, seed: int) -> TexturedMesh:
 
 
 def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:
-    """The scene's mesh: the stand-in of its ``builder``, or the file at its ``path``.
+    """Build the stand-in named by the scene's ``builder``, or load the file at its ``path``.
 
     Textures that lie beside the file are not part of its hash.
     """
@@ -155,10 +155,17 @@ DIM = 0.75  # of the built-in cartons beside their pictures: rooms are dimmer th
 def cluttered(
     mesh: TexturedMesh, bounds_m: Array, clutter: ClutterConfig, rng: np.random.Generator, key: str
 ) -> tuple[TexturedMesh, list[dict[str, Any]]]:
-    """The objects placed in a scene, and where each stands.
+    """Place objects in a scene.
 
-    They are let down from the space between the corners ``bounds_m`` (2, 3); ``key`` is that of the
-    scene's settings, for messages.
+    Args:
+        mesh: The scene.
+        bounds_m: Corners (2, 3) of the space that objects are let down from, world, metres.
+        clutter: Which objects, and how many.
+        rng: Source of the places.
+        key: Key of the scene's settings, for messages.
+
+    Returns:
+        The scene with the objects in it, and a record of where each stands.
 
     Raises:
         InputError: an object is larger than the scene, cannot be read, or finds no place.
@@ -192,7 +199,7 @@ def save_cartons(mesh: Path) -> None:
 
 
 def _carton(clutter: ClutterConfig, rng: np.random.Generator) -> TexturedMesh:
-    """A carton with labels."""
+    """Build a carton with labels."""
     wide, deep, high = rng.uniform(*clutter.size_m, 3)
     painter = materials.label(pick(rng, VIVID))
     parts = []

@@ -240,7 +240,7 @@ def collect(job: CollectJob, workers: int = 1) -> None:
 
 
 def _prepare(job: CollectJob, scene: Path) -> None:
-    """The scene, unless it is there."""
+    """Prepare the scene, unless that is done."""
     if not (scene / "mesh.glb").is_file():
         config, settings = job.config, job.config.scenes[job.scene]
         agreement = config.collection.collision_agreement
@@ -257,7 +257,7 @@ def _prepare(job: CollectJob, scene: Path) -> None:
 
 
 def _plan(job: CollectJob, scene: Path, part: Path) -> dict[Split, PoseTable]:
-    """The plans of the splits that have frames, and what they cover."""
+    """Plan the splits that have frames, and record what the plans cover."""
     config, name = job.config, job.scene
     splits = [split for split in SPLITS if job.counts[split]]
     coverage = part / "coverage.json"
@@ -282,7 +282,7 @@ def _plan(job: CollectJob, scene: Path, part: Path) -> dict[Split, PoseTable]:
 
 
 def _choose_detail(job: CollectJob, scene: Path, part: Path) -> Path | None:
-    """The mesh that colours are drawn of, if not of the full one; made unless it is there."""
+    """Choose the mesh that colours are drawn from, unless that is done; None for the full one."""
     config, detail = job.config, scene / "detail.glb"
     if config.render.draws_full_mesh:
         return None
@@ -340,12 +340,12 @@ WIDE = """\
 
 
 def with_backend(config: DatasetConfig) -> DatasetConfig:
-    """The settings with the backend that ``auto`` stands for here: images depend on it."""
+    """Replace the backend ``auto`` by the one it stands for here, since images depend on it."""
     return config.model_copy(update={"render": resolved(config.render)})
 
 
 def configuration_text(job: CollectJob) -> str:
-    """The profile as YAML; every key is given, as keys that are not come from the default one.
+    """Write the profile as YAML with every key, as missing keys come from the default profile.
 
     Where there are test frames, its design is one row: the localizers on this data set.
     """

@@ -71,7 +71,7 @@ class Strict(BaseModel):
 
 
 def part(model: Callable[[], Any], description: str) -> Any:
-    """A field that holds another model, all of whose keys have defaults."""
+    """Define a field that holds another model, all of whose keys have defaults."""
     return Field(default_factory=model, description=description)
 
 

@@ -149,7 +149,7 @@ class CameraConfig(Strict):
 
 
 def _usual_view(values: dict[str, Any]) -> dict[str, Any]:
-    """Field of view and sides of a projection where they are not given."""
+    """Fill in the field of view and sides of a projection where they are not given."""
     if values.get("projection") == "fisheye":
         return {"horizontal_fov_deg": 180.0}
     if values.get("projection") != "equirectangular":
@@ -164,7 +164,7 @@ def _usual_view(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _calibrated(values: dict[str, Any]) -> dict[str, Any]:
-    """A camera's values with those of its calibration in place of the path."""
+    """Replace the path of a calibration in a camera's values by what it says."""
     lens = ("fx", "fy", "cx", "cy", "distortion", "projection", "fisheye_k")
     fixed = ("horizontal_fov_deg", *lens)
     for name in fixed:
@@ -266,6 +266,6 @@ class DatasetConfig(Strict):
         return self.results / self.profile
 
     def n_frames(self, scene: str, size: str, split: str) -> int:
-        """Frames of a split at this profile's scale: at least 2, where there are as many."""
+        """Count the frames of a split at this profile's scale: at least 2, if there are as many."""
         full: int = getattr(self.scenes[scene].sizes[size], split)
         return max(min(2, full), round(full * self.scale))

@@ -133,7 +133,7 @@ class RobustnessConfig(Strict):
         return effects
 
     def rendered(self, collection: CollectionConfig, own_mesh: bool) -> dict[str, EffectsConfig]:
-        """The effects that can be rendered, by name, and ``mixed``.
+        """Return the effects that can be rendered, by name, and ``mixed``.
 
         Nothing is known of the lamps of a mesh of one's own, and independent frames do not move.
         """
@@ -149,7 +149,7 @@ class RobustnessConfig(Strict):
 
 
 def _shortened(effects: EffectsConfig, collection: CollectionConfig) -> EffectsConfig:
-    """With no exposure longer than the time between frames."""
+    """Limit the exposure to the time between frames."""
     blur = effects.motion_blur
     if blur is None or collection.mode == "repeat":
         return effects

@@ -35,7 +35,7 @@ def merge(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, Any
 
 
 def describe(error: ValidationError) -> str:
-    """The first problem in one line: dotted key, what is wrong, what was found, what is allowed."""
+    """Describe the first problem in a line: dotted key, what is wrong, found and allowed."""
     first = error.errors()[0]
     key = ".".join(str(part) or "''" for part in first["loc"] if "[" not in str(part))
     if first["type"] == "missing" and isinstance(first["loc"][-1], int):  # of a list

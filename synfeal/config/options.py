@@ -67,7 +67,9 @@ FURTHER_BOXES = f"scenes.{SCENE}.further_boxes"
 
 
 def dataset_config(options: Mapping[str, Any], out: Path | None = None) -> DatasetConfig:
-    """The settings of a collection, by the names of ``KEYS``; None stands for the default.
+    """Build the settings of a collection from options by the names of ``KEYS``.
+
+    None stands for the default.
 
     ``box`` is a list of boxes, each x0, x1, y0, y1, z0, z1, metres; ``out`` is the data set, which
     gives the profile its name.
@@ -92,7 +94,7 @@ def dataset_config(options: Mapping[str, Any], out: Path | None = None) -> Datas
 
 
 def scene_config(options: Mapping[str, Any]) -> SceneConfig:
-    """The scene alone, without sizes: of a command that collects nothing, with MESH first."""
+    """Build the settings of a scene alone, for commands that collect nothing."""
     check_mesh_file(Path(options["mesh"]), "MESH")
     scene = _nested(options)["scenes"][SCENE]
     with options_named():
@@ -100,7 +102,7 @@ def scene_config(options: Mapping[str, Any]) -> SceneConfig:
 
 
 def render_configs(options: Mapping[str, Any]) -> tuple[CameraConfig, RenderConfig]:
-    """The camera and how it draws, of the options that say so."""
+    """Build the settings of camera and renderer from options."""
     if options.get("effects") is not None:
         raise InputError("effects: act on the frames of paths; use collect for them")
     if options.get("stereo") is not None:
@@ -160,7 +162,7 @@ def options_named() -> Iterator[None]:
 
 
 def _nested(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options as a mapping of mappings, by their keys."""
+    """Turn options into nested mappings by their dotted keys."""
     unknown = sorted(set(options) - set(KEYS))
     if unknown:
         raise InputError(f"{unknown[0]}: no such option; there are {', '.join(KEYS)}")

@@ -39,21 +39,33 @@ MANIFEST = "manifest.json"
 
 
 def finish_dataset(
-    mesh: Path,  # ``mesh.glb`` of the scene; the manifest names its hash
-    plans: Sequence[Path],  # of the splits that have frames, in the order of ``counts``
-    camera: CameraConfig,  # the camera of the frames
-    counts: Mapping[Split, int],  # frames of each split
-    shard_frames: int,  # frames of a sequence
-    origin: Mapping[str, Any],  # where they come from, see :func:`origin_of`
-    out_manifest: Path,  # beside the sequences
-    coverage: Sequence[Path] = (),  # what each plan covers, if that is to be written
-    packed_px: int | None = None,  # side of packed frames that are written too, pixels, if any
-    detail: Path | None = None,  # record of the level of detail, if it was chosen
+    mesh: Path,
+    plans: Sequence[Path],
+    camera: CameraConfig,
+    counts: Mapping[Split, int],
+    shard_frames: int,
+    origin: Mapping[str, Any],
+    out_manifest: Path,
+    coverage: Sequence[Path] = (),
+    packed_px: int | None = None,
+    detail: Path | None = None,
 ) -> None:
     """Write what is made of all frames together beside the sequences of a data set.
 
     Poses with the names of the images, their coverage, split files, contact sheet, manifest. What
     draws is described for the machine that this runs on.
+
+    Args:
+        mesh: ``mesh.glb`` of the scene; the manifest records its hash.
+        plans: Pose tables of the splits that have frames, in the order of ``counts``.
+        camera: Camera of the frames.
+        counts: Number of frames of each split.
+        shard_frames: Number of frames of a sequence.
+        origin: Record of where the frames come from, see :func:`origin_of`.
+        out_manifest: Manifest to write, beside the sequences.
+        coverage: What each plan covers, if that is to be written.
+        packed_px: Side of packed frames, pixels, if they are written too.
+        detail: Record of the level of detail, if it was chosen.
     """
     directory = out_manifest.parent
     splits: list[Split] = [split for split, count in counts.items() if count]
@@ -177,7 +189,7 @@ def _stereo(camera: CameraConfig) -> dict[str, Any]:
 
 
 def sequence_sha256(sequence: Path) -> str:
-    """SHA-256 over the names and contents of the frames, in order of name; archived or not."""
+    """Hash the names and contents of the frames in order of name, archived or not, by SHA-256."""
     digest = hashlib.sha256()
     for name in sequence_names(sequence):
         if name.startswith("frame-"):

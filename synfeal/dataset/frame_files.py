@@ -92,7 +92,7 @@ class ArchivedFile:
             return opened.read(info)
 
     def read_text(self, encoding: str = "utf-8") -> str:
-        """The same as text."""
+        """Read the file as text."""
         return self.read_bytes().decode(encoding)
 
     def is_file(self) -> bool:
@@ -110,18 +110,18 @@ def is_archive(sequence: Path) -> bool:
 
 
 def sequence_at(directory: Path) -> Path:
-    """The form in which a sequence is there: ``seq-01``, or where that is not, ``seq-01.zip``."""
+    """Return the form in which a sequence is stored: ``seq-01``, or else ``seq-01.zip``."""
     archive = directory.with_name(directory.name + SUFFIX)
     return archive if archive.is_file() and not directory.is_dir() else directory
 
 
 def frame_file(sequence: Path, name: str) -> FrameFile:
-    """A file of a sequence, which need not exist."""
+    """Return a file of a sequence, which need not exist."""
     return ArchivedFile(sequence, name) if is_archive(sequence) else sequence / name
 
 
 def sequence_names(sequence: Path) -> list[str]:
-    """Names of the files of a sequence, in order."""
+    """List the names of the files of a sequence, in order."""
     if not is_archive(sequence):
         return sorted(path.name for path in sequence.iterdir() if path.is_file())
     prefix = f"{sequence.stem}/"
@@ -134,7 +134,7 @@ def sequence_names(sequence: Path) -> list[str]:
 
 
 def foreign_members(archive: Path) -> list[str]:
-    """Members that unpack to anything but one file each in the directory of the sequence."""
+    """List members that would not unpack to one file each in the directory of the sequence."""
     prefix = f"{archive.stem}/"
     with reading(archive) as opened:
         counts = Counter(opened.namelist())
@@ -173,7 +173,7 @@ def link_or_unpack(source: FrameFile, target: Path) -> None:
 
 @contextmanager
 def reading(archive: Path) -> Iterator[zipfile.ZipFile]:
-    """An open archive; what is wrong with it is an ``OSError`` that names it."""
+    """Open an archive; raise what is wrong with it as an ``OSError`` that names it."""
     try:
         status = archive.stat()
         yield _opened(archive, status.st_ino, status.st_size, status.st_mtime_ns)
@@ -183,7 +183,7 @@ def reading(archive: Path) -> Iterator[zipfile.ZipFile]:
 
 @lru_cache(MOST_OPEN)
 def _opened(archive: Path, *_: int) -> zipfile.ZipFile:
-    """Opened once; a file that is written anew under the same name has another status."""
+    """Open an archive once; one that is written anew under the same name has another status."""
     return zipfile.ZipFile(archive)
 
 
@@ -207,7 +207,7 @@ Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 def encode_png(pixels: Pixels) -> bytes:
-    """A PNG file of colours (H, W, 3) uint8 or of grey values (H, W) uint16."""
+    """Encode colours (H, W, 3) uint8 or grey values (H, W) uint16 as PNG."""
     is_rgb = pixels.ndim == 3 and pixels.shape[2] == 3 and pixels.dtype == np.uint8
     if not is_rgb and not (pixels.ndim == 2 and pixels.dtype == np.uint16):
         raise ValueError(f"cannot encode pixels {pixels.shape} {pixels.dtype} as PNG")
@@ -220,7 +220,7 @@ def encode_png(pixels: Pixels) -> bytes:
 
 
 def _filtered(pixels: Pixels) -> NDArray[np.uint8]:
-    """Rows of bytes, most significant first, each after its filter and as differences."""
+    """Filter rows of bytes, most significant first, each preceded by its filter."""
     big_endian = np.ascontiguousarray(pixels, pixels.dtype.newbyteorder(">"))
     rows = big_endian.view(np.uint8).reshape(len(pixels), -1)
     filtered = np.empty((rows.shape[0], rows.shape[1] + 1), np.uint8)
@@ -239,7 +239,7 @@ _START = len(SIGNATURE) + 8 + _HEADER.size + 4  # of what follows IHDR
 
 
 def decode_png(content: bytes) -> Pixels | None:
-    """Pixels of a file that :func:`encode_png` wrote, every checksum verified.
+    """Decode a file that :func:`encode_png` wrote, verifying every checksum.
 
     In half the time that Pillow takes. None for damaged files and for those of other programs,
     which Pillow reads or says what is wrong with them.
@@ -276,7 +276,7 @@ def decode_png(content: bytes) -> Pixels | None:
 def opened_image(
     content: bytes, formats: tuple[str, ...] | None = None, most_pixels: int = MOST_PIXELS
 ) -> Iterator[Image.Image]:
-    """An image that is not decoded yet.
+    """Open an image without decoding it.
 
     Raises:
         ValueError: It claims more pixels than a frame may have; memory for them is not taken.
@@ -291,7 +291,7 @@ def opened_image(
 
 
 def read_image(path: FrameFile, mode: str | None = None) -> Image.Image:
-    """A decoded image, converted to ``mode`` if one is given."""
+    """Read and decode an image, converted to ``mode`` if one is given."""
     with read_as(path, "an image", *IMAGE_DAMAGE), opened_image(path.read_bytes()) as image:
         image.load()
         return image.convert(mode) if mode else image.copy()

@@ -28,7 +28,7 @@ COPIED_BYTES = 2**24  # at a time
 
 @contextmanager
 def new_packed(out: Path, n_frames: int, input_px: int) -> Iterator[NDArray[np.uint8]]:
-    """An array (n_frames, input_px, input_px, 3) to fill; the file appears when the block ends."""
+    """Yield an array (n_frames, input_px, input_px, 3) to fill; its file appears at the end."""
     shape = (n_frames, input_px, input_px, 3)
     with atomic_path(out) as temporary:
         frames = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.uint8, shape=shape)
@@ -67,7 +67,7 @@ def join_packed(parts: list[Path], out: Path) -> None:
 
 
 def read_packed(path: Path) -> np.memmap[Any, np.dtype[np.uint8]]:
-    """Packed frames (N, S, S, 3) as a memory map."""
+    """Open packed frames (N, S, S, 3) as a memory map."""
     # A damaged header is refused in every way there is.
     with read_as(path, "packed frames", Exception, remedy="; render it again"):
         frames: np.memmap[Any, np.dtype[np.uint8]] = np.lib.format.open_memmap(path, mode="r")
@@ -90,7 +90,7 @@ class Crop(NamedTuple):
 
 
 def crop_of(size: tuple[int, int], input_px: int, view: View = "square") -> Crop:
-    """Of a frame of ``size`` (width, height), what of it localizers see.
+    """Return what localizers see of a frame of ``size`` (width, height), pixels.
 
     ``square``: as in the published code, the short side becomes ``input_px + 1`` and the centre is
     cut out. ``whole``: all of it, squeezed into the square; nothing the camera saw is lost.
@@ -103,7 +103,7 @@ def crop_of(size: tuple[int, int], input_px: int, view: View = "square") -> Crop
 
 
 def fit_frame(image: Image.Image, input_px: int, view: View = "square") -> NDArray[np.uint8]:
-    """Pixels (input_px, input_px, 3) of a picture as :func:`crop_of` says; resizing averages."""
+    """Crop and resize an image to (input_px, input_px, 3) by :func:`crop_of`, averaging pixels."""
     width, height, left, top = crop_of(image.size, input_px, view)
     small = image.resize((width, height), Image.Resampling.BILINEAR)
     return np.asarray(small.crop((left, top, left + input_px, top + input_px)))
@@ -121,16 +121,27 @@ def _read_shard(path: Path) -> dict[str, Any]:
 
 
 def write_packed(
-    plan: Path,  # pose table of the frames
-    shards: list[Path],  # parts of packed frames, in order
-    records: list[Path],  # of the parts
-    camera: CameraConfig,  # what they were rendered through, before they were made smaller
-    render: RenderConfig,  # how they were rendered
-    view: View,  # what of a frame was packed
+    plan: Path,
+    shards: list[Path],
+    records: list[Path],
+    camera: CameraConfig,
+    render: RenderConfig,
+    view: View,
     out_frames: Path,
-    detail: Path | None = None,  # what the level of detail was, if it was chosen
+    detail: Path | None = None,
 ) -> None:
-    """Join parts of packed frames, and write ``.json`` beside them in place of ``.npy``."""
+    """Join parts of packed frames, and describe them in a ``.json`` file beside the ``.npy``.
+
+    Args:
+        plan: Pose table of the frames.
+        shards: Parts of packed frames, in order.
+        records: Records of the parts, in the same order.
+        camera: Camera that rendered them, before they were made smaller.
+        render: Backend and effects they were rendered with.
+        view: Whether all of a frame or its central square was packed.
+        out_frames: File ``.npy`` to write.
+        detail: Record of the level of detail, if it was chosen.
+    """
     join_packed(shards, out_frames)
     square = "short side resized to S + 1 px, then centre crop"
     seen = square if view == "square" else "the whole frame resized to S x S px"

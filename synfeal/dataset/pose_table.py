@@ -55,7 +55,7 @@ class PoseTable:
         return pose_from_quat(self.position_m, self.quat_wxyz)
 
     def with_poses(self, world_from_cam: NDArray[np.float64]) -> PoseTable:
-        """The same frames with other poses (N, 4, 4)."""
+        """Return the same frames with other poses ``world_from_cam`` (N, 4, 4)."""
         return PoseTable(
             self.frame, self.path, world_from_cam[:, :3, 3].copy(), quat_wxyz_of(world_from_cam)
         )
@@ -68,7 +68,7 @@ class PoseTable:
         return np.flatnonzero(self.registered)
 
     def between(self, start: int, stop: int) -> PoseTable:
-        """Frames ``start`` to ``stop`` (exclusive), which must all exist."""
+        """Return frames ``start`` to ``stop`` (exclusive), which must all exist."""
         if not 0 <= start <= stop <= len(self):
             raise ValueError(f"asked for frames {start} to {stop} of a table of {len(self)}")
         edges = np.concatenate([[0], np.flatnonzero(np.diff(self.path)) + 1, [len(self)]])
@@ -76,13 +76,13 @@ class PoseTable:
         return self.at(slice(start, stop), None if self.whole else self.at(around))
 
     def at(self, rows: slice | NDArray[np.int64], whole: PoseTable | None = None) -> PoseTable:
-        """Some of the frames, by row."""
+        """Select frames by row."""
         columns = (self.frame[rows], self.path[rows], self.position_m[rows], self.quat_wxyz[rows])
         registered = None if self.registered is None else self.registered[rows]
         return PoseTable(*columns, whole or self.whole, registered)
 
     def first(self, count: int) -> PoseTable:
-        """The first ``count`` frames: smaller data sets are prefixes of larger ones."""
+        """Return the first ``count`` frames: smaller data sets are prefixes of larger ones."""
         return self.between(0, count)
 
 
@@ -133,7 +133,7 @@ def read_pose_table(path: Path, any_frames: bool = False) -> PoseTable:
 
 
 def read_frames(path: Path, start: int, stop: int) -> PoseTable:
-    """Frames ``start`` to ``stop`` (exclusive) of a pose table, which must have as many."""
+    """Read the frames ``start`` to ``stop`` (exclusive) of a pose table that has as many."""
     table = read_pose_table(path)
     if len(table) < stop:
         raise InputError(f"{path}: holds {len(table)} poses, {stop} are needed; make it again")
@@ -141,7 +141,7 @@ def read_frames(path: Path, start: int, stop: int) -> PoseTable:
 
 
 def whole_numbers(values: NDArray[np.float64], path: Path) -> NDArray[np.int64]:
-    """The leading columns (N, C) of a table as indices: whole numbers, 0 or above."""
+    """Convert the leading columns (N, C) of a table to indices: whole numbers, 0 or above."""
     good = ((values >= 0) & (values < 2**53) & (values == np.floor(values))).all(axis=1)
     if not good.all():
         row = int(np.argmin(good)) + 2

@@ -133,7 +133,7 @@ class _Entry:
         return f"{self.prefix}frame-{self.number}"
 
     def file(self, kind: str) -> FrameFile:
-        """A file it must have.
+        """Return the file of one kind, which must exist.
 
         Raises:
             InputError: It is missing.
@@ -149,7 +149,7 @@ class _Entry:
 
 
 def _listed(path: Path) -> list[_Entry]:
-    """All frames of which any file is there, in order, sequence after sequence."""
+    """List all frames of which any file exists, in order, sequence after sequence."""
     if is_archive(path):
         entries = _entries(path, "")
     else:
@@ -174,7 +174,7 @@ def _listed(path: Path) -> list[_Entry]:
 
 
 def _entries(sequence: Path, prefix: str) -> list[_Entry]:
-    """The frames of one sequence, in order of their numbers."""
+    """List the frames of one sequence in order of their numbers."""
     found: dict[str, dict[str, str]] = {}
     with read_as(sequence, "a sequence", OSError):
         names = sequence_names(sequence)
@@ -195,7 +195,7 @@ def _entries(sequence: Path, prefix: str) -> list[_Entry]:
 
 
 def _read_frames(entries: Sequence[_Entry]) -> PosedFrames:
-    """Files and poses of frames, all of which must be whole."""
+    """Read files and poses of frames, each of which must be complete."""
     with_depth = any("depth" in entry.files for entry in entries)
     color = [entry.file("color") for entry in entries]
     depth = [entry.file("depth") if with_depth else None for entry in entries]
@@ -220,7 +220,7 @@ def _read_frames(entries: Sequence[_Entry]) -> PosedFrames:
 
 
 def _pose(path: FrameFile) -> Array | None:
-    """A rigid pose (4, 4), or None where it is not finite."""
+    """Read a rigid pose (4, 4); None where it is not finite."""
     with read_as(path, "a pose"):
         cells = path.read_text(encoding="utf-8").split()
         values = np.array(cells, np.float64)
@@ -251,7 +251,7 @@ def _chosen(sequence: PosedFrames, frames: slice | None, path: Path) -> PosedFra
 
 
 def _read_tum(path: Path) -> PosedFrames:
-    """The photographs of a TUM sequence that have a pose, and depth where there is a list of it."""
+    """Read the photographs of a TUM sequence that have a pose, with depth where it is listed."""
     color_s, color = _read_list(path, RGB_LIST)
     keep = np.ones(len(color_s), bool)
     depth: list[FrameFile | None] = [None] * len(color)
@@ -298,7 +298,7 @@ def _lines(path: Path) -> Iterable[tuple[int, list[str]]]:
 
 
 def _read_list(path: Path, name: str) -> tuple[Array, list[Path]]:
-    """Time stamps (N,) in seconds and files of ``rgb.txt`` or ``depth.txt``."""
+    """Read time stamps (N,) in seconds and files from ``rgb.txt`` or ``depth.txt``."""
     rows = _lines(path / name)
     stamps, files = [], []
     for number, row in rows:
@@ -317,7 +317,7 @@ def _read_list(path: Path, name: str) -> tuple[Array, list[Path]]:
 
 
 def _read_trajectory(path: Path) -> tuple[Array, Array]:
-    """Time stamps (N,) in seconds, rising, and poses (N, 4, 4) of a TUM trajectory."""
+    """Read rising time stamps (N,) in seconds and poses (N, 4, 4) of a TUM trajectory."""
     values = []
     for number, row in _lines(path):
         with read_as(f"{path}: line {number}", "timestamp tx ty tz qx qy qz qw"):

@@ -76,7 +76,7 @@ def write_preview(
 
 
 def encoder() -> str:
-    """The program that encodes films: the system's, or that of the wheel ``imageio-ffmpeg``.
+    """Find the program that encodes films: the system's, or that of the wheel ``imageio-ffmpeg``.
 
     It is run as a program of its own, so its licence (GPL, for x264) does not reach this one.
     """
@@ -94,13 +94,13 @@ def encoder() -> str:
 
 
 def _write_gif(pictures: Sequence[Image.Image], fps: float, out: Path) -> None:
-    """256 colours for each picture; dithering would flicker, and hide the noise that is shown."""
+    """Write a GIF of 256 colours per picture; dithering would flicker and hide the noise shown."""
     plain = [p.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE) for p in pictures]
     plain[0].save(out, "GIF", save_all=True, append_images=plain[1:], duration=1e3 / fps, loop=0)
 
 
 def _write_mp4(pictures: Sequence[Image.Image], fps: float, out: Path) -> None:
-    """H.264 in the one pixel format that all browsers play, which has even sides."""
+    """Write H.264 in the one pixel format that all browsers play, which needs even sides."""
     width, height = pictures[0].size
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}"]
     even = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
@@ -126,7 +126,7 @@ class Column(NamedTuple):
 
 
 def _rows(columns: Sequence[Column]) -> Iterator[Image.Image]:
-    """The frames of all data sets at one moment, until the shortest ends."""
+    """Yield the frames of all data sets side by side, until the shortest ends."""
     names = [column.name for column in columns]
     for moment in zip(*(column.files for column in columns), strict=False):
         pictures = (column.picture(file) for column, file in zip(columns, moment, strict=True))
@@ -148,7 +148,7 @@ SHEET_FRAMES, SHEET_COLUMNS, SHEET_TILE_PX = 24, 6, 240
 
 
 def write_contact_sheet(frames: Sequence[FrameFile], out: Path) -> None:
-    """A grid of at most 24 frames, evenly spaced over ``frames`` (at least one)."""
+    """Write a grid of at most 24 frames, evenly spaced over ``frames`` (at least one)."""
     count = min(SHEET_FRAMES, len(frames))
     chosen = [frames[index * len(frames) // count] for index in range(count)]
     tiles = [_tile(read_image(path), SHEET_TILE_PX) for path in chosen]

@@ -37,7 +37,7 @@ class Studio:
     detail: Path | None = None  # what colours are drawn of, if not of ``mesh``
 
     def open(self) -> SceneRenderer:
-        """A renderer."""
+        """Open a renderer."""
         return open_scene(self.mesh, self.camera, self.render, self.detail)
 
     def carry_out(
@@ -99,7 +99,7 @@ _worker: dict[str, Any] = {}  # what a worker process keeps between sequences
 
 
 def _start_worker(studio: Studio, workers: int, n_done: Any, stop: Any) -> None:
-    """Set up a worker process: it ends with its parent, and leaves Ctrl-C to it."""
+    """Set up a worker process that ends with its parent and leaves Ctrl-C to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     # Read by Mesa's software renderer when it starts.

@@ -54,7 +54,13 @@ class Progress(tqdm):  # type: ignore[type-arg]
         super().__init__(total=n_frames, initial=n_done, unit="frame", desc=name, disable=None)
 
     def part_done(self, name: str, n_frames: int, seconds: float) -> None:
-        """One sequence is done."""
+        """Print a line about a finished sequence where there is no terminal for the bar.
+
+        Args:
+            name: The sequence, such as ``seq-01``.
+            n_frames: Frames that were rendered.
+            seconds: Time that took.
+        """
         if self.disable:
             rate = n_frames / seconds if seconds else float("inf")
             line = f"{name}, {n_frames} frames in {seconds:.1f} s, {rate:.1f}/s"
@@ -66,21 +72,34 @@ REMEDY = "nothing was kept; fix that and render again"
 
 
 def render_sequence(
-    mesh: Path,  # in the world frame, as :func:`synfeal.mesh.save.save_glb` writes it
+    mesh: Path,
     camera: CameraConfig,
-    plan: Path,  # pose table
-    start: int,  # row of the first frame
-    stop: int,  # one past that of the last
+    plan: Path,
+    start: int,
+    stop: int,
     with_depth: bool,
-    render: RenderConfig,  # backend and effects
-    out_frames: Path,  # a directory, or an archive if its name ends in ``.zip``
-    detail: Path | None = None,  # what colours are drawn of, if not of ``mesh``
+    render: RenderConfig,
+    out_frames: Path,
+    detail: Path | None = None,
     with_normals: bool = False,
     with_masks: bool = False,
 ) -> None:
     """Render poses of a table into a new sequence, which appears when it is complete.
 
     Frames are numbered from 0 inside the sequence.
+
+    Args:
+        mesh: Mesh in the world frame, as :func:`synfeal.mesh.save.save_glb` writes it.
+        camera: Camera of the frames.
+        plan: Pose table.
+        start: Row of the first frame.
+        stop: One past the row of the last frame.
+        with_depth: Write depth, too.
+        render: Backend and effects.
+        out_frames: Directory to write, or an archive if its name ends in ``.zip``.
+        detail: Mesh that colours are drawn from; None for ``mesh`` itself.
+        with_normals: Write normals, too.
+        with_masks: Write masks of instances, too.
     """
     began, poses = time.perf_counter(), read_frames(plan, start, stop)
     with (
@@ -199,7 +218,7 @@ def effects_of(camera: CameraConfig, render: RenderConfig | None) -> Effects | N
 
 @contextmanager
 def _new_sequence(out: Path) -> Iterator[Path]:
-    """A directory to fill with frames, which becomes ``out``, or is packed into it."""
+    """Yield a directory to fill with frames, which becomes ``out``, or is packed into it."""
     if not is_archive(out):
         with atomic_directory(out) as directory:
             yield directory
@@ -213,7 +232,7 @@ def _new_sequence(out: Path) -> Iterator[Path]:
 
 
 def resolved(render: RenderConfig) -> RenderConfig:
-    """With ``auto`` replaced by the backend it stands for on this machine."""
+    """Replace ``auto`` by the backend it stands for on this machine."""
     if render.backend != "auto":
         return render
     return render.model_copy(update={"backend": fastest_working()})

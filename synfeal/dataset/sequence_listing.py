@@ -42,7 +42,7 @@ class Frame:
     number: int
 
     def path(self, kind: str) -> FrameFile:
-        """The file of one kind."""
+        """Return the file of one kind."""
         return frame_file(self.sequence, f"frame-{self.number:06d}.{kind}")
 
     @property
@@ -71,7 +71,7 @@ class SequenceListing:
         return tuple(Frame(self.path, number) for number in numbers)
 
     def files(self, kind: str) -> list[FrameFile]:
-        """The file of one kind of each of :attr:`frames`.
+        """List the file of one kind of each of :attr:`frames`.
 
         A sequence with images or poses must have them of every frame: an image or a pose that
         stands alone is of no frame, and would take the place of one.
@@ -134,12 +134,12 @@ def refuse_problems(sequences: Iterable[SequenceListing]) -> None:
 
 
 def frames_of(sequences: Iterable[SequenceListing]) -> list[Frame]:
-    """All frames of several sequences, in order."""
+    """List all frames of several sequences, in order."""
     return [frame for sequence in sequences for frame in sequence.frames]
 
 
 def gap_in(sequence: SequenceListing) -> Frame | None:
-    """The first frame that a sequence numbered 0, 1, 2, ... would have and this one does not."""
+    """Find the first frame that is missing from the numbers 0, 1, 2, ... of a sequence, if any."""
     for expected, frame in enumerate(sequence.frames):
         if frame.number != expected:
             return Frame(sequence.path, expected)

@@ -29,13 +29,13 @@ SPLIT_FILES = {"train": "TrainSplit.txt", "test": "TestSplit.txt"}
 
 
 def depth_mm_of(depth_m: NDArray[np.float32]) -> NDArray[np.uint16]:
-    """Depth (H, W) in whole millimetres; beyond 65.534 m or infinite is invalid."""
+    """Convert depth (H, W) in metres to millimetres; 65535 beyond 65.534 m and for nothing hit."""
     depth_mm = np.round(np.asarray(depth_m, np.float64) * 1000.0)
     return np.minimum(depth_mm, INVALID_MM).astype(np.uint16)
 
 
 def read_depth_m(path: FrameFile) -> NDArray[np.float32]:
-    """Depth (H, W) in metres along the optical axis of a 16-bit image, inf where it is invalid."""
+    """Read a 16-bit depth image (H, W) as metres along the optical axis, inf where invalid."""
     depth_mm = np.asarray(read_image(path))
     if depth_mm.ndim != 2 or depth_mm.dtype == np.uint8:
         raise InputError(f"{path}: must be a 16-bit grey image, millimetres")
@@ -44,13 +44,13 @@ def read_depth_m(path: FrameFile) -> NDArray[np.float32]:
 
 
 def pose_text(world_from_cam: NDArray[np.float64]) -> str:
-    """A pose (4, 4) as four tab-separated rows, exact to about 1e-10."""
+    """Format a pose (4, 4) as four tab-separated rows, exact to about 1e-10."""
     rows = ("\t".join(f"{value:.10e}" for value in row) for row in world_from_cam.tolist())
     return "".join(f"{row}\n" for row in rows)
 
 
 def read_pose(path: FrameFile) -> NDArray[np.float64]:
-    """A pose (4, 4), from a file of sixteen finite numbers in four rows."""
+    """Read a pose (4, 4) from a file of sixteen finite numbers in four rows."""
     with read_as(path, "a pose"):
         rows = [line.split() for line in path.read_text(encoding="utf-8").splitlines() if line]
         pose = np.array(rows, np.float64)
@@ -62,7 +62,7 @@ def read_pose(path: FrameFile) -> NDArray[np.float64]:
 
 
 def frame_paths(sequences: Iterable[Path], kind: str) -> list[FrameFile]:
-    """Files of one kind of all frames of sequences, in order.
+    """List the files of one kind of all frames of sequences, in order.
 
     For readers that take the rows of another file by position; so frames must be numbered from 0
     without gaps, and each must have its file.
@@ -90,7 +90,7 @@ def frame_paths(sequences: Iterable[Path], kind: str) -> list[FrameFile]:
 def frames_between(
     sequences: Series[Path], kind: str, start: int = 0, stop: int | None = None
 ) -> list[FrameFile]:
-    """Files of one kind of the frames ``start`` to ``stop`` (exclusive) of a split.
+    """List the files of one kind of the frames ``start`` to ``stop`` (exclusive) of a split.
 
     Its frames are counted through its sequences, each of which must be as long as
     :func:`sequences_of` makes it: one frame less in any of them would shift all that follow.
@@ -120,7 +120,7 @@ def frames_between(
 
 
 def write_splits(dataset_dir: Path, sequences: Iterable[Sequence]) -> None:
-    """``TrainSplit.txt`` and ``TestSplit.txt``: one line ``sequence1`` for each ``seq-01``."""
+    """Write ``TrainSplit.txt`` and ``TestSplit.txt``: a line ``sequence1`` for each ``seq-01``."""
     sequences = list(sequences)
     for split, name in SPLIT_FILES.items():
         lines = [f"sequence{s.number}\n" for s in sequences if s.split == split]
@@ -129,7 +129,7 @@ def write_splits(dataset_dir: Path, sequences: Iterable[Sequence]) -> None:
 
 
 def read_split(dataset_dir: Path, split: str) -> list[Path]:
-    """The sequences of a split in order, each the directory or the archive that is there."""
+    """List the sequences of a split in order, each as a directory or an archive."""
     path = dataset_dir / SPLIT_FILES[split]
     if not os.path.lexists(path):
         raise InputError(f"{path}: missing; a 7-Scenes data set has one")
@@ -172,7 +172,7 @@ class Sequence:
 
 
 def sequences_of(n_train: int, n_test: int, shard_frames: int) -> list[Sequence]:
-    """Sequences of at most ``shard_frames`` frames: those of train first, then those of test."""
+    """Divide frames into sequences of at most ``shard_frames``, first train's, then test's."""
     if shard_frames < 1 or min(n_train, n_test) < 0:
         raise ValueError(f"cannot divide {n_train} + {n_test} frames by {shard_frames}")
     sequences: list[Sequence] = []

@@ -32,7 +32,7 @@ class SplitFrames:
         return tuple(frame for sequence in self.sequences for frame in sequence.frames)
 
     def files(self, kind: str) -> list[FrameFile]:
-        """The file of one kind of each frame, none missing.
+        """List the file of one kind of each frame, none missing.
 
         Raises:
             InputError: the file of a frame is missing.
@@ -69,7 +69,7 @@ def read_split_frames(dataset: Path, split: str) -> SplitFrames:
 
 
 def read_image_names(table: Path) -> tuple[str, ...] | None:
-    """Names of the images in the last column of a pose table; None where it has no such column.
+    """Read image names from the last column of a pose table; None where it has no such column.
 
     Raises:
         InputError: it cannot be read.
@@ -82,7 +82,7 @@ def read_image_names(table: Path) -> tuple[str, ...] | None:
 
 
 def table_problems(table: Path, frames: Sequence[Frame]) -> list[str]:
-    """Ways in which the rows of a pose table are not those of the frames, a sentence each.
+    """Describe how the rows of a pose table differ from the frames, one sentence per problem.
 
     A table without a column of names can be compared by length only.
     """
@@ -121,7 +121,7 @@ def table_problems(table: Path, frames: Sequence[Frame]) -> list[str]:
 
 
 def rows_of_frames(table: Path, frames: Sequence[Frame]) -> NDArray[np.int64]:
-    """Row (N,) of each frame in a table in which :func:`table_problems` finds nothing."""
+    """Find the row (N,) of each frame in a table in which :func:`table_problems` finds nothing."""
     images = read_image_names(table)
     if images is None:
         return np.arange(len(frames))
@@ -130,6 +130,6 @@ def rows_of_frames(table: Path, frames: Sequence[Frame]) -> NDArray[np.int64]:
 
 
 def _frame_name(image: str) -> str | None:
-    """``seq-01/frame-000000`` of the name of an image."""
+    """Return ``seq-01/frame-000000`` for the name of an image; None for other names."""
     match = _IMAGE_NAME.fullmatch(image)
     return f"{match[1]}/{match[2]}" if match else None

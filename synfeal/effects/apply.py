@@ -107,33 +107,43 @@ def path_effects(config: EffectsConfig, poses: Poses, first: int) -> EffectsConf
 
 
 def path_light(config: EffectsConfig, poses: Poses, first: int) -> LightState | None:
-    """The light of the path that begins at row ``first``, if it has one of its own."""
+    """Draw the light of the path that begins at row ``first``; None where light is not varied."""
     if config.light is None:
         return None
     return drawn_light(config.light, _generator("light", config, poses, first))
 
 
 def paths_of(poses: Poses) -> list[tuple[int, int]]:
-    """First row of every path and the row after its last."""
+    """List the first row of every path and the row after its last."""
     edges = (np.flatnonzero(np.diff(poses.path)) + 1).tolist()
     return list(zip([0, *edges], [*edges, len(poses.path)], strict=True))
 
 
 def _generator(what: str, config: EffectsConfig, poses: Poses, row: int) -> np.random.Generator:
-    """Seeded by the frame: its number and place tell it from those of other splits and scenes."""
+    """Seed by the frame's number and place, so that splits and scenes get different numbers."""
     return generator_of(what, config.seed, poses.frame[row], *poses.position_m[row].tolist())
 
 
 def varied_frames(
-    renderer: SceneRenderer,  # through ``camera``
-    camera: CameraConfig,  # whose frames they are
-    config: EffectsConfig,  # what is added
-    poses: Poses,  # whole paths
-    begin: int,  # first row that is asked for
-    end: int,  # row after the last
-    layers: Layers,  # what is asked for besides; it is that of the middle of the exposure
+    renderer: SceneRenderer,
+    camera: CameraConfig,
+    config: EffectsConfig,
+    poses: Poses,
+    begin: int,
+    end: int,
+    layers: Layers,
 ) -> Iterator[Frame]:
-    """Draw the rows ``begin`` to ``end`` (exclusive) of ``poses`` with effects."""
+    """Render the rows ``begin`` to ``end`` (exclusive) of ``poses`` with effects.
+
+    Args:
+        renderer: Renderer of the scene through ``camera``.
+        camera: Camera of the frames.
+        config: Effects to add.
+        poses: Poses of whole paths.
+        begin: First row to render.
+        end: Row after the last to render.
+        layers: Layers to render besides colour, as they are at the middle of the exposure.
+    """
     for first, last in paths_of(poses):
         if first < end and last > begin:
             own = path_effects(config, poses, first)
@@ -164,7 +174,7 @@ class _Path:
         return self.poses.world_from_cam
 
     def frames(self, begin: int, end: int, layers: Layers) -> Iterator[Frame]:
-        """The frames of some rows, with those before them for auto-exposure alone."""
+        """Yield the frames of some rows; earlier ones are computed only for auto-exposure."""
         exposure = self.config.exposure
         meter = AutoExposure(exposure) if exposure else None
         lags = exposure is not None and exposure.time_constant_s is not None
@@ -178,7 +188,7 @@ class _Path:
                 yield frame.with_surface(layers, self.renderer, pose)
 
     def _seen(self, row: int, with_depth: bool) -> tuple[Light, Depth | None]:
-        """Light (H, W, 3) that reaches the sensor, and depth where it is needed."""
+        """Return the light (H, W, 3) that reaches the sensor, and depth where it is needed."""
         pose, light, depth_m = self._world_from_cam[row], self.light, None
         if with_depth or (light is not None and light.amplitude_ev):
             rgb, depth_m = self.renderer.render_rgbd(pose)
@@ -195,7 +205,7 @@ class _Path:
         return seen, depth_m if with_depth else None
 
     def _blurred(self, row: int, blur: MotionBlurConfig) -> Light:
-        """The mean light of sub-frames, midpoints of equal parts of the exposure."""
+        """Average the light of sub-frames at the midpoints of equal parts of the exposure."""
         count = blur.subframes
         share = min(1.0, blur.exposure_s / self._seconds(row))
         ends = self._world_from_cam[self._neighbour(row)], self._world_from_cam[row]
@@ -209,11 +219,11 @@ class _Path:
         return total
 
     def _neighbour(self, row: int) -> int:
-        """The row of the path that movement is measured from."""
+        """Return the row of the path that movement is measured from."""
         return row - 1 if row > self.first else min(row + 1, self.last - 1)
 
     def _seconds(self, row: int) -> float:
-        """Time between a frame and its neighbour; 0 where the camera does not move."""
+        """Return the time between a frame and its neighbour; 0 where the camera does not move."""
         position_m = self.poses.position_m
         step_m = np.linalg.norm(position_m[row] - position_m[self._neighbour(row)])
         return float(step_m) / self.config.speed_m_s

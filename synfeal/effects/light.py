@@ -43,7 +43,7 @@ STATES: dict[str, tuple[float, float, float]] = {
 
 
 def light_of(rgb: Rgb) -> Light:
-    """Light (...), white is 1, of what files hold (...)."""
+    """Convert sRGB bytes (...) to linear light (...), white at 1."""
     return np.asarray(np.take(_LIGHT, rgb))
 
 
@@ -63,7 +63,7 @@ def channel_gains(temperature_k: float) -> Light:
 
 
 def _planckian(temperature_k: float) -> NDArray[np.float64]:
-    """Linear sRGB (3,) of a black body, luminance 1."""
+    """Return the linear sRGB colour (3,) of a black body, at luminance 1."""
     inverse = 1e3 / temperature_k
     if temperature_k <= 4000:
         x = np.polyval([-0.2661239, -0.2343589, 0.8776956, 0.179910], inverse)
@@ -100,14 +100,14 @@ class LightState:
         return np.asarray(np.exp2(self.ev) * channel_gains(self.temperature_k), np.float32)
 
     def field(self, points_m: NDArray[np.float32]) -> Light:
-        """Factors (...) at points (..., 3) of the world."""
+        """Return the factors (...) on light at points (..., 3), world, metres."""
         waves = points_m @ self.wave_vectors.T.astype(np.float32)
         waves += self.phases.astype(np.float32)
         return np.asarray(np.exp2(np.float32(self.amplitude_ev) * np.cos(waves).sum(-1)))
 
 
 def drawn_light(config: LightConfig, rng: np.random.Generator) -> LightState:
-    """The light of one path."""
+    """Draw the light of one path."""
     ev = rng.uniform(*config.ev)
     coldest, warmest = config.temperature_k
     mired = rng.uniform(1e6 / warmest, 1e6 / coldest)
@@ -130,10 +130,17 @@ class AutoExposure:
         self._ev = 0.0
 
     def next_ev(self, light: Light, since_s: float) -> float:
-        """Exposure of a frame (H, W, 3), stops, ``since_s`` after the last; the first is settled.
+        """Return the exposure of the next frame; the first frame is taken as settled.
 
         ``ev = goal + (ev - goal) * exp(-since_s / time_constant_s)``, with the goal of the frame
         before: what a camera meters it can only use later.
+
+        Args:
+            light: Linear light (H, W, 3) of the frame, white at 1.
+            since_s: Seconds since the last frame.
+
+        Returns:
+            The exposure, stops.
         """
         config = self._config
         if config.time_constant_s is None:
@@ -149,7 +156,7 @@ class AutoExposure:
 
 
 def with_noise(light: Light, noise: NoiseConfig, rng: np.random.Generator) -> Light:
-    """Shot and read noise: variance ``light / full_well + (read / full_well)^2``, clipped at white.
+    """Add shot and read noise: variance ``light / full_well + (read / full_well)^2``, clipped at 1.
 
     The normal approximation of the Poisson-Gaussian model (Foi et al., IEEE TIP 17(10), 2008), in
     which a well that is full holds no more.
@@ -162,7 +169,7 @@ def with_noise(light: Light, noise: NoiseConfig, rng: np.random.Generator) -> Li
 
 
 def compressed(rgb: Rgb, quality: int) -> Rgb:
-    """A frame (H, W, 3) after JPEG."""
+    """Compress a frame (H, W, 3) as JPEG and decode it."""
     file = io.BytesIO()
     Image.fromarray(rgb).save(file, "JPEG", quality=quality)
     return np.asarray(Image.open(file))

@@ -116,11 +116,11 @@ class SceneRenderer(Renderer):
         self._shares = {group: open_renderer(share, camera, even) for group, share in held}
 
     def render(self, world_from_cam: Array) -> Rgb:
-        """Colours (H, W, 3) of the scene alone, in its own light."""
+        """Render the colours (H, W, 3) of the scene alone, in its own light, from a pose (4, 4)."""
         return self._ideal.render(world_from_cam)
 
     def render_rgbd(self, world_from_cam: Array) -> tuple[Rgb, Depth]:
-        """Colours (H, W, 3) of the scene alone, in its own light, and depth (H, W)."""
+        """Render colours (H, W, 3) and depth (H, W) of the scene alone, in its own light."""
         if self._full is None:
             return self._ideal.render_rgbd(world_from_cam)
         return self._ideal.render(world_from_cam), self._solid.render_depth(world_from_cam)
@@ -131,7 +131,7 @@ class SceneRenderer(Renderer):
         return renderer.render_faces(world_from_cam)
 
     def surface(self, world_from_cam: Array) -> Surface:
-        """Normals and instances of the scene alone."""
+        """Render normals and instances of the scene alone."""
         return self._surface_table.look_up(self.render_faces(world_from_cam), world_from_cam)
 
     @cached_property
@@ -151,7 +151,7 @@ class SceneRenderer(Renderer):
         return open_renderer(replace(mesh, parts=tuple(parts)), self._camera, self._render)
 
     def left(self, world_from_cam: Array, weights: Mapping[str, float]) -> Light:
-        """Factors (H, W, 3) of the light that is left with these weights of the groups."""
+        """Return the factors (H, W, 3) of light left when groups of lamps have these weights."""
         total = np.zeros((), np.float32)
         for group, renderer in self._shares.items():
             if weights[group]:
@@ -159,7 +159,7 @@ class SceneRenderer(Renderer):
         return np.asarray(total, np.float32)
 
     def along(self, path_m: Array, rng: np.random.Generator) -> SceneRenderer:
-        """A renderer of the scene with what stands along a path (P, 3)."""
+        """Return a renderer of the scene with objects placed along a path (P, 3), world, metres."""
         assert self._crowd is not None, "opened without `clutter`"
         n_placed, objects, names = len(self._crowd.placed), [], list(self._crowd.placed)
         for number, (parts, place) in enumerate(self._crowd.along(path_m, rng), n_placed):
@@ -181,7 +181,7 @@ class SceneRenderer(Renderer):
 def open_scene(
     mesh: Path, camera: CameraConfig, render: RenderConfig | None, detail: Path | None = None
 ) -> SceneRenderer:
-    """A renderer of a mesh, which knows what else effects ask for: shares of light, objects.
+    """Open a renderer of a mesh that also knows what effects need: shares of light, objects.
 
     Args:
         mesh: The full mesh, which depth is taken of and objects stand in.

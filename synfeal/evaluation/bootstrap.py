@@ -35,7 +35,7 @@ def path_counts(n_paths: int, rng: np.random.Generator, resamples: int = RESAMPL
 
 
 def medians(errors: Array, path: Counts, counts: Counts) -> Array:
-    """Medians (B,) of errors (N,) for each resample of their paths.
+    """Compute medians (B,) of errors (N,) for each resample of their paths.
 
     ``path`` (N,) is the place of each frame's path in a row of ``counts`` (B, P), how often each
     path is taken. An even number of frames gives the mean of the middle two. An infinite error is a
@@ -49,7 +49,7 @@ def medians(errors: Array, path: Counts, counts: Counts) -> Array:
 
 
 def _medians(ranked: Array, frame_counts: Counts) -> Array:
-    """Medians of sorted values (N,), value n taken ``frame_counts[b, n]`` times: (B,)."""
+    """Compute medians (B,) of sorted values (N,), value n taken ``frame_counts[b, n]`` times."""
     reached = np.cumsum(frame_counts, axis=1)
     total = reached[:, -1:]
     below = (reached > (total - 1) // 2).argmax(axis=1)
@@ -59,7 +59,7 @@ def _medians(ranked: Array, frame_counts: Counts) -> Array:
 
 
 def relative_change(new: Array, old: Array) -> Array:
-    """``100 (new - old) / old``; to a failure it is infinite, from one to a score it is -100.
+    """Compute ``100 (new - old) / old``; infinite to a failure, -100 from a failure to a score.
 
     Not a number where both failed: nothing can be said about such a pair.
     """
@@ -68,19 +68,19 @@ def relative_change(new: Array, old: Array) -> Array:
 
 
 def difference(a: Array, b: Array) -> Array:
-    """``a - b``; not a number where both are the same infinity."""
+    """Compute ``a - b``; not a number where both are the same infinity."""
     with np.errstate(invalid="ignore"):
         return a - b
 
 
 def mean_of(samples: Sequence[Array]) -> Array:
-    """Mean over samples, resample by resample."""
+    """Average samples, resample by resample."""
     with np.errstate(invalid="ignore"):
         return np.asarray(np.mean(samples, axis=0))
 
 
 def limits(sample: Array, comparisons: int = 1) -> tuple[float, float]:
-    """Percentile limits of a sample, at 95 % or, corrected after Bonferroni, at ``1 - 0.05 / k``.
+    """Return percentile limits of a sample at 95 %, or at ``1 - 0.05 / k`` after Bonferroni.
 
     Always values that occur, since interpolating towards infinity gives no number. A resample that
     is not a number could be anything, and widens both ends.

@@ -56,7 +56,7 @@ class Estimates:
     frame_key: FrameKey = "name"
 
     def world_from_cam(self, convention: Convention) -> Array:
-        """Poses (N, 4, 4); not a number where there is no rotation."""
+        """Return poses (N, 4, 4), read by a convention; NaN where there is no rotation."""
         with np.errstate(over="ignore", invalid="ignore"):
             off = np.abs(np.linalg.norm(self.quat, axis=1) - 1.0)
         good = np.isfinite(self.translation).all(axis=1) & (off <= UNIT_TOLERANCE)
@@ -94,7 +94,7 @@ def checked_convention(
 def _medians(
     estimates: Estimates, convention: Convention, rows: NDArray[np.int64], reference: Array
 ) -> tuple[float, float]:
-    """Median errors in metres and degrees of the poses that are rotations."""
+    """Compute median errors, metres and degrees, of the poses that are rotations."""
     poses = estimates.world_from_cam(convention)[rows]
     good = np.isfinite(poses).all(axis=(1, 2))
     if not good.any():

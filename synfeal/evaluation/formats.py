@@ -85,7 +85,7 @@ LINE_FORMATS: dict[FormatName, LineFormat] = {
 
 
 def read_estimates(path: Path, file_format: FormatName | None = None) -> Estimates:
-    """Poses from any of the formats above.
+    """Read poses from any of the formats above.
 
     Args:
         path: File or directory.
@@ -118,7 +118,7 @@ def read_estimates(path: Path, file_format: FormatName | None = None) -> Estimat
 
 
 def _name_of(found: Estimates) -> FormatName:
-    """The format of poses that were read from a directory."""
+    """Name the format of poses that were read from a directory."""
     names: dict[str, FormatName] = {
         "a 7-Scenes tree": "7scenes",
         "a COLMAP model": "colmap",
@@ -148,7 +148,7 @@ def _from_directory(path: Path) -> Estimates:
 
 
 def read_sevenscenes(path: Path) -> Estimates:
-    """A tree of ``pose.txt``."""
+    """Read a tree of ``pose.txt`` files."""
     sequences = list_sequences(path)
     refuse_problems(sequences)
     frames = [
@@ -168,7 +168,7 @@ def read_sevenscenes(path: Path) -> Estimates:
 
 
 def read_colmap(path: Path) -> Estimates:
-    """A COLMAP model, text or binary, but not both."""
+    """Read a COLMAP model, as text or binary, but not both."""
     import pycolmap
 
     both = [name for name in MODELS if (path / name).is_file()]
@@ -193,7 +193,7 @@ def read_colmap(path: Path) -> Estimates:
 
 
 def read_csv(path: Path, text: str) -> Estimates:
-    """A table of poses with a header."""
+    """Read a table of poses with a header."""
     with read_as(path, "CSV"):
         table = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
     header = tuple(table.columns)
@@ -224,7 +224,7 @@ def read_csv(path: Path, text: str) -> Estimates:
 
 
 def read_euroc(path: Path, text: str) -> Estimates:
-    """EuRoC's ground truth, or a table of its first eight columns."""
+    """Read EuRoC's ground truth, or a table of its first eight columns."""
     lines = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip()]
     rows = [
         (i, [cell.strip() for cell in line.rstrip(", ").split(",")])
@@ -259,7 +259,7 @@ def read_euroc(path: Path, text: str) -> Estimates:
 def read_lines(
     path: Path, rows: Sequence[tuple[int, list[str]]], file_format: FormatName | None = None
 ) -> Estimates:
-    """Lines of text, by how many numbers they have and whether a name."""
+    """Read lines of text, whose format follows from their count of numbers and a leading name."""
     line_format = _line_format(path, rows[0], file_format)
     columns = line_format.n_numbers + (line_format.frame_key == "name")
     for line, row in rows:
@@ -292,7 +292,7 @@ def read_lines(
 def _line_format(
     path: Path, first: tuple[int, list[str]], file_format: FormatName | None
 ) -> LineFormat:
-    """The format of the first line (its number, its columns)."""
+    """Find the format of the first line (its number, its columns)."""
     line, row = first
     if file_format is not None:
         told = LINE_FORMATS[file_format]
@@ -317,7 +317,7 @@ def _line_format(
 def _of_matrices(
     path: Path, line_format: LineFormat, places: Sequence[str], rows: Sequence[Sequence[str]]
 ) -> Estimates:
-    """Poses of which three rows of four numbers stand on a line."""
+    """Read poses from lines of three rows of four numbers each."""
     matrices = np.tile(np.eye(4), (len(rows), 1, 1))
     matrices[:, :3] = _numbers(path, places, rows).reshape(-1, 3, 4)
     return Estimates(
@@ -332,7 +332,7 @@ def _of_matrices(
 
 
 def _quat_of_rotations(matrices: Array) -> Array:
-    """Quaternions (N, 4) ``wxyz``, not a number where a matrix (N, 4, 4) is no rigid motion."""
+    """Convert matrices (N, 4, 4) to quaternions (N, 4) ``wxyz``; NaN where one is not rigid."""
     quat = np.full((len(matrices), 4), np.nan)
     rigid = rigid_defects(matrices).max(axis=1) <= RIGID_BOUND
     quat[rigid] = quat_wxyz_of(matrices[rigid])
@@ -340,7 +340,7 @@ def _quat_of_rotations(matrices: Array) -> Array:
 
 
 def read_tum_sequences(paths: Sequence[Path]) -> Estimates:
-    """``seq-01.txt``, ``seq-02.txt``, ...: a TUM trajectory each."""
+    """Read ``seq-01.txt``, ``seq-02.txt``, ..., each a TUM trajectory."""
     parts = [read_estimates(path) for path in paths]
     odd = [p for p, part in zip(paths, parts, strict=True) if part.convention != TUM]
     if odd:

@@ -63,7 +63,7 @@ class ScoredFrames:
         return self.split if self.frame_key else f"{self.split} split"
 
     def at(self, chosen: NDArray[np.int64]) -> ScoredFrames:
-        """The poses of a file with these indices (K,); the others are left out."""
+        """Select the poses of a file by index (K,)."""
         return replace(
             self,
             names=tuple(self.names[index] for index in chosen),
@@ -74,7 +74,7 @@ class ScoredFrames:
 
 
 def read_scored_frames(dataset: Path, split: str) -> ScoredFrames:
-    """The frames of a split, all of which must have rigid poses.
+    """Read the frames of a split, all of which must have rigid poses.
 
     Photographs with poses, a flat folder of frames or folders ``seq-XX`` that no file splits, are
     scored all together, whatever the split.
@@ -119,7 +119,7 @@ def _is_unsplit(dataset: Path) -> bool:
 
 
 def _unsplit_photographs(dataset: Path) -> ScoredFrames:
-    """All photographs of a folder that have a pose."""
+    """Read all photographs of a folder that have a pose."""
     if is_tum(dataset):
         raise InputError(
             f"{dataset}: poses of TUM RGB-D sequences are scored by the tools of that benchmark and"
@@ -139,7 +139,7 @@ def _unsplit_photographs(dataset: Path) -> ScoredFrames:
 
 
 def _frame_named(dataset: Path, name: str) -> Frame:
-    """The frame that ``seq-01/frame-000000`` or ``frame-000000`` names."""
+    """Return the frame that ``seq-01/frame-000000`` or ``frame-000000`` names."""
     sequence, _, frame = name.rpartition("/")
     where = sequence_at(dataset / sequence) if sequence else dataset
     return Frame(where, int(frame.removeprefix("frame-")))
@@ -181,7 +181,7 @@ def _paths(dataset: Path, split: str, frames: Sequence[Frame]) -> NDArray[np.int
 def match(
     frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float
 ) -> NDArray[np.int64]:
-    """Row (N,) of the estimate of each frame, by name, by index or by time; -1 where there is none.
+    """Find the row (N,) of each frame's estimate by name, index or time; -1 where there is none.
 
     Raises:
         InputError: a name says no frame, or not of which sequence; a frame has two estimates; none
@@ -209,7 +209,7 @@ def match(
 
 
 def _keys(frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float) -> list[Key]:
-    """Sequence and number of each estimate's frame."""
+    """Return sequence and number of each estimate's frame."""
     pairs = list(zip(estimates.names, estimates.places, strict=True))
     if estimates.frame_key == "index":
         keys = [_by_index(frames, name, f"{path}: {place}") for name, place in pairs]

@@ -69,7 +69,7 @@ BOUNDS = (
 
 
 def pose_errors(predicted: PoseTable, reference: PoseTable) -> dict[str, Array]:
-    """``position_m`` and ``orientation_deg`` (N,); infinite where a prediction is no pose."""
+    """Compute ``position_m`` and ``orientation_deg`` (N,); infinite where a prediction failed."""
     good = is_pose(predicted)
     position, orientation = np.full(len(good), np.inf), np.full(len(good), np.inf)
     position[good] = position_error_m(predicted.position_m[good], reference.position_m[good])
@@ -96,19 +96,19 @@ def within(errors: Mapping[str, Array], bound: Bound, end: str = "") -> NDArray[
 
 
 def joint_error(errors: Mapping[str, Array], end: str = "") -> Array:
-    """The larger of centimetres and degrees (N,), as ACE colours frames by: x is x cm and x°."""
+    """Return the larger of centimetres and degrees (N,), as ACE colours frames."""
     return np.maximum(100.0 * errors[POSITION + end], errors[ORIENTATION + end])
 
 
 def cumulative(errors: Array) -> tuple[Array, Array]:
-    """The finite errors in rising order, and the per cent of all errors up to each of them."""
+    """Sort the finite errors, with the percentage of all errors that are at most as large."""
     ordered = np.sort(errors)
     percent = 100 * np.arange(1, len(errors) + 1) / len(errors)
     return ordered[np.isfinite(ordered)], percent[np.isfinite(ordered)]
 
 
 def summary(errors: Mapping[str, Array], path: NDArray[np.int64]) -> Metrics:
-    """Median, mean and recalls, each with its limits under ``_low`` and ``_high``.
+    """Compute median, mean and recalls, each with its limits under ``_low`` and ``_high``.
 
     None where a value is not finite. ``errors`` are (N,) by name; ``position_m`` and
     ``orientation_deg`` with the same ending (``""``, ``_true``) go together. ``path`` (N,) is what
@@ -124,7 +124,7 @@ def summary(errors: Mapping[str, Array], path: NDArray[np.int64]) -> Metrics:
 
 
 def with_limits(samples: Mapping[str, Array]) -> Metrics:
-    """The observed value of each sample, and its limits."""
+    """Return the observed value of each sample, and its limits."""
     metrics: Metrics = {}
     for name, sample in samples.items():
         metrics[name] = finite(float(sample[0]))
@@ -140,7 +140,7 @@ def draws(path: NDArray[np.int64]) -> tuple[NDArray[np.intp], Counts]:
 
 
 def means(values: Array, place: NDArray[np.intp], counts: Counts) -> Array:
-    """Mean of values (N,) in each resample of their paths: (B,); infinite as soon as one is."""
+    """Average values (N,) in each resample of their paths: (B,), infinite as soon as one is."""
     n_paths = counts.shape[1]
     lost = np.bincount(place, ~np.isfinite(values), n_paths)
     total = np.bincount(place, np.where(np.isfinite(values), values, 0.0), n_paths)
@@ -149,5 +149,5 @@ def means(values: Array, place: NDArray[np.intp], counts: Counts) -> Array:
 
 
 def finite(value: float) -> float | None:
-    """The value, or None (JSON's null) where it is infinite or no number."""
+    """Return the value, or None (JSON's null) where it is infinite or NaN."""
     return value if math.isfinite(value) else None

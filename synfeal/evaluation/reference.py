@@ -57,7 +57,7 @@ def read_reference(path: Path) -> ScoredFrames:
 
 
 def _keys(found: Estimates) -> tuple[str, ...]:
-    """Names (N) in one spelling where they say sequence and frame; others as they are."""
+    """Spell names (N) alike where they say sequence and frame; leave others as they are."""
     if found.frame_key != "name":
         return found.names
     return tuple(map(_spelled, found.names))
@@ -86,7 +86,7 @@ def _sequences(names: tuple[str, ...]) -> NDArray[np.int64]:
 
 
 def match_reference(frames: ScoredFrames, estimates: Estimates, path: Path) -> NDArray[np.int64]:
-    """Row (N,) of the estimate of each frame; -1 where there is none.
+    """Find the row (N,) of each frame's estimate; -1 where there is none.
 
     Args:
         frames: Frames of a reference.

@@ -56,7 +56,7 @@ def _directions(camera: CameraConfig) -> Array:
 
 
 def cell_depth_m(caster: RayCaster, camera: CameraConfig, world_from_cam: Array) -> Array:
-    """Depth (N, 48) of the cells from poses (N, 4, 4), metres; ``inf`` where nothing is."""
+    """Cast rays from poses (N, 4, 4) to the cells: depth (N, 48), metres, ``inf`` for nothing."""
     direction = _directions(camera)
     length = np.linalg.norm(direction, axis=1)
     parts = []
@@ -69,10 +69,17 @@ def cell_depth_m(caster: RayCaster, camera: CameraConfig, world_from_cam: Array)
 
 
 def dcre(predicted: PoseTable, reference: PoseTable, depth_m: Array, camera: CameraConfig) -> Array:
-    """DCRE (N,) of predictions against labels or true poses, as shares of the image's diagonal.
+    """Compute the dense correspondence reprojection error of predictions.
 
-    Infinite where a prediction is no pose, not a number where a frame shows nothing. ``depth_m`` is
-    (N, 48), of the frames' cells, from :func:`cell_depth_m`.
+    Args:
+        predicted: Poses to score.
+        reference: Labels or true poses of the same frames, row by row.
+        depth_m: Depth (N, 48) of the frames' cells, metres, from :func:`cell_depth_m`.
+        camera: The frames' camera.
+
+    Returns:
+        Errors (N,) as shares of the image's diagonal; infinite where a prediction is no pose, NaN
+        where a frame shows nothing.
     """
     errors = np.full(len(predicted), np.inf)
     good = np.flatnonzero(is_pose(predicted))
@@ -83,7 +90,7 @@ def dcre(predicted: PoseTable, reference: PoseTable, depth_m: Array, camera: Cam
 
 
 def dcre_summary(errors: Array, path: NDArray[np.int64], end: str = "") -> Metrics:
-    """Median of DCREs (N,), and shares below :data:`DCRE_BOUNDS`, with limits.
+    """Compute the median of DCREs (N,) and the shares below :data:`DCRE_BOUNDS`, with limits.
 
     Frames that show nothing are left out. Names end in ``end``; ``path`` (N,) is what is drawn.
     """
@@ -99,7 +106,7 @@ def dcre_summary(errors: Array, path: NDArray[np.int64], end: str = "") -> Metri
 
 
 def _moved(estimate_from_reference: Array, depth_m: Array, camera: CameraConfig) -> Array:
-    """Mean over the cells (N,) of how far they move, as shares of the diagonal."""
+    """Average over the cells how far (N,) they move, as shares of the diagonal."""
     seen = np.isfinite(depth_m)
     points = _directions(camera) * np.where(seen, depth_m, 1.0)[..., None]
     points = np.einsum("nij,nkj->nki", estimate_from_reference[:, :3, :3], points)
@@ -120,7 +127,7 @@ def write_cell_depth(path: Path, depth_m: Array) -> None:
 
 
 def read_cell_depth(path: Path, n_frames: int) -> Array:
-    """Depths (n_frames, 48) of the first frames of a file of as many or more; ``inf`` for none."""
+    """Read depths (n_frames, 48) of the first frames of a file; ``inf`` where nothing is."""
     with read_as(path, "depths", OSError, ValueError, EOFError, remedy="; make it again"):
         # A map is refused where the header claims more than the file holds; an array is not.
         depth_mm = np.load(path, mmap_mode="r", allow_pickle=False)
@@ -135,7 +142,7 @@ def read_cell_depth(path: Path, n_frames: int) -> Array:
 
 
 def depth_of_images(paths: Iterable[FrameFile], camera: CameraConfig) -> Iterator[Array]:
-    """Depths (48,) of the cells' middles, read from depth images of the size of the camera's."""
+    """Yield depths (48,) at the centres of the cells from depth images of the camera's size."""
     column, row = cell_pixels(camera, *CELLS).reshape(-1, 2).astype(int).T
     for path in paths:
         depth_mm = read_depth_mm(path)

@@ -106,7 +106,7 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
 
 
 def _scored(dataset: Path, settings: Settings) -> ScoredFrames:
-    """The frames of a data set, or of a file of poses."""
+    """Read the frames of a data set, or of a file of poses."""
     if not dataset.is_file() or dataset.suffix == ".zip":
         return read_scored_frames(dataset, settings.split)
     if settings.split != "test" or settings.camera is not None:
@@ -118,7 +118,7 @@ def _scored(dataset: Path, settings: Settings) -> ScoredFrames:
 def _matched(
     frames: ScoredFrames, estimates: Estimates, path: Path, settings: Settings
 ) -> NDArray[np.int64]:
-    """Row (N,) of the estimate of each frame; -1 where there is none."""
+    """Find the row (N,) of each frame's estimate; -1 where there is none."""
     if frames.frame_key is not None:
         return match_reference(frames, estimates, path)
     return match(frames, estimates, path, settings.rate_hz)
@@ -142,9 +142,9 @@ def _taken(
     settings: Settings,
     convention: str | None,
 ) -> tuple[Convention, Array]:
-    """As what estimates are taken, and the poses (N, 4, 4) of the frames.
+    """Choose the convention of the estimates; return it with the frames' poses (N, 4, 4).
 
-    These are not a number where there is none.
+    Poses are NaN where there is no estimate.
     """
     with np.errstate(invalid="ignore"):
         far = (np.abs(estimates.translation) > FARTHEST_M) & np.isfinite(estimates.translation)
@@ -164,7 +164,7 @@ def _taken(
 
 
 def _labels(path: Path, frames: ScoredFrames, settings: Settings) -> Array:
-    """Poses (N, 4, 4) of a second yardstick, which must have every frame."""
+    """Read poses (N, 4, 4) of a second yardstick, which must have every frame."""
     estimates = read_estimates(path)
     row = _matched(frames, estimates, path, settings)
     _, poses = _taken(path, frames, estimates, row, settings, None)
@@ -178,7 +178,7 @@ def _labels(path: Path, frames: ScoredFrames, settings: Settings) -> Array:
 
 
 def aligned(poses: Array, reference: Array, align: Align, path: Path) -> tuple[Array, float]:
-    """Poses (N, 4, 4) moved as a whole onto ``reference``, and the scale of that, as evo does.
+    """Move poses (N, 4, 4) as a whole onto ``reference`` as evo does; also return the scale.
 
     Least squares over the positions of the frames that have a pose (Umeyama, PAMI 1991).
 
@@ -207,7 +207,7 @@ def _table(poses: Array, frames: ScoredFrames) -> PoseTable:
 
 
 def _depth(frames: ScoredFrames, camera: CameraConfig) -> Array | None:
-    """Depth (N, 48) of the frames' cells; None where a frame has no depth image."""
+    """Read depth (N, 48) of the frames' cells; None where a frame has no depth image."""
     paths = [frame.path(DEPTH) for frame in frames.frames]
     if not all(path.is_file() for path in paths):
         return None
@@ -220,7 +220,7 @@ def _depth(frames: ScoredFrames, camera: CameraConfig) -> Array | None:
 
 
 def _metrics(errors: Mapping[str, Array], ends: Iterable[str], frames: ScoredFrames) -> Metrics:
-    """Medians and recalls of all frames; mean, RMSE and maximum of those that have a pose."""
+    """Compute medians and recalls of all frames; mean, RMSE and maximum of those with a pose."""
     metrics = summary({k: v for k, v in errors.items() if "dcre" not in k}, frames.path)
     for end in ends:
         if f"dcre{end}" in errors:

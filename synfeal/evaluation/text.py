@@ -31,7 +31,7 @@ TITLES = {"": "against the data set", "_labels": "against --labels"}
 
 
 def rows_of(found: Evaluation) -> list[tuple[str, str, str, float]]:
-    """Title, key in ``metrics``, format and factor of everything that is printed, in order."""
+    """List title, key in ``metrics``, format and factor of everything that is printed, in order."""
     rows = []
     units = ((POSITION, "position", "{:.4g} m"), (ORIENTATION, "orientation", "{:.4g}°"))
     for name, title, text in units:
@@ -47,7 +47,7 @@ def rows_of(found: Evaluation) -> list[tuple[str, str, str, float]]:
 
 
 def scores_table(found: Evaluation) -> pd.DataFrame:
-    """One row per score: ``score,against,value,low,high``."""
+    """Tabulate the scores, one per row: ``score,against,value,low,high``."""
     return pd.DataFrame(
         {
             "score": key,
@@ -62,7 +62,7 @@ def scores_table(found: Evaluation) -> pd.DataFrame:
 
 
 def report_text(poses: Path, settings: Settings, found: Evaluation) -> str:
-    """Findings, then the table."""
+    """Write the findings, then the table."""
     lines = [*_findings(poses, settings, found), ""]
     heads = [TITLES[end] for end in found.ends]
     rows = [
@@ -126,7 +126,7 @@ LEAST = 1e-6  # where an error of nothing is drawn on a logarithmic axis
 
 
 def figure_of(title: str, found: Evaluation) -> Figure:
-    """Three panels: position, orientation, and both at once (x cm and x°)."""
+    """Draw three panels: position, orientation, and both at once (x cm and x°)."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator, NullFormatter
 

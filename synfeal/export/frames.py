@@ -76,12 +76,12 @@ class ExportSet:
     has_splits: bool
 
     def of_split(self, split: str) -> Iterator[ExportFrame]:
-        """The frames of a split, in order."""
+        """Yield the frames of a split, in order."""
         return (frame for frame in self.frames if frame.split == split)
 
 
 def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
-    """The frames of a data set, all of which must be there with rigid poses.
+    """Read the frames of a data set, all of which must be there with rigid poses.
 
     Without ``camera_file``, a calibration, the manifest says which camera.
 

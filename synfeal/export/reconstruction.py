@@ -63,7 +63,7 @@ def export_colmap(data: ExportSet, out: Path, place: Place) -> None:
 
 
 def _rigs(data: ExportSet) -> list[dict[str, Any]]:
-    """The stereo pairs as ``colmap rig_configurator`` reads them, a rig for each sequence."""
+    """Describe the stereo pairs as ``colmap rig_configurator`` reads them, a rig per sequence."""
     assert data.camera.stereo_baseline_m is not None
     sequences = dict.fromkeys(frame.sequence for frame in data.frames if not frame.is_right)
     right_from_left_m = [-data.camera.stereo_baseline_m, 0.0, 0.0]
@@ -124,7 +124,7 @@ def write_model(folder: Path, camera: CameraConfig, frames: Iterable[ExportFrame
 
 
 def camera_line(camera: CameraConfig) -> str:
-    """The simplest of COLMAP's models that holds the camera."""
+    """Choose the simplest of COLMAP's camera models that holds the camera."""
     if camera.projection == "equirectangular":
         size = f"{camera.width} {camera.height}"
         return f"1 EQUIRECTANGULAR {size} {_numbers([camera.width, camera.height])}"
@@ -164,7 +164,7 @@ def export_hloc(data: ExportSet, out: Path, place: Place) -> None:
 
 
 def _write_binary(folder: Path, data: ExportSet, frames: Iterable[ExportFrame]) -> None:
-    """A model in the form that hloc reads by default."""
+    """Write a model in the binary form that hloc reads by default."""
     import pycolmap
 
     folder.mkdir()

@@ -75,7 +75,7 @@ def _write_bag(
 
 
 def _messages(data: ExportSet, store: Typestore, frame: ExportFrame, time_ns: int) -> Messages:
-    """Everything that stands in the bag of one frame."""
+    """Return all messages of one frame."""
     types = store.types
     stamp = types["builtin_interfaces/msg/Time"](sec=time_ns // 10**9, nanosec=time_ns % 10**9)
     optical = types["std_msgs/msg/Header"](stamp=stamp, frame_id=CAMERA)
@@ -92,7 +92,7 @@ def _messages(data: ExportSet, store: Typestore, frame: ExportFrame, time_ns: in
 
 
 def _image(store: Typestore, header: Any, pixels: np.ndarray, encoding: str) -> Any:
-    """``sensor_msgs/Image`` of pixels (H, W) or (H, W, 3)."""
+    """Build a ``sensor_msgs/Image`` of pixels (H, W) or (H, W, 3)."""
     content = np.ascontiguousarray(pixels)
     height, width = content.shape[:2]
     return store.types["sensor_msgs/msg/Image"](
@@ -107,7 +107,7 @@ def _image(store: Typestore, header: Any, pixels: np.ndarray, encoding: str) -> 
 
 
 def _camera_info(data: ExportSet, store: Typestore, header: Any) -> Any:
-    """``sensor_msgs/CameraInfo``: OpenCV's camera, nothing cut out and not rectified."""
+    """Build a ``sensor_msgs/CameraInfo``: OpenCV's camera, nothing cut out and not rectified."""
     camera = data.camera
     matrix = camera.intrinsics.matrix()
     matrix[:2, 2] -= 0.5
@@ -130,7 +130,7 @@ def _camera_info(data: ExportSet, store: Typestore, header: Any) -> Any:
 
 
 def _poses(store: Typestore, frame: ExportFrame, header: Any) -> Messages:
-    """``nav_msgs/Odometry`` and ``tf2_msgs/TFMessage`` of ``world_from_cam``."""
+    """Build ``nav_msgs/Odometry`` and ``tf2_msgs/TFMessage`` of ``world_from_cam``."""
     types = store.types
     x, y, z = frame.world_from_cam[:3, 3].tolist()
     qw, qx, qy, qz = quat_wxyz_of(frame.world_from_cam).tolist()

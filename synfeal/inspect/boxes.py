@@ -107,7 +107,7 @@ def share_inside(points_m: Array, boxes_m: Array) -> float:
 
 
 def largest_box(is_wanted: Mask, is_neutral: Mask | None = None) -> tuple[Corner, Corner]:
-    """First and last indices, both included, of the box with the greatest worth.
+    """Find the box of greatest worth and return its first and last indices, both included.
 
     Worth is the number of wanted points less twice the number of others, neutral ones not
     counted; at least one of (X, Y, Z) is wanted. Every pair of limits along x and z that may be
@@ -127,7 +127,7 @@ def largest_box(is_wanted: Mask, is_neutral: Mask | None = None) -> tuple[Corner
 
 
 def _best_rectangle(worth: NDArray[np.float64]) -> tuple[float, tuple[int, int], tuple[int, int]]:
-    """Greatest sum over a rectangle of (X, Y), with its first and last indices."""
+    """Find the rectangle of (X, Y) with the greatest sum: that sum, first and last indices."""
     sums = np.vstack([np.zeros(worth.shape[1]), np.cumsum(worth, axis=0)])
     pairs = np.array(_pairs(worth.shape[0]))
     strips = sums[pairs[:, 1] + 1] - sums[pairs[:, 0]]
@@ -140,5 +140,5 @@ def _best_rectangle(worth: NDArray[np.float64]) -> tuple[float, tuple[int, int],
 
 
 def _pairs(count: int) -> list[tuple[int, int]]:
-    """All (first, last) with first <= last < count."""
+    """List all (first, last) with first <= last < count."""
     return [(first, last) for first in range(count) for last in range(first, count)]

@@ -32,7 +32,7 @@ MAX_ELSEWHERE = 0.1
 
 
 def doubts_of(extents_m: Array, floors_m2: Array, space: FreeSpace) -> list[str]:
-    """Sentences, each with what to try; empty if nothing looks wrong.
+    """Say in sentences what looks wrong, each with what to try; empty if nothing does.
 
     ``floors_m2`` (3,) is what :func:`floor_areas_m2` found along x, y and z.
     """
@@ -129,7 +129,7 @@ def suggestion_doubts(suggestion: Suggestion) -> list[str]:
 
 
 def floor_areas_m2(normal: Array, position_m: Array, area_m2: float) -> Array:
-    """Area (3,) of the largest floor if x, y or z pointed up.
+    """Estimate the area (3,) of the largest floor if x, y or z pointed up.
 
     A floor is surface within 15 degrees of perpendicular to the axis, within 10 cm along it, in the
     lower half of the mesh. From normals and positions (N, 3) of points spread evenly over it.
@@ -154,7 +154,7 @@ N_POINTS = 20_000
 def load_as_meant(
     scene: SceneConfig, unit_is_given: bool
 ) -> tuple[SceneConfig, TexturedMesh, list[str]]:
-    """The mesh in the unit and with the axis up that make a room of it.
+    """Load the mesh in the unit and with the up axis that make a room of it.
 
     What the person said, such as the unit if it is given, is not changed, and nothing is while the
     mesh makes sense as it is.

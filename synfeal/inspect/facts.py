@@ -35,7 +35,7 @@ N_HOLES = 10  # of which the length is told
 
 
 def facts_of(found: Inspection) -> dict[str, Any]:
-    """Numbers, findings and doubts, ready for JSON."""
+    """Collect numbers, findings and doubts, ready for JSON."""
     scene, mesh, space, suggestion = found.scene, found.mesh, found.space, found.suggestion
     title = title_of(Path(str(scene.path)))
     detail, collect = detail_of(mesh), None
@@ -102,7 +102,7 @@ def _part(part: MeshPart) -> dict[str, Any]:
 
 
 def _material_key(part: MeshPart) -> tuple[str, str, bytes, float | None]:
-    """Equal for parts that are drawn alike."""
+    """Return a key that is equal for parts that are drawn alike."""
     texels = b"" if part.texture is None else part.texture.tobytes()
     texture = hashlib.sha256(texels).hexdigest()
     return colour_of(part), texture, part.base_color.tobytes(), part.alpha_cutoff
@@ -112,7 +112,7 @@ QUANTILES = (0.05, 0.5, 0.95)
 
 
 def detail_of(mesh: TexturedMesh) -> dict[str, Any]:
-    """Surface by what colours it, and the density of texels and of coloured vertices.
+    """Measure surface by what colours it, and the density of texels and of coloured vertices.
 
     ``texels_per_m`` holds the 5 %, 50 % and 95 % quantiles over the textured surface, weighted by
     area, of the square root of texels per square metre; ``coloured_vertices_per_m`` is the square
@@ -134,7 +134,7 @@ def detail_of(mesh: TexturedMesh) -> dict[str, Any]:
 
 
 def texels_per_m(parts: list[MeshPart]) -> list[float] | None:
-    """Quantiles of texel density over textured parts; see :func:`detail_of`."""
+    """Compute quantiles of texel density over textured parts; see :func:`detail_of`."""
     if not parts:
         return None
     area = np.concatenate([triangle_areas_m2(part) for part in parts])
@@ -148,7 +148,7 @@ def texels_per_m(parts: list[MeshPart]) -> list[float] | None:
 
 
 def _texels(part: MeshPart) -> Array:
-    """Texels (F,) that each triangle of a textured part covers."""
+    """Count the texels (F,) that each triangle of a textured part covers."""
     assert part.texture is not None
     assert part.uv is not None
     size = part.texture.shape[1::-1]
@@ -165,7 +165,7 @@ N_RAYS = 5000
 
 
 def back_face_share(mesh: TexturedMesh, caster: RayCaster, space: FreeSpace) -> float | None:
-    """Share of what random rays from the clear points of a space hit that is a back side.
+    """Estimate the share of hits on back faces by random rays from a space's clear points.
 
     A face shows its front where its vertices run counter-clockwise. None if nothing is hit.
     """

@@ -143,7 +143,7 @@ def find_free_spaces(caster: RayCaster, found: Survey, slack: float = SLACK) -> 
 def _space_seen_from(
     caster: RayCaster, found: Survey, is_enclosed: Mask, places_m: Array, elsewhere: float
 ) -> FreeSpace:
-    """The space of one group of places (P, 3); ``elsewhere`` are those of no group."""
+    """Survey the space of one group of places (P, 3); ``elsewhere`` are those of no group."""
     shape = tuple(len(axis) for axis in found.axes_m)
     is_free = is_enclosed.copy()
     space = ConnectedSpace(caster, places_m[:N_HUBS])
@@ -170,7 +170,7 @@ def together(spaces: Sequence[FreeSpace]) -> FreeSpace:
 
 
 def viewpoint(space: FreeSpace, box_m: Array | None) -> Array | None:
-    """The clear point (3,) nearest to the middle of the box; of the clear space without a box."""
+    """Find the clear point (3,) nearest to the centre of the box, or of the clear space."""
     points = space.clear_m
     if not len(points):
         return None
@@ -179,7 +179,7 @@ def viewpoint(space: FreeSpace, box_m: Array | None) -> Array | None:
 
 
 def ray_directions() -> Array:
-    """Directions (64, 3) spread evenly, from level to the greatest elevation."""
+    """Return directions (64, 3) spread evenly, from level to the greatest elevation."""
     index = np.arange(N_RAYS) + 0.5
     z = index / N_RAYS * np.sin(np.deg2rad(MAX_ELEVATION_DEG))
     turn = np.pi * (1.0 + np.sqrt(5.0)) * index
@@ -188,7 +188,7 @@ def ray_directions() -> Array:
 
 
 def _grid(box_m: Array) -> tuple[tuple[Array, Array, Array], float]:
-    """Centres of cells along each axis, and the longest side of a cell.
+    """Return the centres of cells along each axis, and the longest side of a cell, metres.
 
     Cells are cubes unless those would leave too few layers at camera heights; then they are wider.
     """
@@ -204,19 +204,19 @@ def _grid(box_m: Array) -> tuple[tuple[Array, Array, Array], float]:
 
 
 def step_m_of(axis: Array) -> float:
-    """Distance of neighbouring points along an axis of a grid."""
+    """Return the distance of neighbouring points along an axis of a grid, metres."""
     return float(axis[1] - axis[0]) if len(axis) > 1 else 0.1
 
 
 def _floors_m(caster: RayCaster, points: Array) -> Array:
-    """Height (N,) of what lies straight below points (N, 3); -inf where nothing does."""
+    """Return the height (N,) of the surface straight below points (N, 3); -inf where none is."""
     return points[:, 2] - caster.first_hit_m(
         points, np.broadcast_to([0.0, 0.0, -1.0], points.shape)
     )
 
 
 def _frequent(heights_m: Array) -> tuple[float, ...]:
-    """The middles of the heights (N,) that many of them are near, the most frequent first."""
+    """Find heights that many of the heights (N,) are near, the most frequent first, metres."""
     heights_m = heights_m[np.isfinite(heights_m)]
     least = LEAST_FLOOR * len(heights_m)
     found: list[float] = []

@@ -78,7 +78,7 @@ def inspect_mesh(scene: SceneConfig, out: Path, unit_is_given: bool = True) -> s
 
 
 def box_lines(box_m: Array) -> list[Array]:
-    """The edges of a box (2, 3) as polylines (N, 3): bottom, top and four uprights."""
+    """Return the edges of a box (2, 3) as polylines (N, 3): bottom, top and four uprights."""
     (x0, y0, z0), (x1, y1, z1) = box_m
     ring = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
     rings = [np.column_stack([ring, np.full(5, z)]) for z in (z0, z1)]
@@ -86,7 +86,7 @@ def box_lines(box_m: Array) -> list[Array]:
 
 
 def heading_from_opening(caster: RayCaster, position_m: Array) -> float:
-    """Heading, radians, that looks in through the side level rays from (3,) escape to most.
+    """Find the heading, radians, that looks into a room from the side where level rays escape.
 
     Across the corners of a room where none or all escape.
     """
@@ -100,7 +100,7 @@ def heading_from_opening(caster: RayCaster, position_m: Array) -> float:
 
 
 def picture_png(facts: Facts, found: Inspection) -> bytes:
-    """Title, numbers, the mesh from above and four views from inside as PNG, 1600 x 880 pixels.
+    """Draw title, numbers, the mesh from above and four views from inside as PNG, 1600 x 880 px.
 
     It is cut at mid-height of the suggested box, if there is one.
     """
@@ -153,7 +153,7 @@ def _draw_top(
 
 
 def _draw_position(axes: Axes, position_m: Array, reach: float) -> None:
-    """A dot with an arrow for each view."""
+    """Draw a dot with an arrow for each view."""
     x, y = position_m[:2]
     for yaw in LOOKS_ALONG:
         dx, dy = reach * math.cos(math.radians(yaw)), reach * math.sin(math.radians(yaw))
@@ -164,7 +164,7 @@ def _draw_position(axes: Axes, position_m: Array, reach: float) -> None:
 
 
 def _draw_scale(axes: Axes, top: TopView) -> None:
-    """A bar of 1, 2 or 5 times a power of ten, a fifth of the width or less, at the lower right."""
+    """Draw a scale bar of 1, 2 or 5 times a power of ten, a fifth of the width or less."""
     x0, x1, y0, y1 = top.extent_m
     fifth = (x1 - x0) / 5.0
     power = 10.0 ** math.floor(math.log10(fifth))
@@ -191,7 +191,7 @@ def inside_views(mesh: TexturedMesh, position_m: Array) -> list[Rgb]:
 
 
 def top_view(mesh: TexturedMesh, cut_m: float) -> TopView:
-    """The mesh below the height ``cut_m``, from far above: the near plane takes the ceiling off."""
+    """Render the mesh below height ``cut_m`` from far above: the near plane removes the ceiling."""
     low, high = mesh.bounds_m
     middle = (low + high) / 2.0
     sides_m = (1.0 + 2.0 * MARGIN) * np.maximum(high - low, 1e-6)[:2]

@@ -152,7 +152,7 @@ def suggest(
 def _best_covering(
     attempts: Iterator[tuple[_Planner, _Places]],
 ) -> tuple[FreeSpace, Suggestion] | None:
-    """The first attempt with paths in most of its boxes; of none, the one that covers most."""
+    """Take the first attempt with paths in most of its boxes, else the one that covers most."""
     best: tuple[FreeSpace, Suggestion] | None = None
     for planner, where in attempts:
         suggestion = planner.suggestion(where)

@@ -32,7 +32,7 @@ class SurfacePoints:
 
     @classmethod
     def of(cls, mesh: TexturedMesh, rng: np.random.Generator, count: int = N_POINTS) -> Self:
-        """About ``count`` points, in proportion to area, at least one on every triangle."""
+        """Sample about ``count`` points in proportion to area, at least one on every triangle."""
         areas = [triangle_areas_m2(part) for part in mesh.parts]
         per_m2 = count / max(sum(float(area.sum()) for area in areas), 1e-12)
         pieces = [
@@ -42,14 +42,14 @@ class SurfacePoints:
 
 
 def triangle_areas_m2(part: MeshPart) -> Array:
-    """Area (F,) of each triangle, square metres."""
+    """Compute the area (F,) of each triangle, square metres."""
     return np.asarray(np.linalg.norm(cross(part.vertices_m[part.faces]), axis=1) / 2.0)
 
 
 def _sample(
     part: MeshPart, area_m2: Array, per_m2: float, rng: np.random.Generator
 ) -> tuple[Array, Array, NDArray[np.uint8], NDArray[np.bool_]]:
-    """Positions, normals, colours and whether they are drawn, of points on one part."""
+    """Sample points on one part: positions, normals, colours and whether they are drawn."""
     expected = area_m2 * per_m2
     counts = np.maximum(1, np.floor(expected + rng.random(len(expected)))).astype(np.int64)
     index = np.repeat(np.arange(len(counts)), counts)
@@ -65,7 +65,7 @@ def _sample(
 
 
 def _rgba(part: MeshPart, corners: NDArray[np.int64], weight: Array) -> Array:
-    """Colours (N, 4) in 0 to 255: texture or vertex colours times the base colour."""
+    """Return colours (N, 4) in 0 to 255: texture or vertex colours times the base colour."""
     rgba = np.full((len(corners), 4), 255.0)
     if part.texture is not None and part.uv is not None:
         uv = np.einsum("nc,ncd->nd", weight, part.uv[corners])
@@ -77,7 +77,15 @@ def _rgba(part: MeshPart, corners: NDArray[np.int64], weight: Array) -> Array:
 
 
 def nearest_texels(texture: NDArray[np.uint8], uv: Array) -> NDArray[np.uint8]:
-    """Texels (N, C) at coordinates (N, 2), origin at the bottom left, repeated beyond 0 to 1."""
+    """Look up the nearest texels, repeating the texture beyond 0 to 1.
+
+    Args:
+        texture: Pixels (H, W, C).
+        uv: Texture coordinates (N, 2), origin at the bottom left.
+
+    Returns:
+        Texels (N, C).
+    """
     height, width = texture.shape[:2]
     column = np.floor((uv[:, 0] % 1.0) * width).astype(np.int64) % width
     row = height - 1 - np.floor((uv[:, 1] % 1.0) * height).astype(np.int64) % height
@@ -123,7 +131,7 @@ class ViewerMesh:
     def scene(
         self, polylines: Sequence[tuple[ArrayLike, Sequence[int]]] = (), yaw_rad: float = ACROSS_RAD
     ) -> dict[str, Any]:
-        """The argument of ``synfealViewer``, ready for JSON.
+        """Build the argument of ``synfealViewer``, ready for JSON.
 
         With lines through points (N, 3), metres, of a colour (0 to 255 each), and the heading of
         the first view, 0 along x.
@@ -143,12 +151,12 @@ class ViewerMesh:
 
 
 def viewer_js() -> str:
-    """The script that defines ``synfealViewer(canvas, scene)``."""
+    """Read the script that defines ``synfealViewer(canvas, scene)``."""
     return files("synfeal.inspect").joinpath("viewer.js").read_text(encoding="utf-8")
 
 
 def viewer_mesh(mesh: TexturedMesh, surface: SurfacePoints) -> ViewerMesh:
-    """At most 60,000 triangles with colours at their corners.
+    """Reduce a mesh to at most 60,000 triangles with colours at their corners.
 
     Large triangles are split until the budget is used, since corners are all that carries colour.
     Triangles that the alpha test cuts out are left out.
@@ -189,7 +197,7 @@ def split_longest_edges(corners: Array, max_faces: int, min_edge_m: float) -> Ar
 def _indexed(
     bounds_m: Array, corners: Array, normals: Array, surface: SurfacePoints, tree: Any
 ) -> ViewerMesh:
-    """Corners that agree in place and normal as one vertex, coloured by the surface nearby."""
+    """Join corners that agree in place and normal to one vertex, coloured by the surface nearby."""
     offset_m = bounds_m.mean(axis=0)
     step_m = max(float(np.ptp(bounds_m, axis=0).max()) / 2.0 / STEPS, 1e-9)
     steps = np.round((corners.reshape(-1, 3) - offset_m) / step_m)

@@ -23,7 +23,7 @@ VALUE_WIDTH = 72
 
 
 def sections_of(facts: Facts) -> Sections:
-    """All sections, in the order they are read."""
+    """Return all sections, in the order in which they are read."""
     found = [
         ("Mesh", _mesh_rows(facts)),
         ("Surface", _surface_rows(facts)),
@@ -38,7 +38,7 @@ def sections_of(facts: Facts) -> Sections:
 
 
 def plain_text(facts: Facts) -> str:
-    """The sections, the doubts and the snippet as aligned text."""
+    """Format the sections, the doubts and the snippet as aligned text."""
     sections = sections_of(facts)
     width = max(len(label) for _, rows in sections for label, _ in rows)
     lines: list[str] = []
@@ -51,7 +51,7 @@ def plain_text(facts: Facts) -> str:
 
 
 def how_to_go_on(facts: Facts) -> str:
-    """A scene for a configuration file and, last, the command that collects a first data set."""
+    """Write a scene for a configuration file and, last, the command that collects a data set."""
     lines = ["For a configuration file, under scenes:", snippet(facts), ""]
     collect = facts["collect"]
     if collect is None:
@@ -66,7 +66,7 @@ def how_to_go_on(facts: Facts) -> str:
 
 
 def _aligned(label: str, value: str, width: int) -> list[str]:
-    """A row as lines, what is too long for one going on below its beginning."""
+    """Format a row as lines, continuing what is too long below its beginning."""
     wrapped = wrap(value, VALUE_WIDTH, break_long_words=False, break_on_hyphens=False)
     return [
         f"  {text:<{width}}  {line}" for text, line in zip_longest([label], wrapped, fillvalue="")
@@ -74,7 +74,7 @@ def _aligned(label: str, value: str, width: int) -> list[str]:
 
 
 def snippet(facts: Facts) -> str:
-    """A scene in YAML, ready to paste under ``scenes:``."""
+    """Write a scene in YAML, ready to paste under ``scenes:``."""
     mesh = facts["mesh"]
     suggested = "\n".join(f"    {line}" for line in _suggested_lines(facts))
     return f"""\
@@ -88,7 +88,7 @@ def snippet(facts: Facts) -> str:
 
 
 def _suggested_lines(facts: Facts) -> list[str]:
-    """Lines of a scene in YAML that say where cameras go."""
+    """Write the lines of a scene in YAML that say where cameras go."""
     collect, boxes = facts["collect"], facts["suggested_sampling_boxes"]
     if collect is None:
         return ["# sampling_box: no suggestion; see the free space"]
@@ -201,14 +201,23 @@ def _part_rows(parts: Sequence[Facts]) -> Rows:
 
 
 def page_html(
-    title: str,  # heading
-    doubts: Sequence[str],  # sentences to stand out at the top
+    title: str,
+    doubts: Sequence[str],
     sections: Sections,
-    snippet: str,  # lines for a configuration file and for a shell
-    picture_png: bytes,  # the picture
-    scene: dict[str, Any],  # what :meth:`synfeal.inspect.surface.ViewerMesh.scene` returns
+    snippet: str,
+    picture_png: bytes,
+    scene: dict[str, Any],
 ) -> str:
-    """The page as HTML, with nothing to load from elsewhere."""
+    """Build the page as HTML that loads nothing from elsewhere.
+
+    Args:
+        title: Heading of the page.
+        doubts: Sentences to highlight at the top.
+        sections: Titles and rows of the tables, from :func:`sections_of`.
+        snippet: Lines for a configuration file and for a shell.
+        picture_png: Content of the picture, from :func:`synfeal.inspect.run.picture_png`.
+        scene: Argument of the viewer, from :meth:`synfeal.inspect.surface.ViewerMesh.scene`.
+    """
     loader = PackageLoader("synfeal.inspect", ".")
     pages = Environment(loader=loader, autoescape=True, keep_trailing_newline=True)
     return pages.get_template("page.html").render(

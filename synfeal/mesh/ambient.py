@@ -85,7 +85,7 @@ def cut_part(part: MeshPart, longest_m: float) -> MeshPart:
 
 
 def _indexed(part: MeshPart, corners: Floats) -> MeshPart:
-    """The part with triangles of these corners (F, 3, K), equal ones that face alike joined."""
+    """Build the part from corners (F, 3, K), joining equal ones that face alike."""
     facing = np.round(8.0 * _normals(corners[..., :3]))
     keys = np.concatenate([corners, np.repeat(facing[:, None], 3, axis=1)], axis=2)
     rows, index = np.unique(keys.reshape(-1, keys.shape[2]), axis=0, return_inverse=True)
@@ -117,7 +117,7 @@ def _lit(part: MeshPart, caster: RayCaster, lift_m: float) -> MeshPart:
 
 
 def _centres(part: MeshPart) -> Floats:
-    """Mean (V, 3) of the middles of the triangles around each vertex."""
+    """Average the centres of the triangles around each vertex: (V, 3)."""
     middle_m = part.vertices_m[part.faces].mean(axis=1)
     total, count = np.zeros_like(part.vertices_m), np.zeros(len(part.vertices_m))
     for corner in range(3):
@@ -174,7 +174,7 @@ def hemisphere_directions(count: int) -> Floats:
 
 
 def _turned(local: Floats, up: Floats) -> Floats:
-    """Directions (N, R, 3): ``local`` (R, 3) in frames whose z axes are ``up`` (N, 3)."""
+    """Turn directions ``local`` (R, 3) into frames with z axes ``up`` (N, 3): (N, R, 3)."""
     # Any axis that is not along ``up`` gives the other two.
     helper = np.where(np.abs(up[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     x = np.cross(helper, up)

@@ -104,7 +104,7 @@ def _charts(part: MeshPart, texel_m: float) -> _Charts:
 
 
 def _connected(faces: Ints, kind: Ints) -> Ints:
-    """The chart of each face: faces of one kind that share edges, directly or by others."""
+    """Number the chart of each face: faces of one kind that share edges, directly or by others."""
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
     owner = np.repeat(np.arange(len(faces)), 3)
     kinds = kind[owner]
@@ -119,7 +119,7 @@ def _connected(faces: Ints, kind: Ints) -> Ints:
 
 
 def _shelves(sides: Ints) -> tuple[Ints, tuple[int, int]]:
-    """Places (N, 2) of rectangles of sides (N, 2), width and height, on shelves of an image.
+    """Place rectangles of sides (N, 2), width and height, on shelves of an image.
 
     Returns:
         The upper left corner of each, column and row, and height and width of the image.
@@ -139,7 +139,7 @@ def _shelves(sides: Ints) -> tuple[Ints, tuple[int, int]]:
 
 
 def _texels(charts: _Charts, part: MeshPart) -> tuple[Ints, Floats, Floats]:
-    """Texels whose centres lie on a triangle or within half a texel of it.
+    """Find texels whose centres lie on a triangle or within half a texel of it.
 
     Returns:
         Column and row (T, 2), the point of the triangle (T, 3) in metres, and its normal (T, 3).
@@ -182,7 +182,7 @@ def _unit(vectors: Floats) -> Floats:
 def _colours_at(
     points_m: Floats, normals: Floats, full: MeshPart, texel_m: float
 ) -> NDArray[np.uint8]:
-    """Colours (T, 3) of the full mesh beside points (T, 3) that face as ``normals`` (T, 3) do."""
+    """Look up colours (T, 3) of the full mesh at points (T, 3) with normals (T, 3)."""
     assert full.vertex_rgb is not None
     corners = full.vertices_m[full.faces]
     face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

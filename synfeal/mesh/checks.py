@@ -49,7 +49,7 @@ def refuse_colourless(mesh: TexturedMesh, name: str) -> None:
 
 
 def check_indices(part: MeshPart, path: Path) -> None:
-    """Every face names vertices that are there."""
+    """Refuse faces that name vertices that do not exist."""
     if part.faces.min() < 0 or part.faces.max() >= len(part.vertices_m):
         raise InputError(
             f"{path}: part '{part.name}' has faces that name vertices it lacks; export it again"
@@ -63,7 +63,7 @@ def shows_one_colour(mesh: TexturedMesh) -> bool:
 
 
 def _extreme_colours(part: MeshPart) -> NDArray[np.float64]:
-    """The least and the greatest value (2, 3) of each channel that a part shows."""
+    """Return the least and the greatest value (2, 3) of each channel that a part shows."""
     shown = np.full((1, 3), 255, np.uint8)
     if part.texture is not None:
         shown = part.texture[..., :3].reshape(-1, 3)
@@ -74,7 +74,7 @@ def _extreme_colours(part: MeshPart) -> NDArray[np.float64]:
 
 
 def check_sampling_box(box: NDArray[np.float64], bounds_m: NDArray[np.float64], name: str) -> None:
-    """The box (2, 3) must overlap the mesh's bounds (2, 3) and be of a comparable size.
+    """Refuse a box (2, 3) that misses the mesh's bounds (2, 3) or is of another scale.
 
     A box that misses the mesh, or a mesh more than a hundred times as large as the box, is almost
     always a file in millimetres or centimetres read as metres, or another up axis.
@@ -167,7 +167,7 @@ def refuse_extensions(path: Path, header: Json) -> None:
 
 
 def repaired(part: MeshPart, findings: Findings) -> MeshPart:
-    """The part without faces that have no area or occur twice, and without unused vertices.
+    """Remove faces without area, repeated faces and unused vertices.
 
     Texture coordinates that are NaN or infinite become 0. Vertices keep their order.
     """
@@ -214,6 +214,6 @@ def _without_area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> ND
 
 
 def _first_of_each(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Indices of the faces, in order, whose three vertices no earlier face has."""
+    """Return the indices, in order, of faces whose three vertices no earlier face has."""
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
     return np.sort(first)

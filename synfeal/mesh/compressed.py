@@ -52,7 +52,7 @@ Values = NDArray[Any]
 
 
 def decoded(gltf: Gltf, read: Callable[[str], bytes]) -> Gltf:
-    """The glTF with everything plain that can be decoded here; itself if nothing needs it.
+    """Decode the compressed parts of a glTF; return it as it is if there are none.
 
     ``read`` gives the content of a file the glTF refers to.
 
@@ -120,7 +120,7 @@ class _Decoder:
                 self._fill(primitive["indices"], np.asarray(mesh.faces, "<u4").reshape(-1, 1))
 
     def _dequantise(self) -> None:
-        """Positions and texture coordinates as floats, which is how they are read."""
+        """Convert positions and texture coordinates to floats, which is how they are read."""
         for primitive in primitives_of(self.header):
             for name, index in primitive["attributes"].items():
                 accessor = self.header["accessors"][index]
@@ -152,12 +152,12 @@ class _Decoder:
         accessor.update(bufferView=view, componentType=kind, count=len(values))
 
     def _view_of(self, content: bytes) -> int:
-        """The index of a new view of ``content``."""
+        """Add a view of ``content`` and return its index."""
         self._views.append(self._stored(content))
         return len(self._views) - 1
 
     def _stored(self, content: bytes) -> Json:
-        """A view of ``content``, kept in the buffer of what was decoded."""
+        """Add ``content`` to the decoded buffer and return a view of it."""
         self.store += b"\0" * (-len(self.store) % 8)
         start = len(self.store)
         self.store += content
@@ -165,7 +165,7 @@ class _Decoder:
         return {"buffer": buffer, "byteOffset": start, "byteLength": len(content)}
 
     def _values(self, accessor: Json) -> Values:
-        """Values (N, C) of an accessor as they are stored."""
+        """Return the values (N, C) of an accessor as they are stored."""
         view = self._views[accessor["bufferView"]]
         dtype, width = np.dtype(DTYPES[accessor["componentType"]]), WIDTHS[accessor["type"]]
         row = width * dtype.itemsize
@@ -196,7 +196,7 @@ class _Decoder:
 
 
 def decode_meshopt(data: bytes, stored: Json) -> bytes:
-    """The plain content of a view compressed by meshoptimizer.
+    """Decompress a view that meshoptimizer compressed.
 
     ``stored`` is its extension: ``count``, ``byteStride``, ``mode`` and ``filter``.
     """
@@ -217,14 +217,14 @@ def decode_meshopt(data: bytes, stored: Json) -> bytes:
 
 
 def fractions(values: Values, accessor: Json) -> NDArray[np.float32]:
-    """Integers (N, C) as the numbers they stand for: fractions of their range where normalised."""
+    """Convert integers (N, C) to fractions of their range where the accessor is normalised."""
     if not accessor.get("normalized", False):
         return values.astype("<f4")
     return np.asarray(np.maximum(to_float(values), -1.0), "<f4")
 
 
 def png_of_ktx2(content: bytes) -> bytes:
-    """A KTX2 texture of Basis Universal (ETC1S or UASTC) as PNG, its largest level."""
+    """Transcode the largest level of a KTX2 texture (Basis Universal, ETC1S or UASTC) to PNG."""
     import opengl_basisu
 
     width, height = struct.unpack_from("<II", content, KTX2_SIDES)

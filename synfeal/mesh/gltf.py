@@ -81,7 +81,7 @@ def _parse_json(path: Path, text: bytes) -> Json:
 
 
 def simplified(gltf: Gltf) -> Json:
-    """A copy of the JSON for trimesh.
+    """Return a copy of the JSON that trimesh reads without losing anything.
 
     Every primitive has a material, whose name is its index; so trimesh keeps vertex colours as they
     are stored, and materials can be looked up. Nodes are named by their index, which tells their
@@ -136,7 +136,7 @@ def _use_one_uv_set(attributes: Json, material: Json) -> None:
 
 
 def base_color_file(header: Json, material: Json) -> str | None:
-    """The file a base colour comes from: WebP where offered, as trimesh chooses; None if inside."""
+    """Return the file of a base colour, WebP if offered, as trimesh chooses; None if embedded."""
     slot = base_color(material).get("baseColorTexture")
     if slot is None:
         return None
@@ -152,7 +152,7 @@ DRACO, BASISU = "KHR_draco_mesh_compression", "KHR_texture_basisu"
 
 
 def stand_alone(header: Json) -> list[str]:
-    """Extensions without which something that is drawn cannot be read."""
+    """List extensions without which something that is drawn cannot be read."""
     found = []
     for primitive in primitives_of(header):
         positions = header["accessors"][primitive["attributes"]["POSITION"]]
@@ -179,7 +179,7 @@ def listed(header: Json, key: str) -> list[Json]:
 
 
 def primitives_of(header: Json) -> list[Json]:
-    """The primitives of all meshes."""
+    """List the primitives of all meshes."""
     return [primitive for mesh in listed(header, "meshes") for primitive in mesh["primitives"]]
 
 
@@ -188,7 +188,7 @@ EVERYBODYS = ("scene", "model", "mesh", "index", "untitled", "textured", "object
 
 
 def title_of(path: Path) -> str:
-    """The title in a glTF, else the name of the file, else, if that says nothing, its folder's."""
+    """Return the title of a glTF, else the name of the file, or of its folder if that says more."""
     if path.suffix.lower() in (".gltf", ".glb"):
         extras = read_gltf(path).header["asset"].get("extras")
         title = extras.get("title") if isinstance(extras, dict) else None
@@ -199,5 +199,5 @@ def title_of(path: Path) -> str:
 
 
 def slug_of(title: str) -> str:
-    """A title as a name that configurations and shells take without quotes."""
+    """Turn a title into a name that configurations and shells take without quotes."""
     return re.sub(r"[^a-z0-9]+", "_", title.lower().replace("'", "")).strip("_")[:64] or "scene"

@@ -77,7 +77,7 @@ def is_y_up(path: Path, up_axis: UpAxis) -> bool:
 def _read_parts(
     path: Path, gltf: Gltf | None, world_from_file: NDArray[np.float64], findings: Findings
 ) -> tuple[MeshPart, ...]:
-    """All parts that can be seen, in the order of the file's geometry, then of its nodes."""
+    """Read all visible parts in the order of the file's geometry, then of its nodes."""
     if gltf is not None:
         gltf = decoded(gltf, ReferenceResolver(path).get)
         checks.refuse_extensions(path, gltf.header)
@@ -111,7 +111,7 @@ def _read_parts(
 
 
 def _read_scene(path: Path, gltf: Gltf | None, findings: Findings) -> Any:
-    """The file as a trimesh scene, without merging or reordering vertices."""
+    """Read the file as a trimesh scene, without merging or reordering vertices."""
     resolver = ReferenceResolver(path, gltf)
     # It prints tracebacks of what the findings name.
     logging.getLogger("trimesh").setLevel(logging.ERROR)
@@ -131,7 +131,7 @@ def _read_scene(path: Path, gltf: Gltf | None, findings: Findings) -> Any:
 def _placed(
     part: MeshPart, file_from_part: NDArray[np.float64], world_from_file: NDArray[np.float64]
 ) -> MeshPart:
-    """The part in the world; a mirrored one is turned inside out again, as glTF asks."""
+    """Place the part in the world; a mirrored one is turned inside out again, as glTF asks."""
     vertices = trimesh.transform_points(part.vertices_m, file_from_part) @ world_from_file.T
     is_mirrored = np.linalg.det(file_from_part[:3, :3]) < 0
     faces = part.faces[:, ::-1].copy() if is_mirrored else part.faces
@@ -141,7 +141,7 @@ def _placed(
 def _part(
     name: str, geometry: trimesh.Trimesh, materials: MaterialReader, findings: Findings
 ) -> MeshPart:
-    """One geometry of the file, in its own frame."""
+    """Read one geometry of the file, in its own frame."""
     vertices = np.asarray(geometry.vertices, dtype=np.float64)
     faces = np.asarray(geometry.faces, dtype=np.int64)
     visual = geometry.visual
@@ -156,7 +156,7 @@ def _part(
 
 
 def _with_material(part: MeshPart, uv: Any, material: BaseMaterial, findings: Findings) -> MeshPart:
-    """The part with its material; without a texture its coordinates are of no use and dropped."""
+    """Attach a material to the part; without a texture its coordinates are dropped."""
     part = replace(part, base_color=material.base_color, alpha_cutoff=material.alpha_cutoff)
     if material.texture is None:
         return part

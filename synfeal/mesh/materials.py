@@ -47,7 +47,7 @@ class BaseMaterial:
     uv_transform: NDArray[np.float64] | None = None
 
     def transformed(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Texture coordinates (V, 2), origin at the bottom left, after the material's transform."""
+        """Apply the material's transform to texture coordinates (V, 2), origin bottom left."""
         if self.uv_transform is None:
             return uv
         top_left = np.column_stack([uv[:, 0], 1.0 - uv[:, 1], np.ones(len(uv))])
@@ -108,7 +108,7 @@ class MaterialReader:
         return BaseMaterial(texture, base, cutoff, transform)
 
     def _from_mtl(self, material: Any) -> BaseMaterial:
-        """An MTL or PLY material: alpha counts where ``map_d`` or ``d`` say so."""
+        """Convert an MTL or PLY material; alpha counts where ``map_d`` or ``d`` say so."""
         owner = f"material '{material.name or 'unnamed'}'"
         texture = self._decoded(material.image, owner)
         # MTL writes Kd next to map_Kd without meaning the product; many exporters leave Kd at 0.
@@ -122,7 +122,7 @@ class MaterialReader:
         return BaseMaterial(texture, base, BLEND_CUTOFF)
 
     def _decoded(self, image: Image.Image | None, owner: str) -> Pixels | None:
-        """The texture, if it fits into memory beside those before it."""
+        """Decode the texture, if it fits into memory beside those before it."""
         if image is not None and image.width * image.height <= MAX_PIXELS:
             self._n_pixels += image.width * image.height
             check_textures(self._path, self._n_pixels)
@@ -140,7 +140,7 @@ def is_opaque(texture: Pixels | None, base: Pixels) -> bool:
 
 
 def _mtl_opacity(extra: dict[str, Any]) -> float:
-    """Opacity of an MTL: ``d``, or one minus ``Tr``; 1 where neither is a number."""
+    """Return the opacity of an MTL: ``d``, or one minus ``Tr``; 1 where neither is a number."""
     for key, sign in (("d", 1.0), ("tr", -1.0)):
         try:
             value = float(extra[key][-1])
@@ -151,7 +151,7 @@ def _mtl_opacity(extra: dict[str, Any]) -> float:
 
 
 def uv_transform(slot: Json) -> NDArray[np.float64] | None:
-    """Matrix (3, 3) of KHR_texture_transform: scale, then rotation, then offset."""
+    """Return the matrix (3, 3) of KHR_texture_transform: scale, then rotation, then offset."""
     found = slot.get("extensions", {}).get("KHR_texture_transform")
     if found is None:
         return None
@@ -171,7 +171,7 @@ def srgb_from_linear(rgba: ArrayLike) -> Pixels:
 
 
 def linear_from_srgb(rgba: ArrayLike) -> NDArray[np.float64]:
-    """Linear colours (..., 4) in 0 to 1 of display colours uint8: what glTF stores."""
+    """Convert sRGB colours (..., 4) uint8 to the linear ones, 0 to 1, that glTF stores."""
     value = np.asarray(rgba, dtype=np.float64) / 255.0
     value[..., :3] = srgb_to_linear(value[..., :3])
     return value
@@ -179,7 +179,7 @@ def linear_from_srgb(rgba: ArrayLike) -> NDArray[np.float64]:
 
 @contextmanager
 def large_images_allowed() -> Iterator[None]:
-    """Inside, Pillow opens images beyond its limit against hostile files from the web.
+    """Lift Pillow's limit on image size, which guards against hostile files from the web.
 
     Textures of scans exceed it regularly; :func:`decode` has a limit of its own.
     """
@@ -192,7 +192,7 @@ def large_images_allowed() -> Iterator[None]:
 
 
 def decode(image: Image.Image | None, owner: str, findings: Findings) -> Pixels | None:
-    """Pixels (H, W, 3 | 4) uint8 of an image, if there is one that is neither broken nor too large.
+    """Decode an image to pixels (H, W, 3 | 4) uint8; None if missing, broken or too large.
 
     What was converted, made smaller or given up goes to the findings, as ``owner``'s, such as
     ``material 'Wall'``.
@@ -218,7 +218,7 @@ def decode(image: Image.Image | None, owner: str, findings: Findings) -> Pixels 
 
 
 def within_limit(pixels: Pixels, owner: str, findings: Findings) -> Pixels:
-    """The pixels, made smaller where a side exceeds what renderers take."""
+    """Shrink the pixels where a side exceeds what renderers take."""
     height, width = pixels.shape[:2]
     if max(height, width) <= MAX_SIDE_PX:
         return pixels
@@ -232,7 +232,7 @@ def within_limit(pixels: Pixels, owner: str, findings: Findings) -> Pixels:
 
 
 def to_rgb(image: Image.Image) -> Pixels:
-    """Pixels (H, W, 3), or (H, W, 4) where the image carries transparency, as uint8.
+    """Convert an image to pixels (H, W, 3), or (H, W, 4) where it carries transparency, as uint8.
 
     Palette, grey, grey with alpha, 16-bit, float, CMYK and YCbCr images are converted.
     """

@@ -39,7 +39,7 @@ class MeshPart:
         return bool(alpha >= self.alpha_cutoff)
 
     def over(self, faces: NDArray[np.int64]) -> MeshPart:
-        """Other faces (F, 3) over the same vertices, without those that none of them uses."""
+        """Return the part with other faces (F, 3), without vertices that none of them uses."""
         used, index = np.unique(faces, return_inverse=True)
         return replace(
             self,
@@ -76,7 +76,7 @@ class TexturedMesh:
         return np.stack([lower, upper])
 
     def merged(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Vertices (V, 3) and faces (F, 3) of all parts as one geometry, without colours."""
+        """Join all parts to vertices (V, 3) and faces (F, 3) of one geometry, without colours."""
         counts = [len(part.vertices_m) for part in self.parts]
         offsets = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
         vertices = np.concatenate([part.vertices_m for part in self.parts])

@@ -14,7 +14,7 @@ from synfeal.mesh.triangles import merge_vertices
 
 
 def mesh_properties(mesh: TexturedMesh) -> dict[str, Any]:
-    """Vertices, faces, extents and volume of a scene.
+    """Measure vertices, faces, extents and volume of a scene.
 
     ``vertices`` counts distinct positions, as the file of a scan does; ``vertices_with_seams``
     counts a vertex on a texture seam once per copy, as a renderer needs it. ``volume_m3`` is the
@@ -73,7 +73,7 @@ def mesh_topology(vertices_m: Vertices, faces: Indices) -> dict[str, Any]:
 
 
 def _counted(pairs: Indices, n_vertices: int) -> tuple[Indices, Indices]:
-    """Distinct pairs (E, 2) of vertex indices and how often each occurs (E,)."""
+    """Return distinct pairs (E, 2) of vertex indices and how often each occurs (E,)."""
     # One integer per pair sorts several times faster than rows do.
     keys, counts = np.unique(pairs[:, 0] * n_vertices + pairs[:, 1], return_counts=True)
     return np.stack([keys // n_vertices, keys % n_vertices], axis=1), counts.astype(np.int64)

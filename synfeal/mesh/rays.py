@@ -46,10 +46,14 @@ class RayCaster:
     def first_hits(
         self, origins: ArrayLike, directions: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Distance (N,) in metres to the first triangle on each ray, and its index (N,).
+        """Find the first triangle on each ray.
 
-        Where there is none, the distance is ``inf`` and the index -1. Rays start at ``origins``
-        (N, 3), world, metres; ``directions`` (N, 3) are of any length but zero.
+        Args:
+            origins: Starts of the rays (N, 3), world, metres.
+            directions: Directions (N, 3), world, of any length but zero.
+
+        Returns:
+            The distance (N,) in metres and the triangle's index (N,); ``inf`` and -1 without a hit.
         """
         hit = self._scene.run(self._starts(origins), _unit(directions), output=True)
         face = hit["primID"].astype(np.int64)
@@ -89,18 +93,18 @@ class RayCaster:
         return np.asarray((hit == NOTHING) | ~apart, dtype=np.bool_)
 
     def _starts(self, origins: ArrayLike) -> NDArray[np.float32]:
-        """Starting points (N, 3) as the scene has them: near its middle, moved sideways."""
+        """Shift starting points (N, 3) to the scene's own origin, near its middle, and sideways."""
         start = np.asarray(origins, dtype=np.float64) - self._ray_origin_m
         return np.ascontiguousarray(start, dtype=np.float32)
 
 
 def _lengths(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Lengths (N,) of vectors (N, 3)."""
+    """Return lengths (N,) of vectors (N, 3)."""
     return np.asarray(np.sqrt(np.einsum("ni,ni->n", vectors, vectors)))
 
 
 def _unit(directions: ArrayLike) -> NDArray[np.float32]:
-    """Vectors (N, 3) of length 1, normalised in double precision."""
+    """Return vectors (N, 3) of length 1, normalised in double precision."""
     direction = np.asarray(directions, dtype=np.float64)
     unit = direction / _lengths(direction)[:, None]
     return np.ascontiguousarray(unit, dtype=np.float32)

@@ -66,7 +66,7 @@ class ReferenceResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is u
             raise self._refusal
 
     def _checked(self, name: str, content: bytes) -> bytes:
-        """The content, its name remembered if it should be an image and is none."""
+        """Return the content, and remember its name if it should be an image and is none."""
         if PurePosixPath(name).suffix.lower() in IMAGE_SUFFIXES:
             try:
                 Image.open(io.BytesIO(content)).close()
@@ -76,7 +76,7 @@ class ReferenceResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is u
 
 
 def _spellings(name: str) -> dict[str, None]:
-    """Paths a reference can mean: as written, percent-encoded, from Windows, without its folder.
+    """List paths a reference can mean: as written, percent-encoded, from Windows, without folder.
 
     Exporters write the absolute path of the artist's disk; the file then lies beside the mesh. An
     MTL may put options before the name.

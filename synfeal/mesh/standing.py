@@ -27,15 +27,25 @@ PATH_CLEARANCE_M = 0.25  # between an object and a camera that passes
 
 
 def standing(
-    kinds: Sequence[tuple[str, TexturedMesh]],  # objects by name, taken in turn
-    count: int,  # how many are to stand
-    corners: Array,  # (N, 3, 3) of the triangles they stand on, and must not touch
-    bounds_m: Array,  # (2, 3) they are let down from random places between these corners
+    kinds: Sequence[tuple[str, TexturedMesh]],
+    count: int,
+    corners: Array,
+    bounds_m: Array,
     rng: np.random.Generator,
-    tries: int,  # places for each of them
-    path_m: Array | None = None,  # (P, 3) positions that a camera passes one after the other
+    tries: int,
+    path_m: Array | None = None,
 ) -> Iterator[Standing | None]:
-    """One object after the other, none touching another; None for each that finds no place."""
+    """Yield placed objects one by one, none touching another; None for each without a place.
+
+    Args:
+        kinds: Objects by name, taken in turn.
+        count: Number of objects to place.
+        corners: Corners (N, 3, 3), world, metres, of the triangles that objects stand on.
+        bounds_m: Lower and upper corner (2, 3) of the space they are let down from.
+        rng: Source of the places.
+        tries: Places tried for each object.
+        path_m: Positions (P, 3) of a camera, in order; objects keep off its way.
+    """
     ground = Ground(corners, path_m)
     for number in range(count):
         name, kind = kinds[number % len(kinds)]

@@ -46,7 +46,7 @@ def merge_vertices(vertices_m: NDArray[np.float64], faces: NDArray[np.int64]) ->
 
 
 def weld(points_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Distinct places (W, 3) of points (V, 3), and the place (V,) of each point."""
+    """Return distinct places (W, 3) of points (V, 3), and the place (V,) of each point."""
     keys = np.round(points_m / MERGE_M).astype(np.int64)
     _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     return points_m[first], index.reshape(-1).astype(np.int64)
@@ -88,7 +88,7 @@ def load_collision_mesh(path: Path) -> Triangles:
 
 
 def simplify(mesh: Triangles, n_faces: int) -> Triangles:
-    """Quadric simplification to about ``n_faces`` triangles.
+    """Simplify by quadrics to about ``n_faces`` triangles.
 
     Open edges are given planes of their own (``boundary_weight``). Without them the rim of a flat
     sheet retracts within its plane at no cost: a column of four sheets without lids is the first
@@ -115,7 +115,7 @@ def simplify(mesh: Triangles, n_faces: int) -> Triangles:
 
 
 def with_smaller_textures(mesh: TexturedMesh, factor: int) -> TexturedMesh:
-    """The mesh with every texture ``factor`` times smaller along each axis, averaged over boxes.
+    """Shrink every texture ``factor`` times along each axis, averaging over boxes.
 
     Colours are weighted with their alpha: what is cut out does not shine through.
     """
@@ -134,7 +134,7 @@ def _smaller_texture(part: MeshPart, factor: int) -> MeshPart:
 
 
 def _box_means(image: NDArray[np.float32], factor: int) -> NDArray[np.float32]:
-    """Means of an image (H, W, C); not rounded on the way, as Pillow does with 8 bits."""
+    """Average an image (H, W, C) over boxes, without the rounding to 8 bits that Pillow does."""
     size = tuple(max(1, round(side / factor)) for side in image.shape[1::-1])
     channels = (Image.fromarray(np.ascontiguousarray(c)) for c in np.moveaxis(image, 2, 0))
     return np.stack([np.asarray(c.resize(size, Image.Resampling.BOX)) for c in channels], axis=2)
@@ -145,7 +145,7 @@ def _rounded(image: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def with_fewer_faces(mesh: TexturedMesh, n_faces: int) -> TexturedMesh:
-    """The mesh with about ``n_faces`` triangles, which use a subset of its vertices.
+    """Simplify the mesh to about ``n_faces`` triangles, which use a subset of its vertices.
 
     Triangles are taken away by joining vertices to neighbours that are there already, so what
     remains has its own place, texture coordinates and colour. Copies of a vertex on both sides of a

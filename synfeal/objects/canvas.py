@@ -35,11 +35,11 @@ class Canvas:
         return self.width_px / self.px_per_m, self.height_px / self.px_per_m
 
     def plain(self, colour: Colour) -> Pixels:
-        """One colour everywhere."""
+        """Return one colour everywhere."""
         return np.full((self.height_px, self.width_px, 3), colour, np.float32)
 
     def coordinates_m(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Metres from the top-left corner: x as (1, W), y as (H, 1)."""
+        """Return metres from the top-left corner: x as (1, W), y as (H, 1)."""
         x = (np.arange(self.width_px, dtype=np.float32) + 0.5) / self.px_per_m
         y = (np.arange(self.height_px, dtype=np.float32) + 0.5) / self.px_per_m
         return x[None, :], y[:, None]
@@ -47,7 +47,7 @@ class Canvas:
     def noise(
         self, cell_m: float | tuple[float, float], octaves: int = 4, persistence: float = 0.6
     ) -> NDArray[np.float32]:
-        """Fractal value noise (H, W), zero mean and roughly unit deviation.
+        """Draw fractal value noise (H, W), zero mean and roughly unit deviation.
 
         ``cell_m`` is the size of the coarsest cells (along x and y if a pair); the cells of each
         octave are half as large as those of the one before.
@@ -76,7 +76,7 @@ Settings = ParamSpec("Settings")
 
 
 def painter(paint: Callable[Concatenate[Canvas, Settings], Pixels]) -> Callable[Settings, Painter]:
-    """From what paints a canvas with given settings, what gives a painter with these settings."""
+    """Turn a function that paints a canvas with settings into one that returns a painter."""
 
     @wraps(paint)
     def chosen(*values: Settings.args, **named: Settings.kwargs) -> Painter:
@@ -98,29 +98,39 @@ class Sketch:
         return [(x, y) for x, y in scaled.tolist()]
 
     def polygon(self, points: ArrayLike, colour: Colour) -> None:
-        """A filled polygon (N, 2)."""
+        """Fill a polygon (N, 2)."""
         self._draw.polygon(self._at(points), fill=_bytes(colour))
 
     def line(self, points: ArrayLike, colour: Colour, width: float = 0.01) -> None:
-        """A polyline (N, 2); ``width`` relative to the canvas' height."""
+        """Draw a polyline (N, 2); ``width`` is relative to the canvas' height."""
         width_px = max(1, round(width * self.height_px))
         self._draw.line(self._at(points), fill=_bytes(colour), width=width_px, joint="curve")
 
     def rectangle(self, x0: float, y0: float, x1: float, y1: float, colour: Colour) -> None:
-        """A filled axis-aligned rectangle."""
+        """Fill an axis-aligned rectangle."""
         self.polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], colour)
 
     def ellipse(self, x: float, y: float, radius_x: float, radius_y: float, colour: Colour) -> None:
-        """A filled ellipse, radii relative to width and height."""
+        """Fill an ellipse, radii relative to width and height."""
         angle = np.linspace(0, 2 * np.pi, 32, endpoint=False)
         ring = np.stack([x + radius_x * np.cos(angle), y + radius_y * np.sin(angle)], axis=1)
         self.polygon(ring, colour)
 
     def text_lines(
-        self, rng: np.random.Generator, box: tuple[float, float, float, float], rows: int,
+        self,
+        rng: np.random.Generator,
+        box: tuple[float, float, float, float],
+        rows: int,
         colour: Colour,
-    ) -> None:  # fmt: skip
-        """Rows of letter-like strokes inside ``box`` (x0, y0, x1, y1)."""
+    ) -> None:
+        """Draw rows of letter-like strokes.
+
+        Args:
+            rng: Source of the strokes.
+            box: Where they stand: x0, y0, x1, y1, 0 to 1 across the canvas.
+            rows: Number of rows.
+            colour: Colour of the strokes.
+        """
         x0, y0, x1, y1 = box
         pitch = (y1 - y0) / rows
         for row in range(rows):
@@ -134,7 +144,7 @@ class Sketch:
                 x += 1.3 * letter
 
     def pixels(self) -> Pixels:
-        """The drawing as float pixels."""
+        """Return the drawing as float pixels."""
         return np.asarray(self._image, np.float32) / np.float32(255)
 
 
@@ -143,29 +153,29 @@ def _bytes(colour: Colour) -> tuple[int, ...]:
 
 
 def pick(rng: np.random.Generator, palette: tuple[Colour, ...]) -> Colour:
-    """One colour of a palette."""
+    """Draw one colour of a palette."""
     return palette[int(rng.integers(len(palette)))]
 
 
 def shade(colour: Colour, factor: float) -> Colour:
-    """A lighter or darker version of a colour."""
+    """Make a colour lighter or darker."""
     red, green, blue = (min(1.0, channel * factor) for channel in colour)
     return red, green, blue
 
 
 def mix(first: ArrayLike, second: ArrayLike, share: NDArray[np.float32]) -> Pixels:
-    """Per pixel ``first·(1 − share) + second·share`` of images or colours; ``share`` is (H, W)."""
+    """Blend images or colours: ``first·(1 − share) + second·share`` with ``share`` (H, W)."""
     first, second = np.asarray(first, np.float32), np.asarray(second, np.float32)
     return np.asarray(first + (second - first) * share[..., None], np.float32)
 
 
 def tinted(image: ArrayLike, relief: NDArray[np.float32]) -> Pixels:
-    """An image or a colour, lighter where the relief (H, W) is above 0 and darker below."""
+    """Lighten an image or a colour where the relief (H, W) is above 0 and darken it below."""
     return np.asarray(np.asarray(image, np.float32) * (1 + relief[..., None]), np.float32)
 
 
 def ramp(canvas: Canvas, first: Colour, second: Colour, angle_rad: float) -> Pixels:
-    """From one colour to another along a direction (0 is right, π/2 is down)."""
+    """Blend from one colour to another along a direction (0 is right, π/2 is down)."""
     x, y = canvas.coordinates_m()
     width, height = canvas.size_m
     along = np.cos(angle_rad) * (x / width - 0.5) + np.sin(angle_rad) * (y / height - 0.5) + 0.5
@@ -174,7 +184,7 @@ def ramp(canvas: Canvas, first: Colour, second: Colour, angle_rad: float) -> Pix
 
 
 def bordered(image: Pixels, share: float, colour: Colour) -> Pixels:
-    """The image with a frame that takes ``share`` of the shorter side."""
+    """Put a frame that takes ``share`` of the shorter side around the image."""
     margin = max(1, round(share * min(image.shape[:2])))
     for edge in (image[:margin], image[-margin:], image[:, :margin], image[:, -margin:]):
         edge[:] = colour

@@ -23,13 +23,19 @@ from synfeal.objects.canvas import (
 
 @painter
 def painted(canvas: Canvas, colour: Colour, wear: float = 0.05) -> Pixels:
-    """Paint or plastic: one colour with a little wear."""
+    """Paint a smooth surface of paint or plastic: one colour with a little wear.
+
+    Args:
+        canvas: What is painted on.
+        colour: Red, green and blue.
+        wear: Standard deviation of the brightness, roughly, in parts of the full range.
+    """
     return tinted(colour, wear * canvas.noise(0.08, 3))
 
 
 @painter
 def plaster(canvas: Canvas, colour: Colour, stains: float = 0.03, grain: float = 0.012) -> Pixels:
-    """A painted wall: almost no texture, broad stains."""
+    """Paint a painted wall: almost no texture, broad stains."""
     return tinted(colour, stains * canvas.noise(0.9, 5, 0.65) + grain * canvas.noise(0.025, 2))
 
 
@@ -42,7 +48,7 @@ def wainscot(
     grain: float = 0.02,
     stains: float = 0.03,
 ) -> Pixels:
-    """Plaster with a differently painted band of ``height_m`` above the floor and a rail on it."""
+    """Paint plaster with another colour and a rail up to ``height_m`` above the floor."""
     image = plaster(colour, stains, grain)(canvas)
     _, y = canvas.coordinates_m()
     above_floor = canvas.size_m[1] - y[:, 0]
@@ -55,7 +61,7 @@ def wainscot(
 
 @painter
 def wood(canvas: Canvas, colour: Colour, contrast: float = 0.12) -> Pixels:
-    """Wood grain along x."""
+    """Paint wood grain along x."""
     cell = (0.8, 0.035)
     rings = np.sin(6 * canvas.noise((cell[0] * 3, cell[1] * 3), 2)).astype(np.float32)
     relief = contrast * (0.5 * rings + 0.6 * canvas.noise(cell, 4, 0.75))
@@ -72,7 +78,7 @@ def masonry(
     stagger: float = 0.5,
     spread: float = 0.08,
 ) -> Pixels:
-    """Tiles, bricks, planks or ashlar: blocks of random palette colours between joints.
+    """Paint tiles, bricks, planks or ashlar: blocks of random palette colours between joints.
 
     ``stagger`` shifts every other row by that share of a block; ``spread`` is the deviation of the
     blocks' brightness.
@@ -97,7 +103,7 @@ def masonry(
 def fabric(
     canvas: Canvas, colour: Colour, stripe: Colour | None = None, pitch_m: float = 0.1
 ) -> Pixels:
-    """Cloth with a weave and, if given, stripes."""
+    """Paint cloth with a weave and, if given, stripes."""
     image = tinted(colour, 0.06 * canvas.noise(0.012, 2) + 0.06 * canvas.noise(0.3, 3))
     if stripe is not None:
         x, _ = canvas.coordinates_m()
@@ -108,7 +114,7 @@ def fabric(
 
 @painter
 def marble(canvas: Canvas, colour: Colour, vein: Colour, scale_m: float = 0.35) -> Pixels:
-    """Polished stone with turbulent veins."""
+    """Paint polished stone with turbulent veins."""
     turbulence = canvas.noise(scale_m, 6, 0.65)
     share = np.exp(-9 * np.abs(turbulence)).astype(np.float32)
     share = np.clip(share + 0.12 * canvas.noise(scale_m / 3, 4), 0, 1)
@@ -117,7 +123,7 @@ def marble(canvas: Canvas, colour: Colour, vein: Colour, scale_m: float = 0.35) 
 
 @painter
 def rug(canvas: Canvas, palette: tuple[Colour, ...]) -> Pixels:
-    """A woven rug: nested borders around a field of random diamonds."""
+    """Paint a woven rug: nested borders around a field of random diamonds."""
     x, y = canvas.coordinates_m()
     width, height = canvas.size_m
     inset = np.minimum(np.minimum(x, width - x), np.minimum(y, height - y))
@@ -134,7 +140,7 @@ def rug(canvas: Canvas, palette: tuple[Colour, ...]) -> Pixels:
 
 @painter
 def damask(canvas: Canvas, colour: Colour, motif: Colour, pitch_m: float = 0.22) -> Pixels:
-    """Wallpaper with a repeated flower-like motif; repetition is the point."""
+    """Paint wallpaper with a repeated flower-like motif; repetition is the point."""
     x, y = canvas.coordinates_m()
     row = np.floor(y / (0.8 * pitch_m))
     u = ((x / pitch_m + 0.5 * (row % 2)) % 1 - 0.5) * 2
@@ -152,7 +158,7 @@ PAPER: Colour = (0.93, 0.92, 0.88)
 
 @painter
 def screen(canvas: Canvas) -> Pixels:
-    """A computer screen: windows, a plot, lines of code."""
+    """Paint a computer screen: windows, a plot, lines of code."""
     rng = canvas.rng
     sketch = Sketch(ramp(canvas, shade(pick(rng, VIVID), 0.6), (0.1, 0.12, 0.2), rng.uniform(0, 6)))
     for _ in range(3):
@@ -168,7 +174,7 @@ def screen(canvas: Canvas) -> Pixels:
 
 @painter
 def spine(canvas: Canvas, colour: Colour) -> Pixels:
-    """The back of a book: cloth, two bands and a title."""
+    """Paint the back of a book: cloth, two bands and a title."""
     rng = canvas.rng
     sketch = Sketch(plaster(colour, 0.06, 0.03)(canvas))
     bands = shade(pick(rng, VIVID), rng.uniform(0.6, 1.6))
@@ -181,7 +187,7 @@ def spine(canvas: Canvas, colour: Colour) -> Pixels:
 
 @painter
 def door(canvas: Canvas, colour: Colour, window: bool = False) -> Pixels:
-    """A door leaf with frame, panels, handle and, if wanted, a small window."""
+    """Paint a door leaf with frame, panels, handle and, if wanted, a small window."""
     sketch = Sketch(plaster(colour, 0.05, 0.03)(canvas))
     dark = shade(colour, 0.7)
     for y0, y1 in ((0.1, 0.45), (0.55, 0.92)):
@@ -195,7 +201,7 @@ def door(canvas: Canvas, colour: Colour, window: bool = False) -> Pixels:
 
 @painter
 def cabinet_front(canvas: Canvas, colour: Colour, doors: int = 2, rows: int = 1) -> Pixels:
-    """Doors or drawers side by side, each with a handle and a label."""
+    """Paint doors or drawers side by side, each with a handle and a label."""
     sketch = Sketch(plaster(colour, 0.05, 0.03)(canvas))
     for column in range(doors):
         for row in range(rows):
@@ -214,7 +220,7 @@ def cabinet_front(canvas: Canvas, colour: Colour, doors: int = 2, rows: int = 1)
 
 @painter
 def keyboard(canvas: Canvas) -> Pixels:
-    """Dark keys in five rows."""
+    """Paint dark keys in five rows."""
     sketch = Sketch(canvas.plain((0.1, 0.1, 0.11)))
     for row in range(5):
         for column in range(16):
@@ -226,7 +232,7 @@ def keyboard(canvas: Canvas) -> Pixels:
 
 @painter
 def page(canvas: Canvas) -> Pixels:
-    """A printed sheet of paper, sometimes with a figure."""
+    """Paint a printed sheet of paper, sometimes with a figure."""
     sketch = Sketch(canvas.plain(PAPER))
     sketch.text_lines(canvas.rng, (0.1, 0.06, 0.9, 0.14), 1, pick(canvas.rng, INK))
     sketch.text_lines(canvas.rng, (0.1, 0.5, 0.9, 0.94), 9, (0.2, 0.2, 0.2))
@@ -236,7 +242,7 @@ def page(canvas: Canvas) -> Pixels:
 
 @painter
 def label(canvas: Canvas, colour: Colour) -> Pixels:
-    """A carton with a printed label."""
+    """Paint a carton with a printed label."""
     sketch = Sketch(plaster(colour, 0.06, 0.03)(canvas))
     sketch.rectangle(0.15, 0.2, 0.85, 0.8, PAPER)
     sketch.text_lines(canvas.rng, (0.2, 0.28, 0.8, 0.75), 3, pick(canvas.rng, INK))
@@ -245,6 +251,6 @@ def label(canvas: Canvas, colour: Colour) -> Pixels:
 
 @painter
 def gilded(canvas: Canvas) -> Pixels:
-    """Gold leaf over carved wood."""
+    """Paint gold leaf over carved wood."""
     image = marble((0.86, 0.66, 0.24), (0.4, 0.24, 0.06), 0.12)(canvas)
     return tinted(image, 0.15 * canvas.noise(0.03, 3))

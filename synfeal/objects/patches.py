@@ -50,7 +50,7 @@ def _shares(points: Points) -> NDArray[np.float64]:
 def bilinear(
     grid: NDArray[Real], row_at: NDArray[np.float64], column_at: NDArray[np.float64]
 ) -> NDArray[Real]:
-    """Values of a (R, C, K) grid at fractional row and column indices, as (A, B, K)."""
+    """Interpolate a grid (R, C, K) at fractional row and column indices, as (A, B, K)."""
     top = np.clip(np.floor(row_at).astype(np.int64), 0, grid.shape[0] - 2)
     left = np.clip(np.floor(column_at).astype(np.int64), 0, grid.shape[1] - 2)
     below = (row_at - top)[:, None, None].astype(grid.dtype)
@@ -67,7 +67,7 @@ class Item:
     patches: tuple[Patch, ...]
 
     def placed(self, x_m: float, y_m: float, z_m: float = 0.0, yaw_deg: float = 0.0) -> Item:
-        """The item turned about z, then moved."""
+        """Return the item turned about z, then moved."""
         yaw = np.radians(yaw_deg)
         cos, sin = np.cos(yaw), np.sin(yaw)
         world_from_item = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
@@ -75,7 +75,7 @@ class Item:
         return self._with(lambda points_m: points_m @ world_from_item.T + offset)
 
     def clipped(self, lower_m: tuple[float, ...], upper_m: tuple[float, ...]) -> Item:
-        """The item pressed flat where it would stick out of a box, as leaves are by a wall."""
+        """Press the item flat where it would stick out of a box, as a wall does with leaves."""
         return self._with(lambda points_m: np.clip(points_m, lower_m, upper_m))
 
     def _with(self, moved: Callable[[Points], Points]) -> Item:
@@ -83,7 +83,7 @@ class Item:
 
 
 def joined(*things: Item | Iterable[Item]) -> Item:
-    """Several items as one, in their order."""
+    """Join several items into one, in their order."""
     items = (each for thing in things for each in ([thing] if isinstance(thing, Item) else thing))
     return Item(tuple(patch for item in items for patch in item.patches))
 
@@ -91,7 +91,7 @@ def joined(*things: Item | Iterable[Item]) -> Item:
 def upright(
     start_xy: tuple[float, float], end_xy: tuple[float, float], low_m: float, high_m: float
 ) -> Points:
-    """A vertical sheet; from its front, ``start_xy`` is on the left and ``end_xy`` on the right."""
+    """Return a vertical sheet; seen from its front, ``start_xy`` is left and ``end_xy`` right."""
     rows = [[(*start_xy, z), (*end_xy, z)] for z in (high_m, low_m)]
     return np.array(rows, np.float64)
 
@@ -99,7 +99,7 @@ def upright(
 def level(
     x_m: tuple[float, float], y_m: tuple[float, float], z_m: float, face_down: bool = False
 ) -> Points:
-    """A horizontal sheet that faces up (a floor) or down (a ceiling)."""
+    """Return a horizontal sheet that faces up (a floor) or down (a ceiling)."""
     x0, x1 = x_m[::-1] if face_down else x_m
     return np.array([[(x0, y, z_m), (x1, y, z_m)] for y in y_m[::-1]], np.float64)
 
@@ -111,7 +111,7 @@ class Maker:
     rng: np.random.Generator
 
     def sheet(self, points_m: Points, painter: Painter, px_per_m: float, glow: float = 0.0) -> Item:
-        """A grid of points (R, C, 3) with a picture of ``DETAIL * px_per_m`` texels per metre.
+        """Make a grid of points (R, C, 3) with a picture of ``DETAIL * px_per_m`` texels per metre.
 
         At least 4 a side. Whatever the painter draws gets a fine grain, so that no surface is flat
         from nearby.
@@ -128,13 +128,24 @@ class Maker:
         return Item((Patch(np.asarray(points_m, np.float64), quantised, glow),))
 
     def box(
-        self, size_m: tuple[float, float, float], painter: Painter, px_per_m: float,
-        faces: str = "fblrtu", front: Painter | None = None,
-    ) -> Item:  # fmt: skip
-        """A box on z = 0, centred in x and y.
+        self,
+        size_m: tuple[float, float, float],
+        painter: Painter,
+        px_per_m: float,
+        faces: str = "fblrtu",
+        front: Painter | None = None,
+    ) -> Item:
+        """Make a box on z = 0, centred in x and y.
 
         ``faces`` names those built: front (−y), back, left (−x), right, top, under. ``front``
         paints the front differently.
+
+        Args:
+            size_m: Extents along x, y and z.
+            painter: Paints the faces.
+            px_per_m: Texels per metre, before ``DETAIL``.
+            faces: Letters of the faces to build.
+            front: Paints the front; None for ``painter``.
         """
         x, y, high = size_m[0] / 2, size_m[1] / 2, size_m[2]
         sides = {
@@ -151,7 +162,7 @@ class Maker:
     def turned(
         self, profile_m: ArrayLike, painter: Painter, px_per_m: float, segments: int = 16
     ) -> Item:
-        """A surface of revolution about z: ``profile_m`` (K, 2) is (radius, z), top to bottom."""
+        """Make a surface of revolution about z from (radius, z) pairs (K, 2), top to bottom."""
         profile = np.asarray(profile_m, np.float64)
         angle = np.linspace(-np.pi, np.pi, segments + 1)
         ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -161,10 +172,22 @@ class Maker:
         return self.sheet(points, painter, px_per_m)
 
     def tube(
-        self, path_m: ArrayLike, radius_m: float, painter: Painter, px_per_m: float,
+        self,
+        path_m: ArrayLike,
+        radius_m: float,
+        painter: Painter,
+        px_per_m: float,
         segments: int = 8,
-    ) -> Item:  # fmt: skip
-        """A pipe of constant radius along a polyline (K, 3)."""
+    ) -> Item:
+        """Make a pipe along a polyline.
+
+        Args:
+            path_m: Points (K, 3) of its axis.
+            radius_m: Radius of the pipe.
+            painter: Paints the surface.
+            px_per_m: Texels per metre, before ``DETAIL``.
+            segments: Number of flat sides around the axis.
+        """
         path = np.asarray(path_m, np.float64)
         tangent = np.gradient(path, axis=0)
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
@@ -179,10 +202,26 @@ class Maker:
         return self.sheet(points, painter, px_per_m)
 
     def on_wall(
-        self, centre_m: tuple[float, float, float], yaw_deg: float, size_m: tuple[float, float],
-        painter: Painter, px_per_m: float, depth_m: float = 0.02, glow: float = 0.0,
-    ) -> Item:  # fmt: skip
-        """A flat picture with a thin rim, its back at ``centre_m``; at yaw 0 it faces −y."""
+        self,
+        centre_m: tuple[float, float, float],
+        yaw_deg: float,
+        size_m: tuple[float, float],
+        painter: Painter,
+        px_per_m: float,
+        depth_m: float = 0.02,
+        glow: float = 0.0,
+    ) -> Item:
+        """Make a flat picture with a thin rim.
+
+        Args:
+            centre_m: Centre of its back, world.
+            yaw_deg: Turn about z; at 0 it faces −y.
+            size_m: Width and height.
+            painter: Paints the picture.
+            px_per_m: Texels per metre, before ``DETAIL``.
+            depth_m: Distance of the picture from its back.
+            glow: Light it gives off, see :meth:`sheet`.
+        """
         width, height = size_m
         face = upright((-width / 2, -depth_m), (width / 2, -depth_m), -height / 2, height / 2)
         front = self.sheet(face, painter, px_per_m, glow)
@@ -191,7 +230,7 @@ class Maker:
 
 
 def cell_corners(shape: tuple[int, ...]) -> NDArray[np.int64]:
-    """Vertices (4, N) of the cells of a grid: top left, top right, bottom left, bottom right."""
+    """Return the vertices (4, N) of a grid's cells: top left, top right, bottom left and right."""
     index = np.arange(shape[0] * shape[1]).reshape(shape)
     corners = (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:])
     return np.stack([corner.ravel() for corner in corners])

@@ -63,7 +63,7 @@ class DepthImage:
         self._bent_along_y, self._bent_along_x = (self._bent(axis) for axis in (0, 1))
 
     def _bent(self, axis: int) -> NDArray[np.bool_]:
-        """Pixels (H, W) that are on no plane with their two neighbours along an axis."""
+        """Mark pixels (H, W) that are on no plane with their two neighbours along an axis."""
         values = np.moveaxis(self._inverse, axis, 0)
         second = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
         bent = np.zeros(self._inverse.shape, bool)

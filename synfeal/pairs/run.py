@@ -153,7 +153,7 @@ def read_pairs(path: Path) -> pd.DataFrame:
 
 
 def _groups(frames: DepthFrames, among: Among) -> list[NDArray[np.int64]]:
-    """Indices of the frames that are paired with one another, group by group."""
+    """Group the indices of the frames that are paired with one another."""
     if among == "all":
         return [np.arange(len(frames))]
     split = np.array(frames.splits, str)
@@ -163,7 +163,7 @@ def _groups(frames: DepthFrames, among: Among) -> list[NDArray[np.int64]]:
 def _table(
     job: PairsJob, frames: DepthFrames, groups: list[NDArray[np.int64]]
 ) -> tuple[pd.DataFrame, int]:
-    """The pairs that are kept, with the indices of their frames, and how many were compared."""
+    """Tabulate the pairs that are kept with the indices of their frames; count those compared."""
     import pandas as pd  # takes time to load
 
     with _progress(len(frames), "read", "frame") as progress:
@@ -199,7 +199,7 @@ def _overlaps(
     group: NDArray[np.int64],
     progress: Any,
 ) -> NDArray[np.float32]:
-    """Overlaps (G, G) of the frames of a group: row a, column b is that of a with b."""
+    """Compute overlaps (G, G) in a group: row a, column b is the share of a that b sees."""
     overlap = np.ones((len(group), len(group)), np.float32)
     for column, index in enumerate(group.tolist()):
         others = np.flatnonzero(group != index)
@@ -265,7 +265,7 @@ def _record(job: PairsJob, n_frames: int, compared: int, kept: int) -> dict[str,
 
 
 def _progress(total: int, name: str, unit: str) -> Any:
-    """A bar with rate and time left, on a terminal."""
+    """Open a bar with rate and time left, on a terminal."""
     return tqdm(
         total=total, unit=unit, desc=name, leave=False, disable=None, unit_scale=total > 99_999
     )

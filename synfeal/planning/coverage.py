@@ -86,12 +86,12 @@ def seen_surface(
 
 
 def shown_frames(n_frames: int) -> NDArray[np.int64]:
-    """Indices of at most ``MAX_FRAMES`` frames, spread evenly over all."""
+    """Return indices of at most ``MAX_FRAMES`` frames, spread evenly over all."""
     return np.linspace(0, n_frames - 1, min(n_frames, MAX_FRAMES)).round().astype(np.int64)
 
 
 def visible_points(caster: RayCaster, places_m: Array, points_m: Array) -> Array:
-    """Those of the surface points (N, 3) that at least one place (P, 3) sees."""
+    """Return those of the surface points (N, 3) that at least one place (P, 3) sees."""
     found = np.zeros(len(points_m), dtype=np.bool_)
     for place in places_m:
         left = np.flatnonzero(~found)
@@ -141,7 +141,7 @@ def empty_pixels(caster: RayCaster, plan: PoseTable, camera: CameraConfig) -> Em
 
 
 def empty_shares(caster: RayCaster, world_from_cam: Array, camera: CameraConfig) -> Array:
-    """Share (N,) of the pixels that show nothing, from each of the poses (N, 4, 4)."""
+    """Render the share (N,) of pixels that show nothing from each of the poses (N, 4, 4)."""
     ray = cell_directions(camera, COLUMNS, ROWS).reshape(-1, 3)  # at depth 1
     n_rays = len(ray)
     ray = ray[np.isfinite(ray).all(axis=1)]  # a fisheye may show nothing in its corners
@@ -228,7 +228,15 @@ def free_space_coverage(
 
 
 def voxel_centres(box_m: Array) -> tuple[Array, float]:
-    """Centres (N, 3) of cells that fill a box (2, 3), and the edge they have on average."""
+    """Divide a box into cells about :data:`VOXEL_M` wide, at most about :data:`MAX_VOXELS`.
+
+    Args:
+        box_m: Lower and upper corner (2, 3), world, metres.
+
+    Returns:
+        The centres (N, 3) of the cells, world, metres, and the edge aimed at, metres; cells are
+        stretched a little along each axis so that they fill the box.
+    """
     side_m = box_m[1] - box_m[0]
     edge_m = max(VOXEL_M, float(np.cbrt(np.prod(side_m) / MAX_VOXELS)))
     count = np.maximum(np.round(side_m / edge_m), 1).astype(np.int64)
@@ -240,7 +248,7 @@ def voxel_centres(box_m: Array) -> tuple[Array, float]:
 
 
 def headings(plan: PoseTable) -> NDArray[np.int64]:
-    """Sector (N,) of the horizontal direction each camera looks in; 0 starts at world x."""
+    """Return the sector (N,) of each camera's horizontal heading; 0 starts at world x."""
     forward = plan.world_from_cam[:, :3, 2]
     turn = np.arctan2(forward[:, 1], forward[:, 0]) / (2.0 * np.pi)
     return np.asarray(np.floor(turn * N_HEADINGS) % N_HEADINGS, dtype=np.int64)

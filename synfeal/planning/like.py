@@ -98,7 +98,7 @@ def like_trajectory(
 
 
 def rpy_of(rotation: Array) -> Array:
-    """Roll, pitch and yaw (N, 3), radians, of ``world_from_cam`` rotations (N, 3, 3).
+    """Compute roll, pitch and yaw (N, 3), radians, of ``world_from_cam`` rotations (N, 3, 3).
 
     The inverse of :func:`synfeal.geometry.rotations.rotation_from_rpy`.
     """
@@ -107,7 +107,7 @@ def rpy_of(rotation: Array) -> Array:
 
 
 def _arc(angle_deg: Array, margin_deg: float) -> tuple[float, float]:
-    """The shortest arc that holds all angles, with a margin; a whole turn where it is nearly one.
+    """Find the shortest arc of all angles with a margin; a whole turn where it is nearly one.
 
     Its bounds rise, so the second may be beyond 360 degrees.
     """
@@ -126,7 +126,7 @@ def _arc(angle_deg: Array, margin_deg: float) -> tuple[float, float]:
 
 
 def _camera(mesh: Path, sequence: Path, record: dict[str, Any] | None) -> CameraConfig | None:
-    """The camera of the photographs: as the scan knows it, or as a data set of our own says."""
+    """Return the camera of the photographs from a scan's record or a data set's manifest."""
     if record is not None:
         path, values = mesh.with_suffix(".json"), record.get("camera", {}).get("color")
     elif (sequence / MANIFEST).is_file():
@@ -142,7 +142,7 @@ def _camera(mesh: Path, sequence: Path, record: dict[str, Any] | None) -> Camera
 
 
 def resized(camera: CameraConfig, width: int | None, height: int | None) -> CameraConfig:
-    """The same lens with images of another size; a side that is None follows from the other.
+    """Resize the images of a lens; a side that is None follows from the other.
 
     Raises:
         InputError: The two sides would not keep the aspect ratio.

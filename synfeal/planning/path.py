@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 def n_frames_of(start: Array, target: Array, frame_spacing_m: float) -> int:
-    """Frames between two pose vectors (6,): the distance over the spacing, a whole number >= 1."""
+    """Count frames between two pose vectors (6,): distance over spacing, a whole number >= 1."""
     distance = float(np.linalg.norm(target[:3] - start[:3]))
     return max(1, round(distance / frame_spacing_m))
 
@@ -38,7 +38,7 @@ def step_of(start: Array, target: Array, n_frames: int) -> Array:
 
 
 def path_vectors(start: Array, target: Array, n_frames: int) -> PoseVectors:
-    """Pose vectors (n, 6) of frames 1 to n: ``v_j = v_i + j * step``.
+    """Return the pose vectors (n, 6) of frames 1 to n: ``v_j = v_i + j * step``.
 
     Erratum: the paper prints ``v_j = v_(j-1) + j * step``, which grows quadratically and overshoots
     the target; the movement it describes is this linear one.
@@ -50,7 +50,7 @@ def path_vectors(start: Array, target: Array, n_frames: int) -> PoseVectors:
 def path_poses(
     start: Array, target: Array, frame_spacing_m: float, interpolation: Literal["rpy", "slerp"]
 ) -> Array:
-    """``world_from_cam`` (n, 4, 4) of the frames after ``start`` up to and including ``target``.
+    """Return ``world_from_cam`` (n, 4, 4) of the frames after ``start`` up to ``target`` inclusive.
 
     ``rpy`` moves roll, pitch and yaw as the paper does; ``slerp`` turns about one axis at constant
     speed.
@@ -63,7 +63,7 @@ def path_poses(
 
 
 def poses_of(vectors: PoseVectors) -> Array:
-    """``world_from_cam`` (N, 4, 4) of pose vectors (N, 6)."""
+    """Return ``world_from_cam`` (N, 4, 4) of pose vectors (N, 6)."""
     return pose_matrix(rotation_from_rpy(vectors[:, 3:]), vectors[:, :3])
 
 
@@ -85,7 +85,7 @@ class CandidateStream:
     def next_target(
         self, start: NDArray[np.float64], min_path_m: float, max_rounds: int
     ) -> NDArray[np.float64] | None:
-        """The target (6,) of a path from ``start`` (6,): the first admissible round's farthest.
+        """Draw the target (6,) of a path from ``start`` (6,): the farthest of the first fit round.
 
         None if none of the next ``max_rounds`` rounds has an admissible candidate that is
         ``min_path_m`` away.
@@ -131,7 +131,7 @@ class CandidateStream:
 
 
 def independent_poses(space: PoseSpace, collection: CollectionConfig, n_frames: int) -> PoseVectors:
-    """Pose vectors (n_frames, 6), uniform among those with a free view in the connected space.
+    """Draw pose vectors (n_frames, 6), uniform where a view is free in the connected space.
 
     Every admissible candidate is kept, so a round of candidates gives as many frames as it has
     admissible ones, and ``candidates`` does not change what is drawn. A shorter plan is a prefix

@@ -55,7 +55,7 @@ def plan_mesh(
 
 
 def sampling_boxes_of(scene: SceneConfig, mesh_bounds_m: Array, name: str) -> Array:
-    """The configured sampling boxes (B, 2, 3), or the mesh's bounds (2, 3) as in the paper."""
+    """Return the configured sampling boxes (B, 2, 3), or the mesh's bounds as in the paper."""
     if scene.sampling_box is None:
         return mesh_bounds_m[None]
     boxes = np.stack([box_array(box) for box in (scene.sampling_box, *scene.further_boxes)])
@@ -65,7 +65,7 @@ def sampling_boxes_of(scene: SceneConfig, mesh_bounds_m: Array, name: str) -> Ar
 
 
 def sampling_box_of(scene: SceneConfig, mesh_bounds_m: Array, name: str) -> Array:
-    """The box (2, 3) around all of :func:`sampling_boxes_of`."""
+    """Return the box (2, 3) around all of :func:`sampling_boxes_of`."""
     boxes = sampling_boxes_of(scene, mesh_bounds_m, name)
     return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
@@ -76,26 +76,34 @@ def box_array(box: Box) -> Array:
 
 
 def plan_split(
-    caster: RayCaster,  # rays against the collision mesh
-    # (B, 2, 3), or (2, 3) for one: lower and upper corners of the spaces that camera centres are
-    # sampled in, metres
+    caster: RayCaster,
     boxes: Array,
-    scene: SceneConfig,  # angle bounds and least view distance
-    # mode, candidates, frame spacing, least path length, interpolation
+    scene: SceneConfig,
     collection: CollectionConfig,
-    n_frames: int,  # frames wanted, at least 1
-    rng: np.random.Generator,  # the only source of randomness; not used to repeat
-    split: str = "train",  # ``train`` or ``test``; which poses to repeat
-    # distance that cameras keep from surfaces, if any; not asked of poses that are repeated
+    n_frames: int,
+    rng: np.random.Generator,
+    split: str = "train",
     clearance: Clearance | None = None,
 ) -> PoseTable:
-    """Poses of ``n_frames`` frames of a split, as ``collection.mode`` says.
+    """Plan the poses of a split by ``collection.mode``.
 
     ``path``: connected straight paths; the last may be cut short, and all of the test split where
     ``collection.test_paths`` asks for more paths than whole ones would give. ``random``:
     independent admissible poses, each a path of its own. ``repeat``: the poses of an earlier data
     set. Every box has paths of its own, and frames in proportion to its volume in every prefix of
     the plan.
+
+    Args:
+        caster: Rays against the collision mesh.
+        boxes: Lower and upper corners (B, 2, 3), or (2, 3) for one box, of the spaces that camera
+            centres are sampled in, world, metres.
+        scene: Angle bounds and least view distance.
+        collection: Mode, candidates, frame spacing, least path length, interpolation.
+        n_frames: Number of frames, at least 1.
+        rng: The only source of randomness; unused where poses are repeated.
+        split: ``train`` or ``test``: which poses to repeat.
+        clearance: Distance that cameras keep from surfaces, if any; not checked for poses that
+            are repeated.
 
     Raises:
         InputError: no frames wanted; no admissible pose found, which says what to relax; or the
@@ -136,7 +144,7 @@ def plan_split(
 def _independent(
     spaces: Sequence[PoseSpace], turns: _Turns, collection: CollectionConfig, n_frames: int
 ) -> Array:
-    """Pose vectors (n_frames, 6); the spaces take turns."""
+    """Draw pose vectors (n_frames, 6) from the spaces in turns."""
     owner = np.array([turns.next(1) for _ in range(n_frames)])
     vectors = np.empty((n_frames, 6))
     for index, space in enumerate(spaces):
@@ -196,7 +204,7 @@ class _Turns:
 
 
 def _walk(space: PoseSpace, collection: CollectionConfig) -> Iterator[Array]:
-    """Poses (n, 4, 4) of connected paths through one box: where one ends the next begins."""
+    """Yield poses (n, 4, 4) of connected paths through one box: each begins where one ended."""
     at = sample_start(space, collection.max_tries)  # itself no frame
     stream = CandidateStream(space, collection.candidates, collection.frame_spacing_m)
     while True:
@@ -221,7 +229,7 @@ def _or_clearance(space: PoseSpace) -> str:
 
 
 def _table(paths: list[Array], n_frames: int) -> PoseTable:
-    """The first ``n_frames`` poses of consecutive paths (n, 4, 4)."""
+    """Tabulate the first ``n_frames`` poses of consecutive paths (n, 4, 4)."""
     poses = np.concatenate(paths)[:n_frames]
     index = np.repeat(np.arange(len(paths)), [len(path) for path in paths])[:n_frames]
     return PoseTable(np.arange(n_frames), index, poses[:, :3, 3].copy(), quat_wxyz_of(poses))

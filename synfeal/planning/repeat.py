@@ -26,7 +26,7 @@ log = logging.getLogger("synfeal")
 def repeated_poses(
     source: Path, split: str, n_frames: int, mesh_bounds_m: NDArray[np.float64]
 ) -> PoseTable:
-    """The first ``n_frames`` poses of ``source``, which must have as many; see :func:`read_poses`.
+    """Read the first ``n_frames`` poses of ``source``, which must have as many.
 
     Logs a warning if some lie outside the mesh's bounds (2, 3).
     """
@@ -49,7 +49,7 @@ def repeated_poses(
 
 
 def read_poses(source: Path, split: str) -> PoseTable:
-    """Poses ``world_from_cam`` of a split (``train`` or ``test``), numbered from 0.
+    """Read poses ``world_from_cam`` of a split (``train`` or ``test``), numbered from 0.
 
     ``source`` is a data set of :mod:`synfeal.collection.run`, a 7-Scenes data set, a directory
     of its frames (``frame-XXXXXX.pose.txt``), a pose table (``.csv``) or a trajectory in the
@@ -75,14 +75,14 @@ def read_poses(source: Path, split: str) -> PoseTable:
 
 
 def _read_table(path: Path) -> PoseTable:
-    """A pose table of one's own, numbered anew: nothing is paired with its rows."""
+    """Read a pose table of one's own, numbered anew: nothing is paired with its rows."""
     table = read_pose_table(path, any_frames=True)
     check_places(table.position_m, path, np.arange(len(table)) + 2)
     return PoseTable(np.arange(len(table)), table.path, table.position_m, table.quat_wxyz)
 
 
 def _read_frames(directories: list[Path], source: Path) -> PoseTable:
-    """The poses of 7-Scenes sequences, each a path."""
+    """Read the poses of 7-Scenes sequences, each a path."""
     if not directories:
         raise InputError(f"{source}: the list of its sequences is empty")
     files = [list_sequence(directory).files(POSE) for directory in directories]
@@ -95,7 +95,7 @@ def _read_frames(directories: list[Path], source: Path) -> PoseTable:
 
 
 def _rigid(path: FrameFile) -> NDArray[np.float64]:
-    """A pose (4, 4) that is a rotation and a translation."""
+    """Read a pose (4, 4) that is a rotation and a translation."""
     pose = read_pose(path)
     rotation = pose[:3, :3].clip(-2.0, 2.0)  # anything beyond 1 is none, and must not overflow
     orthonormal = np.allclose(rotation @ rotation.T, np.eye(3), rtol=0.0, atol=TOLERANCE)
@@ -106,7 +106,7 @@ def _rigid(path: FrameFile) -> NDArray[np.float64]:
 
 
 def _read_tum(path: Path) -> PoseTable:
-    """A trajectory of lines ``timestamp tx ty tz qx qy qz qw``; ``#`` starts a comment."""
+    """Read a trajectory of lines ``timestamp tx ty tz qx qy qz qw``; ``#`` starts a comment."""
     with read_as(path, "a trajectory"):
         lines = [line.partition("#")[0].split() for line in path.read_text("utf-8").splitlines()]
     rows = {number: line for number, line in enumerate(lines, 1) if line}
@@ -120,7 +120,7 @@ def _read_tum(path: Path) -> PoseTable:
 
 
 def _tum_row(path: Path, number: int, line: list[str]) -> list[float]:
-    """The eight finite numbers of a line."""
+    """Read the eight finite numbers of a line."""
     try:
         values = [float(cell) for cell in line]
     except ValueError:

@@ -27,19 +27,19 @@ PoseVectors = Array
 
 
 def pose_bounds(box_m: Array, angles: Angles) -> Array:
-    """Least and greatest value (2, 6) of each element of a pose vector; ``box_m`` is (2, 3)."""
+    """Return lower and upper bounds (2, 6) of pose vectors in a box (2, 3), metres and radians."""
     intervals = (angles.roll_deg, angles.pitch_deg, angles.yaw_deg)
     angle_bounds = np.deg2rad(np.array(intervals, dtype=np.float64).T)
     return np.hstack([np.asarray(box_m, dtype=np.float64), angle_bounds])
 
 
 def sample_poses(bounds: Array, count: int, rng: np.random.Generator) -> PoseVectors:
-    """Pose vectors (count, 6), every element uniform and independent (Eq. 1)."""
+    """Draw pose vectors (count, 6), every element uniform and independent (Eq. 1)."""
     return rng.uniform(bounds[0], bounds[1], (count, 6))
 
 
 def view_directions(poses: PoseVectors) -> Array:
-    """Unit vectors (N, 3) along the optical axes of pose vectors (N, 6), in the world.
+    """Compute unit vectors (N, 3) along the optical axes of pose vectors (N, 6), world.
 
     The third column of :func:`synfeal.geometry.rotations.rotation_from_rpy`; roll turns about it.
     """
@@ -51,7 +51,7 @@ def view_directions(poses: PoseVectors) -> Array:
 def has_free_view(
     caster: RayCaster, poses: PoseVectors, min_view_distance_m: float
 ) -> NDArray[np.bool_]:
-    """Mark poses (N, 6) with a free view, far enough and of enough: (N,).
+    """Mark poses (N, 6) that look at a surface, but at none too near: (N,).
 
     Clarification of the paper: a view ray that hits nothing has an infinite length and would pass
     ``R > d``. It looks out through a hole of the mesh, at an image without information, which is
@@ -66,14 +66,16 @@ VIEW_TANGENT, VIEW_RAYS = (np.tan(np.deg2rad(25.0)), np.tan(np.deg2rad(20.0))), 
 
 
 def seen_shares(caster: RayCaster, poses: PoseVectors) -> Array:
-    """Measure how much of what poses look at is there.
+    """Measure how much of the view from each pose meets the mesh.
+
+    The view is a pinhole of 50 x 40 degrees, whatever the camera, sampled by 30 rays.
 
     Args:
         caster: Rays against the mesh.
-        poses: Pose vectors (N, 6).
+        poses: Pose vectors (N, 6): position, metres, then roll, pitch and yaw, radians.
 
     Returns:
-        Shares (N,) of a view of 50 x 40 degrees, whatever the camera, that meet the mesh.
+        Shares (N,) from 0 to 1; less than 1 where rays leave through a hole of the mesh.
     """
     columns, rows = VIEW_RAYS
     x = ((np.arange(columns) + 0.5) / columns * 2.0 - 1.0) * VIEW_TANGENT[0]
@@ -99,18 +101,26 @@ def admissible(
 
 
 def farthest_admissible(
-    caster: RayCaster,  # rays against the collision mesh
-    start: Array,  # where the path starts, (6,)
-    rounds: PoseVectors,  # (R, k, 6) rounds of candidates
-    has_view: NDArray[np.bool_],  # (R, k) which have a free view, see :func:`has_free_view`
-    min_path_m: float,  # least length of a path
-    # whether the way from the start to a target (6,) is wide enough; None: every one is
+    caster: RayCaster,
+    start: Array,
+    rounds: PoseVectors,
+    has_view: NDArray[np.bool_],
+    min_path_m: float,
     is_clear_way: Callable[[Array], bool] | None = None,
 ) -> tuple[int, int] | None:
     """Index of the first round with an admissible candidate, and there of the farthest.
 
     None if no round has an admissible candidate at least ``min_path_m`` from ``start`` (6,). The
     least length is the published collector's: a path of a few centimetres adds no new view.
+
+    Args:
+        caster: Rays against the collision mesh.
+        start: Pose vector (6,) that the path starts from.
+        rounds: Candidates (R, k, 6), pose vectors, in R rounds.
+        has_view: Which candidates (R, k) have a free view, see :func:`has_free_view`.
+        min_path_m: Least length of a path, metres.
+        is_clear_way: Tells whether the way from the start to a target (6,) is wide enough; None if
+            every way is.
     """
     length_m = np.linalg.norm(rounds[..., :3] - start[:3], axis=-1)
     fit = has_view & (length_m >= min_path_m)
@@ -145,7 +155,7 @@ class PoseSpace:
         rng: np.random.Generator,
         clearance: Clearance | None = None,
     ) -> Self:
-        """Of a box (2, 3), with the angles and the view distance of a scene."""
+        """Build the space of a box (2, 3) with the angles and the view distance of a scene."""
         bounds = pose_bounds(box_m, scene.angles)
         return cls(
             caster=caster,
@@ -158,17 +168,17 @@ class PoseSpace:
 
     @property
     def also_asked(self) -> str:
-        """Name the clearance in messages about poses that were not found, if there is one."""
+        """Clause on the clearance for messages that no free view was found; may be empty."""
         if self.clearance is None:
             return ""
         return f" and keeps min_clearance_m ({self.clearance.min_clearance_m} m) from surfaces"
 
     def sample(self, count: int) -> PoseVectors:
-        """Pose vectors (count, 6), uniform within the bounds."""
+        """Draw pose vectors (count, 6), uniform within the bounds."""
         return sample_poses(self.bounds, count, self.rng)
 
     def has_free_view(self, poses: PoseVectors) -> NDArray[np.bool_]:
-        """Mark poses (N, 6) with a free view, far enough and of enough: (N,)."""
+        """Mark poses (N, 6) whose view is free, shows enough mesh and keeps the clearance: (N,)."""
         good = has_free_view(self.caster, poses, self.min_view_distance_m)
         if self.min_seen > 0.0:
             good[good] = seen_shares(self.caster, poses[good]) >= self.min_seen
@@ -181,7 +191,7 @@ N_POSES = 64
 
 
 def sample_start(space: PoseSpace, max_tries: int) -> Array:
-    """A pose vector (6,) with a free view in the largest free part of a space.
+    """Draw a pose vector (6,) with a free view in the largest free part of a space.
 
     The paper does not say where the camera starts. Inside a cupboard it would stay there, since
     every path must be free of collisions. Normals cannot tell inside from outside in a scan, but
@@ -191,7 +201,7 @@ def sample_start(space: PoseSpace, max_tries: int) -> Array:
 
 
 def largest_group(space: PoseSpace, max_tries: int, n_poses: int) -> PoseVectors:
-    """The largest group (M, 6) among ``n_poses`` sampled poses with a free view.
+    """Find the largest group (M, 6) among ``n_poses`` sampled poses with a free view.
 
     Those that see each other are joined. Samples are uniform in volume, so the group is in the
     largest space connected by free lines.
@@ -217,7 +227,7 @@ def largest_group(space: PoseSpace, max_tries: int, n_poses: int) -> PoseVectors
 
 
 def seeing_groups(caster: RayCaster, places_m: Array) -> NDArray[np.int64]:
-    """Number (N,) of the group of each place (N, 3); free lines of sight connect a group."""
+    """Label places (N, 3) by group (N,): free lines of sight connect those of one group."""
     i, j = np.triu_indices(len(places_m), k=1)
     free = caster.sees(places_m[i], places_m[j]) if len(i) else np.empty(0, np.bool_)
     graph = coo_array((np.ones(int(free.sum())), (i[free], j[free])), shape=(len(places_m),) * 2)
@@ -247,7 +257,7 @@ class ConnectedSpace:
 
 
 def connected_space(space: PoseSpace, max_tries: int) -> ConnectedSpace:
-    """The space in which :func:`synfeal.planning.space.sample_start` starts a path."""
+    """Find the space in which :func:`synfeal.planning.space.sample_start` starts a path."""
     return ConnectedSpace(space.caster, largest_group(space, max_tries, N_CONNECTED)[:, :3])
 
 
@@ -276,17 +286,23 @@ class Questions:
 
 
 def draw_questions(
-    caster: RayCaster,  # rays against the undecimated mesh
-    scene: SceneConfig,  # angle bounds and least view distance
-    box_m: Array,  # (2, 3) lower and upper corner of the space that is sampled
-    rng: np.random.Generator,  # the only source of randomness
-    # number of questions; all are independent of each other but for the first pose
+    caster: RayCaster,
+    scene: SceneConfig,
+    box_m: Array,
+    rng: np.random.Generator,
     count: int = N_QUESTIONS,
 ) -> Questions:
-    """Questions that planners of a scene would ask: the last candidates of ``count`` short walks.
+    """Draw questions planners of a scene would ask: the last candidates of ``count`` short walks.
 
     Each walk leaves the planner's first pose and goes to every admissible candidate it draws, so a
     start is always an admissible pose: no question starts in a cupboard or outside the room.
+
+    Args:
+        caster: Rays against the undecimated mesh.
+        scene: Angle bounds and least view distance.
+        box_m: Lower and upper corner (2, 3) of the space that is sampled, world, metres.
+        rng: The only source of randomness.
+        count: Number of questions, which are independent but for the first pose.
     """
     space = PoseSpace.of_scene(caster, box_m, scene, rng)
     starts = np.tile(sample_start(space, MAX_TRIES), (count, 1))

@@ -31,7 +31,7 @@ def unfinished_prefix(name: str) -> str:
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """A temporary path beside ``path``, same suffix, renamed to it if the block succeeds.
+    """Yield a temporary path beside ``path``, same suffix, renamed to it if the block succeeds.
 
     Raises:
         OSError: it cannot be written; whatever the system calls the file, ``path`` is named.
@@ -81,7 +81,7 @@ def _whole(text: str) -> int:
 
 
 def dotted(record: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Nested mappings as one: their keys joined by dots."""
+    """Flatten nested mappings, joining their keys by dots."""
     flat: dict[str, Any] = {}
     for key, value in record.items():
         inner = dotted(value, f"{prefix}{key}.") if isinstance(value, Mapping) else None
@@ -101,7 +101,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def file_sha256(path: Path) -> str:
-    """SHA-256 of a file."""
+    """Hash a file by SHA-256."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -193,14 +193,14 @@ class PlainLoader(yaml.SafeLoader):
     """
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        """A node; an alias is refused."""
+        """Compose a node; refuse an alias."""
         if self.check_event(yaml.AliasEvent):
             mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
             raise yaml.composer.ComposerError(None, None, "aliases (*name) are not read", mark)
         return super().compose_node(parent, index)
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        """A mapping; a key that is there twice is refused."""
+        """Construct a mapping; refuse a key that occurs twice."""
         keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
         for place, key in enumerate(keys):
             if key in keys[:place]:

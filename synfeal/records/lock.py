@@ -105,7 +105,7 @@ def _abandoned(path: Path, host: str, process: int) -> bool:
 
 
 def _end_future(root: Path) -> None:
-    """Date now, in their order, what a clock that jumped back has left dated in the future.
+    """Set to now, in order, the times of files that lie in the future after a clock jumped back.
 
     Snakemake fails every job that reads a file younger than what the job writes.
     """
@@ -157,7 +157,7 @@ SETTINGS = "settings.json"
 
 @contextmanager
 def growing(out: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
-    """The directory that becomes ``out`` when the block ends, with what earlier commands made.
+    """Yield the directory that becomes ``out`` at the end, with what earlier attempts made.
 
     ``out`` is from :func:`place_of`, and must not exist yet or be an empty directory; ``settings``
     are what decides its bytes, ready for JSON, and another command's must be the same.
@@ -196,7 +196,7 @@ def _holds_files(part: Path) -> bool:
 
 
 def place_of(out: Path) -> Path:
-    """``out`` as an absolute path, to which something can be renamed."""
+    """Return ``out`` as an absolute path, to which something can be renamed."""
     try:
         place = out.resolve()
         if place.is_mount():

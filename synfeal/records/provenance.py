@@ -36,7 +36,7 @@ CPU_INFO = Path("/proc/cpuinfo")
 
 
 def seed_of(*components: object) -> int:
-    """A 63-bit seed of the components alone, e.g. ``seed_of(7, "large_room", "train")``.
+    """Hash the components alone to a 63-bit seed, e.g. ``seed_of(7, "large_room", "train")``.
 
     Adding a model or a scene never shifts the random numbers of another.
     """
@@ -45,7 +45,7 @@ def seed_of(*components: object) -> int:
 
 
 def generator_of(*components: object) -> np.random.Generator:
-    """A NumPy generator seeded by :func:`seed_of`."""
+    """Make a NumPy generator seeded by :func:`seed_of`."""
     return np.random.default_rng(seed_of(*components))
 
 
@@ -64,13 +64,13 @@ def provenance(seed: int, config_hash: str) -> dict[str, Any]:
 
 
 def frame_versions() -> dict[str, str]:
-    """The versions that decide what frames look like; not every renderer has to be installed."""
+    """Collect the versions that decide what frames look like; renderers need not be installed."""
     found = {name: _version(name) for name in DRAWING if _version(name) != UNKNOWN}
     return {"synfeal": synfeal.__version__, **found}
 
 
 def config_hash(model: BaseModel) -> str:
-    """SHA-256 of a configuration as canonical JSON: equal values, equal hash, in any key order."""
+    """Hash a configuration (SHA-256): equal values, equal hash, in any order of keys."""
     text = json.dumps(model.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -90,7 +90,7 @@ def git_commit(folder: Path) -> str:
 
 
 def processor_name(cpu_info: Path) -> str:
-    """The model name the kernel gives; elsewhere what Python knows, else ``unknown``."""
+    """Return the processor's model as the kernel names it, or else as Python does."""
     try:
         lines = cpu_info.read_text(encoding="utf-8").splitlines()
     except OSError:

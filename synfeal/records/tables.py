@@ -52,7 +52,7 @@ Schema = Mapping[str, Kind]
 
 
 def read_frame(path: Path, schema: Schema, remedy: str = REMEDY, sep: str = ",") -> pd.DataFrame:
-    """The columns of a schema, in its order, from a file, which may have others.
+    """Read the columns of a schema, in its order, from a file, which may have others.
 
     ``remedy`` is what to do where it cannot be used: the file is missing or no CSV, lacks a column,
     has a row of another length, or a cell does not hold what its column does.
@@ -77,7 +77,10 @@ def read_frame(path: Path, schema: Schema, remedy: str = REMEDY, sep: str = ",")
 def read_records(
     path: Path, needed: Iterable[str] = (), remedy: str = REMEDY, sep: str = ","
 ) -> list[tuple[int, dict[str, str]]]:
-    """Rows of a file, each with its line: cells by column, as text. See :func:`read_frame`."""
+    """Read the rows of a file, each with its line number: cells by column, as text.
+
+    See :func:`read_frame`.
+    """
     with (
         read_as(path, "CSV", OSError, UnicodeDecodeError, csv.Error, remedy=f"; {remedy}"),
         path.open(encoding="utf-8-sig", newline="") as file,  # spreadsheets add a mark
@@ -96,7 +99,7 @@ def read_records(
 
 
 def frame_of(records: Iterable[Mapping[str, Any]], schema: Schema) -> pd.DataFrame:
-    """Rows as a frame with the columns and types of a schema; what a row lacks is missing."""
+    """Build a frame with the columns and types of a schema; what a row lacks is missing."""
     import pandas as pd
 
     frame = pd.DataFrame.from_records(
@@ -106,12 +109,12 @@ def frame_of(records: Iterable[Mapping[str, Any]], schema: Schema) -> pd.DataFra
 
 
 def records_of(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """The rows of a frame, by column."""
+    """Return the rows of a frame as mappings by column."""
     return [{str(name): value for name, value in row.items()} for row in frame.to_dict("records")]
 
 
 def rows_of(frame: pd.DataFrame) -> list[Any]:
-    """The rows of a frame as named tuples, ``Index`` first."""
+    """Return the rows of a frame as named tuples, ``Index`` first."""
     return list(frame.itertuples())
 
 
@@ -135,7 +138,7 @@ _EMPTY: Sequence[str] = ("", "-", "NA")  # Snakemake's for what a job was too sh
 
 
 def _value(cell: str, kind: Kind) -> object:
-    """A cell as its column holds it; ``_BAD`` where it does not."""
+    """Convert a cell to the kind of its column; ``_BAD`` where that fails."""
     if kind.dtype == "str":
         return cell
     if kind.optional and cell in _EMPTY:
@@ -166,7 +169,7 @@ def read_numbers(
     passed_over: str = "",
     optional: str = "",
 ) -> NDArray[np.float64]:
-    """Values (N, columns of ``header``) of a file, whose ``kind`` messages name.
+    """Read values (N, columns of ``header``) from a CSV file; messages call it a ``kind``.
 
     It may have one more column of numbers, ``optional``, whose values then come last, and after
     that a last column of names, which is ``passed_over``. Anything else than that

@@ -28,15 +28,15 @@ class Renderer(Protocol):
     """
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
-        """Colours (H, W, 3) seen from a pose (4, 4)."""
+        """Render colours (H, W, 3) from a pose ``world_from_cam`` (4, 4)."""
         ...
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
-        """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
+        """Render colours (H, W, 3) and depth (H, W), metres along the optical axis or inf."""
         ...
 
     def render_depth(self, world_from_cam: NDArray[np.float64]) -> Depth:
-        """Depth (H, W) as :meth:`render_rgbd` gives it, without colours where that is cheaper."""
+        """Render depth (H, W) as :meth:`render_rgbd` does, without colours if that is cheaper."""
         return self.render_rgbd(world_from_cam)[1]
 
     def render_faces(self, world_from_cam: NDArray[np.float64]) -> Faces:
@@ -58,7 +58,7 @@ class Renderer(Protocol):
 
 
 def pieces(part: MeshPart, most_vertices: int = MOST_VERTICES) -> Iterator[MeshPart]:
-    """The part in pieces of at most ``most_vertices``, each with the vertices of its own faces."""
+    """Yield pieces of at most ``most_vertices``, each with the vertices of its own faces."""
     if len(part.vertices_m) <= most_vertices:
         yield part
         return
@@ -68,7 +68,7 @@ def pieces(part: MeshPart, most_vertices: int = MOST_VERTICES) -> Iterator[MeshP
 
 
 def drawn_pieces(mesh: TexturedMesh) -> Iterator[tuple[MeshPart, int]]:
-    """The drawn parts of a mesh in pieces, each with the index of its first triangle."""
+    """Yield the drawn parts of a mesh in pieces, each with the index of its first triangle."""
     first = 0
     for part in mesh.parts:
         start = first
@@ -79,7 +79,7 @@ def drawn_pieces(mesh: TexturedMesh) -> Iterator[tuple[MeshPart, int]]:
 
 
 def faces_of_halves(halves: NDArray[np.float32]) -> Faces:
-    """Indices (H, W), -1 for nothing, of numbers from 1 that shaders wrote as two halves (H, W, 2).
+    """Decode indices (H, W), -1 for nothing, from pairs of halves (H, W, 2) that shaders wrote.
 
     Single precision holds whole numbers up to 2^24, and meshes have more triangles.
     """
@@ -88,7 +88,7 @@ def faces_of_halves(halves: NDArray[np.float32]) -> Faces:
 
 
 def thresholded(part: MeshPart) -> NDArray[np.uint8]:
-    """The part's texture with alpha 0 or 255, or without alpha where the part is opaque.
+    """Threshold the texture's alpha to 0 or 255, or drop it where the part is opaque.
 
     Texels that are not drawn take the mean colour of those that are: filtering mixes them in at the
     edges and in every mip level, and their own colour is arbitrary.
@@ -121,10 +121,9 @@ SAMPLES_PER_AXIS = 8  # of a pixel, of reference images
 
 
 def reference_images(
-    # opens a renderer for a camera; best one without anti-aliasing of its own
     opened: Callable[[CameraConfig], Renderer],
-    camera: CameraConfig,  # at most 1024 pixels wide and high
-    poses: Iterable[NDArray[np.float64]],  # ``world_from_cam``
+    camera: CameraConfig,
+    poses: Iterable[NDArray[np.float64]],
 ) -> Iterator[NDArray[np.float32]]:
     """Render the ideal: means over 64 points of each pixel, (H, W, 3) in 0 to 255, unrounded.
 
@@ -132,6 +131,11 @@ def reference_images(
     image with eight times the pixels along each axis. It is drawn as that one image, so that a
     texture is filtered over the eighth of a pixel a sample stands for, and not over a whole pixel
     64 times.
+
+    Args:
+        opened: Opens a renderer for a camera, preferably one without anti-aliasing of its own.
+        camera: Camera of the images, at most 1024 pixels wide and high.
+        poses: Poses ``world_from_cam`` (4, 4).
     """
     count, width, height = SAMPLES_PER_AXIS, camera.width, camera.height
     finer = {name: count * value for name, value in camera.intrinsics._asdict().items()}

@@ -23,7 +23,7 @@ EGL_PACKAGES = "on Debian and Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri
 
 
 def _opener(place: str) -> Opener:
-    """Opens the class at ``module:name``, which is loaded by then: backends take up to a second."""
+    """Return the class at ``module:name``, loaded when called: backends take up to a second."""
     return lambda mesh, camera, render: resolve_name(place)(mesh, camera, render)
 
 
@@ -43,7 +43,7 @@ INSTALL = {
 def open_renderer(
     mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig | None = None
 ) -> Renderer:
-    """A renderer of ``mesh`` through ``camera``, by the configured backend; a context manager.
+    """Open a renderer of ``mesh`` through ``camera`` as a context manager, by the chosen backend.
 
     Raises:
         InputError: the backend named in ``render`` does not work on this machine, or none does.
@@ -126,7 +126,7 @@ _FACING = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
 def _red_square() -> TexturedMesh:
-    """A square 1 m in front of a camera at the origin that looks along x; it fills the image."""
+    """Build a square that fills the image of a camera at the origin, 1 m ahead along x."""
     corners = np.array([[1.0, 9, -9], [1, -9, -9], [1, -9, 9], [1, 9, 9]])
     faces = np.array([[0, 1, 2], [0, 2, 3]])
     red = np.array([255, 0, 0, 255], np.uint8)

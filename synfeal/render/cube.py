@@ -80,19 +80,19 @@ class CubeRenderer(Renderer):
         self._inner = open_pinhole(face)
 
     def render(self, world_from_cam: Array) -> Rgb:
-        """Colours (H, W, 3) seen from a pose (4, 4)."""
+        """Render colours (H, W, 3) from a pose ``world_from_cam`` (4, 4)."""
         return self._resampled(
             np.stack([self._inner.render(pose) for pose in self._poses(world_from_cam)])
         )
 
     def render_rgbd(self, world_from_cam: Array) -> tuple[Rgb, Depth]:
-        """Colours (H, W, 3) and depth (H, W): metres along the ray, inf for nothing."""
+        """Render colours (H, W, 3) and depth (H, W): metres along the ray, inf for nothing."""
         seen = [self._inner.render_rgbd(pose) for pose in self._poses(world_from_cam)]
         rgb, depth_m = (np.stack(images) for images in zip(*seen, strict=True))
         return self._resampled(rgb), self._distance(depth_m)
 
     def render_depth(self, world_from_cam: Array) -> Depth:
-        """Depth (H, W) alone: metres along the ray, inf for nothing."""
+        """Render depth (H, W) alone: metres along the ray, inf for nothing."""
         return self._distance(
             np.stack([self._inner.render_depth(pose) for pose in self._poses(world_from_cam)])
         )
@@ -109,7 +109,7 @@ class CubeRenderer(Renderer):
         self._inner.close()
 
     def _poses(self, world_from_cam: Array) -> list[Array]:
-        """Poses of the faces that are drawn."""
+        """Return the poses of the faces that are drawn."""
         poses = np.repeat(np.asarray(world_from_cam, np.float64)[None], len(self._drawn), axis=0)
         poses[:, :3, :3] = poses[:, :3, :3] @ self._cam_from_face
         return list(poses)
@@ -125,7 +125,7 @@ class CubeRenderer(Renderer):
         return np.asarray(place)
 
     def _slant_of(self, rays: Array) -> NDArray[np.float32]:
-        """Distance along each ray (H, W) for depth 1 of its face; infinite where there is none."""
+        """Return the distance along each ray (H, W) at depth 1 of its face, inf without one."""
         towards = np.einsum("...i,fi->...f", rays, self._cam_from_face[:, :, 2]).max(axis=-1)
         with np.errstate(divide="ignore"):
             return np.asarray(1.0 / np.nan_to_num(towards, nan=0.0), np.float32)
@@ -162,7 +162,7 @@ def face_camera(camera: CameraConfig) -> CameraConfig:
 
 
 def _faces_of(rays: Array) -> NDArray[np.int64]:
-    """Face (...) that each ray (..., 3) meets, -1 where a ray is NaN."""
+    """Find the face (...) that each ray (..., 3) meets, -1 where a ray is NaN."""
     towards = rays @ CAM_FROM_FACE[:, :, 2].T
     shown = np.isfinite(towards).all(axis=-1)
     return np.where(shown, np.nan_to_num(towards, nan=0.0).argmax(axis=-1), -1)

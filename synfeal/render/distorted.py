@@ -50,16 +50,16 @@ class DistortedRenderer(Renderer):
         self._inner = open_pinhole(pinhole)
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
-        """Colours (H, W, 3) seen from a pose (4, 4)."""
+        """Render colours (H, W, 3) from a pose ``world_from_cam`` (4, 4)."""
         return self._resampled(self._inner.render(world_from_cam))
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
-        """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
+        """Render colours (H, W, 3) and depth (H, W), metres along the optical axis or inf."""
         rgb, depth_m = self._inner.render_rgbd(world_from_cam)
         return self._resampled(rgb), resampled_depth(depth_m, *self._depth_taps)
 
     def render_depth(self, world_from_cam: NDArray[np.float64]) -> Depth:
-        """Depth (H, W) alone: metres along the optical axis, inf for nothing."""
+        """Render depth (H, W) alone: metres along the optical axis, inf for nothing."""
         return resampled_depth(self._inner.render_depth(world_from_cam), *self._depth_taps)
 
     def render_faces(self, world_from_cam: NDArray[np.float64]) -> Faces:
@@ -79,7 +79,7 @@ class DistortedRenderer(Renderer):
 
 
 def covering_camera(camera: CameraConfig) -> CameraConfig:
-    """The pinhole that sees all that a lens sees, at least at the resolution of its centre.
+    """Find the pinhole that sees all that a lens sees, at least at the resolution of its centre.
 
     Raises:
         InputError: the view is so wide that the pinhole image would exceed 8192 pixels.
@@ -107,7 +107,7 @@ def covering_camera(camera: CameraConfig) -> CameraConfig:
 def resampled_depth(
     depth_m: Depth, index: NDArray[np.int32], weight: NDArray[np.floating]
 ) -> Depth:
-    """Depth (...) at points between the pixels of a pinhole image (h, w); metres, inf for nothing.
+    """Interpolate depth (...) of a pinhole image (h, w) between pixels; metres, inf for nothing.
 
     ``index`` (..., 4) are the neighbours of each point in the flat image, ``weight`` theirs.
     """
@@ -140,13 +140,13 @@ def _seen_at(
 
 
 def pixels_of_rows(camera: CameraConfig, rows: range, offset: tuple[float, float]) -> Array:
-    """Centres of the pixels of some rows, moved by ``offset``: (rows, W, 2), column and row."""
+    """Return pixel centres (rows, W, 2), column and row, of some rows, moved by ``offset``."""
     column, row = np.meshgrid(np.arange(camera.width) + 0.5, np.array(rows) + 0.5)
     return np.stack([column, row], axis=-1) + offset
 
 
 def taps(pixel: Array, width: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Neighbours (..., 4) of points (..., 2) in a flat image of ``width``, and their weights.
+    """Return neighbours (..., 4) of points (..., 2) in a flat image of ``width``, and weights.
 
     Of a point that is NaN all weights are 0.
     """

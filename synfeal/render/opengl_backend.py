@@ -48,7 +48,7 @@ GL_VERSION = 330
 
 @functools.cache
 def shared_context() -> Any:
-    """The one moderngl context of this process, on the first EGL device that gives one.
+    """Create this process's one moderngl context, on the first EGL device that gives one.
 
     It is current only while renderers draw, so that other users of OpenGL in the process, such as
     pyrender, find their own.
@@ -73,7 +73,7 @@ def shared_context() -> Any:
 
 @functools.cache
 def finish() -> Callable[[], None]:
-    """``glFinish`` of the current context, which lets other Python threads run while it waits.
+    """Return ``glFinish`` of the current context, which lets other Python threads run meanwhile.
 
     moderngl's own calls hold the interpreter for the whole frame, and threads that compress images
     starve meanwhile.
@@ -128,18 +128,18 @@ class OpenglRenderer(Renderer):
         self._mean = context.vertex_array(program, [])
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
-        """Colours (H, W, 3) seen from a pose (4, 4)."""
+        """Render colours (H, W, 3) from a pose ``world_from_cam`` (4, 4)."""
         with self._context:
             return self._draw_colour(world_from_cam)
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
-        """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
+        """Render colours (H, W, 3) and depth (H, W), metres along the optical axis or inf."""
         with self._context:
             rgb = self._draw_colour(world_from_cam)
             return rgb, self._draw_depth(self._clip_from_mesh(world_from_cam))
 
     def render_depth(self, world_from_cam: NDArray[np.float64]) -> Depth:
-        """Depth (H, W) alone: metres along the optical axis, inf for nothing."""
+        """Render depth (H, W) alone: metres along the optical axis, inf for nothing."""
         with self._context:
             return self._draw_depth(self._clip_from_mesh(world_from_cam))
 
@@ -209,7 +209,7 @@ class OpenglRenderer(Renderer):
 
 
 def clip_from_cam(camera: CameraConfig) -> NDArray[np.float64]:
-    """The projection (4, 4) from camera coordinates (x right, y down, z forward).
+    """Return the projection (4, 4) from camera coordinates (x right, y down, z forward).
 
     The top row of the image comes out as OpenGL's bottom row, which is read first.
     """

@@ -76,7 +76,7 @@ def _morton_codes(points_m: Floats) -> NDArray[np.int64]:
 
 
 def visible_runs(chunks: Chunks, clip_from_mesh: Floats) -> list[tuple[int, int]]:
-    """First index and number of indices of each run of chunks that may be in the frustum.
+    """Find runs of chunks that may be in the frustum: first index and number of indices of each.
 
     ``clip_from_mesh`` (4, 4) maps to OpenGL's clip coordinates: -w <= x, y, z <= w is drawn.
     """
@@ -93,7 +93,7 @@ def visible_runs(chunks: Chunks, clip_from_mesh: Floats) -> list[tuple[int, int]
 
 
 def program_of(context: Any, vertex: str, fragment: str, features: Collection[str] = ()) -> Any:
-    """A program of two files in ``shaders``, which begin with what is named defined."""
+    """Compile a program of two files in ``shaders``, with the named features defined."""
     header = "#version 330\n" + "".join(f"#define {name}\n" for name in sorted(features))
     vertex, fragment = (header + (SHADERS / name).read_text() for name in (vertex, fragment))
     return context.program(vertex_shader=vertex, fragment_shader=fragment)
@@ -154,14 +154,14 @@ class DevicePart:
 
     @cached_property
     def faces(self) -> Any:
-        """Numbers of triangles, which few ask for."""
+        """Vertex array that draws the index of each triangle, compiled on first use."""
         return self._program("faces.frag", self._cut_out, self._solid)
 
     def _attribute(self, values: NDArray[Any], layout: str, name: str) -> tuple[Any, str, str]:
         return self._context.buffer(np.ascontiguousarray(values)), layout, name
 
     def _program(self, fragment: str, features: list[str], attributes: list[Any]) -> Any:
-        """A vertex array that draws the part's triangles with a program of its own."""
+        """Make a vertex array that draws the part's triangles with a program of its own."""
         program = program_of(self._context, "part.vert", fragment, features)
         return self._context.vertex_array(program, attributes, self._index)
 
@@ -191,7 +191,7 @@ class DevicePart:
 
 
 def _upload(context: Any, pixels: NDArray[np.uint8]) -> Any:
-    """A mip-mapped texture of pixels (H, W, C), first row at the top, as large as is possible."""
+    """Upload pixels (H, W, C), top row first, as a mip-mapped texture, shrunk if too large."""
     limit = context.info["GL_MAX_TEXTURE_SIZE"]
     if max(pixels.shape[:2]) > limit:
         pixels = np.asarray(Image.fromarray(pixels).reduce(-(-max(pixels.shape[:2]) // limit)))

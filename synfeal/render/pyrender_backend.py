@@ -51,7 +51,7 @@ COLOUR_BIAS, DEPTH_BIAS = -0.5, -100.0
 
 @functools.cache
 def _context() -> tuple[Any, _Pass, _Pass, _Pass]:
-    """The one OpenGL context of this process, and its passes for colour, depth and triangles.
+    """Create this process's one OpenGL context, with passes for colour, depth and triangles.
 
     Deleting one terminates the EGL display all others share, so it is made once and kept.
     """
@@ -97,17 +97,17 @@ class PyrenderRenderer(Renderer):
         )
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
-        """Colours (H, W, 3) seen from a pose (4, 4)."""
+        """Render colours (H, W, 3) from a pose ``world_from_cam`` (4, 4)."""
         self._look_from(world_from_cam)
         samples = self._drawn(self._colour, self._supersampling, self._background)
         return mean_of_samples(samples, self._supersampling)
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
-        """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
+        """Render colours (H, W, 3) and depth (H, W), metres along the optical axis or inf."""
         return self.render(world_from_cam), self.render_depth(world_from_cam)
 
     def render_depth(self, world_from_cam: NDArray[np.float64]) -> Depth:
-        """Depth (H, W) alone: metres along the optical axis, inf for nothing."""
+        """Render depth (H, W) alone: metres along the optical axis, inf for nothing."""
         self._look_from(world_from_cam)
         depth_m = self._drawn(self._depth, 1, np.zeros(4))[..., 0]
         return np.where(depth_m > 0.0, depth_m, np.float32(np.inf))
@@ -142,7 +142,7 @@ class PyrenderRenderer(Renderer):
 
 
 def mean_of_samples(samples: NDArray[np.uint8], factor: int) -> Rgb:
-    """The image (H, W, 3) whose pixels are means of ``factor`` x ``factor`` samples."""
+    """Average ``factor`` x ``factor`` samples to each pixel of an image (H, W, 3)."""
     total = np.zeros((samples.shape[0] // factor, samples.shape[1] // factor, 3), np.uint16)
     for row in range(factor):
         for column in range(factor):
@@ -151,7 +151,7 @@ def mean_of_samples(samples: NDArray[np.uint8], factor: int) -> Rgb:
 
 
 def _primitive(part: MeshPart, centre_m: NDArray[np.float64]) -> Any:
-    """One part around ``centre_m``; the alpha test is already decided in its texture."""
+    """Build one part around ``centre_m``; the alpha test is already decided in its texture."""
     rgba = texture = None
     if part.vertex_rgb is not None:
         rgb = part.vertex_rgb.astype(np.float32) / 255.0

@@ -37,11 +37,11 @@ class RaycastRenderer(Renderer):
         self._sample_size = 1.0 / render.supersampling
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
-        """Colours (H, W, 3) seen from a pose (4, 4)."""
+        """Render colours (H, W, 3) from a pose ``world_from_cam`` (4, 4)."""
         return self._image(self._colours, world_from_cam, self._samples_px, self._sample_size)
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
-        """Colours (H, W, 3) and depth (H, W): metres along the optical axis, inf for nothing."""
+        """Render colours (H, W, 3) and depth (H, W), metres along the optical axis or inf."""
         rgb = self.render(world_from_cam)
         # Whether the very centre is cut out.
         return rgb, self._image(self._depth, world_from_cam, np.full((1, 2), 0.5), 0.0)

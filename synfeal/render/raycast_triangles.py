@@ -69,7 +69,7 @@ class TexturedTriangles:
         self._textures = MipMaps(textures)
 
     def first_drawn(self, view: View, rays: Floats) -> tuple[Faces, Floats]:
-        """The first triangle (N,) that shows on each ray, -1 for none, and its depth (N,).
+        """Find the first triangle (N,) that shows on each ray, -1 for none, and its depth (N,).
 
         ``rays`` (N, 3) are of unit length along the optical axis.
         """
@@ -113,7 +113,7 @@ class TexturedTriangles:
         return np.stack(changes, axis=1)
 
     def rgb(self, view: View, points: Points) -> Rgba:
-        """Colours (N, 3), 0 to 255."""
+        """Look up colours (N, 3), 0 to 255."""
         tint = self._tint[self._part_of[points.face]]
         if points.values.shape[1] == 5:
             tint = tint * np.clip(points.values[:, 2:], 0.0, 1.0)
@@ -134,14 +134,14 @@ class TexturedTriangles:
         return np.asarray((face >= 0) & self._has_cutouts[self._part_of[face]], np.bool_)
 
     def _first_hits(self, view: View, rays: Floats, start_m: Floats) -> tuple[Faces, Floats]:
-        """First triangles at depths beyond ``start_m`` (N,), and their depths."""
+        """Find the first triangles at depths beyond ``start_m`` (N,), and their depths."""
         origins = view.origin_m + start_m[:, None] * rays
         distance_m, face = self._caster.first_hits(origins, rays)
         return face, start_m + distance_m / np.linalg.norm(rays, axis=1)
 
 
 def _textures(parts: list[MeshPart]) -> tuple[list[NDArray[np.uint8]], NDArray[np.intp]]:
-    """The textures, white for parts without, and which one each part has; shared ones once."""
+    """Return distinct textures, white for parts without one, and the texture of each part."""
     keys = [
         p.texture is not None and (id(p.texture), p.alpha_cutoff, p.base_color[3]) for p in parts
     ]
@@ -152,7 +152,7 @@ def _textures(parts: list[MeshPart]) -> tuple[list[NDArray[np.uint8]], NDArray[n
 
 
 def _rows(parts: list[MeshPart], centre_m: Floats) -> Floats:
-    """Per triangle (F, 3 | 6, 4): distance from the plane, u, v, and red, green, blue if needed."""
+    """Tabulate per triangle (F, 3 | 6, 4) plane distance, u, v, and red, green, blue if needed."""
     is_coloured = any(part.vertex_rgb is not None for part in parts)
     rows = []
     for part in parts:
@@ -166,7 +166,7 @@ def _rows(parts: list[MeshPart], centre_m: Floats) -> Floats:
 
 
 def _linear(corners: Floats, values: Floats) -> Floats:
-    """Rows (F, 1 + K, 4): the plane of each triangle, then what is linear between ``values``.
+    """Compute rows (F, 1 + K, 4): each triangle's plane, then values linear between the corners.
 
     ``corners`` (F, 3, 3) are the positions, ``values`` (F, 3, K) the values at the three corners.
     """
@@ -207,7 +207,7 @@ class MipMaps:
                 self._texels[start:end] = texels
 
     def rgba(self, texture: NDArray[np.intp], uv: Floats, uv_per_px: Floats) -> Rgba:
-        """Colours (N, 4), 0 to 255, of textures (N,) at ``uv`` (N, 2), origin at the bottom left.
+        """Look up colours (N, 4), 0 to 255, of textures (N,) at ``uv`` (N, 2), origin bottom left.
 
         ``uv_per_px`` (N, 4) is the change from pixel to pixel: du/dx, dv/dx, du/dy, dv/dy.
         """
@@ -230,13 +230,13 @@ class MipMaps:
 
 
 def _sizes(width: int, height: int) -> list[tuple[int, int]]:
-    """Width and height of each level: halved and rounded down until one texel is left."""
+    """List width and height of each level: halved and rounded down until one texel is left."""
     top = max(width, height).bit_length() - 1
     return [(max(1, width >> level), max(1, height >> level)) for level in range(top + 1)]
 
 
 def _levels(texture: NDArray[np.uint8]) -> Iterator[NDArray[np.uint32]]:
-    """Texels (H * W,) of each level as packed RGBA."""
+    """Yield the texels (H * W,) of each level as packed RGBA."""
     height, width, channels = texture.shape
     rgba = np.full((height, width, 4), 255, np.uint8)
     rgba[..., :channels] = texture
@@ -251,7 +251,7 @@ def _levels(texture: NDArray[np.uint8]) -> Iterator[NDArray[np.uint32]]:
 def _neighbours(
     position: Floats, size: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Rgba]:
-    """The texels before and after a repeated position, and the share (N, 1) of the latter."""
+    """Return the texels around a repeated position, and the share (N, 1) of the second."""
     texel = position * size - 0.5
     below = np.floor(texel)
     share = (texel - below).astype(np.float32)[:, None]

@@ -82,7 +82,7 @@ def agreement(
     inverted: bool = False,
     tolerance: float = TOLERANCE,
 ) -> float:
-    """Share of points that other frames confirm among those they confirm or look through.
+    """Measure which share of points other frames confirm, of those they confirm or look through.
 
     Args:
         sample: Of depth images.
@@ -179,7 +179,7 @@ def _blame(sample: Sample, camera: RgbdCamera, share: float, where: str) -> None
 
 
 def _best_focal_px(sample: Sample, camera: CameraConfig) -> float:
-    """Focal length (px, along x) of the depth camera with which the frames agree best."""
+    """Find the focal length (px, along x) of the depth camera with which frames agree best."""
     values = [
         agreement(sample, _zoomed(camera, float(factor)), tolerance=FOCAL_TOLERANCE)
         for factor in FOCAL_FACTORS
@@ -201,6 +201,6 @@ def _zoomed(camera: CameraConfig, factor: float) -> CameraConfig:
 
 
 def replace_intrinsics(camera: CameraConfig, fx: float, fy: float) -> CameraConfig:
-    """The camera with other focal lengths, pixels."""
+    """Return the camera with other focal lengths, pixels."""
     _, _, cx, cy = camera.intrinsics
     return camera.model_copy(update={"fx": fx, "fy": fy, "cx": cx, "cy": cy})

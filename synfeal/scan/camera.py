@@ -60,7 +60,7 @@ class RgbdCamera:
 
 
 def intrinsics_record(camera: CameraConfig) -> dict[str, Any]:
-    """Size, pinhole and distortion of a camera, ready for JSON."""
+    """Return size, pinhole and distortion of a camera, ready for JSON."""
     return {
         "width": camera.width,
         "height": camera.height,
@@ -79,7 +79,7 @@ def pinhole(width: int, height: int, focal_px: float) -> CameraConfig:
 def _tum(
     fx: float, fy: float, cx: float, cy: float, *distortion: float
 ) -> tuple[CameraConfig, CameraConfig]:
-    """Depth of the benchmark is registered to colour: one camera for both."""
+    """Return one camera for both: the benchmark's depth is registered to colour."""
     lens = (*distortion, 0.0, 0.0, 0.0, 0.0, 0.0)[:5]
     camera = CameraConfig(
         width=640,
@@ -196,7 +196,7 @@ def rgbd_camera(
 def _one(
     file: Path | None, focal_px: float | None, size: tuple[int, int], kind: str
 ) -> CameraConfig | None:
-    """A camera given as a file or a focal length, if it is."""
+    """Return the camera given as a file or a focal length; None where neither is given."""
     if file is not None and focal_px is not None:
         raise InputError(f"--{kind}-focal: comes from --{kind}-camera too; leave one of them out")
     if file is not None:
@@ -225,7 +225,7 @@ def _refuse_wide(camera: CameraConfig, name: str) -> None:
 
 
 def _of_manifest(sequence: Path) -> RgbdCamera | None:
-    """The camera of a data set of our own, which has one for colour and depth."""
+    """Read the camera of a data set of our own, which has one for colour and depth."""
     path = sequence / MANIFEST
     if not path.is_file():
         return None

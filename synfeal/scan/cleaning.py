@@ -35,7 +35,7 @@ def without_small_pieces(surface: Surface, min_area_m2: float) -> tuple[Surface,
 
 
 def pieces_of(faces: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]:
-    """Number (F,) of the connected piece that each triangle (F, 3) belongs to."""
+    """Label each triangle (F, 3) with the number (F,) of the connected piece it belongs to."""
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
     graph = coo_array((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), (n_vertices,) * 2)
     label = connected_components(graph, directed=False)[1]

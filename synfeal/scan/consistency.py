@@ -55,7 +55,7 @@ class Sightings:
     n_points: int
 
     def disagreement(self, camera: CameraConfig) -> float:
-        """Share of variance within points, 0 to about 1; NaN where too few are seen often enough.
+        """Return the share of variance within points, 0 to about 1; NaN where too few are seen.
 
         Args:
             camera: Of the photographs at their full size.
@@ -83,7 +83,7 @@ class Sightings:
 
 
 def shrunk(camera: CameraConfig, factor: int) -> CameraConfig:
-    """The camera of images whose sides are one ``factor``-th as long."""
+    """Return the camera of images whose sides are one ``factor``-th as long."""
     pinhole = {name: value / factor for name, value in camera.intrinsics._asdict().items()}
     size = {"width": camera.width // factor, "height": camera.height // factor}
     return camera.model_copy(update={**pinhole, **size})
@@ -121,7 +121,7 @@ def sightings_of(
 
 
 def spread(total: int, count: int) -> list[int]:
-    """At most ``count`` indices below ``total``, evenly spread."""
+    """Return at most ``count`` indices below ``total``, evenly spread."""
     count = min(count, total)
     return [index * total // count for index in range(count)]
 
@@ -204,7 +204,7 @@ def fit_color(sightings: Sightings, given: CameraConfig) -> ColorFit:
 
 
 def changed(camera: CameraConfig, change: NDArray[np.float64]) -> CameraConfig:
-    """The camera with other intrinsics.
+    """Return the camera with other intrinsics.
 
     Args:
         camera: To begin with.
@@ -217,5 +217,5 @@ def changed(camera: CameraConfig, change: NDArray[np.float64]) -> CameraConfig:
 
 
 def with_color(camera: RgbdCamera, fit: ColorFit) -> RgbdCamera:
-    """The sensor with the fitted calibration of its photographs."""
+    """Return the sensor with the fitted calibration of its photographs."""
     return replace(camera, color=fit.fitted, source=f"{camera.source}, fitted to the photographs")

@@ -123,7 +123,7 @@ class Pinhole:
             self._index = np.where(inside, y * camera.width + x, -1)
 
     def __call__(self, depth_m: Depth) -> Depth:
-        """Depth (H, W), 0 where the lens does not look; the nearest pixel, for edges are sharp."""
+        """Resample depth (H, W) to the pinhole's nearest pixels, for edges are sharp; 0 outside."""
         if self._index is None:
             return depth_m
         return np.where(self._index >= 0, depth_m.reshape(-1)[self._index], np.float32(0.0))

@@ -96,7 +96,7 @@ def area_weighted_normals(surface: Surface, count: int) -> Array:
 
 
 def _directions_near(guess: Array) -> Array:
-    """Unit vectors (N, 3) within ``MOST_TILT_DEG`` of one, evenly ``STEP_DEG`` apart."""
+    """Return unit vectors (N, 3) within ``MOST_TILT_DEG`` of one, evenly ``STEP_DEG`` apart."""
     step, most = np.deg2rad(STEP_DEG), np.deg2rad(MOST_TILT_DEG)
     count = int(np.ceil(2.0 * np.pi * (1.0 - np.cos(most)) / step**2))
     index = np.arange(count) + 0.5
@@ -112,9 +112,9 @@ def _directions_near(guess: Array) -> Array:
 
 
 def _refined(up: Array, normals: Array, window_rad: float) -> tuple[Array, float]:
-    """The direction that normals within a window of level or plumb agree with best.
+    """Find the direction with which normals that are nearly level or plumb agree best.
 
-    And which share of the normals holds it where it is, against the turn that changes least.
+    Also return the share of normals that fixes it against the turn that changes least.
     """
     cosine = np.abs(normals @ up)
     level = normals[cosine > np.cos(window_rad)]

@@ -99,7 +99,7 @@ def write_picture(compared: Sequence[Comparison], title: str, out: Path) -> None
 
 
 def overlay(one: Comparison) -> Rgb:
-    """The photograph in red over the rendering in cyan: grey where both agree, else two edges."""
+    """Overlay the photograph in red and the rendering in cyan: grey where both agree."""
     photograph, rendering = one.photograph @ LUMA, one.rendering @ LUMA
     return np.stack([photograph, rendering, rendering], axis=-1).clip(0, 255).astype(np.uint8)
 

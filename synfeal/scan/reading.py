@@ -56,7 +56,7 @@ def read_color(path: FrameFile, size: tuple[int, int], shrink: int = 1) -> NDArr
 
 
 def image_size(path: FrameFile) -> tuple[int, int]:
-    """Width and height of an image, pixels."""
+    """Read the width and height of an image, pixels."""
     width, height = read_image(path).size
     return width, height
 

@@ -176,7 +176,7 @@ def _read(job: ScanJob) -> PosedFrames:
 
 
 def _held_out(every: PosedFrames, stride: int) -> PosedFrames:
-    """The frames that are not fused, or all where all are."""
+    """Return the frames that are not fused, or all of them where all are fused."""
     index = [i for i in range(len(every)) if i % stride]
     return _at(every, index) if index else every
 

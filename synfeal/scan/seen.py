@@ -75,7 +75,10 @@ def seen_points(
 
 
 def project(local_m: Floats, camera: CameraConfig, intrinsics: Intrinsics | None = None) -> Floats:
-    """Pixels (M, 2) of points (M, 3) in front of a camera; other ``intrinsics`` on request."""
+    """Project points (M, 3) in front of a camera to pixels (M, 2).
+
+    Other ``intrinsics`` take the place of the camera's.
+    """
     fx, fy, cx, cy = (np.float32(value) for value in intrinsics or camera.intrinsics)
     normalised = local_m[:, :2] / local_m[:, 2:]
     if any(camera.distortion):

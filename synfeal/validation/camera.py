@@ -40,7 +40,7 @@ class KnownCamera:
 
 
 def camera_of_dataset(dataset: Path, camera_file: Path | None) -> KnownCamera:
-    """The camera of a data set; a calibration file goes before the manifest."""
+    """Read the camera of a data set; a calibration file takes precedence over the manifest."""
     if camera_file is not None:
         from synfeal.camera.calibration import read_calibration
 
@@ -113,7 +113,7 @@ class Lens:
         self.places = (self._pixels - centre) / (camera.width / 2.0)
 
     def project(self, points_m: Array) -> Array:
-        """Pixels (N, 2) of points (N, 3) in the camera, NaN where the camera cannot see them."""
+        """Project points (N, 3) in the camera to pixels (N, 2), NaN where it cannot see them."""
         pixels = np.full((len(points_m), 2), np.nan)
         with np.errstate(divide="ignore", invalid="ignore"):
             radius = np.linalg.norm(points_m[:, :2], axis=1) / points_m[:, 2]
@@ -123,7 +123,7 @@ class Lens:
         return pixels
 
     def depth_of(self, points_m: Array) -> Array:
-        """Depths (N,) of points (N, 3) in the camera."""
+        """Return depths (N,) of points (N, 3) in the camera."""
         return np.asarray(points_m[:, 2])
 
     def normals(self, points_m: Array, inverse: Array, slope: Array) -> Array:
@@ -179,7 +179,7 @@ class WideLens(Lens):
         self.curvature = float(np.sum(1.0 / np.square(pixels_per_radian(camera))) / 8.0)
 
     def project(self, points_m: Array) -> Array:
-        """Pixels (N, 2) of points (N, 3) in the camera, NaN where the camera cannot see them."""
+        """Project points (N, 3) in the camera to pixels (N, 2), NaN where it cannot see them."""
         pixels = np.full((len(points_m), 2), np.nan)
         with np.errstate(invalid="ignore"):
             seen = np.isfinite(points_m).all(axis=1) & (np.linalg.norm(points_m, axis=1) > 1e-6)
@@ -189,7 +189,7 @@ class WideLens(Lens):
         return pixels
 
     def depth_of(self, points_m: Array) -> Array:
-        """Depths (N,) of points (N, 3) in the camera."""
+        """Return depths (N,) of points (N, 3) in the camera."""
         return np.asarray(np.linalg.norm(points_m, axis=1))
 
     def normals(self, points_m: Array, inverse: Array, slope: Array) -> Array:
@@ -221,7 +221,7 @@ class WideLens(Lens):
 
 
 def _angle_rad(points_m: Array) -> Array:
-    """Angles (N,) between points (N, 3) and the optical axis."""
+    """Return angles (N,) between points (N, 3) and the optical axis."""
     return np.asarray(np.arctan2(np.linalg.norm(points_m[:, :2], axis=1), points_m[:, 2]))
 
 

@@ -183,7 +183,7 @@ def _view(
     color: str = COLOR,
     depth: str = DEPTH,
 ) -> View | None:
-    """The frame, None if it cannot be read or has another size: other checks say so.
+    """Read a frame; None if it is unreadable or of another size, as other checks report.
 
     Colours are those of the pixels of depth, whichever camera took them.
     """
@@ -206,7 +206,7 @@ def _view(
 def _registered(
     grey: NDArray[np.float32], color: CameraConfig, depth: CameraConfig
 ) -> NDArray[np.float32]:
-    """An image (H, W) of the colour camera at the pixels of a depth camera in the same place."""
+    """Resample an image (H, W) of the colour camera to a depth camera in the same place."""
     column, row = np.meshgrid(np.arange(depth.width) + 0.5, np.arange(depth.height) + 0.5)
     pixel = pixels_of_normalised(color, normalised_of_pixels(depth, np.stack([column, row], -1)))
     places = pixel[..., ::-1].transpose(2, 0, 1) - 0.5  # rows and columns, the first at 0
@@ -215,7 +215,7 @@ def _registered(
 
 
 def _overlap_check(pairs: list[Pair], poses: Poses, camera: CameraConfig) -> Check:
-    """Most pairs must see the same surfaces, or nothing below means anything.
+    """Check that most pairs see the same surfaces; otherwise nothing below means anything.
 
     That is, frames that hardly moved must see each other's points at all, and of frames that have
     them in their views most must not have all of them hidden behind what they see.
@@ -278,7 +278,7 @@ def measure_check(measure: Measure, pairs: list[Pair]) -> Check:
 
 
 def _blame(measure: Measure, wrong: list[tuple[Pair, float]], total: int) -> str:
-    """The frame in the most pairs that are wrong, the earliest of several."""
+    """Name the frame that is in the most wrong pairs, the earliest of several."""
     counts = Counter(frame for pair, _ in wrong for frame in (pair.a, pair.b))
     frame = min(counts, key=lambda f: (-counts[f], f.sequence.name, f.number))
     pair, value = max((p for p in wrong if frame in (p[0].a, p[0].b)), key=lambda p: p[1])

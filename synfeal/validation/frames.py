@@ -46,7 +46,7 @@ REMEDIES = {
 
 
 def kinds_of(sequences: Iterable[SequenceListing]) -> tuple[str, ...]:
-    """The kinds of file every frame must have: layers and right images only if any has."""
+    """List the kinds of file every frame must have: layers and right images only if any has."""
     listed = list(sequences)
     return tuple(
         kind
@@ -56,7 +56,7 @@ def kinds_of(sequences: Iterable[SequenceListing]) -> tuple[str, ...]:
 
 
 def check_names(sequences: Sequence[SequenceListing]) -> Check:
-    """Frames are numbered 0, 1, 2, ... and have a file of each kind."""
+    """Check that frames are numbered 0, 1, 2, ... and have a file of each kind."""
     kinds = kinds_of(sequences)
     failures = [problem for sequence in sequences for problem in sequence.problems]
     failures += [failure for sequence in sequences for failure in _gaps(sequence, kinds)]
@@ -84,7 +84,7 @@ def check_images(
     camera: CameraConfig | None,
     on_frame: Callable[[], object],
 ) -> list[Check]:
-    """Every image decodes to its last row, has the size of the camera, and shows something.
+    """Check that every image decodes fully, has the camera's size, and shows something.
 
     Without a camera all must be of the size of the first one, and depth, which then comes from a
     sensor, does not tell what is empty.
@@ -136,7 +136,7 @@ def check_images(
 
 
 def _median_m(depth_mm: Pixels) -> float:
-    """Of the depths that are known, infinite where there are none."""
+    """Return the median of the known depths, metres; infinite where there are none."""
     depth_mm = depth_mm[::EVERY, ::EVERY]
     known = depth_mm[(depth_mm > 0) & (depth_mm < 65535)]
     return float(np.median(known)) / 1000.0 if known.size else math.inf
@@ -163,14 +163,14 @@ def is_of_one_colour(rgb: Pixels) -> bool:
 
 
 def _is_mostly_empty(rgb: Pixels, depth_mm: Pixels | None) -> bool:
-    """Without its depth what is black counts as empty."""
+    """Tell whether most of an image shows nothing; without depth, black counts as empty."""
     black = (rgb[::EVERY, ::EVERY] == 0).all(axis=2)
     empty = black if depth_mm is None else (depth_mm == 0) | (depth_mm == 65535)
     return bool(np.mean(empty) > 0.5)
 
 
 def read_poses(sequences: Iterable[SequenceListing]) -> tuple[Poses, tuple[str, ...]]:
-    """The poses (4, 4) of all frames that can be read, and what is wrong with the others."""
+    """Read the poses (4, 4) of all readable frames, and what is wrong with the others."""
     poses: Poses = {}
     failures: list[str] = []
     for sequence in sequences:

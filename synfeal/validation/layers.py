@@ -81,7 +81,7 @@ def _check_normals(
     camera: CameraConfig | None,
     on_frame: Callable[[], object],
 ) -> Check:
-    """Unit normals that face the camera, and agree with depth."""
+    """Check that normals are unit vectors that face the camera and agree with depth."""
     failures: list[str] = []
     worst_deg, n_compared = 0.0, 0
     step = max(1, -(-len(with_depth) // MOST_COMPARED))
@@ -130,7 +130,7 @@ def _check_normals(
 
 
 def _angle_to_depth_deg(normals: Array, frame: Frame, rays: Array) -> float | None:
-    """Median angle between mean normals of cells and those of depth; None where little is seen."""
+    """Return the median angle between normals of cells and of depth; None if little is seen."""
     try:
         depth_mm = read_depth_mm(frame.path(DEPTH))
     except InputError:
@@ -160,7 +160,7 @@ def _angle_to_depth_deg(normals: Array, frame: Frame, rays: Array) -> float | No
 
 
 def _cell_sums(vectors: Array) -> Array:
-    """Sums (12 * 16, 3) of vectors (H, W, 3) over the cells of an image."""
+    """Sum vectors (H, W, 3) over the cells of an image: (12 * 16, 3)."""
     rows = np.linspace(0, vectors.shape[0], ROWS + 1).astype(int)[:-1]
     columns = np.linspace(0, vectors.shape[1], COLUMNS + 1).astype(int)[:-1]
     sums = np.add.reduceat(np.add.reduceat(vectors, rows, axis=0), columns, axis=1)
@@ -174,7 +174,7 @@ def _check_masks(
     camera: CameraConfig | None,
     on_frame: Callable[[], object],
 ) -> Check:
-    """Ids that the table knows, and nothing where depth shows nothing."""
+    """Check that the table knows all ids, and that nothing is masked where depth shows nothing."""
     try:
         table = read_instances(dataset)
     except InputError as error:

@@ -55,7 +55,7 @@ __all__ = [
 
 
 def list_sequences(dataset: Path) -> list[SequenceListing]:
-    """The sequences of a data set, in order of their numbers.
+    """List the sequences of a data set in order of their numbers.
 
     Raises:
         InputError: ``dataset`` is not a directory, holds no ``seq-XX``, or an archive is damaged.
@@ -95,7 +95,7 @@ Pixels = NDArray[Any]
 
 
 def read_color(path: FrameFile) -> NDArray[np.uint8]:
-    """Colours (H, W, 3).
+    """Read colours (H, W, 3) of an 8-bit PNG.
 
     Raises:
         InputError: the file is missing, truncated, damaged, or no 8-bit PNG.
@@ -111,7 +111,7 @@ def read_color(path: FrameFile) -> NDArray[np.uint8]:
 
 
 def read_depth_mm(path: FrameFile) -> NDArray[np.uint16]:
-    """Depth (H, W) in millimetres as stored; 0 and 65535 mean no depth.
+    """Read depth (H, W) in millimetres as stored; 0 and 65535 mean no depth.
 
     Raises:
         InputError: the file is missing, truncated, damaged, or no 16-bit grey PNG.
@@ -138,7 +138,7 @@ def _content(path: FrameFile) -> bytes:
 
 
 def _decoded(path: FrameFile, content: bytes) -> Image.Image:
-    """A PNG with every checksum verified and every row decoded."""
+    """Decode a PNG with every checksum verified and every row decoded."""
     try:
         with opened_image(content, ("PNG",)) as image:
             image.verify()

@@ -81,7 +81,7 @@ def has_headlight(dataset: Path) -> bool:
 
 
 def read_manifest(dataset: Path) -> dict[str, Any]:
-    """The manifest as it stands.
+    """Read the manifest as it stands.
 
     Raises:
         InputError: it cannot be read as a JSON object.
@@ -100,7 +100,7 @@ Splits = dict[str, list[SequenceListing]]
 def read_splits(
     dataset: Path, sequences: Iterable[SequenceListing]
 ) -> tuple[Splits, tuple[str, ...]]:
-    """The sequences of each split that can be read, in order, and what is wrong with the files."""
+    """List the sequences of each readable split in order, and what is wrong with the files."""
     by_path = {sequence.path: sequence for sequence in sequences}
     splits: Splits = {}
     failures: list[str] = []
@@ -125,7 +125,7 @@ def check_splits(
     splits: Mapping[str, list[SequenceListing]],
     unreadable: tuple[str, ...],
 ) -> Check:
-    """Each sequence is in one split, once."""
+    """Check that each sequence is in one split, once."""
     uses = Counter(sequence.name for listed in splits.values() for sequence in listed)
     names = " and ".join(SPLIT_FILES.values())
     failures = [

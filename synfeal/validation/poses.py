@@ -74,7 +74,7 @@ def rigid_poses(poses: Poses, bound: float) -> Poses:
 def check_tables(
     dataset: Path, poses: Poses, splits: Mapping[str, Iterable[SequenceListing]]
 ) -> Check:
-    """The poses of the frames are those of ``train.csv`` and ``test.csv``."""
+    """Check that the poses of the frames are those of ``train.csv`` and ``test.csv``."""
     failures: list[str] = []
     differences: list[float] = []
     bound = TABLE_BOUND
@@ -113,7 +113,7 @@ def check_tables(
 
 
 def check_leaks(poses: Poses, splits: Mapping[str, list[SequenceListing]]) -> Check:
-    """No test frame is taken from the pose of a training frame."""
+    """Check that no test frame is taken from the pose of a training frame."""
     frames = frames_of(splits.get("train", []))
     train = {poses[frame].tobytes(): frame for frame in frames if frame in poses}
     test = [frame for frame in frames_of(splits.get("test", [])) if frame in poses]
@@ -136,7 +136,7 @@ PAIRS_PER_GAP = 200  # evenly spread over larger sets
 def choose_pairs(
     sequences: Iterable[SequenceListing], usable: Poses, every: bool
 ) -> list[tuple[Frame, Frame]]:
-    """Pairs ``GAPS`` frames apart, and each frame with those of the most similar poses.
+    """Choose pairs ``GAPS`` frames apart, and each frame with those of the most similar poses.
 
     Of a sequence each; at most ``PAIRS_PER_GAP`` of each kind unless ``every``.
     """
@@ -161,7 +161,7 @@ def choose_pairs(
 
 
 def _nearest(sequence: SequenceListing, usable: Poses) -> list[tuple[Frame, Frame]]:
-    """Each frame with the ``N_NEAREST`` of the most similar poses, the earlier frame first.
+    """Pair each frame with the ``N_NEAREST`` of the most similar poses, the earlier frame first.
 
     A turn by a radian counts as much as a step across the space that the cameras are in.
     """

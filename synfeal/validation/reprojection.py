@@ -89,7 +89,7 @@ class _Seen:
 
 
 def compare(a: View, b: View, lens: Lens) -> Residual | None:
-    """The residuals of a pair, None if b sees fewer than ``MIN_PIXELS`` of a's grid."""
+    """Compute the residuals of a pair; None if b sees fewer than ``MIN_PIXELS`` of a's grid."""
     seen = _look(a, b, lens)
     if np.count_nonzero(seen.mask) < MIN_PIXELS:
         return None
@@ -143,7 +143,7 @@ def _look(a: View, b: View, lens: Lens) -> _Seen:
 def _magnification(
     points: Array, rays_of_a: Array, inverse: Array, slope: Array, lens: Lens
 ) -> Array:
-    """By how much more depth in b changes than depth in a, for points (N, 3) on the surface, (N,).
+    """Compute how much depth in b changes per change of depth in a, (N,), for points (N, 3).
 
     Of ``inverse`` (N,) depth in b, which changes by ``slope`` (N, 2) from pixel to pixel; points
     and rays at depth 1 in a are in the frame of b.
@@ -157,7 +157,7 @@ def _magnification(
 
 
 def _corners(image: NDArray[Any], corner: NDArray[np.int_]) -> Array:
-    """Values (4, N) at the pixel, its right, lower and lower right neighbour."""
+    """Return values (4, N) at the pixel, its right, lower and lower right neighbour."""
     width = image.shape[1]
     upper_left = corner[:, 1] * width + corner[:, 0]
     # One look-up along the flat image is three times as fast as four by row and column.
@@ -169,7 +169,7 @@ def _corners(image: NDArray[Any], corner: NDArray[np.int_]) -> Array:
 def _interpolate(
     image: NDArray[Any], corner: NDArray[np.int_], fraction: Array
 ) -> tuple[Array, Array]:
-    """Bilinear values (N,) and gradients (N, 2) per pixel."""
+    """Interpolate values (N,) and gradients (N, 2) per pixel bilinearly."""
     v00, v01, v10, v11 = _corners(image, corner)
     x, y = fraction.T
     upper, lower = v00 + x * (v01 - v00), v10 + x * (v11 - v10)
@@ -178,7 +178,7 @@ def _interpolate(
 
 
 def _shift_px(grey_error: Array, gradient: Array, place: Array) -> float:
-    """Root mean square of the shifts ``d`` that solve ``error + gradient @ d = 0``.
+    """Solve ``error + gradient @ d = 0`` for shifts ``d`` and return their root mean square.
 
     A shift is that of an image moved, turned and zoomed, so a camera that goes forward shows too.
     Of errors (N,), gradients (N, 2) per pixel and places (N, 2), -1 to 1 across the image's width.
@@ -201,7 +201,7 @@ def _shift_px(grey_error: Array, gradient: Array, place: Array) -> float:
 
 
 def camera_normal(a: View, b: View, lens: Lens, moved: Sequence[Lens], delta: Array) -> Array:
-    """Normal equations (P, P + 1) of what moving the camera's parameters does to the depths.
+    """Build the normal equations (P, P + 1) of depths against the camera's parameters.
 
     Depths count in multiples of what may differ; ``moved`` are P cameras, of which each has one
     parameter moved by that of ``delta`` (P,).

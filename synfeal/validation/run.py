@@ -119,7 +119,7 @@ def _stereo(
 def _geometry(
     sequences: Sequence[SequenceListing], rigid: Poses, camera: KnownCamera, every_pair: bool
 ) -> list[Check]:
-    """The checks that need depth, the camera and rigid poses."""
+    """Run the checks that need depth, the camera and rigid poses."""
     if DEPTH not in kinds_of(sequences):
         return [Check("pairs", "no depth images: frames cannot be compared", skipped=True)]
     pairs = choose_pairs(sequences, rigid, every_pair)
@@ -130,14 +130,14 @@ def _geometry(
 
 
 def report(dataset: Path, checks: Sequence[Check]) -> str:
-    """One line for each check: name, verdict, what was checked."""
+    """Format one line per check: name, verdict, what was checked."""
     width = max(len(check.name) for check in checks)
     lines = [f"{check.name:<{width}}  {check.verdict:<11}  {check.text}" for check in checks]
     return "\n".join([f"{dataset}", *lines]) + "\n"
 
 
 def error_lines(checks: Sequence[Check]) -> list[str]:
-    """One line for each check that failed: its first failure, and how many more there are."""
+    """Format one line per failed check: its first failure, and how many more there are."""
     return [
         f"{check.name}: {check.failures[0]}"
         + f" (and {len(check.failures) - 1} more)" * (len(check.failures) > 1)
