@@ -143,7 +143,7 @@ def train(arguments: argparse.Namespace) -> None:
 
 
 def _randomisation(text: str) -> PhotometricConfig | None:
-    """The ranges that ``--randomisation`` stands for.
+    """Read the ranges that ``--randomisation`` stands for.
 
     Raises:
         InputError: The file cannot be read, or holds other keys or values.
@@ -253,7 +253,7 @@ SOURCES = {
 
 
 def resampled_text(done: Localized) -> str:
-    """By what the pictures were brought to the training camera, and what they do not show of it."""
+    """Say by what pictures were brought to the training camera, and what they lack of its view."""
     which = "all" if done.n_resampled == done.n_images else f"{done.n_resampled} of {done.n_images}"
     by = SOURCES[done.calibration] if done.calibration else ""
     text = f"{which} pictures were brought to that view by {by}"

@@ -135,7 +135,7 @@ def read_image(path: FrameFile, camera: CameraConfig, mode: str | None = None) -
 
 
 def link_images(color_paths: Sequence[FrameFile], camera: CameraConfig, images: Path) -> None:
-    """A new directory ``images`` in which the order of the names is the order of the frames.
+    """Link frames into a new directory ``images``, under names whose order is that of the frames.
 
     COLMAP leaves out an image that it cannot read, which would look like a frame without texture.
 

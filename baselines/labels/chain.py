@@ -233,7 +233,7 @@ def _place(
 
 
 def _error(pose: Array, true_pose: Array) -> tuple[float, float]:
-    """Position error in metres and orientation error in degrees of one pose."""
+    """Compute the position error in metres and the orientation error in degrees of one pose."""
     position_m, orientation_rad = pose_error(pose, true_pose)
     return float(position_m), float(np.degrees(orientation_rad))
 

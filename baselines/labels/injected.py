@@ -49,7 +49,7 @@ def independent_noise(
 def add_noise(
     table: PoseTable, noise_m: float, noise_deg: float, rng: np.random.Generator
 ) -> PoseTable:
-    """The same frames with noisy poses; a noise of 0 leaves its part bit-identical.
+    """Add noise to the poses of all frames; a noise of 0 leaves its part bit-identical.
 
     Every position is displaced by ``noise_m``, every orientation turned by ``noise_deg``. Both sets
     of directions are drawn whatever the sizes, so with the same seed a variant with position noise
@@ -71,9 +71,15 @@ def add_noise(
 
 
 def displaced(table: PoseTable, shift_m: Array, rotvec_rad: Array) -> PoseTable:
-    """Poses moved and then turned in the world; where all of a part is zero it stays as it is.
+    """Move and then turn poses in the world; where all of a part is zero, it stays bit-identical.
 
-    By displacements (N, 3) and rotation vectors (N, 3), both in the world.
+    Args:
+        table: The frames and their poses.
+        shift_m: Displacements (N, 3), world, metres.
+        rotvec_rad: Rotation vectors (N, 3), world, radians.
+
+    Returns:
+        The same frames with the displaced poses.
     """
     position_m, quat_wxyz = table.position_m.copy(), table.quat_wxyz.copy()
     if shift_m.any():
@@ -180,10 +186,15 @@ def seed_names(kind: str, split: str) -> tuple[str, ...]:
 def _smooth_field(
     position_m: Array, median: float, rng: np.random.Generator
 ) -> Callable[[Array], Array]:
-    """Vectors as a function of positions (N, 3); their median length at ``position_m`` is given.
+    """Draw a smooth vector field as a function of positions (N, 3).
 
     Each component is one sine wave in a random direction with a random phase, as long as the
     longest side of the box around the positions.
+
+    Args:
+        position_m: Positions (N, 3) the field is scaled by, world, metres.
+        median: Median length of the vectors at those positions.
+        rng: Source of directions and phases.
     """
     low, high = position_m.min(axis=0), position_m.max(axis=0)
     length_m = max(float((high - low).max()), 1e-9)
@@ -219,7 +230,7 @@ def write_erroneous_labels(
 
 
 def constant_pose(train: PoseTable, frames: PoseTable) -> PoseTable:
-    """The same pose for all of some frames: mean position and mean rotation of a label set.
+    """Answer every frame with one pose: mean position and mean rotation of a label set.
 
     The mean rotation is the one with the least sum of squared chords (Markley et al., "Averaging
     Quaternions", JGCD 2007). Cameras that look all round have hardly a mean; then any rotation does

@@ -101,7 +101,7 @@ class FusedModel:
         size_px: tuple[int, int],
         tile_px: int,
     ) -> Depth:
-        """Depth of some blocks (n, 3) in an image of a width and height, 0 where there is none."""
+        """Cast rays at some blocks (n, 3) for the depth of an image of a size, 0 for nothing."""
         shown: Depth = self._grid.ray_cast(
             blocks,
             o3d.core.Tensor.from_numpy(matrix),
@@ -153,7 +153,7 @@ class FusedModel:
 
 
 def _cam_from_first(first_from_cam: Array) -> o3d.core.Tensor:
-    """The inverse of a pose (4, 4) as Open3D takes it."""
+    """Invert a pose (4, 4), as Open3D takes it."""
     return o3d.core.Tensor.from_numpy(np.ascontiguousarray(inverse(first_from_cam)))
 
 

@@ -48,7 +48,15 @@ class RelativeError:
 
 
 def absolute_errors(labels: PoseTable, truth: PoseTable) -> PoseErrors:
-    """Compute position errors in metres (N,) and orientation errors in degrees (N,) of labels."""
+    """Compute the errors of labels as they are, without aligning them to the truth.
+
+    Args:
+        labels: Poses to judge.
+        truth: True poses of the same frames, row by row.
+
+    Returns:
+        Position errors (N,) in metres and orientation errors (N,) in degrees.
+    """
     position_m, orientation_rad = pose_error(labels.world_from_cam, truth.world_from_cam)
     return position_m, np.degrees(orientation_rad)
 
@@ -84,12 +92,12 @@ def relative_error(sequences: Sequence[Pair], frames: int) -> RelativeError | No
 
 
 def _travelled_m(truth: PoseTable, frames: int) -> float:
-    """Length of the true path over each run of ``frames`` frames, added up."""
+    """Add up the lengths of the true path over each run of ``frames`` frames."""
     steps_m = np.linalg.norm(np.diff(truth.position_m, axis=0), axis=1)
     return float(np.convolve(steps_m, np.ones(frames), "valid").sum())
 
 
 def _motion(table: PoseTable, frames: int) -> Array:
-    """Motions ``i_from_j`` (N - frames, 4, 4) with j = i + frames."""
+    """Compute motions ``i_from_j`` (N - frames, 4, 4) with j = i + frames."""
     poses = table.world_from_cam
     return relative(poses[:-frames], poses[frames:])

@@ -114,7 +114,7 @@ def write_solved(
 
 
 def solve_graph(name: str, graph: PoseGraph, cfg: PoseGraphConfig) -> tuple[BatchTrajectory, Facts]:
-    """Trajectory of a batch by a method with an optimiser, and what the optimiser took.
+    """Optimise a batch's pose graph; return the trajectory and what the optimiser took.
 
     Raises:
         ValueError: the edges do not connect all nodes.

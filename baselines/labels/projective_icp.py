@@ -45,7 +45,7 @@ class Surface(NamedTuple):
 
 
 def pyramid_of(depth_m: Depth, camera: CameraConfig) -> list[Surface]:
-    """A depth image (H, W), not finite where nothing was measured, at all levels."""
+    """Turn a depth image (H, W), metres, not finite where nothing was measured, into all levels."""
     measured = np.where(np.isfinite(depth_m), depth_m, np.float32(np.nan))
     image = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(np.ascontiguousarray(measured)))
     smooth_m = image.filter_bilateral(*_SMOOTHING).as_tensor().numpy()[..., 0]
@@ -53,7 +53,7 @@ def pyramid_of(depth_m: Depth, camera: CameraConfig) -> list[Surface]:
 
 
 def _surface(depth_m: Depth, smooth_m: Depth, camera: CameraConfig, stride: int) -> Surface:
-    """One level; normals are those of the smoothed depth."""
+    """Build one level; its normals are those of the smoothed depth."""
     normals = np.full((*depth_m.shape, 3), np.nan)
     normals[1:-1, 1:-1] = normals_of(points_of(smooth_m, camera, stride))
     return Surface(points_of(depth_m, camera, stride), normals)
@@ -106,7 +106,7 @@ def _normal_equations(
     projection: Array,
     motion: Array,
 ) -> tuple[Array, Array]:
-    """The 6x6 system and right side of a small turn, then shift, that lowers plane distances."""
+    """Build the 6x6 system of the small turn, then shift, that lowers plane distances."""
     system, right = np.zeros((6, 6)), np.zeros(6)
     row = np.empty(6)
     height, width = points.shape[:2]

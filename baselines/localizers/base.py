@@ -31,7 +31,7 @@ class PoseRegressor(OutputLayer):
         self.quat = nn.Linear(n_in, 4)
 
     def forward(self, features: Tensor) -> PosePrediction:
-        """Poses of features (B, n_in), in float32: bfloat16 rounds positions to centimetres."""
+        """Regress poses from features (B, n_in), in float32: bfloat16 rounds positions to 1 cm."""
         device = features.device.type
         mixed = torch.amp.is_autocast_available(device)  # not on "meta", where shapes are planned
         with torch.autocast(device, enabled=False) if mixed else nullcontext():
@@ -75,7 +75,7 @@ class Localizer(nn.Module):
     criterion: PoseLoss
 
     def forward(self, images: Tensor) -> list[PosePrediction]:
-        """Predictions for normalised images (B, 3, H, W): the main one, then auxiliary ones."""
+        """Predict poses of normalised images (B, 3, H, W): the main one, then auxiliary ones."""
         raise NotImplementedError
 
     def loss(

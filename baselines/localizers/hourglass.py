@@ -38,7 +38,7 @@ class UpBlock(nn.Module):
         self.n_out = 2 * n_encoder if concatenate else n_encoder
 
     def forward(self, maps: Tensor, encoder: Tensor) -> Tensor:
-        """(B, n_in, h, w) and (B, n_encoder, H, W), h = ceil(H / 2), to (B, n_out, H, W)."""
+        """Map (B, n_in, h, w) and (B, n_encoder, H, W), h = ceil(H / 2), to (B, n_out, H, W)."""
         upsampled = torch.relu_(self.bn(self.up(maps, output_size=list(encoder.shape[-2:]))))
         return torch.cat([upsampled, encoder], 1) if self.concatenate else upsampled + encoder
 
@@ -78,7 +78,7 @@ class Hourglass(Localizer):
         self.criterion = beta_loss(self.kind.name, hyper)
 
     def forward(self, images: Tensor) -> list[PosePrediction]:
-        """One prediction."""
+        """Predict poses of normalised images (B, 3, H, W): one prediction."""
         layer1, layer2, layer3, layer4 = self.backbone(images)
         maps = self.up3(layer4, layer3)
         maps = self.up2(maps, layer2)

@@ -94,7 +94,7 @@ class BetaLoss(PoseLoss):
         self.beta = beta
 
     def forward(self, prediction: PosePrediction, position_m: Tensor, quat_wxyz: Tensor) -> Tensor:
-        """Scalar loss of predictions against positions (B, 3) and unit quaternions (B, 4)."""
+        """Compute the scalar loss against positions (B, 3), metres, and unit quaternions (B, 4)."""
         position, orientation = self.distances(prediction, position_m, quat_wxyz)
         return position + self.beta * orientation
 
@@ -112,7 +112,7 @@ class LearnedWeightLoss(PoseLoss):
         self.s_orientation = nn.Parameter(torch.tensor(s_orientation))
 
     def forward(self, prediction: PosePrediction, position_m: Tensor, quat_wxyz: Tensor) -> Tensor:
-        """Scalar loss of predictions against positions (B, 3) and unit quaternions (B, 4)."""
+        """Compute the scalar loss against positions (B, 3), metres, and unit quaternions (B, 4)."""
         position, orientation = self.distances(prediction, position_m, quat_wxyz)
         weighted_position = torch.exp(-self.s_position) * position + self.s_position
         return weighted_position + torch.exp(-self.s_orientation) * orientation + self.s_orientation

@@ -43,7 +43,7 @@ class FourDirectionLstm(nn.Module):
         self.n_out = 4 * hidden
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, rows * columns) to (B, 4 * hidden)."""
+        """Map (B, rows * columns) to (B, 4 * hidden)."""
         matrix = features.view(-1, *self.shape)
         _, (vertical, _) = self.vertical(matrix.transpose(0, 1))  # steps: rows
         _, (horizontal, _) = self.horizontal(matrix.permute(2, 0, 1))  # steps: columns
@@ -76,6 +76,6 @@ class PoseLstm(Localizer):
         self.criterion = beta_loss(self.kind.name, hyper)
 
     def forward(self, images: Tensor) -> list[PosePrediction]:
-        """One prediction."""
+        """Predict poses of normalised images (B, 3, H, W): one prediction."""
         features = self.feature(self.backbone(images).last)
         return [self.regressor(self.lstm(features))]

@@ -63,7 +63,7 @@ class PoseNet(Localizer):
         self.criterion = beta_loss(self.kind.name, hyper)
 
     def forward(self, images: Tensor) -> list[PosePrediction]:
-        """Main prediction, then those of the first and second auxiliary regressor."""
+        """Predict poses: the main ones, then those of the first and second auxiliary regressor."""
         maps = self.backbone(images)
         return [
             self.regressor(maps.last),

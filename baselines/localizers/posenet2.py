@@ -44,7 +44,7 @@ class PoseNet2(Localizer):
         self.criterion = learned_loss(hyper)
 
     def forward(self, images: Tensor) -> list[PosePrediction]:
-        """One prediction."""
+        """Predict poses of normalised images (B, 3, H, W): one prediction."""
         return [self.regressor(self.backbone(images).last)]
 
 
@@ -69,5 +69,5 @@ class PoseNet2ResNet(Localizer):
         self.criterion = learned_loss(hyper)
 
     def forward(self, images: Tensor) -> list[PosePrediction]:
-        """One prediction."""
+        """Predict poses of normalised images (B, 3, H, W): one prediction."""
         return [self.regressor(self.backbone(images).layer4)]

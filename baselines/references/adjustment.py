@@ -47,7 +47,7 @@ def adjusted(evidence: Evidence) -> Array:
 
 
 def placed_on(poses: Array, labels: Array, usable: Rows | None = None) -> Array:
-    """Poses (N, 4, 4) moved, turned and scaled as one so that their centres fit those of labels.
+    """Move, turn and scale poses (N, 4, 4) as one so that their centres fit those of labels.
 
     Frames whose centres stay far off, three times the median, have no say: estimated labels can be
     wrong by metres where a batch was lost. Nor have frames besides the ``usable`` rows, if given.
@@ -108,7 +108,7 @@ def longest(tracks: Tracks, usable: NDArray[np.bool_], n_frames: int) -> Rows:
 def _model(
     tracks: Tracks, world_from_cam: Array, point_m: Array, chosen: Rows, camera: pycolmap.Camera
 ) -> pycolmap.Reconstruction:
-    """A COLMAP model of the chosen tracks and the frames that see them, counted from 1."""
+    """Build a COLMAP model of the chosen tracks and the frames that see them, counted from 1."""
     kept = np.flatnonzero(np.isin(tracks.track, chosen))
     kept = kept[np.argsort(tracks.frame[kept], kind="stable")]
     frame, pixel = tracks.frame[kept], tracks.slope[kept] * camera.params[:2]
@@ -127,7 +127,7 @@ def _model(
 
 
 def _add_points(model: pycolmap.Reconstruction, point_m: Array, frame: Rows, point: Rows) -> None:
-    """Points (C, 3) with their observations: frame (M,), in rising order, and point (M,)."""
+    """Add points (C, 3) with their observations: frame (M,), in rising order, and point (M,)."""
     within = np.arange(len(frame)) - np.searchsorted(frame, frame)
     order = np.argsort(point, kind="stable")
     bounds = np.searchsorted(point[order], np.arange(len(point_m) + 1))
@@ -138,7 +138,7 @@ def _add_points(model: pycolmap.Reconstruction, point_m: Array, frame: Rows, poi
 
 
 def _solve(model: pycolmap.Reconstruction, labels: Array, loss_px: float) -> None:
-    """Some iterations on one thread, with the positions of ``labels`` as weak priors."""
+    """Iterate on one thread, with the positions of ``labels`` as weak priors."""
     config, options = adjustment_of(model, ITERATIONS)
     options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
     options.ceres.loss_function_scale = loss_px

@@ -70,7 +70,7 @@ def dense_sift(frames: Frames) -> Tensor:
 
 
 def _oriented_gradients(frames: Tensor) -> Tensor:
-    """Gradient magnitudes (N, 8, S, S), shared linearly between the two nearest directions."""
+    """Compute gradient magnitudes (N, 8, S, S), shared linearly by the two nearest directions."""
     grey = nnf.pad(frames.float().mean(dim=-1)[:, None], (1, 1, 1, 1), mode="replicate")[:, 0]
     dx = grey[:, 1:-1, 2:] - grey[:, 1:-1, :-2]
     dy = grey[:, 2:, 1:-1] - grey[:, :-2, 1:-1]
@@ -81,7 +81,7 @@ def _oriented_gradients(frames: Tensor) -> Tensor:
 
 
 def _windowed(maps: Tensor, cell_px: int) -> Tensor:
-    """Maps (N, 8, S, S) summed under triangular windows of two cells' width, where they fit."""
+    """Sum maps (N, 8, S, S) under triangular windows of two cells' width, where they fit."""
     window = 1 - torch.arange(1 - cell_px, cell_px).abs() / cell_px
     kernel = window.float().expand(ORIENTATIONS, 1, -1)
     rows = nnf.conv2d(maps, kernel[:, :, None, :], groups=ORIENTATIONS)

@@ -126,7 +126,7 @@ def features_of(
 
 
 def _frame_features(sift: Any, grey: NDArray[np.uint8]) -> tuple[Array, NDArray[np.uint8]]:
-    """Positions (k, 2) in pixels, the first pixel's centre at (0.5, 0.5), and descriptors."""
+    """Detect features: positions (k, 2) in pixels, first centre at (0.5, 0.5), and descriptors."""
     keypoints, descriptor = sift.detectAndCompute(grey, None)
     height, width = grey.shape
     pixel = np.array([point.pt for point in keypoints], dtype=np.float64).reshape(-1, 2) + 0.5

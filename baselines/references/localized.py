@@ -126,7 +126,7 @@ def localize_in_map(
 def _find_all(
     finder: Finder, pictures: Sequence[Path], camera: PhotographCamera, taken_s: list[float]
 ) -> list[Answer]:
-    """Answers in the order of the photographs; notes how long each took."""
+    """Answer the photographs in their order, noting how long each took."""
     answers = []
     with Progress(len(pictures), "localize") as progress:
         for index, path in enumerate(pictures, start=1):

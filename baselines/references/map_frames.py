@@ -103,7 +103,7 @@ class MapFrames:
 
 
 def _at(depth_m: Depth, camera: CameraConfig, slope: Array) -> Array:
-    """Depth (n,) of the pixels that rays (n, 2) of the depth camera go through, else inf."""
+    """Look up depth (n,) where rays (n, 2) of the depth camera meet its image, else inf."""
     pixel = pixels_of_normalised(camera, slope)
     height, width = depth_m.shape
     inside = np.asarray(((pixel >= 0) & (pixel < [width, height])).all(axis=1))
@@ -184,7 +184,7 @@ def read_map_frames(folder: Path, choice: FrameChoice, cameras: CameraOptions) -
 
 
 def _training_frames(folder: Path, frames: slice) -> PosedFrames:
-    """The chosen ones of the training frames of a data set."""
+    """Select training frames of a data set."""
     sequences = read_split(folder, "train")
     if not sequences:
         raise InputError(f"{folder}: has no training frames to make a map of")

@@ -101,7 +101,7 @@ class StructureMap:
 
 
 def detector(max_features: int = MAX_FEATURES) -> Any:
-    """SIFT as maps and photographs are searched with."""
+    """Create the SIFT detector that maps and photographs share."""
     cv2.setNumThreads(1)
     return cv2.SIFT.create(max_features, contrastThreshold=CONTRAST, enable_precise_upscale=True)
 
@@ -173,7 +173,7 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
 
 
 def _read_frames(frames: MapFrames) -> tuple[Features, NDArray[np.uint8]]:
-    """Features with depth, and the views (N, 64, 64, 3) that retrieval compares."""
+    """Read features with depth, and the views (N, 64, 64, 3) that retrieval compares."""
     sift = detector()
     views = np.empty((len(frames), VIEW_PX, VIEW_PX, 3), np.uint8)
     found = []

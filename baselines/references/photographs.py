@@ -170,7 +170,7 @@ class Finder:
         return _Attempt(found.world_from_cam, support, pixel, point_m)
 
     def _focal_ratio(self, attempt: _Attempt) -> float:
-        """Ratio of the best focal length to the one given, from matches that nearly agree."""
+        """Estimate the best focal length over the given one, from matches that nearly agree."""
         cam_from_world = inverse(attempt.world_from_cam)
         in_cam_m = attempt.point_m @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -196,7 +196,7 @@ class _Attempt(NamedTuple):
 
 
 def _sampled(pixels: NDArray[np.uint8], looks: Array) -> NDArray[np.uint8]:
-    """Colours (64, 64, 3) as means over samples at (64 s, 64 s, 2) pixels; edges are continued."""
+    """Average samples at (64 s, 64 s, 2) pixels to colours (64, 64, 3); edges are continued."""
     column, row = np.moveaxis((looks - 0.5).astype(np.float32), -1, 0)
     fine = cv2.remap(pixels, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     small = cv2.resize(fine, (VIEW_PX, VIEW_PX), interpolation=cv2.INTER_AREA)
@@ -204,7 +204,7 @@ def _sampled(pixels: NDArray[np.uint8], looks: Array) -> NDArray[np.uint8]:
 
 
 def _places(calibration: Calibration, camera: CameraConfig) -> Array:
-    """Pixels (64 s, 64 s, 2) of a photograph that show what the pixels of a map's view show."""
+    """Find the pixels (64 s, 64 s, 2) of a photograph that show what those of a map's view show."""
     return _places_of(calibration, camera.model_dump_json())
 
 

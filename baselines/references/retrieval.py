@@ -63,7 +63,15 @@ def nearest_pose(evidence: Evidence) -> NDArray[np.float64]:
 
 
 def nearest_rows(train: PoseTable, test: PoseTable) -> NDArray[np.int64]:
-    """Find the training pose at the least metres plus radians from each test pose (N,)."""
+    """Find the training pose nearest to each test pose, a radian counting as much as a metre.
+
+    Args:
+        train: Training poses.
+        test: Test poses (N).
+
+    Returns:
+        Rows (N,) of ``train``.
+    """
     squares = np.square(train.position_m).sum(axis=1)
     found = []
     for start in range(0, len(test), CHUNK):

@@ -48,7 +48,7 @@ class _Residual(nn.Module):
         self.layers = nn.Sequential(*(_Convolution(CHANNELS, CHANNELS, k) for k in kernels))
 
     def forward(self, x: Tensor) -> Tensor:
-        """Maps (B, 128, R, C)."""
+        """Map (B, 128, R, C) to the same shape."""
         out: Tensor = x + self.layers(x)
         return out
 
@@ -94,7 +94,7 @@ class CoordinateNetwork(nn.Module):
         nn.init.zeros_(out.linear.weight)  # the mean at first, not points outside the room
 
     def forward(self, images: Tensor) -> Tensor:
-        """Of normalised images."""
+        """Predict scene coordinates from normalised images."""
         out: Tensor = self.layers(images) + self.mean_m
         return out
 

@@ -207,7 +207,7 @@ def triangulate(tracks: Tracks, world_from_cam: Array) -> Array:
 
 
 def _meet(tracks: Tracks, centre: Array, across: Array) -> Array:
-    """Points (T, 3) from centres (M, 3) and weighted projections (M, 3, 3) across the rays."""
+    """Triangulate points (T, 3) from centres (M, 3) and weighted projections (M, 3, 3)."""
     left = np.zeros((tracks.count, 3, 3))
     right = np.zeros((tracks.count, 3))
     np.add.at(left, tracks.track, across)

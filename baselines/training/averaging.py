@@ -61,12 +61,12 @@ class WeightAverage:
                 value.copy_(self._sums[name] / self._count)
 
     def _values(self) -> dict[str, Tensor]:
-        """Parameters and buffers, but those that count."""
+        """Return parameters and buffers, except counters."""
         state = self._network.state_dict()
         return {name: value for name, value in state.items() if value.is_floating_point()}
 
     def state_dict(self) -> dict[str, Any]:
-        """The sums so far."""
+        """Return the sums so far."""
         return {"sums": self._sums, "count": self._count}
 
     def load_state_dict(self, state: Mapping[str, Any], /) -> None:

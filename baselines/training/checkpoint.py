@@ -209,7 +209,7 @@ def _read(path: Path, device: torch.device) -> dict[str, Any]:
 
 
 def _statistics(stored: object) -> ImageStatistics:
-    """Image statistics as they are stored.
+    """Read image statistics as they are stored.
 
     Raises:
         ValueError: They are not a mean and a positive deviation (1, 3, 1, 1).
@@ -226,7 +226,7 @@ def _statistics(stored: object) -> ImageStatistics:
 
 
 def _calibration(stored: object) -> Calibration | None:
-    """The calibration as it is stored; None in checkpoints written before there was any.
+    """Read the calibration as it is stored; None in checkpoints written before there was any.
 
     Raises:
         ValueError: It is damaged.

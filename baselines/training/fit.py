@@ -62,14 +62,14 @@ class Randomisation(Restorable, Interface):
     """Changes how images look before they are normalised; its state is its generator's."""
 
     def __call__(self, images: Tensor, /) -> Tensor:
-        """Float grey levels (B, 3, H, W) of images (B, 3, H, W) uint8."""
+        """Randomise images (B, 3, H, W) uint8 to float grey levels (B, 3, H, W)."""
 
 
 class Augmentation(Restorable, Interface):
     """Changes training images and the labels with them; its state is where its generator stands."""
 
     def __call__(self, images: Tensor, quat_wxyz: Tensor) -> tuple[Tensor, Tensor]:
-        """Other images (B, 3, H, W), normalised, and their unit quaternions (B, 4)."""
+        """Augment images (B, 3, H, W), normalised, and their unit quaternions (B, 4)."""
 
 
 @dataclass

@@ -172,7 +172,7 @@ class Seen(NamedTuple):
         return np.asarray(self.typicality <= OUTSIDE)
 
     def status(self, good: NDArray[np.bool_]) -> NDArray[np.object_]:
-        """Words (N,) of the column ``status``; ``good`` (N,) are finite poses."""
+        """Fill the column ``status`` (N,) in words; ``good`` (N,) are finite poses."""
         told = [~good, self.unlike | self.beyond, np.isfinite(self.typicality)]
         words = np.select(told, ["no pose", "outside", "inside"], default="unknown")
         return words.astype(object)
@@ -200,7 +200,7 @@ def _seen(trained: TrainedLocalizer, position_m: Array, features: Tensor | None)
 
 
 def _moved(sequence_from_world: Array, position_m: Array, quat_wxyz: Array) -> tuple[Array, Array]:
-    """Positions (N, 3) and quaternions (N, 4) in the sequence's world; ``nan`` stays ``nan``."""
+    """Move positions (N, 3) and quaternions (N, 4) to the sequence's world; NaN stays NaN."""
     position_m = position_m @ sequence_from_world[:3, :3].T + sequence_from_world[:3, 3]
     moved = np.full_like(quat_wxyz, np.nan)
     known = np.isfinite(quat_wxyz).all(axis=1)
@@ -245,7 +245,7 @@ def _predict_all(
 
 
 def _batch(trained: TrainedLocalizer, pictures: Sequence[Path], reader: PictureReader) -> Tensor:
-    """Pictures as (B, 3, px, px) uint8, channels last."""
+    """Read pictures as (B, 3, px, px) uint8, channels last."""
     frames = np.stack([reader(path) for path in pictures])
     return torch.from_numpy(frames).to(trained.device).permute(0, 3, 1, 2)
 
@@ -272,7 +272,7 @@ def _holds_poses(out: Path) -> bool:
 def _write(
     out: Path, pictures: Sequence[Path], poses: Array, good: NDArray[np.bool_], seen: Seen
 ) -> None:
-    """Numbers with enough digits to read back the same values; names as the bytes they are.
+    """Write numbers with enough digits to read back the same values; names as the bytes they are.
 
     Args:
         out: File to write.
@@ -297,7 +297,7 @@ MAX_ASPECT = 20
 
 
 def find_pictures(named: Iterable[Path]) -> list[Path]:
-    """The files named, and in place of a directory the pictures in it, sorted by name.
+    """List the files named and, in place of a directory, the pictures in it, sorted by name.
 
     Of a 7-Scenes sequence these are the colour images: ``*.depth.png`` is left out.
 
@@ -391,7 +391,7 @@ class PictureReader:
         self.outside = 0.0
 
     def __call__(self, path: Path) -> NDArray[np.uint8]:
-        """Pixels (input_px, input_px, 3) of a picture."""
+        """Read a picture as pixels (input_px, input_px, 3)."""
         began = time.perf_counter()
         image = self._brought(open_picture(path), path)
         pixels = fit_frame(image, self._network.input_px, self._network.view)
@@ -399,7 +399,7 @@ class PictureReader:
         return pixels
 
     def _brought(self, image: Image.Image, path: Path) -> Image.Image:
-        """The picture as the training camera sees it, where both cameras are known."""
+        """Resample the picture to the training camera, where both cameras are known."""
         known = None if self._target is None else self._camera.of(image, path)
         if known is None or self._target is None:
             return image

@@ -79,7 +79,7 @@ class Muon(Untraced):
         return buffer
 
     def _stacks_of(self, index: int, parameters: list[Tensor]) -> list[_Stack]:
-        """A group's parameters in stacks; made anew if others have gradients, or they moved."""
+        """Stack a group's parameters; anew if others have gradients, or they moved."""
         places = [p.data_ptr() for p in parameters]
         if index not in self._stacks or self._stacks[index][0] != places:
             by_side: dict[int, list[int]] = {}
@@ -136,14 +136,16 @@ class _Stack:
 
     @staticmethod
     def _as_matrix(step: Tensor, member: _Member) -> Tensor:
-        """The step of a parameter, laid out as the member's matrix is."""
+        """Lay out the step of a parameter as the member's matrix is."""
         if member.permuted:
             step = step.permute(0, 2, 3, 1)
         return step.reshape(member.matrix.shape)
 
 
 def _member(position: int, parameter: Tensor, gram: Tensor) -> _Member:
-    """View a parameter as a matrix whose columns stand in the order in which they lie in memory.
+    """View a parameter as a matrix with columns in the order of memory, so that it is not copied.
+
+    Orthogonalisation does not mind: to exchange columns before it or after it is the same.
 
     So it is not copied. Orthogonalisation does not mind: to exchange columns before it or after it
     is the same.
@@ -161,7 +163,7 @@ def _member(position: int, parameter: Tensor, gram: Tensor) -> _Member:
 
 
 def _side(shorter: int) -> int:
-    """Side to which a Gram matrix is filled up."""
+    """Return the side to which a Gram matrix is filled up."""
     for side in (SIDE // 4, SIDE // 2):
         if shorter <= side:
             return side
@@ -220,7 +222,7 @@ class Optimisation:
             scheduler.step()
 
     def state_dict(self) -> dict[str, Any]:
-        """The state of every part."""
+        """Return the state of every part."""
         return {
             "optimizers": [optimizer.state_dict() for optimizer in self._optimizers],
             "schedulers": [scheduler.state_dict() for scheduler in self._schedulers],
@@ -240,7 +242,7 @@ def optimisation_of(kind: OptimiserName, network: nn.Module, schedule: Schedule)
 
 
 def _muon(network: nn.Module, schedule: Schedule) -> Optimisation:
-    """Muon for kernels and hidden matrices, AdamW for the rest; both rates rise and fall.
+    """Set up Muon for kernels and hidden matrices, AdamW for the rest; both rates rise and fall.
 
     Regressors are the network's output, which Muon's authors leave to AdamW, as they do biases.
     """
@@ -259,7 +261,7 @@ def _muon(network: nn.Module, schedule: Schedule) -> Optimisation:
 
 
 def _halving(network: nn.Module, schedule: Schedule) -> Optimisation:
-    """Adam, every parameter pulled to 0, and half the rate after equal shares of the run."""
+    """Set up Adam with weight decay on all parameters and a rate that halves at equal intervals."""
     optimizer = Adam(
         network.parameters(), schedule.learning_rate, weight_decay=schedule.weight_decay, fused=True
     )
@@ -278,7 +280,7 @@ OPTIMISERS: dict[OptimiserName, Callable[[nn.Module, Schedule], Optimisation]] =
 def _adamw_pair(
     parameters: list[nn.Parameter], schedule: Schedule
 ) -> tuple[torch.optim.Optimizer, LRScheduler]:
-    """Weights decay; biases, batch normalisation and loss weights do not."""
+    """Set up AdamW that decays weights, but not biases, batch normalisation and loss weights."""
     groups = [
         {"params": [p for p in parameters if p.ndim > 1], "weight_decay": schedule.weight_decay},
         {"params": [p for p in parameters if p.ndim <= 1], "weight_decay": 0.0},
@@ -289,7 +291,7 @@ def _adamw_pair(
 
 
 def _rise_and_fall(optimizer: torch.optim.Optimizer, schedule: Schedule) -> LRScheduler:
-    """Straight up to the highest rate within ``WARM_UP`` of the run, then straight down to 0."""
+    """Raise the rate linearly within ``WARM_UP`` of the run, then lower it linearly to 0."""
     steps = schedule.steps
     rise = max(1.0, WARM_UP * steps)
     return LambdaLR(

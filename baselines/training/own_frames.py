@@ -146,7 +146,7 @@ def read_own_frames(folder: Path, ranges: Sequence[FrameRange]) -> OwnFrames:
 def _ranges_of(
     folder: Path, whole: PosedFrames, ranges: Sequence[FrameRange]
 ) -> Iterator[PosedFrames]:
-    """Parts of one sequence of a split; without ranges all of it."""
+    """Yield parts of one sequence of a split; all of it without ranges."""
     if not ranges:
         yield whole
     for chosen in ranges:
@@ -160,7 +160,7 @@ def _ranges_of(
 
 
 def _paths_of_table(folder: Path, n_frames: int) -> NDArray[np.int64] | None:
-    """The path of each frame by ``train.csv``, None where there is none."""
+    """Read the path of each frame from ``train.csv``; None where there is none."""
     table = folder / "train.csv"
     if not table.is_file():
         return None
@@ -174,7 +174,7 @@ def _paths_of_table(folder: Path, n_frames: int) -> NDArray[np.int64] | None:
 
 
 def _blocks(parts: Sequence[PosedFrames]) -> NDArray[np.int64]:
-    """Blocks of neighbours, numbered over all parts, in place of paths."""
+    """Number blocks of neighbours over all parts, in place of paths."""
     found, first = [], 0
     for part in parts:
         count = min(BLOCKS, len(part))
@@ -192,7 +192,7 @@ def _scene_of(folder: Path) -> str:
 
 
 def _manifest_camera(folder: Path) -> FrameCamera | None:
-    """The perspective camera that the manifest of a data set names; None of a fisheye or panorama.
+    """Read the perspective camera in a data set's manifest; None for a fisheye or panorama.
 
     A network learns from those as they are; nothing is turned or resampled.
     """
@@ -265,7 +265,7 @@ def pack_own_frames(
 
 
 def _target_camera(sets: Sequence[OwnFrames], photographs: PhotographCamera) -> FrameCamera | None:
-    """The one camera that all frames are to be of: that of rendered frames where there are any."""
+    """Choose the camera that all frames are brought to: that of rendered frames, if any."""
     cameras = {own.camera: own for own in sets if own.camera is not None}
     if len(cameras) > 1:
         first, second = list(cameras.values())[:2]
@@ -290,7 +290,7 @@ def _resampled(
     target: FrameCamera | None,
     resamplers: dict[Calibration, Resampler | None],
 ) -> Image.Image:
-    """A photograph as ``target`` sees it; as it is where one of the two cameras is not known."""
+    """Resample a photograph to ``target``; leave it where one of the two cameras is unknown."""
     known = None if target is None else photographs.of(image, file)
     if known is None or target is None:
         return image
@@ -301,12 +301,12 @@ def _resampled(
 
 
 def _common_world(sets: Sequence[OwnFrames]) -> Array | None:
-    """From the world of the labels, that of the first data set, to the sequence's."""
+    """Return ``sequence_from_world`` of the first data set, whose world the labels are in."""
     return sets[0].sequence_from_world
 
 
 def _joined(sets: Sequence[OwnFrames]) -> PoseTable:
-    """All frames in the world of the first data set, their paths numbered one after the other.
+    """Join all frames in the world of the first data set, numbering their paths consecutively.
 
     Photographs are in the world of their sequence, rendered frames in that of the mesh.
     """

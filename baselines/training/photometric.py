@@ -52,7 +52,7 @@ class PhotometricRandomisation:
         self._generator = torch.Generator().manual_seed(seed)
 
     def __call__(self, images: Tensor) -> Tensor:
-        """Images (B, 3, S, S) uint8 as float grey levels between 0 and 255, channels last."""
+        """Randomise images (B, 3, S, S) uint8 to float grey levels in 0 to 255, channels last."""
         config, count, side = self._config, len(images), images.shape[-1]
         if config.unseen is not None:
             cells = config.unseen.cells
@@ -83,7 +83,7 @@ class PhotometricRandomisation:
         return {"generator": self._generator.get_state()}
 
     def load_state_dict(self, state: Mapping[str, Tensor], /) -> None:
-        """Set the generator."""
+        """Restore the generator."""
         self._generator.set_state(state["generator"])
 
     def _uniform(self, *shape: int) -> Tensor:
@@ -93,7 +93,7 @@ class PhotometricRandomisation:
         return torch.randn(count, channels, side, side, generator=self._generator)
 
     def _rectangles(self, config: OcclusionConfig, count: int, side: int) -> Rectangles:
-        """Of uniform area and place, their aspect ratio uniform in logarithm."""
+        """Draw rectangles of uniform area and place, their aspect ratio uniform in logarithm."""
         low, high = config.area
         area_px = (low + (high - low) * self._uniform(count)) * side**2
         log_aspect = math.log(config.most_aspect) * (2 * self._uniform(count) - 1)
@@ -108,7 +108,7 @@ class PhotometricRandomisation:
 
 
 def filled(images: Tensor, level: int, colours: Tensor) -> Tensor:
-    """Images (B, 3, H, W) uint8 whose empty pixels show something.
+    """Fill the empty pixels of images (B, 3, H, W) uint8 with smooth random colours.
 
     A pixel is empty if no channel is above ``level``, or if it lies beside such a pixel, where the
     edge of what is seen was averaged with nothing.
@@ -127,7 +127,7 @@ def filled(images: Tensor, level: int, colours: Tensor) -> Tensor:
 
 
 def light_of(images: Tensor) -> Tensor:
-    """Linear light (...), white is 1, of grey levels (...) uint8."""
+    """Convert grey levels (...) uint8 to linear light (...), white at 1."""
     level = torch.arange(256, dtype=torch.float32, device=images.device) / 255
     linear = torch.where(
         level <= 12.92 * LINEAR_BELOW, level / 12.92, ((level + 0.055) / 1.055) ** POWER
@@ -136,14 +136,14 @@ def light_of(images: Tensor) -> Tensor:
 
 
 def levels_of(light: Tensor) -> Tensor:
-    """Grey levels (...), not rounded, of linear light (...); what is beyond white is 255."""
+    """Convert linear light (...) to grey levels (...), not rounded; above white it is 255."""
     light = light.clamp(0.0, 1.0)
     curve = 1.055 * light.clamp_min(LINEAR_BELOW) ** (1 / POWER) - 0.055
     return 255 * torch.where(light <= LINEAR_BELOW, 12.92 * light, curve)
 
 
 def smooth_gain(nodes_ev: Tensor, side: int) -> Tensor:
-    """Factors (B, 1, side, side) that interpolate stops (B, 1, n, n) at equally spaced nodes."""
+    """Interpolate stops (B, 1, n, n) at equally spaced nodes to factors (B, 1, side, side)."""
     size = (side, side)
     if nodes_ev.shape[-1] == 1:
         return torch.exp2(nodes_ev).expand(-1, -1, *size)
@@ -151,7 +151,7 @@ def smooth_gain(nodes_ev: Tensor, side: int) -> Tensor:
 
 
 def covered(light: Tensor, rectangles: Rectangles) -> Tensor:
-    """Light (B, 3, H, W) with a rectangle of one colour before each image."""
+    """Cover light (B, 3, H, W) with a rectangle of one colour per image."""
     left, top, width, height = (values.to(light.device)[:, None] for values in rectangles[:4])
     column = torch.arange(light.shape[3], device=light.device)
     row = torch.arange(light.shape[2], device=light.device)
@@ -162,7 +162,7 @@ def covered(light: Tensor, rectangles: Rectangles) -> Tensor:
 
 
 def blurred(light: Tensor, sigma_px: Tensor) -> Tensor:
-    """Light (B, C, S, S) after a Gaussian of standard deviations (B, 2) across and down, pixels.
+    """Blur light (B, C, S, S) by Gaussians of standard deviations (B, 2) across and down, pixels.
 
     The image goes on as in a mirror beyond its border. There the cosine transform diagonalises the
     filter, which is ``exp(-sigma^2 omega^2 / 2)`` on its coefficients: the mean stays as it is,
@@ -173,7 +173,7 @@ def blurred(light: Tensor, sigma_px: Tensor) -> Tensor:
 
 
 def _mirrored_gaussian(side: int, sigma_px: Tensor) -> Tensor:
-    """Symmetric matrices (B, side, side) that filter a row or a column."""
+    """Return symmetric matrices (B, side, side) that filter a row or a column."""
     cosines = _cosine_transform(side).to(sigma_px)
     omega = torch.arange(side).to(sigma_px) * (math.pi / side)
     damping = torch.exp(-0.5 * (sigma_px[:, None] * omega) ** 2)
@@ -181,7 +181,7 @@ def _mirrored_gaussian(side: int, sigma_px: Tensor) -> Tensor:
 
 
 def _cosine_transform(side: int) -> Tensor:
-    """The orthogonal DCT-II (side, side): a row for each frequency."""
+    """Return the orthogonal DCT-II (side, side): a row for each frequency."""
     frequency = torch.arange(side, dtype=torch.float64)[:, None]
     place = torch.arange(side, dtype=torch.float64)[None] + 0.5
     rows = torch.cos(math.pi / side * frequency * place) * math.sqrt(2 / side)
@@ -190,7 +190,7 @@ def _cosine_transform(side: int) -> Tensor:
 
 
 def noisy(light: Tensor, normal: Tensor, noise: NoiseConfig) -> Tensor:
-    """Light (B, 3, H, W) between 0 and 1 with noise, from standard normal values of its shape.
+    """Add noise to light (B, 3, H, W) between 0 and 1, from standard normal values of its shape.
 
     Variance ``light / full_well + (read / full_well)^2``, as in
     :func:`synfeal.effects.light.with_noise`.
@@ -200,6 +200,6 @@ def noisy(light: Tensor, normal: Tensor, noise: NoiseConfig) -> Tensor:
 
 
 def balance_gains(balance_ev: Tensor) -> Tensor:
-    """Factors (B, 3, 1, 1) on the channels for stops (B, 2) of red and blue beside green."""
+    """Convert stops (B, 2) of red and blue beside green to factors (B, 3, 1, 1) on the channels."""
     red, blue = torch.exp2(balance_ev).unbind(1)
     return torch.stack([red, torch.ones_like(red), blue], dim=1)[:, :, None, None]

@@ -86,16 +86,20 @@ def quintics_for(lowest: float, count: int) -> tuple[Quintic, ...]:
 def inverse_square_root(gram: Tensor, quintics: tuple[Quintic, ...]) -> Tensor:
     """Approximate ``G^(-1/2)`` of symmetric, positive semi-definite matrices.
 
-    The largest eigenvalue is at most the fourth root of the trace of ``G^4``, which is much nearer
-    to it than the trace of ``G`` (the squared Frobenius norm of ``X``, by which Muon divides) and
-    comes for free, as ``G^2`` is needed anyway.
+    ``G = X X^T`` is scaled so that its largest eigenvalue is at most 1, by the fourth root of the
+    trace of ``G^4``. That bound is much nearer than the trace of ``G`` (the squared Frobenius norm
+    of ``X``, by which Muon divides) and comes for free, as ``G^2`` is needed anyway.
 
     Args:
-        gram: the matrices (K, M, M); rows and columns of zeros may fill them up.
-        quintics: polynomials of the singular values, the square roots of the eigenvalues.
+        gram: The matrices G (K, M, M); rows and columns of zeros may fill them up.
+        quintics: Polynomials, in the order of their use, that bring the singular values of ``X`` to
+            1, as :func:`quintics_for` chooses them; at least one.
 
     Returns:
         The roots (K, M, M). Those of zero matrices have no meaning, but are finite.
+
+    Raises:
+        ValueError: No quintic is given.
     """
     trace = gram.diagonal(dim1=1, dim2=2).sum(1)[:, None, None].clamp_min(LEAST_TRACE)
     gram = gram / trace  # the fourth power of a gradient would underflow

@@ -92,7 +92,7 @@ def predict_ms(trained: TrainedLocalizer, images: Tensor) -> float:
 
 
 def median_ms(act: Callable[[], object]) -> float:
-    """Time an action that ends on the processor: median of a few, after one that is not timed."""
+    """Time an action that ends on the processor, ms: the median of a few after a warm-up."""
     act()
     times_s = []
     for _ in range(TIMED_CALLS):

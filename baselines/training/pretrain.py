@@ -48,7 +48,7 @@ class RoomHeads(OutputLayer):
         self.poses = nn.Linear(n_in, 7 * n_rooms)
 
     def forward(self, features: Tensor, room: Tensor) -> PosePrediction:
-        """Poses of features (B, n_in) in their rooms (B,)."""
+        """Regress poses from features (B, n_in) in their rooms (B,)."""
         poses = self.poses(features).view(len(features), -1, 7)
         own = poses[torch.arange(len(features), device=features.device), room]
         return PosePrediction(own[:, :3], own[:, 3:])
@@ -67,7 +67,7 @@ class RoomsNetwork(Localizer):
         self.criterion = LearnedWeightLoss(s_position=0.0, s_orientation=-1.0)
 
     def forward(self, images: Tensor) -> Tensor:  # type: ignore[override]
-        """Features (B, n) of normalised images (B, 3, H, W)."""
+        """Compute features (B, n) of normalised images (B, 3, H, W)."""
         features: Tensor = self.feature(self.backbone(images)[-1])
         return features
 
@@ -163,7 +163,7 @@ def _train_on_rooms(
 def _read_rooms(
     rooms: Sequence[tuple[Path, Path]], input_px: int, device: torch.device
 ) -> LabelledFrames:
-    """Frames of all rooms, positions relative to each room's mean, a fourth number says whose."""
+    """Read frames of all rooms; positions are relative to a room's mean, with its number as 4th."""
     sets = [read_labelled_frames(frames, labels, input_px, device) for frames, labels in rooms]
     places = [
         nn.functional.pad(some.position_m - some.position_m.mean(0), (0, 1), value=room)

@@ -53,7 +53,7 @@ class Resampler:
         self._grid = torch.from_numpy(grid.astype(np.float32))[None]
 
     def __call__(self, image: Image.Image) -> Image.Image:
-        """The photograph (RGB, of the source's size) as the target sees it."""
+        """Resample the photograph (RGB, of the source's size) to the target."""
         if image.size != self._size:
             raise ValueError(f"a picture of {image.size} for a camera of {self._size}")
         small = np.array(image.reduce(self._reduction))

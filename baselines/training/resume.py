@@ -33,7 +33,7 @@ class Restorable(Protocol):
     """Part of a training run whose state is tensors and plain values."""
 
     def state_dict(self) -> Mapping[str, Any]:
-        """The state as it is now."""
+        """Return the state as it is now."""
 
     def load_state_dict(self, state: Any, /) -> Any:
         """Take over a state."""
@@ -71,7 +71,7 @@ class ResumeFile:
         self._saved = time.monotonic()
 
     def remove(self) -> None:
-        """The training is finished: remove the file, and what a kill left of its making."""
+        """Remove the file once training is finished, and what a kill left of its making."""
         if self._path is not None:
             self._path.unlink(missing_ok=True)
             unfinished = f"{UNFINISHED}-*-{self._path.stem}-*{self._path.suffix}"
@@ -108,14 +108,14 @@ class RandomState:
         self._device = device
 
     def state_dict(self) -> dict[str, Tensor]:
-        """States of the processor's generator and of the GPU's in use."""
+        """Return the states of the processor's generator and of the GPU's in use."""
         state = {"cpu": torch.get_rng_state()}
         if self._device.type == "cuda":
             state["cuda"] = torch.cuda.get_rng_state(self._device)
         return state
 
     def load_state_dict(self, state: Mapping[str, Tensor]) -> None:
-        """Set them."""
+        """Restore the generators."""
         torch.set_rng_state(state["cpu"])
         if self._device.type == "cuda":
             torch.cuda.set_rng_state(state["cuda"], self._device)

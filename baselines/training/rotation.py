@@ -44,7 +44,7 @@ class RandomRotation:
         self._grid_from_ray = _grid_from_ray(intrinsics, input_px)
 
     def __call__(self, images: Tensor, quat_wxyz: Tensor) -> tuple[Tensor, Tensor]:
-        """Rotated images (B, 3, S, S), channels last, and their quaternions (B, 4)."""
+        """Rotate images (B, 3, S, S), channels last, and their quaternions (B, 4)."""
         draws = torch.rand(len(images), 3, generator=self._generator)
         rotvec_rad = ((2 * draws - 1) * self._largest_rad).to(images.device)
         return self.rotated(images, rotvec_rad), quat_product(quat_wxyz, quat_of(rotvec_rad))
@@ -70,14 +70,14 @@ class RandomRotation:
         return {"generator": self._generator.get_state()}
 
     def load_state_dict(self, state: Mapping[str, Tensor], /) -> None:
-        """Set the generator."""
+        """Restore the generator."""
         self._generator.set_state(state["generator"])
 
 
 def random_rotation(
     frames: Path, network: NetworkConfig, augmentation: AugmentationConfig, seed: int
 ) -> RandomRotation | None:
-    """For packed frames, by the record beside them; None where nothing is to be rotated.
+    """Set up rotations of packed frames from the record beside them; None if none are wanted.
 
     Raises:
         InputError: there is no record, or the lens of its camera bends lines.
@@ -130,7 +130,7 @@ def quat_product(a_wxyz: Tensor, b_wxyz: Tensor) -> Tensor:
 
 
 def _rays(intrinsics: Intrinsics, input_px: int) -> Tensor:
-    """Directions (3, S * S) through the pixel centres, row by row, of depth 1."""
+    """Return directions (3, S * S) through the pixel centres, row by row, of depth 1."""
     centres = torch.arange(input_px) + 0.5
     x = (centres - intrinsics.cx) / intrinsics.fx
     y = (centres - intrinsics.cy) / intrinsics.fy
@@ -139,7 +139,7 @@ def _rays(intrinsics: Intrinsics, input_px: int) -> Tensor:
 
 
 def _grid_from_ray(intrinsics: Intrinsics, input_px: int) -> Tensor:
-    """Projection (3, 3) to ``grid_sample``'s coordinates: -1 and 1 are the image's borders.
+    """Return the projection (3, 3) to ``grid_sample``'s coordinates, -1 and 1 at the borders.
 
     With ``align_corners=False`` the centre of the first pixel is half a pixel from them, as in our
     cameras.

@@ -211,12 +211,12 @@ def step_seconds(job: Job, frames: Path, labels: Path, weights: Path | None) -> 
 
 
 def _rows_of(matrix: NDArray[np.float64] | None) -> Any:
-    """A matrix as the description of a model holds it."""
+    """Format a matrix as the description of a model holds it."""
     return None if matrix is None else tuple(tuple(row) for row in matrix.tolist())
 
 
 def _bounds_m(job: Job, material: Material) -> Any:
-    """The corners of the box that the positions of the training set lie in."""
+    """Return the corners of the box that the positions of the training set lie in."""
     parts = [material.learned]
     if material.held_out is not None and job.protocol.selection != "test":
         parts.append(material.held_out)
@@ -278,7 +278,7 @@ def _randomisation(job: Job) -> PhotometricRandomisation | None:
 def _split(
     job: Job, data: LabelledFrames, test: FramesAndLabels
 ) -> tuple[LabelledFrames, LabelledFrames | None]:
-    """The frames to learn from, and those that choose the weights."""
+    """Divide frames into those to learn from and those that choose the weights."""
     if job.protocol.selection == "test":
         if test is None:
             raise ValueError("this protocol chooses weights by the test set, which is not given")

@@ -131,7 +131,7 @@ def score_common(predictions: Path, truth: Path, out: Path) -> None:
 
 
 def _both_scores(poses: PoseTable, labels: PoseTable, truth: PoseTable) -> dict[str, Array]:
-    """Errors (N,) against the labels, and under names that end in ``_true`` against the truth."""
+    """Compute errors (N,) against the labels, and, under names in ``_true``, against the truth."""
     true = {f"{name}_true": e for name, e in pose_errors(poses, truth).items()}
     return pose_errors(poses, labels) | true
 

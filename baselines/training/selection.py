@@ -40,7 +40,7 @@ class HeldOutErrors(NamedTuple):
     orientation_deg: float
 
     def score(self, selection: SelectionKind) -> float:
-        """Selection criterion; lower is better.
+        """Return the selection criterion; lower is better.
 
         ``test``: the loss, as the paper's authors do. ``validation``: the product of the two median
         errors. No unit and no weight enters, so losses whose weights are learned can be compared
@@ -67,7 +67,7 @@ class Selection:
         self._score, self._since_best = math.inf, 0
 
     def due_after(self, steps: int, samples_seen: int) -> frozenset[int]:
-        """After which of the steps to evaluate: evenly spread, the last one among them."""
+        """List the steps after which to evaluate: evenly spread, the last one among them."""
         if self._kind == "last" or not self._held_out:
             return frozenset()
         allowed = TIME_SHARE * PREDICTIONS_PER_SAMPLE * samples_seen / len(self._held_out)
@@ -99,7 +99,7 @@ class Selection:
             self._localizer.load_state_dict(self._best)
 
     def state_dict(self) -> dict[str, Any]:
-        """The best weights so far."""
+        """Return the best weights so far."""
         return {"best": self._best, "score": self._score, "since_best": self._since_best}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
@@ -210,7 +210,7 @@ class Progress:
         )
 
     def _held_out_text(self) -> str:
-        """The errors on held-out frames when they were last looked at."""
+        """Return the errors on held-out frames when they were last looked at."""
         looked_at = [row for row in self.rows if row.held_out_position_m is not None]
         if not looked_at:
             return ""
@@ -223,7 +223,7 @@ class Progress:
             self.rows[-1] = HistoryRow(*self.rows[-1][:3], *errors)
 
     def state_dict(self) -> dict[str, Any]:
-        """The history so far."""
+        """Return the rows of the history, the steps done, and losses not yet in a row."""
         rows = [tuple(row) for row in self.rows]
         return {"rows": rows, "done": self.done, "losses": list(self._losses)}
 

@@ -209,7 +209,7 @@ def _is_left(name: str) -> bool:
 
 
 def _settings(job: TrainJob) -> dict[str, Any]:
-    """All that decides the weights but the frames themselves, ready for JSON."""
+    """Collect all that decides the weights but the frames themselves, ready for JSON."""
     camera = job.photographs
     return {
         "datasets": [str(path) for path in job.datasets],
@@ -229,7 +229,7 @@ def _settings(job: TrainJob) -> dict[str, Any]:
 
 
 def _finished(job: TrainJob, settings: dict[str, Any]) -> TrainedModel:
-    """The run that has ended here, if it is this one."""
+    """Return the run that ended here, or refuse one that was trained otherwise."""
     path = job.out / RECORD
     record = read_json(path)
     differing = [key for key in settings if record["settings"].get(key) != settings[key]]
@@ -247,7 +247,7 @@ def _finished(job: TrainJob, settings: dict[str, Any]) -> TrainedModel:
 
 
 def _job_of(job: TrainJob, packed: PackedFrames) -> Job:
-    """The training run, as the benchmark's are described."""
+    """Describe the training run as the benchmark's are described."""
     training = TrainingConfig(
         samples_seen={},
         batch_size=BATCH,
@@ -271,7 +271,7 @@ def _job_of(job: TrainJob, packed: PackedFrames) -> Job:
 
 
 def _rotations(job: TrainJob, packed: PackedFrames) -> AugmentationConfig:
-    """Rotations of images, none through a camera that is not known or bends lines."""
+    """Choose rotations of images: none through a camera that is unknown or bends lines."""
     camera = packed.camera
     if camera is not None and not any(camera.distortion):
         return job.rotations
@@ -295,5 +295,5 @@ def _images_in(minutes: float, run: Job, packed: PackedFrames, out: Path) -> int
 
 
 def _start_of(run: Job) -> Path:
-    """The shipped weights that its backbone starts from."""
+    """Return the shipped weights that its backbone starts from."""
     return shipped_weights_path(backbone_of(run.name, run.network))

@@ -90,7 +90,7 @@ def calibrate(
 
 
 def _spread(count: int, most: int) -> Tensor:
-    """At most so many indices, evenly spread over ``count``."""
+    """Return at most so many indices, evenly spread over ``count``."""
     return torch.linspace(0, count - 1, min(count, most), dtype=torch.float64).round().long()
 
 
@@ -101,7 +101,7 @@ def _features(
     chosen: Tensor,
     randomise: PhotometricRandomisation | None,
 ) -> Tensor:
-    """Features (B, F) of the frames with these indices (B,), on the processor."""
+    """Compute features (B, F) of the frames with these indices (B,), on the processor."""
     features = []
     for some in torch.split(chosen, BATCH):
         images = frames.batch(some.to(frames.rows.device)).images
@@ -112,7 +112,7 @@ def _features(
 
 @torch.inference_mode()
 def features_of(localizer: Localizer, images: Tensor) -> Tensor:
-    """Last maps of the backbone, averaged over the image.
+    """Average the backbone's last maps over the image.
 
     Args:
         localizer: In evaluation mode.
@@ -133,7 +133,7 @@ Paths = NDArray[np.int64]
 def nearest_distance(
     features: Tensor, seen: Tensor, paths: tuple[Paths, Paths] | None = None
 ) -> Tensor:
-    """Cosine distance (B,) to the nearest of other frames.
+    """Compute the cosine distance (B,) to the nearest of other frames.
 
     Args:
         features: Features of frames (B, F), unit length.
@@ -153,7 +153,7 @@ def nearest_distance(
 
 
 def typicality(calibration: Calibration, features: Tensor) -> Array:
-    """Share (B,) of frames of the place that are at least as far from those of other paths.
+    """Rate pictures by the share (B,) of known frames at least as far from those of other paths.
 
     Args:
         calibration: Calibration of the localizer.

@@ -84,11 +84,11 @@ class Evidence:
     _tests: dict[tuple[str, str, bool], TestSet] = field(default_factory=dict)
 
     def under(self, score: str) -> Evidence:
-        """The same results under a score, with nothing read yet."""
+        """Return the same results under a score, with nothing read yet."""
         return replace(self, score=score, used={}, test_paths={}, seeds={})
 
     def file(self, relative: str) -> Path:
-        """A result file that the design makes, noted as used."""
+        """Return a result file that the design makes, and note it as used."""
         path = self.root / relative
         if not path.is_file():
             raise InputError(f"{path}: missing; make the results again")
@@ -101,14 +101,14 @@ class Evidence:
             raise Missing(f"this profile has no row {' '.join(keys.values())}")
 
     def runs_of(self, cell: Cell) -> Sequence[Run]:
-        """The repetitions of a cell."""
+        """Return the repetitions of a cell."""
         if cell not in self.runs:
             named = " ".join((cell.scene, cell.size, cell.labels, cell.init))
             raise Missing(f"this profile has no row {named}")
         return self.runs[cell]
 
     def errors(self, *cells: Cell) -> Array:
-        """Samples (N, 2, B) of the median errors of cells: over test paths and training runs."""
+        """Sample the median errors (N, 2, B) of cells over test paths and training runs."""
         return np.array([self._errors_of(cell) for cell in cells])
 
     def _errors_of(self, cell: Cell) -> Array:
@@ -134,7 +134,7 @@ class Evidence:
         return {measure: borrowed_deviations()[model, measure] for measure in MEASURES}
 
     def _group_of(self, cell: Cell) -> tuple[Cell, int]:
-        """The name of the runs that a cell's repetitions move with, and how many there are.
+        """Name the runs that a cell's repetitions move with, and count them.
 
         Cells that differ in their labels alone drew the same random numbers in each repetition, so
         that what one repetition moves in all of them is left out of all at once. A single run
@@ -162,7 +162,7 @@ class Evidence:
         return Layout(RESAMPLES, tuple(self.groups.values()))
 
     def _medians(self, path: Path, test: TestSet) -> list[Array]:
-        """Samples of both medians of one run's errors on the frames of a test set."""
+        """Sample both medians of one run's errors on the frames of a test set."""
         _, columns, measures = SCORES[self.score]
         table = read_errors(path, columns)
         if not np.array_equal(table["frame"], test.poses.frame):
@@ -170,7 +170,7 @@ class Evidence:
         return [medians(table[m].to_numpy(), test.path, test.counts) for m in measures]
 
     def test_set(self, scene: str, size: str) -> TestSet:
-        """A test set, and the errors on it of always answering the mean true training pose."""
+        """Return a test set, and the errors on it of always answering the mean training pose."""
         train = self.file(f"labels/{scene}/{size}/synfeal/train.csv")
         common = self.score == COMMON
         sizes = {cell.size for cell in self.runs if cell.scene == scene} if common else {size}
@@ -207,7 +207,7 @@ class Evidence:
 
 
 def evidence_of(design: Design, root: Path) -> Evidence:
-    """The results of a profile."""
+    """Collect the results of a profile."""
     runs = defaultdict[Cell, list[Run]](list)
     for run in design.runs:
         runs[Cell(run.model, run.scene, run.size, run.labels, run.init)].append(run)

@@ -59,7 +59,7 @@ ON_OWN_TEST_SET = {"labels": ("C1", "C2", "C3", "C5", "C6", "C15"), "true": ("C1
 
 
 def views(claim: Claim, evidence: Evidence) -> dict[str, Evidence]:
-    """The results that a claim is judged on, by score: on the common test set where it can be."""
+    """Return the results that judge a claim, by score: on the common test set where possible."""
     return {
         score: evidence.under(score if claim.id in own else COMMON)
         for score, own in ON_OWN_TEST_SET.items()
@@ -67,7 +67,7 @@ def views(claim: Claim, evidence: Evidence) -> dict[str, Evidence]:
 
 
 def judge(claim: Claim, evidence: Evidence) -> Outcome:
-    """The verdict of a claim's own rule.
+    """Judge a claim by its own rule.
 
     What the profile does not make leaves it ``not testable here``. Where the localizers it rests on
     have not learnt it is ``not learnt at this scale``, and with fewer than ten paths in a test set

@@ -37,12 +37,12 @@ LEVELS = {
 
 
 def changes(evidence: Evidence, new: Sequence[Cell], old: Sequence[Cell]) -> Array:
-    """Relative change of both median errors from cells to others (N, 2, 1 + RESAMPLES), percent."""
+    """Compute relative changes of both median errors (N, 2, 1 + RESAMPLES), percent."""
     return relative_change(evidence.errors(*new), evidence.errors(*old))
 
 
 def effects(found: Array, claim: Claim, evidence: Evidence) -> Outcome:
-    """Changes of both errors, percent, against the two that the paper prints."""
+    """Judge changes of both errors, percent, against the two that the paper prints."""
     signs = np.sign(claim.numbers)
     conditions = [
         Condition(name, sign * sample, evidence.layout, number)
@@ -56,7 +56,7 @@ def effects(found: Array, claim: Claim, evidence: Evidence) -> Outcome:
 def every_localizer(
     found: Array, groups: Sequence[str], joint: str, evidence: Evidence
 ) -> Judgement:
-    """The verdict of a claim about all localizers, from effects (groups, localizers, 2, ...).
+    """Judge a claim about all localizers from effects (groups, localizers, 2, ...).
 
     ``joint`` stands between a localizer and a group in their names.
     """
@@ -74,12 +74,12 @@ def every_localizer(
 
 
 def _effects(found: Array) -> Array:
-    """Samples (N, ...) of effects (..., 2, 1 + RESAMPLES), one after another."""
+    """Flatten samples of effects (..., 2, 1 + RESAMPLES) to (N, ...)."""
     return found.reshape(-1, found.shape[-1])
 
 
 def lowest_of_all(claim: Claim, evidence: Evidence) -> Outcome:
-    """C1: the relative changes from each rival's labels to the simulator's are below 0."""
+    """Judge C1: relative changes from each rival's labels to the simulator's are below 0."""
     ours = [Cell(model) for model in MODELS]
     rivals = [[Cell(model, labels=rival) for model in MODELS] for rival in RIVALS]
     found = np.array([changes(evidence, ours, cells) for cells in rivals])
@@ -106,7 +106,7 @@ def lowest_of_all(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def gain_over_sfm(claim: Claim, evidence: Evidence) -> Outcome:
-    """C2: PoseNet2's errors fall by two thirds of the published share, or by more."""
+    """Judge C2: PoseNet2's errors fall by two thirds of the published share, or by more."""
     ours = [Cell("posenet2")]
     found = changes(evidence, ours, [Cell("posenet2", labels="sfm")])[0]
     outcome = effects(found, claim, evidence)
@@ -114,7 +114,7 @@ def gain_over_sfm(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def labels_against_models(claim: Claim, evidence: Evidence) -> Outcome:
-    """C3: better labels and the newer model both cut the errors, and labels cut them more.
+    """Judge C3: better labels and the newer model cut the errors, and labels cut them more.
 
     Without the first two conditions the claim could hold because the newer model is worse.
     """
@@ -138,7 +138,7 @@ def labels_against_models(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def kind_of_noise(claim: Claim, evidence: Evidence) -> Outcome:
-    """C5: each block raises the error it names, and by more than the other; both raise both."""
+    """Judge C5: each block raises the error it names more than the other; both raise both."""
     increases = {block: _increase(evidence, labels) for block, labels in LEVELS.items()}
     orientation, position, both = (increases[b] for b in ("orientation", "position", "both"))
     conditions = {
@@ -166,7 +166,7 @@ def kind_of_noise(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def highest_noise(claim: Claim, evidence: Evidence) -> Outcome:
-    """C6: the noisy error exceeds the clean one by a share of the noisy, the paper's base."""
+    """Judge C6: the noisy error exceeds the clean one by a share of the noisy, the paper's base."""
     clean, noisy = [Cell("posenet2")], [Cell("posenet2", labels=LEVELS["both"][-1])]
     outcome = effects(-changes(evidence, clean, noisy)[0], claim, evidence)
     over_clean = values_text(PERCENT, changes(evidence, noisy, clean)[0])
@@ -174,7 +174,7 @@ def highest_noise(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def _increase(evidence: Evidence, labels: Sequence[str]) -> Array:
-    """Relative increase from no noise to the highest level (2, ...), mean over the localizers."""
+    """Compute the relative increase from no noise to the highest level (2, ...), averaged."""
     ends = ([Cell(model, labels=name) for model in MODELS] for name in (labels[-1], labels[0]))
     return mean_of(list(changes(evidence, *ends)))
 
@@ -198,7 +198,7 @@ def _dose_text(evidence: Evidence, rivals: Sequence[str], cells: Sequence[Cell])
 
 
 def _tau_text(evidence: Evidence, labels: Sequence[str]) -> str:
-    """Mean over the localizers of Kendall's tau of error and level."""
+    """Format Kendall's tau of error and level, mean over the localizers."""
     errors = np.array(
         [evidence.errors(*(Cell(m, labels=name) for name in labels))[:, :, 0] for m in MODELS]
     )

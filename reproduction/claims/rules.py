@@ -38,12 +38,12 @@ class Rules(NamedTuple):
 
 @cache
 def rules_history() -> tuple[Rules, ...]:
-    """Every set of rules, oldest first."""
+    """Read every set of rules, oldest first."""
     return tuple(Rules(**row) for _, row in read_records(RULES, Rules._fields))
 
 
 def frozen_rules() -> Rules:
-    """The rules in force."""
+    """Return the rules in force."""
     return rules_history()[-1]
 
 
@@ -55,7 +55,7 @@ def digest_of_rules() -> str:
 
 
 def _bare(path: Path) -> str:
-    """The code of a module without imports, comments, docstrings and white space."""
+    """Return the code of a module without imports, comments, docstrings and white space."""
     text = path.read_text(encoding="utf-8")
     lines = text.splitlines()
     for node in ast.walk(ast.parse(text)):

@@ -43,7 +43,7 @@ def write_claims(design: Design, root: Path, seed: int, out_csv: Path) -> None:
 
 
 def claim_rows(evidence: Evidence, seed: int = 0) -> list[dict[str, str]]:
-    """One row per claim, by column."""
+    """Tabulate the claims, one row each, by column."""
     tag = frozen_rules().tag
     return [
         _row(claim, evidence) | {"seed": str(seed), "rules": tag} for claim in published_claims()
@@ -51,7 +51,7 @@ def claim_rows(evidence: Evidence, seed: int = 0) -> list[dict[str, str]]:
 
 
 def claims_markdown(rows: Sequence[Row]) -> str:
-    """The claims in short, group by group: figures and verdicts under both scores, remarks below.
+    """Format the claims by group: figures and verdicts under both scores, remarks below.
 
     Rows of an earlier version, which have no groups, are grouped as the claims are now.
     """

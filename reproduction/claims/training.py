@@ -44,7 +44,7 @@ IN_PRINT = np.array([[np.sqrt(3)], [1.0]])
 
 
 def grows(claim: Claim, evidence: Evidence, scene: str) -> Outcome:
-    """C7, C8: the errors fall by two thirds of the published share, or more, mean of localizers."""
+    """Judge C7, C8: mean errors fall by two thirds of the published share, or more."""
     sizes = SIZES[scene]
     series = np.array([evidence.errors(*(Cell(m, scene, size) for size in sizes)) for m in MODELS])
     found = mean_of(list(relative_change(series[:, -1], series[:, 0])))
@@ -57,7 +57,7 @@ def grows(claim: Claim, evidence: Evidence, scene: str) -> Outcome:
 
 
 def sanctuary_at_6k(claim: Claim, evidence: Evidence) -> Outcome:
-    """C9: errors of another room, camera and network, in metres: measured, and not judged."""
+    """Measure C9 without judging it: errors of another room, camera and network, metres."""
     cells = [Cell(model, "sanctuary", "6k") for model in MODELS]
     means = mean_of(list(evidence.errors(*cells) / IN_PRINT))
     shares = [float(mean[0]) / n for mean, n in zip(means, claim.numbers, strict=True)]
@@ -70,7 +70,7 @@ def sanctuary_at_6k(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def worse_when_small(claim: Claim, evidence: Evidence) -> Outcome:
-    """C10: the changes from transfer learning to scratch are above 0 at the two smallest sizes."""
+    """Judge C10: from scratch is worse than transfer learning at the two smallest sizes."""
     sizes = ("6k", "20k")
     found = np.array([_from_scratch(evidence, size) for size in sizes])
     judged = every_localizer(found, sizes, " ", evidence)
@@ -84,7 +84,7 @@ def worse_when_small(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def better_when_large(claim: Claim, evidence: Evidence) -> Outcome:
-    """C11: at least three localizers are better from scratch, in both errors, at 80k.
+    """Judge C11: at least three localizers are better from scratch, in both errors, at 80k.
 
     Three are when the third best is: its smaller gain of both errors is above 0.
     """
@@ -101,7 +101,7 @@ def better_when_large(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def best_of_all(claim: Claim, evidence: Evidence) -> Outcome:
-    """C12: PoseNet2 from scratch at 80k has a lower position error than every other cell."""
+    """Judge C12: PoseNet2 from scratch at 80k has the lowest position error of all cells."""
     claimed = Cell("posenet2", SCENE, "80k", init="scratch")
     cells = [Cell(m, SCENE, size, init=i) for i in STARTS for size in SIZES[SCENE] for m in MODELS]
     errors = evidence.errors(*cells)
@@ -126,7 +126,7 @@ def best_of_all(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def longer(claim: Claim, evidence: Evidence) -> Outcome:
-    """C13: from scratch, more images have to be shown for the same errors, at 6k."""
+    """Judge C13: from scratch, more images have to be shown for the same errors, at 6k."""
     logs = np.array([_log_ratio(evidence, model) for model in MODELS])
     change = 100 * np.expm1(mean_of(list(logs)))
     low, high = limits(change, evidence.layout)
@@ -142,7 +142,7 @@ def longer(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def _log_ratio(evidence: Evidence, model: str) -> Array:
-    """Logarithm (1 + RESAMPLES,) of images from scratch over images with transfer learning."""
+    """Sample the logarithm (1 + RESAMPLES,) of images from scratch over those with transfer."""
     old, new = (
         np.log(evidence.errors(*(Cell(model, init=f"{start}{end}") for end in LENGTHS)))
         for start in STARTS
@@ -168,7 +168,7 @@ def images_ratio(new: Array, old: Array) -> Array:
 
 
 def _from_scratch(evidence: Evidence, size: str) -> Array:
-    """Changes of the localizers (5, 2, ...) from transfer learning to scratch."""
+    """Compute changes of the localizers (5, 2, ...) from transfer learning to scratch."""
     scratch = [Cell(model, SCENE, size, init="scratch") for model in MODELS]
     return changes(evidence, scratch, [cell._replace(init="pretrained") for cell in scratch])
 

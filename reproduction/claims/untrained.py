@@ -47,7 +47,7 @@ class _Speed(BaseModel):
 
 
 def few_assisted(claim: Claim, evidence: Evidence) -> Outcome:
-    """C4: each method needs assistance in few batches of the Large Room, one-sided at 5 %.
+    """Judge C4: each method needs assistance in few Large Room batches, one-sided at 5 %.
 
     The paper's batches are of that room; those of other scenes are printed beside and not judged.
     """
@@ -81,7 +81,7 @@ def few_verdict(counts: Mapping[str, tuple[int, int]], thresholds: Thresholds = 
 
 
 def collection_rate(claim: Claim, evidence: Evidence) -> Outcome:
-    """C14: every scene is collected at the published rate: 640 x 480 as PNG, with poses."""
+    """Judge C14: every scene is collected at the published rate: 640 x 480 as PNG, with poses."""
     verdicts, measured, spans, machines = [], [], [], []
     for scene in SCENES:
         evidence.need(scene=scene)
@@ -101,7 +101,7 @@ def collection_rate(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def times_7_scenes(claim: Claim, evidence: Evidence) -> Outcome:
-    """C16: both volumes, over the mean of the 7-Scenes and rounded, are the published numbers.
+    """Judge C16: both volumes over the mean of 7-Scenes, rounded, are the published numbers.
 
     The stand-in rooms are built to the volumes that Table 1 prints: nothing is found out.
     """
@@ -120,7 +120,7 @@ def times_7_scenes(claim: Claim, evidence: Evidence) -> Outcome:
 
 
 def kinectfusion_fails(claim: Claim, evidence: Evidence) -> Outcome:
-    """C15: frame-to-model tracking needs assistance in more than half of its batches.
+    """Judge C15: frame-to-model tracking needs assistance in more than half of its batches.
 
     Frames farther apart than ``FARTHEST_M`` defeat any such tracker, whatever the scene: it starts
     at the pose before and reaches a few centimetres (docs/groundtruth.md).
@@ -155,7 +155,7 @@ def _turned(verdict: Callable[[Thresholds], Verdict]) -> dict[str, Verdict]:
 
 
 def _assisted(evidence: Evidence, method: str) -> dict[str, tuple[int, int]]:
-    """By scene, how many batches were assisted, of how many.
+    """Count by scene how many batches were assisted, of how many.
 
     Scenes have equally many batches, so that the binomial limits of all batches together are no
     narrower than those of a stratified sample.
@@ -175,7 +175,7 @@ def _of_all(by_scene: Mapping[str, tuple[int, int]]) -> tuple[int, int]:
 
 
 def _beside_text(by_scene: Mapping[str, tuple[int, int]]) -> str:
-    """Counts of the scene that is judged, and of others beside it."""
+    """Format counts of the scene that is judged, and of others beside it."""
     assisted, batches = by_scene[PUBLISHED_SCENE]
     others = ", ".join(
         f"{scene_title(scene)} {n} of {total}"

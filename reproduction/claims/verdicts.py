@@ -126,7 +126,7 @@ class Missing(Exception):  # noqa: N818 - not an error: it ends in the verdict `
 
 @cache
 def published_claims() -> tuple[Claim, ...]:
-    """The claims of the paper, in its order."""
+    """Read the claims of the paper, in its order."""
     rows = [row for _, row in read_records(FOLDER / "claims.csv")]
     return tuple(
         Claim(numbers=tuple(map(float, row.pop("numbers").split())), **row) for row in rows
@@ -139,12 +139,12 @@ ERRORS = ("p {:.2f} m RMS", "o {:.2f}°")
 
 
 def values_text(forms: Sequence[str], samples: Iterable[Array]) -> str:
-    """Observed values, e.g. ``p -55.0 %, o -60.0 %``."""
+    """Format observed values, e.g. ``p -55.0 %, o -60.0 %``."""
     return ", ".join(_print(form, float(s[0])) for form, s in zip(forms, samples, strict=True))
 
 
 def limits_text(forms: Sequence[str], samples: Iterable[Array], layout: Layout) -> str:
-    """95 % limits, e.g. ``p -60.1 % to -40.2 %, o -70.0 % to -50.0 %``."""
+    """Format 95 % limits, e.g. ``p -60.1 % to -40.2 %, o -70.0 % to -50.0 %``."""
     pairs = [limits(sample, layout) for sample in samples]
     ends = [
         (_print(form, low), _print(form.partition(" ")[2], high))
@@ -154,7 +154,7 @@ def limits_text(forms: Sequence[str], samples: Iterable[Array], layout: Layout) 
 
 
 def _print(form: str, value: float) -> str:
-    """A value; infinite where a run failed, unknown where two did."""
+    """Format a value; infinite where a run failed, unknown where two did."""
     if math.isfinite(value):
         return form.format(value)
     name = form.partition("{")[0]
@@ -197,7 +197,7 @@ class Condition(NamedTuple):
 
 
 def verdict_of(condition: Condition, comparisons: int = 1) -> Verdict:
-    """The region an effect's interval lies in; ``comparisons``: conditions it is one of."""
+    """Classify an effect's interval; ``comparisons`` counts the conditions it is one of."""
     return _region(condition, limits(condition.effect, condition.layout, comparisons), RULE)
 
 
@@ -225,7 +225,7 @@ class Judgement(NamedTuple):
 
 
 def all_of(conditions: Sequence[Condition], each: Sequence[Condition] = ()) -> Judgement:
-    """The verdict of a claim that all conditions make, and how each of them came out.
+    """Judge a claim that holds if all conditions do, and say how each of them came out.
 
     Args:
         conditions: all of them have to hold.
@@ -258,7 +258,7 @@ def all_of(conditions: Sequence[Condition], each: Sequence[Condition] = ()) -> J
 def _all_of(
     parts: Sequence[Verdict], corrected: Sequence[Verdict], single: Sequence[Verdict]
 ) -> Verdict:
-    """One verdict for conditions: at 95 %, at the corrected level, and single ones."""
+    """Combine verdicts of conditions at 95 %, at the corrected level, and of single ones."""
     refuted = {part for part in (*corrected, *single) if part in DECIDED_AGAINST}
     if refuted:
         return Verdict.MIXED if Verdict.HOLDS in (*parts, *single) else _together(refuted)
@@ -266,7 +266,7 @@ def _all_of(
 
 
 def _together(refuted: set[Verdict]) -> Verdict:
-    """One verdict for conditions that are refuted, each in its way."""
+    """Combine the verdicts of conditions that are refuted, each in its way."""
     if len(refuted) == 1:
         return next(iter(refuted))
     less = Verdict.LESS in refuted and Verdict.OPPOSITE not in refuted
@@ -274,7 +274,7 @@ def _together(refuted: set[Verdict]) -> Verdict:
 
 
 def best_of(rivals: Sequence[Condition]) -> Judgement:
-    """The verdict of a claim that one thing is better than every other.
+    """Judge a claim that one thing is better than every other.
 
     Args:
         rivals: by how much it is better than each of the others.
@@ -294,7 +294,7 @@ def best_of(rivals: Sequence[Condition]) -> Judgement:
 
 
 def compared(low: float, high: float, number: float) -> Verdict:
-    """Holds: an interval starts at ``number`` or above. Opposite: it ends below it."""
+    """Return ``holds`` for an interval from ``number`` upwards, ``opposite`` for one below it."""
     if low >= number:
         return Verdict.HOLDS
     return Verdict.OPPOSITE if high < number else Verdict.UNDECIDED
@@ -314,6 +314,6 @@ def _parts_text(conditions: Sequence[Condition], parts: Sequence[Verdict]) -> st
 def _by_part(
     conditions: Sequence[Condition], parts: Sequence[Verdict]
 ) -> list[tuple[Verdict, list[str]]]:
-    """The names of the conditions that came out in each way."""
+    """Name the conditions that came out in each way."""
     pairs = list(zip(conditions, parts, strict=True))
     return [(part, [c.name for c, own in pairs if own == part]) for part in dict.fromkeys(parts)]

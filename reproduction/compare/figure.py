@@ -28,7 +28,7 @@ MARGIN = 1.08
 
 
 def comparison_figure(comparison: Comparison) -> Figure:
-    """Runs down, sorted by the change of the position error against the true poses.
+    """Draw runs down, sorted by the change of the position error against the true poses.
 
     Filled markers are errors against the labels (the paper's protocol), open ones against the true
     poses where these differ. An infinite difference sits at the edge with the word *failed*.
@@ -50,7 +50,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
 
 
 def _placed(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows that say something of their own, with the name, place and height of each run."""
+    """Select the rows that add something, with the name, place and height of each run."""
     runs = [run for _, run in table.groupby(list(KEY), sort=False)]
     runs.sort(key=lambda r: float(r.difference[r.measure == "position_m_true"].iloc[0]))
     parts = []

@@ -71,7 +71,7 @@ def compare(root_a: Path, root_b: Path, out: Path | None) -> str:
 
 
 def text_of(comparison: Comparison, form: str = PLAIN) -> str:
-    """Summary, remarks, changes by group, every run, and provenance: for the terminal or a page."""
+    """Format summary, remarks, changes by group, every run and provenance as text."""
     page = form == MARKDOWN
     figure = "![B−A of every run with its 95 % limits](compare.png)\n\n" if page else ""
     parts = {
@@ -90,7 +90,7 @@ def text_of(comparison: Comparison, form: str = PLAIN) -> str:
 
 
 def summary_rows(comparison: Comparison) -> Rows:
-    """One row per measure: verdicts, signs and the mean relative change."""
+    """Tabulate verdicts, signs and the mean relative change, one row per measure."""
     found = summary_of(comparison.table)
     found["measure"] = found["measure"].map(TITLES)
     found["p_sign"] = found["p_sign"].map("{:.2g}".format)
@@ -100,7 +100,7 @@ def summary_rows(comparison: Comparison) -> Rows:
 
 
 def group_rows(comparison: Comparison) -> Rows:
-    """Mean relative changes by scene, label source and model."""
+    """Tabulate mean relative changes by scene, label source and model."""
     found = groups_of(comparison.table)
     for measure in MEASURES:
         found[measure] = found[measure].map(_signed)
@@ -112,7 +112,7 @@ def _texts(table: pd.DataFrame) -> Rows:
 
 
 def remarks_of(comparison: Comparison) -> list[str]:
-    """Sentences on how the runs were matched and how far the numbers carry."""
+    """Say how the runs were matched and how far the numbers carry."""
     runs = comparison.runs
     only_a, only_b = comparison.only
     by_chance = (1 - CONFIDENCE) * len(runs)
@@ -157,7 +157,7 @@ def _pairing(runs: pd.DataFrame) -> str:
 
 
 def run_rows(comparison: Comparison) -> Rows:
-    """A row per run and yardstick, below its heading; a data set is named in its first row.
+    """Tabulate each run and yardstick; a data set is named in its first row.
 
     Where the labels are the true poses, both yardsticks are one.
     """
@@ -178,7 +178,7 @@ def run_rows(comparison: Comparison) -> Rows:
 
 
 def _cells(row: Any, digits: int) -> tuple[str, ...]:
-    """Both errors, their difference, its limits, and the verdict."""
+    """Format both errors, their difference, its limits, and the verdict."""
     number, signed = f"{{:.{digits}f}}", f"{{:+.{digits}f}}"
     errors = ["failed" if math.isinf(e) else number.format(e) for e in (row.a, row.b)]
     low, difference, high = (_signed(v, signed) for v in (row.low, row.difference, row.high))
@@ -189,14 +189,14 @@ def _cells(row: Any, digits: int) -> tuple[str, ...]:
 
 
 def _signed(value: float, form: str = "{:+.1f} %") -> str:
-    """E.g. ``+3.1 %``."""
+    """Format a number with its sign, e.g. ``+3.1 %``."""
     if math.isinf(value):
         return "+∞" if value > 0 else "-∞"
     return form.format(value) if value else "0"
 
 
 def change_rows(changes: pd.DataFrame) -> Rows:
-    """Keys of ``provenance.json`` that differ, the first of them."""
+    """Tabulate the first keys of ``provenance.json`` that differ."""
     rows: Rows = [("provenance.json", "A", "B")]
     for key, *values in changes.fillna("(none)").head(MOST_CHANGES).itertuples(index=False):
         texts = (v if len(v) <= WIDEST_VALUE else f"{v[: WIDEST_VALUE - 1]}…" for v in values)

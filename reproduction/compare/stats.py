@@ -31,14 +31,14 @@ class RunErrors:
     errors: NDArray[np.float64]
 
     def counts(self) -> dict[str, int]:
-        """Test frames, the paths these belong to, seeds, and predictions that were not finite."""
+        """Count test frames, the paths these belong to, seeds, and predictions that failed."""
         paths, seeds = len(np.unique(self.path)), len(self.errors)
         failed = int(np.isinf(self.errors[:, 0]).sum())
         return {"n_test": len(self.frame), "n_paths": paths, "n_seeds": seeds, "failed": failed}
 
 
 def compare_errors(a: RunErrors, b: RunErrors, paired: bool) -> pd.DataFrame:
-    """The differences between two runs, a row per measure; errors, so lower is better.
+    """Compare the errors of two runs, a row per measure; lower is better.
 
     Columns are ``measure``; ``a`` and ``b``, the median error in either tree, averaged over its
     seeds, infinite where the run failed; ``difference``, ``b - a``, zero where both failed; ``low``
@@ -71,7 +71,7 @@ def draws_of(path: NDArray[np.int64], tree: str) -> tuple[Counts, Counts]:
 def _difference(
     errors_a: Array, errors_b: Array, draws_a: tuple[Counts, Counts], draws_b: tuple[Counts, Counts]
 ) -> dict[str, Any]:
-    """The difference of errors (seeds, N) of two runs."""
+    """Compare errors (seeds, N) of two runs by one measure."""
     medians_a, medians_b = np.median(errors_a, axis=1), np.median(errors_b, axis=1)
     a, b = float(medians_a.mean()), float(medians_b.mean())
     value = float(_minus(np.float64(b), np.float64(a)))
@@ -92,7 +92,7 @@ def _difference(
 
 
 def _percent(difference: float, a: float) -> float:
-    """Relative change, in the limit where an error is infinite.
+    """Compute the relative change, in the limit where an error is infinite.
 
     -100 for a run that failed in A only, infinite for one that failed in B only, 0 where both did.
     """
@@ -104,12 +104,12 @@ def _percent(difference: float, a: float) -> float:
 
 
 def _minus(b: Array | np.float64, a: Array | np.float64) -> Array:
-    """``b - a``, zero where both are infinite: two failures do not differ."""
+    """Compute ``b - a``, zero where both are infinite: two failures do not differ."""
     both = np.isinf(a) & np.isinf(b)
     return np.asarray(np.where(both, 0.0, b) - np.where(both, 0.0, a))
 
 
 def _deviation(medians: Array) -> tuple[float, int]:
-    """Standard deviation of the finite medians, NaN below two, and of how many."""
+    """Compute the standard deviation of the finite medians, NaN below two, and count them."""
     finite = medians[np.isfinite(medians)]
     return (float(finite.std(ddof=1)) if len(finite) > 1 else math.nan), max(len(finite), 1)

@@ -76,7 +76,7 @@ def one_yardstick(run: pd.DataFrame) -> bool:
 
 
 def summary_of(table: pd.DataFrame) -> pd.DataFrame:
-    """Runs by measure: how many are ``better``, ``worse`` or ``unseen`` by their intervals.
+    """Count by measure how many runs are ``better``, ``worse`` or ``unseen`` by their intervals.
 
     And how many are ``lower`` or ``higher``, by however little, with ``p_sign`` of a two-sided sign
     test of these (1 without either); and ``percent``, the mean relative change.
@@ -92,7 +92,7 @@ def summary_of(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def groups_of(table: pd.DataFrame) -> pd.DataFrame:
-    """Mean relative changes by scene, label source and model, in order of appearance.
+    """Average relative changes by scene, label source and model, in order of appearance.
 
     Columns are ``grouping``, ``name``, ``n_runs``, and a mean for each measure, infinite where a
     run of the group failed in B only.
@@ -135,7 +135,7 @@ def _compare_run(
     seeds_b: list[Path],
     sameness: Callable[[str, int], Sameness],
 ) -> pd.DataFrame:
-    """The differences of one run, and what both trees tested it on."""
+    """Compare one run, and record what both trees tested it on."""
     a, b = read_run(seeds_a), read_run(seeds_b)
     scene, size, labels, *_ = key
     plans, carried = f"plans/{scene}/test.csv", f"labels/{scene}/{size}/{labels}/test.csv"
@@ -174,7 +174,7 @@ def _changes(path_a: Path, path_b: Path) -> pd.DataFrame | None:
 
 
 def find_runs(root: Path) -> dict[tuple[str, ...], list[Path]]:
-    """The directories of all seeds of every scored run of a tree, in the order of their names."""
+    """Find the directories of all seeds of every scored run of a tree, in order of name."""
     found: dict[tuple[str, ...], list[Path]] = {}
     for path in sorted(root.glob("runs/*/*/*/*/*/seed*/metrics.json")):
         key = path.parent.relative_to(root / "runs").parts[:-1]
@@ -188,7 +188,7 @@ def find_runs(root: Path) -> dict[tuple[str, ...], list[Path]]:
 
 
 def read_run(seeds: Sequence[Path]) -> RunErrors:
-    """The errors of a run from the directories of its seeds."""
+    """Read the errors of a run from the directories of its seeds."""
     index = [_read_index(seed) for seed in seeds]
     for seed, found in zip(seeds, index, strict=True):
         if not np.array_equal(found, index[0]):
@@ -198,7 +198,7 @@ def read_run(seeds: Sequence[Path]) -> RunErrors:
 
 
 def _read_index(seed: Path) -> NDArray[np.int64]:
-    """Frame and path (N, 2) of the predictions."""
+    """Read frame and path (N, 2) of the predictions."""
     path = seed / "predictions.csv"
     values = read_numbers(path, HEADER, "table of predictions", finite=False)[:, :2]
     if not len(values):
@@ -207,7 +207,7 @@ def _read_index(seed: Path) -> NDArray[np.int64]:
 
 
 def _read_seed(seed: Path, frame: NDArray[np.int64]) -> Array:
-    """Errors (4, N) of one seed, which its scores are the medians of."""
+    """Read the errors (4, N) of one seed, which its scores are the medians of."""
     path = seed / "errors.csv"
     table = read_errors(path)
     if not np.array_equal(table["frame"], frame):

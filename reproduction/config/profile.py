@@ -100,7 +100,7 @@ class Config(DatasetConfig):
         return [name for name, scene in self.scenes.items() if scene.builder == "random_room"]
 
     def n_largest(self, scene: str, split: str) -> int:
-        """Frames planned and rendered for a split: those of the scene's largest size."""
+        """Count frames planned and rendered for a split: those of the scene's largest size."""
         if scene in self.rooms:
             return self.pretraining.frames if split == "train" else 2
         return max(self.n_frames(scene, size, split) for size in self.scenes[scene].sizes)

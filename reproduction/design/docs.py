@@ -101,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def documents(folder: Path) -> dict[str, str]:
-    """Contents of the generated files by name; ``folder`` holds the shipped profiles."""
+    """Generate the contents of the files by name; ``folder`` holds the shipped profiles."""
     schema, columns = Config.model_json_schema(), Experiment.model_json_schema()["properties"]
     keys = joined(key_rows(schema, schema["$defs"]))
     parts = [
@@ -122,7 +122,7 @@ def documents(folder: Path) -> dict[str, str]:
 def key_rows(
     schema: Node, defs: Node, prefix: str = "", told: dict[str, str] | None = None
 ) -> Iterator[tuple[str, ...]]:
-    """Dotted key, value and meaning of every key of an object's schema, depth first.
+    """Yield dotted key, value and meaning of every key of an object's schema, depth first.
 
     Keys of a model that is told already are told by where; ``told`` collects these places.
     """
@@ -142,7 +142,7 @@ def key_rows(
 
 
 def joined(rows: Iterator[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
-    """Neighbouring rows that say the same of their keys are one."""
+    """Join neighbouring rows that say the same of their keys."""
     for said, alike in groupby(rows, key=lambda row: row[1:]):
         first, *more = [row[0] for row in alike]
         yield ", ".join([first, *(f"`{key.strip('`').rpartition('.')[2]}`" for key in more)]), *said
@@ -160,13 +160,13 @@ def setting_rows(folder: Path) -> Iterator[tuple[str, ...]]:
 
 
 def table(heading: Sequence[str], rows: Iterator[tuple[str, ...]]) -> str:
-    """A Markdown table with a final newline."""
+    """Format a Markdown table with a final newline."""
     lines = [f"| {' | '.join(line)} |\n" for line in (heading, *rows)]
     return "".join([lines[0], "|" + "---|" * len(heading) + "\n", *lines[1:]])
 
 
 def value_of(field: Node) -> str:
-    """Default and bounds, e.g. ``500, ≥ 1``; where there is no default, the type."""
+    """Format default and bounds, e.g. ``500, ≥ 1``; the type where there is no default."""
     kind = type_name(field)
     if "default" not in field:
         return f"required: {kind}"
@@ -181,7 +181,7 @@ def value_of(field: Node) -> str:
 
 
 def type_name(node: Node) -> str:
-    """A schema's type and bounds, e.g. ``integer ≥ 1``; ``or null`` if not the default."""
+    """Format a schema's type and bounds, e.g. ``integer ≥ 1``; ``or null`` if not the default."""
     if "anyOf" in node:
         name = " or ".join(map(type_name, node["anyOf"]))
         return name.removesuffix(" or null") if node.get("default", 0) is None else name
@@ -202,13 +202,13 @@ def type_name(node: Node) -> str:
 
 
 def _values(node: Node) -> Node:
-    """The schema of the values of a mapping, whatever is said of its keys."""
+    """Return the schema of a mapping's values, whatever is said of its keys."""
     found: Node = node.get("additionalProperties") or next(iter(node["patternProperties"].values()))
     return found
 
 
 def _model_below(node: Node, key: str) -> tuple[str, str]:
-    """The model a key leads to, through lists, mappings (``key.<name>``) and ``| None``."""
+    """Follow a key to its model, through lists, mappings (``key.<name>``) and ``| None``."""
     if node.get("type") == "object":
         return _model_below(_values(node), f"{key}.<name>")
     inner = [node, node.get("items", {}), *node.get("anyOf", ())]

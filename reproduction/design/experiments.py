@@ -116,7 +116,7 @@ class Run:
         return SHARES[split_init(self.init)[1]]
 
     def seed(self, profile_seed: int) -> int:
-        """Seed of what the run draws, its labels and how many images it is shown left out.
+        """Hash what the run is, leaving out its labels and how many images it is shown.
 
         So runs that differ in their labels alone have the same initial weights, held-out paths,
         order and rotations: a comparison of labels is paired.
@@ -139,7 +139,7 @@ def split_init(init: str) -> tuple[Start, str]:
 
 
 def read_experiments(config: Config) -> tuple[Experiment, ...]:
-    """The rows of ``config.experiments``, checked against the scenes and sizes of the profile.
+    """Read ``config.experiments``, checked against the scenes and sizes of the profile.
 
     What is wrong is said with file, or the configuration's key, with row and column.
     """
@@ -241,11 +241,11 @@ class Design(Strict):
         return sorted(runs)
 
     def rows_of(self, table: str) -> list[Experiment]:
-        """The rows of one table."""
+        """List the rows of one table."""
         return [row for row in self.rows if row.table == table]
 
     def runs_of(self, row: Experiment, model: str) -> list[Run]:
-        """All repetitions of a cell, whichever table asked for them."""
+        """List all repetitions of a cell, whichever table asked for them."""
         cell = (row.scene, row.size, row.label_id, row.init)
         asked = [
             self._asked(other.table)
@@ -256,7 +256,7 @@ class Design(Strict):
         return [Run(*cell, model, repetition) for repetition in range(max(asked, default=0))]
 
     def table_runs(self, table: str) -> list[Run]:
-        """Every run a table reads."""
+        """List every run a table reads."""
         rows = [e for row in self.rows_of(table) for e in _compared(row)]
         return sorted({run for row in rows for model in MODELS for run in self.runs_of(row, model)})
 
@@ -265,7 +265,7 @@ class Design(Strict):
 
 
 def common_every(counts: Collection[int]) -> int:
-    """One in how many frames of a scene's largest test set is in its common one.
+    """Choose ``k`` so that every k-th frame of a scene's largest test set is in its common one.
 
     That has about as many frames as the smallest of the test sets, of ``counts`` frames.
     """
@@ -273,7 +273,7 @@ def common_every(counts: Collection[int]) -> int:
 
 
 def read_design(config: Config) -> Design:
-    """The design of a profile: :func:`read_experiments`, and what its further scenes need.
+    """Read the design of a profile with :func:`read_experiments`, and what its further scenes need.
 
     Raises:
         InputError: a row, a further scene, or the data set of the robustness table is wrong.
@@ -305,5 +305,5 @@ def _check_robustness(config: Config) -> None:
 
 
 def _compared(row: Experiment) -> list[Experiment]:
-    """A row and what its table shows it against: Table 5 the same run with transfer learning."""
+    """List a row and what its table compares it with: in Table 5 the run with transfer learning."""
     return [row, row.pretrained] if row.table == FROM_SCRATCH else [row]

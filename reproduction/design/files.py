@@ -87,30 +87,30 @@ class Files:
     # Frames
 
     def n_frames(self, scene: str, camera: str, split: str) -> int:
-        """Frames of a split that are rendered with a camera: no more than are used."""
+        """Count frames of a split that are rendered with a camera: no more than are used."""
         if camera == "network":
             return self.config.n_largest(scene, split)
         sizes = {size for labelled, size, _ in self.design.estimated if labelled == scene}
         return max((self.config.n_frames(scene, size, split) for size in sizes), default=0)
 
     def sequences(self, scene: str, camera: str) -> list[Sequence]:
-        """Parts that the frames of a camera are rendered in, of both splits."""
+        """List the parts that the frames of a camera are rendered in, of both splits."""
         n_train, n_test = (self.n_frames(scene, camera, split) for split in SPLITS)
         return sequences_of(n_train, n_test, self.config.shard_frames)
 
     def sequence(self, scene: str, camera: str, name: str) -> Sequence:
-        """The part of this name."""
+        """Return the part of this name."""
         return next(s for s in self.sequences(scene, camera) if s.name == name)
 
     def packed_shards(self, scene: str, split: str, kind: str) -> list[str]:
-        """Parts of packed frames, in order: ``npy``, or ``json`` that says what they are."""
+        """List parts of packed frames in order: ``npy``, or ``json`` that describes them."""
         sequences = (s for s in self.sequences(scene, "network") if s.split == split)
         return [f"{self.root}/frames/{scene}/shards/{s.name}.{kind}" for s in sequences]
 
     def sequence_dirs(
         self, scene: str, camera: str, split: str | None = None, stop: int | None = None
     ) -> list[str]:
-        """Sequences of image files, directories or archives.
+        """List sequences of image files, directories or archives.
 
         Args:
             scene: Of these frames.
@@ -126,7 +126,7 @@ class Files:
         ]
 
     def plans(self, scene: str, camera: str, kind: str) -> list[str]:
-        """Plans of the splits that have frames; ``kind`` is ``csv`` or ``coverage.json``.
+        """List plans of the splits that have frames; ``kind`` is ``csv`` or ``coverage.json``.
 
         Coverage is known of whole plans, which only the network camera renders.
         """
@@ -136,23 +136,23 @@ class Files:
         return [f"{self.root}/plans/{scene}/{split}.{kind}" for split in splits]
 
     def manifests(self, camera: str) -> list[str]:
-        """Data sets of image files."""
+        """List data sets of image files."""
         scenes = self.scenes if camera == "network" else self.labelled_scenes
         return [f"{self.root}/datasets/{scene}/{camera}/manifest.json" for scene in scenes]
 
     def light_shares(self, scene: str, effects: EffectsConfig | None) -> list[str]:
-        """Shares of a scene's light, where effects switch its lamps."""
+        """List shares of a scene's light, where effects switch its lamps."""
         switched = effects and effects.light and effects.light.states
         groups = LIGHT_GROUPS if switched else ()
         return [f"{self.root}/scenes/{scene}/light_{group}.glb" for group in groups]
 
     def cartons(self, scene: str) -> list[str]:
-        """The built-in objects of a scene."""
+        """List the built-in objects of a scene."""
         mesh = self.config.root / "scenes" / scene / "mesh.glb"
         return [path.as_posix() for path in carton_files(mesh)]
 
     def beside_mesh(self, scene: str, effects: EffectsConfig | None) -> list[str]:
-        """Files that effects need of a scene: shares of its light, and objects."""
+        """List files that effects need of a scene: shares of its light, and objects."""
         clutter = effects.clutter if effects else None
         own = [path.as_posix() for path in clutter.files] if clutter else []
         built_in = self.cartons(scene) if clutter and not clutter.files else []
@@ -161,7 +161,7 @@ class Files:
     def detail(
         self, scene: str, camera: str, kind: str, render: RenderConfig | None = None
     ) -> str | None:
-        """Mesh that a camera's colours are drawn of (``glb``), and what it leaves out (``json``).
+        """Return the mesh that a camera's colours are drawn of (``glb``), or its record (``json``).
 
         None where the full mesh is drawn.
         """
@@ -170,37 +170,37 @@ class Files:
         return f"{self.root}/scenes/{scene}/detail_{camera}.{kind}"
 
     def cameras(self, scene: str) -> list[str]:
-        """Cameras that frames of a scene are rendered through."""
+        """List cameras that frames of a scene are rendered through."""
         return ["network", *(["groundtruth"] if scene in self.labelled_scenes else [])]
 
     def details(self, scene: str, kind: str) -> list[str]:
-        """Levels of detail of these cameras; none where the full mesh is drawn."""
+        """List levels of detail of these cameras; none where the full mesh is drawn."""
         found = [self.detail(scene, camera, kind) for camera in self.cameras(scene)]
         return [path for path in found if path is not None]
 
     # Labels
 
     def batches(self, scene: str, size: str, split: str) -> list[Batch]:
-        """Batches that the labels of a split are estimated in."""
+        """List batches that the labels of a split are estimated in."""
         count = self.config.n_frames(scene, size, split)
         return batches_of(count, self.config.groundtruth.batch_frames)
 
     def batch(self, scene: str, size: str, split: str, index: str) -> Batch:
-        """A batch by its number in file names."""
+        """Return a batch by its number in file names."""
         return self.batches(scene, size, split)[int(index)]
 
     def frames_of_batch(self, scene: str, size: str, split: str, index: str) -> list[str]:
-        """Sequences of image files up to the one that a batch ends in."""
+        """List sequences of image files up to the one that a batch ends in."""
         stop = self.batch(scene, size, split, index).stop
         return self.sequence_dirs(scene, "groundtruth", split, stop)
 
     def batch_files(self, scene: str, size: str, method: str, split: str) -> list[str]:
-        """Trajectories of all batches of a split by one method."""
+        """List trajectories of all batches of a split by one method."""
         folder = f"{self.root}/groundtruth/{scene}/{size}/{method}/{split}"
         return [f"{folder}/batch-{b.index:03d}.csv" for b in self.batches(scene, size, split)]
 
     def batch_facts(self) -> list[str]:
-        """Records of all batches of the estimated label sets, stage by stage."""
+        """List records of all batches of the estimated label sets, stage by stage."""
         return sorted(
             {
                 f"{self.root}/groundtruth/{scene}/{size}/{stage}/{split}/batch-{b.index:03d}.json"
@@ -229,21 +229,21 @@ class Files:
     # Training runs and reference methods
 
     def runs_of(self, table: str) -> list[str]:
-        """Folders of the runs that a table reads."""
+        """List folders of the runs that a table reads."""
         return [run.directory for run in self.design.table_runs(table)]
 
     def of_runs(self, file: str) -> list[str]:
-        """A file of every run."""
+        """List a file of every run."""
         return [f"{self.root}/runs/{run.directory}/{file}" for run in self.design.runs]
 
     def weights(self, model: str, init: str) -> str | None:
-        """Backbone that a run starts from; None where it starts from scratch."""
+        """Return the backbone that a run starts from; None where it starts from scratch."""
         if split_init(init)[0] == "scratch":
             return None
         return f"{self.root}/pretrained/{backbone_of(model, self.config.network)}.pt"
 
     def common_test_set(self, scene: str) -> tuple[str, int]:
-        """Test frames that localizers of all sizes answer, beside their own.
+        """Return the test frames that localizers of all sizes answer, beside their own.
 
         Returns:
             True poses of the scene's largest test set, and one in how many of its frames is taken.
@@ -254,21 +254,21 @@ class Files:
         return f"{self.root}/labels/{scene}/{largest}/synfeal/test.csv", common_every(counts)
 
     def n_of_size(self, scene: str, size: str) -> int:
-        """Frames of both splits of a size, which a training run holds in memory."""
+        """Count frames of both splits of a size, which a training run holds in memory."""
         return sum(self.config.n_frames(scene, size, split) for split in SPLITS)
 
     def smallest_train(self, scene: str) -> int:
-        """Training frames of a scene's smallest size."""
+        """Count training frames of a scene's smallest size."""
         sizes = {size for of, size in self.sizes if of == scene}
         return min(self.config.n_frames(scene, size, "train") for size in sizes)
 
     def references(self) -> dict[DataSet, list[str]]:
-        """Reference methods that answer for each data set."""
+        """List reference methods that answer for each data set."""
         rows, settings = self.design.rows, self.config.references
         return {key: answered_by(rows, key, settings) for key in data_sets(rows)}
 
     def of_references(self, file: str) -> list[str]:
-        """A file of every reference method and data set."""
+        """List a file of every reference method and data set."""
         return [
             f"{self.root}/references/{'/'.join(key)}/{name}/{file}"
             for key, names in self.references().items()
@@ -276,7 +276,7 @@ class Files:
         ]
 
     def external_poses(self, name: str, data_set: Mapping[str, str]) -> str | None:
-        """File with the answers of somebody else's localizer; None where it is run here.
+        """Return the file with answers of an external localizer; None where it is run here.
 
         Args:
             name: Of the localizer, a key of ``references.external``.
@@ -311,7 +311,7 @@ class Files:
         return f"{robust.scene}/{robust.size}/synfeal"
 
     def robust_run(self, model: str) -> Run:
-        """The localizer trained on frames without effects."""
+        """Return the localizer trained on frames without effects."""
         robust = self.config.robustness
         return Run(robust.scene, robust.size, "synfeal", "pretrained", model, repetition=0)
 
@@ -331,37 +331,37 @@ class Files:
         return has_structure(self.design.rows, robust.scene, robust.size)
 
     def robust_frames(self, split: str) -> int:
-        """Frames of a split of its data set."""
+        """Count frames of a split of the robustness table's data set."""
         robust = self.config.robustness
         return self.config.n_frames(robust.scene, robust.size, split)
 
     def varied_detail(self, effects: str, kind: str) -> str | None:
-        """The same as :meth:`detail`, of frames with a variation."""
+        """Return the file of :meth:`detail` for frames with a variation."""
         scene = self.config.robustness.scene
         return self.detail(scene, "network", kind, self.varied_render(effects))
 
     def varied_render(self, effects: str) -> RenderConfig:
-        """Settings of rendering with a variation; ``clean`` is the profile's own."""
+        """Return settings of rendering with a variation; ``clean`` is the profile's own."""
         chosen = self.variations.get(effects, self.config.render.effects)
         return self.config.render.model_copy(update={"effects": chosen})
 
     def varied_extras(self, names: Iterable[str]) -> list[str]:
-        """Files that variations need of the scene beside its mesh."""
+        """List files that variations need of the scene beside its mesh."""
         scene = self.config.robustness.scene
         effects = [self.varied_render(name).effects for name in names]
         return sorted({file for each in effects for file in self.beside_mesh(scene, each)})
 
     def varied_structure(self) -> list[str]:
-        """Structure-based poses of the varied test frames."""
+        """List structure-based poses of the varied test frames."""
         names = [CLEAN, *self.tested_effects] if self.has_robust_structure else []
         return [f"{self.root}/robustness/structure/{name}.csv" for name in names]
 
     def robustness_tables(self, kind: str = "csv") -> list[str]:
-        """The robustness table, where it has rows."""
+        """List the robustness table, where it has rows."""
         return [f"{self.root}/tables/robustness.{kind}"] if self.has_robustness else []
 
     def drawn_robustness(self) -> list[str]:
-        """Files of it that figures and speeds read, where figures of runs are drawn."""
+        """List robustness files that figures and speeds read, where figures of runs are drawn."""
         if not (self.has_robustness and self.drawn_tables):
             return []
         speed = f"{self.root}/scenes/{self.config.robustness.scene}/effects_speed.csv"

@@ -62,7 +62,7 @@ def _scenes(files: Files) -> dict[str, list[Job]]:
 
 
 def _details(files: Files, rooms: Iterable[str]) -> list[Job]:
-    """Meshes that colours are drawn of, but for cameras that draw the full one."""
+    """List the meshes that colours are drawn of, but for cameras that draw the full one."""
     drawn = [(scene, "network") for scene in [*files.scenes, *rooms]]
     drawn += [(scene, "groundtruth") for scene in files.labelled_scenes]
     drawn = [key for key in drawn if files.detail(*key, "glb")]
@@ -134,7 +134,7 @@ def _labels(files: Files) -> dict[str, list[Job]]:
 
 
 def _estimation(stage: str) -> tuple[str, Job]:
-    """The rule of a stage of label estimation, and the wildcard that names its method."""
+    """Return the rule of a stage of label estimation, and the wildcard that names its method."""
     if stage in frame_methods():
         return "estimate", {"frame_method": stage}
     if stage in graph_methods():
@@ -155,7 +155,7 @@ def _references(files: Files) -> dict[str, list[Job]]:
     answers = files.references()
 
     def asked(*groups: Group) -> list[DataSet]:
-        """Data sets that methods of these groups answer for."""
+        """Return data sets that methods of these groups answer for."""
         names = {name for group in groups for name in in_group(group)}
         return [key for key, methods in answers.items() if names.intersection(methods)]
 
@@ -234,5 +234,5 @@ def _evidence(files: Files) -> dict[str, list[Job]]:
 
 
 def _each(jobs: Iterable[Job]) -> list[Job]:
-    """The jobs, each once, in their order."""
+    """Drop repeated jobs, keeping their order."""
     return [dict(key) for key in dict.fromkeys(tuple(job.items()) for job in jobs)]

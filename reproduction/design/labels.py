@@ -25,7 +25,7 @@ def check_sources(rows: Sequence[Experiment], design: Path | str) -> None:
 
 
 def estimation_parameters(config: Config, name: str) -> dict[str, Any]:
-    """The part of a configuration that the labels of a method depend on, ready for JSON."""
+    """Return the part of a configuration that the labels of a method depend on, ready for JSON."""
     chained = {"batch_frames", "assist_position_m", "assist_orientation_deg"}
     method = METHODS[name]
     on_graph = method.works_on == "graph"

@@ -15,7 +15,7 @@ PAPERS = ("table2_ground_truth", "table3_inconsistencies")
 
 
 def data_sets(rows: Iterable[Experiment]) -> list[DataSet]:
-    """The data sets of a design, each once."""
+    """List the data sets of a design, each once."""
     return sorted({(row.scene, row.size, row.label_id) for row in rows})
 
 
@@ -47,7 +47,7 @@ def answered_by(
 
 
 def worst(rows: Iterable[Experiment]) -> set[str]:
-    """The simulator's label set, and the one with the largest noise of each block of Table 3."""
+    """Select the simulator's label set, and the noisiest one of each block of Table 3."""
     rows = list(rows)
     blocks = {row.block for row in rows if row.block}
     by_noise = sorted(rows, key=lambda row: (row.noise_m, row.noise_deg), reverse=True)

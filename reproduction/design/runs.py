@@ -9,7 +9,7 @@ from reproduction.design.experiments import Run
 
 
 def training_parameters(config: Config, run: Run) -> dict[str, Any]:
-    """The part of a configuration that a training run depends on, ready for JSON.
+    """Return the part of a configuration that a training run depends on, ready for JSON.
 
     Which poses it learns from is not in it: the hashes of the label files say that.
     """

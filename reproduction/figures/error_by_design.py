@@ -30,7 +30,7 @@ ASIDE = dict(zip(MODELS, np.linspace(-0.16, 0.16, len(MODELS)), strict=True))
 
 
 def draw_localizers(axes: Axes, rows: pd.DataFrame, measure: str, published: bool) -> None:
-    """One line per localizer over the places 0, 1, ... of its rows of a table, with 95 % limits.
+    """Draw a line per localizer over its rows' places 0, 1, ..., with 95 % limits.
 
     ``measure`` is the column of the error; with ``published`` the paper's values are drawn, too.
     """
@@ -59,7 +59,7 @@ def draw_localizers(axes: Axes, rows: pd.DataFrame, measure: str, published: boo
 
 
 def published_values(rows: pd.DataFrame, measure: str) -> Array:
-    """The paper's values (N,) in the unit of ours, left out where they are misprints.
+    """Return the paper's values (N,) in our unit; NaN where they are misprints.
 
     Its positions are RMS over the axes: distances over the root of three.
     """
@@ -74,7 +74,7 @@ SHOWN = ("constant", "nearest-vlad", STRUCTURE)
 
 
 def draw_references(axes: Axes, data_sets: Sequence[pd.DataFrame], measure: str) -> None:
-    """Grey lines over the places 0, 1, ... on axes whose limits stand; they do not change them.
+    """Draw grey lines over the places 0, 1, ... without changing the axes' limits.
 
     ``data_sets`` are rows of ``references.csv``, of the data set at each place. A line that lies
     above the axes is said in words.
@@ -119,7 +119,11 @@ PROTOCOLS = {
 
 
 def draw_by_noise(results: Results) -> Figure | None:
-    """Both scores, one below the other; nothing when the design has no rows of Table 3."""
+    """Draw errors over the noise of the labels (Table 3), against labels above, the truth below.
+
+    Returns:
+        The figure; None where the design has no rows of Table 3.
+    """
     design = results.design.rows_of(NOISE)
     if not design:
         return None
@@ -134,7 +138,7 @@ def draw_by_noise(results: Results) -> Figure | None:
 
 
 def by_noise(rows: pd.DataFrame, references: pd.DataFrame, title: str) -> Figure:
-    """The figure of ``table3_inconsistencies.csv``, and of ``references.csv`` on its data sets."""
+    """Draw ``table3_inconsistencies.csv``, and ``references.csv`` on its data sets."""
     blocks = {name: rows[rows["block"] == block] for block, name in BLOCKS.items()}
     blocks = {name: chosen for name, chosen in blocks.items() if len(chosen)}
     figure = Figure(figsize=(1.6 + 2.9 * len(blocks), 9.0), layout="constrained")
@@ -157,7 +161,11 @@ def _levels(rows: pd.DataFrame) -> list[str]:
 
 
 def draw_by_size(results: Results) -> Figure | None:
-    """Measures down, scenes across; nothing when the design has no rows of Table 4."""
+    """Draw errors over the size of the data set (Table 4): measures down, scenes across.
+
+    Returns:
+        The figure; None where the design has no rows of Table 4.
+    """
     if not results.design.rows_of(SIZE):
         return None
     references = read_references(results.root / "tables" / f"{NAME}.csv")
@@ -165,7 +173,7 @@ def draw_by_size(results: Results) -> Figure | None:
 
 
 def by_size(rows: pd.DataFrame, references: pd.DataFrame) -> Figure:
-    """The figure of the rows of ``table4_size.csv``, and of ``references.csv`` on true labels."""
+    """Draw rows of ``table4_size.csv``, and of ``references.csv`` on true labels."""
     scenes = {scene_title(str(name)): chosen for name, chosen in rows.groupby("scene", sort=False)}
     figure = Figure(figsize=(1.4 + 3.9 * len(scenes), 6.6), layout="constrained")
     panels = _draw_panels(figure, scenes, TRUE_UNITS, _sizes, published=True)
@@ -181,12 +189,16 @@ def _sizes(rows: pd.DataFrame) -> list[str]:
 
 
 def draw_by_images(results: Results) -> Figure | None:
-    """Measures down, starts across; nothing when the design has no rows of Table 7."""
+    """Draw errors over the images shown (Table 7): measures down, starts across.
+
+    Returns:
+        The figure; None where the design has no rows of Table 7.
+    """
     return by_images(results.table(IMAGES)) if results.design.rows_of(IMAGES) else None
 
 
 def by_images(rows: pd.DataFrame) -> Figure:
-    """The figure of the rows of ``table7_images_shown.csv``."""
+    """Draw rows of ``table7_images_shown.csv``."""
     start = rows["init"].map(lambda init: split_init(init)[0])
     parts = {STARTS[name]: chosen for name, chosen in rows.groupby(start, sort=False)}
     figure = Figure(figsize=(1.4 + 3.2 * len(parts), 6.6), layout="constrained")
@@ -210,7 +222,7 @@ def _draw_panels(
     places: Callable[[pd.DataFrame], list[str]],
     published: bool,
 ) -> NDArray:  # type: ignore[type-arg]
-    """Measures down, parts of a table by title across, ``places`` below; the axes (2, N)."""
+    """Draw measures down, parts of a table by title across, ``places`` below; the axes (2, N)."""
     panels = figure.subplots(2, len(parts), squeeze=False, sharey="row", sharex="col")
     for column, (title, rows) in zip(panels.T, parts.items(), strict=True):
         for axes, measure in zip(column, units, strict=True):
@@ -231,7 +243,7 @@ def _draw_references(
     references: pd.DataFrame,
     keys: Sequence[str],
 ) -> None:
-    """Lines of ``references`` into panels; data sets are told apart by the columns ``keys``."""
+    """Draw lines of ``references`` into panels; ``keys`` tell data sets apart."""
     for column, rows in zip(panels.T, parts.values(), strict=True):
         places = rows[[*keys]].drop_duplicates()
         same = [references.merge(places.iloc[[place]]) for place in range(len(places))]

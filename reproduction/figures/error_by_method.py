@@ -39,7 +39,11 @@ MARKED_AT = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 
 def draw_cumulative_error(results: Results) -> Figure | None:
-    """Scenes across, measures down; nothing when the design has no rows of Table 4."""
+    """Draw cumulative errors on the data sets of Table 4: scenes across, measures down.
+
+    Returns:
+        The figure; None where the design has no rows of Table 4.
+    """
     rows = results.design.rows_of("table4_size")
     largest = {scene: results.sizes(scene)[-1] for scene in dict.fromkeys(r.scene for r in rows)}
     rows = [row for row in rows if row.size == largest[row.scene]]
@@ -61,7 +65,7 @@ def draw_cumulative_error(results: Results) -> Figure | None:
 
 
 def _errors(results: Results, row: Experiment, model: str) -> dict[str, Array]:
-    """By measure, a localizer's errors (N,) of all test frames of all repetitions on a data set.
+    """Read a localizer's errors (N,) by measure, of all test frames of all repetitions.
 
     They are infinite where a prediction failed.
     """
@@ -77,7 +81,7 @@ def _errors(results: Results, row: Experiment, model: str) -> dict[str, Array]:
 
 
 def _draw_curves(axes: Axes, errors: Mapping[str, Array]) -> None:
-    """One curve per localizer; one whose predictions failed ends below 100 %."""
+    """Draw a curve per localizer; one whose predictions failed ends below 100 %."""
     axes.axhline(50, color="0.85", linewidth=0.8, zorder=0)
     for model, values in errors.items():
         error, percent = cumulative(values)
@@ -102,7 +106,11 @@ PARTS = {**BLOCKS, "": "labels from images"}
 
 
 def draw_references_by_noise(results: Results) -> Figure | None:
-    """Nothing without rows of Table 3, or without structure-based poses on them."""
+    """Draw errors of all methods over the noise and the source of the labels.
+
+    Returns:
+        The figure; None without rows of Table 3, or without structure-based poses on them.
+    """
     rows = results.design.rows_of(NOISE)
     if not rows:
         return None
@@ -116,7 +124,7 @@ def draw_references_by_noise(results: Results) -> Figure | None:
 
 
 def references_by_noise(table: pd.DataFrame, rows: Sequence[Experiment]) -> Figure:
-    """The figure of one data set size: rows of ``references.csv``, and the label sets to show."""
+    """Draw one data set size: rows of ``references.csv``, and the label sets to show."""
     blocks = [block for block in PARTS if any(row.block == block for row in rows)]
     figure = Figure(figsize=(1.6 + 2.9 * len(blocks), 6.8), layout="constrained")
     finding = references.crossing_finding(table)
@@ -138,7 +146,7 @@ def references_by_noise(table: pd.DataFrame, rows: Sequence[Experiment]) -> Figu
 
 
 def _ordered(labels: Sequence[str] | dict[str, None], table: pd.DataFrame) -> list[str]:
-    """Noise as the design has it; label sources by the error of structure that is built on them."""
+    """Order noise as the design does, label sources by the error of structure built on them."""
     names = list(labels)
     if any("-p" in name for name in names):  # injected
         return names
@@ -149,7 +157,7 @@ def _ordered(labels: Sequence[str] | dict[str, None], table: pd.DataFrame) -> li
 def _draw_methods(
     axes: Axes, table: pd.DataFrame, labels: list[str], measure: str, joined: bool
 ) -> None:
-    """Marks per method, joined where labels are levels: localizers in colour, others in grey."""
+    """Draw marks per method, joined where labels are levels: localizers in colour, others grey."""
     titles = references.titles_in(table)
     others = [name for name in titles if name not in MODELS]
     styles = {**reference_styles(others), **MODEL_STYLES}
@@ -176,9 +184,12 @@ OFFSET = 0.17  # of the marks of a line, in lines
 
 
 def draw_robustness(results: Results) -> Figure | None:
-    """Measures down, methods across; a line for each of the effects, ideal frames first.
+    """Draw errors by effect of camera and light: measures down, methods across.
 
-    Nothing where the robustness table is not made.
+    There is a line for each of the effects, ideal frames first.
+
+    Returns:
+        The figure; None where the robustness table is not made.
     """
     path = results.root / "tables" / f"{robustness.NAME}.csv"
     if not path.exists():
@@ -215,7 +226,7 @@ def draw_robustness(results: Results) -> Figure | None:
 
 
 def _draw_errors(axes: Axes, rows: pd.DataFrame, measure: str, style: Style, label: str) -> None:
-    """Medians with 95 % limits, and where ideal frames are as a line to compare with."""
+    """Draw medians with 95 % limits, and a line where ideal frames are."""
     if rows[measure].isna().all():
         return
     place = np.arange(len(rows)) + (OFFSET if style is STYLES[MIXED] else -OFFSET)

@@ -53,7 +53,7 @@ class LabelledSet:
 
 
 def read_labelled_set(results: Results) -> LabelledSet | None:
-    """The first data set of the design that ground-truth methods label; none if there is none."""
+    """Read the first data set of the design that is labelled by estimation; None without one."""
     sets = results.design.estimated
     if not sets:
         return None
@@ -86,7 +86,11 @@ MARKED = {
 
 
 def draw_label_error(results: Results) -> Figure | None:
-    """Errors and a strip of batches below each other, training and test side by side."""
+    """Draw errors of labels above a strip of batches, training and test side by side.
+
+    Returns:
+        The figure; None where the design has no estimated labels.
+    """
     data = read_labelled_set(results)
     if data is None:
         return None
@@ -138,7 +142,7 @@ def _draw_errors(position: Axes, orientation: Axes, methods: Mapping[str, Labell
 
 
 def _draw_batches(axes: Axes, methods: Mapping[str, LabelledSplit]) -> None:
-    """One bar per method: a filled stretch is an assisted batch, a crossed one a lost batch."""
+    """Draw one bar per method: filled for assisted batches, crossed for lost ones."""
     for place, (method, part) in enumerate(methods.items()):
         colour = METHOD_STYLES[method]["color"]
         for batch in part.batches:
@@ -162,7 +166,11 @@ PANEL_IN, LEGEND_IN = 2.4, 7.0
 
 
 def draw_trajectories(results: Results) -> Figure | None:
-    """A panel per method, training above test."""
+    """Draw estimated trajectories: a panel per method, training above test.
+
+    Returns:
+        The figure; None where the design has no estimated labels.
+    """
     data = read_labelled_set(results)
     if data is None:
         return None
@@ -192,7 +200,7 @@ def draw_trajectories(results: Results) -> Figure | None:
 
 
 def draw_paths(axes: Axes, part: LabelledSplit, method: str) -> None:
-    """The true path, the estimated one, where batches meet, and which were assisted.
+    """Draw the true path, the estimated one, where batches meet, and which were assisted.
 
     Assisted batches are drawn wide; a ring is where the last label is the true pose.
     """

@@ -27,7 +27,7 @@ OUTLINE = [withStroke(linewidth=2.5, foreground="black")]
 
 
 def draw_frames(results: Results) -> Figure | None:
-    """Two rows of six test frames per scene, evenly over the largest test set."""
+    """Draw two rows of six test frames per scene, evenly over the largest test set."""
     packed = results.root / "frames"
     scenes = {scene: read_packed(packed / scene / "test.npy") for scene in results.scenes}
     if not scenes:
@@ -52,7 +52,7 @@ def draw_frames(results: Results) -> Figure | None:
 
 
 def evenly(count: int) -> list[int]:
-    """At most twelve indices below ``count``, spread evenly, the first and the last among them."""
+    """Return at most twelve indices below ``count``, evenly spread, first and last among them."""
     n_tiles = min(LINES * COLUMNS, count)
     return [round(place) for place in np.linspace(0, count - 1, n_tiles)]
 
@@ -72,7 +72,7 @@ class Plan:
 
 
 def read_plan(results: Results, scene: str) -> Plan:
-    """The plan of a scene, cut above the highest camera of its true poses."""
+    """Read the floor plan of a scene, cut above the highest camera of its true poses."""
     mesh = load_collision_mesh(results.root / "scenes" / scene / "collision.ply")
     largest = results.sizes(scene)[-1]
     return plan_of(mesh, results.labels(scene, largest, "synfeal", "train").position_m[:, 2].max())
@@ -90,7 +90,7 @@ def plan_of(mesh: Triangles, top_m: float) -> Plan:
 
 
 def floor_m(corners_m: Array) -> float:
-    """Height of the floor under triangles (N, 3, 3): 2 % of their area lies below it."""
+    """Estimate the floor's height under triangles (N, 3, 3): 2 % of their area lies below it."""
     height = corners_m[:, :, 2].mean(axis=1)
     order = np.argsort(height)
     covered = np.cumsum(area(corners_m)[order])
@@ -118,7 +118,7 @@ SMALL_SET = 500  # frames; larger sets have thinner marks
 
 
 def draw_poses(results: Results) -> Figure | None:
-    """Sizes across, scenes down."""
+    """Draw the poses of data sets from above: sizes across, scenes down."""
     scenes = {scene: results.sizes(scene) for scene in results.scenes}
     if not scenes:
         return None
@@ -141,7 +141,7 @@ def draw_poses(results: Results) -> Figure | None:
 
 
 def view_ticks(table: PoseTable) -> Array:
-    """Segments (N, 2, 2) in world x and y: from each camera along its optical axis, from above.
+    """Return segments (N, 2, 2) in world x and y, from each camera along its optical axis.
 
     A camera that looks steeply up or down has a short tick.
     """

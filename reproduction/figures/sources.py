@@ -34,23 +34,23 @@ class Results:
         return sorted({row.scene for row in self.design.rows})
 
     def table(self, name: str) -> pd.DataFrame:
-        """``tables/<name>.csv``."""
+        """Read ``tables/<name>.csv``."""
         schema = speed_vs_error.SCHEMA if name == speed_vs_error.NAME else schema_of(name)
         # What is drawn is a number or a gap, a count too.
         kinds = {column: MAYBE if kind.optional else kind for column, kind in schema.items()}
         return read_frame(self.root / "tables" / f"{name}.csv", kinds)
 
     def speeds(self, stage: str) -> pd.DataFrame:
-        """The rows of ``speed_vs_error.csv`` of one stage."""
+        """Read the rows of ``speed_vs_error.csv`` of one stage."""
         table = self.table(speed_vs_error.NAME)
         return table[table["stage"] == stage]
 
     def labels(self, scene: str, size: str, labels: str, split: str) -> PoseTable:
-        """The poses a data set carries; those of ``synfeal`` are the true ones."""
+        """Read the poses a data set carries; those of ``synfeal`` are the true ones."""
         return read_pose_table(self.root / "labels" / scene / size / labels / f"{split}.csv")
 
     def sizes(self, scene: str) -> list[str]:
-        """Data set sizes of a scene in the design, the smallest first."""
+        """List data set sizes of a scene in the design, the smallest first."""
         names = dict.fromkeys(row.size for row in self.design.rows if row.scene == scene)
         return sorted(names, key=lambda size: len(self.labels(scene, size, "synfeal", "train")))
 
@@ -60,5 +60,5 @@ Draw = Callable[[Results], Figure | None]
 
 
 def counted(n_train: int, n_test: int) -> str:
-    """Frames of a data set as figures say it."""
+    """Format the frames of a data set as figures print them."""
     return f"{n_train:,} training, {n_test:,} test frames"

@@ -65,7 +65,7 @@ def of_stage(stage: str, figure: Callable[[pd.DataFrame], Figure]) -> Draw:
 
 
 def collision_figure(rows: pd.DataFrame) -> Figure:
-    """Meshes for collisions, one line per scene."""
+    """Draw the error of meshes for collisions against their speed, one line per scene."""
     figure = Figure(figsize=SIZE, layout="constrained")
     axes = figure.subplots()
     for (_, scene), style in zip(rows.groupby("scene", sort=False), cycle(MODEL_STYLES.values())):
@@ -78,7 +78,7 @@ def collision_figure(rows: pd.DataFrame) -> Figure:
 
 
 def _draw_meshes(axes: Axes, rows: pd.DataFrame, style: Style) -> None:
-    """Meshes of a scene small and open; those on the front filled and joined, the choice ringed."""
+    """Draw meshes of a scene small and open; those on the front filled, the choice ringed."""
     speed, error = (rows["items_per_s"] / 1e6).to_numpy(), 100.0 * rows["error"].to_numpy()
     front = pareto_front(1.0 / speed, error)
     order = np.argsort(speed[front], kind="stable")
@@ -101,7 +101,7 @@ def _draw_meshes(axes: Axes, rows: pd.DataFrame, style: Style) -> None:
 
 
 def labels_figure(rows: pd.DataFrame) -> Figure:
-    """Methods that estimate labels."""
+    """Draw the error of methods that estimate labels against their time."""
     figure = Figure(figsize=SIZE, layout="constrained")
     axes = figure.subplots()
     for _, scene in rows.groupby("scene", sort=False):
@@ -114,7 +114,7 @@ def labels_figure(rows: pd.DataFrame) -> Figure:
 
 
 def training_figure(rows: pd.DataFrame) -> Figure:
-    """Training runs, a panel for every scene."""
+    """Draw the error of training runs against their time, a panel for every scene."""
     scenes = dict(list(rows.groupby("scene", sort=False)))
     figure = Figure(figsize=(1.0 + 3.4 * len(scenes), 3.6), layout="constrained")
     panels = figure.subplots(1, len(scenes), squeeze=False, sharey=True)[0]
@@ -131,7 +131,7 @@ def training_figure(rows: pd.DataFrame) -> Figure:
 
 
 def _finish(axes: Axes, title: str, linear_below: float) -> None:
-    """Errors below ``linear_below`` are on a linear scale, so that 0 can be shown."""
+    """Finish the axes; errors below ``linear_below`` are on a linear scale, so that 0 shows."""
     axes.set_title(title)
     axes.set_yscale("symlog", linthresh=linear_below)
     axes.set_ylim(bottom=-0.2 * linear_below)  # marks at 0 are seen whole
@@ -140,7 +140,7 @@ def _finish(axes: Axes, title: str, linear_below: float) -> None:
 
 
 def _draw_named(axes: Axes, rows: pd.DataFrame, factor: float = 1.0) -> None:
-    """A mark for each variant, in the style it has in all figures; filled on the Pareto front."""
+    """Draw a mark for each variant, in its style of all figures; filled on the Pareto front."""
     front = pareto_front(1.0 / rows["items_per_s"], rows["error"])
     for row, on_front in zip(rows_of(rows), front, strict=True):
         style: Style = NAMED[row.variant] | {"linestyle": "", "markersize": 8}
@@ -157,7 +157,7 @@ USED = RING | {"markeredgecolor": BLACK}
 
 
 def render_figure(rows: pd.DataFrame) -> Figure:
-    """Ways to draw a frame, a row of panels per scene, a panel for every size of the image."""
+    """Draw ways to draw a frame: a row of panels per scene, a panel for every image size."""
     panels = [
         [panel for _, panel in of_scene.groupby(["width", "height"], sort=False)]
         for _, of_scene in rows.groupby("scene", sort=False)
@@ -179,7 +179,7 @@ def render_figure(rows: pd.DataFrame) -> Figure:
 
 
 def draw_panel(axes: Axes, rows: pd.DataFrame) -> None:
-    """The full mesh joined by backend, less detail joined to it; what is used is ringed.
+    """Draw the full mesh joined by backend, less detail joined to it; what is used is ringed.
 
     ``rows`` are the variants of one scene and one size of the image; one of them is chosen.
     """

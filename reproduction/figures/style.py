@@ -63,7 +63,7 @@ _REFERENCE_MARKS = (
 
 
 def reference_styles(names: Iterable[str]) -> dict[str, Style]:
-    """A style for each reference method, in order."""
+    """Choose a style for each reference method, in order."""
     return {
         name: {"color": color, "marker": marker, "linestyle": dashes, "zorder": 1.5}
         for name, (color, marker, dashes) in zip(names, cycle(_REFERENCE_MARKS), strict=False)
@@ -93,7 +93,7 @@ RC: dict[Any, Any] = {
 
 
 def add_legend(figure: Figure, axes: Axes, columns: int, more: Mapping[str, Artist] = {}) -> None:
-    """A legend below everything: what ``axes`` shows, each title once, and ``more`` by title."""
+    """Add a legend below everything: what ``axes`` shows, once each, and ``more`` by title."""
     entries: dict[str, Artist] = {}
     for handle, title in zip(*axes.get_legend_handles_labels(), strict=True):
         entries.setdefault(title, handle)

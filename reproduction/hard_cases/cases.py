@@ -108,7 +108,7 @@ def _step_deg(given: Inputs) -> float:
 
 
 def path_ends(distance_m: float) -> NDArray[np.float64]:
-    """Ends (2, 6) of a path along x: position and roll, pitch, yaw."""
+    """Return the ends (2, 6) of a path along x: position, metres, and roll, pitch, yaw, radians."""
     start = np.array([0.1, -2.3, 1.1, 0.0, 0.1, 0.2])
     return np.stack([start, start + distance_m * np.eye(6)[0]])
 

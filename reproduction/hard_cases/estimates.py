@@ -43,7 +43,7 @@ def spiral() -> tuple[Array, PoseGraph]:
 
 
 def turned_spiral() -> PoseGraph:
-    """Start the last third of the spiral 170 degrees and about half a metre off."""
+    """Turn the start of the spiral's last third by 170 degrees and move it by half a metre."""
     truth, graph = spiral()
     turn = Rotation.from_euler("z", 170.0, degrees=True).as_matrix()
     shift = 0.3 * np.random.default_rng(1).normal(size=(N_TURNED, 3))

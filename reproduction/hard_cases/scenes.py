@@ -98,7 +98,7 @@ class Plane(NamedTuple):
     slope: float
 
     def corners(self) -> Array:
-        """Corners (4, 3) of a square of it that fills the image."""
+        """Return the corners (4, 3) of a square of it that fills the image."""
         x, y = 2.0 * self.depth_m * SIGNS.T
         return np.column_stack([x, y, self.depth_m + self.slope * x])
 

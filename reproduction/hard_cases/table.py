@@ -41,7 +41,7 @@ REMARK = "None: no answer, or no number; cases without one right answer are to b
 
 
 def side_table(table: pd.DataFrame) -> SideTable:
-    """Every case with both errors, the formulas that made them, and the bound."""
+    """Lay out every case with both errors, the formulas that made them, and the bound."""
     unit = ", " + table.unit
     rows = table.assign(
         judged=table.quantity + unit.where(table.unit != "1", ""),
@@ -58,7 +58,7 @@ def side_table(table: pd.DataFrame) -> SideTable:
 
 
 def short(error: float) -> str:
-    """An error at two digits; ``none`` where there is no finite one."""
+    """Format an error with two digits; ``none`` where there is no finite one."""
     if math.isinf(error):
         return "none"
     if error == 0 or 1e-3 <= error < 1e4:

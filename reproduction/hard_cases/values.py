@@ -82,7 +82,7 @@ def _difference(answer: float, truth: Any) -> float:
 
 
 def _angle_rad(quat_wxyz: list[float], truth: list[Any]) -> float:
-    """Angle between two unit quaternions, by the chord to the nearer of the truth's two signs."""
+    """Compute the angle between unit quaternions by the chord to the nearer sign of the truth."""
     if not all(map(math.isfinite, quat_wxyz)):
         return math.inf
     chords = [

@@ -31,7 +31,7 @@ class PlannedJobs:
 
 
 def planned_jobs(profile: Path) -> PlannedJobs:
-    """All jobs of a run that begins with nothing."""
+    """List all jobs of a run that begins with nothing."""
     with tempfile.TemporaryDirectory(prefix="plan-") as folder:
         out = Path(folder) / "jobs.json"
         command = [sys.executable, "-m", __spec__.name, str(profile), folder, str(out)]
@@ -45,18 +45,18 @@ def planned_jobs(profile: Path) -> PlannedJobs:
 
 
 def job_name(benchmark: str) -> str:
-    """``stage/name`` of a job, from the file that measures it."""
+    """Name a job ``stage/name`` by the file that measures it."""
     return benchmark.partition("/benchmarks/")[2].removesuffix(".tsv")
 
 
 def key_of(benchmark: str) -> Key:
-    """Stage and name of a job, from the file that measures it."""
+    """Return stage and name of a job by the file that measures it."""
     stage, _, name = job_name(benchmark).partition("/")
     return stage, name
 
 
 def _needed(records: list[dict[str, Any]]) -> dict[str, frozenset[Key]]:
-    """By table, the jobs that it comes from and its own."""
+    """Return, by table, the jobs that it depends on and its own."""
     makers = {path: place for place, record in enumerate(records) for path in record["output"]}
     needed = {}
     for place, record in enumerate(records):

@@ -98,7 +98,7 @@ STAGES: dict[str, Stage] = {
 
 
 def jobs_of(profile: Profile, keys: Iterable[Key]) -> pd.DataFrame:
-    """The jobs of these names that the profile may have, in the order of the stages.
+    """Tabulate the jobs of these names that the profile may have, in the order of the stages.
 
     Columns are ``stage`` and ``job``, folder or file of ``<root>/benchmarks`` and path below that;
     ``law``; ``size`` in ``unit``, and ``other`` in a second one (frames of a rendering, layer steps
@@ -112,7 +112,7 @@ def jobs_of(profile: Profile, keys: Iterable[Key]) -> pd.DataFrame:
 
 
 def job_of(profile: Profile, stage: str, name: str) -> dict[str, Any] | None:
-    """The job of this name; None if the profile has no such scene, size, sequence or network."""
+    """Describe the job of this name; None without such a scene, size, sequence or network."""
     kind = STAGES.get(stage, Stage())
     # Stages under one law cost the same per unit.
     law = {"Msamples": "rendering", "TFLOP": TRAINING}.get(kind.unit, stage)
@@ -127,7 +127,7 @@ def job_of(profile: Profile, stage: str, name: str) -> dict[str, Any] | None:
 
 
 def _of_frames(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
-    """Size by the frames that a job goes through."""
+    """Measure a job by the frames that it goes through."""
     config, frames = profile.config, _frames(profile, part, kind)
     with_depth = kind.unit == "Mpx" or part.get("camera") == "groundtruth"
     camera = config.groundtruth_camera if with_depth else config.network_camera
@@ -154,7 +154,7 @@ def _of_frames(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
 
 
 def _frames(profile: Profile, part: Part, kind: Stage) -> int:
-    """Frames of a batch, a sequence, a split or several."""
+    """Count frames of a batch, a sequence, a split or several."""
     config, scene = profile.config, part["scene"]
     sizes = [part["size"]] if "size" in part else list(config.scenes[scene].sizes)
     if part.get("camera") == "groundtruth":
@@ -177,7 +177,7 @@ def _frames(profile: Profile, part: Part, kind: Stage) -> int:
 
 
 def _scene(profile: Profile, part: Part, _: Stage) -> dict[str, float]:
-    """A prepared scene takes as much as the user's mesh, or as a procedural one."""
+    """Size a scene's preparation by the user's mesh, or as a procedural one."""
     path = profile.config.scenes[part["scene"]].path
     return {"disk_bytes": path.stat().st_size if path and path.is_file() else SCENE}
 
@@ -217,7 +217,7 @@ def _features(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
 
 
 def _varied(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
-    """Frames with effects; motion blur draws each several times."""
+    """Size a job by frames with effects; motion blur draws each several times."""
     robust = profile.config.robustness
     job = _of_frames(profile, {**part, "scene": robust.scene, "size": robust.size}, kind)
     effects = {**robust.effects, "mixed": robust.mixed}[part["effects"]]
@@ -227,7 +227,7 @@ def _varied(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
 
 
 def _varied_tests(profile: Profile, part: Part, kind: Stage) -> dict[str, float]:
-    """All frames of a training set and of every test; of each test a sample."""
+    """Size a job by all frames of a training set and of tests, sampled where tests are."""
     robust, config = profile.config.robustness, profile.config
     train, test = (config.n_frames(robust.scene, robust.size, s) for s in ("train", "test"))
     if "effects" in part:

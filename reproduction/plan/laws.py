@@ -33,12 +33,12 @@ LAW = ("fixed_s", "rate_other", "rate", "low", "high", "largest", "base_mb")
 
 
 def matched(jobs: pd.DataFrame, measured: pd.DataFrame) -> pd.DataFrame:
-    """Measured jobs with what is known of those of the same name."""
+    """Join measured jobs with what is known of those of the same name."""
     return measured.merge(jobs, on=["stage", "job"])
 
 
 def fit_laws(pairs: pd.DataFrame, training: tuple[float, ...] | None = None) -> pd.DataFrame:
-    """A law (columns :data:`LAW`) by its name, for all measured jobs that :func:`matched` gives.
+    """Fit a law (columns :data:`LAW`) per name to all measured jobs that :func:`matched` gives.
 
     ``training`` are the parts per unit of training runs, where they are known better.
     """
@@ -51,7 +51,7 @@ def fit_laws(pairs: pd.DataFrame, training: tuple[float, ...] | None = None) -> 
 
 
 def seconds_of(jobs: pd.DataFrame, laws: pd.DataFrame) -> pd.Series[float]:
-    """Seconds of every job by its law; NaN where there is none."""
+    """Predict the seconds of every job by its law; NaN where there is none."""
     law = jobs[["law"]].join(laws, on="law")
     work = law["rate_other"] * jobs["other"].fillna(0.0) + law["rate"] * jobs["size"].fillna(0.0)
     return law["fixed_s"] + work
@@ -60,7 +60,7 @@ def seconds_of(jobs: pd.DataFrame, laws: pd.DataFrame) -> pd.Series[float]:
 def fit_seconds(
     sizes: NDArray[np.float64], seconds: NDArray[np.float64], start_s: float
 ) -> tuple[float, tuple[float, ...]]:
-    """Fixed part, at least the start of a program, and parts per unit, none negative.
+    """Fit a fixed part, at least the start of a program, and parts per unit, none negative.
 
     Sizes (N, K) that differ enough are fitted by robust least squares on relative residuals. Else
     the fixed part is the start of a program, and what all jobs took beyond that is per main (last)
@@ -80,7 +80,7 @@ def fit_seconds(
 def _regression(
     sizes: NDArray[np.float64], seconds: NDArray[np.float64], least_s: float
 ) -> tuple[float, tuple[float, ...]]:
-    """Fixed part and parts per unit, none negative, the fixed part at least ``least_s``."""
+    """Fit a fixed part, at least ``least_s``, and parts per unit, none negative."""
     design = np.column_stack([np.ones(len(sizes)), sizes])
     scale = np.maximum(design.max(axis=0), 1e-12)
     weighted = design / scale / seconds[:, None]
@@ -115,7 +115,7 @@ def _law(pairs: pd.DataFrame, start_s: float, known: tuple[float, ...] | None) -
 
 
 def _start(pairs: pd.DataFrame) -> float:
-    """Seconds to start a program: the median of the stage where it is least."""
+    """Estimate the seconds to start a program: the median of the stage where it is least."""
     stages = pairs.groupby("stage")["cpu_s"].agg(["median", "size"])
     enough = stages[stages["size"] >= LEAST_JOBS]
     return float((enough if len(enough) else stages)["median"].min())
@@ -141,14 +141,14 @@ class Machine:
     gpu_rates: tuple[float, float] | None = None
 
     def gpu_s(self, layer_steps: Any, tflop: Any) -> Any:
-        """Seconds of a training run on a GPU."""
+        """Predict the seconds of a training run on a GPU."""
         if self.gpu_rates is not None:
             return self.gpu_rates[0] * layer_steps + self.gpu_rates[1] * tflop
         return np.maximum(tflop / self.gpu_tflops, layer_steps * LAUNCH_S)
 
 
 def job_costs(jobs: pd.DataFrame, laws: pd.DataFrame, machine: Machine) -> pd.DataFrame:
-    """Every job with its law and its costs; NaN where the law was not measured."""
+    """Tabulate every job with its law and its costs; NaN where the law was not measured."""
     costs = jobs.join(laws, on="law")
     known = costs["fixed_s"].notna()
     on_gpu = costs["law"].eq(TRAINING) & bool(machine.gpus)
@@ -188,7 +188,7 @@ def wall_seconds(seconds: Iterable[float], slots: int) -> float:
 
 
 def stage_costs(costs: pd.DataFrame, machine: Machine) -> list[dict[str, Any]]:
-    """The stages in the order of the jobs; no times where a stage was not measured.
+    """List the stages in the order of the jobs; no times where a stage was not measured.
 
     ``work`` is the sum of the sizes in their ``unit``, ``beyond`` the largest planned job over the
     largest measured one.
@@ -207,7 +207,7 @@ def stage_costs(costs: pd.DataFrame, machine: Machine) -> list[dict[str, Any]]:
 def table_costs(
     costs: pd.DataFrame, needed: Mapping[str, frozenset[Key]], machine: Machine
 ) -> list[dict[str, Any]]:
-    """Each table by itself and its own jobs, then those that several share or none needs.
+    """List each table alone and its own jobs, then those that several share or none needs.
 
     Every job is counted once but in a table ``alone``: what it costs if nothing else is made.
     """
@@ -221,7 +221,7 @@ def table_costs(
 
 
 def compare_cost(laws: pd.DataFrame, pairs: pd.DataFrame) -> pd.DataFrame:
-    """Prediction beside measurement, processor seconds: every stage with a law, and the total.
+    """Compare predicted and measured processor seconds: every stage with a law, and the total.
 
     The most expensive come first, the total last; ``factor`` is predicted over measured.
     """

@@ -30,19 +30,19 @@ class Work:
     activation_bytes: float  # of what these layers put out for one image
 
     def size(self, samples: int, batch_size: int, predicted: int) -> tuple[float, float]:
-        """Layers times steps, and TFLOP, of training on ``samples`` and predicting frames."""
+        """Count layers times steps, and TFLOP, of training on ``samples`` and predicting frames."""
         steps = -(-samples // batch_size)
         images = PASSES * steps * batch_size + predicted
         return float(self.layers * steps), images * self.flop / 1e12
 
     def held_bytes(self, batch_size: int) -> float:
-        """Memory of a training step."""
+        """Return the memory of a training step, bytes."""
         return PARAMETER_COPIES * self.parameter_bytes + batch_size * self.activation_bytes
 
 
 @lru_cache
 def training_work(model: str, network: NetworkConfig, hyper: LocalizerConfig) -> Work:
-    """The network of a localizer."""
+    """Measure the network of a localizer."""
     from baselines.localizers.registry import build_localizer  # torch takes a second to load
 
     return _count(lambda: build_localizer(model, network, hyper), network.input_px)
@@ -50,7 +50,7 @@ def training_work(model: str, network: NetworkConfig, hyper: LocalizerConfig) ->
 
 @lru_cache
 def pretext_work(backbone: BackboneName, network: NetworkConfig) -> Work:
-    """The network that a backbone is pretrained in."""
+    """Measure the network that a backbone is pretrained in."""
     from baselines.training.pretrain import RoomsNetwork
 
     return _count(lambda: RoomsNetwork(backbone, network.width, 1), network.input_px)

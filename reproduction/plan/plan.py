@@ -93,7 +93,7 @@ def compare_runs(measured: Sequence[Path], compared: Path, time_steps: bool = Fa
 
 
 def _rates(run: Path, time_steps: bool) -> tuple[float, float] | None:
-    """Of the networks of a measured run, on a core as those of all measured runs were."""
+    """Return rates of a measured run's networks, on a core as those of all measured runs were."""
     if not time_steps:
         return None
     config = read_profile(run.resolve().name).config
@@ -102,7 +102,7 @@ def _rates(run: Path, time_steps: bool) -> tuple[float, float] | None:
 
 
 def write_plans(path: Path, plans: Sequence[Plan]) -> None:
-    """Plans as one table: hours, 10^9 bytes; a row per stage, per table alone, and for all."""
+    """Write plans as a table: hours, 10^9 bytes; a row per stage, per table alone, and for all."""
     write_frame(path, pd.concat(map(_rows, plans)), "%.4g")
 
 
@@ -129,7 +129,7 @@ def _rows(plan: Plan) -> pd.DataFrame:
 
 
 def write_check(path: Path, comparisons: Comparisons) -> None:
-    """Predictions beside measurements, processor seconds."""
+    """Write predictions beside measurements, processor seconds."""
     tables = [
         pd.DataFrame(
             {

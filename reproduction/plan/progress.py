@@ -31,7 +31,7 @@ class RunPlan:
 
 
 def plan_run(config: Config, design: Design, benchmarks: Iterable[str], cores: int) -> RunPlan:
-    """The plan of a run on ``cores`` whose jobs write ``<root>/benchmarks/<stage>/<name>.tsv``."""
+    """Plan a run on ``cores`` whose jobs write ``<root>/benchmarks/<stage>/<name>.tsv``."""
     paths = list(benchmarks)
     known = _expected_s(Profile(config, design), paths)
     usual = median(known.values()) if known else 1.0
@@ -57,7 +57,7 @@ def to_do(measured: Mapping[str, Sequence[str]], counts: Mapping[str, int]) -> l
 
 
 def _expected_s(profile: Profile, benchmarks: Iterable[str]) -> dict[str, float]:
-    """Seconds by job from the planner's laws (docs/cost.md); none where no run was published."""
+    """Predict seconds by job by the planner's laws (docs/cost.md); none without a published run."""
     try:
         laws = fit_laws(read_runs(MEASURED)[0])
     except InputError:
@@ -87,7 +87,7 @@ class TimeLeft:
         self._taken_s: dict[str, float] = {}
 
     def started(self, job: str, now_s: float) -> None:
-        """A job began; if it was not expected, it takes the place of one of its stage that was."""
+        """Note that a job began; if unexpected, it replaces an expected one of its stage."""
         self._began[job] = now_s
         if job not in self.expected_s:
             begun = self._began.keys() | self._taken_s.keys()
@@ -100,7 +100,7 @@ class TimeLeft:
                 }
 
     def finished(self, job: str, now_s: float) -> None:
-        """A job ended."""
+        """Note that a job ended."""
         self._taken_s[job] = now_s - self._began.pop(job, now_s)
         self.expected_s.setdefault(job, self._taken_s[job])
 
@@ -110,17 +110,17 @@ class TimeLeft:
         return tuple(self._began)
 
     def count(self, stage: str) -> tuple[int, int]:
-        """Jobs of a stage that are done, and all of them."""
+        """Return how many jobs of a stage are done, and how many it has."""
         jobs = [job for job in tuple(self.expected_s) if _stage(job) == stage]
         return sum(job in self._taken_s for job in jobs), len(jobs)
 
     def seconds(self, now_s: float) -> float:
-        """Seconds left: the work there is on all cores, or the longest job on one."""
+        """Return the seconds left: the work there is on all cores, or the longest job on one."""
         left = list(self._left_s(now_s).values())
         return max(sum(left) / self._cores, max(left, default=0.0))
 
     def share(self) -> float:
-        """Part of the expected work that is done, from 0 to 1: it never falls."""
+        """Return the part of the expected work that is done, from 0 to 1; it never falls."""
         expected_s = dict(self.expected_s)
         done_s = sum(expected_s[job] for job in tuple(self._taken_s))
         return done_s / sum(expected_s.values()) if expected_s else 1.0

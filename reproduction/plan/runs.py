@@ -26,7 +26,7 @@ DEFAULT = FOLDER / "config.yaml"
 
 
 def read_profile(name: str) -> Profile:
-    """A profile by its name in a file of ``config/``, or by the path of its file."""
+    """Read a profile by its name in ``config/``, or by the path of its file."""
     path = profile_path(name)
     paths = [path] if is_default(path) else [DEFAULT, path]
     config = load_config(*paths)
@@ -41,7 +41,7 @@ def is_default(path: Path) -> bool:
 
 
 def profile_path(name: str) -> Path:
-    """The file of a profile, by name or path."""
+    """Return the file of a profile, by name or path."""
     if name.endswith((".yaml", ".yml")):
         return Path(name)
     paths = sorted(FOLDER.glob("*.yaml"))
@@ -53,7 +53,7 @@ def profile_path(name: str) -> Path:
 
 
 def read_runs(*roots: Path) -> tuple[pd.DataFrame, int]:
-    """Measured jobs of runs with their sizes, and how many their profiles cannot have.
+    """Read measured jobs of runs with their sizes; count those their profiles cannot have.
 
     A run's directory is called like its profile, as the workflow calls it.
     """

@@ -34,7 +34,7 @@ class StepRates:
 
 
 def timed_rates(config: Config) -> StepRates:
-    """Rates at which a profile's networks are trained here, its batches on random images."""
+    """Time how fast a profile's networks are trained here, on batches of random images."""
     device = open_device(config.training.device)
     batch = config.training.batch_size
     sizes, seconds = [], []
@@ -47,7 +47,7 @@ def timed_rates(config: Config) -> StepRates:
 
 
 def _step_s(name: ModelName, hyper: LocalizerConfig, config: Config, device: torch.device) -> float:
-    """Seconds of a step; the first one, which sets things up, does not count."""
+    """Time a step, seconds; the first one, which sets things up, does not count."""
     torch.manual_seed(0)
     batch, px = config.training.batch_size, config.network.input_px
     localizer = build_localizer(name, config.network, hyper)

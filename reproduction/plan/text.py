@@ -18,12 +18,12 @@ SIZES = ((1e9, 1e9, "GB"), (0, 1e6, "MB"))
 
 
 def plan_text(plans: Sequence[Plan]) -> str:
-    """Plans: one line that sums each up, stages, tables, and what the numbers rest on."""
+    """Format plans: a line that sums each up, stages, tables, and what the numbers rest on."""
     return "\n".join("\n".join(_plan_lines(plan)) + "\n" for plan in plans)
 
 
 def comparison_text(comparisons: Comparisons) -> str:
-    """Predictions beside measurements."""
+    """Format predictions beside measurements."""
     head = ["stage", "jobs", "predicted CPU", "range", "measured CPU", "predicted/measured"]
     parts = []
     for (source, predicted), table in comparisons.items():
@@ -70,7 +70,7 @@ def _row(r: dict[Any, Any], on_gpu: bool) -> list[str]:
 
 
 def _table_table(plan: Plan) -> str:
-    """One line per table of the paper: its own jobs, and all it needs."""
+    """Format one line per table of the paper: its own jobs, and all it needs."""
     own, alone = (plan.costs[plan.costs["part"] == part] for part in (OWN, ALONE))
     shares = own.merge(alone, "left", "name", suffixes=("", "_alone"))
     used = ["cpu_mid", "gpu_mid"] if plan.machine.gpus else ["cpu_mid"]
@@ -110,7 +110,7 @@ def _notes(plan: Plan) -> Iterator[str]:
 
 
 def number(value: float) -> str:
-    """Two or three figures, without an exponent."""
+    """Format two or three figures, without an exponent."""
     if value == 0:
         return "0"
     if value < 0.001:
@@ -119,13 +119,13 @@ def number(value: float) -> str:
 
 
 def scaled(value: float, units: Sequence[tuple[float, float, str]]) -> str:
-    """A value in the unit that suits it."""
+    """Format a value in the unit that suits it."""
     _, unit, name = next(u for u in units if value >= u[0])
     return f"{number(value / unit)} {name}"
 
 
 def duration(seconds: float) -> str:
-    """Seconds in the unit that suits them; nothing where they are not known."""
+    """Format seconds in the unit that suits them; nothing where they are not known."""
     return "" if math.isnan(seconds) else scaled(seconds, DURATIONS)
 
 
@@ -134,7 +134,7 @@ def _memory(peak_mb: float) -> str:
 
 
 def _spoken(costs: Any, what: str) -> str:
-    """As in ``3.5 h (2 h to 7 h)``."""
+    """Format costs as in ``3.5 h (2 h to 7 h)``."""
     low, mid, high = (duration(costs[f"{what}_{end}"]) for end in ("low", "mid", "high"))
     return mid if low == high else f"{mid} ({low} to {high})"
 
@@ -144,7 +144,7 @@ def _time(costs: Any, what: str, of: str = "") -> list[str]:
 
 
 def _span(low: float, mid: float, high: float) -> list[str]:
-    """The middle, and both ends in the unit of the upper one."""
+    """Format the middle, and both ends in the unit of the upper one."""
     if math.isnan(mid):
         return ["", ""]
     _, unit, name = next(u for u in DURATIONS if high >= u[0])

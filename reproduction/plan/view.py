@@ -52,7 +52,7 @@ class FirstScores:
         return label(run)
 
     def complete(self, row: str) -> bool:
-        """True where every run of a row has its scores."""
+        """Tell whether every run of a row has its scores."""
         return len(self._scores.get(row, {})) == self._expected[row]
 
     def cells(self, row: str) -> list[str]:
@@ -69,7 +69,7 @@ class FirstScores:
 
 
 def label(run: Run) -> str:
-    """The data set of a run in few letters: what is usual goes without saying."""
+    """Name the data set of a run in few letters; what is usual is left out."""
     rest = [part for part in (run.labels, run.init) if part not in ("synfeal", "pretrained")]
     return " ".join([run.scene, run.size, *rest]).replace("noise-", "")
 
@@ -105,7 +105,7 @@ class RunView:
         )
 
     def begin(self, plan: RunPlan) -> None:
-        """The jobs are known."""
+        """Show the jobs once they are known."""
         self._begin_s = self._clock()
         self._time_left = TimeLeft(plan.expected_s, plan.cores)
         self._scores = FirstScores(plan.root, plan.runs)
@@ -121,15 +121,15 @@ class RunView:
             self._say_line()
 
     def started(self, job: str) -> None:
-        """A job began; ``stage/name``."""
+        """Note that a job ``stage/name`` began."""
         self._time_left.started(job, self._clock())
 
     def finished(self, job: str) -> None:
-        """A job ended, well or not."""
+        """Note that a job ended, successfully or not."""
         self._time_left.finished(job, self._clock())
 
     def scored(self, metrics: Path) -> None:
-        """There is a ``metrics.json``; what no table can show is left to the run to complain of."""
+        """Show a new ``metrics.json``; the run complains of one that no table can show."""
         try:
             row = self._scores.add(metrics)
         except InputError:
@@ -148,7 +148,7 @@ class RunView:
             self._open_rows.append(row)
 
     def progress(self, done: int, total: int) -> None:
-        """So many jobs are done."""
+        """Note how many jobs are done."""
         self._done, self._total = done, total
         if done == total:
             self.end()
@@ -156,18 +156,18 @@ class RunView:
             self._say_line()
 
     def failed(self, job: str, logs: Iterable[Path]) -> None:
-        """A job failed: what its log ends with."""
+        """Show that a job failed, and what its log ends with."""
         self.say(f"error: {job} failed", "red")
         for log in logs:
             lines = log.read_text(errors="replace").splitlines() if log.is_file() else []
             self.say("\n".join([f"{log}:", *(f"    {line}" for line in lines[-LOG_LINES:])]))
 
     def say(self, text: str, style: str | None = None) -> None:
-        """A message that stays."""
+        """Print a message that stays."""
         self._console.print(Text(text, style or ""), soft_wrap=True)
 
     def end(self) -> None:
-        """The run is over, or broken off: the line goes, and what was done is said."""
+        """End the display when the run is over or broken off, and say what was done."""
         if self._total:
             self._live.stop()
             done = f"{self._done} of {self._total} jobs"
@@ -175,7 +175,7 @@ class RunView:
             self._total = 0
 
     def line(self) -> str:
-        """Jobs done, stages at work, time left."""
+        """Format jobs done, stages at work, time left."""
         now_s = self._clock()
         parts = [f"{self._done} of {self._total} jobs"]
         stages = dict.fromkeys(job.partition("/")[0] for job in self._time_left.running)
@@ -192,7 +192,7 @@ class RunView:
         self.say(f"{time.strftime('%H:%M')}  {share:.0f} %  {self.line()}")
 
     def _picture(self) -> Group:
-        """The rows that are being filled, as many as there is room for, and the line."""
+        """Draw the rows that are being filled, as many as there is room for, and the line."""
         room = max(self._console.size.height - LINES_BELOW, 0)
         rows = self._open_rows[-room:] if room else []
         table = _columns(self._console.width)
@@ -205,7 +205,7 @@ class RunView:
 
 
 def _columns(width: int) -> Table:
-    """A grid whose columns have the same widths every time, for rows come one by one."""
+    """Build a grid whose columns keep their widths, for rows come one by one."""
     cells = len(HEADING) - 1
     cell = WIDE_CELL if width >= LABEL + cells * (WIDE_CELL + 1) else NARROW_CELL
     table = Table.grid(padding=(0, 1))

@@ -167,5 +167,5 @@ def _is_all(part: Part, config: RealConfig) -> bool:
 
 
 def folder(config: RealConfig, part: Part) -> Path:
-    """Folder of the files of a part."""
+    """Return the folder of the files of a part."""
     return config.results / part.name

@@ -59,7 +59,7 @@ def write_real_figures(
 
 
 def draw_amount(points: pd.DataFrame) -> Figure:
-    """Errors of PoseNet2 against the number of rendered frames, and of photographs."""
+    """Draw errors of PoseNet2 against the number of rendered frames, and of photographs."""
     figure = Figure(figsize=(8.0, 5.4), layout="constrained")
     axes = figure.subplots(2, 2, sharex="col", sharey="row")
     for column, (kind, title) in enumerate(KINDS.items()):
@@ -109,7 +109,7 @@ def _line(panel: Axes, group: pd.DataFrame, measure: str, trained_on: str) -> No
 
 
 def draw_cover(bins: pd.DataFrame) -> Figure:
-    """Errors of PoseNet2 against the share of a photograph that the scan covers."""
+    """Draw errors of PoseNet2 against the share of a photograph that the scan covers."""
     bins = bins[bins.n_test >= FEWEST]
     figure = Figure(figsize=(8.8, 3.4), layout="constrained")
     axes = figure.subplots(1, 2)

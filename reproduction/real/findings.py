@@ -26,7 +26,7 @@ def real_findings(root: Path) -> str:
 
 
 def real_table(root: Path) -> str:
-    """The table of a published run."""
+    """Format the table of a published run."""
     table = read_real(root / "tables" / f"{NAME}.csv")
     return sheet_markdown(side_sheet(side_table(table))).rstrip()
 

@@ -62,7 +62,7 @@ def read_sfm_labels(files: Iterable[Path]) -> dict[str, Array]:
 
 
 def motion_of(rotvec_deg_and_m: Sequence[float]) -> Array:
-    """A rigid motion (4, 4) from a rotation vector in degrees and a translation in metres."""
+    """Build a rigid motion (4, 4) from a rotation vector in degrees and a translation in metres."""
     turn = Rotation.from_rotvec(np.asarray(rotvec_deg_and_m[:3]), degrees=True)
     return np.asarray(pose_matrix(turn.as_matrix(), np.asarray(rotvec_deg_and_m[3:])))
 
@@ -104,7 +104,7 @@ def relabelled(frames: PosedFrames, names: Sequence[str], labels: dict[str, Arra
 
 
 def of_depth_camera(world_from_color: Array, depth_from_color: Array) -> Array:
-    """Poses (N, 4, 4) of the depth camera from those of the colour camera beside it."""
+    """Compute poses (N, 4, 4) of the depth camera from those of the colour camera beside it."""
     return np.asarray(world_from_color @ inverse(depth_from_color))
 
 

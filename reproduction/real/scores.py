@@ -47,7 +47,7 @@ def read_truth(path: Path) -> Truth:
 
 
 def photograph_name(image: str) -> str:
-    """The name of a photograph by its file: ``seq-01/frame-000500`` of ``…/….color.png``."""
+    """Name a photograph by its file: ``seq-01/frame-000500`` of ``…/….color.png``."""
     path = Path(image)
     return full_name(path.name.partition(".")[0], path.parent.name)
 
@@ -134,7 +134,7 @@ def samples_of(*results: Sequence[Array]) -> tuple[Layout, list[Array]]:
 
 
 def cell(runs: Sequence[Errors], draws: Draws) -> dict[str, float | int]:
-    """The numbers of a cell of the table, each with its limits under ``_low`` and ``_high``."""
+    """Compute the numbers of a cell, each with its limits under ``_low`` and ``_high``."""
     measured = {
         "position_m": draws.medians([run.position_m for run in runs]),
         "orientation_deg": draws.medians([run.orientation_deg for run in runs]),
@@ -171,7 +171,7 @@ def named(name: str, sample: Array, layout: Layout) -> dict[str, float]:
 def times_as_exact(
     runs: Sequence[Errors], photographs: Sequence[Errors], draws: Draws
 ) -> dict[str, float]:
-    """By how much errors are smaller than those of the same localizer trained on photographs."""
+    """Compare errors with those of the same localizer trained on photographs, as ratios."""
     found: dict[str, float] = {}
     for measure in ("position_m", "orientation_deg"):
         layout, (trained, other) = samples_of(
@@ -183,7 +183,7 @@ def times_as_exact(
 
 
 def correlation_frames(runs: Sequence[Errors]) -> float:
-    """Over how many neighbouring photographs errors stay alike: integrated autocorrelation time.
+    """Estimate over how many neighbouring photographs errors stay alike (autocorrelation time).
 
     Of the logarithms of position errors, mean over runs, summed up to the first lag at which the
     correlation is not positive. Gaps between the photographs are passed over.

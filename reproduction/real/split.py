@@ -148,7 +148,7 @@ def place_frames(frames: PosedFrames, only_sequence: str, directory: Path) -> No
 
 
 def full_name(name: str, only_sequence: str) -> str:
-    """The name of a frame with its sequence."""
+    """Return the name of a frame with its sequence."""
     return name if "/" in name else f"{only_sequence}/{name}"
 
 

@@ -108,7 +108,7 @@ def write_part(
 def _by_sfm(
     frames: PosedFrames, sequence_name: str, labels: dict[str, Array], depth_from_color: Array
 ) -> PosedFrames:
-    """Photographs with labels by SfM, taken to the depth camera."""
+    """Return photographs with labels by SfM, moved to the depth camera."""
     names = [full_name(name, sequence_name) for name in frames.names]
     found = relabelled(frames, names, labels)
     return replace(found, world_from_cam=of_depth_camera(found.world_from_cam, depth_from_color))
@@ -173,7 +173,7 @@ def write_references(
 
 
 def mean_pose(world_from_cam: Array) -> Array:
-    """The mean position and the chordal mean rotation of poses (N, 4, 4), as one pose (4, 4)."""
+    """Average poses (N, 4, 4): mean position and chordal mean rotation, as one pose (4, 4)."""
     left, _, right = np.linalg.svd(world_from_cam[:, :3, :3].sum(axis=0))
     mean = np.eye(4)
     mean[:3, :3] = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
@@ -229,7 +229,7 @@ def write_comparison(scan: Path, test: Path, out_picture: Path) -> None:
 
 
 def scan_camera(scan: Path, width: int | None) -> CameraConfig:
-    """The camera of the photographs that a scan was made of, for images of some width."""
+    """Read the camera of the photographs that a scan was made of, for images of some width."""
     camera = camera_of_dataset(scan.parent, scan.with_suffix(".json")).config
     return camera if width is None else resized(camera, width, None)
 

@@ -90,7 +90,7 @@ def _lean(sequence: Path, out: Path) -> None:
 
 
 def calibration_text(width: int, height: int) -> str:
-    """A camera as OpenCV writes one, whose first pixel has its centre at 0."""
+    """Format a camera as OpenCV writes one, whose first pixel has its centre at 0."""
     focal = FOCAL_SHARE * width
     matrix = [focal, 0.0, width / 2 - 0.5, 0.0, focal, height / 2 - 0.5, 0.0, 0.0, 1.0]
     return (

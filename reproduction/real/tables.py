@@ -60,17 +60,17 @@ class Scored:
         self.fused = int(read_json(at / "scan.json")["frames"]["fused"])
 
     def errors(self, poses: Sequence[str]) -> list[Errors]:
-        """Errors of runs, by their poses below the results, against the given labels."""
+        """Compute errors of runs, by their poses below the results, against the given labels."""
         return [read_errors(self._config.results / path, self.truth) for path in poses]
 
     def by_sfm(self, poses: Sequence[str]) -> list[Errors]:
-        """The same against the labels by SfM; none where there are none."""
+        """Compute the same against the labels by SfM; none where there are none."""
         if self._sfm is None:
             return []
         return [read_errors(self._config.results / path, self._sfm) for path in poses]
 
     def cell(self, poses: Sequence[str]) -> dict[str, Any]:
-        """All numbers of a cell."""
+        """Compute all numbers of a cell."""
         runs, others = self.errors(poses), self.by_sfm(poses)
         found: dict[str, Any] = cell(runs, self.draws)
         if others:
@@ -152,7 +152,7 @@ def _against_photographs(
 
 
 def _amounts(config: RealConfig, design: RealDesign) -> Iterator[dict[str, Any]]:
-    """Points of the figure: of PoseNet2, in the main direction."""
+    """Yield the points of the figure: of PoseNet2, in the main direction."""
     main = Part(design.main)
     if main not in design.parts:
         return
@@ -197,7 +197,7 @@ def _amount(
 def _covers(
     config: RealConfig, design: RealDesign, scored: dict[Part, Scored]
 ) -> Iterator[dict[str, Any]]:
-    """Median errors of photographs by the share of them that the scan covers."""
+    """Yield median errors of photographs by the share of them that the scan covers."""
     for part in (part for part in design.parts if part.labels == GIVEN):
         shares = read_cover(folder(config, part) / "cover.csv")
         bins = np.digitize(shares, SHARE_BOUNDS[1:-1])
@@ -231,5 +231,5 @@ def _bin(
 
 
 def read_cover(path: Path) -> NDArray[np.float64]:
-    """Shares (N,) of the photographs that the scan covers, 0 to 1."""
+    """Read the shares (N,) of the photographs that the scan covers, 0 to 1."""
     return np.asarray(read_frame(path, {"covered": NUMBER}).covered, np.float64)

@@ -45,7 +45,7 @@ class Finding(NamedTuple):
 
 
 def read_table(root: Path, name: str, schema: Schema | None = None) -> pd.DataFrame:
-    """A published table; of localizers, where no columns are named."""
+    """Read a published table; of localizers, where no columns are named."""
     kinds = schema or schema_of(name, repeated=True)
     return read_frame(root / "tables" / f"{name}.csv", kinds, "publish again")
 
@@ -77,7 +77,7 @@ def findings(root: Path) -> list[Finding]:
 
 
 def localizers(root: Path, noise: tuple[float, float] = (0.0, 0.0)) -> pd.DataFrame:
-    """The five localizers of the small Large Room set, without or with noise in their labels."""
+    """Select the localizers on the small Large Room set, without or with noise in their labels."""
     cells = read_table(root, "table3_inconsistencies")
     if noise == (0.0, 0.0):
         cells = read_table(root, "table4_size")
@@ -87,7 +87,7 @@ def localizers(root: Path, noise: tuple[float, float] = (0.0, 0.0)) -> pd.DataFr
 
 
 def reference(root: Path, method: str, noise: tuple[float, float] = (0.0, 0.0)) -> Any | None:
-    """A reference method on the same frames, None where it was not run."""
+    """Select a reference method on the same frames; None where it was not run."""
     rows = read_table(root, "references", REFERENCES)
     labels = "synfeal" if noise == (0.0, 0.0) else f"noise-p{noise[0]:g}-r{noise[1]:g}"
     chosen = (rows.scene == ROOM) & (rows["size"] == SMALL) & (rows.labels == labels)
@@ -96,19 +96,19 @@ def reference(root: Path, method: str, noise: tuple[float, float] = (0.0, 0.0)) 
 
 
 def most_noise(root: Path) -> tuple[float, float]:
-    """The highest noise in both parts of the labels, metres and degrees."""
+    """Return the highest noise in both parts of the labels, metres and degrees."""
     cells = read_table(root, "table3_inconsistencies")
     top = cells[cells.block == "both"].sort_values("noise_m").iloc[-1]
     return float(top.noise_m), float(top.noise_deg)
 
 
 def best(cells: pd.DataFrame) -> Any:
-    """The localizer with the lowest position error."""
+    """Return the localizer with the lowest position error."""
     return rows_of(cells.sort_values(POSITION))[0]
 
 
 def structure_beats_regression(root: Path) -> Finding | None:
-    """Feature matching and regression on identical frames with exact labels."""
+    """Compare feature matching and regression on identical frames with exact labels."""
     matched, network = reference(root, WITHOUT_DEPTH), best(localizers(root))
     if matched is None:
         return None
@@ -129,7 +129,7 @@ def structure_beats_regression(root: Path) -> Finding | None:
 
 
 def a_map_beats_exact_labels(root: Path) -> Finding | None:
-    """A bundle-adjusted map from noisy labels, and regression on exact ones."""
+    """Compare a bundle-adjusted map from noisy labels with regression on exact ones."""
     noise = most_noise(root)
     adjusted, network = reference(root, ADJUSTED, noise), best(localizers(root))
     if adjusted is None:
@@ -151,7 +151,7 @@ def a_map_beats_exact_labels(root: Path) -> Finding | None:
 
 
 def shape_changes(root: Path) -> dict[str, tuple[Interval, Interval]]:
-    """By shape of label errors of one size, how they change both errors against the truth."""
+    """Compute how each shape of label errors changes both errors against the truth."""
     cells = read_table(root, "table6_label_errors")
     noise = most_noise(root)
     clean = cells[cells.labels == "synfeal"]
@@ -167,7 +167,7 @@ def shape_changes(root: Path) -> dict[str, tuple[Interval, Interval]]:
 
 
 def shared_errors_stay(root: Path) -> Finding | None:
-    """Independent errors of labels, and errors that frames share."""
+    """Compare label errors that are independent with those that frames share."""
     changes = shape_changes(root)
     if len(changes) < len(SHAPES):
         return None
@@ -211,7 +211,7 @@ def half_the_images(root: Path) -> tuple[Interval, Interval, float, float]:
 
 
 def more_frames_help(root: Path) -> Finding | None:
-    """Size of the data set, and the part of its effect that is longer training."""
+    """Compare sizes of the data set, with the part of the effect that is longer training."""
     size = read_table(root, "table4_size")
     room = size[size.scene == ROOM]
     if not {SMALL, LARGE} <= {*room["size"]}:
@@ -237,7 +237,7 @@ def more_frames_help(root: Path) -> Finding | None:
 
 
 def no_difference_at_this_dose(root: Path) -> Finding | None:
-    """Labels of SfM and RGB-D SLAM in place of exact ones."""
+    """Compare labels of SfM and RGB-D SLAM with exact ones."""
     cells = read_table(root, "table2_ground_truth")
     errors = read_table(root, "label_error", LABEL_ERROR)
     own = errors[
@@ -286,7 +286,7 @@ def no_difference_at_this_dose(root: Path) -> Finding | None:
 
 
 def paired_changes(root: Path, claim: str, part: str = "") -> tuple[Interval, Interval] | None:
-    """Changes of both errors on the same test frames, where a claim was judged by them.
+    """Return changes of both errors on the same test frames, where a claim was judged by them.
 
     Limits are narrower than those of :func:`mean_change`, for what makes a path hard cancels.
     """
@@ -317,7 +317,7 @@ FINDINGS: Sequence[Callable[[Path], Finding | None]] = (
 
 
 def sentences(root: Path, link: str = "") -> list[str]:
-    """Findings and verdict counts as Markdown, one item each.
+    """List findings and verdict counts as Markdown, one item each.
 
     Args:
         root: published results.
@@ -342,7 +342,7 @@ def verdict_sentence(root: Path) -> str:
 
 
 def _printed(before: pd.DataFrame, after: pd.DataFrame) -> str:
-    """The paper's changes of both errors, geometric mean over the localizers, in brackets."""
+    """Format the paper's changes of both errors, geometric mean over localizers, in brackets."""
     both = before.merge(after, on="model", suffixes=("_old", "_new"), validate="1:1")
     texts = []
     for measure in ("position_m", "orientation_deg"):
@@ -370,7 +370,7 @@ def _noise(noise: tuple[float, float]) -> str:
 
 
 def _change(factor: float) -> str:
-    """A factor as a change in percent."""
+    """Format a factor as a change in percent."""
     change = round(100 * (factor - 1))  # an integer has no minus zero
     return f"{change:+d} %".replace("-", "−") if change else "0 %"
 

@@ -116,7 +116,7 @@ def write_findings_figure(drawn: Sequence[Panel], out_png: Path) -> None:
 
 
 def picture(drawn: Sequence[Panel]) -> bytes:
-    """The figure as PNG."""
+    """Draw the figure as PNG."""
     buffer = io.BytesIO()
     with matplotlib.rc_context(rc=RC):
         metadata = {"Software": None, SOURCE: digest(drawn)}
@@ -146,7 +146,7 @@ def digest(drawn: Sequence[Panel]) -> str:
 
 
 def findings_figure(drawn: Sequence[Panel]) -> Figure:
-    """One axis per panel, a line per row: a dot, and a bar for its 95 % limits."""
+    """Draw one axis per panel, a line per row: a dot, and a bar for its 95 % limits."""
     heights = [len(panel.rows) + 1.6 for panel in drawn]
     figure = Figure(figsize=(9.0, 0.42 * sum(heights) + 0.5), layout="constrained")
     all_axes = figure.subplots(len(drawn), 1, height_ratios=heights, squeeze=False)[:, 0]
@@ -196,5 +196,5 @@ def _times(interval: Interval, factor: float) -> Interval:
 
 
 def _change(interval: Interval) -> Interval:
-    """A factor as a change in percent."""
+    """Convert a factor to a change in percent."""
     return Interval(*(100 * (end - 1) for end in interval))

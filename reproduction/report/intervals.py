@@ -33,7 +33,7 @@ class Interval(NamedTuple):
         return self.low <= number <= self.high
 
     def __truediv__(self, other: Interval) -> Interval:
-        """A ratio, as if both were independent and log-normal."""
+        """Divide as if both were independent and log-normal."""
         value = self.value / other.value
         below = math.hypot(math.log(self.value / self.low), math.log(other.high / other.value))
         above = math.hypot(math.log(self.high / self.value), math.log(other.value / other.low))
@@ -41,7 +41,7 @@ class Interval(NamedTuple):
 
 
 def cell_interval(row: Any, measure: str) -> Interval:
-    """A cell of a published table over test paths and training runs.
+    """Return a cell of a published table with limits over test paths and training runs.
 
     Args:
         row: a row of one of tables 2 to 7, or of a reference method, which trains nothing.
@@ -66,7 +66,7 @@ def cell_interval(row: Any, measure: str) -> Interval:
 
 
 def mean_change(before: pd.DataFrame, after: pd.DataFrame, measure: str) -> Interval:
-    """Factor by which an error changes, geometric mean over the localizers.
+    """Compute the factor by which an error changes, geometric mean over the localizers.
 
     What moves one localizer is taken to move all of them: limits do not shrink with their number.
 

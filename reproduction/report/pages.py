@@ -61,7 +61,7 @@ SIFT = dict.fromkeys(
 
 
 def headline() -> str:
-    """The profile whose results the read-me shows."""
+    """Return the profile whose results the read-me shows."""
     return next((name for name in HEADLINES if (PUBLISHED / name).is_dir()), HEADLINES[-1])
 
 
@@ -95,7 +95,7 @@ def origin(root: Path) -> str:
 
 
 def size_table(root: Path) -> str:
-    """Table 4: errors against the true poses, published errors in brackets."""
+    """Format Table 4: errors against the true poses, published errors in brackets."""
     cells = read_table(root, "table4_size")
     frames = "(" + cells.n_train.astype(str) + ", " + cells.n_test.astype(str) + ")"
     labels = cells.scene.map(scene_title) + " " + cells["size"] + " " + frames
@@ -103,13 +103,13 @@ def size_table(root: Path) -> str:
 
 
 def labels_table(root: Path) -> str:
-    """Table 2, the same way."""
+    """Format Table 2, the same way."""
     cells = read_table(root, "table2_ground_truth")
     return _localizer_table(cells, "labels from", cells.labels.map(lambda n: SOURCES.get(n, n)))
 
 
 def assistance(root: Path) -> str:
-    """Batches that needed assistance, and how good the labels are."""
+    """Say which batches needed assistance, and how good the labels are."""
     errors = read_table(root, "label_error", LABEL_ERROR)
     errors = errors[errors.assistance == "after"]
     position, orientation = 100 * errors.position_m_median, errors.orientation_deg_median
@@ -141,7 +141,7 @@ def assistance(root: Path) -> str:
 
 
 def claims(root: Path) -> str:
-    """Every claim with its verdict under both scores, and the rules they were made by."""
+    """List every claim with its verdict under both scores, and the rules they were made by."""
     rows = read_published(root)
     return f"{rules_note(rows, root)}\n\n{claims_markdown(rows_now(rows, root)).rstrip()}"
 
@@ -167,7 +167,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
 
 
 def rewritten(text: str, part: Callable[[str, str], str]) -> str:
-    """A page with its generated parts replaced by ``part``, called with name and profile."""
+    """Replace the generated parts of a page by ``part``, called with name and profile."""
     pattern = re.compile(r"<!-- (\w+) (\w+) -->.*?<!-- /\1 -->", re.DOTALL)
 
     def fresh(found: re.Match[str]) -> str:
@@ -178,14 +178,14 @@ def rewritten(text: str, part: Callable[[str, str], str]) -> str:
 
 
 def part_of(name: str, profile: str) -> str:
-    """A part of a page."""
+    """Generate a part of a page."""
     if name not in PARTS:
         raise InputError(f"<!-- {name} {profile} -->: no such part; known: {', '.join(PARTS)}")
     return PARTS[name](PUBLISHED / (headline() if profile == "headline" else profile))
 
 
 def _localizer_table(cells: pd.DataFrame, heading: str, labels: pd.Series) -> str:
-    """A row per label in their order, a column per localizer."""
+    """Format a row per label in their order, a column per localizer."""
     texts = [_cell(cell) for cell in rows_of(cells)]
     table = cells.assign(row=labels, text=texts).pivot(index="row", columns="model", values="text")
     table = table.loc[labels.unique(), list(MODELS)].rename(columns=TITLES)
@@ -193,7 +193,7 @@ def _localizer_table(cells: pd.DataFrame, heading: str, labels: pd.Series) -> st
 
 
 def _cell(cell: Any) -> str:
-    """Both errors in the paper's unit, positions as root mean squares over the axes."""
+    """Format both errors in the paper's unit, positions as root mean squares over the axes."""
     own = "failed"
     if not pd.isna(cell.position_m_true):
         position_rms_m = cell.position_m_true / math.sqrt(3)
@@ -222,7 +222,7 @@ def _difficulty(folder: Path, name: str) -> dict[str, str]:
 
 
 def stale(check: bool) -> list[Path]:
-    """Pages, and the figure, that did not show the published results; written unless checking."""
+    """List pages, and the figure, that are out of date; rewrite them unless checking."""
     writers: dict[Path, Callable[[], None]] = {}
     for page in (*PAGES, *([REAL_PAGE] if (PUBLISHED / REAL).is_dir() else [])):
         old = page.read_text(encoding="utf-8")

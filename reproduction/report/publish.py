@@ -70,7 +70,7 @@ def _shown_figures(root: Path, target: Path, pages: Iterable[Path]) -> list[Path
 
 
 def _check_provenance(root: Path, paths: Iterable[Path]) -> None:
-    """Tables of one run and provenance of another must not be published together."""
+    """Refuse to publish tables of one run with the provenance of another."""
     record = root / "provenance.json"
     if record not in paths:
         return

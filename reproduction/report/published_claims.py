@@ -27,18 +27,18 @@ Row = Mapping[str, str]
 
 
 def read_published(root: Path) -> list[dict[str, str]]:
-    """The rows of ``claims.csv``, as they were published."""
+    """Read the rows of ``claims.csv``, as they were published."""
     path = root / "claims.csv"
     return [row for _, row in read_records(path, ["id", "verdict_true"], "publish again")]
 
 
 def rules_of(rows: Sequence[Row]) -> str:
-    """The rules that verdicts were made by."""
+    """Return the rules that verdicts were made by."""
     return rows[0].get("rules") or BEFORE_FREEZE
 
 
 def judged_now(rows: Sequence[Row], root: Path) -> dict[str, Verdict]:
-    """Verdicts that the present rules change and that tracked tables can tell, by claim."""
+    """Return verdicts, by claim, that present rules change and that tracked tables can tell."""
     if rules_of(rows) == frozen_rules().tag:
         return {}
     published = {row["id"]: row["verdict_true"] for row in rows}
@@ -58,7 +58,7 @@ def judged_now(rows: Sequence[Row], root: Path) -> dict[str, Verdict]:
 
 
 def rows_now(rows: Sequence[Row], root: Path) -> list[dict[str, str]]:
-    """Rows with the verdicts of :func:`judged_now` in place of the published ones."""
+    """Replace published verdicts by those of :func:`judged_now`."""
     anew = judged_now(rows, root)
     return [
         {**row, **dict.fromkeys(("verdict_labels", "verdict_true"), str(anew[row["id"]]))}
@@ -89,7 +89,7 @@ def rules_note(rows: Sequence[Row], root: Path) -> str:
 
 
 def interval_in(rows: Sequence[Row], claim: str, part: str, place: int) -> Interval | None:
-    """A change that a claim was judged by, as a factor; None where it was not.
+    """Return a change that a claim was judged by, as a factor; None where it was not.
 
     Args:
         rows: of ``claims.csv``.

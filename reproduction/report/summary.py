@@ -94,7 +94,7 @@ def alive_sentences(cells: pd.DataFrame) -> list[str]:
 
 
 def _sentences(title: str, cells: pd.DataFrame) -> list[str]:
-    """Errors at the largest size below half of the mean pose's, and what more frames change."""
+    """Say which errors are below half of the mean pose's, and what more frames change."""
     n_train = cells.groupby("size", sort=False).n_train.first()
     sizes = n_train.idxmin(), n_train.idxmax()
     first, last = (cells[cells["size"] == size].set_index("model") for size in sizes)

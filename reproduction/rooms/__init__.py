@@ -34,7 +34,7 @@ def save_light_shares(builder: str, seed: int, out_shares: Sequence[Path]) -> No
 
 
 def build_scene(builder: str, seed: int) -> TexturedMesh:
-    """The procedural scene ``builder``: textured, lit, z up, metres; the same bytes for one seed.
+    """Build the procedural scene ``builder``: textured, lit, z up, metres; one seed, same bytes.
 
     Raises:
         InputError: if there is no such builder.

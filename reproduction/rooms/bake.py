@@ -50,7 +50,7 @@ def scanned_mesh(
 def light_shares(
     rng: np.random.Generator, item: Item, lighting: Lighting, scanner: Scanner
 ) -> dict[str, TexturedMesh]:
-    """The same scan by groups of sources: vertices hold the share of their light, linear, 255 is 1.
+    """Bake the same scan by groups of sources: vertices hold the share of their light, 255 is 1.
 
     What shines by itself belongs to the source that is nearest to it.
     """
@@ -85,7 +85,7 @@ def _nearest_group(patch: Patch, lighting: Lighting) -> str:
 def _moved(
     rng: np.random.Generator, surface: Surface, points_m: Points
 ) -> tuple[Points, list[NDArray[np.float64]]]:
-    """Unevenly placed vertices (V, 3), and where they lie on the picture of each patch (V', 2)."""
+    """Move vertices (V, 3) unevenly; also return their places on the picture of each patch."""
     pieces = zip(surface.grids, surface.per_patch(points_m), strict=True)
     points, shares = zip(*(jittered(rng, grid, piece) for grid, piece in pieces), strict=True)
     return np.concatenate(points), list(shares)
@@ -94,7 +94,7 @@ def _moved(
 def _reflecting(
     surface: Surface, patches: Sequence[Patch]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Linear albedo (V, 3) and glow (V,) at the vertices."""
+    """Compute linear albedo (V, 3) and glow (V,) at the vertices."""
     pairs = list(zip(patches, surface.grids, strict=True))
     albedo = np.concatenate([albedo_of(patch, grid).reshape(-1, 3) for patch, grid in pairs])
     glow = np.concatenate([np.full(grid.n_points, p.glow, np.float32) for p, grid in pairs])
@@ -102,7 +102,7 @@ def _reflecting(
 
 
 def _lit(patch: Patch, grid: Grid, tone: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """The picture (H, W, 3) under the light at the vertices, which is interpolated."""
+    """Light the picture (H, W, 3) by interpolating the light at the vertices."""
     height_px, width_px = patch.picture.shape[:2]
     rows, columns = (
         np.interp((np.arange(px) + 0.5) / px, shares, np.arange(len(shares)))
@@ -119,7 +119,7 @@ def _textured(
     seen: NDArray[np.bool_],
     pictures: Sequence[NDArray[np.uint8]],
 ) -> TexturedMesh:
-    """The seen faces, one part for each texture."""
+    """Build the mesh of the seen faces, one part for each texture."""
     places, textures = laid_out(pictures)
     uv = []
     for share, picture, (atlas, *corner) in zip(shares, pictures, places, strict=True):
@@ -143,7 +143,7 @@ Pixels = NDArray[np.uint8]
 
 
 def pack(sizes_px: Sequence[Size]) -> tuple[list[tuple[int, int, int]], list[Size]]:
-    """Shelf packing of (height, width) into as many atlases as are needed.
+    """Pack rectangles (height, width) on shelves of as many atlases as are needed.
 
     Returns:
         The atlas, row and column of every picture's top-left corner, and the atlases' sizes.
@@ -175,7 +175,7 @@ def _rounded_up(side_px: int) -> int:
 
 
 def laid_out(pictures: Sequence[Pixels]) -> tuple[list[tuple[int, int, int]], list[Pixels]]:
-    """Pictures (H, W, 3) in atlases: where each one begins, within its gutter, and the textures."""
+    """Lay out pictures (H, W, 3) in atlases; return where each begins, and the textures."""
     rim = ((GUTTER_PX, GUTTER_PX), (GUTTER_PX, GUTTER_PX), (0, 0))
     padded = [np.pad(picture, rim, mode="edge") for picture in pictures]
     places, atlases = pack([picture.shape[:2] for picture in padded])

@@ -17,7 +17,7 @@ DARK = painted((0.13, 0.13, 0.15))
 
 
 def table(make: Maker, size_m: Size, top: Painter, leg: Colour = METAL) -> Item:
-    """A table: a 4 cm top on four square legs."""
+    """Build a table: a 4 cm top on four square legs."""
     width, depth, height = size_m
     board = make.box((width, depth, 0.04), top, 220).placed(0, 0, height - 0.04)
     legs = (
@@ -29,7 +29,7 @@ def table(make: Maker, size_m: Size, top: Painter, leg: Colour = METAL) -> Item:
 
 
 def monitor(make: Maker) -> Item:
-    """A flat screen on a foot, 0.5 m high."""
+    """Build a flat screen on a foot, 0.5 m high."""
     panel = make.box((0.56, 0.04, 0.34), DARK, 60, "blrtu")
     face = upright((-0.28, -0.02), (0.28, -0.02), 0, 0.34)
     shown = make.sheet(face, materials.screen(), 380, glow=0.6)
@@ -39,7 +39,7 @@ def monitor(make: Maker) -> Item:
 
 
 def chair(make: Maker, colour: Colour) -> Item:
-    """An office chair, 0.95 m high."""
+    """Build an office chair, 0.95 m high."""
     cloth = materials.fabric(colour)
     foot = partial(make.box, (0.32, 0.05, 0.05), DARK, 40, "fblrt")
     turns = range(0, 360, 72)
@@ -52,13 +52,13 @@ def chair(make: Maker, colour: Colour) -> Item:
 
 
 def cabinet(make: Maker, size_m: Size, colour: Colour, doors: int = 2, rows: int = 1) -> Item:
-    """A closed cupboard with doors, or with rows of drawers."""
+    """Build a closed cupboard with doors, or with rows of drawers."""
     front = materials.cabinet_front(colour, doors=doors, rows=rows)
     return make.box(size_m, painted(shade(colour, 0.85), 0.08), 150, "flrt", front=front)
 
 
 def bookshelf(make: Maker, size_m: Size, rows: int = 5) -> Item:
-    """A bookcase with a back, boards and sides, filled with books."""
+    """Build a bookcase with a back, boards and sides, filled with books."""
     width, depth, height = size_m
     grain = materials.wood((0.5, 0.36, 0.22))
     levels = np.linspace(0.02, height - 0.025, rows + 1)
@@ -73,7 +73,7 @@ def bookshelf(make: Maker, size_m: Size, rows: int = 5) -> Item:
 
 
 def cushion(make: Maker, size_m: Size, painter: Painter, px_per_m: float = 130) -> Item:
-    """A soft box: one bulging sheet over top and sides."""
+    """Build a soft box: one bulging sheet over top and sides."""
     width, depth, height = size_m
     grid = np.linspace(-1, 1, 11)
     x, y = np.meshgrid(grid, -grid)
@@ -84,7 +84,7 @@ def cushion(make: Maker, size_m: Size, painter: Painter, px_per_m: float = 130) 
 
 
 def pew(make: Maker, width_m: float) -> Item:
-    """A church bench, 0.9 m high; one sits facing +y."""
+    """Build a church bench, 0.9 m high; one sits facing +y."""
     oak, edge = materials.wood((0.46, 0.29, 0.16), contrast=0.22), width_m / 2 + 0.025
     return joined(
         make.box((width_m, 0.38, 0.04), oak, 110).placed(0, 0, 0.42),
@@ -94,7 +94,7 @@ def pew(make: Maker, width_m: float) -> Item:
 
 
 def sofa(make: Maker, width_m: float, painter: Painter) -> Item:
-    """A sofa with bulging cushions."""
+    """Build a sofa with bulging cushions."""
     edge, inner = width_m / 2 - 0.09, (width_m - 0.36) / 2
     seat = partial(cushion, make, (inner, 0.6, 0.16), painter)
     return joined(
@@ -114,7 +114,7 @@ MUG_M = [(0.03, 0.1), (0.042, 0.1), (0.04, 0.0)]
 
 
 def on_table(make: Maker, width_m: float, depth_m: float) -> Item:
-    """Keyboard, sheets of paper, mugs and boxes spread over a table top at z = 0."""
+    """Build keyboard, sheets of paper, mugs and boxes spread over a table top at z = 0."""
     rng, scale = make.rng, (width_m, depth_m)
     keys = make.box((0.42, 0.14, 0.02), materials.keyboard(), 300, "fblrt")
     things = [keys.placed(rng.uniform(-0.2, 0.2), -depth_m * 0.25, 0.001, rng.uniform(-8, 8))]
@@ -135,7 +135,7 @@ def on_table(make: Maker, width_m: float, depth_m: float) -> Item:
 
 
 def books(make: Maker, width_m: float, depth_m: float, height_m: float) -> Item:
-    """A row of books on z = 0, some leaning, with gaps; the spines face -y."""
+    """Build a row of books on z = 0, some leaning, with gaps; the spines face -y."""
     rng, things, x = make.rng, [], -width_m / 2
     while x < width_m / 2 - 0.05:
         thick = rng.uniform(0.018, 0.055)
@@ -150,7 +150,7 @@ def books(make: Maker, width_m: float, depth_m: float, height_m: float) -> Item:
 
 
 def bottles(make: Maker, width_m: float, count: int) -> Item:
-    """A row of bottles, jars and tins on z = 0."""
+    """Build a row of bottles, jars and tins on z = 0."""
     rng, things = make.rng, []
     for x in np.linspace(-width_m / 2, width_m / 2, count) + rng.uniform(-0.02, 0.02, count):
         radius, high = rng.uniform(0.025, 0.05), rng.uniform(0.1, 0.24)
@@ -163,7 +163,7 @@ def bottles(make: Maker, width_m: float, count: int) -> Item:
 
 
 def wall_shelf(make: Maker, width_m: float, count: int) -> Item:
-    """A board on two brackets with a row of bottles; its back is at y = 0."""
+    """Build a board on two brackets with a row of bottles; its back is at y = 0."""
     iron, edge = painted((0.3, 0.3, 0.32)), 0.4 * width_m
     board = make.box((width_m, 0.22, 0.025), materials.wood((0.8, 0.7, 0.55)), 120)
     bracket = partial(make.box, (0.02, 0.18, 0.12), iron, 60, "flru")
@@ -173,7 +173,7 @@ def wall_shelf(make: Maker, width_m: float, count: int) -> Item:
 
 
 def pinned_page(make: Maker) -> Item:
-    """A sheet of paper on a wall at y = 0, pinned at the top, its lower edge curling off."""
+    """Build a sheet of paper on a wall at y = 0, pinned at the top, its lower edge curling off."""
     wide, high = PAGES_M[int(make.rng.integers(len(PAGES_M)))]
     down = np.linspace(0, 1, 7)
     y = -0.006 - make.rng.uniform(0.0, 0.05) * down**2
@@ -182,7 +182,7 @@ def pinned_page(make: Maker) -> Item:
 
 
 def coat(make: Maker, colour: Colour) -> Item:
-    """A coat on a hook: a folded, drooping sheet in front of a wall at y = 0, hook at z = 0."""
+    """Build a coat on a hook: a folded sheet in front of a wall at y = 0, the hook at z = 0."""
     rng = make.rng
     down, across = np.meshgrid(np.linspace(0, 1, 19), np.linspace(-1, 1, 15), indexing="ij")
     half = 0.07 + 0.2 * np.sqrt(down) + 0.05 * down
@@ -193,7 +193,7 @@ def coat(make: Maker, colour: Colour) -> Item:
 
 
 def plant(make: Maker, height_m: float, pot: Colour, leaves: int = 40) -> Item:
-    """A pot plant: bent leaves around a stem."""
+    """Build a pot plant: bent leaves around a stem."""
     rng, rim = make.rng, 0.14
     profile = [(0.005, 0.24), (rim - 0.02, 0.24), (rim, 0.28), (rim * 0.7, 0.0)]
     things = [make.turned(profile, painted(pot, 0.1), 150, 14)]

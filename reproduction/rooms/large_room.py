@@ -72,7 +72,7 @@ BIN_M = [(0.11, 0.05), (0.14, 0.35), (0.15, 0.35), (0.11, 0.0)]
 
 
 def ingredients(seed: int) -> tuple[np.random.Generator, Item, Lighting, Scanner]:
-    """Surfaces and objects to scan; nothing that has a volume sticks out of the room."""
+    """Build surfaces and objects to scan; nothing that has a volume sticks out of the room."""
     rng = generator_of("scene", "large_room", seed)
     make = Maker(rng)
     boards = (make.on_wall(*board, 320) for board in BOARDS)
@@ -105,7 +105,7 @@ def _lighting() -> Lighting:
 
 
 def _shell(make: Maker) -> Item:
-    """Four nearly white walls, each with its own band of colour, floor and ceiling."""
+    """Build four nearly white walls, each with its own band of colour, floor and ceiling."""
     x, y, z = UPPER_M
     wall = partial(materials.wainscot, grain=0.003, stains=0.006)
     return joined(
@@ -119,7 +119,7 @@ def _shell(make: Maker) -> Item:
 
 
 def _floor(canvas: Canvas) -> Pixels:
-    """Grey linoleum, a lane of blue, tape markings and a door mat."""
+    """Paint grey linoleum, a lane of blue, tape markings and a door mat."""
     image = materials.plaster((0.58, 0.57, 0.54), 0.03, 0.012)(canvas)
     x, y = canvas.coordinates_m()
     y = canvas.size_m[1] - y  # image rows run towards −y
@@ -138,7 +138,7 @@ def _floor(canvas: Canvas) -> Pixels:
 
 
 def _ceiling(canvas: Canvas) -> Pixels:
-    """White mineral tiles, all alike; a water stain in one corner."""
+    """Paint white mineral tiles, all alike; a water stain in one corner."""
     x, y = canvas.coordinates_m()
     tiles = materials.plaster((0.84, 0.84, 0.81), 0.006, 0.004)(canvas)
     joint = np.minimum(np.abs((x + 0.3) % 0.6 - 0.3), np.abs((y + 0.3) % 0.6 - 0.3)) < 0.005
@@ -150,7 +150,7 @@ def _ceiling(canvas: Canvas) -> Pixels:
 
 
 def _windows(make: Maker) -> Item:
-    """Three equal bays in the west wall: view, sill and radiator."""
+    """Build three equal bays in the west wall: view, sill and radiator."""
     view, middle = pictures.window_view(blind=0.25), (0.0, 0.0, SILL_M + WINDOW_M[1] / 2)
     sill = make.box((WINDOW_M[0] + 0.2, 0.2, 0.04), BEECH, 120).placed(0.1, 0, SILL_M - 0.05, 90)
     outside = make.on_wall(middle, 90, WINDOW_M, view, 230, depth_m=0.05, glow=0.85)
@@ -160,7 +160,7 @@ def _windows(make: Maker) -> Item:
 
 
 def _south_wall(make: Maker) -> Item:
-    """Door with exit sign, whiteboard, notice and extinguisher."""
+    """Build door with exit sign, whiteboard, notice and extinguisher."""
     door, sign = materials.door((0.15, 0.3, 0.6), window=True), materials.label((0.1, 0.6, 0.25))
     extinguisher = make.turned(EXTINGUISHER_M, painted((0.8, 0.08, 0.06)), 150, 12)
     return joined(
@@ -173,7 +173,7 @@ def _south_wall(make: Maker) -> Item:
 
 
 def _desks(make: Maker) -> Item:
-    """Equal desks with two equal screens and a chair each, and an island with one."""
+    """Build equal desks with two equal screens and a chair each, and an island with one."""
     rng, screen = make.rng, furniture.monitor(make)
     screens = [screen.placed(dx, 0.18, 0.74) for dx in (-0.32, 0.32)]
     desk = joined(furniture.table(make, (1.4, 0.7, 0.74), BEECH), screens)
@@ -190,7 +190,7 @@ def _desks(make: Maker) -> Item:
 
 
 def _storage(make: Maker) -> Item:
-    """Cupboards, a bookcase, cartons, plants: large areas of one colour."""
+    """Build cupboards, a bookcase, cartons, plants: large areas of one colour."""
     cabinet, plant = partial(furniture.cabinet, make), partial(furniture.plant, make)
     east = WIDTH_M - 0.23
     large = make.box((0.5, 0.4, 0.4), materials.label((0.65, 0.48, 0.3)), 200, "fblrt")
@@ -211,7 +211,7 @@ def _storage(make: Maker) -> Item:
 
 
 def _lamps(make: Maker) -> Item:
-    """Six ceiling lamps; a dark one looks dark."""
+    """Build six ceiling lamps; a dark one looks dark."""
     z, things = HEIGHT_M - 0.06, []
     for (x, y), strength in zip(LAMPS_M, LAMP_STRENGTHS, strict=True):
         frame = make.box((0.3, 1.2, 0.06), painted(WHITE), 60, "fblr")
@@ -222,7 +222,7 @@ def _lamps(make: Maker) -> Item:
 
 
 def _fittings(make: Maker) -> Item:
-    """A pillar, a red pipe, a cable tray with cables that hang from it."""
+    """Build a pillar, a red pipe, a cable tray with cables that hang from it."""
     y, z = LENGTH_M, HEIGHT_M
     tray = make.box((0.2, y, 0.08), painted((0.3, 0.32, 0.35)), 60, "lru")
     cables = []
@@ -240,7 +240,7 @@ def _fittings(make: Maker) -> Item:
 
 
 def _small_things(make: Maker) -> Item:
-    """Shelves with bottles, pinned sheets of paper, coats, files on cupboards, more plants."""
+    """Build shelves of bottles, pinned sheets of paper, coats, files on cupboards, more plants."""
     files, plant = partial(furniture.books, make), partial(furniture.plant, make)
     return joined(
         *(furniture.pinned_page(make).placed(x, y, z, yaw) for x, y, z, yaw in PAGES_M),

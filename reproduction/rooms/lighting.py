@@ -60,7 +60,7 @@ class Lighting:
     sun: Sun | None  # sunlight through openings, if any
 
     def ambient_at(self, points: Vectors) -> Vectors:
-        """Ambient light (N, 3) at points (N, 3)."""
+        """Return ambient light (N, 3) at points (N, 3)."""
         lower, upper = _single(self.lower_m), _single(self.upper_m)
         share = np.clip((points - lower) / (upper - lower), 0, 1)
         value = self.ambient.astype(np.float32)[None]
@@ -70,7 +70,7 @@ class Lighting:
         return np.asarray(value, np.float32)
 
     def of_group(self, group: str) -> Lighting:
-        """One of :data:`synfeal.effects.light.GROUPS` alone: all of them add up to the whole."""
+        """Keep one of :data:`synfeal.effects.light.GROUPS`; all of them add up to the whole."""
         return replace(
             self,
             ambient=self.ambient if group == "ambient" else np.zeros_like(self.ambient),
@@ -86,21 +86,21 @@ def _single(values: ArrayLike) -> NDArray[np.float32]:
 def baked(
     surface: Surface, albedo: Vectors, glow: NDArray[np.float32], lighting: Lighting
 ) -> Vectors:
-    """Factors (V, 3) on display-referred albedo, after exposure; see :func:`received`."""
+    """Compute factors (V, 3) on display-referred albedo, after exposure; see :func:`received`."""
     light = received(surface, albedo, glow, lighting)
     exposed = light * exposure_of(light)
     return np.asarray(exposed ** np.float32(1 / 2.2), np.float32)
 
 
 def exposure_of(light: Vectors) -> np.float32:
-    """The factor on light (V, 3) that a scene is shown with."""
+    """Choose the factor on light (V, 3) that a scene is shown with."""
     return np.float32(MEDIAN_LIGHT / np.median(light))
 
 
 def received(
     surface: Surface, albedo: Vectors, glow: NDArray[np.float32], lighting: Lighting
 ) -> Vectors:
-    """Linear light (V, 3) that arrives; the sum of what every source alone gives.
+    """Compute linear light (V, 3) that arrives; the sum of what every source alone gives.
 
     The surface receives, blocks and passes it on, with linear ``albedo`` (V, 3) and ``glow`` (V,)
     of :class:`synfeal.objects.patches.Patch`.
@@ -124,7 +124,7 @@ def received(
 def _gather_rays(
     caster: RayCaster, origins: Vectors, normals: Vectors
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Openness (N,) and the faces (N, K) hit by cosine-distributed rays, −1 where there is none.
+    """Cast cosine-distributed rays: openness (N,) and the faces (N, K) hit, −1 for none.
 
     Openness is the mean free length of the rays up to ``REACH_M``, floored at one fifth.
     """
@@ -137,7 +137,7 @@ def _gather_rays(
 
 
 def _sky_directions(normals: Vectors) -> list[Vectors]:
-    """K directions (N, 3), cosine-distributed around every normal, the same pattern for all."""
+    """Return K directions (N, 3), cosine-distributed around each normal by one pattern."""
     index = np.arange(N_SKY_RAYS) + 0.5
     radius, angle = np.sqrt(index / N_SKY_RAYS), index * np.pi * (3 - np.sqrt(5))
     helper = np.where(np.abs(normals[:, 2:]) < 0.9, _single([0, 0, 1]), _single([1, 0, 0]))
@@ -151,7 +151,7 @@ def _sky_directions(normals: Vectors) -> list[Vectors]:
 
 
 def _gathered(radiance: Vectors, hits: NDArray[np.int32]) -> Vectors:
-    """Mean radiance (N, 3) of the faces each point's rays hit; the outside is dark."""
+    """Average the radiance (N, 3) of the faces each point's rays hit; the outside is dark."""
     padded = np.concatenate([radiance, np.zeros((1, 3), np.float32)])  # where −1 points to
     chunks = (hits[start : start + CHUNK] for start in range(0, len(hits), CHUNK))
     return np.concatenate([padded[chunk].mean(axis=1) for chunk in chunks])
@@ -193,7 +193,7 @@ def _sun_light(sun: Sun, origins: Vectors, normals: Vectors, caster: RayCaster) 
 def ambient_corners(
     near_left: Colour, far_left: Colour, near_right: Colour, far_right: Colour, top: float
 ) -> NDArray[np.float32]:
-    """Ambient light (2, 2, 2, 3) by x, y, z from the colours at the corners of the floor.
+    """Compute ambient light (2, 2, 2, 3) by x, y, z from the colours at the floor's corners.
 
     ``left`` and ``right`` are low and high x, ``near`` and ``far`` low and high y; the light at the
     ceiling is ``top`` times that at the floor.

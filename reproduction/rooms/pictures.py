@@ -27,7 +27,7 @@ FACADES: tuple[Colour, ...] = ((0.7, 0.5, 0.4), (0.75, 0.72, 0.65), (0.5, 0.55, 
 
 @painter
 def poster(canvas: Canvas, ground: Colour | None = None) -> Pixels:
-    """A poster nobody else has: ramp, coloured shapes, rows of type, a white border."""
+    """Paint a poster nobody else has: ramp, coloured shapes, rows of type, a white border."""
     rng = canvas.rng
     base = ground or pick(rng, VIVID)
     sketch = Sketch(ramp(canvas, base, shade(pick(rng, VIVID), 1.3), rng.uniform(0, 2 * np.pi)))
@@ -53,7 +53,7 @@ def poster(canvas: Canvas, ground: Colour | None = None) -> Pixels:
 def painting(
     canvas: Canvas, palette: tuple[Colour, ...] = VIVID, frame: Colour = (0.45, 0.3, 0.1)
 ) -> Pixels:
-    """An abstract landscape in a frame: noise layers as sky and hills, dabs of paint."""
+    """Paint an abstract landscape in a frame: noise layers as sky and hills, dabs of paint."""
     rng = canvas.rng
     image = ramp(canvas, shade(pick(rng, palette), 1.4), (0.95, 0.9, 0.8), np.pi / 2)
     y = (np.arange(canvas.height_px, dtype=np.float32) / canvas.height_px)[:, None]
@@ -71,7 +71,7 @@ def painting(
 
 @painter
 def whiteboard(canvas: Canvas) -> Pixels:
-    """A whiteboard with formulas, diagrams and half-wiped smudges in an aluminium frame."""
+    """Paint a whiteboard with formulas, diagrams and half-wiped smudges in an aluminium frame."""
     rng = canvas.rng
     sketch = Sketch(plaster((0.93, 0.94, 0.95), 0.03)(canvas))
     for _ in range(13):
@@ -91,7 +91,7 @@ def whiteboard(canvas: Canvas) -> Pixels:
 
 @painter
 def noticeboard(canvas: Canvas, ground: Colour = (0.62, 0.45, 0.27)) -> Pixels:
-    """Cork with overlapping sheets of paper."""
+    """Paint cork with overlapping sheets of paper."""
     rng = canvas.rng
     sketch = Sketch(plaster(ground, 0.1, 0.12)(canvas))
     for _ in range(22):
@@ -106,7 +106,7 @@ def noticeboard(canvas: Canvas, ground: Colour = (0.62, 0.45, 0.27)) -> Pixels:
 
 @painter
 def window_view(canvas: Canvas, panes: tuple[int, int] = (2, 2), blind: float = 0.0) -> Pixels:
-    """Sky, buildings and trees behind glazing bars; slats cover the share ``blind`` from above."""
+    """Paint sky, houses and trees behind glazing bars; slats cover a share ``blind`` from above."""
     rng = canvas.rng
     sky = ramp(canvas, (0.62, 0.8, 1.0), (0.97, 0.98, 1.0), np.pi / 2)
     clouds = np.clip(canvas.noise((0.7, 0.3), 4), 0, 1)
@@ -138,7 +138,7 @@ def _skyline(sketch: Sketch, rng: np.random.Generator) -> None:
 
 @painter
 def stained_glass(canvas: Canvas, palette: tuple[Colour, ...] = VIVID, cells: int = 160) -> Pixels:
-    """Coloured glass cells in lead: a Voronoi diagram with a rose of larger cells in the middle."""
+    """Paint glass cells in lead: a Voronoi diagram with a rose of larger cells in the middle."""
     rng = canvas.rng
     seeds = rng.uniform(0, 1, (cells, 2)) * canvas.size_m
     x, y = canvas.coordinates_m()
@@ -161,7 +161,7 @@ SKIN: Colour = (0.85, 0.65, 0.5)
 
 @painter
 def mural(canvas: Canvas, ground: Colour, sky: Colour, figures: int = 5) -> Pixels:
-    """Saints before a landscape of ``ground`` and ``sky``, framed by a painted border."""
+    """Paint saints before a landscape of ``ground`` and ``sky``, framed by a painted border."""
     rng = canvas.rng
     y = (np.arange(canvas.height_px, dtype=np.float32) / canvas.height_px)[:, None]
     horizon = 0.55 + 0.06 * canvas.noise((canvas.size_m[0] / 3, 1e3), 3)
@@ -217,7 +217,7 @@ def _border(sketch: Sketch, rng: np.random.Generator, colour: Colour, canvas: Ca
 
 @painter
 def starry_vault(canvas: Canvas, first: Colour, second: Colour) -> Pixels:
-    """A painted vault: from ``first`` to ``second`` along x, golden stars, ribbons, medallions."""
+    """Paint a vault from ``first`` to ``second`` along x, with golden stars and medallions."""
     rng = canvas.rng
     x, _ = canvas.coordinates_m()
     blend = mix(first, second, (x / canvas.size_m[0]).astype(np.float32))

@@ -35,7 +35,7 @@ class Wall(NamedTuple):
     yaw_deg: float
 
     def place(self, item: Item, at_m: float, off_m: float, z_m: float = 0.0) -> Item:
-        """An item ``at_m`` along the wall, ``off_m`` in front of it, its front to the room."""
+        """Place an item ``at_m`` along the wall and ``off_m`` off it, its front to the room."""
         (x, y), (ax, ay) = self.start_m, self.along
         x, y = x + at_m * ax + off_m * ay, y + at_m * ay - off_m * ax
         return item.placed(x, y, z_m, self.yaw_deg)
@@ -138,7 +138,7 @@ def _picture(rng: Generator) -> Painter:
 
 
 def _standing(make: Maker, wide_m: float) -> tuple[Item, float, float]:
-    """Something with its back to a wall, its depth and its height."""
+    """Build something with its back to a wall; also return its depth and its height."""
     rng = make.rng
     deep, tall = rng.uniform(0.3, 0.6), rng.uniform(0.5, 2.1)
     cloth = materials.fabric(_colour(rng), stripe=_colour(rng))
@@ -157,7 +157,7 @@ def _standing(make: Maker, wide_m: float) -> tuple[Item, float, float]:
 
 
 def _free_standing(make: Maker, size: Size) -> Item:
-    """Rugs, tables with what lies on them, and chairs, away from the walls."""
+    """Build rugs, tables with what lies on them, and chairs, away from the walls."""
     rng, things = make.rng, list[Item]()
     for _ in range(int(rng.integers(1, 4))):
         x, y = rng.uniform((1.1, 1.1), (size[0] - 1.1, size[1] - 1.1))

@@ -87,7 +87,7 @@ STATUES: tuple[tuple[float, float, Colour], ...] = (  # x, y and robe
 
 
 def ingredients(seed: int) -> tuple[np.random.Generator, Item, Lighting, Scanner]:
-    """Surfaces and objects to scan."""
+    """Build surfaces and objects to scan."""
     rng = generator_of("scene", "sanctuary", seed)
     parts = (_shell, _side_walls, _portal_wall, _altar, _pews, _columns, _statues, _chandelier)
     everything = joined(part(Maker(rng)) for part in parts)
@@ -114,7 +114,7 @@ def _lighting() -> Lighting:
 
 
 def _arc(inset_m: float = 0.0, n: int = 41) -> Points:
-    """The vault's profile (n, 2): x and z from the west spring over the crown to the east one."""
+    """Return the vault's profile (n, 2), x and z, from the west spring to the east one."""
     angle = np.linspace(np.pi, 0, n)
     x = (HALF_X_M - inset_m) * np.cos(angle)
     z = SPRING_M + (CROWN_M - SPRING_M - inset_m) * np.sin(angle)
@@ -122,7 +122,7 @@ def _arc(inset_m: float = 0.0, n: int = 41) -> Points:
 
 
 def _shell(make: Maker) -> Item:
-    """West and east wall, altar wall (+y), portal wall (−y), painted barrel vault, marble floor."""
+    """Build west, east, altar (+y) and portal wall (−y), painted barrel vault and marble floor."""
     x, y = HALF_X_M, HALF_Y_M
     surfaces = (
         (upright((-x, -y), (-x, y), 0, SPRING_M), WEST, 120),
@@ -136,7 +136,7 @@ def _shell(make: Maker) -> Item:
 
 
 def _end_wall(y_m: float) -> Points:
-    """A wall under the vault: its rows are bent like the vault, so that no gap is left."""
+    """Return a wall under the vault: its rows are bent like the vault, so that no gap is left."""
     profile = _arc() if y_m > 0 else _arc()[::-1]
     share = np.linspace(1, 0, 31)[:, None]
     columns = np.broadcast_arrays(profile[:, 0], y_m, share * profile[:, 1])
@@ -144,7 +144,7 @@ def _end_wall(y_m: float) -> Points:
 
 
 def _floor(canvas: Canvas) -> Pixels:
-    """Chequered marble with a red runner and two tomb slabs."""
+    """Paint chequered marble with a red runner and two tomb slabs."""
     x, y = canvas.coordinates_m()
     light = materials.marble((0.74, 0.7, 0.62), (0.5, 0.45, 0.4))(canvas)
     dark = materials.marble((0.3, 0.2, 0.18), (0.6, 0.5, 0.45))(canvas)
@@ -162,7 +162,7 @@ def _floor(canvas: Canvas) -> Pixels:
 
 
 def _side_walls(make: Maker) -> Item:
-    """Six bays between pilasters: two windows and four frescoes."""
+    """Build six bays between pilasters: two windows and four frescoes."""
     pilaster = partial(make.box, (0.3, 0.12, SPRING_M), STONE, 120, "flr")
     return joined(
         (make.on_wall(*fresco) for fresco in FRESCOES),
@@ -173,7 +173,7 @@ def _side_walls(make: Maker) -> Item:
 
 
 def _window(make: Maker) -> Item:
-    """Stained glass in a stone frame, around the origin."""
+    """Build stained glass in a stone frame, around the origin."""
     width, height = WINDOW_M
     jamb = partial(make.box, (0.14, 0.1, height + 0.28), STONE, 120, "flrt")
     beam = partial(make.box, (width, 0.1, 0.14), STONE, 120, "ftu")
@@ -186,7 +186,7 @@ def _window(make: Maker) -> Item:
 
 
 def _portal_wall(make: Maker) -> Item:
-    """Portal, rose window, confessional and font at the far end."""
+    """Build portal, rose window, confessional and font at the far end."""
     y = -HALF_Y_M
     jamb = partial(make.box, (0.22, 0.14, 2.3), ROSE, 140, "flrt")
     leaf = materials.door((0.38, 0.23, 0.12))
@@ -203,13 +203,13 @@ def _portal_wall(make: Maker) -> Item:
 
 
 def _circle(n: int) -> Points:
-    """Points (n, 3) of the unit circle about z, the last the first."""
+    """Return points (n, 3) of the unit circle about z, the last the first."""
     angle = np.linspace(0, 2 * np.pi, n)
     return np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
 
 
 def _rose_window(make: Maker, y_m: float, z_m: float, radius_m: float) -> Item:
-    """A round window: a polar grid, so that the glass cells spread from its middle."""
+    """Build a round window: a polar grid, so that the glass cells spread from its middle."""
     circle, centre = -_circle(25)[:, [0, 2, 1]], np.array([0, y_m, z_m])
     points = centre + np.linspace(radius_m, 0.01, 6)[:, None, None] * circle
     glass = pictures.stained_glass(cells=90)
@@ -218,7 +218,7 @@ def _rose_window(make: Maker, y_m: float, z_m: float, radius_m: float) -> Item:
 
 
 def _altar(make: Maker) -> Item:
-    """Steps, table, candles and a gilded altar piece with painted panels."""
+    """Build steps, table, candles and a gilded altar piece with painted panels."""
     slender = partial(make.turned, SLENDER, materials.gilded(), 130, 12)
     candle = partial(make.turned, CANDLE, painted((0.95, 0.92, 0.8)), 80, 8)
     flowers = partial(furniture.plant, make, 0.45, (0.75, 0.6, 0.25), 30)
@@ -241,7 +241,7 @@ def _pews(make: Maker) -> Item:
 
 
 def _columns(make: Maker) -> Item:
-    """Four free columns of different stone under two beams, and ribs across the vault."""
+    """Build four free columns of different stone under two beams, and ribs across the vault."""
     sides, beam = (-COLUMN_X_M, COLUMN_X_M), (2 * HALF_Y_M, 0.24, 0.22)
     places = [(x, y) for x in sides for y in COLUMNS_Y_M]
     stones = zip((STONE, ROSE, GREEN_MARBLE, BLUE_MARBLE), places, strict=True)
@@ -254,7 +254,7 @@ def _columns(make: Maker) -> Item:
 
 
 def _statues(make: Maker) -> Item:
-    """Robed figures on pedestals, two beside the altar and one at the east wall."""
+    """Build robed figures on pedestals, two beside the altar and one at the east wall."""
     things = []
     for x, y, colour in STATUES:
         robe = materials.fabric(colour, stripe=pictures.GOLD, pitch_m=0.25)

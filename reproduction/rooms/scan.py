@@ -45,7 +45,7 @@ class Grid:
 
 
 def refined(patch: Patch, cell_m: float) -> Grid:
-    """The patch in cells of about ``cell_m``; its own rows and columns remain.
+    """Divide the patch into cells of about ``cell_m``; its own rows and columns remain.
 
     Patches that share a rim divide it alike, so they still meet without a gap.
     """
@@ -67,7 +67,7 @@ def refined(patch: Patch, cell_m: float) -> Grid:
 
 
 def _divided(points: Points, cell_m: float) -> Shares:
-    """Fractional row indices that divide every step between rows into cells."""
+    """Return fractional row indices that divide every step between rows into cells."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=-1).max(axis=1)
     parts = np.maximum(1, np.round(steps / cell_m)).astype(np.int64)
     inner = [index + np.arange(count) / count for index, count in enumerate(parts)]
@@ -77,7 +77,7 @@ def _divided(points: Points, cell_m: float) -> Shares:
 def jittered(
     rng: np.random.Generator, grid: Grid, points_m: Points
 ) -> tuple[Points, NDArray[np.float64]]:
-    """Points (R·C, 3) moved along the surface, and where they lie on the picture (R·C, 2).
+    """Move points (R·C, 3) along the surface; also return their places on the picture (R·C, 2).
 
     The picture stays in place. Rims stay even, so that neighbours still meet.
     """
@@ -91,7 +91,7 @@ def jittered(
 
 
 def grid_faces(rng: np.random.Generator, points: Points) -> NDArray[np.int64]:
-    """Triangles (F, 3) of a grid, counter-clockwise from its front, without those of no area.
+    """Triangulate a grid (F, 3), counter-clockwise from its front, without faces of no area.
 
     Every cell is cut along one of its diagonals at random.
     """
@@ -105,7 +105,7 @@ def grid_faces(rng: np.random.Generator, points: Points) -> NDArray[np.int64]:
 
 
 def albedo_of(patch: Patch, grid: Grid) -> NDArray[np.float32]:
-    """Mean linear albedo (R, C, 3) of the picture around every vertex."""
+    """Average the linear albedo (R, C, 3) of the picture around every vertex."""
     rows, columns = grid.shape
     small = Image.fromarray(patch.picture).resize((columns, rows), Image.Resampling.BOX)
     return (np.asarray(small, np.float32) / np.float32(255)) ** np.float32(2.2)
@@ -124,14 +124,14 @@ class Surface:
     n_faces: tuple[int, ...]  # how many of them belong to each patch, in order
 
     def per_patch(self, values: NDArray[Real]) -> list[NDArray[Real]]:
-        """Values (V, K) of all vertices as grids (R, C, K), one for each patch."""
+        """Split values (V, K) of all vertices into grids (R, C, K), one for each patch."""
         sizes = [grid.n_points for grid in self.grids]
         pieces = zip(np.split(values, np.cumsum(sizes)[:-1]), self.grids, strict=True)
         return [piece.reshape(*grid.shape, -1) for piece, grid in pieces]
 
 
 def surface_of(rng: np.random.Generator, patches: Sequence[Patch], cell_m: float) -> Surface:
-    """All patches, refined to cells of about ``cell_m``."""
+    """Join all patches, refined to cells of about ``cell_m``."""
     grids = tuple(refined(patch, cell_m) for patch in patches)
     sizes = [grid.n_points for grid in grids]
     first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
@@ -174,13 +174,13 @@ class Scanner:
 def stations(
     lower_m: tuple[float, ...], upper_m: tuple[float, ...], shape: tuple[int, ...]
 ) -> Points:
-    """A lattice (S, 3) of stations with ``shape`` of them along x, y and z, away from the walls."""
+    """Place stations (S, 3) on a lattice of ``shape`` along x, y and z, away from the walls."""
     share = (np.array(list(np.ndindex(*shape))) + 0.5) / shape
     return np.asarray(lower_m + share * np.subtract(upper_m, lower_m))
 
 
 def scanned(rng: np.random.Generator, surface: Surface, scanner: Scanner) -> Points:
-    """Vertices (V, 3) as scanned; those at one place stay at one place, so nothing tears."""
+    """Scan vertices (V, 3); those at one place stay at one place, so nothing tears."""
     welded, index = weld(surface.points_m)
     rough = rounded(welded, index[surface.edges], index[surface.faces])
     rough = rough + displacement(rng, rough)
@@ -191,7 +191,7 @@ def scanned(rng: np.random.Generator, surface: Surface, scanner: Scanner) -> Poi
 
 
 def rounded(points: Points, edges: Faces, faces: Faces) -> Points:
-    """Every vertex a step towards the mean of its neighbours along ``edges`` (E, 2).
+    """Move every vertex a step towards the mean of its neighbours along ``edges`` (E, 2).
 
     Open rims stay, so that nothing comes off a wall; in the plane an even grid stays too.
     """
@@ -209,7 +209,7 @@ def rounded(points: Points, edges: Faces, faces: Faces) -> Points:
 
 
 def displacement(rng: np.random.Generator, points_m: Points) -> Points:
-    """A smooth random vector field (V, 3): nearby surfaces move together, as scans are warped."""
+    """Draw a smooth vector field (V, 3): nearby surfaces move together, as scans are warped."""
     total = np.zeros_like(points_m)
     low = points_m.min(axis=0)
     for wavelength, deviation in WAVES:

@@ -59,7 +59,7 @@ def run_job(log: str, function: Callable[..., None], /, **arguments: object) -> 
 
 
 def _sentence(error: InputError | MemoryError | OSError) -> InputError:
-    """The error as a line for people, with what to do."""
+    """Reword the error as a line for people, with what to do."""
     if isinstance(error, InputError):
         return error
     if isinstance(error, MemoryError):

@@ -23,7 +23,7 @@ REMEDY = "run that job again, or leave its measurement out"
 
 
 def read_measured(root: Path) -> pd.DataFrame:
-    """Jobs of a run: from ``<root>/benchmarks``, else from ``<root>/benchmarks.csv``."""
+    """Read the jobs of a run from ``<root>/benchmarks``, else from ``<root>/benchmarks.csv``."""
     folder, table = root / "benchmarks", root / "benchmarks.csv"
     paths = sorted(folder.rglob("*.tsv"))
     if paths:
@@ -34,7 +34,7 @@ def read_measured(root: Path) -> pd.DataFrame:
 
 
 def read_jobs(paths: Iterable[Path], folder: Path) -> pd.DataFrame:
-    """Jobs by their files below ``folder``, ``<root>/benchmarks``.
+    """Read jobs from their files below ``folder``, ``<root>/benchmarks``.
 
     Processor time is completed up to the end, at the share of a core a job had when last seen. What
     was too short to tell is taken to have had the run's median share.
@@ -62,7 +62,7 @@ def last_look_s(wall_s: float) -> float:
 
 
 def _read_tsv(path: Path, folder: Path) -> tuple[str, str, float, float, float]:
-    """A job, its processor time as it was seen last."""
+    """Read a job, its processor time as it was seen last."""
     stage, *rest = path.relative_to(folder).with_suffix("").parts
     rows = read_frame(path, BENCHMARK, REMEDY, sep="\t")
     if rows.empty:

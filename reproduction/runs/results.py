@@ -18,13 +18,13 @@ ADAPTER_OF = cache(TypeAdapter)  # of a model or type
 
 
 def read_text(path: Path) -> str:
-    """The text of a result file."""
+    """Read the text of a result file."""
     with read_as(path, "text", remedy="; make it again"):
         return path.read_text(encoding="utf-8")
 
 
 def read_result(path: Path, needed: Iterable[str], remedy: str, shape: Any = None) -> Any:
-    """A mapping from a result file, or the model or type ``shape`` of it.
+    """Read a mapping from a result file, or the model or type ``shape`` of it.
 
     Raises:
         InputError: the file is missing, is not JSON, is no mapping, lacks a key of ``needed`` or
@@ -49,7 +49,7 @@ def shaped(path: Path, value: Any, shape: Any, remedy: str) -> Any:
 
 
 def unequal_leaves(a: Mapping[str, Any], b: Mapping[str, Any]) -> pd.DataFrame:
-    """Leaves of two nested mappings that differ.
+    """Tabulate the leaves in which two nested mappings differ.
 
     Columns are ``key``, dotted, in order; ``a`` and ``b``, values as JSON, NaN where one lacks it.
     """

@@ -104,7 +104,7 @@ def seconds_of_effects(
     render: RenderConfig,
     effects: Mapping[str, EffectsConfig],
 ) -> dict[str, float]:
-    """Seconds of the processor that a frame takes, drawn and compressed: ideal, and with effects.
+    """Time a frame, drawn and compressed, ideal and with effects: processor seconds.
 
     All are drawn in turn, so that what else the machine does slows them alike; the first frame
     loads what all use, and does not count.

@@ -58,7 +58,7 @@ class Variant:
     texture_scale: float = 1.0
 
     def opened(self, camera: CameraConfig) -> Renderer:
-        """A renderer through ``camera``."""
+        """Open a renderer through ``camera``."""
         return open_renderer(self.mesh, camera, self.render)
 
 
@@ -163,7 +163,7 @@ def measure_speed(
 
 
 def other_settings(full: Variant, with_slow: bool) -> list[Variant]:
-    """The full mesh with all backends that work here and numbers of samples but those in use."""
+    """List the full mesh with all backends that work here and all numbers of samples not in use."""
     names = [
         name
         for name in choose.BACKENDS
@@ -175,7 +175,7 @@ def other_settings(full: Variant, with_slow: bool) -> list[Variant]:
 
 
 def less_detailed(full: Variant) -> list[Variant]:
-    """The settings in use with smaller textures, and with fewer triangles."""
+    """List the settings in use with smaller textures, and with fewer triangles."""
     mesh, render = full.mesh, full.render
     variants = [Variant(with_smaller_textures(mesh, k), render, 1.0 / k) for k in FACTORS]
     if importlib.util.find_spec("meshoptimizer") is None:
@@ -225,7 +225,7 @@ def measure_camera(
 
 
 def truth_of(full: Variant, camera: CameraConfig, poses: Poses) -> Truth:
-    """Colours by 64 samples of the backend in use, and depth by rays against the full mesh."""
+    """Render colours by 64 samples of the backend in use; cast depth against the full mesh."""
     mesh = full.mesh
     plain = full.render.model_copy(update={"supersampling": 1})
     views = reference_images(lambda large: open_renderer(mesh, large, plain), camera, poses)
@@ -245,7 +245,7 @@ def errors_of(renderer: Renderer, poses: Poses, truth: Truth) -> dict[str, float
 
 
 def colour_errors(rgb: Rgb, expected: NDArray[np.float32]) -> dict[str, float]:
-    """Mean absolute difference in levels of 0 to 255, and peak signal-to-noise ratio in dB."""
+    """Compute the mean absolute difference in levels of 0 to 255, and the PSNR in dB."""
     difference = rgb - expected
     mean_square = float(np.mean(difference**2, dtype=np.float64))
     return {
@@ -255,7 +255,7 @@ def colour_errors(rgb: Rgb, expected: NDArray[np.float32]) -> dict[str, float]:
 
 
 def depth_errors(depth_m: Depth, expected_m: Depth) -> dict[str, float]:
-    """Median difference in millimetres, and the share of more than 10 mm, where both hit."""
+    """Compute the median difference in millimetres, and the share above 10 mm, where both hit."""
     hit = np.isfinite(depth_m) & np.isfinite(expected_m)
     off_mm = 1e3 * np.abs(depth_m[hit].astype(np.float64) - expected_m[hit])
     return {
@@ -265,7 +265,7 @@ def depth_errors(depth_m: Depth, expected_m: Depth) -> dict[str, float]:
 
 
 def seconds_in_turns(renderers: Sequence[Renderer], poses: Poses) -> NDArray[np.float64]:
-    """Times (rounds * P, R) of R renderers, which draw each colour image in turns."""
+    """Time R renderers (rounds * P, R), which draw each colour image in turns."""
     return np.array(
         [
             seconds_of(partial(renderer.render, pose) for renderer in renderers)

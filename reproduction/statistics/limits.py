@@ -31,7 +31,7 @@ Score = Annotated[FiniteFloat, Field(ge=0)]
 
 
 def read_metrics(path: Path) -> Metrics:
-    """The scores of one run."""
+    """Read the scores of one run."""
     limits = [f"{measure}_{end}" for measure in MEASURES for end in ("low", "high")]
     scores = (*MEASURES, *limits, "position_rms_m", *BASELINES, *FLOORS)
     values = read_result(path, (*COUNTS, *scores), REMEDY)
@@ -41,13 +41,25 @@ def read_metrics(path: Path) -> Metrics:
 
 
 def read_errors(path: Path, columns: Sequence[str] = COLUMNS) -> pd.DataFrame:
-    """Errors of one run, a row per test frame; not finite where a prediction failed."""
+    """Read the errors of one run, a row per test frame.
+
+    Args:
+        path: File ``errors.csv``, or ``common_errors.csv`` with ``columns=COMMON_COLUMNS``.
+        columns: Columns it must have.
+
+    Returns:
+        Frame number, metres and degrees, as the columns are named; infinite or NaN where a
+        prediction failed.
+
+    Raises:
+        InputError: The file is missing, or holds other columns or no numbers.
+    """
     values = read_numbers(path, ",".join(columns), "table of errors", finite=False)
     return pd.DataFrame(values, columns=list(columns))
 
 
 def combine(runs: Sequence[Metrics]) -> dict[str, float | str | None]:
-    """Scores of the repetitions of one cell that finished, and counts of all, by column.
+    """Combine the scores of a cell's finished repetitions, and count all, by column.
 
     Returns:
         Each of ``MEASURES`` with its limits and deviation (:func:`score_of`); ``position_rms_m``,
@@ -71,7 +83,7 @@ def combine(runs: Sequence[Metrics]) -> dict[str, float | str | None]:
 
 
 def score_of(finished: Sequence[Metrics], measure: str) -> dict[str, float | None]:
-    """One measure over the runs that finished.
+    """Combine one measure over the runs that finished.
 
     Returns:
         By column: the run's median, or the mean of the medians of several runs, missing when all
@@ -94,12 +106,12 @@ def score_of(finished: Sequence[Metrics], measure: str) -> dict[str, float | Non
 
 
 def percent_change(new: float | None, old: float | None) -> float | None:
-    """``100 (new - old) / old``; None where either is missing or ``old`` is zero."""
+    """Compute ``100 (new - old) / old``; None where either is missing or ``old`` is zero."""
     return None if new is None or not old else 100 * (new - old) / old
 
 
 def sign_test(changes: Sequence[float]) -> tuple[int, int, float]:
-    """Two-sided sign test of changes; those that are exactly 0 are left out.
+    """Test by signs, two-sided, whether changes go one way; those of exactly 0 are left out.
 
     Returns:
         How many are negative, how many count, and the probability of a split at least as uneven
@@ -112,13 +124,13 @@ def sign_test(changes: Sequence[float]) -> tuple[int, int, float]:
 
 
 def share_limits(count: int, total: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact (Clopper-Pearson) limits of a share observed as ``count`` of ``total`` > 0."""
+    """Compute exact (Clopper-Pearson) limits of a share observed as ``count`` of ``total`` > 0."""
     found = binomtest(count, total).proportion_ci(confidence, method="exact")
     return float(found.low), float(found.high)
 
 
 def kendall_tau(levels: Sequence[float], errors: Sequence[float]) -> float:
-    """Kendall's rank correlation (tau-b) of two series; NaN when all of one series is equal.
+    """Compute Kendall's tau-b of two series; NaN when all of one series is equal.
 
     Ranks need no finite numbers: a failed run, of infinite error, is simply the worst.
     """
@@ -126,6 +138,6 @@ def kendall_tau(levels: Sequence[float], errors: Sequence[float]) -> float:
 
 
 def _mean(runs: Sequence[Metrics], key: str) -> float | None:
-    """Mean over runs; None without runs, or where a run has no finite value (a wide limit)."""
+    """Average over runs; None without runs, or where a run has no finite value (a wide limit)."""
     values = [run[key] for run in runs]
     return fmean(values) if values and None not in values else None

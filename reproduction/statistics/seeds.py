@@ -81,7 +81,7 @@ class Layout:
         return 1 + self.resamples + sum(group.n_rows for group in self.groups)
 
     def rows(self) -> list[slice]:
-        """The seed rows of each group."""
+        """Return the seed rows of each group."""
         ends = accumulate((group.n_rows for group in self.groups), initial=1 + self.resamples)
         return [
             slice(end, end + group.n_rows) for end, group in zip(ends, self.groups, strict=False)
@@ -113,7 +113,7 @@ class Layout:
 
 
 def limits(sample: Array, layout: Layout, comparisons: int = 1) -> tuple[float, float]:
-    """95 % limits over paths and seeds; corrected after Bonferroni, at ``1 - 0.05 / k``.
+    """Compute limits over paths and seeds at 95 %, or at ``1 - 0.05 / k`` (Bonferroni).
 
     Where a run failed, so that the value or one of its seed rows is infinite, the limits span what
     paths and rows give.
@@ -138,7 +138,7 @@ def limits(sample: Array, layout: Layout, comparisons: int = 1) -> tuple[float, 
 
 
 def seed_variance(sample: Array, layout: Layout) -> tuple[float, float]:
-    """Variance of the observed value over seeds, and its degrees of freedom (Satterthwaite's)."""
+    """Compute the variance over seeds of the observed value, and its degrees of freedom."""
     variance = squares = 0.0
     for rows, group in zip(layout.rows(), layout.groups, strict=True):
         values = sample[rows]
@@ -156,7 +156,7 @@ def seed_variance(sample: Array, layout: Layout) -> tuple[float, float]:
 def half_width(
     of_paths: float, seed_error: float, degrees: float, confidence: float = CONFIDENCE
 ) -> float:
-    """Half-width of an interval over paths and seeds.
+    """Compute the half-width of an interval over paths and seeds.
 
     Args:
         of_paths: half-width over the test paths alone, at the same confidence.
@@ -179,7 +179,7 @@ def half_width(
 
 @cache
 def borrowed_deviations() -> Mapping[tuple[str, str], Borrowed]:
-    """By localizer and measure, what a single run borrows."""
+    """Return, by localizer and measure, the deviation that a single run borrows."""
     rows = rows_of(read_frame(BORROWED, BORROWED_SCHEMA))
     return {
         (row.model, row.measure): Borrowed(row.relative_sd, row.degrees_of_freedom) for row in rows

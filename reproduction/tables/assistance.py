@@ -100,7 +100,7 @@ def write_assistance_table(design: Design, root: Path, out_csv: Path, out_tex: P
 def assistance_record(
     root: Path, scene: str, size: str, method: str, split: str = TOTAL
 ) -> dict[str, Any]:
-    """One row of the table, by column; both splits together unless one is named."""
+    """Compute one row of the table, by column; both splits together unless one is named."""
     splits = SPLITS if split == TOTAL else (split,)
     found = [r for name in splits for r in batch_records(root, scene, size, method, name)]
     batches = pd.DataFrame(found, columns=[*BatchRecord.__annotations__])
@@ -139,7 +139,7 @@ def truth_used_by(root: Path, scene: str, size: str, method: str) -> str:
 
 
 def side_table(table: pd.DataFrame) -> SideTable:
-    """The rows of both splits together."""
+    """Lay out the rows of both splits together."""
     rows = of_both_splits(table)
     for when in ("before", "after"):
         errors = rows[[f"last_m_{when}_median", f"last_deg_{when}_median"]].to_numpy(float)
@@ -148,7 +148,7 @@ def side_table(table: pd.DataFrame) -> SideTable:
 
 
 def of_both_splits(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows of both splits together, with titles of their data set and method."""
+    """Select the rows of both splits together, with titles of their data set and method."""
     rows = table[table.split == TOTAL]
     titles = rows.method.map(lambda method: SOURCES.get(method, method))
     return rows.assign(data_set=data_set_titles(rows), title=titles)

@@ -60,7 +60,7 @@ def key_of(row: Experiment, model: str) -> Key:
 
 @cache
 def published_cells(table: str) -> dict[Key, Any]:
-    """Cells of one of the tables 2 to 5 by what they are run with, attributes as in ``SCHEMA``."""
+    """Read the cells of one of tables 2 to 5, by what they are run with."""
     cells = published_frame(table)
     keys = cells[list(KEY)].itertuples(index=False, name=None)
     return dict(zip(keys, cells.itertuples(index=False), strict=True))
@@ -68,7 +68,7 @@ def published_cells(table: str) -> dict[Key, Any]:
 
 @cache
 def published_frame(table: str) -> pd.DataFrame:
-    """Columns ``SCHEMA`` of one of the tables 2 to 5; no rows of one that the paper has not."""
+    """Read columns ``SCHEMA`` of one of tables 2 to 5; no rows of one that the paper lacks."""
     path = FOLDER / f"{table}.csv"
     return read_frame(path, SCHEMA) if path.is_file() else frame_of((), SCHEMA)
 
@@ -122,7 +122,7 @@ def read_cells(table: str, design: Design, root: Path) -> pd.DataFrame:
 
 
 def schema_of(table: str, repeated: bool = False) -> Schema:
-    """The columns of a table's CSV, in order; ``*_sd`` where a cell has several seeds."""
+    """Return the columns of a table's CSV, in order; ``*_sd`` where a cell has several seeds."""
     left_out = {
         *(() if repeated else DEVIATIONS),
         *(() if table == FROM_SCRATCH else CHANGES.values()),

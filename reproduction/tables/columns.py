@@ -44,7 +44,7 @@ class Column:
         return bool(self.form or self.text)
 
     def written(self, value: Any, missing: str = NOTHING) -> str:
-        """A value of the column as it is printed."""
+        """Format a value of the column as it is printed."""
         if pd.isna(value):
             return missing
         return self.form.format(self.factor * value) if self.form else str(value)
@@ -77,7 +77,7 @@ class Cell:
 
 
 def cells_of(row: Mapping[str, Any], column: Column) -> list[Cell]:
-    """A cell, or one for each of two scores."""
+    """Return a cell, or one for each of two scores."""
     if column.scored:
         return [_score(row, column, style) for style in SCORES]
     value = row[column.name]
@@ -102,7 +102,7 @@ def _score(row: Mapping[str, Any], column: Column, style: str) -> Cell:
 
 
 def by_method(cells: pd.DataFrame, rows: Sequence[str]) -> pd.DataFrame:
-    """A row for each combination of ``rows``, equal first ones together, a column per method.
+    """Pivot cells to a row per combination of ``rows`` and a column per method.
 
     ``cells`` have a ``method``, a ``number`` to sort by and a ``text``; the texts of a method are
     in the column ``<method>_text``.
@@ -116,7 +116,7 @@ def by_method(cells: pd.DataFrame, rows: Sequence[str]) -> pd.DataFrame:
 
 
 def method_columns(titles: Mapping[str, str], on_paper: bool = True) -> list[Column]:
-    """Columns for what :func:`by_method` made."""
+    """Return columns for what :func:`by_method` made."""
     return [
         Column(title, name, text=f"{name}_text", on_paper=on_paper)
         for name, title in titles.items()
@@ -129,7 +129,7 @@ def write_side(path: Path, table: SideTable) -> None:
 
 
 def side_sheet(table: SideTable) -> Sheet:
-    """A side table as it is printed on paper: what the paper has is a grey line below.
+    """Lay out a side table as it is printed on paper; the paper's values are a grey line below.
 
     Lines with the label of the one above belong to the same row, and do not repeat it.
     """
@@ -150,7 +150,7 @@ def side_sheet(table: SideTable) -> Sheet:
 
 
 def _printed(cell: Cell) -> str:
-    """The text of a cell without limits of a score."""
+    """Return the text of a cell without limits of a score."""
     mark, small = "✗ " if cell.bad else "", f" ({cell.small})" if cell.small else ""
     return f"{mark}{cell.text}{'' if cell.style else small}"
 

@@ -99,7 +99,7 @@ def write_label_error_table(design: Design, root: Path, out_csv: Path, out_tex: 
 def label_records(
     root: Path, scene: str, size: str, method: str, split: str
 ) -> list[dict[str, Any]]:
-    """Both rows of a label set and a split, or of both splits together."""
+    """Compute both rows of a label set and a split, or of both splits together."""
     splits = SPLITS if split == TOTAL else (split,)
     batches = [b for s in splits for b in batch_records(root, scene, size, method, s)]
     folder, records = root / "labels" / scene / size, []
@@ -116,7 +116,7 @@ def label_records(
 
 
 def error_record(pairs: Sequence[Pair]) -> dict[str, Any]:
-    """Errors of the labels of some splits against their true poses, by column."""
+    """Compute errors of the labels of some splits against their true poses, by column."""
     every = [absolute_errors(*pair) for pair in pairs]
     position_m, orientation_deg = (np.concatenate(parts) for parts in zip(*every, strict=True))
     record: dict[str, Any] = {}
@@ -142,7 +142,7 @@ def error_record(pairs: Sequence[Pair]) -> dict[str, Any]:
 def cost_record(
     root: Path, scene: str, size: str, method: str, splits: Sequence[str], frames: int
 ) -> dict[str, Any]:
-    """Processor seconds per frame and the largest memory, over all stages and batches."""
+    """Compute processor seconds per frame and the largest memory, over all stages and batches."""
     seconds, peaks = 0.0, [0.0]
     for stage in stages_of(method):
         for split in splits:
@@ -157,7 +157,7 @@ def cost_record(
 
 
 def side_table(table: pd.DataFrame) -> SideTable:
-    """A row before and a row after assistance for every method and data set."""
+    """Lay out a row before and a row after assistance for every method and data set."""
     rows = of_both_splits(table)
     rows = rows.assign(share_registered=1 - rows.share_filled)
     return SideTable(NAME, CAPTION, COLUMNS, rows, REMARK, block="data_set")

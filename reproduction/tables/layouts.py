@@ -71,23 +71,23 @@ UNITS = {"position_m": " m", "orientation_deg": "°"}
 
 
 def scene_title(scene: str) -> str:
-    """A scene's name as printed, e.g. ``Large Room``."""
+    """Title a scene as it is printed, e.g. ``Large Room``."""
     return scene.replace("_", " ").title()
 
 
 def data_set_titles(table: pd.DataFrame) -> pd.Series:
-    """Data sets of a table with ``scene`` and ``size``, as in ``Large Room, 6k``."""
+    """Title data sets of a table with ``scene`` and ``size``, as in ``Large Room, 6k``."""
     return table.scene.map(scene_title) + ", " + table["size"]
 
 
 def label_title(labels: str) -> str:
-    """A label set as tables call it: ``noise-p0.1-r5`` is noise 0.1 m, 5°."""
+    """Title a label set as tables do: ``noise-p0.1-r5`` is noise 0.1 m, 5°."""
     found = re.fullmatch(r"([\w-]+)-p([\d.]+)-r([\d.]+)", labels)
     return f"{found[1]} {found[2]} m, {found[3]}°" if found else SOURCES.get(labels, labels)
 
 
 def row_label(name: str, cell: Any) -> str:
-    """First column of a row: label source, noise, or size with the frames actually used."""
+    """Title a row: label source, noise, or size with the frames actually used."""
     if name == "table2_ground_truth":
         return SOURCES.get(cell.labels, str(cell.label_id))
     if name == "table3_inconsistencies":
@@ -102,7 +102,7 @@ def row_label(name: str, cell: Any) -> str:
 
 
 def published_labels(name: str, cells: pd.DataFrame) -> dict[Any, str]:
-    """By row, its label in print: frames, or another one than it is run under, or none."""
+    """Return, by row, its label in print: frames, or another one than it is run under, or none."""
     rows = cells[cells.published_position_m.notna()].groupby("row").first()
     if name not in ("table4_size", FROM_SCRATCH):
         return dict(rows.published_printed_row)
@@ -111,7 +111,7 @@ def published_labels(name: str, cells: pd.DataFrame) -> dict[Any, str]:
 
 
 def _level(noise_m: float) -> str:
-    """A noise level with the paper's two digits, or as many as it needs; 0 stays 0."""
+    """Format a noise level with the paper's two digits, or as many as it needs; 0 stays 0."""
     if noise_m == 0 or round(noise_m, 2) != noise_m:
         return f"{noise_m:g}"
     return f"{noise_m:.2f}"

@@ -60,7 +60,7 @@ class MeshFacts:
 
 
 def read_meshes(scenes: Sequence[str], root: Path) -> pd.DataFrame:
-    """Columns ``SCHEMA`` of some scenes; what the paper has not is missing."""
+    """Read columns ``SCHEMA`` of some scenes; what the paper lacks is missing."""
     own = pd.DataFrame([{"scene": s} | vars(read_mesh_facts(root, s)) for s in scenes])
     published = read_frame(
         FOLDER / f"{NAME}.csv", {name: SCHEMA[name] for name in ("scene", *FACTS)}
@@ -70,14 +70,14 @@ def read_meshes(scenes: Sequence[str], root: Path) -> pd.DataFrame:
 
 
 def read_mesh_facts(root: Path, scene: str) -> MeshFacts:
-    """Counts and volume from ``<root>/scenes/<scene>/properties.json``."""
+    """Read counts and volume from ``<root>/scenes/<scene>/properties.json``."""
     path = root / "scenes" / scene / "properties.json"
     facts: MeshFacts = read_result(path, FACTS, "make the scene again", MeshFacts)
     return facts
 
 
 def side_table(meshes: pd.DataFrame) -> SideTable:
-    """Table 1 as the paper prints it: properties down, scenes across."""
+    """Lay out Table 1 as the paper prints it: properties down, scenes across."""
     columns = [Column("Property", "fact")]
     rows = pd.DataFrame({"fact": [title for title, _ in FACTS.values()]})
     for mesh in records_of(meshes):

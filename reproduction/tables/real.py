@@ -74,7 +74,7 @@ CAPTION = (
 
 
 def read_real(path: Path) -> pd.DataFrame:
-    """The table that :func:`reproduction.real.tables.write_real_tables` wrote."""
+    """Read the table that :func:`reproduction.real.tables.write_real_tables` wrote."""
     return read_frame(path, SCHEMA)
 
 
@@ -84,7 +84,7 @@ def block_title(direction: str, labels: str) -> str:
 
 
 def side_table(table: pd.DataFrame) -> SideTable:
-    """A line for each training and localizer, a block for each direction and source of labels."""
+    """Lay out a line per training and localizer, a block per direction and source of labels."""
     rows = table.assign(
         block=[block_title(row.direction, row.labels) for row in rows_of(table)],
         trained_on=table.trained_on.map(ROWS),
@@ -131,7 +131,7 @@ def _between(row: Any, name: str, form: str) -> str:
 
 
 def _median(value: float, form: str) -> str:
-    """A median error; infinite where fewer than half of the photographs were localized."""
+    """Format a median error; infinite where fewer than half of the photographs were localized."""
     if math.isnan(value):
         return NOTHING
     return form.format(value) if math.isfinite(value) else LOST

@@ -70,7 +70,7 @@ def write_recall_table(design: Design, root: Path, out_csv: Path, out_tex: Path)
 
 
 def recall_table(design: Design, root: Path) -> pd.DataFrame:
-    """Scores of every cell, columns ``SCHEMA``; missing where a repetition has none."""
+    """Tabulate scores of every cell, columns ``SCHEMA``; missing where a repetition has none."""
     runs = sorted(design.runs, key=lambda run: (*_key(run)[:-1], MODELS.index(run.model)))
     records = [
         dict(zip(KEYS, _key(run), strict=True))
@@ -87,7 +87,7 @@ def _key(run: Run) -> tuple[str, ...]:
 
 
 def _read(path: Path) -> dict[str, float | None]:
-    """Scores of a run; those of DCRE are absent where its test frames show nothing."""
+    """Read scores of a run; those of DCRE are absent where its test frames show nothing."""
     needed = [column for column in COLUMNS if not column.startswith("dcre")]
     metrics = read_result(path, needed, REMEDY)
     found = {column: metrics[column] for column in COLUMNS if column in metrics}
@@ -96,7 +96,7 @@ def _read(path: Path) -> dict[str, float | None]:
 
 
 def side_table(table: pd.DataFrame) -> SideTable:
-    """A row for every run; on paper those whose labels are true, if there are any."""
+    """Lay out a row for every run; on paper those whose labels are true, if there are any."""
     true = (table.labels == SIMULATOR) & (table.init == "pretrained")
     rows = table.assign(
         data_set=data_set_titles(table),

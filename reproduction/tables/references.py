@@ -68,7 +68,7 @@ def write_references_table(
 
 
 def references_table(design: Design, references: ReferencesConfig, root: Path) -> pd.DataFrame:
-    """The table of :data:`SCHEMA`; where more than half of a method's answers failed, no score."""
+    """Compute the table of :data:`SCHEMA`; no score where more than half of the answers failed."""
     titles = {**titles_of(references.external), **TITLES}
     rows = {(row.scene, row.size, row.label_id): row for row in design.rows}
     trained = {key: row for key, row in rows.items() if design.runs_of(row.pretrained, MODELS[0])}
@@ -94,7 +94,7 @@ def references_table(design: Design, references: ReferencesConfig, root: Path) -
 
 
 def read_references(path: Path) -> pd.DataFrame:
-    """The table that :func:`write_references_table` wrote."""
+    """Read the table that :func:`write_references_table` wrote."""
     return read_frame(path, SCHEMA)
 
 
@@ -111,7 +111,7 @@ def _record(folders: Sequence[Path]) -> dict[str, Any]:
 
 
 def side_table(table: pd.DataFrame) -> SideTable:
-    """A row for each label set and score, a column per method; below, what an answer takes.
+    """Lay out a row per label set and score, a column per method, and what an answer takes.
 
     Where labels are the true poses, both scores are one.
     """
@@ -135,7 +135,7 @@ def side_table(table: pd.DataFrame) -> SideTable:
 
 
 def _cells(table: pd.DataFrame, against: str, end: str) -> pd.DataFrame:
-    """The cells of one of two scores, whose columns have names with this end."""
+    """Return the cells of one of two scores, whose columns have names with this end."""
     return table.assign(
         data_set=data_set_titles(table),
         labels=table.labels.map(label_title),
@@ -146,7 +146,7 @@ def _cells(table: pd.DataFrame, against: str, end: str) -> pd.DataFrame:
 
 
 def _cost(table: pd.DataFrame) -> pd.DataFrame:
-    """Cells of what a method's answers take, and of how many failed, over all label sets."""
+    """Return cells of what a method's answers take, and of how many failed, over all label sets."""
     methods = table[table.seconds_per_frame.notna()].groupby("method")
     seconds, counts = methods.seconds_per_frame.median(), methods[["failed", "n_test"]].sum()
     texts = {
@@ -169,7 +169,7 @@ def _text(row: Mapping[str, Any], end: str) -> str:
 
 
 def titles_in(table: pd.DataFrame) -> dict[str, str]:
-    """Titles of the methods of a table by name, in its order."""
+    """Return the titles of a table's methods by name, in its order."""
     return dict(zip(table["method"], table["title"], strict=True))
 
 
@@ -178,7 +178,7 @@ TRUE = ("position_m_true", "orientation_deg_true")
 
 
 def crossing_findings(table: pd.DataFrame) -> list[str]:
-    """The findings of all scenes and sizes that have one."""
+    """List the findings of all scenes and sizes that have one."""
     blocks = [block for _, block in table.groupby(["scene", "size"], sort=False)]
     return [sentence for sentence in map(crossing_finding, blocks) if sentence]
 
@@ -224,6 +224,6 @@ def _off(position_m: float, orientation_deg: float) -> str:
 
 
 def two_digits(value: float) -> str:
-    """A positive number with two digits that count, and all before the point."""
+    """Format a positive number with two significant digits, and all before the point."""
     places = max(0, 1 - math.floor(math.log10(value))) if 0 < value < math.inf else 0
     return f"{value:.{places}f}"

@@ -59,12 +59,12 @@ def write_robustness_table(
 
 
 def read_robustness(path: Path) -> pd.DataFrame:
-    """The table that :func:`write_robustness_table` wrote."""
+    """Read the table that :func:`write_robustness_table` wrote."""
     return read_frame(path, SCHEMA)
 
 
 def side_table(table: pd.DataFrame) -> SideTable:
-    """A row for each training set and each of the effects, a column per method."""
+    """Lay out a row for each training set and each of the effects, a column per method."""
     texts = [
         table[measure].map(partial(printed, digits=digits)) + unit
         for measure, (unit, digits) in UNITS.items()
@@ -85,7 +85,7 @@ def side_table(table: pd.DataFrame) -> SideTable:
 
 
 def printed(value: float, digits: int) -> str:
-    """A number with so many digits after the point; small ones with two that count."""
+    """Format a number with so many digits after the point, a small one with two significant."""
     return f"{value:.{digits}f}" if value >= 10.0 ** (1 - digits) else f"{value:.2g}"
 
 
@@ -101,7 +101,7 @@ def remark_on(table: pd.DataFrame) -> str:
 
 
 def effects_title(effects: str) -> str:
-    """As in ``motion blur, strength 2``; frames without effects are ideal."""
+    """Title effects as in ``motion blur, strength 2``; frames without effects are ideal."""
     if effects == CLEAN:
         return "ideal"
     name, _, strength = effects.rpartition("_")

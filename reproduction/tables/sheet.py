@@ -77,7 +77,11 @@ class _Format:
 
 
 def footnotes(sheet: Sheet) -> dict[str, str]:
-    """Marks (a, b, c, ...) of all distinct footnotes in reading order."""
+    """Assign marks (a, b, c, ...) to distinct footnotes in reading order.
+
+    Returns:
+        The mark of each footnote by its text.
+    """
     notes = [value.note for line in sheet.lines for cell in line.cells for value in cell]
     return {note: chr(ord("a") + k) for k, note in enumerate(dict.fromkeys(filter(None, notes)))}
 
@@ -88,7 +92,7 @@ def write_latex(path: Path, sheet: Sheet) -> None:
 
 
 def sheet_latex(sheet: Sheet) -> str:
-    """The table environment of a sheet, ending in a newline."""
+    """Format a sheet as a LaTeX table environment, ending in a newline."""
     marks = footnotes(sheet)
     table = _table(sheet, _LATEX, marks)
     table.columns = pd.Index(map(_heading, sheet.headings, range(len(sheet.headings))))
@@ -117,18 +121,18 @@ def sheet_latex(sheet: Sheet) -> str:
 
 
 def _heading(heading: str, place: int) -> str:
-    """A heading; what follows a comma stands below but in the first column."""
+    """Format a heading; what follows a comma stands below, except in the first column."""
     first, comma, rest = escape(heading).partition(", ")
     return rf"\shortstack[l]{{{first}\\{rest}}}" if place and comma else first + comma + rest
 
 
 def escape(text: str) -> str:
-    """Unicode text as LaTeX; a sign before a number becomes a minus sign, not a hyphen."""
+    """Escape Unicode text for LaTeX; a sign before a number becomes a minus, not a hyphen."""
     return text.translate(SPECIAL)
 
 
 def sheet_markdown(sheet: Sheet) -> str:
-    """A table with its caption above and its footnotes below, ending in a newline."""
+    """Format a table with its caption above and its footnotes below, ending in a newline."""
     marks = footnotes(sheet)
     table = _table(sheet, _MARKDOWN, marks)
     if any(line.block for line in sheet.lines):
@@ -139,13 +143,13 @@ def sheet_markdown(sheet: Sheet) -> str:
 
 
 def markdown_table(table: pd.DataFrame) -> str:
-    """A frame of texts as Markdown, its cells as wide as what they hold."""
+    """Format a frame of texts as Markdown, its cells as wide as what they hold."""
     padded = table.to_markdown(index=False, disable_numparse=True)
     return re.sub(r":?-{3,}:?", "---", re.sub(r" {2,}(?=\|)", " ", padded))
 
 
 def text_table(rows: Sequence[Sequence[str]], n_left: int = 1, form: str = PLAIN) -> str:
-    """Rows, the first of them the headings; columns are right-aligned but the first ``n_left``."""
+    """Format rows under their headings, the first row; right-aligned but the first ``n_left``."""
     sides = ["left" if i < n_left else "right" for i in range(len(rows[0]))]
     frame = pd.DataFrame(rows[1:], columns=list(rows[0]))
     text = frame.to_markdown(index=False, tablefmt=form, disable_numparse=True, colalign=sides)
@@ -153,7 +157,7 @@ def text_table(rows: Sequence[Sequence[str]], n_left: int = 1, form: str = PLAIN
 
 
 def _table(sheet: Sheet, form: _Format, marks: Mapping[str, str]) -> pd.DataFrame:
-    """Lines by heading, as text of a language."""
+    """Format lines by heading, as text of a language."""
     rows = []
     for line in sheet.lines:
         texts = [", ".join(form.value(value, line.kind) for value in cell) for cell in line.cells]
@@ -188,7 +192,7 @@ _MARKDOWN = _Format(_markdown_value, lambda mark: f" ({mark})")
 
 
 def _titles(sheet: Sheet, upright: bool) -> list[str]:
-    """By line, the title of its block: at the first, or at the middle and upright if it fits."""
+    """Return by line the title of its block: at the first, or upright at the middle if it fits."""
     titles: list[str] = []
     for block, lines in groupby(line.block for line in sheet.lines):
         n, title, place = len([*lines]), block, 0
@@ -202,7 +206,7 @@ def _titles(sheet: Sheet, upright: bool) -> list[str]:
 
 
 def _ruled(body: Sequence[str], lines: Sequence[Line]) -> list[str]:
-    """Lines of a table with a rule before each new block, a thin gap before each new row."""
+    """Insert a rule before each new block, a thin gap before each new row."""
     ruled = list(body[:1])  # a table may have no lines
     for text, line, above in zip(body[1:], lines[1:], lines, strict=False):
         if (line.block, line.row) != (above.block, above.row):

@@ -42,7 +42,7 @@ CELL = {
 
 
 def training_rows(root: Path, scene: str) -> pd.DataFrame:
-    """The localizers on the largest set of Table 4; an item is an image shown.
+    """Tabulate the localizers on the largest set of Table 4; an item is an image shown.
 
     The error is the median of positions against the true poses, in metres. The time is that of
     the processor in the whole job, over all seeds: starting up, reading frames, and predicting the
@@ -69,7 +69,7 @@ def training_rows(root: Path, scene: str) -> pd.DataFrame:
 
 
 def _seconds_per_image(root: Path, run: str, n_seeds: int) -> float:
-    """Processor seconds of the training runs of a localizer by the images shown in them."""
+    """Divide the processor seconds of a localizer's training runs by the images shown in them."""
     seconds, shown = 0.0, 0
     for seed in range(n_seeds):
         measured = root / "benchmarks" / "train" / f"{run}/seed{seed}.tsv"
@@ -104,7 +104,7 @@ def write_speed_vs_error(scenes: Sequence[str], root: Path, out_csv: Path) -> No
 
 
 def speeds_of(stage: str, scenes: Sequence[str], root: Path) -> pd.DataFrame:
-    """The rows of a stage, columns ``SCHEMA``; an item is what the stage makes one of."""
+    """Tabulate a stage, columns ``SCHEMA``; an item is what the stage makes one of."""
     parts = [READERS[stage](root, scene).assign(scene=scene) for scene in scenes]
     rows = [row for part in parts for row in records_of(part)]
     same = {"stage": stage}
@@ -114,7 +114,7 @@ def speeds_of(stage: str, scenes: Sequence[str], root: Path) -> pd.DataFrame:
 
 
 def collision_rows(root: Path, scene: str) -> pd.DataFrame:
-    """The face counts of the collision mesh, largest first; an item is a ray, an error a decision.
+    """Tabulate face counts of the collision mesh; an item is a ray, an error a decision.
 
     The curve holds each mesh's speed beside the full mesh's at the same moment. Only their ratio
     is free of what else the machine did, so it is applied to the full mesh's median speed.
@@ -140,7 +140,7 @@ def collision_rows(root: Path, scene: str) -> pd.DataFrame:
 
 
 def render_rows(root: Path, scene: str) -> pd.DataFrame:
-    """Ways to draw a frame, by camera; an item is a colour image, an error in levels of 0-255."""
+    """Tabulate ways to draw a frame by camera; errors are in levels of 0 to 255."""
     lines = read_frame(root / "scenes" / scene / "render_speed.csv", RENDERED, "measure again")
     camera = lines.width.astype(str) + "x" + lines.height.astype(str) + ", "
     return lines.assign(
@@ -152,7 +152,7 @@ def render_rows(root: Path, scene: str) -> pd.DataFrame:
 
 
 def _detail(lines: pd.DataFrame) -> pd.Series:
-    """Variants in words: backend, samples per pixel, and what detail of the mesh is left out."""
+    """Describe variants: backend, samples per pixel, and what detail of the mesh is left out."""
     samples = lines.supersampling.astype(str)
     textures = [
         "" if scale == 1.0 else f", textures 1/{round(1.0 / scale)}"
@@ -164,7 +164,7 @@ def _detail(lines: pd.DataFrame) -> pd.Series:
 
 
 def label_rows(root: Path, scene: str) -> pd.DataFrame:
-    """The methods that estimate labels; an item is a frame, an error that of its position.
+    """Tabulate methods that estimate labels; an item is a frame, an error that of its position.
 
     The error is the median over both splits after assistance; times are of the processor. Nothing
     is chosen: the paper compares the methods. No rows where the design has no such labels.
@@ -184,7 +184,7 @@ def label_rows(root: Path, scene: str) -> pd.DataFrame:
 
 
 def effect_rows(root: Path, scene: str) -> pd.DataFrame:
-    """Effects of camera and light, where they are measured; an item is a frame for the network.
+    """Tabulate measured effects of camera and light; an item is a frame for the network.
 
     Seconds are of the processor; an error is the median position error of the localizers trained on
     ideal frames, the mean over the five. The tables of the paper use ideal frames.

@@ -52,7 +52,15 @@ PATHS_ONLY = {PATHS: ", paths only", PATHS_AND_SEEDS: ""}
 
 
 def write_table(table: str, design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
-    """Write one of tables 2 to 7 from the scores of its runs: a row per cell, and LaTeX."""
+    """Write one of tables 2 to 7 from the scores of its runs, a row per cell.
+
+    Args:
+        table: Name of the table, such as ``table4_size``.
+        design: Rows of the table, and the runs they read.
+        root: Results of the profile.
+        out_csv: Tidy table to write.
+        out_tex: LaTeX in the paper's layout to write.
+    """
     cells = read_cells(table, design, root)
     write_frame(out_csv, cells[[*schema_of(table, repeated=bool((cells.n_seeds > 1).any()))]])
     write_latex(out_tex, sheet_of(table, cells))
@@ -108,7 +116,7 @@ def _order(name: str, row: Any) -> object:
 
 
 def _numbers(kind: str, cell: Any) -> list[Value]:
-    """Position and orientation of a localizer on a line; none where the paper has no such cell."""
+    """Format position and orientation of a localizer on a line; none where the paper lacks them."""
     source, _, change = kind.partition(" ")
     if source in ("unit", PAPER) and pd.isna(cell.published_position_m):
         return []
@@ -153,7 +161,7 @@ def _change(value: Any) -> Value:
 
 
 def _reference(start: str, kind: str, cell: Any) -> list[Value]:
-    """An answer without training, the same for every localizer of a row."""
+    """Format an answer without training, the same for every localizer of a row."""
     scores = {f"{start}_{m}{KIND_OF[kind]}": u for m, u in UNITS.items() if kind in KIND_OF}
     values = [(getattr(cell, score), u) for score, u in scores.items() if hasattr(cell, score)]
     return [Value(_plain(v, unit), sort="" if pd.isna(v) else v) for v, unit in values]

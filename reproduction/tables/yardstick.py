@@ -37,7 +37,7 @@ DIRECTIONS = 64
 def against_noisy_labels(
     position_m: Array, orientation_deg: Array, noise_m: float, noise_deg: float
 ) -> tuple[float, float]:
-    """Median errors against labels with noise, from errors against the truth.
+    """Compute median errors against labels with noise, from errors against the truth.
 
     Args:
         position_m: errors of the frames (N,).
@@ -71,7 +71,7 @@ def against_noisy_labels(
 def yardstick_alone(
     row: Experiment, model: str, design: Design, root: Path
 ) -> dict[str, float | None]:
-    """Columns ``COLUMNS`` of a cell of Table 3: the mean over the runs on clean labels.
+    """Compute columns ``COLUMNS`` of a cell of Table 3: the mean over the runs on clean labels.
 
     Missing where the row has no noise, or where those runs' errors are not stored.
     """

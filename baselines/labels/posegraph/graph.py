@@ -149,7 +149,7 @@ def read_g2o(path: Path) -> PoseGraph:
 
 
 def _graph(vertices: dict[int, Array], edges: Sequence[Edge], path: Path) -> PoseGraph:
-    """The graph, after checking that nodes are numbered 0..n-1 and edges join two of them."""
+    """Build the graph after checking that nodes are numbered 0..n-1 and edges join two of them."""
     if sorted(vertices) != list(range(len(vertices))) or not vertices:
         raise InputError(f"{path}: vertices must be numbered 0 to n-1 without a gap")
     for edge in edges:
@@ -164,7 +164,7 @@ def _graph(vertices: dict[int, Array], edges: Sequence[Edge], path: Path) -> Pos
 
 
 def _numbers(cells: Sequence[str], count: int, where: str) -> Array:
-    """The cells as finite numbers."""
+    """Read the cells as finite numbers."""
     try:
         values = np.array([float(cell) for cell in cells])
     except ValueError as error:
@@ -175,11 +175,11 @@ def _numbers(cells: Sequence[str], count: int, where: str) -> Array:
 
 
 def _pose(values: Array) -> Array:
-    """A pose (4, 4) from x y z qx qy qz qw."""
+    """Build a pose (4, 4) from x y z qx qy qz qw."""
     return pose_from_quat(values[:3], values[[6, 3, 4, 5]])
 
 
 def _pose_cells(pose: Array) -> list[str]:
-    """The pose as x y z qx qy qz qw."""
+    """Format the pose as x y z qx qy qz qw."""
     quat_wxyz = quat_wxyz_of(pose)
     return [repr(float(value)) for value in (*pose[:3, 3], *quat_wxyz[[1, 2, 3, 0]])]

@@ -39,7 +39,7 @@ def factors_of(graph: PoseGraph) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Valu
 
 
 def optimise_lm(graph: PoseGraph, iterations: int) -> NDArray[np.float64]:
-    """Optimised poses (n, 4, 4) relative to the first, after at most ``iterations`` steps."""
+    """Optimise poses (n, 4, 4) relative to the first, in at most ``iterations`` steps."""
     params = gtsam.LevenbergMarquardtParams()
     params.setMaxIterations(iterations)
     params.setRelativeErrorTol(_RELATIVE_CHANGE)
@@ -81,7 +81,7 @@ def by_open3d(graph: PoseGraph, cfg: PoseGraphConfig) -> NDArray[np.float64]:
 
 
 def optimise_open3d(graph: PoseGraph, iterations: int) -> NDArray[np.float64]:
-    """Optimised poses (n, 4, 4) relative to the first, after at most ``iterations`` steps.
+    """Optimise poses (n, 4, 4) relative to the first, in at most ``iterations`` steps.
 
     Its line process, which switches off edges that disagree, is left out: all edges count, as in
     the other optimisers.

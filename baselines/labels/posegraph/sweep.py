@@ -20,7 +20,7 @@ compiled = numba.njit(cache=True)
 
 
 def _product(a: Array, b: Array) -> Array:
-    """Quaternion product, made a unit again: rounding must not add up over many passes."""
+    """Multiply quaternions and normalise: rounding must not add up over many passes."""
     c = np.empty(4)
     c[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
     c[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
@@ -30,12 +30,12 @@ def _product(a: Array, b: Array) -> Array:
 
 
 def _inverse(a: Array) -> Array:
-    """The conjugate of a unit quaternion."""
+    """Return the conjugate of a unit quaternion."""
     return np.array([a[0], -a[1], -a[2], -a[3]])
 
 
 def _rotated(a: Array, v: Array) -> Array:
-    """A vector (3,) turned by a unit quaternion."""
+    """Turn a vector (3,) by a unit quaternion."""
     tx = 2.0 * (a[2] * v[2] - a[3] * v[1])
     ty = 2.0 * (a[3] * v[0] - a[1] * v[2])
     tz = 2.0 * (a[1] * v[1] - a[2] * v[0])
@@ -47,7 +47,7 @@ def _rotated(a: Array, v: Array) -> Array:
 
 
 def _part(a: Array, share: float) -> Array:
-    """The rotation about the axis of ``a`` by ``share`` of its angle, the short way."""
+    """Return the rotation about the axis of ``a`` by ``share`` of its angle, the short way."""
     sine = math.sqrt(a[1] * a[1] + a[2] * a[2] + a[3] * a[3])
     c = np.array([1.0, 0.0, 0.0, 0.0])
     if sine > 0.0:

@@ -72,7 +72,7 @@ class _PathEdge:
 
 
 def optimise_toro(graph: PoseGraph, iterations: int, epsilon: float) -> Array:
-    """Optimised poses (n, 4, 4) relative to the first, after at most ``iterations`` passes.
+    """Optimise poses (n, 4, 4) relative to the first, in at most ``iterations`` passes.
 
     Raises:
         ValueError: a node has no edge to a lower-numbered one, so no tree spans the graph.
@@ -119,7 +119,7 @@ def spanning_tree(graph: PoseGraph) -> NDArray[np.int64]:
 
 
 def _path_edges(graph: PoseGraph, parents: NDArray[np.int64]) -> list[_PathEdge]:
-    """All edges with their paths in the tree."""
+    """List all edges with their paths in the tree."""
     result = []
     for edge in graph.edges:
         up, down, node_i, node_j = [], [], edge.i, edge.j
@@ -142,7 +142,7 @@ def _path_edges(graph: PoseGraph, parents: NDArray[np.int64]) -> list[_PathEdge]
 
 
 def _depth(node: int, parents: NDArray[np.int64]) -> int:
-    """Number of parents above a node."""
+    """Count the parents above a node."""
     depth = 0
     while node != 0:
         node, depth = int(parents[node]), depth + 1
@@ -150,7 +150,7 @@ def _depth(node: int, parents: NDArray[np.int64]) -> int:
 
 
 def _stiffness(edges: list[_PathEdge], n_nodes: int) -> Array:
-    """M (n - 1, 2) of the nodes 1..n-1 for rotation and translation."""
+    """Return M (n - 1, 2) of the nodes 1..n-1 for rotation and translation."""
     stiffness = np.zeros((n_nodes - 1, 2))
     for edge in edges:
         stiffness[edge.nodes - 1] += edge.weight
@@ -158,13 +158,13 @@ def _stiffness(edges: list[_PathEdge], n_nodes: int) -> Array:
 
 
 def _shares(stiffness: Array) -> Array:
-    """Cumulative weights u and v (L, 2) along a path whose nodes have ``stiffness`` (L, 2)."""
+    """Return cumulative weights u and v (L, 2) along a path of nodes of ``stiffness`` (L, 2)."""
     compliance = 1.0 / stiffness
     return np.asarray(np.cumsum(compliance, axis=0) / compliance.sum(axis=0), dtype=np.float64)
 
 
 def _poses(parent_from_node: Array, parents: NDArray[np.int64]) -> Array:
-    """Poses (n, 4, 4) relative to the first; rotations are made orthonormal again."""
+    """Return poses (n, 4, 4) relative to the first; rotations are made orthonormal again."""
     poses = np.empty_like(parent_from_node)
     poses[0] = np.eye(4)
     for node in range(1, len(poses)):

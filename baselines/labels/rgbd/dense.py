@@ -44,7 +44,7 @@ def depth_agreement(
 def matched_depths(
     depth_i_m: Depth, depth_j_m: Depth, i_from_j: Array, camera: CameraConfig
 ) -> tuple[Array, Array, int]:
-    """Points of image j (H, W) projected into image i (H, W) by a motion (4, 4).
+    """Project the points of image j (H, W) into image i (H, W) by a motion ``i_from_j`` (4, 4).
 
     Returns:
         For the points inside image i the depth (n,) measured there, inf where there is none, and
@@ -76,9 +76,14 @@ def points_of(depth_m: Depth, camera: CameraConfig, stride: int, first: float = 
 
 
 def normals_of(point_m: Array) -> Array:
-    """Compute normals (h - 2, w - 2, 3) of points (h, w, 3), from the neighbours to all sides.
+    """Compute unit normals from the neighbours above, below, left and right.
 
-    They are nan where those neighbours are not on one surface.
+    Args:
+        point_m: Points (h, w, 3) of an image's pixels, in the camera, metres.
+
+    Returns:
+        Normals (h - 2, w - 2, 3) in the camera, away from it; NaN where the neighbours do not lie
+        on one surface.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         down, right = point_m[2:, 1:-1] - point_m[:-2, 1:-1], point_m[1:-1, 2:] - point_m[1:-1, :-2]
@@ -195,7 +200,7 @@ class DenseOdometry:
         return fitness if fitness >= self.cfg.min_fitness and rmse_m <= max_rmse_m else 0.0
 
     def refine(self, i: RgbdFrame, j: RgbdFrame, start: Array) -> Motion | None:
-        """Refined and accepted motion ``i_from_j`` from a starting point (4, 4), or None."""
+        """Refine a motion ``i_from_j`` (4, 4) from a start; None where it is not accepted."""
         if self.cfg.method == "point-to-plane":
             found = align(i.surfaces, j.surfaces, start, 2 * self.cfg.max_rmse_m)
         else:

@@ -77,7 +77,7 @@ def near(a: Array, b: Array, max_m: float = MAX_CHANGE_M, max_deg: float = MAX_C
 
 
 def _surface(depth_m: NDArray[np.float32], matrix: Array, stride: int) -> Surface:
-    """One scale; pixel (0, 0) stays where it is, so focal lengths and centre shrink alike."""
+    """Build one scale; pixel (0, 0) stays where it is, so focal lengths and centre shrink alike."""
     pixels = np.ascontiguousarray(depth_m[::stride, ::stride])
     image = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(pixels))
     intrinsics = o3d.core.Tensor.from_numpy(np.diag([1 / stride, 1 / stride, 1]) @ matrix)
@@ -214,5 +214,5 @@ def kinect_depth(depth_m: NDArray[np.float32], rng: np.random.Generator) -> NDAr
 
 
 def frame_generator(seed: int, path: FrameFile) -> np.random.Generator:
-    """Noise of one image: the same wherever it is read, for batches share a frame."""
+    """Seed the noise of one image: the same wherever it is read, for batches share a frame."""
     return generator_of(seed, "depth-sensor", path.parent.name, path.name)

@@ -132,7 +132,7 @@ def _odometry(
 
 
 def _loops(track: _Track, cfg: RgbdConfig) -> tuple[int, list[Edge]]:
-    """Closures tried and those accepted."""
+    """Close loops; return how many were tried, and those accepted."""
 
     def predicted(i: int, j: int) -> Array | None:
         if track.guesses[i] != track.guesses[j]:
@@ -158,6 +158,6 @@ def _loops(track: _Track, cfg: RgbdConfig) -> tuple[int, list[Edge]]:
 
 
 def _information(sigma: tuple[float, float]) -> Array:
-    """Information (6, 6), translation first, from deviations in metres and degrees."""
+    """Compute information (6, 6), translation first, from deviations in metres and degrees."""
     sigma_m, sigma_deg = sigma
     return np.diag([sigma_m**-2.0] * 3 + [np.radians(sigma_deg) ** -2.0] * 3)

@@ -146,7 +146,7 @@ def neighbour(i: View, j: View, previous: Array) -> tuple[Array, bool]:
 
 
 def _by_features(i: View, j: View, previous: Array) -> tuple[Array, bool]:
-    """In front of a surface that depth slides along, features alone give the motion.
+    """Estimate a motion by features alone in front of a surface that depth slides along.
 
     Open3D compares colours at whole pixels and would move it away again.
     """
@@ -188,7 +188,7 @@ def loop_candidates(first_from_cam: Array, keyframe_every: int) -> list[tuple[in
 def most_telling(
     candidates: Sequence[tuple[int, int]], overlap: Callable[[int, int], float], per_keyframe: int
 ) -> list[tuple[int, int]]:
-    """Of each later keyframe the ``per_keyframe`` earliest partners that overlap it.
+    """Keep each later keyframe's ``per_keyframe`` earliest partners that overlap it.
 
     The further apart in time, the more drift a closure takes away. Candidates are pairs (i, j),
     i < j, ordered by i; ``overlap`` is the share of image j that image i shows, 0 where the pair is

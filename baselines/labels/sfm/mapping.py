@@ -100,7 +100,7 @@ def camera_poses(
 
 
 def _best_start(matches: Matches, work_dir: Path, cfg: SfmConfig, seed: int) -> Mapping:
-    """The model of the first start that explains enough, or the best one of all starts."""
+    """Map from several starts until one explains enough; return that model, or the best one."""
     deadline = time.monotonic() + cfg.max_mapping_s
     best = Mapping(None, 0, 0, 0.0)
     for starts, start in enumerate(_STARTS, start=1):
@@ -120,7 +120,7 @@ def _best_start(matches: Matches, work_dir: Path, cfg: SfmConfig, seed: int) -> 
 
 
 def _mapping(models: Iterable[pycolmap.Reconstruction], matches: Matches) -> Mapping:
-    """The model with the most observations among those of one start."""
+    """Choose the model with the most observations among those of one start."""
     by_observations = sorted(models, key=lambda model: int(model.compute_num_observations()))
     if not by_observations:
         return Mapping(None, 0, 1, 0.0)

@@ -2,7 +2,7 @@
 
 
 def scaled_channels(channels: int, width: float, multiple: int = 8) -> int:
-    """``channels * width`` rounded to a multiple, at least one multiple; unchanged at width 1.
+    """Round ``channels * width`` to a multiple, at least one multiple; unchanged at width 1.
 
     Vectorised convolutions work on blocks of eight channels, so other counts save no time.
     """

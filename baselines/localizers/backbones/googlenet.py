@@ -42,11 +42,11 @@ class ConvBn(nn.Module):
         self.bn = nn.BatchNorm2d(n_out, eps=0.001)
 
     def forward(self, maps: Tensor) -> Tensor:
-        """(B, n_in, H, W) to (B, n_out, ceil(H / stride), ceil(W / stride)); less if unpadded."""
+        """Map (B, n_in, H, W) to (B, n_out, H / stride, W / stride); rounded up if padded."""
         return torch.relu_(self.normalised(maps))
 
     def normalised(self, maps: Tensor) -> Tensor:
-        """As ``forward``, before the ReLU."""
+        """Do what ``forward`` does, but without the ReLU."""
         normalised: Tensor = self.bn(convolved(self.conv, self.conv.weight, maps))
         return normalised
 
@@ -140,7 +140,7 @@ class InceptionBackbone(nn.Module):
         self.register_buffer("input_shift", shift, persistent=False)
 
     def forward(self, images: Tensor) -> InceptionMaps:
-        """Feature maps of images (B, 3, H, W) of zero mean and unit deviation per channel."""
+        """Compute feature maps of images (B, 3, H, W), normalised per channel."""
         return self.maps_of(torch.addcmul(self.input_shift, images, self.input_scale))
 
     def maps_of(self, images: Tensor) -> InceptionMaps:
@@ -175,7 +175,7 @@ class Inception(nn.Module):
         self.n_out = one + three + five + pool
 
     def forward(self, maps: Tensor) -> Tensor:
-        """(B, n_in, H, W) to (B, n_out, H, W)."""
+        """Map (B, n_in, H, W) to (B, n_out, H, W)."""
         reduce3, conv3 = (cast(ConvBn, layer) for layer in self.branch2)
         reduce5, conv5 = (cast(ConvBn, layer) for layer in self.branch3)
         one, reduced3, reduced5 = side_by_side([self.branch1, reduce3, reduce5], maps)

@@ -121,7 +121,7 @@ class Mixed(nn.Module):
         return n
 
     def forward(self, maps: Tensor) -> Tensor:
-        """(B, n_in, H, W) to (B, n_out, H, W); a reduction's maps have half the side."""
+        """Map (B, n_in, H, W) to (B, n_out, H, W); a reduction's maps have half the side."""
         return torch.cat([self._branch(branch, maps) for branch in self.branches], dim=1)
 
     def _branch(self, branch: Branch, maps: Tensor) -> Tensor:
@@ -162,7 +162,7 @@ class InceptionV3(InceptionBackbone):
         self.n_out = n
 
     def maps_of(self, images: Tensor) -> InceptionMaps:
-        """Feature maps of images (B, 3, H, W) in [-1, 1]; H and W at least 75."""
+        """Compute feature maps of images (B, 3, H, W) in [-1, 1]; H and W at least 75."""
         maps = self.Conv2d_2b_3x3(self.Conv2d_2a_3x3(self.Conv2d_1a_3x3(images)))
         maps = self.Conv2d_4a_3x3(self.Conv2d_3b_1x1(self.pool(maps)))
         maps = self.pool(maps)

@@ -26,7 +26,7 @@ class BasicBlock(nn.Module):
             )
 
     def forward(self, maps: Tensor) -> Tensor:
-        """(B, n_in, H, W) to (B, n_out, ceil(H / stride), ceil(W / stride))."""
+        """Map (B, n_in, H, W) to (B, n_out, ceil(H / stride), ceil(W / stride))."""
         shortcut = maps if self.downsample is None else self.downsample(maps)
         maps = torch.relu_(self.bn1(self.conv1(maps)))
         return torch.relu_(self.bn2(self.conv2(maps)) + shortcut)
@@ -61,7 +61,7 @@ class ResNet34(nn.Module):
                 nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
 
     def forward(self, images: Tensor) -> ResNetMaps:
-        """Feature maps of normalised images (B, 3, H, W)."""
+        """Compute feature maps of normalised images (B, 3, H, W)."""
         # Pooling before the ReLU is the same as after it, and leaves it a quarter of the pixels.
         layer1 = self.layer1(torch.relu_(self.maxpool(self.bn1(self.conv1(images)))))
         layer2 = self.layer2(layer1)
@@ -70,6 +70,6 @@ class ResNet34(nn.Module):
 
 
 def _stage(n_in: int, n_out: int, blocks: int, stride: int) -> nn.Sequential:
-    """Basic blocks of which the first changes the resolution and the channels."""
+    """Build basic blocks of which the first changes the resolution and the channels."""
     first = BasicBlock(n_in, n_out, stride)
     return nn.Sequential(first, *(BasicBlock(n_out, n_out, 1) for _ in range(blocks - 1)))

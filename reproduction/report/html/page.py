@@ -58,7 +58,7 @@ LARGEST_SIDE_PX = 1800
 
 
 def figure_files(folder: Path, captions: Mapping[str, str]) -> dict[str, Path]:
-    """One file per figure of a folder, those with captions first and in their order."""
+    """Find one file per figure of a folder, those with captions first and in their order."""
     found: dict[str, Path] = {}
     for path in sorted(folder.glob("*.png")) + sorted(folder.glob("*.svg")):
         is_large = path.suffix == ".svg" and path.stat().st_size > LARGEST_SVG
@@ -69,7 +69,7 @@ def figure_files(folder: Path, captions: Mapping[str, str]) -> dict[str, Path]:
 
 
 def data_address(path: Path) -> str:
-    """A picture as a ``data:`` address; large PNG files become WebP."""
+    """Encode a picture as a ``data:`` address; large PNG files become WebP."""
     content, kind = path.read_bytes(), "svg+xml" if path.suffix == ".svg" else "png"
     if kind == "png" and len(content) > LARGEST_PNG:
         with Image.open(path) as image:
@@ -164,7 +164,7 @@ def write_report(design: Design, root: Path, out_html: Path, with_robustness: bo
 
 
 def opening(root: Path) -> str:
-    """The figure of the main findings as an address; nothing where the run lacks their rows."""
+    """Draw the main findings as a ``data:`` address; empty where the run lacks their rows."""
     drawn = panels(root) if can_tell(root) else []
     if not drawn:
         return ""
@@ -173,7 +173,7 @@ def opening(root: Path) -> str:
 
 
 def rowless_tables(design: Design, with_robustness: bool) -> list[str]:
-    """Side tables for which a design has no rows: of estimated labels, of frames with effects."""
+    """List side tables for which a design has no rows: of estimated labels, of effects."""
     of_labels = [] if design.estimated else [assistance.NAME, label_error.NAME]
     return [*of_labels, *([] if with_robustness else [robustness.NAME])]
 
@@ -181,7 +181,7 @@ def rowless_tables(design: Design, with_robustness: bool) -> list[str]:
 def _tables(
     cells: Mapping[str, pd.DataFrame], sides: Sequence[Any], root: Path
 ) -> Iterator[dict[str, Any]]:
-    """Name, title and HTML of every table; no HTML where its file is missing."""
+    """Yield name, title and HTML of every table; no HTML where its file is missing."""
     for module in (meshes, *sides):
         path = root / "tables" / f"{module.NAME}.csv"
         body = path.exists() and side_html(module.side_table(read_frame(path, module.SCHEMA)))
@@ -191,7 +191,7 @@ def _tables(
 
 
 def _real_table(root: Path) -> Iterator[dict[str, Any]]:
-    """The table of `make real`, where that was run."""
+    """Yield the table of `make real`, where that was run."""
     path = root / "tables" / f"{real.NAME}.csv"
     if path.exists():
         body = side_html(real.side_table(real.read_real(path)))
@@ -199,7 +199,7 @@ def _real_table(root: Path) -> Iterator[dict[str, Any]]:
 
 
 def missing_rows(rows: Sequence[Experiment]) -> list[str]:
-    """By table, the paper's rows that this run's table of experiments leaves out."""
+    """List by table the paper's rows that this run's table of experiments leaves out."""
     sentences = []
     for table in KEYS:
         own = {key_of(row, "")[:-1] for row in rows if row.table == table}
@@ -243,7 +243,7 @@ class Trajectory:
 
 
 def room_html(scene: str, root: Path, design: Design) -> Markup:
-    """The view of one scene, ready for ``report.js``; the design says what label sets there are."""
+    """Build the view of one scene, ready for ``report.js``; the design tells its label sets."""
     mesh = load_mesh(root / "scenes" / scene / "mesh.glb")
     small = viewer_mesh(mesh, SurfacePoints.of(mesh, generator_of(0, "report", scene)))
     drawn = trajectories(scene, root, design)
@@ -252,7 +252,7 @@ def room_html(scene: str, root: Path, design: Design) -> Markup:
 
 
 def trajectories(scene: str, root: Path, design: Design) -> list[Trajectory]:
-    """The planned cameras of both splits, then every estimated label set of the scene."""
+    """List the planned cameras of both splits, then every estimated label set of the scene."""
     found = [
         Trajectory(title, rgb, paths_of(read_pose_table(path)), True)
         for split, (title, rgb) in SPLITS.items()
@@ -268,6 +268,6 @@ def trajectories(scene: str, root: Path, design: Design) -> list[Trajectory]:
 
 
 def paths_of(table: PoseTable) -> tuple[Array, ...]:
-    """Camera centres (N, 3) of each path that has more than one frame."""
+    """Return camera centres (N, 3) of each path that has more than one frame."""
     starts = np.flatnonzero(np.diff(table.path)) + 1
     return tuple(path for path in np.split(table.position_m, starts) if len(path) > 1)

@@ -55,7 +55,7 @@ def stages_of(jobs: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def hashes(results: Iterable[Path], root: Path) -> dict[str, str]:
-    """SHA-256 of files, and of all files in directories, by path relative to ``root``."""
+    """Hash files, and all files in directories, by path relative to ``root`` (SHA-256)."""
     paths = [p for path in results for p in (sorted(path.iterdir()) if path.is_dir() else [path])]
     return {
         path.relative_to(root).as_posix(): file_sha256(path)
@@ -105,14 +105,18 @@ class _Origin(BaseModel):
 
 
 def read_origin(path: Path) -> Record:
-    """``provenance.json``."""
+    """Read ``provenance.json``: machine, stages, packages and what else the report prints.
+
+    Raises:
+        InputError: The file is missing or lacks any of that.
+    """
     record: Record = read_result(path, (*NEEDED, "machine", "stages"), "make it again")
     shaped(path, record, _Origin, "make it again")
     return record
 
 
 def origin_html(record: Record) -> Markup:
-    """Facts, and the stages as a table."""
+    """Format the facts, and the stages as a table."""
     columns = [
         Column("Stage", "stage"),
         Column("Jobs", "jobs", "{:,.0f}"),

@@ -32,12 +32,12 @@ ENVIRONMENT = Environment(
 
 
 def render(template: str, **values: Any) -> Markup:
-    """A template of the folder ``templates`` with its values."""
+    """Fill a template of the folder ``templates`` with values."""
     return Markup(ENVIRONMENT.get_template(template).render(**values))
 
 
 def side_html(table: SideTable) -> Markup:
-    """A side table, a row per row."""
+    """Format a side table, a row per row."""
     rows = [
         {"style": row.get("style", ""), "cells": [cells_of(row, c) for c in table.columns]}
         for row in records_of(table.rows)
@@ -53,7 +53,7 @@ SAME = "All labels of this table are true poses, so both scores are the same num
 
 
 def score_table(name: str, cells: pd.DataFrame) -> Markup:
-    """One of tables 2 to 7, from what :func:`reproduction.tables.cells.read_cells` read for it."""
+    """Format one of tables 2 to 7 from what :func:`reproduction.tables.cells.read_cells` read."""
     sheet = sheet_of(name, cells)
     one_truth = not any(line.kind == "truth" for line in sheet.lines)
     label = Column(sheet.headings[0])
@@ -83,7 +83,7 @@ def score_table(name: str, cells: pd.DataFrame) -> Markup:
 
 
 def _row(lines: Sequence[Line]) -> dict[str, Any]:
-    """The lines of a row: its label, the paper's, and by number both scores and the paper's."""
+    """Return the lines of a row: its label, the paper's values, both scores by number."""
     kinds = {line.kind: line.cells for line in lines}
 
     def value(kind: str, column: int, place: int) -> Value | None:
@@ -109,7 +109,7 @@ def _row(lines: Sequence[Line]) -> dict[str, Any]:
 
 
 def table_title(name: str) -> str:
-    """As in ``Table 4`` or ``Label error``."""
+    """Title a table as in ``Table 4`` or ``Label error``."""
     found = re.match(r"table(\d+)", name)
     return f"Table {found[1]}" if found else name.replace("_", " ").capitalize()
 
@@ -133,7 +133,7 @@ Claims = Sequence[Mapping[str, str]]
 
 
 def read_claims(path: Path) -> Claims:
-    """The rows of ``claims.csv``."""
+    """Read the rows of ``claims.csv``."""
     rows = records_of(read_frame(path, dict.fromkeys(COLUMNS, TEXT)))
     for row in rows:
         for score in SCORES:
@@ -144,7 +144,7 @@ def read_claims(path: Path) -> Claims:
 
 
 def claims_table(claims: Claims) -> Markup:
-    """One row per claim; measured values, limits and verdicts follow the switch."""
+    """Format one row per claim; measured values, limits and verdicts follow the switch."""
     columns = [Column(title) for title in CLAIM_HEADINGS]
     values = {"claims": claims, "columns": columns, "scores": list(SCORES), "badges": BADGES}
     return render("claims.html", **values, reason=reason_of)
@@ -165,6 +165,6 @@ def verdict_table(claims: Claims) -> Markup:
 
 
 def reason_of(reason: str, score: str) -> str:
-    """The reason of a verdict; where the two scores have their own, that of ``score``."""
+    """Return the reason of a verdict; that of ``score`` where the two scores have their own."""
     found = re.fullmatch(r"labels: (?P<labels>.*); true: (?P<true>.*)", reason)
     return found[score] if found else reason
