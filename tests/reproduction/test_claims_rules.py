@@ -34,7 +34,7 @@ CHANGES = [
     ("statistics/seeds.py", "WELCH_SHARE = 0.4", "WELCH_SHARE = 0.5", True),
     ("tables/published/claims.csv", "below a third", "below a half", True),
     ("claims/verdicts.py", "# Percent.", "# Per cent.", False),
-    ("claims/verdicts.py", '"""The verdict of a claim that all', '"""Whether all', False),
+    ("claims/verdicts.py", '"""Judge a claim that holds if all', '"""Whether all', False),
 ]
 
 
