@@ -61,6 +61,12 @@ def add_noise(
     adds ``noise_deg / sqrt(3)`` with a random sign to each of three Euler angles, so that the
     geodesic angle varies around the nominal value.
 
+    Args:
+        table: Frames and their poses.
+        noise_m: Length of the displacement, metres.
+        noise_deg: Angle of the turn, degrees.
+        rng: Source of directions and axes.
+
     Raises:
         ValueError: a size is negative.
     """

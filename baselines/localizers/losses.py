@@ -78,7 +78,16 @@ class PoseLoss(nn.Module):
     def distances(
         self, prediction: PosePrediction, position_m: Tensor, quat_wxyz: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """Compute distances to positions (B, 3) and unit quaternions (B, 4), in float32."""
+        """Compute the distances of predictions from poses, before they are weighted.
+
+        Args:
+            prediction: Predicted positions (B, 3), metres, and quaternions (B, 4) of any length.
+            position_m: Positions (B, 3), metres.
+            quat_wxyz: Unit quaternions (B, 4).
+
+        Returns:
+            Scalar distances of positions and of quaternions, in float32, by ``distance``.
+        """
         position, orientation = DISTANCES[self.distance]
         return (
             position(prediction.position_m.float(), position_m),

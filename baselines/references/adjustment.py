@@ -65,10 +65,16 @@ def placed_on(poses: Array, labels: Array, usable: Rows | None = None) -> Array:
 
 
 def adjust(tracks: Tracks, world_from_cam: Array, point_m: Array, camera: pycolmap.Camera) -> Array:
-    """Find poses (N, 4, 4) that, with points moved along, fit the images best.
+    """Adjust poses and points so that they fit the images best.
 
-    Poses and points (T, 3) are where it starts; points that are not used are NaN, and the poses of
-    frames that see none of the others stay. The camera, without distortion, is not moved.
+    Args:
+        tracks: Observations of the points.
+        world_from_cam: Poses (N, 4, 4) to start from.
+        point_m: Points (T, 3) to start from, world, metres; NaN for those that are not used.
+        camera: Camera without distortion, which is kept.
+
+    Returns:
+        Adjusted poses (N, 4, 4); those of frames that see no used point stay.
     """
     usable = np.asarray(np.isfinite(point_m).all(axis=1))
     chosen = longest(tracks, usable, len(world_from_cam))
@@ -90,7 +96,17 @@ def adjust(tracks: Tracks, world_from_cam: Array, point_m: Array, camera: pycolm
 def errors_px(
     tracks: Tracks, world_from_cam: Array, point_m: Array, camera: pycolmap.Camera
 ) -> Array:
-    """Compute the reprojection errors (M,) in pixels of points (T, 3) seen by poses (N, 4, 4)."""
+    """Compute the reprojection errors of observed points.
+
+    Args:
+        tracks: Observations (M).
+        world_from_cam: Poses (N, 4, 4).
+        point_m: Points (T, 3), world, metres.
+        camera: Camera without distortion.
+
+    Returns:
+        Errors (M,), pixels.
+    """
     cam_from_world = inverse(world_from_cam)[tracks.frame]
     point = np.einsum("mij,mj->mi", cam_from_world[:, :3, :3], point_m[tracks.track])
     point += cam_from_world[:, :3, 3]

@@ -55,10 +55,17 @@ def lifted(matches: Correspondences, train: PoseTable) -> Array:
 
 
 def localize(matches: Correspondences, point_m: Array, seen_by: CameraConfig, seed: int) -> Array:
-    """Find the poses (N, 4, 4) of the test frames, NaN where none is found.
+    """Find the poses of test frames from their matches.
 
-    ``point_m`` (C, 3) is where the training feature of each match lies in the world; not finite
-    where that is not known.
+    Args:
+        matches: Matches (C) of test features with training features.
+        point_m: Where the training feature of each match lies (C, 3), world, metres; not finite
+            where that is not known.
+        seen_by: Camera of the test frames.
+        seed: Seed of RANSAC's samples.
+
+    Returns:
+        Poses ``world_from_cam`` (N, 4, 4); NaN where none is found.
     """
     camera = pinhole(seen_by)
     known = np.asarray(np.isfinite(point_m).all(axis=1))
@@ -74,7 +81,18 @@ def absolute_pose(
     seed: int,
     max_error_px: float = MAX_ERROR_PX,
 ) -> Array:
-    """Find ``world_from_cam`` (4, 4) from points (n, 3) and where they are seen (n, 2), or NaN."""
+    """Estimate a pose as :func:`supported_pose` does.
+
+    Args:
+        pixel: Pixels (n, 2) that show the points, from the principal point.
+        point_m: Points (n, 3), world, metres.
+        camera: Camera without distortion.
+        seed: Seed of RANSAC's samples.
+        max_error_px: Largest reprojection error of an inlier, pixels.
+
+    Returns:
+        ``world_from_cam`` (4, 4); NaN where no pose is found.
+    """
     found = supported_pose(pixel, point_m, camera, seed, max_error_px)
     return np.full((4, 4), np.nan) if found is None else found.world_from_cam
 
@@ -102,10 +120,10 @@ def supported_pose(
 
     Args:
         pixel: Pixels (n, 2) that show the points, from the principal point.
-        point_m: Points (n, 3) in the world.
+        point_m: Points (n, 3), world, metres.
         camera: Camera without distortion.
-        seed: Seed of the samples.
-        max_error_px: Largest reprojection error of an inlier.
+        seed: Seed of RANSAC's samples.
+        max_error_px: Largest reprojection error of an inlier, pixels.
 
     Returns:
         The pose; None where fewer than ``MIN_INLIERS`` matches agree on one.

@@ -83,12 +83,20 @@ class LabelledFrames:
 def read_images(
     path: Path, count: int, input_px: int, device: torch.device, every: int = 1
 ) -> Tensor:
-    """Read the first ``count`` frames of a packed file as (count, 3, px, px) uint8, channels last.
-
-    With ``every`` above 1 the first of each so many frames, ``count`` of them.
+    """Read frames of a packed file.
 
     Beside the result no more than ``CHUNK`` frames are in memory, on whatever device it is. On a
     processor a result of over 2 GiB is a map of the file, which must not be changed meanwhile.
+
+    Args:
+        path: Packed frames, uint8 (N, px, px, 3).
+        count: Number of frames to read.
+        input_px: Side they must have, pixels.
+        device: Device of the result.
+        every: Read the first of each so many frames.
+
+    Returns:
+        Images (count, 3, px, px), uint8, channels last.
 
     Raises:
         InputError: the file is no packed frames, has another size, or holds too few of them.
@@ -116,9 +124,15 @@ def read_images(
 def read_labelled_frames(
     frames: Path, labels: Path, input_px: int, device: torch.device
 ) -> LabelledFrames:
-    """Read every labelled frame with its pose; ``frames`` may hold more, for larger sets.
+    """Read every labelled frame with its pose.
 
     Frames whose labels were filled in, because no method registered them, are left out.
+
+    Args:
+        frames: Packed frames; there may be more of them than labels, for larger sets.
+        labels: Pose table of the first frames.
+        input_px: Side the frames must have, pixels.
+        device: Device of the result.
 
     Raises:
         InputError: one of the files cannot be used, or there are no labels.

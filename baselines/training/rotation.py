@@ -77,7 +77,16 @@ class RandomRotation:
 def random_rotation(
     frames: Path, network: NetworkConfig, augmentation: AugmentationConfig, seed: int
 ) -> RandomRotation | None:
-    """Set up rotations of packed frames from the record beside them; None if none are wanted.
+    """Set up random rotations of packed frames.
+
+    Args:
+        frames: Packed frames; the record beside them says through which camera they were taken.
+        network: Side and view of the network's input.
+        augmentation: Largest rotations.
+        seed: Seed of the rotations.
+
+    Returns:
+        The rotations; None where nothing is to be rotated.
 
     Raises:
         InputError: there is no record, or the lens of its camera bends lines.

@@ -38,7 +38,22 @@ def write_scores(
     out_metrics: Path,
     out_common_errors: Path,
 ) -> None:
-    """Score a training run: :func:`score_run` and :func:`score_common`."""
+    """Score a training run by :func:`score_run` and :func:`score_common`.
+
+    Args:
+        predictions: Predicted poses of the test frames.
+        labels: Poses the test set carries.
+        truth: True poses of the test frames.
+        train_labels: Poses the training set carries, for scores of always answering the same.
+        depth: Depths of the cells of the test frames.
+        camera: Camera of the frames.
+        common: Predicted poses of the test frames that all sizes share.
+        common_truth: True poses of these.
+        wildcards: Names of the run, which are copied into its metrics.
+        out_errors: Errors of the test frames to write.
+        out_metrics: Scores to write.
+        out_common_errors: Errors of the shared test frames to write.
+    """
     score_run(
         predictions=predictions,
         labels=labels,

@@ -158,7 +158,7 @@ class Evidence:
 
     @cached_property
     def layout(self) -> Layout:
-        """Return where the parts of every sample of this evidence are."""
+        """Layout of every sample: resamples of the paths, then seed rows of each group of runs."""
         return Layout(RESAMPLES, tuple(self.groups.values()))
 
     def _medians(self, path: Path, test: TestSet) -> list[Array]:

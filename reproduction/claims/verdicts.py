@@ -197,7 +197,15 @@ class Condition(NamedTuple):
 
 
 def verdict_of(condition: Condition, comparisons: int = 1) -> Verdict:
-    """Classify an effect's interval; ``comparisons`` counts the conditions it is one of."""
+    """Judge an effect by where its interval lies beside no effect and the published one.
+
+    Args:
+        condition: Effect that a claim asserts.
+        comparisons: Number of conditions it is one of, for Bonferroni's correction.
+
+    Returns:
+        The verdict; undecided where the interval spans several regions.
+    """
     return _region(condition, limits(condition.effect, condition.layout, comparisons), RULE)
 
 

@@ -74,10 +74,14 @@ SHOWN = ("constant", "nearest-vlad", STRUCTURE)
 
 
 def draw_references(axes: Axes, data_sets: Sequence[pd.DataFrame], measure: str) -> None:
-    """Draw grey lines over the places 0, 1, ... without changing the axes' limits.
+    """Draw the errors of reference methods as grey lines, without changing the axes' limits.
 
-    ``data_sets`` are rows of ``references.csv``, of the data set at each place. A line that lies
-    above the axes is said in words.
+    A method whose errors all lie above the axes is named in words.
+
+    Args:
+        axes: Axes of localizers' errors over the places 0, 1, ....
+        data_sets: Rows of ``references.csv`` of the data set at each place.
+        measure: Column of the error.
     """
     titles = titles_in(pd.concat(data_sets))
     styles = reference_styles(name for name in titles if name not in MODELS)

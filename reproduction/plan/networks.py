@@ -22,7 +22,7 @@ PARAMETER_COPIES = 4
 
 @dataclass(frozen=True)
 class Work:
-    """A network."""
+    """Cost of running a network on one image."""
 
     flop: float  # of one image forward; a multiply-add is two
     layers: int  # layers with weights

@@ -86,7 +86,17 @@ def _single(values: ArrayLike) -> NDArray[np.float32]:
 def baked(
     surface: Surface, albedo: Vectors, glow: NDArray[np.float32], lighting: Lighting
 ) -> Vectors:
-    """Compute factors (V, 3) on display-referred albedo, after exposure; see :func:`received`."""
+    """Compute what display-referred albedo is multiplied by to show a surface in its light.
+
+    Args:
+        surface: Surface of V vertices.
+        albedo: Linear albedo (V, 3).
+        glow: Light (V,) that vertices give off.
+        lighting: Sources of light.
+
+    Returns:
+        Factors (V, 3), after exposure and display gamma; see :func:`received`.
+    """
     light = received(surface, albedo, glow, lighting)
     exposed = light * exposure_of(light)
     return np.asarray(exposed ** np.float32(1 / 2.2), np.float32)
@@ -100,10 +110,18 @@ def exposure_of(light: Vectors) -> np.float32:
 def received(
     surface: Surface, albedo: Vectors, glow: NDArray[np.float32], lighting: Lighting
 ) -> Vectors:
-    """Compute linear light (V, 3) that arrives; the sum of what every source alone gives.
+    """Compute the light that arrives at a surface; the sum of what every source alone gives.
 
-    The surface receives, blocks and passes it on, with linear ``albedo`` (V, 3) and ``glow`` (V,)
-    of :class:`synfeal.objects.patches.Patch`.
+    The surface receives, blocks and passes it on.
+
+    Args:
+        surface: Surface of V vertices.
+        albedo: Linear albedo (V, 3).
+        glow: Light (V,) that vertices give off, see :class:`synfeal.objects.patches.Patch`.
+        lighting: Sources of light.
+
+    Returns:
+        Linear light (V, 3).
     """
     caster = RayCaster(surface.points_m, surface.faces)
     normals = surface.normals.astype(np.float32)

@@ -24,7 +24,13 @@ def read_text(path: Path) -> str:
 
 
 def read_result(path: Path, needed: Iterable[str], remedy: str, shape: Any = None) -> Any:
-    """Read a mapping from a result file, or the model or type ``shape`` of it.
+    """Read a JSON result file.
+
+    Args:
+        path: The file.
+        needed: Keys it must have.
+        remedy: What to do where it cannot be used, for messages.
+        shape: Model or type to read it as; None for a mapping.
 
     Raises:
         InputError: the file is missing, is not JSON, is no mapping, lacks a key of ``needed`` or

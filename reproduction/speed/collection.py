@@ -104,10 +104,20 @@ def seconds_of_effects(
     render: RenderConfig,
     effects: Mapping[str, EffectsConfig],
 ) -> dict[str, float]:
-    """Time a frame, drawn and compressed, ideal and with effects: processor seconds.
+    """Time frames that are drawn and compressed, ideal and with effects.
 
     All are drawn in turn, so that what else the machine does slows them alike; the first frame
     loads what all use, and does not count.
+
+    Args:
+        mesh: Textured mesh, world frame.
+        poses: Poses to draw.
+        camera: Camera of the frames.
+        render: Settings in use.
+        effects: Effects by name.
+
+    Returns:
+        Processor seconds per frame by name.
     """
     switched = [e for e in effects.values() if e.light and e.light.states]
     opened = render.model_copy(update={"effects": switched[0] if switched else None})

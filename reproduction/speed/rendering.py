@@ -194,10 +194,20 @@ def measure_camera(
     poses: Poses,
     chosen: Variant,
 ) -> list[dict[str, object]]:
-    """Measure each variant beside the full mesh with the settings in use, in turns with it.
+    """Measure each variant in turns with the full mesh as it is drawn in use.
 
     What else the machine does slows both: their ratio is free of that, and is applied to the median
     of all times of the full mesh.
+
+    Args:
+        full: The full mesh with the settings in use.
+        others: Variants to measure.
+        camera: Camera of the frames.
+        poses: Poses ``world_from_cam`` to draw.
+        chosen: Variant that the profile uses.
+
+    Returns:
+        A row per variant.
     """
     truth = truth_of(full, camera, poses)
     beside = []

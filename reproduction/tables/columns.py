@@ -77,7 +77,7 @@ class Cell:
 
 
 def cells_of(row: Mapping[str, Any], column: Column) -> list[Cell]:
-    """Return a cell, or one for each of two scores."""
+    """Fill the cells of a column in one row: one cell, or, if ``scored``, one per score."""
     if column.scored:
         return [_score(row, column, style) for style in SCORES]
     value = row[column.name]

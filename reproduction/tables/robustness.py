@@ -40,12 +40,21 @@ def write_robustness_table(
     out_csv: Path,
     out_tex: Path,
 ) -> None:
-    """Measure and write the table.
+    """Measure the robustness table and write it.
 
-    ``clean`` and ``mixed`` are checkpoints of all localizers, trained on ideal frames and with
-    effects mixed in; ``descriptors`` are of the frames of both training sets. ``structure`` are
-    answers of structure-based poses for the ideal frames and each of ``effects``, none where frames
-    have no depth; ``varied`` are the ``test`` frames with each; ``labels`` lie in one folder.
+    Args:
+        clean: Checkpoints of all localizers trained on ideal frames.
+        mixed: Checkpoints of all localizers trained with effects mixed in.
+        descriptors: Descriptors of the frames of both training sets.
+        structure: Structure-based answers for ideal frames and each of ``effects``; none where
+            frames have no depth.
+        test: Packed ideal test frames.
+        varied: Packed test frames with each of ``effects``.
+        labels: Label files, in one folder.
+        effects: Names of the effects.
+        device: Device of prediction.
+        out_csv: Table to write.
+        out_tex: LaTeX to write.
     """
     models = {
         name: dict(zip(MODELS, m, strict=True)) for name, m in ((CLEAN, clean), (MIXED, mixed))

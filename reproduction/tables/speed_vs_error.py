@@ -140,7 +140,10 @@ def collision_rows(root: Path, scene: str) -> pd.DataFrame:
 
 
 def render_rows(root: Path, scene: str) -> pd.DataFrame:
-    """Tabulate ways to draw a frame by camera; errors are in levels of 0 to 255."""
+    """Tabulate ways to draw a frame, by camera.
+
+    An item is a colour image; its error is in grey levels, 0 to 255.
+    """
     lines = read_frame(root / "scenes" / scene / "render_speed.csv", RENDERED, "measure again")
     camera = lines.width.astype(str) + "x" + lines.height.astype(str) + ", "
     return lines.assign(

@@ -71,9 +71,17 @@ def against_noisy_labels(
 def yardstick_alone(
     row: Experiment, model: str, design: Design, root: Path
 ) -> dict[str, float | None]:
-    """Compute columns ``COLUMNS`` of a cell of Table 3: the mean over the runs on clean labels.
+    """Compute what noise in the test labels alone does to a cell of Table 3.
 
-    Missing where the row has no noise, or where those runs' errors are not stored.
+    Args:
+        row: Row of the table.
+        model: Localizer.
+        design: Design, which names the runs on clean labels.
+        root: Results of the profile.
+
+    Returns:
+        Columns ``COLUMNS``, the mean over the runs on clean labels; missing where the row has no
+        noise, or where those runs' errors are not stored.
     """
     clean = row.model_copy(update={"labels": "synfeal", "noise_m": 0.0, "noise_deg": 0.0})
     runs = design.runs_of(clean, model) if row.labels == "noise" else []

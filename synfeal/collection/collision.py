@@ -131,7 +131,14 @@ def last_agreeing(rungs: Sequence[Rung], min_agreement: float) -> int:
 
 
 def next_trial(larger: Trial, n_faces: int, reference: RayCaster, questions: Questions) -> Trial:
-    """Simplify ``larger`` on to ``n_faces`` and measure the result."""
+    """Simplify a mesh further and measure the result.
+
+    Args:
+        larger: Trial whose mesh is simplified.
+        n_faces: Number of triangles to reach.
+        reference: Rays against the full mesh.
+        questions: Questions that both meshes answer.
+    """
     begin = time.perf_counter()
     mesh = simplify(larger.mesh, n_faces)
     build_s = larger.rung.build_s + time.perf_counter() - begin
@@ -139,7 +146,14 @@ def next_trial(larger: Trial, n_faces: int, reference: RayCaster, questions: Que
 
 
 def measure(mesh: Triangles, reference: RayCaster, questions: Questions, build_s: float) -> Trial:
-    """Compare the answers of ``mesh`` with those of ``reference``, and their speed."""
+    """Compare the answers of a mesh with those of the full one, and their speed.
+
+    Args:
+        mesh: Mesh to judge.
+        reference: Rays against the full mesh.
+        questions: Questions that both answer.
+        build_s: Seconds that simplifying it took.
+    """
     caster = RayCaster(*mesh)
     expected, found = questions.answers(reference), questions.answers(caster)
     n_equal = int(np.sum(expected == found))

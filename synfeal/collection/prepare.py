@@ -40,10 +40,18 @@ def prepare_scene(
     out_mesh: Path,
     shade: Shade | None = None,
 ) -> None:
-    """Write what later stages read of a scene: ``out_mesh`` (``mesh.glb``, world frame).
+    """Write what later stages read of a scene.
 
-    Beside it ``collision.ply``, how that was chosen (``collision_curve.csv``, whose times differ
-    between runs), ``clutter.json`` (what was placed in it, if anything) and ``properties.json``.
+    Args:
+        name: Name of the scene, for messages.
+        scene: Settings of the scene.
+        collision_agreement: Share of decisions in which the collision mesh must agree with the
+            full one; None to use the full mesh.
+        seed: Root of all random numbers.
+        out_mesh: File ``mesh.glb`` to write, in the world frame. Beside it: ``collision.ply``; how
+            that was chosen, ``collision_curve.csv``, whose times differ between runs;
+            ``clutter.json``, what was placed, if anything; ``properties.json``.
+        shade: Light that frames are drawn with, if any, see :func:`prepare_mesh`.
 
     Raises:
         InputError: the mesh cannot be used, is not the expected file, or contradicts the

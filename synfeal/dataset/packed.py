@@ -39,9 +39,13 @@ def new_packed(out: Path, n_frames: int, input_px: int) -> Iterator[NDArray[np.u
 
 
 def pack_frames(sequences: list[Path], input_px: int, out: Path, view: View = "square") -> None:
-    """Write the colour frames of the sequences, in order, as one ``.npy``.
+    """Write the colour frames of sequences, in order, as one ``.npy``.
 
-    uint8 (N, input_px, input_px, 3); see :func:`fit_frame`.
+    Args:
+        sequences: Directories or archives of frames.
+        input_px: Side of the packed frames, pixels.
+        out: File to write: uint8 (N, input_px, input_px, 3).
+        view: Whether all of a frame or its central square is packed, see :func:`fit_frame`.
     """
     paths = frames_between(sequences, "color.png")
     with new_packed(out, len(paths), input_px) as packed:

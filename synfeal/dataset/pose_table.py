@@ -155,7 +155,17 @@ def check_places(
     line_of: NDArray[np.int64],
     farthest_m: float = FARTHEST_M,
 ) -> None:
-    """Refuse positions (N, 3) that no camera can have; what is not finite passes."""
+    """Refuse positions that no camera can have; what is not finite passes.
+
+    Args:
+        position_m: Positions (N, 3), world, metres.
+        path: File they were read from, for messages.
+        line_of: Line (N,) of the file that each stands on.
+        farthest_m: Largest distance from the origin, metres.
+
+    Raises:
+        InputError: a position is farther away.
+    """
     distance_m = np.abs(position_m).max(axis=1, initial=0.0)
     off = (distance_m > farthest_m) & np.isfinite(distance_m)
     if off.any():

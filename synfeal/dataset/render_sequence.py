@@ -250,10 +250,21 @@ def render_packed(
     out_frames: Path,
     detail: Path | None = None,
 ) -> None:
-    """Render rows ``start`` to ``stop`` of a plan into one array, as :func:`pack_frames` packs.
+    """Render rows of a plan into one array, as :func:`pack_frames` packs frames.
 
-    ``detail`` is what is drawn in place of ``mesh``, see :func:`synfeal.effects.scene.open_scene`.
-    ``.json`` beside it, in place of ``.npy``, says how many frames it holds and what drew them.
+    Args:
+        mesh: Mesh in the world frame.
+        camera: Camera of the frames.
+        plan: Pose table.
+        start: Row of the first frame.
+        stop: One past the row of the last frame.
+        input_px: Side of the packed frames, pixels.
+        view: Whether all of a frame or its central square is packed.
+        render: Backend and effects.
+        out_frames: File ``.npy`` to write; ``.json`` beside it says how many frames it holds and
+            what drew them.
+        detail: Mesh that colours are drawn from; None for ``mesh`` itself, see
+            :func:`synfeal.effects.scene.open_scene`.
     """
     chosen, poses = resolved(render), read_frames(plan, start, stop)
     with (

@@ -74,10 +74,16 @@ GOOD_M, GOOD_DEG = 0.05, 5.0
 def checked_convention(
     path: Path, estimates: Estimates, rows: NDArray[np.int64], reference: Array
 ) -> None:
-    """Refuse poses that another convention fits far better, and name that, for ``--convention``.
+    """Refuse poses that another convention fits far better, and name that one.
 
-    ``rows`` (M,) are those that belong to a frame, ``reference`` (M, 4, 4) the ``world_from_cam``
-    of these frames.
+    Args:
+        path: File of the poses, for messages.
+        estimates: Poses as the file holds them.
+        rows: Those (M,) that belong to a frame.
+        reference: ``world_from_cam`` (M, 4, 4) of these frames.
+
+    Raises:
+        InputError: another convention fits far better; it says which ``--convention`` to give.
     """
     taken = _medians(estimates, estimates.convention, rows, reference)
     if taken[0] < GOOD_M or taken[1] < GOOD_DEG:

@@ -181,7 +181,16 @@ def _paths(dataset: Path, split: str, frames: Sequence[Frame]) -> NDArray[np.int
 def match(
     frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float
 ) -> NDArray[np.int64]:
-    """Find the row (N,) of each frame's estimate by name, index or time; -1 where there is none.
+    """Find each frame's estimate by name, index or time.
+
+    Args:
+        frames: Frames (N) to score.
+        estimates: Poses of a file.
+        path: That file, for messages.
+        rate_hz: Frames per second, by which time stamps are turned into frame numbers.
+
+    Returns:
+        Rows (N,) of ``estimates``; -1 where there is none.
 
     Raises:
         InputError: a name says no frame, or not of which sequence; a frame has two estimates; none

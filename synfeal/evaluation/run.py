@@ -178,9 +178,18 @@ def _labels(path: Path, frames: ScoredFrames, settings: Settings) -> Array:
 
 
 def aligned(poses: Array, reference: Array, align: Align, path: Path) -> tuple[Array, float]:
-    """Move poses (N, 4, 4) as a whole onto ``reference`` as evo does; also return the scale.
+    """Move poses as a whole onto a reference, as evo does.
 
     Least squares over the positions of the frames that have a pose (Umeyama, PAMI 1991).
+
+    Args:
+        poses: Poses ``world_from_cam`` (N, 4, 4), NaN where there is none.
+        reference: Poses (N, 4, 4) of the same frames.
+        align: Which motion is allowed: none, rigid, or rigid with scale.
+        path: File of the poses, for messages.
+
+    Returns:
+        The moved poses (N, 4, 4), and the scale.
 
     Raises:
         InputError: positions do not determine the motion.

@@ -29,10 +29,17 @@ FORMATS: dict[str, Exporter] = {
 
 
 def export(dataset: Path, to: str, out: Path, copy: bool, camera_file: Path | None) -> int:
-    """Write a data set in another format, a key of ``FORMATS``; returns the number of frames.
+    """Write a data set in another format.
 
-    Colour images are linked to, or copied. ``out`` is new; a calibration file is needed where there
-    is no manifest.
+    Args:
+        dataset: Data set to export.
+        to: Format, a key of ``FORMATS``.
+        out: Directory to write, which must not exist.
+        copy: Copy colour images; otherwise they are linked to.
+        camera_file: Calibration; needed where the data set has no manifest.
+
+    Returns:
+        The number of frames.
     """
     refuse_existing(out)
     if lies_in(out, dataset):

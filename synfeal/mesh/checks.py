@@ -39,7 +39,7 @@ def check_mesh(mesh: TexturedMesh, path: Path) -> None:
 
 
 def refuse_colourless(mesh: TexturedMesh, name: str) -> None:
-    """Check for a texture, colours of vertices, or materials of several colours."""
+    """Refuse a mesh without texture and vertex colours whose materials all have one colour."""
     painted = any(p.texture is not None or p.vertex_rgb is not None for p in mesh.parts)
     if not painted and len({part.base_color.tobytes() for part in mesh.parts}) == 1:
         raise InputError(

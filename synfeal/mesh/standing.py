@@ -93,9 +93,17 @@ class Ground:
     def place(
         self, kind: TexturedMesh, bounds_m: Array, rng: np.random.Generator, tries: int
     ) -> tuple[Array, float] | None:
-        """Find a place (3,) and a heading for an object; None after so many tries.
+        """Find a place for an object, let down from a random position.
 
-        It is let down from a random place between the corners ``bounds_m`` (2, 3).
+        Args:
+            kind: The object, in its own frame.
+            bounds_m: Lower and upper corner (2, 3) of the space it is let down from, world, metres.
+            rng: Source of positions and headings.
+            tries: Number of positions tried.
+
+        Returns:
+            Where the centre of its base stands (3,), world, metres, and its heading about z,
+            radians; None if no try succeeds.
         """
         half_m = np.ptp(kind.bounds_m, axis=0) / 2
         base = np.array([(x, y, 0.0) for x in (-1, 0, 1) for y in (-1, 0, 1)]) * half_m
@@ -122,7 +130,19 @@ def _about_z(yaw_rad: float) -> Array:
 
 
 def meets_box(corners: Array, centre_m: Array, half: Array, yaw_rad: float) -> NDArray[np.bool_]:
-    """Mark triangles (N, 3, 3) that meet a box turned about z, its inside included: (N,)."""
+    """Mark the triangles that meet a box turned about z, its inside included.
+
+    By the separating-axis theorem.
+
+    Args:
+        corners: Corners (N, 3, 3) of the triangles, world, metres.
+        centre_m: Centre (3,) of the box.
+        half: Half of its extents (3,), metres.
+        yaw_rad: Its turn about z.
+
+    Returns:
+        Marks (N,).
+    """
     corners = (corners - centre_m) @ _about_z(yaw_rad)
     meets = ((corners.min(axis=1) <= half) & (corners.max(axis=1) >= -half)).all(axis=1)
     near = corners[meets]

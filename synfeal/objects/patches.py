@@ -111,10 +111,15 @@ class Maker:
     rng: np.random.Generator
 
     def sheet(self, points_m: Points, painter: Painter, px_per_m: float, glow: float = 0.0) -> Item:
-        """Make a grid of points (R, C, 3) with a picture of ``DETAIL * px_per_m`` texels per metre.
+        """Make a sheet: a grid of points with a picture on it.
 
-        At least 4 a side. Whatever the painter draws gets a fine grain, so that no surface is flat
-        from nearby.
+        Whatever the painter draws gets a fine grain, so that no surface is flat from nearby.
+
+        Args:
+            points_m: Grid (R, C, 3), first row at the top of the picture.
+            painter: Paints the picture.
+            px_per_m: Texels per metre, before ``DETAIL``; the picture has at least 4 a side.
+            glow: 0 if it only reflects light, 1 if it shines by itself.
         """
         scale = DETAIL * px_per_m
         down_m = np.linalg.norm(np.diff(points_m, axis=0), axis=-1).sum(axis=0).mean()
@@ -162,7 +167,14 @@ class Maker:
     def turned(
         self, profile_m: ArrayLike, painter: Painter, px_per_m: float, segments: int = 16
     ) -> Item:
-        """Make a surface of revolution about z from (radius, z) pairs (K, 2), top to bottom."""
+        """Make a surface of revolution about z.
+
+        Args:
+            profile_m: Radius and z (K, 2), from top to bottom.
+            painter: Paints the surface.
+            px_per_m: Texels per metre, before ``DETAIL``.
+            segments: Number of flat sides around the axis.
+        """
         profile = np.asarray(profile_m, np.float64)
         angle = np.linspace(-np.pi, np.pi, segments + 1)
         ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)

@@ -159,8 +159,13 @@ def plan_coverage(
 ) -> dict[str, object]:
     """Measure a plan's coverage, as the content of ``coverage.json``; see ``DEFINITIONS``.
 
-    ``mesh`` is the scene or its collision mesh, ``boxes_m`` (B, 2, 3) or (2, 3) the corners of the
-    spaces that camera centres are sampled in.
+    Args:
+        mesh: The scene or its collision mesh.
+        boxes_m: Corners (B, 2, 3), or (2, 3) for one, of the boxes that camera centres are sampled
+            in, world, metres.
+        scene: Settings of the scene.
+        plan: Poses of the plan.
+        camera: Camera of the frames.
     """
     caster = RayCaster(*mesh)
     boxes_m = np.reshape(boxes_m, (-1, 2, 3))

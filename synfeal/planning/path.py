@@ -50,10 +50,17 @@ def path_vectors(start: Array, target: Array, n_frames: int) -> PoseVectors:
 def path_poses(
     start: Array, target: Array, frame_spacing_m: float, interpolation: Literal["rpy", "slerp"]
 ) -> Array:
-    """Return ``world_from_cam`` (n, 4, 4) of the frames after ``start`` up to ``target`` inclusive.
+    """Interpolate the frames of a straight path.
 
-    ``rpy`` moves roll, pitch and yaw as the paper does; ``slerp`` turns about one axis at constant
-    speed.
+    Args:
+        start: Pose vector (6,) of the path's start, which is no frame of it.
+        target: Pose vector (6,) of its last frame.
+        frame_spacing_m: Distance between neighbouring frames, metres.
+        interpolation: ``rpy`` moves roll, pitch and yaw as the paper does; ``slerp`` turns about
+            one axis at constant speed.
+
+    Returns:
+        Poses ``world_from_cam`` (n, 4, 4).
     """
     n_frames = n_frames_of(start, target, frame_spacing_m)
     if interpolation == "rpy":

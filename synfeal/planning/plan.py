@@ -33,9 +33,27 @@ def write_plan(
     split: str,
     out_plan: Path,
 ) -> None:
-    """Plan one split of a scene; see :func:`plan_split`."""
-    given = (load_collision_mesh(collision), str(collision), scene, collection, n_frames)
-    write_pose_table(out_plan, plan_mesh(*given, np.random.default_rng(seed), split))
+    """Plan one split of a scene; see :func:`plan_split`.
+
+    Args:
+        collision: Collision mesh of the scene.
+        scene: Settings of the scene; :func:`sampling_boxes_of` says where cameras may be.
+        collection: How paths are planned.
+        n_frames: Number of frames.
+        seed: Seed of this plan's random numbers.
+        split: ``train`` or ``test``.
+        out_plan: Pose table to write.
+    """
+    table = plan_mesh(
+        mesh=load_collision_mesh(collision),
+        name=str(collision),
+        scene=scene,
+        collection=collection,
+        n_frames=n_frames,
+        rng=np.random.default_rng(seed),
+        split=split,
+    )
+    write_pose_table(out_plan, table)
 
 
 def plan_mesh(

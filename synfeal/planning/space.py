@@ -90,10 +90,18 @@ def seen_shares(caster: RayCaster, poses: PoseVectors) -> Array:
 def admissible(
     caster: RayCaster, start: Array, poses: PoseVectors, min_view_distance_m: float
 ) -> NDArray[np.bool_]:
-    """Mark candidates (N, 6) with a free view that a free line from ``start`` reaches: (N,).
+    """Mark candidates with a free view that a free line from ``start`` reaches.
 
-    ``start`` is one pose vector (6,) for all of them or one for each (N, 6).
     This is the set X_a of section 3.2: ``R(p_i, p_c) > |p_i - p_c|`` and ``R(p_c, p_c) > d``.
+
+    Args:
+        caster: Rays against the collision mesh.
+        start: One pose vector (6,) for all candidates, or one for each (N, 6).
+        poses: Candidates (N, 6), pose vectors.
+        min_view_distance_m: Least free view, the paper's ``d``.
+
+    Returns:
+        Marks (N,).
     """
     starts = np.broadcast_to(start[..., :3], (len(poses), 3))
     reachable = caster.sees(starts, poses[:, :3])

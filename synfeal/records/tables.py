@@ -54,8 +54,15 @@ Schema = Mapping[str, Kind]
 def read_frame(path: Path, schema: Schema, remedy: str = REMEDY, sep: str = ",") -> pd.DataFrame:
     """Read the columns of a schema, in its order, from a file, which may have others.
 
-    ``remedy`` is what to do where it cannot be used: the file is missing or no CSV, lacks a column,
-    has a row of another length, or a cell does not hold what its column does.
+    Args:
+        path: CSV file.
+        schema: Kind of value by column.
+        remedy: What to do where the file cannot be used, for messages.
+        sep: Separator of its cells.
+
+    Raises:
+        InputError: the file is missing or no CSV, lacks a column, has a row of another length, or a
+            cell does not hold what its column does.
     """
     import pandas as pd
 
@@ -169,11 +176,21 @@ def read_numbers(
     passed_over: str = "",
     optional: str = "",
 ) -> NDArray[np.float64]:
-    """Read values (N, columns of ``header``) from a CSV file; messages call it a ``kind``.
+    """Read a table of numbers.
 
-    It may have one more column of numbers, ``optional``, whose values then come last, and after
-    that a last column of names, which is ``passed_over``. Anything else than that
-    header and rows of numbers below it, with ``finite`` of finite ones, is refused.
+    Args:
+        path: CSV file.
+        header: Header it must have; columns separated by commas.
+        kind: What messages call the file.
+        finite: Refuse values that are not finite.
+        passed_over: Name of a last column of text that may follow, and is left out.
+        optional: Name of one more column of numbers that may follow those of ``header``.
+
+    Returns:
+        Values (N, columns); with one column more where ``optional`` is there.
+
+    Raises:
+        InputError: the file holds anything else.
     """
     with read_as(path, f"a {kind}"):
         found, *lines = path.read_text(encoding="utf-8").splitlines() or [""]

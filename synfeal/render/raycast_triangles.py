@@ -89,7 +89,18 @@ class TexturedTriangles:
         return face, depth_m
 
     def points(self, view: View, rays: Floats, face: Faces, depth_m: Floats) -> Points:
-        """Intersect ``rays`` (N, 3) with triangles ``face`` (N,): exactly, given ``depth_m``."""
+        """Intersect rays with the planes of triangles they are known to hit, in double precision.
+
+        Args:
+            view: Origin of the rays.
+            rays: Rays (N, 3), of unit length along the optical axis.
+            face: Triangle (N,) that each ray hits.
+            depth_m: Depth (N,) of the hit, metres, as the ray caster found it. The exact one stays
+                near it where a triangle is seen edge-on.
+
+        Returns:
+            The hits with exact depth, texture coordinates and vertex colours.
+        """
         rows = self._rows[face]
         constant = np.einsum("nkj,j->nk", rows, np.append(view.origin_m, 1.0))
         slope = np.einsum("nkj,nj->nk", rows[:, :, :3], rays)

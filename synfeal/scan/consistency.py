@@ -204,11 +204,14 @@ def fit_color(sightings: Sightings, given: CameraConfig) -> ColorFit:
 
 
 def changed(camera: CameraConfig, change: NDArray[np.float64]) -> CameraConfig:
-    """Return the camera with other intrinsics.
+    """Change the intrinsics of a camera.
 
     Args:
-        camera: To begin with.
-        change: Of the focal lengths, relative, and of cx and cy, pixels: (3,).
+        camera: Camera to begin with.
+        change: Relative change of both focal lengths, and shifts of cx and cy in pixels: (3,).
+
+    Returns:
+        The camera with focal lengths multiplied by ``1 + change[0]`` and its principal point moved.
     """
     fx, fy, cx, cy = camera.intrinsics
     factor = 1.0 + float(change[0])

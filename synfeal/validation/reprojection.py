@@ -201,10 +201,17 @@ def _shift_px(grey_error: Array, gradient: Array, place: Array) -> float:
 
 
 def camera_normal(a: View, b: View, lens: Lens, moved: Sequence[Lens], delta: Array) -> Array:
-    """Build the normal equations (P, P + 1) of depths against the camera's parameters.
+    """Build the normal equations of errors in depth against the parameters of the camera.
 
-    Depths count in multiples of what may differ; ``moved`` are P cameras, of which each has one
-    parameter moved by that of ``delta`` (P,).
+    Args:
+        a: Frame whose points are projected.
+        b: Frame they are projected into.
+        lens: Lens of both.
+        moved: Lenses with one parameter each moved a little, P of them.
+        delta: How far each parameter is moved (P,).
+
+    Returns:
+        Matrix and right side (P, P + 1); depths count in multiples of what may differ.
     """
     here, *there = (_look(a, b, each) for each in (lens, *moved))
     residual = here.predicted_m - here.depth_m

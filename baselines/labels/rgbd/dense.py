@@ -25,10 +25,15 @@ _BLOCK, _MAX_STEP = 8, 0.1
 def depth_agreement(
     depth_i_m: Depth, depth_j_m: Depth, i_from_j: Array, camera: CameraConfig, max_rmse_m: float
 ) -> tuple[float, float]:
-    """Compute the overlap and residual of two depth images (H, W) under a motion (4, 4).
+    """Compute the overlap and residual of two depth images under a motion.
 
-    A point of image j agrees when its depth differs by at most twice ``max_rmse_m`` from the one
-    measured there in image i.
+    Args:
+        depth_i_m: Depth (H, W) of image i, metres.
+        depth_j_m: Depth (H, W) of image j, metres.
+        i_from_j: Motion (4, 4).
+        camera: Camera of both.
+        max_rmse_m: A point of image j agrees when its depth differs by at most twice this from the
+            one measured there in image i, metres.
 
     Returns:
         The share of the points of j that agree, and the RMS of their depth differences in metres.
@@ -64,9 +69,16 @@ def matched_depths(
 
 
 def points_of(depth_m: Depth, camera: CameraConfig, stride: int, first: float = 0.5) -> Array:
-    """Compute points (h, w, 3) in camera coordinates, not finite where there is no depth.
+    """Compute the points that depth pixels show.
 
-    ``depth_m`` is every ``stride``-th row and column of the camera's image, the first at ``first``.
+    Args:
+        depth_m: Every ``stride``-th row and column (h, w) of the camera's depth image, metres.
+        camera: Camera of the full image.
+        stride: Distance between rows and columns, pixels.
+        first: Where the first row and column lie, pixels; 0.5 is the first pixel's centre.
+
+    Returns:
+        Points (h, w, 3) in the camera, metres; not finite where there is no depth.
     """
     fx, fy, cx, cy = camera.intrinsics
     row, column = np.indices(depth_m.shape) * stride + first
@@ -152,9 +164,18 @@ def register(
     cfg: RgbdConfig,
     method: str = "point-to-plane",
 ) -> Array | None:
-    """Find the motion ``i_from_j`` (4, 4) near a starting point (4, 4), or None if there is none.
+    """Find a motion by Open3D's own loop over scales, which knows all its methods.
 
-    By Open3D's own loop over scales, which knows all its methods.
+    Args:
+        i: Frame the motion leads to.
+        j: Frame the motion comes from.
+        start: Motion ``i_from_j`` (4, 4) to start from.
+        camera: Camera of both.
+        cfg: Settings of odometry.
+        method: Name of Open3D's method.
+
+    Returns:
+        ``i_from_j`` (4, 4), or None if none is found.
     """
     odometry = o3d.t.pipelines.odometry
     matrix = o3d.core.Tensor.from_numpy(camera.intrinsics.matrix(centre_shift_px=-0.5))

@@ -71,7 +71,14 @@ Surfaces = dict[int, Surface]
 
 
 def near(a: Array, b: Array, max_m: float = MAX_CHANGE_M, max_deg: float = MAX_CHANGE_DEG) -> bool:
-    """Check that a motion (4, 4) stays near another one (4, 4), its starting point."""
+    """Check that a motion stays near its starting point.
+
+    Args:
+        a: Motion (4, 4).
+        b: Motion (4, 4) it started from.
+        max_m: Largest difference of position, metres.
+        max_deg: Largest difference of orientation, degrees.
+    """
     change_m, change_rad = pose_error(a, b)
     return bool(change_m <= max_m and np.degrees(change_rad) <= max_deg)
 

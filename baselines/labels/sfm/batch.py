@@ -67,9 +67,17 @@ def metric_trajectory(
     true_world_from_cam: Array,
     gauge: Gauge = "first_poses",
 ) -> BatchTrajectory:
-    """Scale and place a model of some ``frames`` (m,), poses (m, 4, 4), by true poses (n, 4, 4).
+    """Scale and place a model by true poses.
 
-    No frame is registered where there are fewer than two, or none to read a scale from.
+    Args:
+        frames: Frames (m,) of the batch that the model registers.
+        model_from_cam: Their poses (m, 4, 4) in the model.
+        true_world_from_cam: True poses (n, 4, 4) of all frames of the batch.
+        gauge: Which true poses place and scale the model.
+
+    Returns:
+        The trajectory. No frame is registered where there are fewer than two, or none to read a
+        scale from.
     """
     trajectory = failed_trajectory(len(true_world_from_cam))
     world_from_cam = placed(model_from_cam, true_world_from_cam[frames], gauge)
