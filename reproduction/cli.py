@@ -1,4 +1,4 @@
-"""Commands about runs of the workflow; what they call lies above this module."""
+"""Commands about runs of the workflow: ``synfeal plan``, ``run`` and ``compare``."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ PLUGINS = Path("workflow/plugins")
 
 
 @command(
-    "what a run of a profile costs before it is started",
+    "predict what a run of a profile costs",
     "synfeal plan --profile paper --cores 16 --gpus 1",
     option("--profile", "a profile of config/, or its .yaml file (mini)", default="mini"),
     option(
         "--cores",
-        "processor cores, one job each (this machine's); several: a plan for each",
+        "processor cores, one job each (this machine's); with several numbers, a plan for each",
         type=int,
         nargs="+",
         metavar="N",
     ),
     option(
         "--gpus",
-        "GPUs, one training run each (0: train on cores); as many as --cores, or one",
+        "GPUs, one training run each (0: train on cores); one number, or as many as --cores has",
         type=int,
         nargs="+",
         default=[0],
@@ -52,13 +52,13 @@ PLUGINS = Path("workflow/plugins")
     option("--csv", "write the plan as a table too", type=Path, metavar="FILE"),
     option(
         "--compare",
-        "no plan: predict this measured run from the others, and these from it",
+        "instead of a plan, predict this measured run from the others, and these from it",
         type=Path,
         metavar="RESULTS",
     ),
 )
 def plan(arguments: argparse.Namespace) -> None:
-    """Predicts jobs, hours, memory and disk of a run of the workflow before it is started."""
+    """Predict jobs, hours, memory and disk of a run of the workflow before it is started."""
     from reproduction.plan.plan import compare_runs, plan_of, write_check, write_plans
     from reproduction.plan.text import comparison_text, plan_text
 
@@ -92,11 +92,11 @@ def _machines(arguments: argparse.Namespace) -> list[Machine]:
 
 
 @command(
-    "the workflow with a profile: every table of the paper",
+    "run the workflow with a profile: every table of the paper",
     "synfeal run --profile paper --cores 16 -- runs",
     option(
         "--profile",
-        "a profile of config/, or its .yaml file (mini); of several, later ones go over earlier"
+        "a profile of config/, or a .yaml file (mini); of several, later ones override earlier"
         " ones",
         nargs="+",
         default=["mini"],
@@ -104,15 +104,15 @@ def _machines(arguments: argparse.Namespace) -> list[Machine]:
     option("--cores", "jobs at a time, one core each (this machine's)", type=int, metavar="N"),
     option(
         "snakemake",
-        "after --: targets and further options of Snakemake (all)",
+        "after --: targets and further options for Snakemake (all)",
         nargs="*",
         metavar="SNAKEMAKE",
     ),
 )
 def run(arguments: argparse.Namespace) -> None:
-    """Runs the workflow with a profile of config/ or a configuration of your own.
+    """Run the workflow with a profile of config/ or a configuration of your own.
 
-    In a clone of Synfeal; shows its progress.
+    It is started in a clone of Synfeal, and shows its progress.
     """
     from reproduction.plan.runs import is_default, profile_path
     from synfeal.config.load import read_yaml
@@ -135,14 +135,14 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    "two result trees: did a change matter?",
+    "compare two result trees: did a change matter?",
     "synfeal compare before/mini results/mini --out comparison",
     option("results_a", "results before, e.g. a copy", type=Path, metavar="RESULTS_A"),
     option("results_b", "results after: results/mini", type=Path, metavar="RESULTS_B"),
     option("--out", "directory for compare.csv, compare.md and compare.png", type=Path),
 )
 def compare(arguments: argparse.Namespace) -> None:
-    """Compares two result trees run by run: which errors changed, by how much, with 95 % limits."""
+    """Compare two result trees run by run: which errors changed, by how much, with 95 % limits."""
     from reproduction.compare.run import compare as compared
 
     print(compared(arguments.results_a, arguments.results_b, arguments.out), end="")

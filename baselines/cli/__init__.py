@@ -12,20 +12,18 @@ DEVICES = ("auto", "cpu", "cuda")
 
 
 @command(
-    "poses of your own pictures by a trained model or a map",
+    "estimate poses of your own pictures with a trained model or a map",
     "synfeal localize trained/model.pt photos/ --out poses.csv",
     option(
         "model",
-        "model.pt of synfeal train or of a training run in this place, or the folder that"
-        " synfeal map wrote",
+        "model.pt of synfeal train or of the benchmark, or the folder that synfeal map wrote",
         type=Path,
         metavar="MODEL",
     ),
     option(
         "images",
-        "PNG or JPEG of any size, or a directory of them; a map must know their focal length, and"
-        " where nothing says what their lens sees, a model takes them to have the field of view of"
-        " its training frames, which is printed",
+        "PNG or JPEG of any size, or a directory of them; a map needs their focal length, and"
+        " without it a model assumes the field of view of its training frames, which is printed",
         type=Path,
         nargs="+",
         metavar="IMAGE",
@@ -33,10 +31,10 @@ DEVICES = ("auto", "cpu", "cuda")
     *training.LOCALIZE_OPTIONS,
     *mapping.MAP_OPTIONS,
     option("--out", "file to write (poses.csv)", type=Path, default=Path("poses.csv")),
-    option("--device", "of a model: where to run (auto)", choices=DEVICES, default="auto"),
+    option("--device", "with a model: where to run (auto)", choices=DEVICES, default="auto"),
 )
 def localize(arguments: argparse.Namespace) -> None:
-    """Estimates where pictures were taken, with a model or a map of that place."""
+    """Estimate where pictures were taken, with a model or a map of that place."""
     if arguments.model.is_dir():
         mapping.localize_by_map(arguments)
     else:

@@ -24,7 +24,7 @@ log = logging.getLogger("synfeal")
 
 
 @command(
-    "a map of a place, to find photographs in without training",
+    "build a map of a place, to localize photographs without training",
     "synfeal map mydata --out mymap",
     option(
         "dataset",
@@ -36,24 +36,24 @@ log = logging.getLogger("synfeal")
     option("--out", "folder to write", type=Path, required=True, metavar="DIR"),
     option(
         "--frames",
-        "frames to take, from 0, the last one exclusive (all)",
+        "range of frames to take, from 0, STOP exclusive (all)",
         type=int,
         nargs=2,
         metavar=("START", "STOP"),
     ),
-    option("--every", "take one frame of so many (1)", type=int, default=1, metavar="K"),
+    option("--every", "take every K-th frame (1)", type=int, default=1, metavar="K"),
     option(
         "--most",
-        "largest number of frames; of more, this many spread evenly (1000)",
+        "largest number of frames; if there are more, N of them, spread evenly (1000)",
         type=int,
         default=1000,
         metavar="N",
     ),
     *RGBD_OPTIONS,
-    option("--seed", "of the vocabulary that retrieval learns (0)", type=int, default=0),
+    option("--seed", "seed of the vocabulary that retrieval learns (0)", type=int, default=0),
 )
 def map(arguments: argparse.Namespace) -> None:  # noqa: A001 (the name of the command)
-    """Builds a map of features that depth puts into space, from rendered frames or photographs."""
+    """Build a map of image features, placed in space by depth, from renderings or photographs."""
     from baselines.references.localized import describe_map
     from baselines.references.map_frames import FrameChoice, read_map_frames
     from baselines.references.mapped import build_map
@@ -87,7 +87,7 @@ def camera_options(arguments: argparse.Namespace) -> CameraOptions:
 MAP_OPTIONS = (
     option(
         "--confidence",
-        "of a map: poses with less are left out as not localized (0.99)",
+        "with a map: leave out poses below this confidence, as not localized (0.99)",
         type=float,
         default=0.99,
         metavar="C",

@@ -1,4 +1,4 @@
-"""The command ``synfeal train``, and what ``synfeal localize`` is told about photographs."""
+"""The command ``synfeal train``, and ``synfeal localize`` with a trained model."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ CALIBRATION_OPTIONS = (
     ),
     option(
         "--no-exif",
-        "do not take the focal length that photographs carry as EXIF",
+        "ignore the focal length in the photographs' EXIF data",
         action="store_true",
     ),
 )
@@ -43,15 +43,14 @@ LOCALIZE_OPTIONS = (
     *CALIBRATION_OPTIONS,
     option(
         "--world",
-        "whose coordinates poses are written in, where the place was scanned from a sequence"
-        " (sequence)",
+        "world that poses are written in, where the place was scanned from a sequence (sequence)",
         choices=("sequence", "mesh"),
         default="sequence",
     ),
     option(
         "--turns",
-        "of a model: average each pose over N virtual rotations of the camera, there and back"
-        " (8); 0: the picture as it is, faster and less exact",
+        "with a model: average each pose over N pairs of opposite virtual rotations of the camera"
+        " (8); 0: the picture alone, faster and less exact",
         type=int,
         metavar="N",
     ),
@@ -68,23 +67,25 @@ def photograph_camera(arguments: argparse.Namespace) -> PhotographCamera:
 
 
 @command(
-    "a localizer for a data set of your own",
+    "train a localizer on a data set of your own",
     "synfeal train mydata --out trained",
     option(
         "datasets",
         "data set of collect, or a sequence of photographs with poses (flat folder, seq-XX,"
-        " TUM RGB-D); several are learned from together",
+        " TUM RGB-D); several are combined",
         type=Path,
         nargs="+",
         metavar="DATASET",
     ),
     option("--out", "directory of the model", type=Path, required=True, metavar="DIR"),
-    option("--localizer", "which one (posenet2)", choices=MODELS, default="posenet2"),
-    option("--images", "images to show in all (30000)", type=int, metavar="N"),
-    option("--minutes", "or about how long to learn", type=float, metavar="M"),
+    option("--localizer", "localizer to train (posenet2)", choices=MODELS, default="posenet2"),
+    option(
+        "--images", "number of images to train on, repeats included (30000)", type=int, metavar="N"
+    ),
+    option("--minutes", "train for about this long instead", type=float, metavar="M"),
     option(
         "--frames",
-        "photographs to take, from 0, the last one exclusive; again for each further part",
+        "range of photographs to take, from 0, STOP exclusive; repeat it for further ranges",
         type=int,
         nargs=2,
         action="append",
@@ -93,24 +94,24 @@ def photograph_camera(arguments: argparse.Namespace) -> PhotographCamera:
     ),
     option(
         "--held-out",
-        "share of the paths that are not learned from and tell the error (0.1)",
+        "share of the paths that is held out to measure the error (0.1)",
         type=float,
         default=0.1,
         metavar="SHARE",
     ),
     option(
         "--randomisation",
-        "`on`: other light, lens and sensor whenever an image is shown; `off`; or a YAML file"
-        " with its ranges (docs/localizing.md) (on)",
+        "`on`: vary light, lens and sensor each time an image is shown; `off`; or a YAML file of"
+        " ranges (docs/localizing.md) (on)",
         default="on",
         metavar="on|off|FILE",
     ),
     *CALIBRATION_OPTIONS,
     option("--device", "where to train (auto)", choices=("auto", "cpu", "cuda"), default="auto"),
-    option("--seed", "of all that is drawn (0)", type=int, default=0),
+    option("--seed", "seed of all random numbers (0)", type=int, default=0),
 )
 def train(arguments: argparse.Namespace) -> None:
-    """Trains a localizer on data sets; the same command again goes on where one was stopped."""
+    """Train a localizer on data sets; after an interruption, the same command continues."""
     from baselines.training.own_frames import FrameRange
     from baselines.training.train import DEFAULT_IMAGES, TrainJob
     from baselines.training.train import train as learn

@@ -1,4 +1,4 @@
-"""Command line: look at a mesh, make a data set of it, plan and compare runs, use a model."""
+"""Make data sets for camera localization from meshes; train, localize and evaluate on them."""
 
 from __future__ import annotations
 
@@ -73,6 +73,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     every = tuple(option for command in commands for option in command.options)
     given = sys.argv[1:] if argv is None else argv
     arguments, unknown = build_parser(commands).parse_known_args(list(numbers_apart(given, every)))
-    if unknown:  # said by the command's own parser
+    if unknown:  # the command's own parser reports it, with its usage
         arguments.usage.error(f"unrecognized arguments: {' '.join(unknown)}")
     return exit_status(lambda: arguments.action(arguments), "nothing was kept")

@@ -1,4 +1,4 @@
-"""Commands about frames: ``synfeal preview``, validate, export and evaluate."""
+"""Commands about data sets: ``synfeal preview``, validate, export, pairs and evaluate."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CAMERA = option("--camera", "calibration file (manifest.json)", type=Path, metav
 
 
 @command(
-    "see the paths of a data set as a moving picture",
+    "show the paths of a data set as a moving picture",
     "synfeal preview clean blurred --out both.gif",
     option(
         "datasets",
@@ -37,15 +37,15 @@ CAMERA = option("--camera", "calibration file (manifest.json)", type=Path, metav
         metavar="DATASET",
     ),
     option("--out", "GIF or MP4 to write (preview.gif in the first data set)", type=Path),
-    option("--frames", "frames to show, from the first (120)", type=int, default=120),
-    option("--fps", "frames a second, at most 50 (12)", type=float, default=12.0),
-    option("--split", "(train)", choices=("train", "test"), default="train"),
+    option("--frames", "number of frames to show, from the first (120)", type=int, default=120),
+    option("--fps", "frames per second, at most 50 (12)", type=float, default=12.0),
+    option("--split", "split to show (train)", choices=("train", "test"), default="train"),
     option("--show", "layers to show side by side (color)", nargs="+", choices=LAYERS),
 )
 def preview(arguments: argparse.Namespace) -> None:
-    """Writes a GIF or MP4 of the first frames of a data set.
+    """Write a GIF or MP4 of the first frames of a data set.
 
-    Several, with other effects on the same paths for example, stand side by side under their names.
+    Several data sets, such as the same paths with other effects, are shown side by side.
     """
     from synfeal.dataset.preview import write_preview
 
@@ -62,14 +62,14 @@ def preview(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    "is a data set whole and consistent?",
+    "check that a data set is complete and consistent",
     "synfeal validate mydata",
     DATASET,
     CAMERA,
     option("--all", "compare every pair of frames, not a sample of 600", action="store_true"),
 )
 def validate(arguments: argparse.Namespace) -> None:
-    """Checks files, poses, splits, hashes and geometry of a data set; exit 1 if one fails."""
+    """Check files, poses, splits, hashes and geometry of a data set; exit 1 if a check fails."""
     from synfeal.validation.run import error_lines, report
     from synfeal.validation.run import validate as run_checks
 
@@ -83,7 +83,7 @@ def validate(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    "a data set for ACE, COLMAP, hloc, Nerfstudio and others",
+    "convert a data set for ACE, COLMAP, hloc, Nerfstudio and others",
     "synfeal export mydata --to colmap --out mydata-colmap",
     DATASET,
     option("--to", "format to write", choices=FORMATS, required=True),
@@ -92,7 +92,7 @@ def validate(arguments: argparse.Namespace) -> None:
     CAMERA,
 )
 def export(arguments: argparse.Namespace) -> None:
-    """Writes a 7-Scenes data set in the format of another program."""
+    """Write a 7-Scenes data set in the format of another program."""
     from synfeal.export.run import export as write
 
     out: Path = arguments.out
@@ -101,29 +101,29 @@ def export(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    "which frames see the same surfaces, and optical flow between them",
+    "find frames that see the same surfaces, and optical flow between them",
     "synfeal pairs mydata --per-frame 20 --max-overlap 0.8 --flow",
     DATASET,
     option("--out", "directory to create (DATASET-pairs)", type=Path, metavar="FOLDER"),
     option(
         "--among",
-        "frames that are paired: of each split with one another, of one split, or all (each)",
+        "frames to pair: within each split, within one of them, or all with all (each)",
         choices=("each", "train", "test", "all"),
         default="each",
     ),
     option("--every", "take every N-th frame of each sequence (1)", type=int, default=1),
     option("--min-overlap", "least overlap of a pair, 0 - 1 (0.1)", type=float, default=0.1),
     option("--max-overlap", "greatest overlap of a pair, 0 - 1 (1)", type=float, default=1.0),
-    option("--per-frame", "most pairs of a frame, those that overlap most (all)", type=int),
+    option("--per-frame", "keep only this many pairs per frame, by overlap (all)", type=int),
     option(
         "--tolerance",
-        "relative difference of depth up to which a point is visible (0.01)",
+        "largest relative difference of depth at which a point counts as visible (0.01)",
         type=float,
         default=0.01,
     ),
     option(
         "--grid",
-        "points of a frame that are looked for in the others (32 24)",
+        "grid of a frame's points that are looked up in the others (32 24)",
         type=int,
         nargs=2,
         default=(32, 24),
@@ -133,9 +133,9 @@ def export(arguments: argparse.Namespace) -> None:
     CAMERA,
 )
 def pairs(arguments: argparse.Namespace) -> None:
-    """Compares all frames of a data set by depth and poses: a table of overlaps, and flow.
+    """Compare all frames of a data set by depth and poses, without rendering.
 
-    Nothing is rendered.
+    Writes a table of overlaps, and optical flow if asked for.
     """
     from synfeal.pairs.choose import Choice
     from synfeal.pairs.run import PairsJob, find_pairs
@@ -164,7 +164,7 @@ def pairs(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    "how good are these poses? yours or another program's",
+    "score estimated poses, yours or another program's",
     "synfeal evaluate mydata results_ace.txt --out scores",
     option(
         "dataset",
@@ -182,29 +182,35 @@ def pairs(arguments: argparse.Namespace) -> None:
     ),
     option(
         "--format",
-        "of POSES (told by what they hold)",
+        "format of POSES (recognised by their content)",
         choices=POSE_FORMATS,
         dest="file_format",
     ),
     option("--split", "frames to score (test)", choices=("test", "train", "all"), default="test"),
     option(
         "--align",
-        "move all poses onto the data set's first, as a whole (none)",
+        "first align all poses, as a whole, to those of the data set (none)",
         choices=("none", "se3", "sim3"),
         default="none",
     ),
-    option("--labels", "poses as a second yardstick, in any format", type=Path, metavar="POSES"),
+    option("--labels", "second reference poses, in any format", type=Path, metavar="POSES"),
     option(
         "--convention",
-        "what POSES hold, where it is not what their format says",
+        "convention of POSES, where it is not that of their format",
         choices=CONVENTIONS,
     ),
-    option("--rate", "TUM and EuRoC: frames a second (30)", type=float, default=30.0, metavar="HZ"),
+    option(
+        "--rate",
+        "with TUM and EuRoC: frames per second (30)",
+        type=float,
+        default=30.0,
+        metavar="HZ",
+    ),
     CAMERA,
     option("--out", "directory for scores.csv, errors.csv and errors.png", type=Path),
 )
 def evaluate(arguments: argparse.Namespace) -> None:
-    """Scores poses of any common format against a data set: errors, recalls, reprojection error."""
+    """Score poses of any common format against a data set: errors, recalls, reprojection error."""
     from synfeal.evaluation import run
     from synfeal.evaluation.text import report_text, write_files
     from synfeal.records.files import refuse_foreign

@@ -1,4 +1,4 @@
-"""``synfeal scan``, ``collect`` and ``inspect``: a mesh, what is made of it, and a first look."""
+"""Commands about meshes: ``synfeal scan``, ``collect`` and ``inspect``."""
 
 from __future__ import annotations
 
@@ -42,62 +42,71 @@ RGBD_OPTIONS = (
     option("--depth-focal", "the same for depth", type=float, metavar="PX"),
     option(
         "--depth-from-color",
-        "from the colour camera to the depth camera: rotation vector, degrees, and translation,"
+        "transform from the colour to the depth camera: rotation vector, degrees, and translation,"
         " metres (none)",
         type=float,
         nargs=6,
         metavar=("RX", "RY", "RZ", "X", "Y", "Z"),
     ),
-    option("--depth-scale", "what depth of 1 m is stored as (1000; TUM 5000)", type=float),
+    option("--depth-scale", "stored value of a depth of 1 m (1000; TUM 5000)", type=float),
 )
 
 
 @command(
-    "make a data set from a textured mesh",
+    "render a data set from a textured mesh",
     "synfeal collect --mesh scan.glb --frames 5000 --test-frames 1000 --out mydata",
     option("--mesh", "GLB, glTF, OBJ or PLY file", type=Path, required=True),
-    option("--frames", "training frames", type=int, required=True),
+    option("--frames", "number of training frames", type=int, required=True),
     option("--out", "directory to create", type=Path, required=True),
-    option("--test-frames", "test frames (0)", type=int, default=0),
+    option("--test-frames", "number of test frames (0)", type=int, default=0),
     option("--depth", "write depth images too", action="store_true"),
     option("--normals", "write surface normals too (docs/layers.md)", action="store_true"),
     option("--masks", "write masks of parts and objects too", action="store_true"),
-    option("--seed", "root of all random numbers (0)", type=int),
+    option("--seed", "seed of all random numbers (0)", type=int),
     *MESH_OPTIONS,
-    option("--spacing", "metres between frames (0.03)", type=float),
+    option("--spacing", "distance between frames, metres (0.03)", type=float),
     option("--roll", "bounds of the camera's roll, degrees (-29.8 29.8)", **RANGE),
-    option("--pitch", "bounds of its pitch; positive looks down (-29.8 29.8)", **RANGE),
-    option("--yaw", "bounds of its heading; 0 is world x, 90 is y (0 360)", **RANGE),
+    option("--pitch", "bounds of its pitch, degrees; positive is down (-29.8 29.8)", **RANGE),
+    option("--yaw", "bounds of its heading, degrees; 0 is world x, 90 is y (0 360)", **RANGE),
     option("--min-view-distance", "least free view at the end of a path, metres (1.2)", type=float),
     option(
         "--min-seen",
-        "least share of a view that meets the mesh (0; 0.85 with --like)",
+        "least share of the view that the mesh fills (0; 0.85 with --like)",
         type=float,
     ),
     option("--min-clearance", "least distance of cameras from surfaces, metres (0)", type=float),
-    option("--min-path", "metres; shorter paths are drawn again (1.5)", type=float),
-    option("--test-paths", "paths that test frames are of, at least (8)", type=int, metavar="N"),
-    option("--mode", "where cameras go (path)", choices=MODES),
+    option(
+        "--min-path", "least length of a path, metres; shorter ones are redrawn (1.5)", type=float
+    ),
+    option(
+        "--test-paths", "least number of paths among the test frames (8)", type=int, metavar="N"
+    ),
+    option(
+        "--mode",
+        "straight paths, independent (random) poses, or those of --poses (path)",
+        choices=MODES,
+    ),
     option(
         "--poses",
-        "mode repeat: data set, 7-Scenes frames, pose table (.csv) or TUM trajectory",
+        "with --mode repeat: data set, 7-Scenes frames, pose table (.csv) or TUM trajectory",
         **FILE,
     ),
     option(
         "--like",
-        "posed photographs: camera, box and angles as theirs, independent poses (docs/scanning.md)",
+        "posed photographs whose camera, box and angles to take over; poses are independent"
+        " (docs/scanning.md)",
         type=Path,
         metavar="SEQUENCE",
     ),
     option(
         "--like-frames",
-        "of --like: first frame and one past the last (all)",
+        "with --like: first frame and one past the last (all)",
         type=int,
         nargs=2,
         metavar=("START", "STOP"),
     ),
-    option("--margin", "of --like: added to the box, metres (0.2)", type=float),
-    option("--angle-margin", "of --like: added to the angles, degrees (10)", type=float),
+    option("--margin", "with --like: metres added around the box (0.2)", type=float),
+    option("--angle-margin", "with --like: degrees added around the angles (10)", type=float),
     option("--camera", "calibration: OpenCV or ROS .yaml or .json, COLMAP cameras.txt", **FILE),
     option(
         "--projection",
@@ -106,14 +115,14 @@ RGBD_OPTIONS = (
     ),
     option(
         "--fisheye-k",
-        "coefficients of a fisheye, as OpenCV (0 0 0 0)",
+        "distortion coefficients of a fisheye, as in OpenCV (0 0 0 0)",
         type=float,
         nargs=4,
         metavar=("K1", "K2", "K3", "K4"),
     ),
     option(
         "--stereo",
-        "draw a second camera this far to the right, too, metres",
+        "also render a second camera this far to the right, metres",
         type=float,
         metavar="BASELINE_M",
     ),
@@ -123,7 +132,9 @@ RGBD_OPTIONS = (
     option("--backend", "renderer (auto)", choices=BACKENDS),
     option("--supersampling", "N x N samples per pixel, 1 - 4 (2)", type=int, metavar="N"),
     option(
-        "--detail", "full: draw all of the mesh, whatever the resolution (auto)", choices=DETAILS
+        "--detail",
+        "level of detail that colours are drawn with: by resolution, or the full mesh (auto)",
+        choices=DETAILS,
     ),
     option(
         "--shade",
@@ -145,24 +156,24 @@ RGBD_OPTIONS = (
     ),
     option(
         "--clutter",
-        "YAML: objects that stand about, your own or cartons (docs/variation.md)",
+        "YAML: objects to place in the scene, your own or cartons (docs/variation.md)",
         **FILE,
     ),
-    option("--workers", "processes that render (1)", type=int, default=1),
+    option("--workers", "number of rendering processes (1)", type=int, default=1),
     option("--sequence-frames", "frames per sequence (500)", type=int, metavar="N"),
     option("--archive", "write each sequence as one seq-XX.zip", action="store_true"),
     option("--packed", "write frames of PX x PX in one .npy too", type=int, metavar="PX"),
     option(
         "--print-config",
-        "make nothing; print a configuration from which the workflow makes the same data set, on"
-        " several machines if need be (docs/collecting.md)",
+        "only print a configuration from which the workflow makes the same data set, on several"
+        " machines if need be (docs/collecting.md)",
         action="store_true",
     ),
 )
 def collect(arguments: argparse.Namespace) -> None:
-    """Plans camera paths through the free space of a mesh and renders them as a 7-Scenes data set.
+    """Plan camera paths through the free space of a mesh and render them as a 7-Scenes data set.
 
-    Run again after an interruption, it goes on where it stopped.
+    After an interruption, the same command continues where it stopped.
     """
     options = options_among(arguments, KEYS)
     camera = None
@@ -281,16 +292,16 @@ def coverage_text(coverage: Mapping[str, Any]) -> str:
 
 
 @command(
-    "numbers, picture and 3D view of a mesh",
+    "describe a mesh in numbers, a picture and a 3D view",
     "synfeal inspect scan.glb",
     option("mesh", "GLB, glTF, OBJ or PLY file", type=Path, metavar="MESH"),
     option("--out", "directory to write to (<name of the mesh>-inspect)", type=Path),
     *MESH_OPTIONS,
 )
 def inspect(arguments: argparse.Namespace) -> None:
-    """Shows what a mesh is and where cameras can be in it, before anything is collected.
+    """Show what a mesh is and where cameras can be in it, before anything is collected.
 
-    In numbers, a picture and an offline 3D page.
+    Writes numbers, a picture and an offline 3D page, and prints the command to collect a data set.
     """
     from synfeal.inspect.run import inspect_mesh
 
@@ -303,7 +314,7 @@ def inspect(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    "a coloured mesh from posed photographs with depth",
+    "fuse posed photographs with depth into a coloured mesh",
     "synfeal scan redkitchen/seq-01 --preset 7scenes --out scan.glb",
     option(
         "sequence",
@@ -323,29 +334,32 @@ def inspect(arguments: argparse.Namespace) -> None:
     ),
     option("--stride", "fuse every N-th frame (2)", type=int, default=2, metavar="N"),
     option("--voxel", "edge of a voxel, metres (0.01)", type=float, default=0.01),
-    option("--max-depth", "leave out depth beyond, metres (4)", type=float, default=4.0),
+    option("--max-depth", "ignore depth beyond this, metres (4)", type=float, default=4.0),
     option(
-        "--min-piece", "drop loose pieces below, square metres (0.02)", type=float, default=0.02
+        "--min-piece",
+        "drop loose pieces smaller than this, square metres (0.02)",
+        type=float,
+        default=0.02,
     ),
     option(
         "--gravity",
-        "which way things fall in the world of the poses (found from the scene)",
+        "direction of gravity in the world of the poses (found from the scene)",
         type=float,
         nargs=3,
         metavar=("X", "Y", "Z"),
     ),
-    option("--keep-axes", "leave the world of the poses as it is", action="store_true"),
+    option("--keep-axes", "keep the axes of the poses' world", action="store_true"),
     option(
         "--keep-calibration",
-        "use the calibration of the photographs as given, not as they agree best",
+        "use the calibration of the photographs as given, without fitting it",
         action="store_true",
     ),
 )
 def scan(arguments: argparse.Namespace) -> None:
-    """Fuses posed RGB-D frames into one mesh that stands upright, z up, in metres.
+    """Fuse posed RGB-D frames into one upright mesh, z up, in metres.
 
-    Writes a picture of it beside photographs from the same poses, and how its world lies in that of
-    the sequence.
+    Also writes a picture of it beside photographs from the same poses, and the motion between its
+    world and that of the sequence.
     """
     if arguments.gravity and arguments.keep_axes:
         raise InputError("--keep-axes: contradicts --gravity; leave one of the two out")

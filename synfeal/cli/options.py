@@ -44,14 +44,14 @@ def command(summary: str, example: str, *options: Option) -> Callable[[Action], 
 MESH_OPTIONS = (
     option(
         "--box",
-        "where camera centres may be, metres (the mesh's bounds); again for each further room or"
-        " floor",
+        "where camera centres may be, metres (the mesh's bounds); repeat it for further rooms or"
+        " floors",
         type=float,
         nargs=6,
         action="append",
         metavar=("X0", "X1", "Y0", "Y1", "Z0", "Z1"),
     ),
-    option("--up-axis", "up in the file (auto)", choices=("auto", "y", "z")),
+    option("--up-axis", "axis that points up in the file (auto)", choices=("auto", "y", "z")),
     option("--unit-m", "metres per unit of the file (1)", type=float),
 )
 
