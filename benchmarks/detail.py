@@ -26,6 +26,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from benchmarks.page import mark_front
+from benchmarks.rows import read_rows
 from reproduction.figures.style import BLUE, GREEN, ORANGE, RC, VERMILION
 from synfeal.collection.detail import choose_detail
 from synfeal.config.dataset import CameraConfig, RenderConfig
@@ -152,7 +153,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def run() -> None:
         path = options.out.with_suffix(".csv")
-        table = pd.read_csv(path) if path.exists() else pd.DataFrame()
+        table = read_rows(path)
         for name in options.scenes:
             for size in options.sizes:
                 width, height = map(int, size.split("x"))

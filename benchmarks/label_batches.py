@@ -22,6 +22,7 @@ from baselines.labels.batches import BatchTrajectory, batches_of
 from baselines.labels.chain import fill_gaps
 from baselines.labels.kinect_fusion import kinect_fusion_batch
 from baselines.labels.sfm import sfm_batch
+from benchmarks.rows import read_rows
 from reproduction.config.load import load_config
 from reproduction.config.profile import Config
 from synfeal.dataset.sevenscenes import read_pose
@@ -110,7 +111,7 @@ def main() -> None:
         row |= {name: facts.get(name, "") for name in ("models", "images_with_weak_features")}
         rows = [pd.DataFrame([row])]
         if args.table.exists():
-            rows.insert(0, pd.read_csv(args.table))
+            rows.insert(0, read_rows(args.table))
         write_frame(args.table, pd.concat(rows).sort_values([*keys][:3], kind="stable"), "%.4g")
         print(row, flush=True)
 

@@ -22,6 +22,7 @@ from pydantic import Field, ValidationError, model_validator
 from tqdm import tqdm
 
 from benchmarks.measures import MEASURES, open_measure
+from benchmarks.rows import read_rows
 from reproduction.config.load import load_config
 from synfeal.config.collection import Strict
 from synfeal.config.load import describe, merge, read_yaml
@@ -169,12 +170,7 @@ def read_table(path: Path, keys: Sequence[str]) -> pd.DataFrame:
         InputError: the file is no table of such runs.
     """
     names = [*keys, SETTINGS]
-    if not path.exists():
-        return pd.DataFrame(columns=names, dtype=str)
-    try:
-        table = pd.read_csv(path, dtype=dict.fromkeys(names, str), keep_default_na=False)
-    except (ValueError, OSError) as error:
-        raise InputError(f"{path}: cannot be read as a table ({error})") from error
+    table = read_rows(path, names)
     if list(table.columns[: len(names)]) != names:
         raise InputError(f"{path}: must begin with the columns {', '.join(names)}; move it away")
     return table

@@ -15,11 +15,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pandas as pd
 
-from baselines.training.localize import HEADER, localize
+from baselines.training.localize import localize
 from synfeal.camera.photograph import PhotographCamera
+from synfeal.dataset.pose_table import COLUMNS
 from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.geometry.poses import pose_error, pose_from_quat
-from synfeal.records.tables import write_frame
+from synfeal.records.tables import NUMBER, read_frame, write_frame
 
 PAIRS = (0, 4, 8, 16)
 
@@ -47,7 +48,7 @@ def main() -> None:
                     camera=PhotographCamera.read(arguments.camera, None, exif=False),
                     turns=pairs,
                 )
-                poses = pd.read_csv(out)[list(HEADER[1:])].to_numpy()
+                poses = read_frame(out, dict.fromkeys(COLUMNS[2:], NUMBER)).to_numpy()
             errors = pose_error(pose_from_quat(poses[:, :3], poses[:, 3:]), truth)
             rows.append(
                 {

@@ -16,7 +16,6 @@ from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from baselines.references.evidence import Evidence
@@ -28,6 +27,7 @@ from synfeal.dataset.pose_table import COLUMNS, PoseTable, read_pose_table, writ
 from synfeal.errors import InputError, why
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.records.files import write_json
+from synfeal.records.tables import COUNT, LIMITLESS_MAYBE, read_frame
 from synfeal.records.timing import Facts, timed
 
 
@@ -107,7 +107,8 @@ def pose_table(frames: PoseTable, world_from_cam: NDArray[np.float64]) -> PoseTa
     return PoseTable(frames.frame, frames.path, position_m, quat_wxyz)
 
 
-NEEDED = ("frame", *COLUMNS[2:])
+# A frame without an answer may be left out, or have empty cells.
+ANSWERS = {"frame": COUNT, **dict.fromkeys(COLUMNS[2:], LIMITLESS_MAYBE)}
 
 
 def answer_externally(
@@ -200,20 +201,14 @@ def read_answers(path: Path, frames: PoseTable) -> PoseTable:
         InputError: The file cannot be read, lacks a column, holds anything but numbers, or names a
             frame twice or one that is not in the test set.
     """
-    try:
-        found = pd.read_csv(path, usecols=list(NEEDED)).astype(np.float64)
-    except (OSError, ValueError) as error:
-        message = (
-            f"{path}: cannot be read as answers with columns {','.join(NEEDED)} ({why(error)})"
-        )
-        raise InputError(message) from error
+    found = read_frame(path, ANSWERS, f"write the columns {','.join(ANSWERS)}")
     twice = found.frame[found.frame.duplicated()]
     if len(twice):
-        raise InputError(f"{path}: frame {twice.iloc[0]:g} appears twice; keep one answer")
+        raise InputError(f"{path}: frame {twice.iloc[0]} appears twice; keep one answer")
     unknown = found.frame[~found.frame.isin(frames.frame)]
     if len(unknown):
         raise InputError(
-            f"{path}: frame {unknown.iloc[0]:g} is not in the test set of {len(frames)} frames,"
+            f"{path}: frame {unknown.iloc[0]} is not in the test set of {len(frames)} frames,"
             " which are counted from 0"
         )
     values = found.set_index("frame").reindex(frames.frame).to_numpy()

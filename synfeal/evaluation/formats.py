@@ -20,7 +20,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +27,6 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from synfeal.dataset.pose_table import COLUMNS, IMAGE, SEEN, SUPPORT
@@ -37,6 +35,7 @@ from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError, read_as
 from synfeal.evaluation.estimates import KITTI, Convention, Estimates, FrameKey
 from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.records.tables import is_number, parse_cells
 from synfeal.validation.listing import POSE, list_sequences
 from synfeal.validation.poses import rigid_defects
 
@@ -112,7 +111,7 @@ def read_estimates(path: Path, file_format: FormatName | None = None) -> Estimat
         raise InputError(f"{path}: is a file; a {file_format} set of poses is a directory")
     first = rows[0][1][0]
     if file_format in ("csv", "euroc") or (file_format is None and "," in first):
-        whole = _is_number(first.partition(",")[0]) and file_format != "csv"
+        whole = is_number(first.partition(",")[0]) and file_format != "csv"
         return read_euroc(path, text) if whole or file_format == "euroc" else read_csv(path, text)
     return read_lines(path, rows, file_format)
 
@@ -194,29 +193,26 @@ def read_colmap(path: Path) -> Estimates:
 
 def read_csv(path: Path, text: str) -> Estimates:
     """Read a table of poses with a header."""
-    with read_as(path, "CSV"):
-        table = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
-    header = tuple(table.columns)
+    table = parse_cells(path, text, remedy="correct the file")
     found = (IMAGE, *COLUMNS[2:])
     known = (COLUMNS, (*COLUMNS, IMAGE), found, (*found, *SUPPORT), (*found, *SEEN))
-    if header not in known:
+    if table.header not in known:
         raise InputError(
             f"{path}: the header must be {','.join(COLUMNS)} or image,{','.join(COLUMNS[2:])},"
-            f" found '{','.join(header)[:80]}'"
+            f" found '{','.join(table.header)[:80]}'"
         )
-    places = [f"line {i}" for i in range(2, len(table) + 2)]
-    cells = table[list(COLUMNS[2:])]
-    if header[-1] == SUPPORT[-1]:  # no pose, no numbers
-        cells = cells.replace("", "nan")
-    values = _numbers(path, places, cells.to_numpy().tolist())
-    if not len(table):
+    table.check_rows()
+    if not table.rows:
         raise InputError(f"{path}: holds no poses below its header")
-    named = IMAGE in header
+    may_be_empty = table.header[-1] == SUPPORT[-1]  # no pose, no numbers
+    values = table.numbers(COLUMNS[2:], may_be_empty)
+    named = IMAGE in table.header
+    names = table.header.index(IMAGE if named else "frame")
     return Estimates(
-        "a pose table" if header[0] == COLUMNS[0] else "poses of synfeal localize",
+        "a pose table" if table.header[0] == COLUMNS[0] else "poses of synfeal localize",
         OURS,
-        tuple(table[IMAGE if named else "frame"]),
-        tuple(places),
+        tuple(row[names] for row in table.rows),
+        tuple(f"line {line}" for line in table.lines),
         values[:, :3],
         values[:, 3:],
         frame_key="name" if named else "index",
@@ -303,7 +299,7 @@ def _line_format(
                 " correct --format, or leave it out"
             )
         return told
-    named = not _is_number(row[0])
+    named = not is_number(row[0])
     for known in LINE_FORMATS.values():
         if (known.frame_key == "name", known.n_numbers) == (named, len(row) - named):
             return known
@@ -356,17 +352,9 @@ def read_tum_sequences(paths: Sequence[Path]) -> Estimates:
     )
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
 def _numbers(path: Path, places: Sequence[str], cells: Sequence[Sequence[str]]) -> Array:
     for place, row in zip(places, cells, strict=True):
-        bad = [cell for cell in row if not _is_number(cell)]
+        bad = [cell for cell in row if not is_number(cell)]
         if bad:
             raise InputError(f"{path}: {place}: '{bad[0][:40]}' is not a number")
     return np.array(cells, np.float64)

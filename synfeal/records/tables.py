@@ -11,6 +11,7 @@ whose types the schema fixes; pandas is imported by what needs one, for it takes
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.errors import InputError, read_as, why
+from synfeal.errors import InputError, read_as
 from synfeal.records.files import atomic_path
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ class Kind:
     """Type of the cells of a column."""
 
     dtype: str  # of the column in memory
-    optional: bool = False  # cells may be empty; in memory they are missing values
+    optional: bool = False  # cells may be empty or "nan"; in memory they are missing values
     expected: bool = True  # files must have the column; without it, all its cells are missing
     finite: bool = True
 
@@ -45,6 +46,7 @@ NUMBER = Kind("float64")
 LIMITLESS = Kind("float64", finite=False)  # may be infinite
 MAYBE_COUNT = Kind("Int64", optional=True)
 MAYBE = Kind("float64", optional=True)
+LIMITLESS_MAYBE = Kind("float64", optional=True, finite=False)
 MAYBE_TEXT = Kind("str", optional=True, expected=False)
 EXTRA = Kind("float64", optional=True, expected=False)
 EXTRA_TEXT = Kind("str", expected=False)
@@ -88,21 +90,113 @@ def read_records(
 
     See :func:`read_frame`.
     """
-    with (
-        read_as(path, "CSV", OSError, UnicodeDecodeError, csv.Error, remedy=f"; {remedy}"),
-        path.open(encoding="utf-8-sig", newline="") as file,  # spreadsheets add a mark
-    ):
-        reader = csv.reader(file, strict=True, delimiter=sep)
-        header = next(reader, [])
-        rows = [(reader.line_num, row) for row in reader if row]
-    absent = [name for name in needed if name not in header]
+    with read_as(path, "CSV", OSError, UnicodeDecodeError, remedy=f"; {remedy}"):
+        text = path.read_text(encoding="utf-8-sig")  # spreadsheets add a mark
+    table = parse_cells(path, text, remedy=remedy, sep=sep)
+    absent = [name for name in needed if name not in table.header]
     if absent:
         raise InputError(f"{path}: column {', '.join(absent)} missing; {remedy}")
-    for line, row in rows:
-        if len(row) != len(header):
-            found = f"has {len(row)} cells where the header has {len(header)}"
-            raise InputError(f"{path}: row {line}: {found}; {remedy}")
-    return [(line, dict(zip(header, row, strict=True))) for line, row in rows]
+    table.check_rows()
+    rows = zip(table.lines, table.rows, strict=True)
+    return [(line, dict(zip(table.header, row, strict=True))) for line, row in rows]
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Text of a CSV, cell by cell.
+
+    Attributes:
+        path: File, for messages.
+        header: Names of the columns; none in an empty file.
+        lines: Line of each row; that of the header is 1.
+        rows: Cells of each row.
+        remedy: What to do about a bad row, for messages.
+    """
+
+    path: Path
+    header: tuple[str, ...]
+    lines: tuple[int, ...]
+    rows: tuple[list[str], ...]
+    remedy: str
+
+    def check_rows(self) -> None:
+        """Refuse two columns of one name, and rows longer or shorter than the header.
+
+        Raises:
+            InputError: There is such a column or row.
+        """
+        twice = [name for i, name in enumerate(self.header) if name in self.header[:i]]
+        if twice:
+            raise InputError(f"{self.path}: column {twice[0]} appears twice; {self.remedy}")
+        for line, row in zip(self.lines, self.rows, strict=True):
+            if len(row) != len(self.header):
+                found = f"has {len(row)} cells where the header has {len(self.header)}"
+                raise InputError(f"{self.path}: row {line}: {found}; {self.remedy}")
+
+    def numbers(self, names: Sequence[str], may_be_empty: bool = False) -> NDArray[np.float64]:
+        """Return the values (N, C) of some columns.
+
+        Args:
+            names: Columns of the header.
+            may_be_empty: Read empty cells as not a number.
+
+        Returns:
+            What the cells hold, which may be infinite or not a number.
+
+        Raises:
+            InputError: A cell holds no number.
+        """
+        places = [self.header.index(name) for name in names]
+        empty = "nan" if may_be_empty else ""
+        cells = [[row[place] or empty for place in places] for row in self.rows]
+        try:
+            return np.array(cells, np.float64).reshape(len(cells), len(places))
+        except ValueError as error:
+            for line, row in zip(self.lines, cells, strict=True):
+                for name, cell in zip(names, row, strict=True):
+                    if not is_number(cell):
+                        where = f"{self.path}: row {line}: {name}"
+                        found = f"must be a number, found '{cell[:40]}'"
+                        raise InputError(f"{where} {found}; {self.remedy}") from error
+            raise
+
+
+def is_number(text: str) -> bool:
+    """Tell whether Python reads a text as a number, which may be infinite or none ("nan")."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def parse_cells(
+    path: Path,
+    text: str,
+    what: str = "CSV",
+    remedy: str = REMEDY,
+    sep: str = ",",
+    skip_blank: bool = True,
+) -> Cells:
+    """Split the text of a CSV with a header into cells.
+
+    Args:
+        path: File of the text, for messages.
+        text: What the file holds.
+        what: What it should hold, with its article, for messages.
+        remedy: What to do about a file that cannot be used, for messages.
+        sep: Separator of cells.
+        skip_blank: Leave out blank lines; otherwise each is a row without cells.
+
+    Raises:
+        InputError: A quoted cell does not end, or has more text after its end.
+    """
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=sep)
+    with read_as(path, what, csv.Error, remedy=f"; {remedy}"):
+        header = next(reader, [])
+        rows = [(reader.line_num, row) for row in reader if row or not skip_blank]
+    lines, cells = zip(*rows, strict=True) if rows else ((), ())
+    return Cells(path, tuple(header), lines, cells, remedy)
 
 
 def frame_of(records: Iterable[Mapping[str, Any]], schema: Schema) -> pd.DataFrame:
@@ -150,11 +244,12 @@ def _value(cell: str, kind: Kind) -> object:
         return cell
     if kind.optional and cell in _EMPTY:
         return None
-    try:
-        number = float(cell)
-    except ValueError:
+    if not is_number(cell):
         return _BAD
-    if math.isnan(number) or (kind.finite and math.isinf(number)):
+    number = float(cell)
+    if math.isnan(number):
+        return None if kind.optional else _BAD
+    if kind.finite and math.isinf(number):
         return _BAD
     if kind.dtype == "float64":
         return number
@@ -163,9 +258,10 @@ def _value(cell: str, kind: Kind) -> object:
 
 def write_numbers(path: Path, header: str, rows: Iterable[Sequence[float | str]]) -> None:
     """Write rows of Python numbers and names with enough digits to read back the same values."""
-    lines = [",".join(map(str, row)) for row in rows]
+    text = io.StringIO(newline="")
+    csv.writer(text, lineterminator="\n").writerows(rows)
     with atomic_path(path) as temporary:
-        temporary.write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
+        temporary.write_text(f"{header}\n{text.getvalue()}", encoding="utf-8")
 
 
 def read_numbers(
@@ -190,22 +286,20 @@ def read_numbers(
         Values (N, columns); with one column more where ``optional`` is there.
 
     Raises:
-        InputError: the file holds anything else.
+        InputError: The file cannot be read, has another header, a blank line, a row of another
+            length, or a cell that holds no number.
     """
     with read_as(path, f"a {kind}"):
-        found, *lines = path.read_text(encoding="utf-8").splitlines() or [""]
-    if optional and f"{found},".startswith(f"{header},{optional},"):
-        header = f"{header},{optional}"
-    n_columns = header.count(",") + 1
-    if passed_over and found == f"{header},{passed_over}":
-        found, lines = header, [line.rpartition(",")[0] for line in lines]
-    if found != header:
+        text = path.read_text(encoding="utf-8-sig")
+    table = parse_cells(path, text, f"a {kind}", skip_blank=False)
+    names = header.split(",")
+    columns = [*names, optional] if optional and optional in table.header else names
+    has_text = bool(passed_over) and table.header[-1:] == (passed_over,)
+    if table.header != (*columns, *([passed_over] if has_text else [])):
+        found = ",".join(table.header)
         raise InputError(f"{path}: header must be '{header}', found '{found[:80]}'")
-    try:
-        values = np.array([[float(cell) for cell in line.split(",")] for line in lines])
-        values = values.reshape(len(lines), n_columns)
-    except ValueError as error:
-        raise InputError(f"{path}: {why(error)}; every row needs {n_columns} numbers") from error
+    table.check_rows()
+    values = table.numbers(columns)
     if finite and not np.isfinite(values).all():
         bad = int(np.argmin(np.isfinite(values).all(axis=1)))
         raise InputError(f"{path}: row {bad + 2} holds a value that is not finite")

@@ -157,7 +157,8 @@ def grey_likeness(files):
 def test_answers_may_be_incomplete_and_in_any_order(tmp_path):
     frames = random_table(4, 0, 3)
     path = tmp_path / "mine.csv"
-    path.write_text("frame,note,tx,ty,tz,qw,qx,qy,qz\n3,x,1,2,3,1,0,0,0\n1,y,4,5,6,0,1,0,0\n")
+    rows = ["3,x,1,2,3,1,0,0,0", "1,y,4,5,6,0,1,0,0", "0,none,nan,nan,nan,,,,"]
+    path.write_text("\n".join(["frame,note,tx,ty,tz,qw,qx,qy,qz", *rows]))
     found = read_answers(path, frames)
     assert np.isnan(found.position_m[[0, 2]]).all()
     assert np.isnan(found.quat_wxyz[[0, 2]]).all()

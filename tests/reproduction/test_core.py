@@ -24,7 +24,9 @@ from synfeal.records.tables import (
     TEXT,
     frame_of,
     read_frame,
+    read_numbers,
     write_frame,
+    write_numbers,
 )
 from tests.support.fuzzing import JARGON
 from tests.support.property_support import random_table
@@ -167,3 +169,13 @@ def test_digits_text_and_columns_come_back(tmp_path):
     assert list(found.columns) == ["name", "x", "x_sd"]
     assert found.x.tolist() == [1.5]
     assert np.isnan(found.x_sd[0])
+
+
+def test_numbers_come_back_beside_names_with_commas_and_after_a_mark_of_a_spreadsheet(tmp_path):
+    path = tmp_path / "a.csv"
+    write_numbers(path, "x,y,image", [[0.1 + 0.2, 2, 'a,"b".png'], [-1e-300, 5e-324, "c.png"]])
+    last = "-1e-300,5e-324,c.png"
+    assert path.read_text() == f'x,y,image\n0.30000000000000004,2,"a,""b"".png"\n{last}\n'
+    path.write_text("\ufeff" + path.read_text(), encoding="utf-8")
+    found = read_numbers(path, "x,y", "table", passed_over="image")
+    assert found.tolist() == [[0.1 + 0.2, 2], [-1e-300, 5e-324]]

@@ -62,14 +62,20 @@ CASES = {
         ("a,n,x\nb,1,\n", "row 2: x must be a number, found ''"),
         ("a,n,x\nb,1,2\nb,1,x\n", "row 3: x must be a number"),
         (b"\xff", "cannot be read as CSV"),
+        ("a,n,x,n\nb,1,2,3\n", "column n appears twice; measure again"),
+        ("a,n,x\n\nb,x,2\n", "row 3: n must be a whole number"),
     ],
     ("poses.csv", read_pose_table): [
-        (f"{HEADER}\n0,0,1,2,3,1,0,0\n", "9 numbers"),
+        (None, "cannot be read as a pose table"),
+        (f"{HEADER}\n0,0,1,2,3,1,0,0\n", "row 2: has 8 cells where the header has 9"),
+        (f"{HEADER}\n\n0,0,1,2,3,1,0,0,0\n", "row 2: has 0 cells"),
+        (f"{HEADER}\n0,0,1,2,x,1,0,0,0\n", "row 2: tz must be a number, found 'x'"),
+        (f'{HEADER},image\n0,0,1,2,3,1,0,0,0,"a\n', "cannot be read as a pose table"),
         (f"{HEADER}\n0,0,1,2,nan,1,0,0,0\n", "row 2"),
     ],
     ("batch-000.csv", read_trajectory): [
         ("", "header must be", "found ''"),
-        (f"{TRAJECTORY}\n0,1,2\n", "needs 9 numbers"),
+        (f"{TRAJECTORY}\n0,1,2\n", "row 2: has 3 cells"),
         (f"{TRAJECTORY}\n0,1,nan,0,0,1,0,0,0\n", "row 2"),
         (f"{TRAJECTORY}\n1,1,0,0,0,1,0,0,0\n", "frames must count from 0"),
         (f"{TRAJECTORY}\n0,2,0,0,0,1,0,0,0\n", "registered be 0 or 1; est"),
@@ -93,6 +99,8 @@ CASES = {
         ("frame,tx,ty,tz\n0,1,2,3\n", "columns frame,tx,ty,tz,qw"),
         (f"{ANSWERS}\n0,1,2,3,1,0,0,0\n0,1,2,3,1,0,0,0\n", "frame 0 appears twice"),
         (f"{ANSWERS}\n4,1,2,3,1,0,0,0\n", "frame 4 is not in the test set of 4"),
+        (f"{ANSWERS}\n0.5,1,2,3,1,0,0,0\n", "row 2: frame must be a whole number, found '0.5'"),
+        (f"{ANSWERS}\n0,1,2,3,one,0,0,0\n", "row 2: qw must be a number, found 'one'"),
     ],
     ("train.json", lambda path: frame_camera(path.with_suffix(".npy"))): [
         (text, "train.json: cannot be read as the record")

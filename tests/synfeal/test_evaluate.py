@@ -171,6 +171,12 @@ BAD_LINES = {
     "TUM of two sequences": (TUM, lambda x: x, "do not say of which sequence"),
     "table, other header": (TABLE, with_line(0, "frame,x,y,z"), "the header must be"),
     "table, half a frame": (TABLE, with_line(2, "1.5,0,0,0,0,1,0,0,0"), "must be a whole number"),
+    "table, a row short": (TABLE, with_line(2, "1,0,0,0,0,1,0,0"), "row 3: has 8 cells where"),
+    "table, after a blank line": (
+        TABLE,
+        lambda x: [*x[:2], "", "1,0,0,0,0,one,0,0,0", *x[3:]],
+        "row 4: qw must be a number, found 'one'",
+    ),
     "table, too long": (TABLE, lambda x: [*x, "99,0,0,0,0,1,0,0,0"], "frame 99 does not exist"),
     "localize, no frame": (LOCALIZED, with_line(1, "a.png,0,0,0,1,0,0,0"), "names no frame"),
     "quaternions xyzw": (
