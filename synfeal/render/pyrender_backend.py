@@ -4,10 +4,22 @@ Images are unlit, since the light of a reconstruction is in its texture; surface
 sides; textures are mip-mapped and a pixel is the mean of a grid of samples, so that small images do
 not alias. Depth is exact at the pixel's centre.
 
-pyrender by itself multi-samples, which takes depth from one of the samples, up to half a pixel from
-the centre and in 24 bits that are spent near the camera; it reads depth whether wanted or not; and
-it cannot test alpha in unlit renders. Here colours and depth are passes that draw into buffers of
-their own, with one shader for both.
+pyrender 0.1.45, its last release, is used as it is installed, but by one subclass of its renderer,
+:class:`_Pass`, with our shaders and buffers. What that is for, it offers no setting for:
+
+- Multi-sampling cannot be switched off (https://github.com/mmatl/pyrender/issues/101). It takes
+  depth from one of the samples, up to half a pixel from the centre, and in 24 bits that are spent
+  near the camera. Depth is also read when only colours are asked for.
+- What a texture cuts out still covers what is behind it
+  (https://github.com/mmatl/pyrender/pull/242), and unlit renders do not test alpha at all.
+- Indices of triangles cannot be drawn.
+- A renderer frees the meshes of other scenes than the one it draws, and a second one needs a
+  context of its own, whose end is the end of the first
+  (https://github.com/mmatl/pyrender/issues/223). Here scenes and passes share one context.
+
+With NumPy 2 pyrender cannot compute the extent of a scene
+(https://github.com/mmatl/pyrender/issues/288). Nothing here asks for it: the far plane is given,
+and there are no shadows.
 """
 
 from __future__ import annotations
@@ -35,12 +47,13 @@ from synfeal.render.base import (
     thresholded,
 )
 
+# Read by PyOpenGL when it is loaded, and the way pyrender is told how to draw without a display
+# (https://pyrender.readthedocs.io/en/latest/examples/offscreen.html).
 os.environ["PYOPENGL_PLATFORM"] = "egl"
-np.__dict__.setdefault("infty", np.inf)  # gone in NumPy 2, used by pyrender
-import pyrender  # noqa: E402
-from OpenGL import GL  # noqa: E402
-from pyrender.platforms import egl  # noqa: E402
-from pyrender.shader_program import ShaderProgramCache  # noqa: E402
+import pyrender
+from OpenGL import GL
+from pyrender.platforms import egl
+from pyrender.shader_program import ShaderProgramCache
 
 # OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
 CAM_FROM_GL: NDArray[np.float64] = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -53,13 +66,14 @@ COLOUR_BIAS, DEPTH_BIAS = -0.5, -100.0
 def _context() -> tuple[Any, _Pass, _Pass, _Pass]:
     """Create this process's one OpenGL context, with passes for colour, depth and triangles.
 
-    Deleting one terminates the EGL display all others share, so it is made once and kept.
+    Deleting one terminates the EGL display all others share, so it is made once and kept
+    (https://github.com/mmatl/pyrender/issues/223).
     """
     device = egl.get_device_by_index(int(os.environ.get("EGL_DEVICE_ID", "0")))
     platform = egl.EGLPlatform(16, 16, device)
     platform.init_context()
     # Texture rows are packed; by default OpenGL expects each to start at a multiple of 4 bytes,
-    # which shears textures of odd width.
+    # which shears textures of odd width (https://github.com/mmatl/pyrender/issues/265).
     GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
     uploaded: set[Any] = set()
     rgb, depth = (GL.GL_RGB, GL.GL_UNSIGNED_BYTE), (GL.GL_RED, GL.GL_FLOAT)
@@ -177,7 +191,10 @@ def _primitive(part: MeshPart, centre_m: NDArray[np.float64]) -> Any:
 
 
 class _Pass(pyrender.Renderer):  # type: ignore[misc]  # pyrender is untyped
-    """Draws scenes with our shaders into a floating-point or byte buffer."""
+    """Draws scenes with our shaders into a floating-point or byte buffer.
+
+    Overrides what pyrender has no setting for; the docstring of the module says what and why.
+    """
 
     def __init__(
         self,
