@@ -217,6 +217,20 @@ PRIVATE = [
 ]
 
 
+# Attributes of ``workflow``: those of Snakemake's documentation, and those that have no other way.
+DOCUMENTED = {"basedir", "cores", "source_path"}
+UNDOCUMENTED = {"configfiles", "storage_settings"}
+
+
+def test_rules_use_two_undocumented_attributes_of_the_workflow_and_say_why():
+    names = {path: re.findall(r"\bworkflow\.(\w+)", path.read_text()) for path in WORKFLOW}
+    found = {path.name: set(used) - DOCUMENTED for path, used in names.items()}
+    assert {name: used for name, used in found.items() if used} == {"common.smk": UNDOCUMENTED}
+    lines = (ROOT / "workflow/rules/common.smk").read_text().splitlines()
+    comments = "\n".join(line for line in lines if line.startswith("#"))
+    assert all(f"`{name}`" in comments for name in UNDOCUMENTED)
+
+
 def test_rules_use_no_private_name_of_snakemake():
     text = {path.relative_to(ROOT).as_posix(): path.read_text() for path in WORKFLOW}
     assert {"Snakefile", "workflow/rules/training.smk", "workflow/real/Snakefile"} <= text.keys()

@@ -31,6 +31,10 @@ from synfeal.errors import InputError
 from synfeal.records.lock import begin_run
 from synfeal.records.provenance import config_hash, seed_of
 
+# Two attributes of `workflow` that Snakemake does not document, as it documents no other way to the
+# names of configuration files and to the settings of a run
+# (https://github.com/snakemake/snakemake/issues/3596): `configfiles`, for keys given twice and for
+# messages, and `storage_settings`, as meshes in a storage are not looked for on this machine.
 try:
     for path in workflow.configfiles:
         read_yaml(Path(path))  # Snakemake takes the last of keys that are there twice
