@@ -44,8 +44,9 @@ _held_to_the_end: list[FileLock] = []
 def begin_run(root: Path) -> None:
     """Keep other runs out of ``root`` until this process ends; put in order what earlier ones left.
 
-    The system frees the lock when the process ends, however it ends: nothing has to be unlocked.
-    What is not finished is removed, and no file stays dated in the future.
+    The system frees the lock when the process ends, however it ends: nothing has to be unlocked, as
+    after Snakemake's own (https://github.com/snakemake/snakemake/issues/2919). What is not finished
+    is removed, and no file stays dated in the future.
 
     Raises:
         InputError: another run is at work there, or nothing can be written there.
