@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError, read_as
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.records.files import atomic_path
 
@@ -25,6 +26,10 @@ element face {faces}
 property list uchar uint vertex_indices
 end_header
 """
+PLY_PATTERN = PLY_HEADER.format(vertices=r"(\d{1,12})", faces=r"(\d{1,12})").encode()
+PLY_END = b"end_header\n"
+PLY_VERTEX = np.dtype(("<f8", 3))
+PLY_FACE = np.dtype([("corners", "u1"), ("index", "<u4", 3)])
 MERGE_M = 1e-5  # copies of a vertex on a texture seam differ by rounding only
 NO_LIMIT = 1e9  # of the error, in diameters of the mesh: the number of faces alone decides
 
@@ -58,7 +63,7 @@ def save_collision_mesh(path: Path, mesh: Triangles) -> None:
     Open3D's writer is not used: on a full disk it leaves an empty file and says that all is well.
     """
     header = PLY_HEADER.format(vertices=len(mesh.vertices_m), faces=len(mesh.faces))
-    faces = np.empty(len(mesh.faces), [("corners", "u1"), ("index", "<u4", 3)])
+    faces = np.empty(len(mesh.faces), PLY_FACE)
     faces["corners"], faces["index"] = 3, mesh.faces
     with atomic_path(path) as temporary:
         vertices = np.ascontiguousarray(mesh.vertices_m, "<f8")
@@ -69,22 +74,24 @@ def load_collision_mesh(path: Path) -> Triangles:
     """Read what :func:`save_collision_mesh` wrote.
 
     Raises:
-        InputError: the file is missing, is no PLY with faces, or holds faces without vertices or
-            vertices that are not finite.
+        InputError: the file is missing or something else, is cut short, holds no faces, faces
+            without vertices, or vertices that are not finite.
     """
-    import trimesh  # half a second to load, and needed by jobs that read a mesh alone
-
-    try:
-        mesh = trimesh.load_mesh(str(path), process=False)
-        found = Triangles(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64))
-        in_range = (found.faces >= 0) & (found.faces < len(found.vertices_m))
-        if not (found.faces.size and in_range.all() and np.isfinite(found.vertices_m).all()):
-            raise ValueError("its faces or vertices are damaged; make the scene again")
-        return found
-    except MemoryError:
-        raise
-    except Exception as error:  # parsers of foreign files fail in every way there is
-        raise InputError(f"{path}: cannot be read as a collision mesh ({why(error)})") from error
+    with read_as(path, "a collision mesh", remedy="; make the scene again"):
+        header, end, body = path.read_bytes().partition(PLY_END)
+        counts = re.fullmatch(PLY_PATTERN, header + end)
+        if counts is None:
+            raise ValueError("its header is another")
+        n_vertices, n_faces = map(int, counts.groups())
+        if len(body) != n_vertices * PLY_VERTEX.itemsize + n_faces * PLY_FACE.itemsize:
+            raise ValueError("its length is not that of its vertices and faces")
+        vertices_m = np.frombuffer(body, PLY_VERTEX, n_vertices).astype(np.float64)
+        rows = np.frombuffer(body, PLY_FACE, offset=n_vertices * PLY_VERTEX.itemsize)
+        faces = rows["index"].astype(np.int64)
+        is_whole = bool(n_faces) and (rows["corners"] == 3).all() and faces.max() < n_vertices
+        if not (is_whole and np.isfinite(vertices_m).all()):
+            raise ValueError("its faces or vertices are damaged")
+    return Triangles(vertices_m, faces)
 
 
 def simplify(mesh: Triangles, n_faces: int) -> Triangles:
