@@ -66,6 +66,7 @@ EVIDENCE = [
     "collection_speed",
     "recall",
     "references_table",
+    "label_ranking",
     "speed_vs_error",
     "hard_cases",
     "document",

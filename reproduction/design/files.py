@@ -15,6 +15,7 @@ from baselines.labels.methods import stages_of
 from baselines.localizers.registry import backbone_of
 from reproduction.config.profile import Config
 from reproduction.design.experiments import Design, Run, common_every, split_init
+from reproduction.design.ranking import ranked_sets, rankings
 from reproduction.design.references import DataSet, answered_by, data_sets, has_structure
 from synfeal.config.dataset import RenderConfig
 from synfeal.config.effects import CLEAN, MIXED, EffectsConfig
@@ -77,6 +78,11 @@ class Files:
     def label_tables(self) -> tuple[str, ...]:
         """Tables of estimated label sets; none where none is estimated."""
         return ("assistance", "label_error") if self.design.estimated else ()
+
+    @cached_property
+    def ranking_tables(self) -> tuple[str, ...]:
+        """The table of how labels rank methods; none where all labels are exact."""
+        return ("label_ranking",) if ranked_sets(self.design) else ()
 
     @cached_property
     def backbones(self) -> list[str]:
@@ -288,6 +294,18 @@ class Files:
     def reference_files(self, folder: str, names: Iterable[str]) -> list[str]:
         """List the files that reference methods write in the folder of one data set."""
         return [f"{folder}/{name}/{file}" for name in names for file in REFERENCE_FILES]
+
+    def ranked_predictions(self) -> list[str]:
+        """List predictions of the methods that labels rank."""
+        found = rankings(self.design, self.config.references)
+        folders = {folder for each in found for runs in each.folders.values() for folder in runs}
+        return [f"{self.root}/{folder}/predictions.csv" for folder in sorted(folders)]
+
+    def ranking_labels(self) -> list[str]:
+        """List test labels that rank them, and the true poses."""
+        sets = ranked_sets(self.design)
+        named = {"/".join(key) for key in sets} | {f"{s}/{size}/synfeal" for s, size, _ in sets}
+        return [f"{self.root}/labels/{name}/test.csv" for name in sorted(named)]
 
     # Robustness: test frames with effects
 

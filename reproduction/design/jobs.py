@@ -218,6 +218,7 @@ def _evidence(files: Files) -> dict[str, list[Job]]:
     once = (
         "table1_meshes",
         *files.label_tables,
+        *files.ranking_tables,
         "recall",
         "references_table",
         "speed_vs_error",

@@ -12,6 +12,7 @@ from reproduction.design.experiments import Design
 from reproduction.figures import (
     error_by_design,
     error_by_method,
+    label_ranking,
     label_sets,
     scenes,
     speed_vs_error,
@@ -67,6 +68,15 @@ FIGURES: dict[str, Entry] = {
         "Median error against the true poses over the errors of the labels that a method learns or "
         "builds its map from: localizers in colour, reference methods in grey; labels from images "
         "stand in the order of the error of structure on depth.",
+    ),
+    "label_ranking": Entry(
+        label_ranking.draw_label_ranking,
+        "Which labels rank methods rightly, and down to which threshold: rank correlation between "
+        "the ranking of all localizers and reference methods by the labels of the test set and "
+        "that of the same predictions by the truth, with 95 % limits over test paths; above for "
+        "methods that learn from labels of the same source, as in any benchmark, below for methods "
+        "that learn from exact labels, so that only the yardstick differs; no mark stands where "
+        "the truth tells no two methods apart.",
     ),
     "error_by_size": Entry(
         error_by_design.draw_by_size,

@@ -14,6 +14,7 @@ from reproduction.figures.registry import CAPTIONS, FIGURES, write_figures
 from reproduction.figures.scenes import floor_m, plan_of
 from reproduction.figures.sources import Results
 from reproduction.figures.style import METHOD_STYLES, RC
+from reproduction.tables.label_ranking import SCHEMA as RANKING
 from reproduction.tables.layouts import SOURCES
 from reproduction.tables.references import SCHEMA as REFERENCE
 from reproduction.tables.speed_vs_error import SCHEMA as SPEED
@@ -58,6 +59,9 @@ def results(tmp_path_factory):
     nearest |= dict.fromkeys(("n_train", "n_test", "n_seeds", "failed"), 1)
     nearest |= {"labels": "synfeal", "method": "nearest-vlad", "title": "Nearest image"}
     write_rows(root / "tables" / "references.csv", [*REFERENCE], [nearest])
+    ranked = dict.fromkeys(RANKING, 1) | {"scene": "large_room", "size": "6k", "labels": "sfm"}
+    ranked |= {"trained_on": "labels", "score": "position_m"}
+    write_rows(root / "tables" / "label_ranking.csv", [*RANKING], [ranked])
     return Results(root, design_of(design()))
 
 
@@ -224,6 +228,7 @@ def test_every_drawing_has_a_caption_and_is_a_figure_or_left_out(results):
         "frames/large_room/test.npy",
         "runs/large_room/20k/synfeal/pretrained/posenet/seed0/errors.csv",
         "tables/table4_size.csv",
+        "tables/label_ranking.csv",
     ],
 )
 def test_a_missing_result_of_the_design_is_one_line_that_names_it(results, tmp_path, missing):

@@ -67,6 +67,27 @@ rule references_table:
         "../scripts/run_references_table.py"
 
 
+rule label_ranking:
+    input:
+        predictions=FILES.ranked_predictions(),
+        labels=FILES.ranking_labels(),
+    output:
+        **table_files("label_ranking"),
+    log:
+        f"{ROOT}/logs/tables/label_ranking.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/label_ranking.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
+    params:
+        design=dump(DESIGN),
+        references=dump(CONFIG.references),
+    script:
+        "../scripts/run_label_ranking.py"
+
+
 rule recall:
     input:
         metrics=FILES.of_runs("metrics.json"),
@@ -177,6 +198,7 @@ rule document:
     input:
         tables=[
             *under("tables/{t}.tex", t=[*FILES.tables, "references", "recall"]),
+            *under("tables/{t}.tex", t=FILES.ranking_tables),
             *FILES.robustness_tables("tex"),
         ],
     output:
@@ -198,6 +220,7 @@ rule figures:
         tables=under("tables/{table}.csv", table=FILES.drawn_tables),
         references=rules.references_table.output.csv if FILES.drawn_tables else [],
         robustness=FILES.drawn_robustness(),
+        ranking=under("tables/{t}.csv", t=FILES.ranking_tables),
         speed=rules.speed_vs_error.output.csv,
         labels=under("labels/{set}/{split}.csv", set=FILES.pose_sets, split=SPLITS),
         assistance=under("labels/{set}/assistance.json", set=FILES.estimated_sets),
@@ -277,6 +300,7 @@ RESULTS = [
     *under("tables/{table}.csv", table=FILES.label_tables),
     rules.references_table.output.csv,
     rules.recall.output.csv,
+    *under("tables/{table}.csv", table=FILES.ranking_tables),
     *FILES.robustness_tables(),
     rules.figures.output.dir,
     rules.summary.output.md,

@@ -18,6 +18,7 @@ from PIL import Image
 from reproduction.claims.verdicts import Verdict
 from reproduction.config.tables import KEYS
 from reproduction.design.experiments import Design, Experiment
+from reproduction.design.ranking import ranked_sets
 from reproduction.figures.registry import CAPTIONS
 from reproduction.hard_cases import table as hard_cases
 from reproduction.report.findings import can_tell, findings
@@ -36,6 +37,7 @@ from reproduction.report.summary import run_sentences
 from reproduction.tables import (
     assistance,
     label_error,
+    label_ranking,
     meshes,
     real,
     recall,
@@ -96,6 +98,7 @@ SIDE_TABLES: Sequence[Any] = (
     robustness,
     assistance,
     label_error,
+    label_ranking,
     speed_vs_error,
     hard_cases,
 )
@@ -173,8 +176,12 @@ def opening(root: Path) -> str:
 
 
 def rowless_tables(design: Design, with_robustness: bool) -> list[str]:
-    """List side tables for which a design has no rows: of estimated labels, of effects."""
+    """List side tables for which a design has no rows.
+
+    Those of estimated labels, of what inexact labels rank, and of frames with effects.
+    """
     of_labels = [] if design.estimated else [assistance.NAME, label_error.NAME]
+    of_labels += [] if ranked_sets(design) else [label_ranking.NAME]
     return [*of_labels, *([] if with_robustness else [robustness.NAME])]
 
 
