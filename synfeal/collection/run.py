@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 import synfeal
 from synfeal.collection.detail import write_detail
+from synfeal.collection.growing import WORK, growing
 from synfeal.collection.prepare import prepare_mesh, save_cartons
 from synfeal.config.collection import SceneConfig
 from synfeal.config.dataset import CameraConfig, DatasetConfig, Shade
@@ -41,7 +42,6 @@ from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.planning.coverage import empty_pixels, scene_coverage
 from synfeal.planning.plan import plan_mesh
 from synfeal.records.files import write_json
-from synfeal.records.lock import WORK, clean_up, growing, place_of
 from synfeal.records.provenance import generator_of
 from synfeal.render.surface import Layers
 
@@ -214,11 +214,10 @@ def collect(job: CollectJob, workers: int = 1) -> None:
         raise InputError(
             f"--packed: {job.packed_px} px must be positive and less than both sides of the image"
         )
-    out = place_of(job.out)
-    if clean_up(out):
-        return
     sequence_from_world = job.sequence_from_world
-    with growing(out, job.settings) as part:
+    with growing(job.out, job.settings) as part:
+        if part is None:
+            return
         scene = part / WORK / "scene"
         _prepare(job, scene)
         plans = _plan(job, scene, part)

@@ -1,10 +1,4 @@
-"""One command at a time in a directory, and nothing left there of those that were killed.
-
-A data set grows in ``<out>.part`` beside ``<out>``, until it is complete. What stands there under
-its final name is whole. ``.work`` holds what is needed on the way: the settings, the lock of the
-command at work, and the prepared scene. When all is there the directory is renamed, and then
-``.work`` goes.
-"""
+"""One command at a time in a directory, and nothing left there of those that were killed."""
 
 from __future__ import annotations
 
@@ -14,23 +8,14 @@ import shutil
 import socket
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from filelock import FileLock, Timeout
 
-from synfeal.errors import InputError, why
-from synfeal.records.files import (
-    UNFINISHED,
-    dotted,
-    read_json,
-    refuse_existing,
-    unfinished_prefix,
-    write_json,
-    writing_to,
-)
+from synfeal.errors import InputError
+from synfeal.records.files import UNFINISHED, unfinished_prefix
 
 LOCK = ".lock"
 # Names of :func:`synfeal.records.files.unfinished_prefix`.
@@ -150,99 +135,3 @@ def _lock(path: Path, directory: Path | None = None) -> FileLock:
     else:
         path.write_text(f"process {os.getpid()} on {socket.gethostname()}")
     return lock
-
-
-WORK = ".work"
-SETTINGS = "settings.json"
-
-
-@contextmanager
-def growing(out: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
-    """Yield the directory that becomes ``out`` at the end, with what earlier attempts made.
-
-    ``out`` is from :func:`place_of`, and must not exist yet or be an empty directory; ``settings``
-    are what decides its bytes, ready for JSON, and another command's must be the same.
-
-    Raises:
-        InputError: ``out`` is there already, cannot be written, grows from other settings, or
-            another command is at work on it.
-        KeyboardInterrupt: with what is kept, for the message.
-    """
-    refuse_existing(out)
-    part = out.with_name(f"{out.name}.part")
-    if part.is_dir() and not os.path.lexists(part / WORK / SETTINGS) and _holds_files(part):
-        raise InputError(
-            f"{part}: is not an unfinished data set; delete it or choose another --out"
-        )
-    try:
-        with writing_to(part, lambda: _kept(part)):
-            (part / WORK).mkdir(parents=True, exist_ok=True)
-            with only_command(part, part / WORK / "lock"):
-                check_settings(part, settings)
-                try:
-                    refuse_existing(out)  # by a command that has just ended
-                    remove_unfinished(part)
-                    yield part
-                    part.replace(out)
-                finally:
-                    if part.is_dir() and not _holds_files(part):
-                        shutil.rmtree(part, ignore_errors=True)
-            clean_up(out)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(_kept(part)) from None
-
-
-def _holds_files(part: Path) -> bool:
-    return any(path.name != WORK for path in part.iterdir())
-
-
-def place_of(out: Path) -> Path:
-    """Return ``out`` as an absolute path, to which something can be renamed."""
-    try:
-        place = out.resolve()
-        if place.is_mount():
-            raise InputError(f"--out: {out} is a whole file system; name a directory in it")
-    except (OSError, RuntimeError) as error:  # a name that is too long; links in a loop
-        reason = getattr(error, "strerror", None) or "its links lead in a circle"
-        raise InputError(f"--out: {out}: {reason}; choose another directory") from error
-    return place
-
-
-def clean_up(out: Path) -> bool:
-    """Finish what a command left that was killed when ``out`` was complete; whether it was."""
-    was_complete = (out / WORK).is_dir()
-    if was_complete:
-        shutil.rmtree(out / WORK)
-    return was_complete
-
-
-def _kept(part: Path) -> str:
-    if not part.is_dir():
-        return "nothing was kept"
-    return f"what is done is kept in {part}; run the same command again to go on"
-
-
-def check_settings(part: Path, settings: Mapping[str, Any]) -> None:
-    """Check that ``part`` was begun with these settings; they are written where there are none."""
-    path = part / WORK / SETTINGS
-    if not os.path.lexists(path):
-        write_json(path, settings)
-    try:
-        found = read_json(path)
-        if not isinstance(found, dict):
-            raise ValueError("holds no mapping")
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"{path}: cannot be read ({why(error)}); delete {part} to start anew"
-        ) from error
-    before, now = dotted(found), dotted(settings)
-    differing = [
-        f"{key} was {before.get(key)}, is {now.get(key)}"
-        for key in {**now, **before}
-        if before.get(key) != now.get(key)
-    ]
-    if differing:
-        raise InputError(
-            f"{path}: is of another data set ({'; '.join(differing)}); go on with the options of"
-            f" that one, or delete {part} to start anew"
-        )
