@@ -42,7 +42,7 @@ def test_the_pages_show_the_published_results(monkeypatch):
 def test_what_pages_name_is_there():
     page = (REPOSITORY / "docs/architecture.md").read_text()
     ways = page.split("## Four ways")[1].split("\n## ")[0]
-    names = re.findall(r"`((?:synfeal|baselines)\.[\w.]+)`", ways)
+    names = re.findall(r"`((?:synfeal|baselines|reproduction)\.[\w.]+)`", ways)
     assert len(names) > 20
     for name in names:
         module, _, function = name.rpartition(".")
