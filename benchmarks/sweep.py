@@ -212,9 +212,8 @@ def _measure(
                 rows = read_table(table, keys)
                 new = pd.DataFrame([row])
                 write_frame(table, new if rows.empty else pd.concat([rows, new]), "%.5g")
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+        finally:
+            pool.shutdown(cancel_futures=True)  # of what is left after an error or Ctrl-C
 
 
 def _key(row: pd.Series | dict[str, str], keys: Sequence[str]) -> tuple[str, ...]:

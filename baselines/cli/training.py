@@ -137,8 +137,8 @@ def train(arguments: argparse.Namespace) -> None:
     logging.getLogger("baselines.training").setLevel(logging.INFO)
     try:
         done = learn(job)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt("run the same command again to go on") from None
+    except KeyboardInterrupt as interrupt:
+        raise KeyboardInterrupt("run the same command again to go on") from interrupt
     print(trained_text(done))
     print(f"synfeal localize {done.model} photos/ --out poses.csv")
 

@@ -61,8 +61,8 @@ def growing(out: Path, settings: Mapping[str, Any]) -> Iterator[Path | None]:
                     if part.is_dir() and not _holds_files(part):
                         shutil.rmtree(part, ignore_errors=True)
             _clean_up(out)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(_kept(part)) from None
+    except KeyboardInterrupt as interrupt:
+        raise KeyboardInterrupt(_kept(part)) from interrupt
 
 
 def _holds_files(part: Path) -> bool:

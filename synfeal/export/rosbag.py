@@ -44,10 +44,10 @@ def export_rosbag(data: ExportSet, out: Path, place: Place) -> None:
     need_perspective(data, "a bag's depth image (REP 118)")
     try:
         from rosbags.typesys import Stores, get_typestore
-    except ImportError:
+    except ModuleNotFoundError as error:
         raise InputError(
             "--to rosbag: needs the package rosbags, which is not there; pip install 'synfeal[ros]'"
-        ) from None
+        ) from error
     store = get_typestore(Stores.ROS2_HUMBLE)
     for sequence, frames in groupby(data.frames, key=lambda frame: frame.sequence):
         _write_bag(out / sequence, data, store, frames, place)

@@ -57,7 +57,7 @@ def decoded(gltf: Gltf, read: Callable[[str], bytes]) -> Gltf:
     ``read`` gives the content of a file the glTF refers to.
 
     Raises:
-        Exception: of any kind, as decoders of foreign files do on damaged ones.
+        ValueError: A part is damaged; or another error of ``synfeal.mesh.load.DAMAGE``.
     """
     found = _Decoder(copy.deepcopy(gltf.header), gltf.binary, read)
     found.decode()
@@ -108,11 +108,14 @@ class _Decoder:
 
     def _decode_draco(self) -> None:
         primitives = primitives_of(self.header)
-        from DracoPy import decode
+        from DracoPy import FileTypeException, decode
 
         for primitive in (p for p in primitives if DRACO in p.get("extensions", {})):
             stored = primitive["extensions"].pop(DRACO)
-            mesh = decode(self._view_bytes(stored["bufferView"]))
+            try:
+                mesh = decode(self._view_bytes(stored["bufferView"]))
+            except FileTypeException as error:
+                raise ValueError(str(error)) from error
             values = {entry["unique_id"]: np.asarray(entry["data"]) for entry in mesh.attributes}
             for name, identity in stored["attributes"].items():
                 self._fill(primitive["attributes"][name], values[identity])

@@ -77,7 +77,41 @@ def _parse_json(path: Path, text: bytes) -> Json:
     version = str(header["asset"].get("version", "2.0"))
     if not version.startswith("2"):
         raise InputError(f"{path}: is glTF {version}; convert it to glTF 2.0")
+    try:
+        _check_kinds(header, "")
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"{path}: cannot be read as a mesh ({why(error)}); export it again"
+        ) from error
     return header
+
+
+def _check_kinds(value: Json, place: str) -> None:
+    """Check that mappings, lists of mappings, and names of files stand where glTF has them.
+
+    Args:
+        value: A mapping of the JSON.
+        place: Its keys, each with a slash after it.
+
+    Raises:
+        ValueError: Something else stands there.
+    """
+    in_extensions = place.endswith("extensions/")
+    for key, inner in value.items():
+        if key == "extras" or (in_extensions and key not in EXTENSIONS):
+            continue  # of other programs, which put there what they like
+        if (key in MAPPINGS or in_extensions) and not isinstance(inner, dict):
+            raise ValueError(f"{place}{key} of its JSON must be a mapping")
+        if key == "uri" and not isinstance(inner, str):
+            raise ValueError(f"{place}{key} of its JSON must be text")
+        are_indices = key == "nodes" and place  # of a scene
+        if key in LISTS and not are_indices:
+            if not isinstance(inner, list) or not all(isinstance(part, dict) for part in inner):
+                raise ValueError(f"{place}{key} of its JSON must be a list of mappings")
+            for index, part in enumerate(inner):
+                _check_kinds(part, f"{place}{key}/{index}/")
+        elif isinstance(inner, dict):
+            _check_kinds(inner, f"{place}{key}/")
 
 
 def simplified(gltf: Gltf) -> Json:
@@ -126,7 +160,7 @@ def base_color(material: Json) -> Json:
 def _use_one_uv_set(attributes: Json, material: Json) -> None:
     """Make the set of texture coordinates that the base colour uses the first one."""
     slot = material.get("pbrMetallicRoughness", {}).get("baseColorTexture", {})
-    transform = slot.get("extensions", {}).get("KHR_texture_transform", {})
+    transform = slot.get("extensions", {}).get(TEXTURE_TRANSFORM, {})
     chosen = int(transform.get("texCoord", slot.get("texCoord", 0)))
     if chosen == 0:
         return
@@ -141,7 +175,7 @@ def base_color_file(header: Json, material: Json) -> str | None:
     if slot is None:
         return None
     stored = header["textures"][slot["index"]]
-    webp = stored.get("extensions", {}).get("EXT_texture_webp", {})
+    webp = stored.get("extensions", {}).get(WEBP, {})
     source = webp.get("source", stored.get("source"))
     uri = None if source is None else header["images"][int(source)].get("uri")
     return None if uri is None or uri.startswith("data:") else str(uri)
@@ -149,6 +183,33 @@ def base_color_file(header: Json, material: Json) -> str | None:
 
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 DRACO, BASISU = "KHR_draco_mesh_compression", "KHR_texture_basisu"
+WEBP, TEXTURE_TRANSFORM = "EXT_texture_webp", "KHR_texture_transform"
+# Extensions that are read, and keys of theirs and of glTF's by what stands there.
+EXTENSIONS = {*MESHOPT, DRACO, BASISU, WEBP, TEXTURE_TRANSFORM, SPECULAR_GLOSSINESS}
+MAPPINGS = {
+    "attributes",
+    "baseColorTexture",
+    "diffuseTexture",
+    "extensions",
+    "pbrMetallicRoughness",
+    "sparse",
+}
+LISTS = {
+    "accessors",
+    "animations",
+    "buffers",
+    "bufferViews",
+    "cameras",
+    "images",
+    "materials",
+    "meshes",
+    "nodes",
+    "primitives",
+    "samplers",
+    "scenes",
+    "skins",
+    "textures",
+}
 
 
 def stand_alone(header: Json) -> list[str]:

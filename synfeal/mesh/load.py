@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import logging
+import struct
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -29,6 +30,19 @@ from synfeal.mesh.model import Findings, MeshPart, TexturedMesh
 from synfeal.mesh.references import ReferenceResolver, report_missing
 
 UpAxis = Literal["auto", "y", "z"]
+# What trimesh, the decoders, and our reading of a glTF's JSON raise for damaged files (found by
+# flipping bytes and changing values). ``AttributeError`` and ``MemoryError`` are not among them: a
+# fault in this program, and a lack of memory, are raised as what they are.
+DAMAGE = (
+    ArithmeticError,
+    AssertionError,
+    LookupError,
+    OSError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+    struct.error,
+)
 GLTF_SUFFIXES = (".glb", ".gltf")
 
 # Rotates y-up files: their y becomes the world's z, their z points towards the viewer (-y).
@@ -56,12 +70,11 @@ def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> Text
         check_ply(path)
     findings = Findings(path)
     gltf = read_gltf(path) if path.suffix.lower() in GLTF_SUFFIXES else None
+    world_from_file = WORLD_FROM_Y_UP if is_y_up(path, up_axis) else np.eye(3)
     try:
-        world_from_file = WORLD_FROM_Y_UP if is_y_up(path, up_axis) else np.eye(3)
-        parts = _read_parts(path, gltf, unit_m * world_from_file, findings)
-    except (InputError, MemoryError):
-        raise
-    except Exception as error:  # parsers of foreign files fail in every way there is
+        with np.errstate(all="ignore"):  # what is not finite is refused below
+            parts = _read_parts(path, gltf, unit_m * world_from_file, findings)
+    except DAMAGE as error:
         raise InputError(f"{path}: cannot be read as a mesh ({why(error)})") from error
     mesh = TexturedMesh(parts, findings.sentences)
     checks.check_mesh(mesh, path)

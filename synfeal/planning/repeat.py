@@ -123,12 +123,12 @@ def _tum_row(path: Path, number: int, line: list[str]) -> list[float]:
     """Read the eight finite numbers of a line."""
     try:
         values = [float(cell) for cell in line]
-    except ValueError:
+    except ValueError as error:
         values = []
         if "," in "".join(line):
             raise InputError(
                 f"{path}: line {number} has commas; {TUM_ROW} are separated by blanks"
-            ) from None
+            ) from error
     if len(values) != 8 or not np.isfinite(values).all():
         raise InputError(f"{path}: line {number} must hold eight finite numbers: {TUM_ROW}")
     return values

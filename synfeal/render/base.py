@@ -21,6 +21,10 @@ SHADERS = Path(__file__).parent / "shaders"
 MOST_VERTICES = 1 << 23
 
 
+class UnavailableError(Exception):
+    """A library, driver or device that a backend needs is missing, or does not work."""
+
+
 class Renderer(Protocol):
     """Unlit images of one mesh through one camera.
 

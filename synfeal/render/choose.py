@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import logging
+import sys
 from collections.abc import Callable
 from pkgutil import resolve_name
 
@@ -15,7 +16,7 @@ import numpy as np
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
-from synfeal.render.base import Renderer
+from synfeal.render.base import Renderer, UnavailableError
 
 log = logging.getLogger("synfeal")
 Opener = Callable[[TexturedMesh, CameraConfig, RenderConfig], Renderer]
@@ -93,11 +94,18 @@ def why_not(name: str) -> str | None:
             rgb, depth_m = r.render_rgbd(_FACING)
     except InputError as error:
         return str(error)
-    except Exception as error:  # a missing library, driver or device each raises its own
-        return " ".join(f"{type(error).__name__}: {error}; {INSTALL[name]}".split())
+    except _errors_of_a_machine() as error:
+        log.debug("render.backend: %s does not work here", name, exc_info=True)
+        return " ".join(f"{error}; {INSTALL[name]}".split())
     if (rgb != [255, 0, 0]).any() or not np.allclose(depth_m, 1.0, atol=1e-3):
         return "it draws a red square wrongly"
     return None
+
+
+def _errors_of_a_machine() -> tuple[type[Exception], ...]:
+    """List what is raised where a library, driver or device is missing, or refuses to draw."""
+    libraries = [sys.modules[name] for name in ("moderngl", "OpenGL.error") if name in sys.modules]
+    return (ImportError, OSError, UnavailableError, *(library.Error for library in libraries))
 
 
 def graphics(backend: str) -> dict[str, str]:

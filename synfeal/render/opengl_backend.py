@@ -33,6 +33,7 @@ from synfeal.render.base import (
     Faces,
     Renderer,
     Rgb,
+    UnavailableError,
     drawn_pieces,
     faces_of_halves,
     floor_share,
@@ -54,21 +55,24 @@ def shared_context() -> Any:
     pyrender, find their own.
 
     Raises:
-        Exception: the first error, of any kind, where no device works.
+        UnavailableError: no device works; the first error says why.
     """
-    errors = []
+    errors: list[Exception] = []
     for device, library in product(range(MOST_DEVICES), GL_LIBRARIES):
         egl: dict[str, Any] = {"backend": "egl", "libegl": EGL_LIBRARY, "libgl": library}
         egl |= {"device_index": device, "require": GL_VERSION, "standalone": True}
         try:
             context: Any = moderngl.create_context(**egl)
-        except Exception as error:  # what is missing decides what is raised
+        except Exception as error:
+            # A missing library or device is a plain ``Exception`` of glcontext, which has no other.
+            if type(error) not in (Exception, moderngl.Error):
+                raise
             errors.append(error)
         else:
             context.gc_mode = "context_gc"  # what is dropped is released where it is current
             context.__exit__(None, None, None)
             return context
-    raise errors[0]
+    raise UnavailableError(str(errors[0])) from errors[0]
 
 
 @functools.cache

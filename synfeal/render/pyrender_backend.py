@@ -41,6 +41,7 @@ from synfeal.render.base import (
     Faces,
     Renderer,
     Rgb,
+    UnavailableError,
     drawn_pieces,
     faces_of_halves,
     floor_share,
@@ -50,10 +51,13 @@ from synfeal.render.base import (
 # Read by PyOpenGL when it is loaded, and the way pyrender is told how to draw without a display
 # (https://pyrender.readthedocs.io/en/latest/examples/offscreen.html).
 os.environ["PYOPENGL_PLATFORM"] = "egl"
-import pyrender
-from OpenGL import GL
-from pyrender.platforms import egl
-from pyrender.shader_program import ShaderProgramCache
+try:
+    import pyrender
+    from OpenGL import GL
+    from pyrender.platforms import egl
+    from pyrender.shader_program import ShaderProgramCache
+except AttributeError as error:  # of PyOpenGL, where a library lacks functions that it looks up
+    raise ImportError(f"PyOpenGL cannot be loaded ({error})") from error
 
 # OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
 CAM_FROM_GL: NDArray[np.float64] = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -68,10 +72,16 @@ def _context() -> tuple[Any, _Pass, _Pass, _Pass]:
 
     Deleting one terminates the EGL display all others share, so it is made once and kept
     (https://github.com/mmatl/pyrender/issues/223).
+
+    Raises:
+        UnavailableError: EGL has no such device, or gives no context.
     """
-    device = egl.get_device_by_index(int(os.environ.get("EGL_DEVICE_ID", "0")))
-    platform = egl.EGLPlatform(16, 16, device)
-    platform.init_context()
+    try:
+        device = egl.get_device_by_index(int(os.environ.get("EGL_DEVICE_ID", "0")))
+        platform = egl.EGLPlatform(16, 16, device)
+        platform.init_context()
+    except (AssertionError, RuntimeError, ValueError) as error:  # as pyrender says it
+        raise UnavailableError(str(error) or "EGL gives no context") from error
     # Texture rows are packed; by default OpenGL expects each to start at a multiple of 4 bytes,
     # which shears textures of odd width (https://github.com/mmatl/pyrender/issues/265).
     GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)

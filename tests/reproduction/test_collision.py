@@ -171,6 +171,20 @@ def test_seam_copies_are_merged_and_files_keep_map_coordinates(tmp_path):
     np.testing.assert_array_equal(back.faces, mesh.faces)
     with pytest.raises(InputError, match="collision mesh"):
         load_collision_mesh(tmp_path / "none.ply")
+    # A reader of another house finds the same in it.
+    found = trimesh.load_mesh(tmp_path / "collision.ply", process=False)
+    np.testing.assert_array_equal(found.vertices, mesh.vertices_m)
+    np.testing.assert_array_equal(found.faces, mesh.faces)
+
+
+@pytest.mark.parametrize("broken", [MemoryError, AttributeError])
+def test_faults_of_the_program_are_no_damaged_collision_mesh(broken, tmp_path, monkeypatch):
+    def fail(_):
+        raise broken("of ours")
+
+    monkeypatch.setattr("pathlib.Path.read_bytes", fail)
+    with pytest.raises(broken, match="of ours"):
+        load_collision_mesh(tmp_path / "collision.ply")
 
 
 def test_the_table_rids_speeds_of_what_else_the_machine_did(tmp_path):

@@ -1,11 +1,14 @@
 """What a person sees of a run: the time left, the first scores, and what went wrong."""
 
 import heapq
+import importlib.util
 import io
+import logging
 import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -139,6 +142,21 @@ def test_the_view_keeps_rows_and_one_line(terminal, tmp_path, runs):
     assert any("0.25 5°" in line for line in lines)
     assert sum("jobs" in line for line in lines) >= 2
     assert "5 of 5 jobs done in 3.3 min" in lines[-1]
+
+
+def test_a_fault_of_the_display_shows_its_traceback_and_ends_nothing(capsys):
+    path = REPOSITORY / "workflow/plugins/snakemake_logger_plugin_synfeal/__init__.py"
+    spec = importlib.util.spec_from_file_location("snakemake_logger_plugin_synfeal", path)
+    plugin = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(plugin)
+    handler = plugin.LogHandler(SimpleNamespace(nocolor=True, dryrun=False), None)
+    handler.view.say = lambda text: text.absent
+    handler.emit(logging.makeLogRecord({"levelno": logging.WARNING, "msg": "disk full"}))
+    handler.close()
+    shown = capsys.readouterr().err
+    assert "in <lambda>" in shown
+    assert "AttributeError: 'str' object has no attribute 'absent'" in shown
+    assert "disk full" in shown
 
 
 SNAKEFILE = """

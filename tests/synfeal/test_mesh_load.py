@@ -228,6 +228,50 @@ def test_contradictory_gltf_is_one_line(tmp_path, place, key, value):
         load_mesh(gltf.store(tmp_path))
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("materials", "x", "materials of its JSON must be a list of mappings"),
+        ("nodes", [None], "nodes of its JSON must be a list of mappings"),
+        ("buffers", [{"uri": 3, "byteLength": 36}], "buffers/0/uri of its JSON must be text"),
+        ("scenes", {"nodes": [0]}, "scenes of its JSON must be a list of mappings"),
+        (
+            "meshes",
+            [{"primitives": [{"attributes": 3}]}],
+            "meshes/0/primitives/0/attributes of its JSON must be a mapping",
+        ),
+        (
+            "textures",
+            [{"extensions": {"KHR_texture_basisu": 0}}],
+            "textures/0/extensions/KHR_texture_basisu of its JSON must be a mapping",
+        ),
+    ],
+)
+def test_a_gltf_of_other_kinds_of_values_says_which(key, value, said, tmp_path):
+    gltf = triangle_gltf({}, [])
+    gltf.header[key] = value
+    with pytest.raises(InputError, match=f"scene.gltf: .*{said}"):
+        load_mesh(gltf.store(tmp_path))
+
+
+def test_what_other_programs_keep_in_a_gltf_may_be_anything(tmp_path):
+    gltf = triangle_gltf({}, [])
+    gltf.header["extras"] = gltf.header["nodes"][0]["extras"] = 7
+    gltf.header["nodes"][0]["extensions"] = {"VENDOR_lists": 3, "VENDOR_more": {"meshes": 4}}
+    in_file = 2.0 * TRIANGLE + [10.0, 20.0, 30.0]  # scale, then translation
+    np.testing.assert_allclose(load_mesh(gltf.store(tmp_path), "z").parts[0].vertices_m, in_file)
+
+
+@pytest.mark.parametrize("broken", [MemoryError, AttributeError, NameError])
+def test_faults_of_the_program_are_no_damage_of_the_file(broken, tmp_path, monkeypatch):
+    def fail(*_):
+        raise broken("of ours")
+
+    monkeypatch.setattr("synfeal.mesh.load._placed", fail)
+    with pytest.raises(broken, match="of ours"):
+        load_mesh(triangle_gltf({}, []).store(tmp_path))
+
+
 def test_an_index_beyond_the_vertices_is_one_line(tmp_path):
     gltf = triangle_gltf({}, [])
     gltf.add("indices", np.array([[0], [1], [9]], "<u4"))

@@ -13,7 +13,7 @@ from synfeal.config.dataset import RenderConfig
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render import choose, open_renderer
-from synfeal.render.base import pieces
+from synfeal.render.base import UnavailableError, pieces
 from tests.support.small_room import (
     BACKENDS,
     LOOK_ALONG_X,
@@ -70,7 +70,7 @@ def no_library(*_, **__):
 
 
 def no_device(*_, **__):
-    raise RuntimeError("requested device index 0,\nbut found 0 devices")
+    raise UnavailableError("requested device index 0,\nbut found 0 devices")
 
 
 def black(*_, **__):
@@ -90,8 +90,8 @@ def black(*_, **__):
 @pytest.mark.parametrize(
     ("broken", "said"),
     [
-        (no_library, "ImportError: libEGL.so.1 not loaded; pip install moderngl"),
-        (no_device, "RuntimeError: requested device index 0, but found 0 devices; pip"),
+        (no_library, "here: libEGL.so.1 not loaded; pip install moderngl"),
+        (no_device, "here: requested device index 0, but found 0 devices; pip"),
         (black, "it draws a red square wrongly"),
     ],
 )
@@ -107,19 +107,49 @@ def test_auto_falls_back_with_one_warning(broken, said, monkeypatch, caplog):
 
 
 @pytest.mark.usefixtures("fresh")
-@pytest.mark.parametrize(
-    ("name", "context", "opens"),
-    [
-        ("opengl", "shared_context", "moderngl.create_context"),
-        ("pyrender", "_context", "egl.get_device_by_index"),
-    ],
-)
-def test_a_context_that_cannot_be_made_names_the_packages(name, context, opens, monkeypatch):
+@pytest.mark.parametrize("broken", [MemoryError, AttributeError, TypeError])
+def test_a_lack_of_memory_and_faults_of_the_program_are_no_missing_driver(broken, monkeypatch):
+    def fail(*_, **__):
+        raise broken("of something else")
+
+    monkeypatch.setitem(choose.BACKENDS, "opengl", fail)
+    with pytest.raises(broken, match="of something else"):
+        seen()
+
+
+CONTEXTS = {
+    "opengl": ("shared_context", "moderngl.create_context", Exception),  # as glcontext raises it
+    "pyrender": ("_context", "egl.get_device_by_index", ValueError),
+}
+
+
+def break_context(name, broken, monkeypatch):
+    """Have the context of a backend made anew, which raises ``broken``."""
     if name not in BACKENDS:
         pytest.skip(f"{name} does not work here anyway")
+
+    def fail(*_, **__):
+        raise broken("requested device index 0,\nbut found 0 devices")
+
+    context, opens, _ = CONTEXTS[name]
     module = importlib.import_module(f"synfeal.render.{name}_backend")
-    monkeypatch.setattr(f"{module.__name__}.{opens}", no_device)
+    monkeypatch.setattr(f"{module.__name__}.{opens}", fail)
     monkeypatch.setattr(module, context, getattr(module, context).__wrapped__)
+
+
+@pytest.mark.usefixtures("fresh")
+@pytest.mark.parametrize("name", CONTEXTS)
+@pytest.mark.parametrize("broken", [MemoryError, AttributeError])
+def test_what_breaks_while_a_context_is_made_is_raised_as_what_it_is(name, broken, monkeypatch):
+    break_context(name, broken, monkeypatch)
+    with pytest.raises(broken):
+        seen(name)
+
+
+@pytest.mark.usefixtures("fresh")
+@pytest.mark.parametrize("name", CONTEXTS)
+def test_a_context_that_cannot_be_made_names_the_packages(name, monkeypatch):
+    break_context(name, CONTEXTS[name][2], monkeypatch)
     assert seen() == ("OpenglRenderer" if name == "pyrender" else "PyrenderRenderer")
     with pytest.raises(
         InputError, match=rf"backend: {name} does not .*found 0 devices.*libegl1 libgl1 libgl1-mesa"
@@ -134,7 +164,7 @@ def test_when_nothing_works_all_of_it_is_named(monkeypatch):
     with pytest.raises(InputError) as raised:
         seen()
     for name in choose.BACKENDS:
-        assert f"{name}: RuntimeError: requested device" in str(raised.value)
+        assert f"{name}: requested device" in str(raised.value)
 
 
 DRAW = """

@@ -43,6 +43,8 @@ class LogHandler(LogHandlerBase):
         try:
             self._show(record)
         except Exception:
+            # As logging asks of handlers: it prints the traceback, and the run goes on
+            # (https://docs.python.org/3/library/logging.html#logging.Handler.handleError).
             self.handleError(record)
 
     def close(self) -> None:
