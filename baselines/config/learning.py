@@ -1,4 +1,4 @@
-"""Typed configuration of the learners and what they are compared with."""
+"""Typed configuration of localizers and their training."""
 
 from __future__ import annotations
 

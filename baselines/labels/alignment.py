@@ -1,4 +1,4 @@
-"""Errors of labels once they were moved onto the true poses as one: how wrong their shape is.
+"""Errors of labels after they are aligned with the true poses as a whole.
 
 ``rigid`` turns and shifts a trajectory, ``similarity`` scales it as well, as evo's ``--align`` and
 ``--correct_scale`` do. There the rotation is that of the camera centres (Umeyama). The centres of a

@@ -1,4 +1,4 @@
-"""The batches of section 4.1: how a split is cut, their images, and what a method estimates.
+"""Batches of section 4.1: division of a split, links to its images, estimated trajectories.
 
 A trajectory is stored as CSV with columns ``frame,registered,tx,ty,tz,qw,qx,qy,qz``; frames count
 from 0 inside the batch, positions are in metres and rotations unit quaternions of

@@ -1,4 +1,4 @@
-"""Label errors of one size and different kinds, to see which of them hurt a localizer.
+"""Injected label errors of one size and different kinds.
 
 `noise` is the paper's (section 4.2).
 

@@ -1,4 +1,4 @@
-"""Registration of a depth image to a surface shown from nearby, as in KinectFusion.
+"""Registration of a depth image to a nearby surface, as in KinectFusion.
 
 Points are matched by projection into the image of the surface, and moved towards its tangent
 planes, coarse to fine (Newcombe et al., ISMAR 2011, section 3.5). Pairs that are far apart or whose

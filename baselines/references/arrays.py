@@ -1,4 +1,4 @@
-"""Named arrays in one file: classes that consist of them, and vectors that describe images."""
+"""Named arrays in one file, and classes made of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One vector per image: a small copy of it, and DenseVLAD, whose parts are learned on the spot.
+"""Global image descriptors: thumbnails and DenseVLAD.
 
 DenseVLAD (Torii et al., CVPR 2015) is the retrieval baseline that Sattler et al. (CVPR 2019) hold
 against pose regression. It needs no weights from elsewhere: its vocabulary and its principal axes

@@ -1,4 +1,4 @@
-"""A map of a place: features of posed frames, put into space by depth; and frames to retrieve.
+"""A map of a place: features of posed frames with their depth, and descriptors for retrieval.
 
 ``synfeal map`` writes it, ``synfeal localize`` finds photographs in it (photographs.py). Nothing is
 trained but the vocabulary of DenseVLAD. A map is a folder of plain files::

@@ -1,4 +1,4 @@
-"""Photographs in a map: features matched with those of frames that look alike, then PnP.
+"""Localization of photographs in a map: retrieval, feature matching, PnP.
 
 A photograph is reduced to the focal length of the map's frames, in pixels, so that a thing at the
 same distance has the same size in both and one pixel means the same angle. Its pose is found twice:

@@ -1,4 +1,4 @@
-"""The pose of the training image that looks most alike, which any localizer has to beat, or is."""
+"""Retrieval: the pose of the most similar training image, which a localizer should beat."""
 
 from __future__ import annotations
 

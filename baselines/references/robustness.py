@@ -1,4 +1,4 @@
-"""Localizers and reference methods on test frames that are not like their training frames.
+"""Localizers and reference methods on test frames unlike their training frames.
 
 In other light or through another camera, localizers see packed frames; structure-based poses are
 found in a sample of them, drawn large enough for features.

@@ -1,4 +1,4 @@
-"""Answers of reference methods, and of somebody else's localizer, scored like predictions.
+"""Predictions of reference methods and external localizers, scored like any others.
 
 A localizer of somebody else's is a command to run or a file to read. It is given what the
 localizers of the paper are given: the training frames, their labels, and the test frames. No label

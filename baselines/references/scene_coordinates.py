@@ -1,4 +1,4 @@
-"""Poses by scene-coordinate regression: a network says where every cell's point is, then PnP.
+"""Poses by scene-coordinate regression: a network predicts 3D points of cells, then PnP.
 
 As in DSAC* with depth (Brachmann and Rother, PAMI 2021), without its end-to-end stage: exact depth
 gives the points of the training images in their cameras, the labels put them into the world, and

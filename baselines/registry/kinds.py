@@ -1,4 +1,4 @@
-"""Declarations: what tables, figures, rules and training know of a method.
+"""Declarations of methods: what tables, figures, rules and training need to know.
 
 Each is a decorator of the class or function that does the work::
 

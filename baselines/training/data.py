@@ -1,4 +1,4 @@
-"""Frames and poses on the device, where a whole set fits; which are shown when, which held out."""
+"""Load frames and poses; batch order; held-out paths."""
 
 from __future__ import annotations
 

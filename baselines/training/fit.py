@@ -1,4 +1,4 @@
-"""The one optimisation that every training run goes through, and the protocols it follows."""
+"""The optimisation loop shared by all training runs, and its protocols."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A trained localizer on a person's own pictures: which files they are, and poses out."""
+"""Localization of a person's own pictures with a trained model."""
 
 from __future__ import annotations
 

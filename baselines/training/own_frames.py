@@ -1,4 +1,4 @@
-"""Frames of a person's own data sets, packed as every training run reads them.
+"""Frames of a person's own data sets, packed for training.
 
 A data set is one that ``synfeal collect`` wrote, of which the training split is taken, or a
 sequence of photographs with poses (see :mod:`synfeal.dataset.posed_sequence`). Several are joined:

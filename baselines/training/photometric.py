@@ -1,4 +1,4 @@
-"""Photometric randomisation: training images as other light, another lens and sensor show them.
+"""Photometric randomisation of training images: light, lens and sensor.
 
 Where a scan has not seen the place, renderings are empty; there they show random colours. The rest
 happens in linear light, white is 1, between files that hold sRGB (IEC 61966-2-1), in the order in

@@ -1,4 +1,4 @@
-"""The orthogonal factor of many small matrices at once, by few and well-chosen matrix products.
+"""Polar factors of many small matrices at once, by a few matrix products.
 
 The polar decomposition of ``X = U S V^T`` has the orthogonal factor ``U V^T = (X X^T)^(-1/2) X``.
 Newton-Schulz iterations find it by multiplication alone: each applies an odd polynomial to all

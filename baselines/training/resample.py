@@ -1,4 +1,4 @@
-"""Photographs as the camera of the training frames would have taken them from the same place.
+"""Photographs resampled to the camera of the training frames.
 
 Two cameras with one centre see the same rays, so what one took follows from what the other took by
 moving pixels: through the pinhole model a homography, and the lens on either side. A focal length

@@ -1,4 +1,4 @@
-"""A training run that was killed goes on where it stood, and ends as if nothing had happened."""
+"""Resuming of interrupted training runs, with the same result as without the interruption."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rotation augmentation: images as the camera would have seen them, rotated about its centre.
+"""Rotation augmentation: images seen by a camera rotated about its centre.
 
 The image of a camera that turns about its centre changes by a homography, whatever the scene: with
 the intrinsics ``K`` and the rotated camera's axes ``R`` in the old camera's frame, the new pixel

@@ -1,4 +1,4 @@
-"""A training run: one localizer learns one labelled set, what from is recorded, poses predicted."""
+"""Train one localizer on one label set, record its inputs, predict poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A localizer for a place of one's own: data sets in, ``model.pt`` out."""
+"""``synfeal train`` as a function: data sets in, ``model.pt`` out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Typicality of pictures: how unlike its training frames a localizer finds what it is shown.
+"""Typicality of pictures: how unlike a localizer's training frames they are.
 
 A pose regressor answers to any picture. What it has learned from lies together in the space of its
 features, though, so a picture of another place is told by its distance to the nearest training

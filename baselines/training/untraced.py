@@ -1,4 +1,4 @@
-"""Torch's optimisers without its compiler, which nothing here asks for.
+"""Torch's optimisers without its compiler, which is slow to import and unused here.
 
 Methods of ``torch.optim.Optimizer`` are wrapped so that ``torch.compile`` leaves them alone. The
 first call of any of them imports the compiler, with SymPy and a thousand modules more, which takes

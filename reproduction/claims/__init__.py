@@ -1,1 +1,1 @@
-"""Claims of the paper's text, and whether this run bears them out, by rules fixed in code."""
+"""Claims of the paper's text, judged on a run by rules fixed in code."""

@@ -1,4 +1,4 @@
-"""Every claim with the function that judges it, and what it is judged on."""
+"""The function that judges each claim, and the results it is judged on."""
 
 from __future__ import annotations
 

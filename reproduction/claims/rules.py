@@ -1,4 +1,4 @@
-"""The rules that claims are judged by, frozen: which there were when, and a digest of them.
+"""The rules that judge claims: their history, and a digest that freezes them.
 
 ``rules.csv`` has a row for every set of rules that was ever in force; ``docs/rules.md`` says what
 each of them said of the numbers of its time and why it changed. The last row is in force. Its

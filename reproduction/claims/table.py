@@ -1,4 +1,4 @@
-"""``claims.csv``: what a run says about every claim of the paper."""
+"""``claims.csv``: the verdict of a run on every claim of the paper."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Claims, and the rules that turn samples into verdicts. There is no other way to a verdict.
+"""Claims, and the rules that turn samples into verdicts.
 
 Every condition of a claim is an effect in percent, positive in the direction the paper claims. Its
 95 % interval is compared with four regions, as in equivalence testing (Lakens, "Equivalence Tests",

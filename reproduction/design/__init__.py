@@ -1,1 +1,1 @@
-"""The paper's design as a table, and what it asks of each stage."""
+"""The paper's design as a table, and the files and jobs that follow from it."""

@@ -1,4 +1,4 @@
-"""The paper's design as a table: which data set and which initialisation each table row needs."""
+"""The paper's design as a table: data set, labels and initialisation of each row."""
 
 from __future__ import annotations
 

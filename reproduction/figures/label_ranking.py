@@ -1,4 +1,4 @@
-"""How far rankings by labels agree with those by the truth, over thresholds and label sets."""
+"""Agreement of rankings by labels with those by the truth, by threshold and label set."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All figures, in the order a report shows them, and drawing them to files."""
+"""All figures in the order of the report, and the drawing of them to files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Speed against error: the variants a stage could choose among, the best of them, the choice."""
+"""Figures of speed against error: variants of a stage, the best of them, the choice."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Inputs of hard cases about labels and statistics: noisy poses, pose graphs, and what is asked."""
+"""Inputs of hard cases about labels and statistics: noisy poses, pose graphs."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Cost of a run before it is started, from the measurements of one that was run."""
+"""Prediction of what a run costs, from measurements of finished runs."""

@@ -1,4 +1,4 @@
-"""A run of the workflow on a terminal: a table of scores that fills, above one line that stays.
+"""Display of a run on a terminal: a growing table of scores above one status line.
 
 Where there is no terminal, rows of the table are printed once they are whole, and the line at
 intervals.

@@ -1,1 +1,1 @@
-"""From a scan to real photographs: what is trained on what, and tested on which photographs."""
+"""From a scan to real photographs: design, stages, scores, tables and figures."""

@@ -1,4 +1,4 @@
-"""Stages of the profile ``real`` that are no command: parts, prefixes, references, coverage."""
+"""Stages of the profile ``real`` that are not commands: parts, prefixes, references, coverage."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From poses of photographs to the table and to what the figures show."""
+"""Tables of the profile ``real``, from poses of photographs to the numbers of figures."""
 
 from __future__ import annotations
 

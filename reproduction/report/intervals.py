@@ -1,4 +1,4 @@
-"""Numbers with 95 % limits from published tables, and how much one change moves the errors.
+"""Numbers of published tables with 95 % limits, and changes of errors between rows.
 
 Published tables hold medians with limits, not the errors of single frames. So a change between two
 cells is given limits as if their test paths had nothing in common: too wide where both were tested

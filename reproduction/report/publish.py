@@ -1,4 +1,4 @@
-"""Copying a finished run to where the pages read it: ``results/published/<profile>``, tracked.
+"""Publication of a finished run to ``results/published/<profile>``, where pages read it.
 
 ``python -m reproduction.report.publish --profile mini`` takes tables, claims, summary, provenance
 and job times from ``results/mini``, and of its figures those that a page shows. Nothing else of a

@@ -1,4 +1,4 @@
-"""Verdicts that are published, and which rules they were made by.
+"""Published verdicts, and the rules they were made by.
 
 The errors of single frames are not tracked, so that verdicts on localizers cannot be judged anew
 when the rules change: they stand as they were made. Three can: C4 from the counts of batches, and

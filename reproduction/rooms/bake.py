@@ -1,4 +1,4 @@
-"""Items and light in, a textured mesh as a scanner delivers it out.
+"""Baking of lit items into a textured mesh, as a scanner delivers one.
 
 Pictures lie in square textures; the charts are the patches, so no unwrapping is needed.
 """

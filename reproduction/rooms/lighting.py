@@ -1,4 +1,4 @@
-"""Light that is baked into the textures: lamps and sun with shadows, and what surfaces pass on."""
+"""Light baked into textures: lamps and sun with shadows, and indirect light."""
 
 from __future__ import annotations
 

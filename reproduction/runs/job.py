@@ -1,4 +1,4 @@
-"""Frame of every batch job: it keeps a log, and fails in one line a person can act on."""
+"""Frame of every batch job: a log, and failures in one line a person can act on."""
 
 from __future__ import annotations
 

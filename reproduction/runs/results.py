@@ -1,4 +1,4 @@
-"""Reading the files that the stages before the report leave behind."""
+"""Reading of the result files of earlier stages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Speed and error of drawing: by backend, samples, and detail of the mesh."""
+"""Speed and error of rendering by backend, samples, and detail of the mesh."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scores and errors of single runs, and from scores to the numbers of one table cell."""
+"""Scores and errors of single runs, combined to the numbers of a table cell."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The cells of tables 2 to 7: what each run scored, beside what the paper published.
+"""Cells of tables 2 to 7: scores of the runs beside the paper's values.
 
 The files in ``published/`` carry the columns of the experiments table, so that a cell is joined to
 its published value only when scene, size, labels, noise and initialisation all agree. Values stand

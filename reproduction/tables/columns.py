@@ -1,4 +1,4 @@
-"""Side tables: what a column shows is said once, for the page, for LaTeX and for Markdown.
+"""Side tables: columns defined once for the page, LaTeX and Markdown.
 
 A module with a side table has a ``SCHEMA`` of its CSV and a function ``side_table`` that makes one
 of the rows read from it. A new column is a line there.

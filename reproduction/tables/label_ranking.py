@@ -1,4 +1,4 @@
-"""Whether scoring against labels ranks methods as scoring against the truth does, and how finely.
+"""Agreement of rankings by labels with rankings by the truth, and down to which threshold.
 
 A benchmark is asked which of several methods is better. Its labels answer rightly where they rank
 the methods as the true poses would, so **the same predictions are scored by two yardsticks**: the

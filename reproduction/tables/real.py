@@ -1,4 +1,4 @@
-"""Table 8, which the paper has not: localizers that learned from a scan, on photographs."""
+"""Table 8, which the paper lacks: localizers trained on a scan, tested on photographs."""
 
 from __future__ import annotations
 

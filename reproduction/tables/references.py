@@ -1,4 +1,4 @@
-"""Reference methods beside the localizers: one row per data set and method, and what they say."""
+"""Table of reference methods beside the localizers: one row per data set and method."""
 
 from __future__ import annotations
 

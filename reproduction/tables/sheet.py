@@ -1,4 +1,4 @@
-"""A table as it is read on paper: LaTeX by pandas' Styler, Markdown by tabulate.
+"""Tables as printed: LaTeX by pandas' Styler, Markdown by tabulate.
 
 A sheet has lines: the regenerated errors of a data set, the same against the true poses, the
 paper's. Text is Unicode; the writers translate it.

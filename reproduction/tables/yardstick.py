@@ -1,4 +1,4 @@
-"""Effect of scoring against noisy labels alone, without any harm to a network.
+"""Effect of scoring against noisy labels alone, without any harm to the network.
 
 Labels with independent noise are a worse yardstick: the error against them is that against the
 truth, with the noise of the test label added. Whoever compares the errors of a network trained on

@@ -1,4 +1,4 @@
-"""A camera as a calibration tool found it: files of OpenCV (YAML, JSON), ROS and COLMAP (text).
+"""Cameras from calibration files: OpenCV (YAML, JSON), ROS and COLMAP (text).
 
 The JSON that ``synfeal scan`` writes beside a mesh is one too, and the manifest of a data set.
 

@@ -1,4 +1,4 @@
-"""The camera of a person's photographs: a calibration file, a focal length, or what EXIF says."""
+"""Cameras of photographs: from a calibration file, a focal length, or EXIF."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The mesh that rays are cast against: as few triangles as the planner's answers need (sec. 3.2).
+"""Choice of a collision mesh: the fewest triangles that keep the planner's answers (sec. 3.2).
 
 Smaller meshes are made one from the other, down a ladder of face counts, and each answers the
 questions a planner asks of the scene. The full mesh's answers are the truth; the smallest mesh

@@ -1,4 +1,4 @@
-"""Level of detail: as much of a mesh as images of one resolution show.
+"""Choice of a level of detail: the mesh simplified to what images of one resolution show.
 
 An image of 88x66 pixels shows neither a 16-megapixel texture nor 200,000 triangles, yet pays for
 both. Textures are made smaller and triangles fewer, step by step, and the images of each step are

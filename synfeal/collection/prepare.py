@@ -1,4 +1,4 @@
-"""The first stage: a scene from its source, and the objects placed in it."""
+"""Preparation of a scene: its mesh, and the objects placed in it."""
 
 from __future__ import annotations
 

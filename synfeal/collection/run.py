@@ -1,4 +1,4 @@
-"""A whole data set from one mesh on one machine: the workflow's stages, one after the other.
+"""Collection of a data set on one machine: the workflow's stages, one after the other.
 
 Scene, plan, sequences, finish: each is the function that the workflow's rule calls, with the same
 seeds, and is skipped where what it makes lies there under its final name.

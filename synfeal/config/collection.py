@@ -1,4 +1,4 @@
-"""Typed configuration of what is collected: scenes, and how the camera moves."""
+"""Typed configuration of collection: scenes, and the movement of the camera."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cameras, how frames are drawn, and the part of a profile that data sets are made of."""
+"""Typed configuration of data sets: cameras, rendering, sizes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reading configuration files: one line that names file and key when something is wrong."""
+"""Reading configuration files; errors name file and key in one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The options of a collection as the settings of a configuration, and back in what is said of them.
+"""Options of a collection as configuration, and errors about its keys as errors about options.
 
 One table names both, so that a value has one bound and one default however it is given: as an
 option of ``synfeal collect``, as an argument of :func:`synfeal.collect`, or as a key of a profile.

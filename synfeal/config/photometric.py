@@ -1,4 +1,4 @@
-"""Light, lens and sensor that photographs differ by from renderings, as ranges to draw from.
+"""Ranges of light, lens and sensor in which photographs differ from renderings.
 
 A rendering has one light, one exposure and a perfect sensor. A localizer that is to be used on
 photographs is shown its training images under others, drawn anew whenever an image is shown. The

@@ -1,4 +1,4 @@
-"""The last step of a data set: what is made of all its frames together, and the manifest."""
+"""The last stage of a data set: manifest, splits, previews, and tables over all frames."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files of frames: in the directory of a sequence or in one archive, and their images as PNG.
+"""Files of frames, in a directory or an archive, and a fast PNG codec.
 
 ``seq-01.zip``, unpacked where it lies, is the directory ``seq-01``. The authors of 7-Scenes ship
 theirs so; a large data set then takes one file for each sequence instead of three for each frame.

@@ -1,4 +1,4 @@
-"""Normals and masks as files of a frame, and the table of what the values of masks stand for.
+"""Files of normals and masks, and the table that names the values of masks.
 
 ``frame-000000.normal.png``: 8-bit RGB. A unit normal (x, y, z) in the frame of the camera (x right,
 y down, z forward), facing the camera, is stored as ``round(127 * n) + 128``, which is 1 to 255;

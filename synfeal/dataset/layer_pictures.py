@@ -1,4 +1,4 @@
-"""Layers of frames as pictures to look at."""
+"""Depth, normals and masks of frames as pictures to look at."""
 
 from __future__ import annotations
 

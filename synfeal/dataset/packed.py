@@ -1,4 +1,4 @@
-"""Frames at network resolution in one array: read by memory map, decoded once for all runs.
+"""Frames at network resolution in one array, decoded once and memory-mapped by all runs.
 
 A file beside it says what they are: enough to know them apart and to check a copy.
 """

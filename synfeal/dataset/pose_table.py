@@ -1,4 +1,4 @@
-"""Tables of poses: plans, label sets and predictions are all one CSV format.
+"""Tables of poses: plans, label sets and predictions share one CSV format.
 
 Columns ``frame,path,tx,ty,tz,qw,qx,qy,qz``: frame index in its split, index of the straight path
 the frame belongs to, position in metres and unit quaternion of ``world_from_cam``. Labels that were

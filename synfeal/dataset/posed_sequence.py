@@ -1,4 +1,4 @@
-"""Sequences of photographs with known poses: which file belongs to which, and where it was taken.
+"""Sequences of posed photographs: their files and poses, paired by frame.
 
 Three layouts are read:
 

@@ -1,4 +1,4 @@
-"""Data sets at a glance: their paths as a moving picture, side by side, and many frames as one."""
+"""Previews of data sets: films of their paths, side by side, and contact sheets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rendering what one job of the workflow makes: a sequence of files, or packed frames."""
+"""Rendering for one job of the workflow: a sequence of files, or packed frames."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The world of the sequence that a data set was made from, where it is not the data set's own.
+"""Transform from a data set's world to that of the sequence it was scanned from.
 
 A scan stands upright (z up), the sequence it was fused from seldom does. ``world.json`` at the root
 of a data set holds the rigid motion between the two, so that poses found in the one are comparable

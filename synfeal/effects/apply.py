@@ -1,4 +1,4 @@
-"""Frames of a camera's paths with effects, the same whatever shard of the paths is drawn.
+"""Frames of paths with effects, identical however the paths are divided into shards.
 
 What depends on time is worked out along whole paths: a shard that begins in the middle of one looks
 at the frames before it, and with auto-exposure draws them.

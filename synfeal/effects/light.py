@@ -1,4 +1,4 @@
-"""Light of a path, and what a camera makes of it: all in linear light, between sRGB files.
+"""Light of a path, and the camera's response to it, in linear light.
 
 The transfer function of the files is that of IEC 61966-2-1, by tables.
 """

@@ -1,4 +1,4 @@
-"""Scenes that know what effects ask for: lights that are switched, objects along each path.
+"""Scenes for effects: lamps that can be switched, objects along each path.
 
 The baking of a stand-in knows how much of its light comes from where. Each pixel of an ideal frame
 is multiplied, in linear light, by the weighted shares of the groups of sources, so that states add

@@ -1,4 +1,4 @@
-"""Medians and what is made of them, with 95 % limits from a bootstrap over test paths.
+"""Medians and functions of them, with 95 % limits from a bootstrap over test paths.
 
 The unit drawn is the path, not the frame: neighbouring frames of a path are nearly the same
 picture. All cells with one test set share one set of draws, so whatever is computed from several of

@@ -1,4 +1,4 @@
-"""Poses as a file holds them, and whether the convention of its format is the one they follow.
+"""Poses as read from a file, and a check of their convention.
 
 Formats fix what a pose maps and the order of its quaternion, but people's scripts swap them. Poses
 that fit the data set far better when they are read in another way are refused: scored as they

@@ -1,4 +1,4 @@
-"""Readers of pose files, and how each format is told from its content.
+"""Readers of pose files, and recognition of each format by its content.
 
 - 7-Scenes: ``seq-XX/frame-XXXXXX.pose.txt``, four rows of ``world_from_cam``.
 - TUM RGB-D ("File Formats"): ``timestamp tx ty tz qx qy qz qw``, ``world_from_cam``.

@@ -1,4 +1,4 @@
-"""The frames that are scored, with their poses, and which estimate is of which."""
+"""Frames to score, with their poses, and the matching of estimates to them."""
 
 from __future__ import annotations
 

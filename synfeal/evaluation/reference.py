@@ -1,4 +1,4 @@
-"""A file of poses as the reference, in place of a data set: ground truth that others have stored.
+"""A file of poses as the reference in place of a data set, such as stored ground truth.
 
 Poses are paired by what their formats say: by equal names (``seq-01/frame-000000`` however it is
 spelled), by times that are nearest to each other, as evo does, or line by line.

@@ -1,4 +1,4 @@
-"""Printed scores, tables and the drawing of ``synfeal evaluate``."""
+"""Output of ``synfeal evaluate``: printed scores, tables, a figure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Formats to learn from: ACE's scenes, MS-Transformer's tables, Nerfstudio's ``transforms.json``.
+"""Exports for learned methods: ACE, MS-Transformer, Nerfstudio.
 
 ACE: ``{train,test}/{rgb,poses,calibration}``, one file of each for a frame. Source: ``dataset.py``
 and ``datasets/setup_7scenes.py`` of nianticlabs/ace: files of a folder go together by their order;

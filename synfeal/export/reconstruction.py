@@ -1,4 +1,4 @@
-"""COLMAP's text model beside the images, what hloc localizes in, and the TUM RGB-D format.
+"""Exports for reconstruction: COLMAP models, hloc, and the TUM RGB-D format.
 
 COLMAP. Source: its documentation, "Output Format". World and camera axes, the order of the
 quaternion and the place of the first pixel's centre are ours; poses are ``cam_from_world``.

@@ -1,4 +1,4 @@
-"""Boxes of free space at camera heights: as few as hold most of a place, room by room."""
+"""Boxes of free space at camera heights: as few as cover most of a place, room by room."""
 
 from __future__ import annotations
 

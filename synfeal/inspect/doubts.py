@@ -1,4 +1,4 @@
-"""A mesh looked at once, in the unit and with the axis up that make sense, and what looks wrong."""
+"""Doubts about a mesh: unit, up axis and other things that look wrong."""
 
 from __future__ import annotations
 

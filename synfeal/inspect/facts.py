@@ -1,4 +1,4 @@
-"""Everything that is said about a mesh, as one value that goes into a file."""
+"""Facts about a mesh, collected for a file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A first look at a mesh: what ``synfeal inspect`` finds out once, draws and writes."""
+"""``synfeal inspect`` as a function: examine a mesh, draw it, write the page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command that collects a first data set: planned and looked at once, nothing is written.
+"""Suggestion of a ``synfeal collect`` command, planned and looked at without writing anything.
 
 What is suggested has been tried: paths were planned in its boxes as ``synfeal collect`` plans them,
 rays counted what of the images would be empty, and some of the images were drawn.

@@ -1,4 +1,4 @@
-"""The facts about a mesh as lines for a terminal and rows for a page; plain ASCII of our own."""
+"""Facts about a mesh as lines for a terminal and as an HTML page."""
 
 from __future__ import annotations
 

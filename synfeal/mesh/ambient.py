@@ -1,4 +1,4 @@
-"""Light for meshes that have none: each vertex darkened by how much of its surroundings is near.
+"""Ambient light for meshes without texture: vertices are darker where surfaces are near.
 
 A mesh without textures is flat where it has one colour. Here its vertices get what a soft light
 from everywhere would leave: less in corners and behind furniture (ambient occlusion; Zhukov, Iones

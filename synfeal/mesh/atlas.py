@@ -1,4 +1,4 @@
-"""Colours of vertices as a texture, so that triangles may be fewer than colours.
+"""Vertex colours baked into a texture, so that a mesh may have fewer triangles than colours.
 
 A scan fused from photographs has a colour at each vertex and a vertex at each voxel: its triangles
 are as fine as its texture would be, on flat walls too. Here a simplified mesh is cut into charts

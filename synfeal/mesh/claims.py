@@ -1,4 +1,4 @@
-"""Sizes that a mesh file states of itself, checked before memory is taken for them.
+"""Sizes stated in a mesh file, checked before memory is taken for them.
 
 A few bytes of a header can ask for gigabytes: values that are stored nowhere, parts drawn a
 thousand times, textures of one colour and enormous size.

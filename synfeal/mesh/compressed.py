@@ -1,4 +1,4 @@
-"""Compressed and quantised glTF put into the plain form that is read, by each kind's own library.
+"""Decoding of compressed and quantised glTF by the library of each kind.
 
 ``pip install synfeal[meshes]`` installs the libraries: meshoptimizer (EXT_meshopt_compression),
 DracoPy (KHR_draco_mesh_compression) and opengl_basisu (KHR_texture_basisu: KTX2). Quantised

@@ -1,4 +1,4 @@
-"""glTF and GLB containers: their JSON, checked, and put into the few forms the parser reads right.
+"""glTF and GLB containers: their JSON, checked and simplified for the parser.
 
 trimesh parses the geometry. Of what glTF allows it silently drops or misreads a part: texture
 transforms, second sets of texture coordinates, colours that are not 8-bit, exact factors. So the

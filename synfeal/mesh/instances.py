@@ -1,4 +1,4 @@
-"""Numbers of what masks tell apart: the parts of a mesh, and objects that were placed in it.
+"""Instance numbers of masks: parts of the mesh, and objects placed in it.
 
 A part is a geometry of the file (a mesh of glTF, a group of OBJ) with one material. Parts are
 numbered from 1 in the order of the mesh; an object, whatever it is made of, has one number after

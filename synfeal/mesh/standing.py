@@ -1,4 +1,4 @@
-"""Objects that stand in a scene: on what lies flat, touching nothing.
+"""Placement of objects on flat surfaces of a scene, touching nothing.
 
 An object stands upright on what lies flat below it, turned at random. Its bounding box meets no
 triangle of the scene, by the separating-axis test of Akenine-Möller (Fast 3D triangle-box overlap

@@ -1,4 +1,4 @@
-"""Triangles that rays are cast against, and simplification: fewer of them, smaller textures."""
+"""Triangles for ray casting, and simplification: fewer triangles, smaller textures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A canvas is what a texture painter gets: a size in pixels, a scale and a random generator."""
+"""Canvas of a texture painter: a size in pixels, a scale and a random generator."""
 
 from __future__ import annotations
 

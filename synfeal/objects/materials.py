@@ -1,4 +1,4 @@
-"""Painters of materials, and of the fronts of things: doors, shelves, screens, sheets of paper."""
+"""Painters of materials and fronts: doors, shelves, screens, sheets of paper."""
 
 from __future__ import annotations
 

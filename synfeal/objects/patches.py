@@ -1,4 +1,4 @@
-"""Patches, the one element of a procedural scene: grids of points with a picture on each.
+"""Patches, the one element of procedural scenes: grids of points with a picture on each.
 
 Then grids for the shapes a room is made of, and boxes, turned shapes and pipes as items.
 """

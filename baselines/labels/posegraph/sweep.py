@@ -1,4 +1,4 @@
-"""One pass of TORO over all edges, compiled: a pass is a loop over short paths, edge after edge.
+"""One pass of TORO over all edges, compiled.
 
 Every edge starts from what the edge before left behind, so there is nothing to vectorise over; in
 NumPy the same pass takes a hundred times as long.

@@ -1,4 +1,4 @@
-"""Dense registration of two frames, and checks of a motion that do not trust what found it."""
+"""Dense registration of two frames, and independent checks of the motions it finds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pose graph of a batch, and the facts of how it was made."""
+"""The pose graph of a batch, and a record of how it was made."""
 
 from __future__ import annotations
 

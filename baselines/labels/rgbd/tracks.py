@@ -1,4 +1,4 @@
-"""Motions between neighbouring frames, and between keyframes that view the same place; which.
+"""Motions between neighbouring frames, and between keyframes that view the same place.
 
 Where depth does not tell them, SIFT features of one frame are lifted to 3D with its depth and found
 again in the other; the pose follows from perspective-n-point with RANSAC. This is how RTAB-Map

@@ -1,4 +1,4 @@
-"""Poses of one batch from its colour images, in metres and from the first true pose.
+"""Poses of one batch from its colour images, scaled and placed by true poses.
 
 Images are matched with those near in time and with those of other paths that look like them
 (``pairs.py``); features are weaker where there are few (``features.py``). A model has no scale and

@@ -1,4 +1,4 @@
-"""Place and scale of a model, which it cannot know: both are taken from true poses.
+"""Gauge of a model: the place and scale that only true poses can give it.
 
 ``first_poses`` fits the model to the first true poses of the batch: as many as the published code
 uses for the scale. Rotations are averaged over these cameras, then scale and shift follow from

@@ -1,4 +1,4 @@
-"""Models of a batch from its matches, and the one that is taken.
+"""Mapping of a batch from its matches, and the choice of a model.
 
 A view of one plane has two reconstructions, and a mapper that starts from the wrong one still
 registers every image. In the wrong one points leave the reprojection threshold and are dropped. So

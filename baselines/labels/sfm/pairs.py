@@ -1,4 +1,4 @@
-"""Pairs of images of one batch that look alike though they are far apart in time.
+"""Retrieved image pairs of one batch: similar images far apart in time.
 
 Neighbours in time tie a straight path together like the links of a chain: nothing holds its ends.
 A batch consists of several paths through one room, so what one path has seen another sees again.

@@ -1,4 +1,4 @@
-"""GoogLeNet with batch normalisation, and what it has in common with Inception v3.
+"""GoogLeNet with batch normalisation, and layers it shares with Inception v3.
 
 Architecture: Szegedy et al., "Going deeper with convolutions", CVPR 2015, table 1; batch
 normalisation after every convolution: Ioffe and Szegedy, ICML 2015. Where torchvision departs from

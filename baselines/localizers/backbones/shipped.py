@@ -1,4 +1,4 @@
-"""The pretrained backbones that come with the package: where they lie, and how they get there.
+"""The pretrained backbones that come with the package.
 
     python -m baselines.localizers.backbones.shipped results/start
 

@@ -1,4 +1,4 @@
-"""``provenance.json``, what a run was made from and what it cost: the file, and its section."""
+"""``provenance.json``, the inputs and the cost of a run: the file and its section."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of the page, to be sorted: side tables, tables 2 to 7 in both scores, the claims."""
+"""Sortable tables of the page: side tables, tables 2 to 7 in both scores, the claims."""
 
 from __future__ import annotations
 
