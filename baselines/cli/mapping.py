@@ -92,6 +92,13 @@ MAP_OPTIONS = (
         default=0.99,
         metavar="C",
     ),
+    option(
+        "--refine",
+        "of a map: draw the mesh that it shows from each pose found and match that too, which makes"
+        " poses more exact",
+        type=Path,
+        metavar="MESH",
+    ),
 )
 
 
@@ -107,6 +114,7 @@ def localize_by_map(arguments: argparse.Namespace) -> None:
         camera=photograph_camera(arguments),
         world=arguments.world,
         least_confidence=arguments.confidence,
+        refine=arguments.refine,
     )
     if abs(done.focal_ratio - 1.0) > WRONG_FOCAL:  # not of NaN
         log.warning(

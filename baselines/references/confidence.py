@@ -27,6 +27,8 @@ from scipy.special import gammaln
 
 PATCHES_ACROSS = 16  # along the longer side of the map's frames
 LN10 = math.log(10.0)
+# One pose in a hundred with no more support than this is chance.
+LEAST_CONFIDENCE = 0.99
 
 
 class Support(NamedTuple):

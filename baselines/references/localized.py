@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Literal, NamedTuple
@@ -13,10 +15,11 @@ import numpy as np
 import pandas as pd
 import torch
 from numpy.typing import NDArray
-from PIL import Image
 
+from baselines.references.confidence import LEAST_CONFIDENCE
 from baselines.references.mapped import StructureMap, read_map
 from baselines.references.photographs import Answer, Finder
+from baselines.references.redrawn import Redrawn, read_redrawn
 from baselines.training.localize import find_pictures, open_picture
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.dataset.pose_table import COLUMNS, IMAGE, SUPPORT
@@ -31,8 +34,6 @@ World = Literal["sequence", "mesh"]
 
 HEADER = (IMAGE, *COLUMNS[2:], *SUPPORT)
 FOUND, NOT_FOUND = "localized", "not localized"
-# One pose in a hundred with no more support than this is chance.
-LEAST_CONFIDENCE = 0.99
 # So many photographs tell whether their focal length is right.
 FEWEST_RATIOS = 5
 DECIMALS = 6  # micrometres
@@ -73,6 +74,7 @@ def localize_in_map(
     camera: PhotographCamera,
     world: World = "sequence",
     least_confidence: float = LEAST_CONFIDENCE,
+    refine: Path | None = None,
     seed: int = 0,
 ) -> LocalizedInMap:
     """Write the pose of each photograph as CSV (columns of ``HEADER``), in the order named.
@@ -86,11 +88,12 @@ def localize_in_map(
         world: Whose coordinates ``world_from_cam`` is written in, where the place was scanned from
             a sequence that has its own.
         least_confidence: Poses with less are not written.
+        refine: Mesh that the map shows, to refine poses on; None leaves them as they are.
         seed: Seed of RANSAC's samples, the same for every photograph.
 
     Raises:
-        InputError: The map or a photograph cannot be used, nothing says what a photograph's focal
-            length is, or ``out`` cannot be written.
+        InputError: The map, the mesh or a photograph cannot be used, nothing says what a
+            photograph's focal length is, or ``out`` cannot be written.
     """
     if not 0 < least_confidence < 1:
         raise InputError(
@@ -101,7 +104,12 @@ def localize_in_map(
     _check_out(out, pictures)
     torch.set_num_threads(1)
     taken_s: list[float] = []
-    answers = _find_all(Finder(place, seed), pictures, camera, taken_s)
+    with ExitStack() as opened:
+        redrawn = None
+        if refine is not None:
+            redrawn = opened.enter_context(read_redrawn(place, refine, folder, seed))
+        find = partial(_find, Finder(place, seed), redrawn, least_confidence, camera)
+        answers = _find_all(find, pictures, taken_s)
     poses = np.array([answer.world_from_cam for answer in answers])
     found = np.array([a.support.confidence >= least_confidence for a in answers])
     if world == "sequence" and place.sequence_from_world is not None:
@@ -124,15 +132,14 @@ def localize_in_map(
 
 
 def _find_all(
-    finder: Finder, pictures: Sequence[Path], camera: PhotographCamera, taken_s: list[float]
+    find: Callable[[Path], Answer], pictures: Sequence[Path], taken_s: list[float]
 ) -> list[Answer]:
     """Answer the photographs in their order, noting how long each took."""
     answers = []
     with Progress(len(pictures), "localize") as progress:
         for index, path in enumerate(pictures, start=1):
             began = time.perf_counter()
-            image = open_picture(path)
-            answers.append(_find(finder, image, path, camera))
+            answers.append(find(path))
             taken_s.append(time.perf_counter() - began)
             progress.update()
             if index % PART == 0:
@@ -141,14 +148,25 @@ def _find_all(
     return answers
 
 
-def _find(finder: Finder, image: Image.Image, path: Path, camera: PhotographCamera) -> Answer:
+def _find(
+    finder: Finder,
+    redrawn: Redrawn | None,
+    least_confidence: float,
+    camera: PhotographCamera,
+    path: Path,
+) -> Answer:
+    image = open_picture(path)
     calibration = camera.of(image, path)
     if calibration is None:
         raise InputError(
             f"{path}: nothing says what its focal length is, which its pose depends on; give the"
             " camera's calibration with --camera, or its focal length in pixels with --focal"
         )
-    return finder.find(finder.look_at(image, calibration))
+    photograph = finder.look_at(image, calibration)
+    answer = finder.find(photograph)
+    if redrawn is None or answer.support.confidence < least_confidence:
+        return answer
+    return redrawn.refine(photograph, answer)
 
 
 def _check_out(out: Path, pictures: Sequence[Path]) -> None:

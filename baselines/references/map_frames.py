@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.camera.projection import pixels_of_normalised
+from synfeal.config.collection import Positive, Strict
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.finish import MANIFEST
 from synfeal.dataset.frame_files import FrameFile
@@ -16,6 +17,8 @@ from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_seque
 from synfeal.dataset.sevenscenes import read_split
 from synfeal.dataset.world import read_sequence_from_world
 from synfeal.errors import InputError
+from synfeal.mesh.load import UpAxis
+from synfeal.records.files import read_json
 from synfeal.scan.camera import CameraOptions, RgbdCamera, rgbd_camera
 from synfeal.scan.reading import Depth, image_size, read_color, read_depth_m
 
@@ -23,6 +26,13 @@ Array = NDArray[np.float64]
 
 # Steps in which the depth of a colour pixel is found where the depth camera stands beside.
 STEPS = 4
+
+
+class MeshFile(Strict):
+    """Options by which a file becomes a mesh in metres, z up."""
+
+    up_axis: UpAxis = "auto"
+    unit_m: Positive = 1.0
 
 
 @dataclass(frozen=True)
@@ -38,6 +48,7 @@ class MapFrames:
         rgbd: Cameras of colour and depth.
         sequence_from_world: Rigid motion (4, 4) to the world of the sequence that the place was
             scanned from; None where the world of the frames is the only one known.
+        mesh_file: How the mesh that they were rendered of is to be read.
     """
 
     source: Path
@@ -47,6 +58,7 @@ class MapFrames:
     world_from_cam: Array
     rgbd: RgbdCamera
     sequence_from_world: Array | None
+    mesh_file: MeshFile
 
     def __len__(self) -> int:
         return len(self.names)
@@ -95,15 +107,24 @@ class MapFrames:
         turned = ray @ turn.T
         for _ in range(STEPS if aside else 1):
             point = found[:, None] * turned + shift
-            seen = _at(depth_m, self.rgbd.depth, point[:, :2] / point[:, 2:])
+            seen = depth_along(depth_m, self.rgbd.depth, point[:, :2] / point[:, 2:])
             # Depth along the depth camera's axis is linear in depth along the colour camera's.
             step = (seen - shift[2]) / turned[:, 2]
             found = np.where(np.isfinite(step), step, found)
         return np.where(np.isfinite(seen) & (found > 0), found, np.inf)
 
 
-def _at(depth_m: Depth, camera: CameraConfig, slope: Array) -> Array:
-    """Look up depth (n,) where rays (n, 2) of the depth camera meet its image, else inf."""
+def depth_along(depth_m: Depth, camera: CameraConfig, slope: Array) -> Array:
+    """Look up the depth (n,) of the pixels that rays go through.
+
+    Args:
+        depth_m: Depth image (H, W); 0 or inf where there is none.
+        camera: Its camera.
+        slope: x / z and y / z (n, 2) of the rays.
+
+    Returns:
+        Depth (n,), inf where there is none.
+    """
     pixel = pixels_of_normalised(camera, slope)
     height, width = depth_m.shape
     inside = np.asarray(((pixel >= 0) & (pixel < [width, height])).all(axis=1))
@@ -180,7 +201,14 @@ def read_map_frames(folder: Path, choice: FrameChoice, cameras: CameraOptions) -
         world_from_cam=found.world_from_cam[rows],
         rgbd=rgbd,
         sequence_from_world=read_sequence_from_world(folder) if rendered else np.eye(4),
+        mesh_file=_mesh_file(folder / MANIFEST) if rendered else MeshFile(),
     )
+
+
+def _mesh_file(manifest: Path) -> MeshFile:
+    """Read from its manifest how the mesh of a data set is to be loaded."""
+    scene = read_json(manifest).get("scene", {})
+    return MeshFile.model_validate({k: scene[k] for k in MeshFile.model_fields if k in scene})
 
 
 def _training_frames(folder: Path, frames: slice) -> PosedFrames:

@@ -27,8 +27,9 @@ from pydantic import ValidationError
 from baselines.references.arrays import Vectors, read_arrays, write_arrays
 from baselines.references.descriptors import CHUNK, Vlad
 from baselines.references.features import Features
-from baselines.references.map_frames import MapFrames
+from baselines.references.map_frames import MapFrames, MeshFile
 from synfeal.camera.projection import normalised_of_pixels
+from synfeal.config.collection import Strict
 from synfeal.config.dataset import CameraConfig
 from synfeal.config.load import describe
 from synfeal.dataset.packed import fit_frame
@@ -60,6 +61,13 @@ FEWEST_FEATURES = 100  # of a map; on fewer there is nothing to find a photograp
 REMEDY = "make the map again with synfeal map"
 
 
+class Shown(Strict):
+    """What ``map.json`` says of the frames; earlier versions did not note the mesh."""
+
+    camera: CameraConfig
+    mesh_file: MeshFile | None = None
+
+
 @dataclass(frozen=True)
 class StructureMap:
     """A place as posed frames with features that have depth.
@@ -72,6 +80,7 @@ class StructureMap:
         vectors: Unit vectors (N, D) to retrieve frames by.
         vlad: Describes a photograph by such a vector.
         sequence_from_world: Rigid motion (4, 4) to the world of the scanned sequence, if any.
+        mesh_file: How the mesh that the frames were rendered of is to be read.
         record: Further entries of ``map.json``.
     """
 
@@ -82,6 +91,7 @@ class StructureMap:
     vectors: Vectors
     vlad: Vlad
     sequence_from_world: Array | None
+    mesh_file: MeshFile
     record: dict[str, Any]
 
     def __len__(self) -> int:
@@ -165,6 +175,7 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
         vectors=vlad.describe(views),
         vlad=vlad,
         sequence_from_world=frames.sequence_from_world,
+        mesh_file=frames.mesh_file,
         record=record,
     )
     with writing_to(out, lambda: "choose another folder with --out"):
@@ -220,6 +231,7 @@ def write_map(made: StructureMap, out: Path) -> None:
         record = {
             **made.record,
             "camera": made.camera.record,
+            "mesh_file": made.mesh_file.model_dump(),
             KEY: None if sequence is None else sequence.tolist(),
             "sha256": {name: file_sha256(folder / name) for name in (FRAMES, FEATURES, RETRIEVAL)},
         }
@@ -232,7 +244,7 @@ def read_map(folder: Path) -> StructureMap:
     Raises:
         InputError: It is no map, of a later version, or damaged.
     """
-    record, camera, sequence_from_world = _read_record(folder)
+    record, shown, sequence_from_world = _read_record(folder)
     table = read_pose_table(folder / FRAMES)
     names = tuple(row["image"] for _, row in read_records(folder / FRAMES, ("image",), REMEDY))
     features = Features.read(folder / FEATURES)
@@ -241,16 +253,17 @@ def read_map(folder: Path) -> StructureMap:
     return StructureMap(
         names=names,
         world_from_cam=table.world_from_cam,
-        camera=camera,
+        camera=shown.camera,
         features=features,
         vectors=stored["vectors"],
         vlad=Vlad(torch.from_numpy(stored["words"]), stored["mean"], stored["axes"]),
         sequence_from_world=sequence_from_world,
+        mesh_file=shown.mesh_file or MeshFile(),
         record=record,
     )
 
 
-def _read_record(folder: Path) -> tuple[dict[str, Any], CameraConfig, Array | None]:
+def _read_record(folder: Path) -> tuple[dict[str, Any], Shown, Array | None]:
     path = folder / RECORD
     if not path.is_file():
         raise InputError(f"{folder}: holds no {RECORD}; give the folder that synfeal map wrote")
@@ -263,11 +276,11 @@ def _read_record(folder: Path) -> tuple[dict[str, Any], CameraConfig, Array | No
             f"{path}: version: {record.get('version')!r} is not read, only {VERSION}; {REMEDY}"
         )
     try:
-        camera = CameraConfig.model_validate(record.get("camera"))
+        shown = Shown.model_validate({key: record.get(key) for key in Shown.model_fields})
     except ValidationError as error:
-        raise InputError(f"{path}: camera: {describe(error)}; {REMEDY}") from error
-    stored = record.get(KEY)
-    return record, camera, None if stored is None else rigid_motion_of(record, path)
+        raise InputError(f"{path}: {describe(error)}; {REMEDY}") from error
+    sequence_from_world = None if record.get(KEY) is None else rigid_motion_of(record, path)
+    return record, shown, sequence_from_world
 
 
 def _check_shapes(

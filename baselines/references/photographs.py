@@ -50,11 +50,15 @@ class Photograph(NamedTuple):
         slope: x / z and y / z (k, 2) of the rays of its features, distortion removed.
         roots: RootSIFT descriptors (k, 128).
         view: It as the map's camera would have seen it (64, 64, 3), squeezed into a square.
+        grey: Grey values (H, W) as the map's camera would have seen them; edges are continued.
+        shown: Pixels (H, W) of these that the photograph shows.
     """
 
     slope: Array
     roots: NDArray[np.float32]
     view: NDArray[np.uint8]
+    grey: NDArray[np.uint8]
+    shown: NDArray[np.bool_]
 
 
 class Answer(NamedTuple):
@@ -111,8 +115,16 @@ class Finder:
         centre = np.array([calibration.cx, calibration.cy])
         slope = undistort((pixel / scale - centre) / focal_px, calibration.distortion)
         known = np.isfinite(slope).all(axis=1)
-        looks = _places(calibration, self._place.camera) * scale
-        return Photograph(slope[known], roots_of(descriptor[known]), _sampled(pixels, looks))
+        camera = self._place.camera
+        cells = _places(calibration, camera, VIEW_PX * SAMPLES, VIEW_PX * SAMPLES)
+        places = _places(calibration, camera, camera.width, camera.height)
+        return Photograph(
+            slope=slope[known],
+            roots=roots_of(descriptor[known]),
+            view=_sampled(pixels, cells * scale),
+            grey=_looked_up(grey, places * scale),
+            shown=np.asarray(((places > 0) & (places < full)).all(axis=-1)),
+        )
 
     def find(self, photograph: Photograph) -> Answer:
         """Estimate where a photograph was taken."""
@@ -196,22 +208,27 @@ class _Attempt(NamedTuple):
 
 
 def _sampled(pixels: NDArray[np.uint8], looks: Array) -> NDArray[np.uint8]:
-    """Average samples at (64 s, 64 s, 2) pixels to colours (64, 64, 3); edges are continued."""
-    column, row = np.moveaxis((looks - 0.5).astype(np.float32), -1, 0)
-    fine = cv2.remap(pixels, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    """Average samples at (64 s, 64 s, 2) pixels to colours (64, 64, 3)."""
+    fine = _looked_up(pixels, looks)
     small = cv2.resize(fine, (VIEW_PX, VIEW_PX), interpolation=cv2.INTER_AREA)
     return np.asarray(small, dtype=np.uint8)
 
 
-def _places(calibration: Calibration, camera: CameraConfig) -> Array:
-    """Find the pixels (64 s, 64 s, 2) of a photograph that show what those of a map's view show."""
-    return _places_of(calibration, camera.model_dump_json())
+def _looked_up(pixels: NDArray[np.uint8], looks: Array) -> NDArray[np.uint8]:
+    """Look up colours or grey values at (H, W, 2) pixels; edges are continued."""
+    column, row = np.moveaxis((looks - 0.5).astype(np.float32), -1, 0)
+    found = cv2.remap(pixels, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(found, dtype=np.uint8)
 
 
-@lru_cache(8)
-def _places_of(calibration: Calibration, camera_json: str) -> Array:
+def _places(calibration: Calibration, camera: CameraConfig, columns: int, rows: int) -> Array:
+    """Find the pixels (rows, columns, 2) of a photograph that show the cells of a map's view."""
+    return _places_of(calibration, camera.model_dump_json(), columns, rows)
+
+
+@lru_cache(16)
+def _places_of(calibration: Calibration, camera_json: str, columns: int, rows: int) -> Array:
     camera = CameraConfig.model_validate_json(camera_json)
-    cells = cell_pixels(camera, VIEW_PX * SAMPLES, VIEW_PX * SAMPLES)
-    ray = np.nan_to_num(normalised_of_pixels(camera, cells))
+    ray = np.nan_to_num(normalised_of_pixels(camera, cell_pixels(camera, columns, rows)))
     centre = np.array([calibration.cx, calibration.cy])
     return centre + distort(ray, calibration.distortion) * [calibration.fx, calibration.fy]

@@ -15,7 +15,8 @@ from synfeal.errors import InputError
 
 Direction = Literal["official", "forward", "reverse", "alternate"]
 Training = Literal["photographs", "rendered", "randomised", "both"]
-MapOf = Literal["rendered", "photographs"]
+# `refined`: poses in the map of rendered frames, found again on the scan drawn from them.
+MapOf = Literal["rendered", "refined", "photographs"]
 
 
 class Tried(Strict):
@@ -29,7 +30,7 @@ class Tried(Strict):
 MAIN = Tried(
     trained_on=("photographs", "rendered", "randomised", "both"),
     localizers=MODELS,
-    maps=("rendered", "photographs"),
+    maps=("rendered", "refined", "photographs"),
 )
 CHECK = Tried(
     trained_on=("photographs", "randomised"), localizers=("posenet2",), maps=("rendered",)

@@ -11,6 +11,7 @@ from reproduction.real.config import RealConfig, Tried
 from reproduction.real.split import directions_of, split_frames
 
 PHOTOGRAPHS, RENDERED, RANDOMISED, BOTH = "photographs", "rendered", "randomised", "both"
+REFINED = "refined"
 GIVEN, SFM = "given", "sfm"
 
 
@@ -63,7 +64,13 @@ class RealRun:
 
 @dataclass(frozen=True)
 class PlaceMap:
-    """A map for localization by structure, of a part's ``rendered`` frames or ``photographs``."""
+    """A map for localization by structure.
+
+    Attributes:
+        part: Whose photographs are localized.
+        of: What the map shows, ``rendered`` frames or ``photographs``; ``refined``: poses in that
+            of rendered frames, found again on the scan drawn from them.
+    """
 
     part: Part
     of: str

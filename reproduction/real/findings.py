@@ -94,9 +94,10 @@ def _localizers(table: pd.DataFrame) -> Iterator[str]:
 
 
 def _structure(table: pd.DataFrame) -> Iterator[str]:
-    for row in rows_of(table[table.method == "structure"]):
+    for row in rows_of(table[table.method.isin(["structure", "structure-refined"])]):
+        refined = ", refined on the scan" if row.method == "structure-refined" else ""
         yield (
-            f"Structure, map of {ROWS[row.trained_on]}: {_pose(row)},"
+            f"Structure, map of {ROWS[row.trained_on]}{refined}: {_pose(row)},"
             f" {100 * row.recall_5cm_5deg:.0f} % within 5 cm and 5°,"
             f" {100 * row.localized:.0f} % localized."
         )

@@ -15,6 +15,8 @@ from reproduction.real.design import (
     GIVEN,
     PHOTOGRAPHS,
     RANDOMISED,
+    REFINED,
+    RENDERED,
     Part,
     RealDesign,
     RealRun,
@@ -37,7 +39,7 @@ from reproduction.tables.real import AMOUNT, COVER, SCHEMA, side_table
 from synfeal.records.files import read_json
 from synfeal.records.tables import NUMBER, frame_of, read_frame, write_frame
 
-STRUCTURE = "structure"
+STRUCTURE, STRUCTURE_REFINED = "structure", "structure-refined"
 REFERENCES = ("retrieval", "nearest", "mean")
 # Shares of a photograph that the scan covers: bounds of the bins that errors are shown for.
 SHARE_BOUNDS = (0.0, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0)
@@ -120,7 +122,8 @@ def _rows(config: RealConfig, design: RealDesign, scored: Scored) -> Iterator[di
         }
     for place in (place for place in design.maps if place.part == part):
         found = scored.cell([f"{place.directory}/poses.csv"])
-        yield {**_labelled(config, part, place.of, STRUCTURE), **found}
+        of, method = (RENDERED, STRUCTURE_REFINED) if place.of == REFINED else (place.of, STRUCTURE)
+        yield {**_labelled(config, part, of, method), **found}
     for name in REFERENCES:
         found = scored.cell([f"{part.name}/references/{name}.csv"])
         trained_on = PHOTOGRAPHS if name == "mean" else "rendered"

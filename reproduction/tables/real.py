@@ -55,6 +55,7 @@ ROWS = {
 }
 METHODS = TITLES | {
     "structure": "Structure",
+    "structure-refined": "Structure, refined on the scan",
     "retrieval": "Most alike by thumbnail",
     "nearest": "Nearest pose (oracle)",
     "mean": "Mean pose",

@@ -43,6 +43,7 @@ def root(tmp_path):
         row("forward", "randomised", "posenet2", 0.12, **around("times_position", 4.0)),
         row("forward", "randomised", "posenet", 0.16),
         row("forward", "rendered", "structure", math.inf),
+        row("forward", "rendered", "structure-refined", 0.05),
         row("forward", "rendered", "retrieval", 0.31),
         row("forward", "rendered", "nearest", 0.21),
         row("forward", "photographs", "mean", 0.62),
@@ -62,7 +63,7 @@ def test_infinite_errors_and_missing_yardsticks_are_read_back(root):
     table = read_real(root / "tables" / f"{NAME}.csv")
     assert math.isinf(table.position_m[3])
     assert table.position_m_sfm.isna().all()
-    assert table.n_test.tolist() == [500] * 9
+    assert table.n_test.tolist() == [500] * 10
 
 
 def test_sentences_give_the_numbers_of_their_rows(root):
@@ -72,6 +73,7 @@ def test_sentences_give_the_numbers_of_their_rows(root):
     assert "1.4 times as exact" in text
     assert "between 0.120 m / 4.8° (PoseNet2) and 0.160 m / 6.4° (PoseNet)" in text
     assert "Structure, map of rendered: half not localized, 25 % within 5 cm" in text
+    assert "Structure, map of rendered, refined on the scan: 0.050 m / 2.0°" in text
     assert "the mean pose 0.620 m / 24.8°" in text
 
 

@@ -66,6 +66,7 @@ def test_every_row_of_the_design_is_trained_and_localized(sequence, tmp_path):
     assert jobs["train"] == jobs["localize"] == 60 + 2 * 6 + 3 + 3
     assert (jobs["scan"], jobs["scan_fewer"], jobs["collect"]) == (3, 2, 5)
     assert jobs["map"] == jobs["localize_in_map"] == 4
+    assert jobs["localize_refined"] == 1
     assert jobs["references"] == jobs["cover"] == jobs["picture"] == 3
 
 
@@ -115,7 +116,7 @@ TOY = {
     "width": 96,
     "height": 72,
     "directions": {
-        "forward": {**TRIED, "maps": ["rendered", "photographs"]},
+        "forward": {**TRIED, "maps": ["rendered", "refined", "photographs"]},
         "reverse": None,
         "alternate": None,
     },
@@ -180,6 +181,7 @@ def test_the_whole_chain_ends_in_a_table_figures_and_sentences(tmp_path):
     assert set(zip(table.labels, table.trained_on, table.method, strict=True)) == {
         *(("given", row, "posenet2") for row in ("photographs", "randomised")),
         *(("given", of, "structure") for of in ("photographs", "rendered")),
+        ("given", "rendered", "structure-refined"),
         ("sfm", "randomised", "posenet2"),
         *((labels, "rendered", name) for labels in ("given", "sfm") for name in NEAREST),
         *((labels, "photographs", "mean") for labels in ("given", "sfm")),
@@ -194,7 +196,7 @@ def test_the_whole_chain_ends_in_a_table_figures_and_sentences(tmp_path):
     assert rows.position_m["randomised", "posenet2"] == pytest.approx(np.mean(medians), rel=1e-4)
     assert rows.position_m_worst["randomised", "posenet2"] == pytest.approx(max(medians), rel=1e-4)
     # What is found by features is found well, in the world of the photographs, which leans.
-    for of in ("photographs", "rendered"):
+    for of in ("photographs", "rendered", "refined"):
         poses = root / "forward" / "maps" / of / "poses.csv"
         assert median_error_m(poses, tested, localized=True) < 0.15
     # Both labels are the same poses but for a millimetre and the world.

@@ -27,7 +27,7 @@ wildcard_constraints:
     row=r"[a-z]+(-\d+)?",
     localizer=r"\w+",
     seed=r"\d+",
-    of="rendered|photographs",
+    of="rendered|photographs",  # of maps; `refined` are poses alone
 
 
 def frames_of(wildcards):
@@ -256,6 +256,25 @@ rule localize_in_map:
     shell:
         "synfeal localize {input.map} {input.test}/seq-* --camera {input.camera}"
         " --out {output} > {log} 2>&1"
+
+
+rule localize_refined:
+    input:
+        map=f"{ROOT}/{{part}}/maps/rendered/map",
+        scan=f"{ROOT}/{{part}}/scan.glb",
+        test=f"{ROOT}/{{part}}/test",
+        camera=SCAN,
+    output:
+        f"{ROOT}/{{part}}/maps/refined/poses.csv",
+    log:
+        f"{ROOT}/logs/localize_refined/{{part}}.log",
+    benchmark:
+        f"{ROOT}/benchmarks/localize_refined/{{part}}.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    shell:
+        "synfeal localize {input.map} {input.test}/seq-* --camera {input.camera}"
+        " --refine {input.scan} --out {output} > {log} 2>&1"
 
 
 rule references:
