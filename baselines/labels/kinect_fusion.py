@@ -28,6 +28,7 @@ from baselines.registry.kinds import LabelMethod
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.geometry.poses import inverse
+from synfeal.scan.fusion import fuse_depth
 
 Array = NDArray[np.float64]
 Depth = NDArray[np.float32]
@@ -69,10 +70,14 @@ class FusedModel:
         """Add a frame seen from a pose (4, 4); one without depth adds nothing."""
         if not np.isfinite(frame.depth_m).any():
             return
-        view = self._fused, _cam_from_first(first_from_cam), 1.0, self._cfg.max_depth_m, _TRUNCATION
-        depth = open3d_depth(frame.depth_m)
-        seen = self._grid.compute_unique_block_coordinates(depth, *view)
-        self._grid.integrate(seen, depth, *view)
+        seen = fuse_depth(
+            self._grid,
+            open3d_depth(frame.depth_m),
+            self._fused,
+            _cam_from_first(first_from_cam),
+            self._cfg.max_depth_m,
+            _TRUNCATION,
+        )
         self._reserve(seen, first_from_cam)
 
     def show(self, first_from_cam: Array) -> Depth:

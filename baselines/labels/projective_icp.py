@@ -72,7 +72,14 @@ def register(
         fx, fy, cx, cy = camera.intrinsics
         projection = np.array([fx, fy, cx - 0.5, cy - 0.5]) / stride
         for _ in range(steps):
-            system, right = _normal_equations(*target, *source, projection, motion)
+            system, right = _normal_equations(
+                target_points=target.points,
+                target_normals=target.normals,
+                points=source.points,
+                normals=source.normals,
+                projection=projection,
+                motion=motion,
+            )
             constraint = _constraint(system)
             if constraint < _SINGULAR:
                 return motion, 0.0

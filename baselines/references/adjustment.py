@@ -135,8 +135,9 @@ def _model(
     cam_from_world = inverse(world_from_cam)
     for index in np.unique(frame):
         seen = pixel[first[index] : first[index + 1]]
-        names = {"name": f"{index}", "camera_id": 1, "image_id": int(index) + 1}
-        image = pycolmap.Image(keypoints=seen, **names)
+        image = pycolmap.Image(
+            keypoints=seen, name=f"{index}", camera_id=1, image_id=int(index) + 1
+        )
         model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(cam_from_world[index, :3]))
     _add_points(model, point_m[chosen], frame, np.searchsorted(chosen, tracks.track[kept]))
     return model

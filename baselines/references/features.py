@@ -177,9 +177,10 @@ def write_views(
         InputError: a sequence or an image cannot be read.
     """
     color, depth = files_of_split(sequences, split, n_frames)
-    pixel = cell_pixels(camera, *side)
+    width, height = side
+    pixel = cell_pixels(camera, width, height)
     column, row = np.moveaxis(pixel.astype(int), -1, 0)
-    images = np.empty((len(color), side[1], side[0], 3), np.uint8)
+    images = np.empty((len(color), height, width, 3), np.uint8)
     depth_m = np.full((len(color), *column.shape), np.inf, np.float32)
     for index, path in enumerate(tqdm(color, "views", unit="frame", mininterval=5)):
         full = read_image(path, camera, "RGB")

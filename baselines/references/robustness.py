@@ -127,8 +127,12 @@ def robustness_table(
             for effects in test_frames:
                 known = read_described(descriptors[trained_on], len(train), len(truth), effects)
                 alike = most_alike(*known[descriptor], 1)[:, 0]
-                found = train.position_m[alike], train.quat_wxyz[alike]
-                answers = PoseTable(truth.frame, truth.path, *found)
+                answers = PoseTable(
+                    frame=truth.frame,
+                    path=truth.path,
+                    position_m=train.position_m[alike],
+                    quat_wxyz=train.quat_wxyz[alike],
+                )
                 records.append(_record(trained_on, method, effects, answers, truth))
         for effects, file in structure.items() if trained_on == CLEAN else ():
             answers = read_predictions(file)

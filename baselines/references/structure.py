@@ -157,8 +157,12 @@ def refined_focal_px(
     Returns:
         The focal length in pixels at which the points are missed least; NaN where it is not found.
     """
-    size = {"width": camera.width, "height": camera.height}
-    free = pycolmap.Camera(model="SIMPLE_PINHOLE", params=[camera.params[0], 0.0, 0.0], **size)
+    free = pycolmap.Camera(
+        model="SIMPLE_PINHOLE",
+        width=camera.width,
+        height=camera.height,
+        params=[camera.params[0], 0.0, 0.0],
+    )
     options = pycolmap.AbsolutePoseRefinementOptions()
     options.refine_focal_length = True
     start = pycolmap.Rigid3d(inverse(world_from_cam)[:3])
@@ -170,8 +174,9 @@ def refined_focal_px(
 def pinhole(camera: CameraConfig) -> pycolmap.Camera:
     """Return a camera without distortion and with its principal point at (0, 0)."""
     fx, fy, _, _ = camera.intrinsics
-    size = {"width": camera.width, "height": camera.height}
-    return pycolmap.Camera(model="PINHOLE", params=[fx, fy, 0.0, 0.0], **size)
+    return pycolmap.Camera(
+        model="PINHOLE", width=camera.width, height=camera.height, params=[fx, fy, 0.0, 0.0]
+    )
 
 
 ROUNDS = 4

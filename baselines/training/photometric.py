@@ -144,10 +144,11 @@ def levels_of(light: Tensor) -> Tensor:
 
 def smooth_gain(nodes_ev: Tensor, side: int) -> Tensor:
     """Interpolate stops (B, 1, n, n) at equally spaced nodes to factors (B, 1, side, side)."""
-    size = (side, side)
     if nodes_ev.shape[-1] == 1:
-        return torch.exp2(nodes_ev).expand(-1, -1, *size)
-    return torch.exp2(nn.functional.interpolate(nodes_ev, size, mode="bicubic", align_corners=True))
+        return torch.exp2(nodes_ev).expand(-1, -1, side, side)
+    return torch.exp2(
+        nn.functional.interpolate(nodes_ev, (side, side), mode="bicubic", align_corners=True)
+    )
 
 
 def covered(light: Tensor, rectangles: Rectangles) -> Tensor:

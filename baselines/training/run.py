@@ -282,7 +282,8 @@ def _split(
     if job.protocol.selection == "test":
         if test is None:
             raise ValueError("this protocol chooses weights by the test set, which is not given")
-        return data, read_labelled_frames(*test, data.images.shape[-1], data.images.device)
+        frames, labels = test
+        return data, read_labelled_frames(frames, labels, data.images.shape[-1], data.images.device)
     aside = job.protocol.selection in ("validation", "averaged")
     share = job.training.validation_share if aside else 0.0
     mask = held_out_paths(data.path, share, job.seed)

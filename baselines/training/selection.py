@@ -186,7 +186,7 @@ class Progress:
             return
         mean = float(torch.stack(self._losses).mean())
         self._losses.clear()
-        row = HistoryRow(self.done * self._batch_size, mean, learning_rate, *(errors or ()))
+        row = _with_errors(HistoryRow(self.done * self._batch_size, mean, learning_rate), errors)
         self.rows.append(row)
         self._say(row)
         if self.diverged:
@@ -220,7 +220,7 @@ class Progress:
     def end(self, errors: HeldOutErrors | None) -> None:
         """Note the errors of the weights that are kept, where these are not the last ones."""
         if errors is not None and self.rows:
-            self.rows[-1] = HistoryRow(*self.rows[-1][:3], *errors)
+            self.rows[-1] = _with_errors(self.rows[-1], errors)
 
     def state_dict(self) -> dict[str, Any]:
         """Return the rows of the history, the steps done, and losses not yet in a row."""
@@ -232,6 +232,17 @@ class Progress:
         self.rows = [HistoryRow(*row) for row in state["rows"]]
         self.done = self._done_before = state["done"]
         self._losses = [loss.to(self._device) for loss in state["losses"]]
+
+
+def _with_errors(row: HistoryRow, errors: HeldOutErrors | None) -> HistoryRow:
+    """Return a row with other errors on held-out frames; itself where there are none."""
+    if errors is None:
+        return row
+    return row._replace(
+        held_out_loss=errors.loss,
+        held_out_position_m=errors.position_m,
+        held_out_orientation_deg=errors.orientation_deg,
+    )
 
 
 def kept_errors(rows: list[HistoryRow]) -> HeldOutErrors | None:

@@ -54,8 +54,13 @@ def run_sfm(case: BatchCase, seed: int) -> dict[str, float]:
         InputError: the frames cannot be used.
     """
     batch = open_batch(case)
-    files = batch.color, case.groundtruth_camera, batch.world_from_cam
-    trajectory, facts = sfm_batch(*files, case.groundtruth.sfm, seed_of(seed, "sfm"))
+    trajectory, facts = sfm_batch(
+        batch.color,
+        case.groundtruth_camera,
+        batch.world_from_cam,
+        case.groundtruth.sfm,
+        seed_of(seed, "sfm"),
+    )
     return {
         **facts,
         **errors("sfm", fill_gaps(trajectory), batch.world_from_cam),
@@ -70,8 +75,9 @@ def run_rgbd(case: BatchCase, seed: int) -> dict[str, float]:
         InputError: the frames cannot be used.
     """
     batch, cfg = open_batch(case), case.groundtruth
-    files = batch.color, batch.depth, case.groundtruth_camera
-    graph, facts = rgbd_graph(*files, cfg.rgbd, seed_of(seed, "rgbd"))
+    graph, facts = rgbd_graph(
+        batch.color, batch.depth, case.groundtruth_camera, cfg.rgbd, seed_of(seed, "rgbd")
+    )
     begin_s = time.process_time()
     optimised = optimise_lm(graph, cfg.posegraph.lm_iterations)
     optimise_s = time.process_time() - begin_s

@@ -17,14 +17,39 @@ from reproduction.design.experiments import Design
 from synfeal.records.tables import write_frame
 
 COLUMNS = (
-    *("id", "section", "group", "statement", "published", "measured_labels", "measured_true"),
-    *("interval_labels", "interval_true", "test", "verdict_labels", "verdict_true"),
-    *("sensitivity_labels", "sensitivity_true", "dose", "test_paths_labels", "test_paths_true"),
-    *("seeds", "limits_of", "seed", "rules", "reason", "footnote", "evidence"),
+    "id",
+    "section",
+    "group",
+    "statement",
+    "published",
+    "measured_labels",
+    "measured_true",
+    "interval_labels",
+    "interval_true",
+    "test",
+    "verdict_labels",
+    "verdict_true",
+    "sensitivity_labels",
+    "sensitivity_true",
+    "dose",
+    "test_paths_labels",
+    "test_paths_true",
+    "seeds",
+    "limits_of",
+    "seed",
+    "rules",
+    "reason",
+    "footnote",
+    "evidence",
 )
 HEADINGS = (
-    *("", "Claim", "Published", "Against the labels (the paper's protocol)", "Verdict"),
-    *("Against the true poses", "Verdict"),
+    "",
+    "Claim",
+    "Published",
+    "Against the labels (the paper's protocol)",
+    "Verdict",
+    "Against the true poses",
+    "Verdict",
 )
 Row = Mapping[str, str]
 

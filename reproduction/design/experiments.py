@@ -121,8 +121,15 @@ class Run:
         So runs that differ in their labels alone have the same initial weights, held-out paths,
         order and rotations: a comparison of labels is paired.
         """
-        names = (self.scene, self.size, self.start, self.model, self.repetition)
-        return seed_of(profile_seed, "train", *names)
+        return seed_of(
+            profile_seed,
+            "train",
+            self.scene,
+            self.size,
+            self.start,
+            self.model,
+            self.repetition,
+        )
 
     @property
     def directory(self) -> str:
@@ -253,7 +260,10 @@ class Design(Strict):
             for e in _compared(other)
             if (e.scene, e.size, e.label_id, e.init) == cell
         ]
-        return [Run(*cell, model, repetition) for repetition in range(max(asked, default=0))]
+        return [
+            Run(row.scene, row.size, row.label_id, row.init, model, repetition)
+            for repetition in range(max(asked, default=0))
+        ]
 
     def table_runs(self, table: str) -> list[Run]:
         """List every run a table reads."""

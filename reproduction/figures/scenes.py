@@ -83,8 +83,9 @@ def plan_of(mesh: Triangles, top_m: float) -> Plan:
     bottom_m = floor_m(mesh.vertices_m[mesh.faces]) + ABOVE_FLOOR_M
     vertices, faces = mesh
     for normal_z, height_m in ((1.0, bottom_m), (-1.0, top_m)):
-        plane = {"plane_normal": [0, 0, normal_z], "plane_origin": [0, 0, height_m]}
-        vertices, faces, _ = slice_faces_plane(vertices, faces, **plane)
+        vertices, faces, _ = slice_faces_plane(
+            vertices, faces, plane_normal=[0, 0, normal_z], plane_origin=[0, 0, height_m]
+        )
     ground = mesh.vertices_m[:, :2]
     return Plan(vertices[faces][:, :, :2], np.stack([ground.min(axis=0), ground.max(axis=0)]))
 

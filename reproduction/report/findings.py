@@ -216,8 +216,8 @@ def more_frames_help(root: Path) -> Finding | None:
     room = size[size.scene == ROOM]
     if not {SMALL, LARGE} <= {*room["size"]}:
         return None
-    ends = room[room["size"] == SMALL], room[room["size"] == LARGE]
-    unpaired = mean_change(*ends, POSITION), mean_change(*ends, ORIENTATION)
+    few, many = room[room["size"] == SMALL], room[room["size"] == LARGE]
+    unpaired = mean_change(few, many, POSITION), mean_change(few, many, ORIENTATION)
     position, orientation = paired_changes(root, "C7") or unpaired
     if max(position.high, orientation.high) >= 1:
         return None
@@ -227,7 +227,7 @@ def more_frames_help(root: Path) -> Finding | None:
         "More frames help, and part of that is longer training.",
         f"From {SMALL} to {LARGE} frames of the Large Room the position error changes by"
         f" {_percent(position)} and the orientation error by {_percent(orientation)}"
-        f" {_printed(*ends)}. But larger sets are also shown more images, and twice the images"
+        f" {_printed(few, many)}. But larger sets are also shown more images, and twice the images"
         f" alone change the errors at {SMALL} by {_change(images_m.value)} and"
         f" {_change(images_deg.value)}, which is {low} to {high} % of that effect. No {SMALL} run"
         f" was shown as many images as the {LARGE} runs.",

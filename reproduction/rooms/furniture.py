@@ -62,13 +62,20 @@ def bookshelf(make: Maker, size_m: Size, rows: int = 5) -> Item:
     width, depth, height = size_m
     grain = materials.wood((0.5, 0.36, 0.22))
     levels = np.linspace(0.02, height - 0.025, rows + 1)
-    inner = width - 0.06, depth - 0.06, levels[1] - levels[0] - 0.06
+    inner_width, inner_depth, inner_height = (
+        width - 0.06,
+        depth - 0.06,
+        levels[1] - levels[0] - 0.06,
+    )
     edge = width / 2 - 0.0125
     return joined(
         make.box((width, 0.02, height), grain, 90, "flrt").placed(0, depth / 2 - 0.01),
         (make.box((width, depth, 0.025), grain, 120, "fbtu").placed(0, 0, z) for z in levels),
         (make.box((0.025, depth, height), grain, 120).placed(x, 0) for x in (-edge, edge)),
-        (books(make, *inner).placed(0, 0, z + 0.025) for z in levels[:-1]),
+        (
+            books(make, inner_width, inner_depth, inner_height).placed(0, 0, z + 0.025)
+            for z in levels[:-1]
+        ),
     )
 
 

@@ -57,8 +57,15 @@ def write_collection_speed(
             ``processor``, ``cores``.
     """
     began = time.perf_counter()
-    asked = (scene, collection, FRAMES, np.random.default_rng(seed), "train")
-    plan = plan_mesh(load_collision_mesh(collision), str(collision), *asked)
+    plan = plan_mesh(
+        mesh=load_collision_mesh(collision),
+        name=str(collision),
+        scene=scene,
+        collection=collection,
+        n_frames=FRAMES,
+        rng=np.random.default_rng(seed),
+        split="train",
+    )
     planning_s = (time.perf_counter() - began) / PARTS
     with (
         tempfile.TemporaryDirectory(dir=out_speed.parent) as folder,

@@ -117,7 +117,7 @@ def label_records(
 
 def error_record(pairs: Sequence[Pair]) -> dict[str, Any]:
     """Compute errors of the labels of some splits against their true poses, by column."""
-    every = [absolute_errors(*pair) for pair in pairs]
+    every = [absolute_errors(labels, truth) for labels, truth in pairs]
     position_m, orientation_deg = (np.concatenate(parts) for parts in zip(*every, strict=True))
     record: dict[str, Any] = {}
     errors = {"position_m": position_m, "orientation_deg": orientation_deg}

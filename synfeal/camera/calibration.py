@@ -196,8 +196,10 @@ def _from_record(values: Any) -> Calibration | None:
         return None
     is_fisheye = camera.get("projection") == "fisheye"
     fx, fy, cx, cy = (_numbers(camera, (name,), (1,))[0] for name in ("fx", "fy", "cx", "cy"))
+    width, height = _size(camera, ("width", "height"))
     return Calibration(
-        *_size(camera, ("width", "height")),
+        width=width,
+        height=height,
         fx=fx,
         fy=fy,
         cx=cx,
@@ -223,12 +225,13 @@ def _from_mapping(values: Any) -> Calibration:
         raise ValueError(
             f"{MATRIX[0]}: must be fx 0 cx, 0 fy cy, 0 0 1 without skew, found {matrix}"
         )
-    size = _size(values)
+    width, height = _size(values)
+    cx, cy = cx + 0.5, cy + 0.5
     if model in FISHEYE_MODELS:
         fisheye_k = _four(values, COEFFICIENTS)
-        return Calibration(*size, fx, fy, cx + 0.5, cy + 0.5, PINHOLE, "fisheye", fisheye_k)
+        return Calibration(width, height, fx, fy, cx, cy, PINHOLE, "fisheye", fisheye_k)
     distortion = _five(COEFFICIENTS[0], _numbers(values, COEFFICIENTS, (4, 5, 8, 12, 14)))
-    return Calibration(*size, fx, fy, cx + 0.5, cy + 0.5, distortion)
+    return Calibration(width, height, fx, fy, cx, cy, distortion)
 
 
 def _four(values: Mapping[str, Any], names: Sequence[str]) -> tuple[float, float, float, float]:
@@ -311,16 +314,17 @@ def _from_colmap(text: str) -> Calibration:
         raise ValueError(f"MODEL: {_shortened(model)} is not supported, only {', '.join(known)}")
     names = known[model]
     values = {"WIDTH": width, "HEIGHT": height, "PARAMS": parameters}
-    size = _size(values, ("WIDTH", "HEIGHT"))
+    width_px, height_px = _size(values, ("WIDTH", "HEIGHT"))
     held = dict(zip(names, _numbers(values, ("PARAMS",), (len(names),)), strict=True))
     fx, fy = (held[name if name in held else "f"] for name in ("fx", "fy"))
-    pinhole = (fx, fy, held["cx"], held["cy"])
+    cx, cy = held["cx"], held["cy"]
     if model in COLMAP_FISHEYE:
         k1, k2, k3, k4 = (held.get(name, 0.0) for name in ("k1", "k2", "k3", "k4"))
-        return Calibration(*size, *pinhole, PINHOLE, "fisheye", (k1, k2, k3, k4))
+        fisheye_k = (k1, k2, k3, k4)
+        return Calibration(width_px, height_px, fx, fy, cx, cy, PINHOLE, "fisheye", fisheye_k)
     coefficients = COLMAP_MODELS["FULL_OPENCV"][4:]
     distortion = _five("PARAMS", [held.get(name, 0.0) for name in coefficients])
-    return Calibration(*size, *pinhole, distortion)
+    return Calibration(width_px, height_px, fx, fy, cx, cy, distortion)
 
 
 def _shortened(value: Any) -> str:

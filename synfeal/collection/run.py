@@ -264,9 +264,15 @@ def _plan(job: CollectJob, scene: Path, part: Path) -> dict[Split, PoseTable]:
         collision, camera = scene / "collision.ply", config.network_camera
         mesh, settings, plans = load_collision_mesh(collision), config.scenes[name], {}
         for split in splits:
-            rng = generator_of(config.seed, "plan", name, split)
-            asked = (settings, config.collection, job.counts[split], rng, split)
-            plans[split] = plan_mesh(mesh, str(collision), *asked)
+            plans[split] = plan_mesh(
+                mesh=mesh,
+                name=str(collision),
+                scene=settings,
+                collection=config.collection,
+                n_frames=job.counts[split],
+                rng=generator_of(config.seed, "plan", name, split),
+                split=split,
+            )
         caster = RayCaster(*mesh)
         refuse_blank(caster, plans, camera, settings)
         if camera.stereo_baseline_m is not None:

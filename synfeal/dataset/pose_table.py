@@ -77,9 +77,14 @@ class PoseTable:
 
     def at(self, rows: slice | NDArray[np.int64], whole: PoseTable | None = None) -> PoseTable:
         """Select frames by row."""
-        columns = (self.frame[rows], self.path[rows], self.position_m[rows], self.quat_wxyz[rows])
-        registered = None if self.registered is None else self.registered[rows]
-        return PoseTable(*columns, whole or self.whole, registered)
+        return PoseTable(
+            frame=self.frame[rows],
+            path=self.path[rows],
+            position_m=self.position_m[rows],
+            quat_wxyz=self.quat_wxyz[rows],
+            whole=whole or self.whole,
+            registered=None if self.registered is None else self.registered[rows],
+        )
 
     def first(self, count: int) -> PoseTable:
         """Return the first ``count`` frames: smaller data sets are prefixes of larger ones."""

@@ -208,10 +208,10 @@ class _Path:
         """Average the light of sub-frames at the midpoints of equal parts of the exposure."""
         count = blur.subframes
         share = min(1.0, blur.exposure_s / self._seconds(row))
-        ends = self._world_from_cam[self._neighbour(row)], self._world_from_cam[row]
+        before, here = self._world_from_cam[self._neighbour(row)], self._world_from_cam[row]
         at = share * ((np.arange(count) + 0.5) / count - 0.5)
         # From the frame before to this one is 0 to 1; on a path's first frame, 0 to -1.
-        moved = interpolate(*ends, 1 + at)
+        moved = interpolate(before, here, 1 + at)
         total: Light = light_of(self.renderer.render(moved[0]))
         for pose in moved[1:]:
             total += light_of(self.renderer.render(pose))
@@ -237,8 +237,8 @@ class _Path:
     @cached_property
     def _rays_cam(self) -> NDArray[np.float32]:
         """Of all pixels (H, W, 3), at depth 1 m; 0 where a lens shows nothing."""
-        size = self.camera.width, self.camera.height
-        return np.nan_to_num(cell_directions(self.camera, *size)).astype(np.float32)
+        directions = cell_directions(self.camera, self.camera.width, self.camera.height)
+        return np.nan_to_num(directions).astype(np.float32)
 
     def _taken(self, light: Light, row: int) -> Rgb:
         """Take a picture of light (H, W, 3) that reaches the sensor."""

@@ -94,10 +94,10 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
     scales: dict[str, float] = {}
     for end, reference in yardsticks.items():
         moved, scales[end] = aligned(predicted, reference, settings.align, poses)
-        tables = _table(moved, frames), _table(reference, frames)
-        errors |= {f"{name}{end}": values for name, values in pose_errors(*tables).items()}
+        answers, truth = _table(moved, frames), _table(reference, frames)
+        errors |= {f"{name}{end}": values for name, values in pose_errors(answers, truth).items()}
         if camera is not None and depth_m is not None:
-            errors[f"dcre{end}"] = dcre(*tables, depth_m, camera)
+            errors[f"dcre{end}"] = dcre(answers, truth, depth_m, camera)
     rotations = np.asarray(np.isfinite(predicted).all(axis=(1, 2)))
     if not rotations.any():
         raise InputError(f"{poses}: none of its poses is a rotation and a position")
@@ -197,9 +197,10 @@ def aligned(poses: Array, reference: Array, align: Align, path: Path) -> tuple[A
     if align == "none":
         return poses, 1.0
     there = np.isfinite(poses).all(axis=(1, 2))
-    pair = poses[there, :3, 3], reference[there, :3, 3]
     try:
-        scale, rotation, translation = umeyama_sim3(*pair, with_scale=align == "sim3")
+        scale, rotation, translation = umeyama_sim3(
+            poses[there, :3, 3], reference[there, :3, 3], with_scale=align == "sim3"
+        )
     except ValueError as error:
         raise InputError(f"{path}: cannot be aligned ({why(error)}); give --align none") from error
     moved = poses.copy()

@@ -62,7 +62,7 @@ def colors_of(
         )
         local = seen.in_depth_cam_m @ turn.T + shift[:, 0]
         pixel = project(local, camera.color)
-        inside = within(pixel, *color_size, MARGIN_PX)
+        inside = within(pixel, camera.color.width, camera.color.height, MARGIN_PX)
         image = read_color(frames.color[index], color_size)
         share = (seen.cosine / local[:, 2]) ** 2
         vertex = seen.index[inside]

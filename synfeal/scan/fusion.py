@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,35 @@ Array = NDArray[np.float64]
 # Voxels per edge of a block, blocks to begin with (more are added), truncation in voxels, and how
 # many frames must have seen a surface for it to be kept: one alone is often a flying pixel.
 BLOCK_VOXELS, BLOCKS, TRUNCATION_VOXELS, MIN_WEIGHT = 8, 20_000, 4.0, 1.5
+
+
+def fuse_depth(
+    grid: Any,
+    depth: Any,
+    matrix: Any,
+    cam_from_grid: Any,
+    max_depth_m: float,
+    truncation_voxels: float,
+) -> Any:
+    """Add a depth image to a signed distance field.
+
+    Args:
+        grid: Open3D's ``VoxelBlockGrid`` with the attributes ``tsdf`` and ``weight``.
+        depth: Open3D image, metres.
+        matrix: Camera matrix (3, 3), a tensor. Projected positions are cut to whole pixels: with
+            the centre of the first pixel at (0.5, 0.5) that is the nearest one.
+        cam_from_grid: Pose (4, 4) of the grid in the camera's frame, a tensor.
+        max_depth_m: Depth beyond is left out.
+        truncation_voxels: Distance from the surface at which the field ends, voxels.
+
+    Returns:
+        Coordinates (M, 3) of the blocks that the image reaches, a tensor.
+    """
+    seen = grid.compute_unique_block_coordinates(
+        depth, matrix, cam_from_grid, 1.0, max_depth_m, truncation_voxels
+    )
+    grid.integrate(seen, depth, matrix, cam_from_grid, 1.0, max_depth_m, truncation_voxels)
+    return seen
 
 
 @dataclass(frozen=True)
@@ -86,8 +116,7 @@ def fuse(
             cam_from_world = o3d.core.Tensor.from_numpy(
                 inverse(world_from_color @ color_from_depth)
             )
-            view = (matrix, cam_from_world, 1.0, max_depth_m, TRUNCATION_VOXELS)
-            grid.integrate(grid.compute_unique_block_coordinates(image, *view), image, *view)
+            fuse_depth(grid, image, matrix, cam_from_world, max_depth_m, TRUNCATION_VOXELS)
         on_frame()
     nothing = InputError(
         f"scan: no surface within {max_depth_m:g} m is seen by two frames; give a smaller --stride,"

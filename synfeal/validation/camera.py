@@ -235,16 +235,16 @@ def colmap_camera(camera: CameraConfig, moved: tuple[float, float, float] = (0.0
     """
     import pycolmap  # takes long to load, and only comparing frames needs it
 
-    size = {"width": camera.width, "height": camera.height}
+    width, height = camera.width, camera.height
     if camera.projection == "equirectangular":
         return pycolmap.Camera(
-            model="EQUIRECTANGULAR", **size, params=[camera.width, camera.height]
+            model="EQUIRECTANGULAR", width=width, height=height, params=[width, height]
         )
     fx, fy, cx, cy = camera.intrinsics
     scale = float(np.exp(moved[2]))
     pinhole = [fx * scale, fy * scale, cx + moved[0], cy + moved[1]]
     if camera.projection == "fisheye":
         params = [*pinhole, *(camera.fisheye_k or EQUIDISTANT)]
-        return pycolmap.Camera(model="OPENCV_FISHEYE", **size, params=params)
+        return pycolmap.Camera(model="OPENCV_FISHEYE", width=width, height=height, params=params)
     params = [*pinhole, *camera.distortion, 0.0, 0.0, 0.0]
-    return pycolmap.Camera(model="FULL_OPENCV", **size, params=params)
+    return pycolmap.Camera(model="FULL_OPENCV", width=width, height=height, params=params)

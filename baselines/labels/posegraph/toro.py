@@ -81,20 +81,28 @@ def optimise_toro(graph: PoseGraph, iterations: int, epsilon: float) -> Array:
     edges = sorted(_path_edges(graph, parents), key=lambda edge: edge.top_depth)
     stiffness = _stiffness(edges, len(graph))
     rates = np.array([len(e.nodes) * e.weight / stiffness.min(axis=0) for e in edges])
-    paths = (
-        np.cumsum([0, *(len(edge.nodes) for edge in edges)]),
-        np.concatenate([edge.nodes for edge in edges]),
-        np.concatenate([edge.upward for edge in edges]),
-        np.concatenate([_shares(stiffness[edge.nodes - 1]) for edge in edges]),
-    )
+    first = np.cumsum([0, *(len(edge.nodes) for edge in edges)])
+    nodes = np.concatenate([edge.nodes for edge in edges])
+    upward = np.concatenate([edge.upward for edge in edges])
+    shares = np.concatenate([_shares(stiffness[edge.nodes - 1]) for edge in edges])
     measured = np.array([edge.i_from_j for edge in edges])
-    motions = quat_wxyz_of(measured), measured[:, :3, 3].copy()
+    measured_quat, measured_m = quat_wxyz_of(measured), measured[:, :3, 3].copy()
     start = relative(graph.first_from_cam[parents], graph.first_from_cam)
     quat_wxyz, position_m = quat_wxyz_of(start), start[:, :3, 3].copy()
     error = chi2(graph, graph.first_from_cam)
     for iteration in range(1, iterations + 1):
         gains = np.minimum(1.0, rates * _DELAY / (_DELAY + iteration - 1))
-        sweep(quat_wxyz, position_m, *paths, gains, *motions)
+        sweep(
+            quat_wxyz=quat_wxyz,
+            position_m=position_m,
+            first=first,
+            nodes=nodes,
+            upward=upward,
+            shares=shares,
+            gains=gains,
+            measured_quat=measured_quat,
+            measured_m=measured_m,
+        )
         poses = _poses(pose_from_quat(position_m, quat_wxyz), parents)
         previous, error = error, chi2(graph, poses)
         if gains.max() < 1 and abs(previous - error) <= epsilon * previous:

@@ -9,7 +9,7 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from baselines.config.labels import RgbdConfig
-from baselines.labels.rgbd.frames import SINGULAR, RgbdFrame, align, near
+from baselines.labels.rgbd.frames import RgbdFrame, align, motion_or_none, near
 from synfeal.config.dataset import CameraConfig
 
 Array = NDArray[np.float64]
@@ -179,8 +179,9 @@ def register(
     """
     odometry = o3d.t.pipelines.odometry
     matrix = o3d.core.Tensor.from_numpy(camera.intrinsics.matrix(centre_shift_px=-0.5))
-    i_from_j = o3d.core.Tensor.from_numpy(np.ascontiguousarray(start))
-    try:
+
+    def estimate() -> o3d.core.Tensor:
+        i_from_j = o3d.core.Tensor.from_numpy(np.ascontiguousarray(start))
         for steps, huber_m in _PASSES:
             i_from_j = odometry.rgbd_odometry_multi_scale(
                 source=j,
@@ -193,12 +194,9 @@ def register(
                 method=_METHODS[method],
                 params=odometry.OdometryLossParams(2 * cfg.max_rmse_m, huber_m),
             ).transformation
-    except RuntimeError as error:
-        if SINGULAR not in str(error):
-            raise
-        return None
-    found = np.asarray(i_from_j.numpy(), dtype=np.float64)
-    return found if np.isfinite(found).all() else None
+        return i_from_j
+
+    return motion_or_none(estimate)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ longer move the camera; the steps themselves are Open3D's.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -112,28 +113,46 @@ def align(i: Surfaces, j: Surfaces, start: Array, max_difference_m: float) -> Ar
     Returns:
         Motion ``i_from_j`` (4, 4), or None where nothing in view constrains it.
     """
+    return motion_or_none(lambda: _aligned(i, j, start, max_difference_m))
+
+
+def _aligned(i: Surfaces, j: Surfaces, start: Array, max_difference_m: float) -> o3d.core.Tensor:
+    """Register as :func:`align` does; raise what Open3D raises."""
     i_from_j = o3d.core.Tensor.from_numpy(np.ascontiguousarray(start))
+    for stage in STAGES:
+        target, source = i[stage.stride], j[stage.stride]
+        for _ in range(stage.max_steps):
+            step = o3d.t.pipelines.odometry.compute_odometry_result_point_to_plane(
+                source_vertex_map=source.points,
+                target_vertex_map=target.points,
+                target_normal_map=target.normals,
+                intrinsics=target.intrinsics,
+                init_source_to_target=i_from_j,
+                depth_outlier_trunc=max_difference_m,
+                depth_huber_delta=stage.huber_m,
+            ).transformation
+            i_from_j = step @ i_from_j
+            if near(step.numpy(), np.eye(4), stage.rest_m, stage.rest_deg):
+                break
+    return i_from_j
+
+
+def motion_or_none(estimate: Callable[[], o3d.core.Tensor]) -> Array | None:
+    """Return the motion (4, 4) that Open3D estimates; None where it finds none.
+
+    Args:
+        estimate: Asks Open3D for a motion.
+
+    Raises:
+        RuntimeError: Open3D fails for another reason than that nothing constrains the motion.
+    """
     try:
-        for stage in STAGES:
-            target, source = i[stage.stride], j[stage.stride]
-            for _ in range(stage.max_steps):
-                step = o3d.t.pipelines.odometry.compute_odometry_result_point_to_plane(
-                    source_vertex_map=source.points,
-                    target_vertex_map=target.points,
-                    target_normal_map=target.normals,
-                    intrinsics=target.intrinsics,
-                    init_source_to_target=i_from_j,
-                    depth_outlier_trunc=max_difference_m,
-                    depth_huber_delta=stage.huber_m,
-                ).transformation
-                i_from_j = step @ i_from_j
-                if near(step.numpy(), np.eye(4), stage.rest_m, stage.rest_deg):
-                    break
+        motion = estimate()
     except RuntimeError as error:
         if SINGULAR not in str(error):
             raise
         return None
-    found = np.asarray(i_from_j.numpy(), dtype=np.float64)
+    found = np.asarray(motion.numpy(), dtype=np.float64)
     return found if np.isfinite(found).all() else None
 
 
