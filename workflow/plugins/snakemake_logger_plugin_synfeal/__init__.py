@@ -42,7 +42,7 @@ class LogHandler(LogHandlerBase):
         """Called for one event after the other, in one thread."""
         try:
             self._show(record)
-        except Exception:
+        except Exception:  # noqa: BLE001
             # As logging asks of handlers: it prints the traceback, and the run goes on
             # (https://docs.python.org/3/library/logging.html#logging.Handler.handleError).
             self.handleError(record)
