@@ -22,6 +22,7 @@ from synfeal.evaluation.reference import MOST_APART_S
 from synfeal.evaluation.reprojection import DCRE_BOUNDS
 from synfeal.evaluation.run import Evaluation, Settings
 from synfeal.records.files import atomic_path
+from synfeal.records.tables import write_frame
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -157,7 +158,6 @@ def write_files(out: Sequence[Path], title: str, found: Evaluation) -> None:
     """Write scores (.csv), errors (.csv) and the figure (.png)."""
     errors = pd.DataFrame({"frame": found.frames.names, **found.errors})  # inf: no pose
     for path, table in zip(out, (scores_table(found), errors), strict=False):
-        with atomic_path(path) as temporary:
-            table.to_csv(temporary, index=False, lineterminator="\n")
+        write_frame(path, table, float_format=None)
     with atomic_path(out[2]) as temporary:
         figure_of(title, found).savefig(temporary, dpi=150)

@@ -44,6 +44,7 @@ from synfeal.export.frames import (
 )
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.records.files import write_json
+from synfeal.records.tables import write_frame
 
 
 def export_ace(data: ExportSet, out: Path, place: Place) -> None:
@@ -84,7 +85,7 @@ def export_mstransformer(data: ExportSet, out: Path, place: Place) -> None:
             pose = (*frame.world_from_cam[:3, 3], *quat_wxyz_of(frame.world_from_cam))
             rows.append((data.path.resolve().name, split, frame.sequence, path, *pose))
         table = pd.DataFrame(rows, columns=list(COLUMNS))
-        table.to_csv(out / f"{split}.csv", index=False, lineterminator="\n")
+        write_frame(out / f"{split}.csv", table, float_format=None)
 
 
 # OpenGL cameras are x right, y up, z backward; ours are x right, y down, z forward.
