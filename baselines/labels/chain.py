@@ -271,9 +271,9 @@ def write_label_set(
     out_assistance: Path,
     out_record: Path,
 ) -> None:
-    """Chain both splits; ``estimation`` is what the record says that the labels depend on.
+    """Chain the batches of both splits, and record what the labels depend on.
 
-    By ``truth_used`` batches are anchored or not.
+    ``estimation`` is that record; ``truth_used`` decides whether batches are anchored.
     """
     anchored = truth_used == TruthUsed.POSES
     records = {

@@ -42,7 +42,7 @@ RECORD = "training.json"
 def write_training_record(
     path: Path, parameters: Mapping[str, Any], inputs: Mapping[str, Path]
 ) -> None:
-    """Write what a run was trained from; packed frames are told by the hash in their own record."""
+    """Record the inputs of a training run; packed frames by the hash in their own record."""
     hashes = {name: _sha256(file) for name, file in inputs.items()}
     origin = provenance(parameters["seed"], "")
     kept = {key: origin[key] for key in ("commit", "packages", "platform")}

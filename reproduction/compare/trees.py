@@ -64,7 +64,7 @@ class Comparison:
 
     @property
     def runs(self) -> pd.DataFrame:
-        """One row per run: what is said of all its measures."""
+        """One row per run, with what its measures have in common."""
         return self.table[self.table["measure"] == MEASURES[0]]
 
 

@@ -124,7 +124,8 @@ def key_rows(
 ) -> Iterator[tuple[str, ...]]:
     """Yield dotted key, value and meaning of every key of an object's schema, depth first.
 
-    Keys of a model that is told already are told by where; ``told`` collects these places.
+    For a model that was listed before, only the place of that list is named; ``told`` collects
+    these places.
     """
     told = {} if told is None else told
     for name, field in schema["properties"].items():

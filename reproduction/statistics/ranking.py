@@ -18,7 +18,7 @@ Orders = NDArray[np.int8]
 
 
 class Agreement(NamedTuple):
-    """What a ranking has in common with the true one."""
+    """Agreement of a ranking with the true one."""
 
     tau: float  # NaN where the truth tells no two methods apart, so that nothing is to be ranked
     tau_low: float  # 95 % limits over test paths

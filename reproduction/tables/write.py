@@ -33,8 +33,8 @@ from reproduction.tables.layouts import (
 from reproduction.tables.sheet import PAPER, Line, Sheet, Value, write_latex
 from synfeal.records.tables import rows_of, write_frame
 
-# Kinds of lines in their order, and what their numbers are measured against; after those of a
-# score stands its change, in Table 5.
+# Kinds of lines in their order, and what their numbers are measured against; in Table 5 each score
+# is followed by its change.
 AGAINST = {
     "labels": "labels",
     "yardstick": "labels, yardstick alone",
@@ -47,7 +47,7 @@ AGAINST = {
 }
 KIND_OF = {"labels": "", "truth": "_true"}
 FAILED = "failed"
-# What stands after the limits of a cell.
+# Suffix of the limits of a cell.
 PATHS_ONLY = {PATHS: ", paths only", PATHS_AND_SEEDS: ""}
 
 

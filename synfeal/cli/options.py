@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any, NamedTuple
 
-# Flag, and what argparse is told about it.
+# Flag, and its arguments of argparse.
 Option = tuple[str, dict[str, Any]]
 Action = Callable[[argparse.Namespace], None]
 

@@ -100,7 +100,7 @@ def write_instances(mesh_path: Path, mesh: TexturedMesh, out: Path, path_objects
     """Write the table of instances, ``masks.json``.
 
     Args:
-        mesh_path: Mesh of the scene; what was placed in it is told beside it.
+        mesh_path: Mesh of the scene; ``clutter.json`` beside it lists what was placed in it.
         mesh: The same, loaded.
         out: File to write.
         path_objects: Whether other objects stand along each path, which tables of objects number.

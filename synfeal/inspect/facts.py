@@ -31,7 +31,7 @@ from synfeal.records.files import file_sha256
 
 Array = NDArray[np.float64]
 
-N_HOLES = 10  # of which the length is told
+N_HOLES = 10  # largest holes whose length is reported
 
 
 def facts_of(found: Inspection) -> dict[str, Any]:

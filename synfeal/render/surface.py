@@ -30,7 +30,7 @@ class Layers(NamedTuple):
 
     @property
     def of_surface(self) -> bool:
-        """Whether a layer needs to know which triangle each pixel shows."""
+        """True if a layer needs to know which triangle each pixel shows."""
         return self.normals or self.masks
 
 

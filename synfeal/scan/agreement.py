@@ -28,7 +28,7 @@ from synfeal.scan.reading import Depth, read_depth_m
 Array = NDArray[np.float64]
 N_FRAMES, N_POINTS = 24, 300  # frames that are compared, each with each, and points of each
 TOLERANCE = 0.03  # of depth, within which two measurements agree
-FOCAL_TOLERANCE = 0.015  # the same, where focal lengths are told apart
+FOCAL_TOLERANCE = 0.015  # the same, for comparing focal lengths
 MIN_COMPARED = 300  # points that another frame must have measured, for anything to be said
 GOOD, CLEARLY = 0.7, 0.15  # share that is not doubted; by how much a better explanation is better
 # What a person may have meant: units that depth is stored in.

@@ -1,4 +1,4 @@
-"""Chain both splits; ``estimation`` is what the record says that the labels depend on."""
+"""Chain the batches of both splits, and record what the labels depend on."""
 
 from baselines.labels.chain import write_label_set
 from reproduction.runs.job import run_job
