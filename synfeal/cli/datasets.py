@@ -20,7 +20,7 @@ POSE_FORMATS = (
     "7scenes", "tum", "kitti", "euroc", "colmap", "hloc", "pgt", "ace", "ace0", "csv",
 )
 # fmt: on
-LAYERS = ("color", "depth", "normals", "masks")
+LAYERS = ("color", "depth", "normals", "masks", "right", "right-depth")
 FILES = ("scores.csv", "errors.csv", "errors.png")
 DATASET = option("dataset", "directory of seq-01 or seq-01.zip", type=Path, metavar="DATASET")
 CAMERA = option("--camera", "calibration file (manifest.json)", type=Path, metavar="FILE")

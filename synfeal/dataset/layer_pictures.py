@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import colorsys
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from PIL import Image
 
 from synfeal.dataset.frame_files import FrameFile, read_image
 from synfeal.dataset.layer_files import read_mask
-from synfeal.dataset.sequence_listing import COLOR, DEPTH, MASK, NORMAL
+from synfeal.dataset.sequence_listing import COLOR, DEPTH, MASK, NORMAL, RIGHT_COLOR, RIGHT_DEPTH
 from synfeal.dataset.sevenscenes import read_depth_m
 
 GOLDEN_RATIO = 0.618034  # neighbours in number get hues far apart
@@ -37,10 +38,30 @@ def _image(file: FrameFile) -> Image.Image:
     return read_image(file, "RGB")
 
 
-# By the names of ``synfeal preview --show``: kind of file, and its picture.
-PICTURES: Mapping[str, tuple[str, Callable[[FrameFile], Image.Image]]] = {
-    "color": (COLOR, _image),
-    "depth": (DEPTH, lambda file: depth_picture(read_depth_m(file))),
-    "normals": (NORMAL, _image),
-    "masks": (MASK, lambda file: mask_picture(read_mask(file))),
+def _depth(file: FrameFile) -> Image.Image:
+    return depth_picture(read_depth_m(file))
+
+
+class Layer(NamedTuple):
+    """How a kind of file is shown.
+
+    Attributes:
+        kind: Ending of its files.
+        picture: Makes a picture of one.
+        collected_with: Options of ``synfeal collect`` that make it.
+    """
+
+    kind: str
+    picture: Callable[[FrameFile], Image.Image]
+    collected_with: str
+
+
+# By the names of ``synfeal preview --show``.
+PICTURES: Mapping[str, Layer] = {
+    "color": Layer(COLOR, _image, ""),
+    "depth": Layer(DEPTH, _depth, "--depth"),
+    "normals": Layer(NORMAL, _image, "--normals"),
+    "masks": Layer(MASK, lambda file: mask_picture(read_mask(file)), "--masks"),
+    "right": Layer(RIGHT_COLOR, _image, "--stereo BASELINE_M"),
+    "right-depth": Layer(RIGHT_DEPTH, _depth, "--depth --stereo BASELINE_M"),
 }

@@ -6,7 +6,7 @@ import importlib.util
 import math
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,10 +14,11 @@ from PIL import Image, ImageDraw
 
 from synfeal.dataset.frame_files import FrameFile, read_image
 from synfeal.dataset.layer_pictures import PICTURES
+from synfeal.dataset.sequence_listing import SequenceListing
 from synfeal.dataset.sevenscenes import Split
 from synfeal.dataset.split_frames import read_split_frames
 from synfeal.errors import InputError
-from synfeal.records.files import atomic_path
+from synfeal.records.files import atomic_path, lies_in
 
 TILE_WIDTH_PX, TITLE_PX = 320, 16
 
@@ -49,8 +50,8 @@ def write_preview(
     """
     if n_frames < 1:
         raise InputError(f"--frames: must be at least 1, found {n_frames}")
-    if not 0 < fps <= 50:
-        raise InputError(f"--fps: must be above 0 and at most 50, which a GIF can show, not {fps}")
+    if not 0.01 <= fps <= 50:
+        raise InputError(f"--fps: must be 0.01 to 50, which a GIF can show, found {fps:g}")
     write = WRITERS.get(out.suffix.lower())
     if write is None:
         raise InputError(f"--out: {out}: a preview is a GIF or MP4; end its name in .gif or .mp4")
@@ -59,20 +60,31 @@ def write_preview(
     columns = []
     for dataset in datasets:
         frames = read_split_frames(dataset, split)
-        for layer in show:
-            kind, picture = PICTURES[layer]
-            if layer != "color" and not any(s.numbers[kind] for s in frames.sequences):
+        _refuse_among_frames(out, frames.sequences)
+        for name in show:
+            layer = PICTURES[name]
+            if name != "color" and not any(s.numbers[layer.kind] for s in frames.sequences):
                 raise InputError(
-                    f"--show: {dataset} has no {layer}; collect it with --{layer}, or leave it out"
+                    f"--show: {dataset} has no {name}; collect it with {layer.collected_with}, or"
+                    " leave it out"
                 )
-            name = dataset.resolve().name + (f" {layer}" if len(show) > 1 else "")
-            columns.append(Column(name, frames.files(kind)[:n_frames], picture))
+            title = dataset.resolve().name + (f" {name}" if len(show) > 1 else "")
+            columns.append(Column(title, frames.files(layer.kind)[:n_frames], layer.picture))
     pictures = list(_rows(columns))
     if not pictures:
         raise InputError(f"{datasets[0]}: has no {split} frames; choose the other --split")
     with atomic_path(out) as temporary:
         write(pictures, fps, temporary)
     return len(pictures)
+
+
+def _refuse_among_frames(out: Path, sequences: Iterable[SequenceListing]) -> None:
+    """Refuse a place where the picture could be taken for one of a frame."""
+    for sequence in sequences:
+        if lies_in(out, sequence.path):
+            raise InputError(
+                f"--out: {out} lies among the frames of {sequence.path}; choose a place beside them"
+            )
 
 
 def encoder() -> str:

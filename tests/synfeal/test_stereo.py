@@ -1,6 +1,7 @@
 """Stereo pairs: disparity is f b / depth, and every reader has both images of every frame."""
 
 import json
+import shutil
 
 import numpy as np
 import open3d as o3d
@@ -13,6 +14,7 @@ from synfeal.cli import main
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import encode_png
 from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.preview import TILE_WIDTH_PX
 from synfeal.dataset.render_sequence import write_sequence
 from synfeal.effects.scene import SceneRenderer
 from synfeal.errors import InputError
@@ -158,6 +160,26 @@ def test_exports_have_both_images_and_colmap_the_rig(dataset, tmp_path):
     lines = (tmp_path / "tum" / "seq-01-right" / "groundtruth.txt").read_text().splitlines()
     position = np.array(lines[3].split()[1:4], float)
     np.testing.assert_allclose(position, dataset.train.right.world_from_cam[0, :3, 3], atol=1e-9)
+
+
+def test_a_preview_shows_both_images_side_by_side(dataset, tmp_path, capfd):
+    """All left images are white, all right ones grey."""
+    folder = shutil.copytree(dataset.path, tmp_path / "set")
+    for kind, level in (("color", 255), ("right.color", 90)):
+        for path in (folder / "seq-01").glob(f"frame-*[0-9].{kind}.png"):
+            path.write_bytes(encode_png(np.full((72, 96, 3), level, np.uint8)))
+    shown = ["--show", "right", "color", "right-depth", "--frames", "2"]
+    assert main(["preview", str(folder), "--out", str(tmp_path / "both.gif"), *shown]) == 0
+    with Image.open(tmp_path / "both.gif") as opened:
+        row = np.asarray(opened.convert("RGB"))[-1]
+    assert row.shape == (3 * TILE_WIDTH_PX, 3)
+    np.testing.assert_allclose(row[:TILE_WIDTH_PX], 90, atol=2)
+    np.testing.assert_allclose(row[TILE_WIDTH_PX : 2 * TILE_WIDTH_PX], 255, atol=2)
+    assert row[2 * TILE_WIDTH_PX :].max() > 20
+    for path in (folder / "seq-01").glob("*.right.*"):
+        path.unlink()
+    message = refused(capfd, "preview", folder, "--show", "right")
+    assert "has no right; collect it with --stereo BASELINE_M" in message
 
 
 def test_refusals_are_one_line(tmp_path, capfd):
