@@ -199,13 +199,7 @@ def pairs(arguments: argparse.Namespace) -> None:
         "convention of POSES, where it is not that of their format",
         choices=CONVENTIONS,
     ),
-    option(
-        "--rate",
-        "with TUM and EuRoC: frames per second (30)",
-        type=float,
-        default=30.0,
-        metavar="HZ",
-    ),
+    option("--rate", "with TUM and EuRoC: frames per second (30)", type=float, metavar="HZ"),
     CAMERA,
     option("--out", "directory for scores.csv, errors.csv and errors.png", type=Path),
 )

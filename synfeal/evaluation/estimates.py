@@ -54,6 +54,19 @@ class Estimates:
     # (N, 4) quaternions in the order of ``convention``; not a number where a matrix is no rotation
     quat: Array
     frame_key: FrameKey = "name"
+    of_matrices: bool = False  # whether the file has matrices in place of quaternions
+
+    @property
+    def counts_seconds(self) -> bool:
+        """Check whether times are 0, 1, 2, ..., in one sequence or each: they may be numbers."""
+        if self.frame_key != "time" or len(self.names) < 2:
+            return False
+        stamps = [name.rpartition("/")[2] for name in self.names]
+        seconds = np.array(stamps, np.float64)
+        if seconds[0] != 0.0 or not np.isfinite(seconds).all():
+            return False
+        onwards = np.diff(seconds) == 1.0
+        return bool(onwards.any() and (onwards | (seconds[1:] == 0.0)).all())
 
     def world_from_cam(self, convention: Convention) -> Array:
         """Return poses (N, 4, 4), read by a convention; NaN where there is no rotation."""

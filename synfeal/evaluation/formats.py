@@ -6,6 +6,7 @@
   each frame, in order.
 - EuRoC (Burri et al., IJRR 2016; ``state_groundtruth_estimate0/data.csv``): a CSV of a time in
   whole nanoseconds, position and quaternion ``wxyz`` of ``world_from_body``, and further columns.
+  Without these, and with times that may be seconds, it may be TUM with commas: a person says which.
 - COLMAP ("Output Format"): ``images.txt`` or ``images.bin``, ``cam_from_world``, ``wxyz``.
 - hloc (``localize_sfm``) and visuallocalization.net: ``name qw qx qy qz tx ty tz``,
   ``cam_from_world``.
@@ -45,6 +46,8 @@ OURS, COLMAP = Convention("world_from_cam", "wxyz"), Convention("cam_from_world"
 TUM = Convention("world_from_cam", "xyzw")
 MODELS = ("images.txt", "images.bin")
 RIGID_BOUND = 1e-3  # text of few digits
+# 1973 in nanoseconds: what seconds, milliseconds and microseconds of today do not reach.
+LEAST_STAMP_NS = 10**17
 
 FormatName = Literal[
     "7scenes", "tum", "kitti", "euroc", "colmap", "hloc", "pgt", "ace", "ace0", "csv"
@@ -103,7 +106,8 @@ def read_estimates(path: Path, file_format: FormatName | None = None) -> Estimat
         raise InputError(f"{path}: missing; give a file of poses, or a directory")
     with read_as(path, "poses"):
         text = path.read_text(encoding="utf-8-sig")
-    rows = [(i, line.split()) for i, line in enumerate(text.splitlines(), start=1)]
+    spaced = text.replace(",", " ") if file_format == "tum" else text
+    rows = [(i, line.split()) for i, line in enumerate(spaced.splitlines(), start=1)]
     rows = [(i, row) for i, row in rows if row and not row[0].startswith("#")]
     if not rows:
         raise InputError(f"{path}: holds no poses")
@@ -112,7 +116,9 @@ def read_estimates(path: Path, file_format: FormatName | None = None) -> Estimat
     first = rows[0][1][0]
     if file_format in ("csv", "euroc") or (file_format is None and "," in first):
         whole = is_number(first.partition(",")[0]) and file_format != "csv"
-        return read_euroc(path, text) if whole or file_format == "euroc" else read_csv(path, text)
+        if whole or file_format == "euroc":
+            return read_euroc(path, text, told=file_format == "euroc")
+        return read_csv(path, text)
     return read_lines(path, rows, file_format)
 
 
@@ -163,6 +169,7 @@ def read_sevenscenes(path: Path) -> Estimates:
         tuple(str(frame.path(POSE)) for _, frame in frames),
         matrices[:, :3, 3],
         _quat_of_rotations(matrices),
+        of_matrices=True,
     )
 
 
@@ -219,8 +226,17 @@ def read_csv(path: Path, text: str) -> Estimates:
     )
 
 
-def read_euroc(path: Path, text: str) -> Estimates:
-    """Read EuRoC's ground truth, or a table of its first eight columns."""
+def read_euroc(path: Path, text: str, told: bool = True) -> Estimates:
+    """Read EuRoC's ground truth, or a table of its first eight columns.
+
+    Args:
+        path: The file, for messages.
+        text: Its content.
+        told: Whether a person said that it is EuRoC's.
+
+    Raises:
+        InputError: it is damaged, or nobody said so and it may as well be TUM's.
+    """
     lines = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip()]
     rows = [
         (i, [cell.strip() for cell in line.rstrip(", ").split(",")])
@@ -237,10 +253,16 @@ def read_euroc(path: Path, text: str) -> Estimates:
         if not row[0].isdecimal():
             raise InputError(
                 f"{path}: {place}: the time '{row[0][:40]}' must be whole nanoseconds (EuRoC); a"
-                " TUM trajectory has seconds, and spaces in place of commas"
+                " TUM trajectory has seconds, and with commas needs --format tum"
             )
     values = _numbers(path, places, [row[1:8] for _, row in rows])
     stamps_ns = [int(row[0]) for _, row in rows]
+    if not told and max(stamps_ns) < LEAST_STAMP_NS and all(len(row) == 8 for _, row in rows):
+        raise InputError(
+            f"{path}: {places[0]}: eight numbers, a time of {rows[0][1][0][:40]} and commas may be"
+            " EuRoC's (nanoseconds, quaternion wxyz) or TUM's (seconds, xyzw); say which with"
+            " --format euroc or tum"
+        )
     return Estimates(
         "a EuRoC trajectory",
         OURS,
@@ -324,6 +346,7 @@ def _of_matrices(
         matrices[:, :3, 3],
         _quat_of_rotations(matrices),
         frame_key=line_format.frame_key,
+        of_matrices=True,
     )
 
 

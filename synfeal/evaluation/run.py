@@ -31,6 +31,7 @@ Align = Literal["none", "se3", "sim3"]
 
 # Endings of the names of errors against the data set's poses and against the second yardstick.
 DATASET, LABELS = "", "_labels"
+DEFAULT_RATE_HZ = 30.0
 
 
 class Settings(NamedTuple):
@@ -39,7 +40,7 @@ class Settings(NamedTuple):
     split: str = "test"  # ``test``, ``train`` or ``all``
     align: Align = "none"  # whether estimates are first moved onto the yardstick, as a whole
     convention: str | None = None  # a key of ``CONVENTIONS``; None takes the format's and checks it
-    rate_hz: float = 30.0  # frames a second of time stamps
+    rate_hz: float | None = None  # frames a second of time stamps; None is DEFAULT_RATE_HZ
     labels: Path | None = None  # poses of the same frames as a second yardstick
     camera: Path | None = None  # calibration file, for the DCRE
     file_format: FormatName | None = None  # of the poses; None tells it by what the file holds
@@ -77,10 +78,11 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
     Raises:
         InputError: One of the files cannot be used.
     """
-    if not 0 < settings.rate_hz < np.inf:
+    if settings.rate_hz is not None and not 0 < settings.rate_hz < np.inf:
         raise InputError(f"--rate: must be above 0 frames a second, found {settings.rate_hz:g}")
     frames = _scored(dataset, settings)
     estimates = read_estimates(poses, settings.file_format)
+    _refuse_useless(dataset, poses, frames, estimates, settings)
     if frames.frame_key == "time":
         frames, row = met_in_time(frames, estimates, poses)
     else:
@@ -105,6 +107,24 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
     return Evaluation(frames, estimates, convention, row, rotations, errors, metrics, scales)
 
 
+def _refuse_useless(
+    dataset: Path, path: Path, frames: ScoredFrames, estimates: Estimates, settings: Settings
+) -> None:
+    """Refuse a rate where nothing has times, and an order of quaternions where there are none."""
+    if settings.rate_hz is not None:
+        if frames.frame_key is not None:
+            raise InputError(f"--rate: {dataset} is a file of poses, not of frames; leave it out")
+        if estimates.frame_key != "time" and settings.labels is None:
+            raise InputError(f"--rate: {path} is {estimates.kind}, without times; leave it out")
+    order = estimates.convention.order
+    asked = CONVENTIONS[settings.convention].order if settings.convention else order
+    if estimates.of_matrices and asked != order:
+        raise InputError(
+            f"--convention: {path} is {estimates.kind}, of matrices, which have no order of"
+            f" quaternions; end it in {order}"
+        )
+
+
 def _scored(dataset: Path, settings: Settings) -> ScoredFrames:
     """Read the frames of a data set, or of a file of poses."""
     if not dataset.is_file() or dataset.suffix == ".zip":
@@ -121,7 +141,12 @@ def _matched(
     """Find the row (N,) of each frame's estimate; -1 where there is none."""
     if frames.frame_key is not None:
         return match_reference(frames, estimates, path)
-    return match(frames, estimates, path, settings.rate_hz)
+    if settings.rate_hz is None and estimates.counts_seconds:
+        raise InputError(
+            f"{path}: its times are 0, 1, 2, ...: give --rate 1 if they number the frames, or the"
+            " frames a second of the data set"
+        )
+    return match(frames, estimates, path, settings.rate_hz or DEFAULT_RATE_HZ)
 
 
 def _camera_and_depth(

@@ -9,6 +9,7 @@ from evo.core.metrics import APE, PoseRelation
 from evo.core.trajectory import PosePath3D
 
 from synfeal.cli import main
+from synfeal.errors import InputError
 from synfeal.evaluation.run import Settings, evaluate
 from tests.support import foreign_poses as foreign
 from tests.support.collected import refused
@@ -167,6 +168,11 @@ BAD_LINES = {
         lambda _: ["1403715524.9,0,0,0,1,0,0,0"] * 24,
         "must be whole nanoseconds",
     ),
+    "TUM or EuRoC": (
+        HLOC,
+        lambda _: [f"{i},0,0,0,0,0,0,1" for i in range(24)],
+        "say which with --format euroc or tum",
+    ),
     "EuRoC, a column short": (HLOC, lambda _: ["#t", "14,0,0,0,1,0,0"], "line 2 has 7 columns"),
     "TUM of two sequences": (TUM, lambda x: x, "do not say of which sequence"),
     "table, other header": (TABLE, with_line(0, "frame,x,y,z"), "the header must be"),
@@ -261,8 +267,23 @@ def test_frames_are_found_by_their_numbers_where_there_is_one_sequence(tmp_path)
     rows = [line.split(",") for line in TABLE(tmp_path, truth[count:])[1:]]
     lines = [" ".join([r[0], *r[2:5], *r[6:], r[5]]) for r in rows]
     (tmp_path / "tum.txt").write_text("\n".join(lines))
-    for name, rate in {"hloc.txt": 30.0, "tum.txt": 1.0}.items():
+    for name, rate in {"hloc.txt": None, "tum.txt": 1.0}.items():
         found = evaluate(dataset, tmp_path / name, Settings(rate_hz=rate))
         assert found.metrics["position_m_max"] == pytest.approx(0, abs=1e-9)
         assert found.frames.names[0] == "seq-03/frame-000000"
         assert len(found.frames.names) == count
+    with pytest.raises(InputError, match=r"0, 1, 2, .* give --rate 1"):
+        evaluate(dataset, tmp_path / "tum.txt", Settings())
+    with pytest.raises(InputError, match=r"^--rate: .*hloc.txt .* without times"):
+        evaluate(dataset, tmp_path / "hloc.txt", Settings(rate_hz=30.0))
+
+
+@pytest.mark.parametrize("write", [foreign.write_tree, foreign.write_kitti])
+def test_matrices_have_no_order_of_quaternions(dataset, truth, tmp_path, write):
+    poses = write(tmp_path / "poses", truth)
+    with pytest.raises(InputError, match=r"^--convention: .* of matrices"):
+        evaluate(dataset, poses, Settings(convention="world_from_cam-xyzw"))
+    inverse = write(tmp_path / "inverse", np.linalg.inv(truth))
+    found = evaluate(dataset, inverse, Settings(convention="cam_from_world-wxyz"))
+    assert found.metrics["position_m_max"] == pytest.approx(0, abs=1e-6)
+    assert found.metrics["orientation_deg_max"] == pytest.approx(0, abs=1e-4)

@@ -7,6 +7,7 @@ github.com/MichaelGrupp/evo.
 
 import json
 import os
+import re
 import sys
 import types
 import zipfile
@@ -128,6 +129,30 @@ def test_euroc_poses_belong_to_frames_of_a_data_set_by_their_time(tmp_path):
     found = evaluate(dataset, poses, Settings())
     assert found.metrics["position_m_max"] == pytest.approx(0, abs=1e-9)
     assert found.estimates.kind == "a EuRoC trajectory"
+
+
+def test_commas_and_whole_seconds_are_read_as_the_format_that_is_named(
+    truth, estimated, tmp_path, capsys
+):
+    """Eight whole columns are both formats', which order quaternions differently."""
+    count = len(truth)
+    spaced = write_tum(tmp_path / "tum.txt", estimated, range(count))
+    commas = tmp_path / "commas.csv"
+    lines = [line.partition(" ")[2].replace(" ", ",") for line in spaced.read_text().splitlines()]
+    commas.write_text("".join(f"{second},{line}\n" for second, line in enumerate(lines)))
+    reference = write_tum(tmp_path / "reference.txt", truth, range(count))
+    line = refused(capsys, "evaluate", reference, commas)
+    assert str(commas) in line
+    assert "--format euroc or tum" in line
+    found = evaluate(reference, commas, Settings(file_format="tum"))
+    expected = errors_of(truth, estimated)
+    np.testing.assert_allclose(found.errors["position_m"], expected[0], atol=1e-9)
+    np.testing.assert_allclose(found.errors["orientation_deg"], expected[1], atol=1e-5)
+    in_ns = foreign.write_euroc(tmp_path / "data.csv", estimated, 10**9 * np.arange(count))
+    in_ns.write_text(re.sub(r",[^,\n]*$", "", in_ns.read_text(), flags=re.MULTILINE))
+    assert "--format euroc or tum" in refused(capsys, "evaluate", reference, in_ns)
+    found = evaluate(reference, in_ns, Settings(file_format="euroc"))
+    np.testing.assert_allclose(found.errors["orientation_deg"], expected[1], atol=1e-5)
 
 
 def numbered(lines, separator):
