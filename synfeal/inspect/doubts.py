@@ -23,6 +23,8 @@ from synfeal.records.provenance import generator_of
 Array = NDArray[np.float64]
 
 EXTENTS_M = (1.0, 200.0)
+UNITS_M = {0.001: "millimetres", 0.01: "centimetres", 0.0254: "inches", 10.0: "", 100.0: ""}
+UNITS_M |= {1000.0: "kilometres"}
 ALIGNED_COS = np.cos(np.deg2rad(15.0))
 FLOOR_BIN_M = 0.1
 FLOOR_RATIO = 1.5
@@ -31,19 +33,24 @@ MIN_COVERED = 0.6
 MAX_ELSEWHERE = 0.1
 
 
-def doubts_of(extents_m: Array, floors_m2: Array, space: FreeSpace) -> list[str]:
+def doubts_of(
+    extents_m: Array, floors_m2: Array, space: FreeSpace, unit_m: float = 1.0
+) -> list[str]:
     """Say in sentences what looks wrong, each with what to try; empty if nothing does.
 
-    ``floors_m2`` (3,) is what :func:`floor_areas_m2` found along x, y and z.
+    Args:
+        extents_m: Size (3,) of the mesh as it was taken.
+        floors_m2: What :func:`floor_areas_m2` found (3,) along x, y and z.
+        space: Its free space.
+        unit_m: Unit of the file as it was taken.
     """
     longest_m, axis = float(extents_m.max()), int(floors_m2.argmax())
-    unit = "0.01 or 0.001" if longest_m > EXTENTS_M[1] else "more than 1"
     turn = "try the other --up-axis" if axis == 1 else "turn the mesh before exporting it"
     can_stand = space.floor_m is not None
     return _that_hold(
         (
             not EXTENTS_M[0] <= longest_m <= EXTENTS_M[1],
-            f"the mesh is {longest_m:.3g} m long: the unit is probably wrong; try --unit-m {unit}",
+            f"the mesh is {longest_m:.3g} m long: {_unit_advice(longest_m, unit_m)}",
         ),
         (
             axis != 2 and floors_m2[axis] >= FLOOR_RATIO * floors_m2[2],
@@ -66,6 +73,23 @@ def doubts_of(extents_m: Array, floors_m2: Array, space: FreeSpace) -> list[str]
             " suggested boxes leave out",
         ),
     )
+
+
+def units_of_a_room(longest: float) -> list[float]:
+    """Usual units, metres, in which a mesh so long in its own unit has the size of a room."""
+    low_m, high_m = EXTENTS_M
+    return [unit_m for unit_m in sorted({1.0, *UNITS_M}) if low_m <= longest * unit_m <= high_m]
+
+
+def _unit_advice(longest_m: float, unit_m: float) -> str:
+    """Say what to do about a mesh that is too long or too short in this unit."""
+    units = [f"{unit:g}" for unit in units_of_a_room(longest_m / unit_m)]
+    if units:
+        named = " or ".join([", ".join(units[:-1]), units[-1]] if units[1:] else units)
+        return f"the unit is probably wrong; try --unit-m {named}"
+    if longest_m > EXTENTS_M[1]:
+        return "in no usual unit is that a room; remove what lies far away from the rest of it"
+    return "in no usual unit is that a room; measure it, and give --unit-m"
 
 
 def _that_hold(*doubts: tuple[bool, str]) -> list[str]:
@@ -145,8 +169,6 @@ def floor_areas_m2(normal: Array, position_m: Array, area_m2: float) -> Array:
     return areas
 
 
-UNITS_M = {0.001: "millimetres", 0.01: "centimetres", 0.0254: "inches", 10.0: "", 100.0: ""}
-UNITS_M |= {1000.0: "kilometres"}
 STOREY_M = 3.0  # rooms are about that high, and longer along the other axes
 N_POINTS = 20_000
 
@@ -164,10 +186,12 @@ def load_as_meant(
     """
     mesh, notes = _load(scene), []
     extents_m = np.ptp(mesh.bounds_m, axis=0)
-    if not unit_is_given and not EXTENTS_M[0] <= extents_m.max() <= EXTENTS_M[1]:
+    is_odd = not EXTENTS_M[0] <= extents_m.max() <= EXTENTS_M[1]
+    units = units_of_a_room(float(extents_m.max()) / scene.unit_m)
+    if is_odd and units and not unit_is_given:
         # What makes the smallest extent most like the height of a room.
         height = max(extents_m.min(), 1e-9) / STOREY_M
-        unit_m = min(UNITS_M, key=lambda unit: abs(np.log(unit * height)))
+        unit_m = min(units, key=lambda unit: abs(np.log(unit * height)))
         scene = scene.model_copy(update={"unit_m": unit_m})
         mesh = _load(scene)
         before, after = (" x ".join(f"{m:.3g}" for m in k * extents_m) for k in (1.0, unit_m))

@@ -82,7 +82,7 @@ def facts_of(found: Inspection) -> dict[str, Any]:
         "doubts": [
             *found.assumed,
             *colour_doubts(mesh, area_m2),
-            *doubts_of(np.ptp(mesh.bounds_m, axis=0), floors_m2, space),
+            *doubts_of(np.ptp(mesh.bounds_m, axis=0), floors_m2, space, found.scene.unit_m),
             *([] if suggestion is None else suggestion_doubts(suggestion)),
         ],
         "version": synfeal.__version__,

@@ -1,12 +1,14 @@
 """Free space, surface points, texel density and doubts, known or worked out by hand."""
 
 import itertools
+import re
 import sys
 
 import numpy as np
 import pytest
 import trimesh
 
+from synfeal.config.options import scene_config
 from synfeal.errors import InputError
 from synfeal.inspect.boxes import (
     UNWANTED_WEIGHT,
@@ -15,7 +17,7 @@ from synfeal.inspect.boxes import (
     suggest_box,
     suggest_boxes,
 )
-from synfeal.inspect.doubts import colour_doubts, doubts_of, floor_areas_m2
+from synfeal.inspect.doubts import colour_doubts, doubts_of, floor_areas_m2, load_as_meant
 from synfeal.inspect.facts import detail_of, texels_per_m
 from synfeal.inspect.freespace import (
     FreeSpace,
@@ -229,17 +231,38 @@ def doubts(extents, **values):
 
 
 @pytest.mark.parametrize(
-    ("extents", "words"),
+    ("extents", "unit_m", "words"),
     [
-        ((5.0, 6.0, 3.0), []),
-        ((5000.0, 6000.0, 3000.0), ["6e+03 m", "0.001"]),
-        ((0.5, 0.4, 0.3), ["0.5 m", "more than 1"]),
+        ((5.0, 6.0, 3.0), 1.0, []),
+        ((5000.0, 6000.0, 3000.0), 1.0, ["6e+03 m", "try --unit-m 0.001, 0.01 or 0.0254"]),
+        ((500.0, 600.0, 300.0), 0.1, ["600 m", "try --unit-m 0.001, 0.01 or 0.0254"]),
+        ((0.5, 0.4, 0.3), 1.0, ["0.5 m", "try --unit-m 10 or 100"]),
+        ((0.5, 0.4, 0.3), 0.001, ["0.5 m", "try --unit-m 0.01 or 0.0254"]),
+        ((6e7, 5e7, 4e7), 1.0, ["6e+07 m", "remove what lies far away"]),
+        ((6e4, 5e4, 4e4), 0.001, ["6e+04 m", "remove what lies far away"]),
+        ((2e-4, 1e-4, 1e-4), 1.0, ["0.0002 m", "give --unit-m"]),
     ],
 )
-def test_sizes_that_are_not_metres_are_doubted(extents, words):
-    found = doubts(extents)
+def test_sizes_that_are_not_metres_are_doubted(extents, unit_m, words):
+    """No unit is named in which the mesh would be doubted again, or in which it was taken."""
+    found = doubts(extents, unit_m=unit_m)
     assert bool(found) == bool(words)
     assert all(word in found for word in words)
+    for named in re.findall(r"[0-9.]+", found.partition("--unit-m")[2]):
+        assert not doubts(np.array(extents) * float(named) / unit_m, unit_m=float(named))
+
+
+@pytest.mark.parametrize(("side", "taken"), [(6000.0, 0.001), (6e7, 1.0), (4.0, 1.0), (0.004, 1e3)])
+def test_a_unit_is_assumed_only_where_it_makes_a_room(tmp_path, side, taken):
+    """Of 60,000 km no unit does: then nothing is assumed, and no advice contradicts it."""
+    trimesh.creation.box((side, side, 0.6 * side)).export(tmp_path / "box.ply")
+    scene = scene_config({"mesh": tmp_path / "box.ply"})
+    scene, mesh, notes = load_as_meant(scene, unit_is_given=False)
+    assert scene.unit_m == taken
+    assert bool(notes) == (taken != 1.0)
+    found = doubts(np.ptp(mesh.bounds_m, axis=0), unit_m=scene.unit_m)
+    assert "--unit-m" not in found
+    assert bool(found) == (side == 6e7)
 
 
 def test_plain_and_open_meshes_are_doubted_and_a_flat_floor_is_a_floor():
