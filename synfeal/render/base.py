@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,15 @@ MOST_VERTICES = 1 << 23
 
 class UnavailableError(Exception):
     """A library, driver or device that a backend needs is missing, or does not work."""
+
+
+class Window(NamedTuple):
+    """Part of an image, pixels: first column and row, and those one past the last."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
 
 
 class Renderer(Protocol):
@@ -49,6 +58,14 @@ class Renderer(Protocol):
         Triangles are counted through all parts of the mesh, as :meth:`TexturedMesh.merged` does.
         """
         ...
+
+    def draw_only(self, window: Window | None) -> None:
+        """Ask for no more than a part of the images that follow; None is all of them.
+
+        The part is what it would be without; what lies outside of it means nothing, and costs less
+        where a backend can leave it out.
+        """
+        del window  # nothing is left out unless a backend says how
 
     def close(self) -> None:
         """Give the mesh's memory back; the renderer must not be used afterwards."""

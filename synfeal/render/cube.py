@@ -4,13 +4,15 @@ As for a lens (:mod:`synfeal.render.distorted`): the faces have twice the resolu
 middle, and each pixel is the mean of 2x2 points, read bilinearly. Far beyond 90 degrees from its
 axis a fisheye shows less at a time, and more sharply than it is drawn. Depth is along the ray; each
 face's own, along its axis, is read as that of a lens is, so it is exact on planes. Only faces that
-the camera sees are drawn. The clip planes are those of the faces: as near and as far along their
-axes.
+the camera sees are drawn, and of each the rectangle that it sees: a fisheye of 120 degrees sees all
+of the face ahead, and strips of four others. The clip planes are those of the faces: as near and as
+far along their axes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 from synfeal.camera.projection import pixels_per_radian, rays_of_pixels
 from synfeal.config.dataset import CameraConfig
 from synfeal.errors import InputError
-from synfeal.render.base import Depth, Faces, Renderer, Rgb
+from synfeal.render.base import Depth, Faces, Renderer, Rgb, Window
 from synfeal.render.distorted import (
     LONGEST_SIDE_PX,
     MARGIN_PX,
@@ -30,6 +32,10 @@ from synfeal.render.distorted import (
 )
 
 Array = NDArray[np.float64]
+Draw = Callable[[Array], Any]
+
+# Around pixels that are read: their neighbours, whose depth tells planes from edges, and one more.
+WINDOW_MARGIN_PX = 2
 
 # Axes of the faces (6, 3, 3) in the camera's frame, as columns: right, down and outwards.
 CAM_FROM_FACE: Array = np.stack(
@@ -77,36 +83,60 @@ class CubeRenderer(Renderer):
         self._behind = unseen * np.array(background_rgb, np.float32)
         self._depth_taps = taps(self._located(face, rays), face.width)
         self._slant = self._slant_of(rays)
+        self._windows = self._windows_of(face)
         self._inner = open_pinhole(face)
 
     def render(self, world_from_cam: Array) -> Rgb:
         """Render colours (H, W, 3) from a pose ``world_from_cam`` (4, 4)."""
-        return self._resampled(
-            np.stack([self._inner.render(pose) for pose in self._poses(world_from_cam)])
-        )
+        return self._resampled(np.stack(self._drawn_by(self._inner.render, world_from_cam)))
 
     def render_rgbd(self, world_from_cam: Array) -> tuple[Rgb, Depth]:
         """Render colours (H, W, 3) and depth (H, W): metres along the ray, inf for nothing."""
-        seen = [self._inner.render_rgbd(pose) for pose in self._poses(world_from_cam)]
+        seen = self._drawn_by(self._inner.render_rgbd, world_from_cam)
         rgb, depth_m = (np.stack(images) for images in zip(*seen, strict=True))
         return self._resampled(rgb), self._distance(depth_m)
 
     def render_depth(self, world_from_cam: Array) -> Depth:
         """Render depth (H, W) alone: metres along the ray, inf for nothing."""
-        return self._distance(
-            np.stack([self._inner.render_depth(pose) for pose in self._poses(world_from_cam)])
-        )
+        return self._distance(np.stack(self._drawn_by(self._inner.render_depth, world_from_cam)))
 
     def render_faces(self, world_from_cam: Array) -> Faces:
         """Index (H, W) of the triangle that the nearest pixel of a cube's face shows, or -1."""
         index, weight = self._depth_taps
         nearest = np.take_along_axis(index, weight.argmax(axis=-1)[..., None], axis=-1)[..., 0]
-        drawn = np.stack([self._inner.render_faces(pose) for pose in self._poses(world_from_cam)])
+        drawn = np.stack(self._drawn_by(self._inner.render_faces, world_from_cam))
         return np.where(np.isfinite(self._slant), drawn.reshape(-1)[nearest], np.int32(-1))
 
     def close(self) -> None:
         """Close the inner renderer."""
         self._inner.close()
+
+    def _drawn_by(self, draw: Draw, world_from_cam: Array) -> list[Any]:
+        """Draw what is seen of each face, by a method of the inner renderer."""
+        images = []
+        for pose, window in zip(self._poses(world_from_cam), self._windows, strict=True):
+            self._inner.draw_only(window)
+            images.append(draw(pose))
+        return images
+
+    def _windows_of(self, face: CameraConfig) -> list[Window]:
+        """Bound, in each drawn face, the pixels that colours or depth are read from."""
+        index, weight = self._depth_taps
+        read = np.zeros(len(self._drawn) * face.height * face.width, bool)
+        read[self._colour.indices[self._colour.data > 0.0]] = True
+        read[index[weight.any(axis=-1)]] = True
+        windows = []
+        for image in read.reshape(-1, face.height, face.width):
+            rows, columns = (np.flatnonzero(image.any(axis=axis)) for axis in (1, 0))
+            windows.append(
+                Window(
+                    left=max(0, int(columns[0]) - WINDOW_MARGIN_PX),
+                    top=max(0, int(rows[0]) - WINDOW_MARGIN_PX),
+                    right=min(face.width, int(columns[-1]) + 1 + WINDOW_MARGIN_PX),
+                    bottom=min(face.height, int(rows[-1]) + 1 + WINDOW_MARGIN_PX),
+                )
+            )
+        return windows
 
     def _poses(self, world_from_cam: Array) -> list[Array]:
         """Return the poses of the faces that are drawn."""

@@ -34,6 +34,7 @@ from synfeal.render.base import (
     Renderer,
     Rgb,
     UnavailableError,
+    Window,
     drawn_pieces,
     faces_of_halves,
     floor_share,
@@ -100,6 +101,8 @@ class OpenglRenderer(Renderer):
         # Vertex buffers hold single precision: exact around the scene's own centre, wherever it is.
         self._centre_m = mesh.bounds_m.mean(axis=0)
         self._size = (camera.width, camera.height)
+        self._supersampling = render.supersampling
+        self.draw_only(None)
         self._background = [level / 255.0 for level in render.background_rgb]
         with self._context:
             self._open_images(render.supersampling)
@@ -154,8 +157,9 @@ class OpenglRenderer(Renderer):
         with self._context:
             self._begin(self._face_target)
             first_face = 0
+            culled = self._window_from_clip @ clip_from_mesh
             for part in self._parts:
-                part.draw(part.faces, clip_from_mesh, first_face)
+                part.draw(part.faces, clip_from_mesh, culled, first_face)
                 first_face += len(part.order)
             self._finish()
             self._face_target.read_into(halves, components=2, dtype="f4", alignment=1)
@@ -167,6 +171,11 @@ class OpenglRenderer(Renderer):
         halves = self._context.renderbuffer(self._size, 2, dtype="f4")
         return self._context.framebuffer([halves], self._context.depth_renderbuffer(self._size))
 
+    def draw_only(self, window: Window | None) -> None:
+        """See :meth:`synfeal.render.base.Renderer.draw_only`."""
+        self._window = window
+        self._window_from_clip = window_from_clip(window or Window(0, 0, *self._size), self._size)
+
     def _clip_from_mesh(self, world_from_cam: NDArray[np.float64]) -> NDArray[np.float64]:
         centred = np.array(world_from_cam, np.float64)
         centred[:3, 3] -= self._centre_m
@@ -174,11 +183,13 @@ class OpenglRenderer(Renderer):
 
     def _draw_colour(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         clip_from_mesh = self._clip_from_mesh(world_from_cam)
+        culled = self._window_from_clip @ clip_from_mesh
         camera_m = np.asarray(world_from_cam)[:3, 3] - self._centre_m
-        self._begin(self._sample_target, *self._background)
+        self._begin(self._sample_target, *self._background, per_pixel=self._supersampling)
         for part in self._parts:
             part.light_from(camera_m)
-            part.draw(part.colour, clip_from_mesh)
+            part.draw(part.colour, clip_from_mesh, culled)
+        self._mean_target.scissor = self._box(1)
         self._mean_target.use()
         self._context.enable_only(moderngl.NOTHING)
         self._samples.use(0)
@@ -189,19 +200,30 @@ class OpenglRenderer(Renderer):
         return rgb
 
     def _draw_depth(self, clip_from_mesh: NDArray[np.float64]) -> Depth:
+        culled = self._window_from_clip @ clip_from_mesh
         self._begin(self._depth_target)
         for part in self._parts:
-            part.draw(part.depth, clip_from_mesh)
+            part.draw(part.depth, clip_from_mesh, culled)
         depth_m = np.empty(self._size[::-1], np.float32)
         self._finish()
         self._depth_target.read_into(depth_m, components=1, dtype="f4", alignment=1)
         depth_m[depth_m == 0.0] = np.inf
         return depth_m
 
-    def _begin(self, target: Any, *rgb: float) -> None:
+    def _begin(self, target: Any, *rgb: float, per_pixel: int = 1) -> None:
+        """Clear all of a target, and confine what is drawn to the window."""
+        target.scissor = None
         target.use()
         self._context.enable_only(moderngl.DEPTH_TEST)
         target.clear(*rgb)
+        target.scissor = self._box(per_pixel)
+
+    def _box(self, per_pixel: int) -> tuple[int, int, int, int] | None:
+        """The window as OpenGL has it, in samples: first column and row, width and height."""
+        if self._window is None:
+            return None
+        left, top, right, bottom = (per_pixel * edge for edge in self._window)
+        return left, top, right - left, bottom - top
 
     def close(self) -> None:
         """Give the mesh's memory back; the renderer must not be used afterwards."""
@@ -210,6 +232,16 @@ class OpenglRenderer(Renderer):
         self.__dict__.pop("_face_target", None)
         with self._context:
             self._context.gc()
+
+
+def window_from_clip(window: Window, size: tuple[int, int]) -> NDArray[np.float64]:
+    """Map (4, 4) clip coordinates of an image (width, height) to those of a part of it."""
+    matrix = np.eye(4)
+    ends = zip(size, window[:2], window[2:], strict=True)
+    for axis, (side, low, high) in enumerate(ends):
+        matrix[axis, axis] = side / (high - low)
+        matrix[axis, 3] = (side - low - high) / (high - low)
+    return matrix
 
 
 def clip_from_cam(camera: CameraConfig) -> NDArray[np.float64]:

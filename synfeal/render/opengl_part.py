@@ -171,20 +171,26 @@ class DevicePart:
             self.colour.program["camera"].value = tuple(camera_m.tolist())
 
     def draw(
-        self, triangles: Any, clip_from_mesh: NDArray[np.float64], first_face: int | None = None
+        self,
+        triangles: Any,
+        clip_from_mesh: NDArray[np.float64],
+        culled_from_mesh: NDArray[np.float64],
+        first_face: int | None = None,
     ) -> None:
         """Draw into the framebuffer in use.
 
         Args:
             triangles: ``colour``, ``depth`` along the optical axis, or ``faces``.
             clip_from_mesh: Projection (4, 4).
+            culled_from_mesh: The same of the part of the image that is drawn: chunks outside of its
+                frustum are left out.
             first_face: With ``faces``, the number of the part's first triangle.
         """
         by_columns = clip_from_mesh.astype(np.float32).tobytes(order="F")
         triangles.program["clip_from_mesh"].write(by_columns)
         if self._texture is not None:
             self._texture.use(0)
-        for first, count in visible_runs(self._chunks, clip_from_mesh):
+        for first, count in visible_runs(self._chunks, culled_from_mesh):
             if first_face is not None:  # OpenGL counts from the beginning of each run
                 triangles.program["first_face"].value = first_face + first // 3
             triangles.render(moderngl.TRIANGLES, vertices=count, first=first)

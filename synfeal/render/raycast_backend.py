@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.mesh.model import TexturedMesh
-from synfeal.render.base import DEFAULTS, Depth, Faces, Renderer, Rgb, floor_share
+from synfeal.render.base import DEFAULTS, Depth, Faces, Renderer, Rgb, Window, floor_share
 from synfeal.render.raycast_triangles import Floats, Points, TexturedTriangles, View
 
 Look = Callable[[View, Floats], NDArray[Any]]
@@ -35,6 +35,7 @@ class RaycastRenderer(Renderer):
         self._samples_px: Floats = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         self._background = np.array(render.background_rgb, np.float32)
         self._sample_size = 1.0 / render.supersampling
+        self._window: Window | None = None
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         """Render colours (H, W, 3) from a pose ``world_from_cam`` (4, 4)."""
@@ -49,6 +50,10 @@ class RaycastRenderer(Renderer):
     def render_faces(self, world_from_cam: NDArray[np.float64]) -> Faces:
         """Index (H, W) of the triangle at the centre of each pixel, -1 for nothing."""
         return self._image(self._faces, world_from_cam, np.full((1, 2), 0.5), 0.0)
+
+    def draw_only(self, window: Window | None) -> None:
+        """See :meth:`synfeal.render.base.Renderer.draw_only`."""
+        self._window = window
 
     def close(self) -> None:
         """Drop triangles and textures."""
@@ -65,14 +70,22 @@ class RaycastRenderer(Renderer):
         per_sample = step_px * pose[:3, :2].T / np.array([[fx], [fy]])
         origin_m = pose[:3, 3] - self._triangles.centre_m
         view = View(origin_m, per_sample, self._camera.near_m, self._camera.far_m)
+        left, top, right, bottom = self._window or (0, 0, width, height)
+        every = np.arange(width * height).reshape(height, width)
+        drawn = every[top:bottom, left:right].reshape(-1)
         tiles, count = [], RAYS_AT_ONCE // len(samples_px)
-        for start in range(0, width * height, count):
-            index = np.arange(start, min(start + count, width * height))
+        for start in range(0, len(drawn), count):
+            index = drawn[start : start + count]
             corners_px = np.stack([index % width, index // width], axis=1)
             x, y = (corners_px + samples_px[:, None]).reshape(-1, 2).T[:, :, None]
             rays = (x - cx) / fx * pose[:3, 0] + (y - cy) / fy * pose[:3, 1] + pose[:3, 2]
             tiles.append(look(view, rays))
-        return np.concatenate(tiles).reshape(height, width, *tiles[0].shape[1:])
+        pixels = np.concatenate(tiles)
+        if self._window is not None:  # elsewhere any value will do
+            image = np.repeat(pixels[:1], width * height, axis=0)
+            image[drawn] = pixels
+            pixels = image
+        return pixels.reshape(height, width, *pixels.shape[1:])
 
     def _points(self, view: View, rays: Floats) -> tuple[NDArray[np.intp], Points]:
         """Find the rays that hit something, and what they hit."""

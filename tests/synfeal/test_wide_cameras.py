@@ -27,7 +27,7 @@ from synfeal.mesh.model import TexturedMesh
 from synfeal.render import open_renderer
 from synfeal.render.cube import CubeRenderer
 from tests.support.collected import painted
-from tests.support.small_room import furnished_room, room_poses
+from tests.support.small_room import BACKENDS, PYOPENGL_WARNS, furnished_room, room_poses
 
 # Of a real lens: camera 1 of the TUM VI benchmark, resized.
 REAL_K = (0.0034823894, 0.0007150348, -0.0020532361, 0.0002029367)
@@ -238,6 +238,9 @@ class PaintedSky:
             total = total + sky(rays @ world_from_cam[:3, :3].T)
         return np.rint(total / self.samples**2).astype(np.uint8)
 
+    def draw_only(self, window):
+        """All is drawn."""
+
 
 def sky(direction):
     """Colour (..., 3) of directions: waves some pixels long, without edges."""
@@ -267,6 +270,59 @@ def test_faces_of_the_cube_leave_no_seam(camera):
     direction = np.abs(rays_of_pixels(camera, pixel_centres(camera)))
     inside = np.sort(direction, axis=-1)[..., 1] < 0.9 * direction.max(axis=-1)
     np.testing.assert_allclose(depth_m[inside], (2.0 / direction.max(axis=-1))[inside], atol=1e-3)
+
+
+NARROW = CameraConfig(projection="fisheye", width=96, height=72, horizontal_fov_deg=120.0)
+
+
+class Everything:
+    """A renderer that draws all of every image."""
+
+    def __init__(self, inner):
+        self.inner = inner
+
+    def __getattr__(self, name):
+        return getattr(self.inner, name)
+
+    def draw_only(self, window):
+        """All is drawn."""
+
+
+@pytest.mark.filterwarnings(PYOPENGL_WARNS)
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("camera", [NARROW, ALL_ROUND], ids=["narrow", "all round"])
+def test_what_is_not_seen_of_a_face_is_not_drawn_and_changes_nothing(camera, backend):
+    mesh, poses = furnished_room((4.0, 12.0)), room_poses(2, 5)
+    render = RenderConfig(backend=backend, background_rgb=(9, 99, 199))
+
+    def opened(face):
+        return open_renderer(mesh, face, render)
+
+    asked = []
+
+    class Asked(Everything):
+        def draw_only(self, window):
+            asked.append((window, self.inner.render(AHEAD).shape))
+            self.inner.draw_only(window)
+
+    with (
+        CubeRenderer(opened, camera, render.background_rgb) as windowed,
+        CubeRenderer(lambda face: Everything(opened(face)), camera, render.background_rgb) as full,
+    ):
+        for pose in poses:
+            for draw in ("render", "render_depth", "render_faces"):
+                expected = getattr(full, draw)(pose)
+                np.testing.assert_array_equal(getattr(windowed, draw)(pose), expected)
+    with CubeRenderer(lambda face: Asked(opened(face)), camera, render.background_rgb) as counted:
+        counted.render_depth(AHEAD)
+    shares = [
+        (window.right - window.left) * (window.bottom - window.top) / (shape[0] * shape[1])
+        for window, shape in asked
+    ]
+    assert len(shares) == (5 if camera is NARROW else 6)
+    if camera is NARROW:  # the whole face ahead, and four strips
+        assert max(shares) == 1.0
+        assert sum(shares) < 2.5
 
 
 def test_antialiasing_is_that_of_perspective_images():
