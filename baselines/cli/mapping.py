@@ -89,7 +89,6 @@ MAP_OPTIONS = (
         "--confidence",
         "with a map: leave out poses below this confidence, as not localized (0.99)",
         type=float,
-        default=0.99,
         metavar="C",
     ),
     option(
@@ -104,16 +103,17 @@ MAP_OPTIONS = (
 
 def localize_by_map(arguments: argparse.Namespace) -> None:
     """Carry out ``synfeal localize`` with a map."""
-    from baselines.references.localized import localize_in_map
+    from baselines.references.localized import LEAST_CONFIDENCE, localize_in_map
 
     out: Path = arguments.out
+    confidence = arguments.confidence
     done = localize_in_map(
         arguments.model,
         arguments.images,
         out,
         camera=photograph_camera(arguments),
         world=arguments.world,
-        least_confidence=arguments.confidence,
+        least_confidence=LEAST_CONFIDENCE if confidence is None else confidence,
         refine=arguments.refine,
     )
     if abs(done.focal_ratio - 1.0) > WRONG_FOCAL:  # not of NaN

@@ -184,7 +184,7 @@ def localize_by_model(arguments: argparse.Namespace) -> None:
         arguments.model,
         arguments.images,
         out,
-        arguments.device,
+        arguments.device or "auto",
         camera=photograph_camera(arguments),
         world=arguments.world,
         turns=DEFAULT_TURNS if arguments.turns is None else arguments.turns,

@@ -43,6 +43,7 @@ from synfeal.records.files import (
     file_sha256,
     read_json,
     refuse_existing,
+    refuse_inside,
     write_json,
     writing_to,
 )
@@ -146,6 +147,7 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
         InputError: An image cannot be read, there are too few features, or ``out`` exists.
     """
     refuse_existing(out)
+    refuse_inside(out, frames.source)
     began = time.perf_counter()
     features, views = _read_frames(frames)
     if len(features.slope) < FEWEST_FEATURES:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import time
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from statistics import median
@@ -40,6 +41,7 @@ World = Literal["sequence", "mesh"]
 LEAST_MARGIN_M = 0.5
 # Pairs of virtual rotations: twice as many change errors by less than their seeds do.
 DEFAULT_TURNS = 8
+MOST_TURNS = 1000
 MOST_PIXELS = 2**27  # of a photograph: beyond what any camera takes
 
 log = logging.getLogger(__name__)
@@ -115,8 +117,8 @@ def localize(
         InputError: The model or a picture cannot be used, or ``out`` cannot be written.
     """
     trained = read_checkpoint(model, open_device(device))
-    if turns < 0:
-        raise InputError(f"--turns: must be 0 or above, found {turns}")
+    if not 0 <= turns <= MOST_TURNS:
+        raise InputError(f"--turns: must be 0 to {MOST_TURNS}, found {turns}")
     reader = PictureReader(trained.description, camera or PhotographCamera(exif=False), model)
     pictures = find_pictures(named)
     _check_out(out, [model, *pictures])
@@ -302,13 +304,17 @@ def find_pictures(named: Iterable[Path]) -> list[Path]:
     Of a 7-Scenes sequence these are the colour images: ``*.depth.png`` is left out.
 
     Raises:
-        InputError: something named is not there, or a directory holds no picture.
+        InputError: something named is not there or is named twice, or a directory holds no picture.
     """
     found: list[Path] = []
     for path in named:
         if not (path.is_dir() or path.is_file()):
             raise InputError(f"{path}: there is no such picture or directory")
         found += _in(path) if path.is_dir() else [path]
+    counts = Counter(path.absolute() for path in found)
+    for path in found:
+        if counts[path.absolute()] > 1:
+            raise InputError(f"{path}: is named twice, by itself or its directory; name it once")
     return found
 
 

@@ -24,6 +24,7 @@ from baselines.training.checkpoint import FrameCamera
 from baselines.training.resample import Resampler, same_view
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.photograph import PhotographCamera
+from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.finish import MANIFEST
 from synfeal.dataset.frame_files import FrameFile, read_image
 from synfeal.dataset.packed import fit_frame, new_packed
@@ -70,7 +71,9 @@ class OwnFrames:
         color: Image of each frame.
         world_from_cam: Poses (N, 4, 4) in the data set's own world.
         path: Index (N,) of the path of each frame, from 0: what is held out as a whole.
-        camera: Camera of the frames, where the data set says so; None for photographs.
+        camera: Perspective camera of the frames, where the data set says so; None for photographs.
+        wide: Camera that the data set says, where it is a fisheye or a panorama.
+        is_rendered: Whether they are the training split of a data set of ``synfeal collect``.
         sequence_from_world: Motion (4, 4) to the world of the sequence scanned, where it differs.
         scene: Name of the place: by the manifest, else that of the folder.
     """
@@ -80,6 +83,8 @@ class OwnFrames:
     world_from_cam: Array
     path: NDArray[np.int64]
     camera: FrameCamera | None
+    wide: CameraConfig | None
+    is_rendered: bool
     sequence_from_world: Array | None
     scene: str
 
@@ -132,12 +137,16 @@ def read_own_frames(folder: Path, ranges: Sequence[FrameRange]) -> OwnFrames:
     else:
         slices = [slice(r.start, r.stop) for r in ranges] or [slice(None)]
         parts, path = [read_posed_sequence(folder, chosen) for chosen in slices], None
+    camera = camera_of_dataset(folder, None).config if rendered else None
+    wide = None if camera is None or camera.projection is None else camera
     return OwnFrames(
         folder=folder,
         color=tuple(file for part in parts for file in part.color),
         world_from_cam=np.concatenate([part.world_from_cam for part in parts]),
         path=_blocks(parts) if path is None else path,
-        camera=_manifest_camera(folder) if rendered else None,
+        camera=None if camera is None or wide else _frame_camera(camera),
+        wide=wide,
+        is_rendered=rendered and split,
         sequence_from_world=read_sequence_from_world(folder),
         scene=_scene_of(folder),
     )
@@ -191,14 +200,8 @@ def _scene_of(folder: Path) -> str:
     return str(name or folder.resolve().name)
 
 
-def _manifest_camera(folder: Path) -> FrameCamera | None:
-    """Read the perspective camera in a data set's manifest; None for a fisheye or panorama.
-
-    A network learns from those as they are; nothing is turned or resampled.
-    """
-    camera = camera_of_dataset(folder, None).config
-    if camera.projection is not None:
-        return None
+def _frame_camera(camera: CameraConfig) -> FrameCamera:
+    """Return what packed frames keep of a perspective camera."""
     fx, fy, cx, cy = camera.intrinsics
     return FrameCamera(
         width=camera.width,
@@ -265,7 +268,15 @@ def pack_own_frames(
 
 
 def _target_camera(sets: Sequence[OwnFrames], photographs: PhotographCamera) -> FrameCamera | None:
-    """Choose the camera that all frames are brought to: that of rendered frames, if any."""
+    """Choose the camera that all frames are brought to: that of rendered frames, if any.
+
+    None for a fisheye or panorama: a network learns from those as they are; nothing is turned or
+    resampled.
+    """
+    for own in sets:
+        if own.wide is not None:
+            _refuse_beside(own, own.wide, sets)
+            return None
     cameras = {own.camera: own for own in sets if own.camera is not None}
     if len(cameras) > 1:
         first, second = list(cameras.values())[:2]
@@ -281,6 +292,16 @@ def _target_camera(sets: Sequence[OwnFrames], photographs: PhotographCamera) -> 
     return FrameCamera(
         width=known.width, height=known.height, fx=known.fx, fy=known.fy, cx=known.cx, cy=known.cy
     )
+
+
+def _refuse_beside(own: OwnFrames, camera: CameraConfig, sets: Sequence[OwnFrames]) -> None:
+    """Refuse frames of another camera beside those of a fisheye or panorama."""
+    for other in sets:
+        if other.wide != camera:
+            raise InputError(
+                f"{own.folder / MANIFEST}: camera: is {camera.projection}, and frames of"
+                f" {other.folder} cannot be brought to it; train on one of them"
+            )
 
 
 def _resampled(

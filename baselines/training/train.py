@@ -32,7 +32,7 @@ from baselines.training.selection import HeldOutErrors, kept_errors
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.config.photometric import PhotometricConfig
 from synfeal.errors import InputError
-from synfeal.records.files import read_json, refuse_foreign, write_json, writing_to
+from synfeal.records.files import read_json, refuse_foreign, refuse_inside, write_json, writing_to
 from synfeal.records.provenance import provenance
 
 log = logging.getLogger(__name__)
@@ -54,6 +54,7 @@ RECIPES: dict[ModelName, LocalizerConfig] = {
 ROTATIONS = AugmentationConfig(tilt_deg=8.0, roll_deg=15.0)
 BATCH = 64
 DEFAULT_IMAGES = 30_000
+MOST_IMAGES = 10**9  # weeks, on any machine
 
 MODEL, HISTORY, RECORD = "model.pt", "history.csv", "training.json"
 # What lies there while a run is under way, and what a kill may leave.
@@ -133,6 +134,7 @@ def train(job: TrainJob) -> TrainedModel:
     if (job.out / RECORD).exists():
         return _finished(job, settings)
     sets = [read_own_frames(folder, job.ranges) for folder in job.datasets]
+    _refuse_useless(job, sets)
     is_new = not job.out.exists()
     job.out.mkdir(parents=True, exist_ok=True)
     try:
@@ -187,10 +189,10 @@ def _trained(
 
 
 def _check(job: TrainJob) -> None:
-    if job.images is not None and job.images < 1:
-        raise InputError(f"--images: must be at least 1, found {job.images}")
+    if job.images is not None and not 1 <= job.images <= MOST_IMAGES:
+        raise InputError(f"--images: must be 1 to {MOST_IMAGES:,}, found {job.images}")
     if job.minutes is not None and not 0 < job.minutes < 1e6:
-        raise InputError(f"--minutes: must be a positive number, found {job.minutes:g}")
+        raise InputError(f"--minutes: must be above 0 and below 1e6, found {job.minutes:g}")
     if not 0 <= job.held_out < 1:
         raise InputError(f"--held-out: must be a share from 0 to below 1, found {job.held_out:g}")
     named = [path.resolve() for path in job.datasets]
@@ -200,6 +202,19 @@ def _check(job: TrainJob) -> None:
     present = sorted(p.name for p in job.out.glob("*")) if job.out.is_dir() else []
     left = [name for name in present if name.startswith(".") and _is_left(name)]
     refuse_foreign(job.out, (*own, *left), "synfeal train")
+    for dataset in job.datasets:
+        refuse_inside(job.out, dataset)
+
+
+def _refuse_useless(job: TrainJob, sets: Sequence[OwnFrames]) -> None:
+    """Refuse what is said of photographs where there are none."""
+    camera = {"file": "--camera", "focal": "--focal"}.get(str(job.photographs.source))
+    for option in ("--frames" if job.ranges else None, camera):
+        if option and all(own.is_rendered for own in sets):
+            raise InputError(
+                f"{option}: is of photographs, and {sets[0].folder} is a data set of synfeal"
+                " collect, which says its own; leave it out"
+            )
 
 
 def _is_left(name: str) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -66,7 +66,7 @@ class CameraConfig(Strict):
     fisheye_k: tuple[Finite, Finite, Finite, Finite] | None = Field(
         None, description="fisheye: k1, k2, k3, k4, as OpenCV; null: equidistant"
     )
-    stereo_baseline_m: Positive | None = Field(
+    stereo_baseline_m: Annotated[float, Field(ge=1e-4, le=100.0)] | None = Field(
         None, description="draw a second camera this far to the right, too"
     )
     near_m: Positive = Field(0.05, description="near clip plane")

@@ -90,7 +90,14 @@ def dataset_config(options: Mapping[str, Any], out: Path | None = None) -> Datas
     profile = re.sub(r"[^a-z0-9]+", "_", out.absolute().name.lower()) if out else ""
     values |= {"profile": profile.strip("_")[:64] or "mine", "scale": 1.0}
     with options_named():
-        return DatasetConfig.model_validate(values)
+        config = DatasetConfig.model_validate(values)
+        n_test, n_paths = config.scenes[SCENE].sizes[SIZE].test, options.get("test_paths")
+        if n_paths is not None and n_paths > n_test:
+            raise InputError(
+                f"collection.test_paths: {n_test} test frames cannot be of {n_paths} paths; give"
+                " fewer, or more --test-frames"
+            )
+    return config
 
 
 def scene_config(options: Mapping[str, Any]) -> SceneConfig:

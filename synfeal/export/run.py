@@ -7,12 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from synfeal.dataset.frame_files import FrameFile, link_or_unpack
-from synfeal.errors import InputError
 from synfeal.export.frames import ExportSet, Place, read_export_set
 from synfeal.export.learned import export_ace, export_mstransformer, export_nerfstudio
 from synfeal.export.reconstruction import export_colmap, export_hloc, export_tum
 from synfeal.export.rosbag import export_rosbag
-from synfeal.records.files import atomic_directory, lies_in, refuse_existing
+from synfeal.records.files import atomic_directory, refuse_existing, refuse_inside
 from synfeal.records.progress import Progress
 
 Exporter = Callable[[ExportSet, Path, Place], None]
@@ -42,10 +41,7 @@ def export(dataset: Path, to: str, out: Path, copy: bool, camera_file: Path | No
         The number of frames.
     """
     refuse_existing(out)
-    if lies_in(out, dataset):
-        raise InputError(
-            f"--out: {out} lies in the data set {dataset} itself; choose a place beside it"
-        )
+    refuse_inside(out, dataset)
     data = read_export_set(dataset, camera_file)
     with (
         atomic_directory(out) as directory,

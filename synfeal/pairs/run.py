@@ -18,7 +18,13 @@ from synfeal.pairs.correspondence import TOLERANCE, DepthImage, State
 from synfeal.pairs.flow import flow_between, write_flows
 from synfeal.pairs.frames import DepthFrames, read_depth_frames
 from synfeal.pairs.overlap import GRID, grid_points, overlaps_with
-from synfeal.records.files import atomic_directory, write_json, write_text
+from synfeal.records.files import (
+    atomic_directory,
+    refuse_existing,
+    refuse_inside,
+    write_json,
+    write_text,
+)
 from synfeal.records.tables import MAYBE_TEXT, NUMBER, TEXT, read_frame, rows_of, write_frame
 
 if TYPE_CHECKING:
@@ -38,6 +44,7 @@ SCHEMA = {
     "flow": MAYBE_TEXT,
 }
 MOST_FRAMES = 20_000  # of which all pairs are compared: 1.6 GB of overlaps
+MOST_POINTS = 2 * 10**8  # of all frames: 4.8 GB
 
 
 @dataclass(frozen=True)
@@ -114,6 +121,8 @@ def find_pairs(job: PairsJob) -> Found:
             used, or no two frames can be compared.
     """
     job.check()
+    refuse_existing(job.out)
+    refuse_inside(job.out, job.dataset)
     splits = (job.among,) if job.among in ("train", "test") else ("train", "test")
     frames = read_depth_frames(job.dataset, splits, job.camera_file, job.every)
     if job.flow and not frames.is_color:
@@ -127,6 +136,7 @@ def find_pairs(job: PairsJob) -> Found:
             f"{job.dataset}: has {len(frames)} frames, and at most {MOST_FRAMES} are compared;"
             f" give --every {math.ceil(job.every * len(frames) / MOST_FRAMES)}"
         )
+    _refuse_fine_grid(job.grid, frames)
     if not any(len(group) > 1 for group in groups):
         raise InputError(f"{job.dataset}: has no two frames to compare; give another --among")
     with atomic_directory(job.out) as directory:
@@ -140,6 +150,21 @@ def find_pairs(job: PairsJob) -> Found:
         write_text(directory / LIST, "".join(lines))
         write_json(directory / RECORD, _record(job, len(frames), compared, len(table)))
     return Found(frames=len(frames), compared=compared, table=table)
+
+
+def _refuse_fine_grid(grid: tuple[int, int], frames: DepthFrames) -> None:
+    """Refuse more points than pixels, and more than memory is likely to hold."""
+    (columns, rows), camera = grid, frames.camera
+    if columns > camera.width or rows > camera.height:
+        raise InputError(
+            f"--grid: {columns} x {rows} points are finer than the {camera.width} x"
+            f" {camera.height} pixels of a frame; give fewer"
+        )
+    if (count := columns * rows * len(frames)) > MOST_POINTS:
+        raise InputError(
+            f"--grid: {count:.2g} points of {len(frames)} frames are more than {MOST_POINTS:.0e};"
+            " give fewer, or --every"
+        )
 
 
 def read_pairs(path: Path) -> pd.DataFrame:

@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 # the least share of it that the scan shows: at the border of a scan cameras could look past it.
 MIN_VIEW_DISTANCE_M, MIN_SEEN = 0.8, 0.85
 FULL_TURN_DEG, STEEPEST_DEG = 330.0, 89.0
+MOST_MARGIN_M, MOST_MARGIN_DEG = 1000.0, 360.0
 
 
 @dataclass(frozen=True)
@@ -73,9 +74,12 @@ def like_trajectory(
     Raises:
         InputError: The sequence cannot be read, or a margin is negative.
     """
-    for flag, margin in (("--margin", margin_m), ("--angle-margin", margin_deg)):
-        if not (np.isfinite(margin) and margin >= 0):
-            raise InputError(f"{flag}: must be 0 or more, found {margin:g}")
+    for flag, margin, most in (
+        ("--margin", margin_m, MOST_MARGIN_M),
+        ("--angle-margin", margin_deg, MOST_MARGIN_DEG),
+    ):
+        if not 0 <= margin <= most:
+            raise InputError(f"{flag}: must be 0 to {most:g}, found {margin:g}")
     poses = read_posed_sequence(sequence, frames).world_from_cam
     record = read_scan_record(mesh)
     if record is not None:

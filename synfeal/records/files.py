@@ -112,6 +112,14 @@ def lies_in(path: Path, folder: Path) -> bool:
     return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
 
 
+def refuse_inside(out: Path, dataset: Path) -> None:
+    """Refuse to write into a data set itself, whose files would no longer be its own."""
+    if lies_in(out, dataset):
+        raise InputError(
+            f"--out: {out} lies in the data set {dataset} itself; choose a place beside it"
+        )
+
+
 def refuse_existing(path: Path) -> None:
     """Refuse to write where there is something already."""
     if path.is_symlink() and not path.exists():

@@ -21,6 +21,7 @@ from synfeal.records.files import read_json
 
 Array = NDArray[np.float64]
 MILLIMETRES = 1000.0
+MOST_ASIDE_M = 10.0  # of the depth camera from the colour camera
 
 
 @dataclass(frozen=True)
@@ -182,6 +183,11 @@ def rgbd_camera(
     if options.depth_from_color is not None:
         if not np.isfinite(options.depth_from_color).all():
             raise InputError("--depth-from-color: must be six finite numbers")
+        if np.abs(options.depth_from_color[3:]).max() > MOST_ASIDE_M:
+            raise InputError(
+                f"--depth-from-color: X Y Z must be within {MOST_ASIDE_M:g} m, which no two cameras"
+                " of one device are apart"
+            )
         turn = Rotation.from_rotvec(options.depth_from_color[:3], degrees=True).as_matrix()
         base = replace(base, depth_from_color=pose_matrix(turn, options.depth_from_color[3:]))
     if options.depth_units_per_m is not None:
@@ -210,7 +216,9 @@ def _one(
         return camera
     if focal_px is not None:
         if not 0 < focal_px < 1e5:
-            raise InputError(f"--{kind}-focal: must be above 0 pixels, found {focal_px:g}")
+            raise InputError(
+                f"--{kind}-focal: must be above 0 and below 1e5 pixels, found {focal_px:g}"
+            )
         return pinhole(*size, focal_px)
     return None
 

@@ -90,9 +90,11 @@ class ScanJob:
         if not (np.isfinite(self.min_piece_m2) and self.min_piece_m2 >= 0):
             raise InputError(f"--min-piece: must be 0 square metres or more, {self.min_piece_m2:g}")
         if not isinstance(self.gravity, str):
-            length = np.linalg.norm(self.gravity)
-            if not (np.isfinite(length) and length > 0):
-                raise InputError("--gravity: must be three numbers, not all 0")
+            longest = np.abs(self.gravity).max()
+            if not 1e-6 <= longest <= 1e6:
+                raise InputError(
+                    "--gravity: must be three numbers, the largest 1e-6 to 1e6 without its sign"
+                )
 
 
 @dataclass(frozen=True)

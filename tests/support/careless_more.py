@@ -1,4 +1,4 @@
-"""Two hundred more careless inputs: commands as typed, what has to be said, and damaged sets.
+"""More careless inputs: commands as typed, what has to be said, and damaged sets.
 
 ``{}`` in a command stands for the name of a damaged file or set, which the message has to name.
 """
@@ -10,6 +10,7 @@ import numpy as np
 from PIL import Image
 
 from tests.support.careless import make_folder
+from tests.support.collected import collect
 
 COLLECT = "collect --mesh room.glb --frames 2 --out new --width 40 --height 33"
 REPEAT = f"{COLLECT} --mode repeat --poses"
@@ -241,6 +242,83 @@ COMMANDS = (
     ("keep set", "COMMAND"),
 )
 
+# The same of options that came later; ``fish`` is a set through a fisheye, ``pair`` one in stereo.
+LATER = (
+    # collect: lenses, stereo, trajectories, test paths
+    (f"{COLLECT} --stereo 1e-300", "--stereo"),
+    (f"{COLLECT} --stereo 1000", "--stereo"),
+    (f"{COLLECT} --projection cylinder", "--projection"),
+    (f"{COLLECT} --projection equirectangular", "--width"),
+    (f"{COLLECT} --projection equirectangular --height 20 --fov 90", "--fov"),
+    (f"{COLLECT} --projection fisheye --fov 500", "--fov"),
+    (f"{COLLECT} --projection fisheye --fisheye-k nan 0 0 0", "--fisheye-k"),
+    (f"{COLLECT} --projection fisheye --fisheye-k 9 9 9", "--fisheye-k"),
+    (f"{COLLECT} --projection fisheye --camera camera.json", "--camera"),
+    (f"{COLLECT} --fisheye-k 0 0 0 0", "--fisheye-k"),
+    (f"{COLLECT} --test-paths 9", "--test-paths"),
+    (f"{COLLECT} --test-paths 9 --test-frames 3", "--test-paths"),
+    (f"{COLLECT} --like set/seq-01 --fov 60 --margin 1e9", "--margin"),
+    (f"{COLLECT} --like set/seq-01 --fov 60 --angle-margin 1000", "--angle-margin"),
+    (f"{COLLECT} --like set/seq-01 --fov 60 --mode repeat", "--poses"),
+    (f"{COLLECT} --like room.glb", "room.glb"),
+    # scan
+    (f"{SCAN} --gravity 1e308 0 0", "--gravity"),
+    (f"{SCAN} --gravity 0 0 -1e-300", "--gravity"),
+    (f"{SCAN} --depth-from-color 0 0 0 1e9 0 0", "--depth-from-color"),
+    (f"{SCAN} --depth-focal 1e9", "--depth-focal"),
+    (f"{SCAN} --voxel 100", "--max-depth"),
+    # train, map, localize
+    ("train set --out new --images 99999999999999", "--images"),
+    ("train set --out new --images 8 --frames 0 5", "--frames"),
+    ("train set --out new --images 8 --focal 35", "--focal"),
+    ("train fish --out new --images 8 --camera camera.json", "--camera"),
+    ("train set fish --out new --images 8", "fish/manifest.json"),
+    ("train set --out set/model --images 8", "--out"),
+    ("map fish --out new", "fish/manifest.json"),
+    ("map pair --out new", "--depth"),
+    ("map set --out set/map", "--out"),
+    ("map set --out new --frames 0 0", "--frames"),
+    ("localize empty photos --out new.csv --turns 4", "--turns"),
+    ("localize empty photos --out new.csv --device cpu", "--device"),
+    ("localize model.pt photos --out new.csv --confidence 0.5", "--confidence"),
+    ("localize model.pt photos --out new.csv --refine room.glb", "--refine"),
+    ("localize model.pt photos --out new.csv --turns 1000000", "--turns"),
+    ("localize model.pt photos photos/a.png --out new.csv", "photos/a.png"),
+    # pairs
+    ("pairs set --out set/pairs", "--out"),
+    ("pairs set --out photos", "photos"),
+    ("pairs set --out new --grid 41 5", "--grid"),
+    ("pairs set --out new --min-overlap nan", "--min-overlap"),
+    ("pairs set --out new --max-overlap 1.5", "--max-overlap"),
+    ("pairs set --out new --tolerance 0", "--tolerance"),
+    ("pairs set/seq-01 --out new", "set/seq-01"),
+    ("pairs pair --out new", "--depth"),
+    ("pairs set --out new --camera wide.json", "--camera"),
+    # evaluate
+    ("evaluate set set/test.csv --format kitti", "--format"),
+    ("evaluate set set/test.csv --format colmap", "set/test.csv"),
+    ("evaluate set set --format tum", "--format"),
+    ("evaluate set set/test.csv --rate 5", "--rate"),
+    ("evaluate set/test.csv set/test.csv --rate 5", "--rate"),
+    ("evaluate set/test.csv set/test.csv --split train", "--split"),
+    ("evaluate set/test.csv set/test.csv --camera camera.json", "--camera"),
+    ("evaluate set set --convention world_from_cam-xyzw", "--convention"),
+    ("evaluate set set --split train --convention cam_from_world-xyzw", "--convention"),
+    ("evaluate set whole-commas.csv", "--format"),
+    ("evaluate set numbered.txt", "--rate"),
+    ("evaluate set set/test.csv --labels numbered.txt", "--rate"),
+    ("evaluate numbered.txt set/test.csv", "set/test.csv"),
+    # export and preview
+    ("export fish --to rosbag --out new", "fish"),
+    ("export fish --to tum --out new", "fish"),
+    ("export set --to rosbag --out set/bag", "--out"),
+    ("export set --to rosbag --out notes.txt", "notes.txt"),
+    ("preview set --show right --out new.gif", "--show"),
+    ("preview pair --show right-depth --out new.gif", "--depth"),
+    ("preview set --fps 1e-9 --out new.gif", "--fps"),
+    ("preview set --out set/seq-01/frame-000000.color.gif", "--out"),
+)
+
 # Files of which each is the only thing wrong with a command that would work.
 MATRIX = [[35.0, 0, 20], [0, 35.0, 16], [0, 0, 1]]
 CAMERA = {"K": MATRIX, "dist": [0.0, 0, 0, 0, 0], "image_size": [40, 33]}
@@ -330,8 +408,17 @@ FILES = (
 
 
 def make_more(folder, mesh, data_set, model):
-    """Sound files and others, for :data:`COMMANDS` and :data:`FILES`."""
+    """Sound files and others, for :data:`COMMANDS`, :data:`LATER` and :data:`FILES`."""
     make_folder(folder, mesh, data_set, model)
+    for name, *lens in (
+        ("fish", "--depth", "--projection", "fisheye"),
+        ("pair", "--stereo", "0.1"),
+    ):
+        frames = ("--frames", "2", "--test-frames", "2")
+        assert collect(mesh, folder / name, *frames, *lens) == 0
+    lines = [f"{second} 0 0 0 0 0 0 1\n" for second in range(3)]
+    (folder / "numbered.txt").write_text("".join(lines))
+    (folder / "whole-commas.csv").write_text("".join(lines).replace(" ", ","))
     for table in (EFFECTS, CLUTTERS, TRAJECTORIES, MESHES):
         for name, text in table.items():
             (folder / name).write_text(text)

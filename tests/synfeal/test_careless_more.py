@@ -1,4 +1,4 @@
-"""Two hundred careless inputs more, over all commands: one line that names what to change."""
+"""More careless inputs, over all commands: one line that names what to change."""
 
 import shlex
 import shutil
@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from tests import CONFIG
-from tests.support.careless_more import COMMANDS, DAMAGES, FILES, ON_SETS, make_more
+from tests.support.careless_more import COMMANDS, DAMAGES, FILES, LATER, ON_SETS, make_more
 from tests.support.coloured_frames import save, untrained
 from tests.support.fuzzing import tree
 from tests.synfeal.test_careless import problem_with
@@ -34,7 +34,8 @@ def problems_of(commands, folder, capfd):
     return found
 
 
-PARTS = [COMMANDS[start : start + 20] for start in range(0, len(COMMANDS), 20)]
+TYPED = (*COMMANDS, *LATER)
+PARTS = [TYPED[start : start + 20] for start in range(0, len(TYPED), 20)]
 
 
 @pytest.mark.parametrize("commands", PARTS, ids=[part[0][0][:30] or "none" for part in PARTS])
@@ -62,8 +63,12 @@ def test_a_damaged_set_is_named_by_every_command(damage, folder, monkeypatch, ca
     assert not found, "\n".join(found)
 
 
+def test_none_is_there_twice():
+    assert len({typed for typed, _ in TYPED}) == len(TYPED)
+
+
 def test_there_are_two_hundred_of_them():
     n_files = sum(len(files) for _, files, _ in FILES)
     n_damages = sum(len(commands) for commands in DAMAGES.values())
     assert len(COMMANDS) + n_files + n_damages >= 200
-    assert len({typed for typed, _ in COMMANDS}) == len(COMMANDS)
+    assert len(LATER) >= 40
