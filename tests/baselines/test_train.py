@@ -255,8 +255,8 @@ def test_a_sequence_that_cannot_be_used_is_told_in_one_line(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--images", 0], "--images: must be at least 1"),
-        (["--minutes", 0], "--minutes: must be a positive number"),
+        (["--images", 0], "--images: must be 1 to 1,000,000,000, found 0"),
+        (["--minutes", 0], "--minutes: must be above 0 and below 1e6, found 0"),
         (["--minutes", 1, "--images", 9], "--minutes: --images says how long already"),
         (["--held-out", 1], "--held-out: must be a share"),
         (["--frames", 5, 5], "--frames: 5 5 holds no frame"),
