@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from statistics import median
@@ -304,17 +303,13 @@ def find_pictures(named: Iterable[Path]) -> list[Path]:
     Of a 7-Scenes sequence these are the colour images: ``*.depth.png`` is left out.
 
     Raises:
-        InputError: something named is not there or is named twice, or a directory holds no picture.
+        InputError: something named is not there, or a directory holds no picture.
     """
     found: list[Path] = []
     for path in named:
         if not (path.is_dir() or path.is_file()):
             raise InputError(f"{path}: there is no such picture or directory")
         found += _in(path) if path.is_dir() else [path]
-    counts = Counter(path.absolute() for path in found)
-    for path in found:
-        if counts[path.absolute()] > 1:
-            raise InputError(f"{path}: is named twice, by itself or its directory; name it once")
     return found
 
 

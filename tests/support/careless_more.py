@@ -283,7 +283,6 @@ LATER = (
     ("localize model.pt photos --out new.csv --confidence 0.5", "--confidence"),
     ("localize model.pt photos --out new.csv --refine room.glb", "--refine"),
     ("localize model.pt photos --out new.csv --turns 1000000", "--turns"),
-    ("localize model.pt photos photos/a.png --out new.csv", "photos/a.png"),
     # pairs
     ("pairs set --out set/pairs", "--out"),
     ("pairs set --out photos", "photos"),
