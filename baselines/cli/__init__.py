@@ -41,7 +41,7 @@ def localize(arguments: argparse.Namespace) -> None:
         _refuse(arguments, ("turns", "device"), "is for models, and a map is a folder")
         mapping.localize_by_map(arguments)
     else:
-        _refuse(arguments, ("confidence", "refine"), "is for maps, which are folders; a model is a file")
+        _refuse(arguments, ("confidence", "refine"), "is for maps, which are folders")
         training.localize_by_model(arguments)
 
 

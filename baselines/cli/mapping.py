@@ -103,7 +103,8 @@ MAP_OPTIONS = (
 
 def localize_by_map(arguments: argparse.Namespace) -> None:
     """Carry out ``synfeal localize`` with a map."""
-    from baselines.references.localized import LEAST_CONFIDENCE, localize_in_map
+    from baselines.references.confidence import LEAST_CONFIDENCE
+    from baselines.references.localized import localize_in_map
 
     out: Path = arguments.out
     confidence = arguments.confidence
