@@ -9,11 +9,13 @@ kind       what is wrong                              as it is left by
 `offset`   each path, all its frames alike            maps registered piece by piece
 `bend`     space, smoothly; nearby frames alike       drift that loop closures spread over a map
 `scale`    all distances by one factor                a monocular map of the wrong scale
+`drift`    each path, smoothly; frames close in time  depth tracking, and maps of video: what label
+           alike (``drift.py``)                       sets of 7-Scenes differ by
 =========  =========================================  ==============================================
 
-All have the same median error, ``noise_m`` and ``noise_deg``: exactly so for `noise` and `offset`;
-`bend` and `scale` are errors of space, one and the same in both splits, and their sizes are set on
-the training poses. A scale turns nothing, so it has no orientation error.
+All have the same median error, ``noise_m`` and ``noise_deg``: exactly so for `noise`, `offset` and
+`drift`; `bend` and `scale` are errors of space, one and the same in both splits, and their sizes
+are set on the training poses. A scale turns nothing, so it has no orientation error.
 """
 
 from __future__ import annotations

@@ -44,8 +44,8 @@ class Experiment(Strict):
     size: str = Field(description="a key of `scenes.<scene>.sizes` and of `training.samples_seen`")
     labels: str = Field(
         "synfeal",
-        description="`synfeal`: true poses; `noise`, `offset`, `bend`, `scale`: with an error"
-        " (docs/tables.md); or a label method (docs/groundtruth.md)",
+        description="`synfeal`: true poses; `noise`, `offset`, `bend`, `scale`, `drift`: with an"
+        " error (docs/tables.md); or a label method (docs/groundtruth.md)",
     )
     noise_m: NonNegative = Field(0.0, description="median position error put into labels, metres")
     noise_deg: NonNegative = Field(

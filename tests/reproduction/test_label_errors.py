@@ -3,16 +3,19 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from baselines.labels.drift import CORRELATED_FRAMES, drift_along_paths, walks
 from baselines.labels.injected import LABEL_ERRORS, add_noise, seed_names, with_error
 from baselines.labels.label_error import absolute_errors, share_within
 from reproduction.design.experiments import INJECTED
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import pose_error, position_error_m
+from tests import ROOT
 from tests.support.property_support import (
     directions,
     few,
@@ -136,6 +139,70 @@ def test_errors_of_space_are_seeded_alike_and_what_stands_still_is_not_scaled():
     assert [name for name, kind in LABEL_ERRORS.items() if not kind.turns] == ["scale"]
     table = replace(random_table(3, 0, 7), position_m=np.ones((3, 3)))
     np.testing.assert_array_equal(erroneous("scale", table, table).position_m, table.position_m)
+
+
+def test_a_drift_is_stationary_along_each_path_and_of_no_other():
+    n_paths, n_frames = 2000, 60
+    path = np.repeat(np.arange(n_paths), n_frames)
+    walk = walks(path, np.random.default_rng(0)).reshape(n_paths, n_frames, 3)
+    bound = 5 / np.sqrt(3 * n_paths)  # standard errors of a mean over paths and components
+    for place in (0, 1, 30, 59):
+        at = walk[:, place]
+        np.testing.assert_allclose(at.mean(), 0, atol=bound)
+        np.testing.assert_allclose(at.T @ at / n_paths, np.eye(3), atol=np.sqrt(6) * bound)
+    # Ornstein and Uhlenbeck: the correlation after k frames is exp(-k / length).
+    for first, lag in ((0, 1), (30, 1), (0, 25), (20, 25), (0, 59)):
+        found = (walk[:, first] * walk[:, first + lag]).mean()
+        assert found == pytest.approx(np.exp(-lag / 150), abs=np.sqrt(2) * bound)
+    moved = walk[:, 1:] - walk[:, :-1]
+    assert (moved**2).mean() == pytest.approx(2 * (1 - np.exp(-1 / 150)), rel=0.02)
+    # The next path begins anew.
+    between = (walk[:-1, -1] * walk[1:, 0]).mean(), (walk[:-1, 0] * walk[1:, 0]).mean()
+    np.testing.assert_allclose(between, 0, atol=bound)
+    # Shift and turn of a frame are drawn apart.
+    clean = random_table(6000, 0, 60)
+    shift, turn = noise_of(clean, erroneous("drift", clean, clean))
+    assert abs(np.corrcoef(shift.ravel(), turn.ravel())[0, 1]) < 5 / np.sqrt(3 * 100)
+
+
+def test_a_drift_goes_on_where_frames_of_paths_alternate():
+    in_turn = np.arange(4000) % 2
+    walk = walks(in_turn, np.random.default_rng(3)).reshape(2000, 2, 3)
+    steps = walk[1:] - walk[:-1]
+    # A step has a variance of 2 (1 - exp(-1 / 150)), that between two paths one of 2.
+    assert (steps**2).mean() == pytest.approx(2 * (1 - np.exp(-1 / 150)), rel=0.1)
+
+
+def test_a_drift_of_zero_changes_no_bit():
+    clean = random_table(50, 0, 7)
+    for noise_m, noise_deg in ((0.0, 0.0), (0.2, 0.0), (0.0, 10.0)):
+        found = drift_along_paths(clean, clean, noise_m, noise_deg, np.random.default_rng(2))
+        assert (found.position_m.tobytes() == clean.position_m.tobytes()) == (noise_m == 0)
+        assert (found.quat_wxyz.tobytes() == clean.quat_wxyz.tobytes()) == (noise_deg == 0)
+
+
+def test_the_size_of_a_drift_is_exact_in_the_test_split_too():
+    train, test = random_table(301, 0, 7), random_table(40, 2, 7)
+    found = erroneous("drift", test, train, 0.057, 1.3)
+    position_m, orientation_rad = pose_error(found.world_from_cam, test.world_from_cam)
+    assert np.median(position_m) == pytest.approx(0.057, rel=1e-9)
+    assert np.degrees(np.median(orientation_rad)) == pytest.approx(1.3, rel=1e-6)
+
+
+def test_the_design_has_the_drift_that_real_label_sets_differ_by():
+    measured = pd.read_csv(ROOT / "results/benchmarks/label_differences.csv")
+    scenes = measured[measured.removed == "worlds and cameras"]
+    assert len(scenes) == 7
+    middle = scenes.median(numeric_only=True)
+    design = pd.read_csv(ROOT / "config/experiments.csv").query("table == 'table6_label_errors'")
+    for kind in ("drift", "noise"):
+        smallest = design[design.labels == kind].iloc[0]
+        assert smallest.noise_m == round(middle.position_m, 3)
+        assert smallest.noise_deg == round(middle.orientation_deg, 1)
+    for lag in (1, 25):
+        ours = np.exp(-lag / CORRELATED_FRAMES)
+        both = [f"{part}_correlation_{lag}" for part in ("position", "orientation")]
+        assert middle[both].min() < ours < middle[both].max()
 
 
 @pytest.mark.parametrize("kind", INJECTED)

@@ -77,12 +77,13 @@ def papers_results(root, **changes):
     """Every frame of a cell has the error the paper printed as the median of that cell; of a run
     that is shown a part of the images, as many times that as the images are fewer."""
     results = Results(root, **changes)
+    printed = {row.label_id for row in results.design if row.table != "table6_label_errors"}
     for row in results.design:
         start, _, part = row.init.partition("-")
         table = row.table
         if table == "table7_images_shown":
             table = "table4_size" if start == "pretrained" else "table5_from_scratch"
-        elif table == "table6_label_errors" and row.labels in ("synfeal", "noise"):
+        elif table == "table6_label_errors" and row.label_id in printed:
             continue  # the runs of other tables
         for model in MODELS:
             key = key_of(row.model_copy(update={"init": start}), model)

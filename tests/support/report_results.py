@@ -21,7 +21,7 @@ ROWS = {
     "table3_inconsistencies": 60,
     "table4_size": 40,
     "table5_from_scratch": 20,
-    "table6_label_errors": 45,
+    "table6_label_errors": 60,
     "table7_images_shown": 30,
 }
 

@@ -44,11 +44,11 @@ def test_default_profile_plans_the_papers_tables(tmp_path):
 
 def test_the_complete_profile_adds_our_own_tables(tmp_path):
     jobs = planned_jobs(tmp_path, "--configfile", "config/complete.yaml")
-    assert jobs["train"] == 175  # 35 distinct data set x start x images, 5 models
-    assert jobs["erroneous_labels"] == (9 + 6) * 2
+    assert jobs["train"] == 190  # 38 distinct data set x start x images, 5 models
+    assert jobs["erroneous_labels"] == (9 + 9) * 2
     # Each data set once; structure where frames with depth are rendered: all but the larger sizes.
-    assert jobs["image_references"] == 27
-    assert jobs["structure_references"] == 20
+    assert jobs["image_references"] == 30
+    assert jobs["structure_references"] == 23
     assert jobs["adjusted_references"] == 14  # those of Tables 2 and 3
     assert jobs["coordinate_references"] == 4  # simulator, largest noise of each block
     assert jobs["descriptors"] == jobs["features"] == jobs["views"] == 2
