@@ -95,9 +95,18 @@ class PoseGraphConfig(Strict):
     lm_iterations: Count = Field(20, description="iterations of Levenberg-Marquardt (g2o)")
 
 
-class GroundTruthConfig(Strict):
-    """Label replacement as in section 4.1."""
+# By how much an injected error moves positions; see `baselines.labels.injected.moved_m`.
+NoiseDose = Literal["text", "code"]
 
+
+class GroundTruthConfig(Strict):
+    """Label replacement as in section 4.1, and the dose of errors put into labels."""
+
+    noise_dose: NoiseDose = Field(
+        "text",
+        description="metres that an injected error moves positions by: those that its row names, as"
+        " the paper's text says, or √3 times as many, as its code moves them and print was made",
+    )
     batch_frames: int = Field(250, ge=2, le=10**9, description="frames per batch")
     more_scenes: tuple[Slug, ...] = Field((), description="more scenes to count assistance in")
     assist_position_m: Positive = Field(0.20, description="assist a batch whose end is off by more")

@@ -20,6 +20,7 @@ are set on the training poses. A scale turns nothing, so it has no orientation e
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from pkgutil import resolve_name
@@ -28,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from baselines.config.labels import NoiseDose
 from baselines.registry.declarations import declared
 from baselines.registry.kinds import LabelError
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
@@ -157,6 +159,19 @@ def wrong_scale(
 LABEL_ERRORS = declared(LabelError)
 
 
+def moved_m(noise_m: float, dose: NoiseDose) -> float:
+    """Return the median distance that positions are moved by.
+
+    The published code reads a size as the root mean square over the three axes, the unit of its
+    errors, so that an error has √3 times that length. Angles are alike in text and code.
+
+    Args:
+        noise_m: Size that a row of the design names, metres.
+        dose: Reading of the paper that is followed.
+    """
+    return noise_m * math.sqrt(3) if dose == "code" else noise_m
+
+
 def with_error(
     kind: str,
     table: PoseTable,
@@ -222,15 +237,27 @@ def write_erroneous_labels(
     train: Path,
     noise_m: float,
     noise_deg: float,
+    dose: NoiseDose,
     seed: int,
     out_labels: Path,
 ) -> None:
-    """Write the true poses of a split with an error (:func:`with_error`)."""
+    """Write the true poses of a split with an error.
+
+    Args:
+        error_kind: Key of ``LABEL_ERRORS``.
+        truth: Table of the true poses of the split.
+        train: The same of the training split.
+        noise_m: Position error that the row of the design names, metres.
+        noise_deg: Orientation error, degrees.
+        dose: How ``noise_m`` is read; see :func:`moved_m`.
+        seed: Seed of directions and shapes.
+        out_labels: Table of poses to write.
+    """
     erroneous = with_error(
         kind=error_kind,
         table=read_pose_table(truth),
         train=read_pose_table(train),
-        noise_m=noise_m,
+        noise_m=moved_m(noise_m, dose),
         noise_deg=noise_deg,
         rng=np.random.default_rng(seed),
     )

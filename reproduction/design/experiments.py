@@ -9,8 +9,9 @@ from typing import Any, Literal, cast
 
 from pydantic import Field, ValidationError, model_validator
 
+from baselines.config.labels import NoiseDose
 from baselines.config.learning import MODELS
-from baselines.labels.injected import LABEL_ERRORS
+from baselines.labels.injected import LABEL_ERRORS, moved_m
 from reproduction.config.profile import Config
 from reproduction.config.tables import KEYS, Repetitions, TableName
 from synfeal.config.collection import NonNegative, Strict
@@ -47,7 +48,11 @@ class Experiment(Strict):
         description="`synfeal`: true poses; `noise`, `offset`, `bend`, `scale`, `drift`: with an"
         " error (docs/tables.md); or a label method (docs/groundtruth.md)",
     )
-    noise_m: NonNegative = Field(0.0, description="median position error put into labels, metres")
+    noise_m: NonNegative = Field(
+        0.0,
+        description="median position error put into labels, metres, as `groundtruth.noise_dose`"
+        " reads it",
+    )
     noise_deg: NonNegative = Field(
         0.0, description="the same of orientation, degrees; 0 with `scale`"
     )
@@ -222,6 +227,7 @@ class Design(Strict):
     rows: tuple[Experiment, ...] = Field(description="in the order of the file")
     repetitions: Repetitions = Field(description="`training.repetitions`")
     more_scenes: tuple[str, ...] = Field((), description="`groundtruth.more_scenes`")
+    noise_dose: NoiseDose = Field("text", description="`groundtruth.noise_dose`")
 
     @property
     def estimated(self) -> list[tuple[str, str, str]]:
@@ -246,6 +252,10 @@ class Design(Strict):
             for repetition in range(self._asked(row.table))
         }
         return sorted(runs)
+
+    def moved_m(self, row: Experiment) -> float:
+        """Return the distance that the errors of a row move positions by, metres."""
+        return moved_m(row.noise_m, self.noise_dose)
 
     def rows_of(self, table: str) -> list[Experiment]:
         """List the rows of one table."""
@@ -290,7 +300,12 @@ def read_design(config: Config) -> Design:
     """
     _check_robustness(config)
     rows, more_scenes = read_experiments(config), config.groundtruth.more_scenes
-    design = Design(rows=rows, repetitions=config.training.repetitions, more_scenes=more_scenes)
+    design = Design(
+        rows=rows,
+        repetitions=config.training.repetitions,
+        more_scenes=more_scenes,
+        noise_dose=config.groundtruth.noise_dose,
+    )
     known = {(row.scene, row.size) for row in rows}
     for scene, size, _ in design.estimated:
         if (scene, size) not in known:

@@ -17,7 +17,7 @@ from baselines.labels.methods import SIMULATOR
 from reproduction.design.experiments import split_init
 from reproduction.figures.sources import Array, Results, counted
 from reproduction.figures.style import MODEL_STYLES, PUBLISHED, add_legend, reference_styles
-from reproduction.tables.layouts import STARTS, TITLES, scene_title
+from reproduction.tables.layouts import DOSE, STARTS, TITLES, scene_title
 from reproduction.tables.references import NAME, STRUCTURE, read_references, titles_in
 
 PAPER = {
@@ -138,7 +138,10 @@ def draw_by_noise(results: Results) -> Figure | None:
     data_sets = {(row.scene, row.size, row.label_id) for row in design}
     keys = zip(table["scene"], table["size"], table["labels"], strict=True)
     references = table[[key in data_sets for key in keys]]
-    return by_noise(rows, references, f"{'; '.join(names)}: {frames}")
+    title = f"{'; '.join(names)}: {frames}"
+    if results.design.noise_dose == "code":
+        title = f"{title}\n{DOSE}"
+    return by_noise(rows, references, title)
 
 
 def by_noise(rows: pd.DataFrame, references: pd.DataFrame, title: str) -> Figure:

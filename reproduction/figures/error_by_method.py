@@ -24,7 +24,7 @@ from reproduction.figures.style import (
 )
 from reproduction.statistics.limits import read_errors
 from reproduction.tables import references, robustness
-from reproduction.tables.layouts import TITLES, label_title, scene_title
+from reproduction.tables.layouts import DOSE, TITLES, label_title, scene_title
 from synfeal.config.effects import CLEAN, MIXED
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import cumulative, joint_error
@@ -118,9 +118,12 @@ def draw_references_by_noise(results: Results) -> Figure | None:
     first = rows[0]
     table = table[(table.scene == first.scene) & (table["size"] == first.size)]
     rows += results.design.rows_of(LABELS)
-    return references_by_noise(
+    figure = references_by_noise(
         table, [r for r in rows if (r.scene, r.size) == (first.scene, first.size)]
     )
+    if results.design.noise_dose == "code":
+        figure.supxlabel(DOSE, fontsize=8)
+    return figure
 
 
 def references_by_noise(table: pd.DataFrame, rows: Sequence[Experiment]) -> Figure:

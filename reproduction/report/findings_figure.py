@@ -23,6 +23,7 @@ from reproduction.report.findings import (
     best,
     localizers,
     most_noise,
+    moved_by,
     reference,
     shape_changes,
 )
@@ -61,7 +62,8 @@ def panels(root: Path) -> list[Panel]:
     A panel that lacks a row, a value or a limit is left out.
     """
     noise = most_noise(root)
-    off = f"{100 * noise[0]:.0f} cm, {noise[1]:.0f}°"
+    moved_m, turned_deg = moved_by(root)
+    off = f"{100 * moved_m:.0f} cm, {turned_deg:.0f}°"
     clean, noisy = best(localizers(root)), best(localizers(root, noise))
     found = {
         "feature map, exact labels": (reference(root, WITHOUT_DEPTH), BOTH, BLUE),

@@ -89,13 +89,15 @@ SCORES = {
     **dict.fromkeys(COUNTS, COUNT),
     "limits_of": EXTRA_TEXT,  # files of earlier versions lack it
 }
+# Distance that label errors truly moved positions by; of the tables whose rows name a size of them.
+MOVED = "moved_m"
 CELL = {
     "row": COUNT,
     **{key: SCHEMA[key] for key in KEY},
     "label_id": TEXT,
     **SCORES,
     "n_finished": COUNT,
-    **dict.fromkeys(yardstick.COLUMNS, EXTRA),
+    **dict.fromkeys((MOVED, *yardstick.COLUMNS), EXTRA),
 }
 PUBLISHED = {name: f"published_{name}" for name in SCHEMA if name not in KEY}
 
@@ -111,6 +113,7 @@ def read_cells(table: str, design: Design, root: Path) -> pd.DataFrame:
     records = [
         {"row": place, "model": model, "label_id": row.label_id}
         | row.model_dump()
+        | {MOVED: design.moved_m(row)}
         | _scores(row, model, design, root)
         for place, row in enumerate(design.rows_of(table))
         for model in MODELS
@@ -137,6 +140,7 @@ def schema_of(table: str, repeated: bool = False) -> Schema:
         "published_flag": TEXT,
     } | (
         (dict.fromkeys(DEVIATIONS, EXTRA) if repeated else {})
+        | ({MOVED: EXTRA} if "noise_m" in KEYS[table] else {})
         | (dict.fromkeys(yardstick.COLUMNS, EXTRA) if table == yardstick.TABLE else {})
     )
 

@@ -59,6 +59,10 @@ YARDSTICK = (
     "labels with that noise. So much of the error is the noise of the test labels, and none of it "
     "harm to the localizer."
 )
+DOSE = (
+    "Positions of labels are moved by √3 times the metres that a row names, as the published code "
+    "moves them."
+)
 CHANGE = (
     "Red: worse than with transfer learning; green: not worse. Changes come from unrounded errors; "
     "some printed in the paper differ from what its rounded cells give."

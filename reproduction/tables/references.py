@@ -19,12 +19,20 @@ from reproduction.design.experiments import Design
 from reproduction.design.references import answered_by, data_sets
 from reproduction.runs.results import read_result
 from reproduction.statistics.limits import MEASURES, REMEDY, combine, read_metrics
-from reproduction.tables.cells import LIMITS
+from reproduction.tables.cells import LIMITS, MOVED
 from reproduction.tables.columns import Column, SideTable, by_method, method_columns, write_side
-from reproduction.tables.layouts import SOURCES, TITLES, data_set_titles, label_title, scene_title
+from reproduction.tables.layouts import (
+    DOSE,
+    SOURCES,
+    TITLES,
+    data_set_titles,
+    label_title,
+    scene_title,
+)
 from synfeal.evaluation.metrics import BOUNDS
 from synfeal.records.tables import (
     COUNT,
+    EXTRA,
     MAYBE,
     MAYBE_COUNT,
     NUMBER,
@@ -44,7 +52,7 @@ SCHEMA = {
     **dict.fromkeys(KEYS, TEXT) | dict.fromkeys(("noise_m", "noise_deg"), NUMBER),
     **dict.fromkeys((*MEASURES, *LIMITS, *WITHIN), MAYBE),
     **dict.fromkeys(("n_train", "n_test", "n_seeds"), COUNT),
-    **{"failed": MAYBE_COUNT, "seconds_per_frame": MAYBE},
+    **{"failed": MAYBE_COUNT, "seconds_per_frame": MAYBE, MOVED: EXTRA},
 }
 TIME = "Time per frame, one core"
 LINES = ["data_set", "labels", "against"]
@@ -77,6 +85,7 @@ def references_table(design: Design, references: ReferencesConfig, root: Path) -
         folder = root.joinpath("references", *key)
         row = rows[key]
         keys = dict(zip(KEYS, (*key, row.noise_m, row.noise_deg), strict=False))
+        keys[MOVED] = design.moved_m(row)
         methods = answered_by(design.rows, key, references)
         any_run = read_metrics(folder / methods[0] / "metrics.json")  # holds the mean pose's scores
         constant = {measure: any_run[f"baseline_{measure}"] for measure in MEASURES}
@@ -131,7 +140,9 @@ def side_table(table: pd.DataFrame) -> SideTable:
     ]
     rows["style"] = followed.where(rows.labels != SOURCES[SIMULATOR], "")
     rows["on_paper"] = rows.labels != TIME  # paper is the same in every run
-    return SideTable(NAME, CAPTION, columns, rows, REMARK, block="data_set")
+    moved = bool((table[MOVED] > table.noise_m).any())
+    remark = f"{REMARK} {DOSE}" if moved else REMARK
+    return SideTable(NAME, CAPTION, columns, rows, remark, block="data_set")
 
 
 def _cells(table: pd.DataFrame, against: str, end: str) -> pd.DataFrame:
@@ -186,11 +197,16 @@ def crossing_findings(table: pd.DataFrame) -> list[str]:
 def crossing_finding(table: pd.DataFrame) -> str:
     """Say from which noise, in both parts of a pose, structure stops being better.
 
-    A sentence on the rows of ``references.csv`` of one scene and size; empty where the design has
-    no noise in both, or no structure.
+    Args:
+        table: Rows of ``references.csv`` of one scene and size.
+
+    Returns:
+        A sentence that names noise as labels truly had it, whatever the dose; empty where the
+        design has no noise in both, or no structure.
     """
     both = table.labels.str.startswith("noise-") & (table.noise_m > 0) & (table.noise_deg > 0)
     noisy = table[both | (table.labels == "synfeal")]
+    noisy = noisy.assign(noise_m=noisy[MOVED].fillna(noisy.noise_m))
     errors = noisy.pivot(index=["noise_m", "noise_deg"], columns="method", values=list(TRUE))
     if len(errors) < 2 or not {STRUCTURE, *MODELS} <= set(noisy.method):
         return ""
@@ -198,7 +214,7 @@ def crossing_finding(table: pd.DataFrame) -> str:
     structure = failed.xs(STRUCTURE, axis=1, level="method")
     localizers = {m: failed.loc[:, [(m, name) for name in MODELS]] for m in TRUE}
     better = [localizers[m].lt(structure[m], axis=0).sum(axis=1) for m in TRUE]
-    levels = [f"{noise_m:g} m and {noise_deg:g}°" for noise_m, noise_deg in errors.index]
+    levels = [f"{noise_m:.3g} m and {noise_deg:g}°" for noise_m, noise_deg in errors.index]
     parts = [
         f"{n_m} in position and {n_deg} in orientation at {level}"
         for level, n_m, n_deg in zip(levels, *better, strict=True)

@@ -12,11 +12,12 @@ import pandas as pd
 from reproduction.design.experiments import FROM_SCRATCH, Design
 from reproduction.statistics.limits import PATHS, PATHS_AND_SEEDS
 from reproduction.tables import yardstick
-from reproduction.tables.cells import CHANGES, read_cells, schema_of
+from reproduction.tables.cells import CHANGES, MOVED, read_cells, schema_of
 from reproduction.tables.layouts import (
     BLOCKS,
     CAPTIONS,
     CHANGE,
+    DOSE,
     HEADINGS,
     ONE_RUN,
     PUBLISHED,
@@ -98,9 +99,15 @@ def sheet_of(name: str, cells: pd.DataFrame) -> Sheet:
     headings = (HEADINGS[name], "Error against", *TITLES.values(), *references.values())
     changes = [CHANGE] if name == FROM_SCRATCH else []
     told = [YARDSTICK] if has_yardstick else []
+    told += dose_remarks(cells)
     remarks = (REMARK, UNTRAINED, *told, PUBLISHED, *changes, *one_run_remarks(cells))
     caption = f"{CAPTIONS[name]} {_where(cells)} Best scores in bold."
     return Sheet(name, caption, headings, lines, remarks)
+
+
+def dose_remarks(cells: pd.DataFrame) -> list[str]:
+    """Remark where labels were moved farther than their rows say."""
+    return [DOSE] if bool((cells[MOVED] > cells.noise_m).any()) else []
 
 
 def one_run_remarks(cells: pd.DataFrame) -> list[str]:

@@ -88,7 +88,7 @@ def yardstick_alone(
     files = [root / "runs" / run.directory / "errors.csv" for run in runs]
     if not files or not all(file.is_file() for file in files):
         return dict.fromkeys(COLUMNS)
-    return dict(zip(COLUMNS, _means(files, row.noise_m, row.noise_deg), strict=True))
+    return dict(zip(COLUMNS, _means(files, design.moved_m(row), row.noise_deg), strict=True))
 
 
 def _means(files: Sequence[Path], noise_m: float, noise_deg: float) -> list[float | None]:

@@ -12,6 +12,7 @@ from reproduction.design.docs import main
 from reproduction.design.experiments import Design, Run, read_design, read_experiments
 from synfeal.config.load import merge, read_yaml
 from synfeal.errors import InputError
+from synfeal.records.provenance import config_hash
 from tests import CONFIG
 from tests.support.report_results import design_of, experiment
 
@@ -130,6 +131,36 @@ def test_controls_show_small_sets_as_many_images_and_large_ones_every_frame_twic
     assert all(run.seed(controls.seed) != run.seed(night.seed) for run in design.runs)
     assert min(map(len, (design.runs_of(row, "posenet") for row in design.rows))) == 3
     assert {row.scene for row in design.rows} == {"large_room", "sanctuary"}
+
+
+def test_the_codes_dose_is_tried_on_nights_table_3_with_fresh_seeds():
+    night, dose = (
+        load_config(CONFIG / "config.yaml", CONFIG / f"{name}.yaml") for name in ("night", "dose")
+    )
+    assert (night.groundtruth.noise_dose, dose.groundtruth.noise_dose) == ("text", "code")
+    assert read_design(dose).rows == tuple(read_design(night).rows_of("table3_inconsistencies"))
+    assert read_design(dose).repetitions["default"] == 3
+    for part in ("scenes", "collection", "render", "network", "network_camera", "localizers"):
+        assert getattr(dose, part) == getattr(night, part), part
+    assert (dose.scale, dose.pretraining) == (night.scale, night.pretraining)
+    alike = {"repetitions": {}, "samples_seen": {}}
+    trainings = (c.training.model_copy(update=alike) for c in (night, dose))
+    assert len({training.model_dump_json() for training in trainings}) == 1
+    assert dose.training.samples_seen["6k"] == night.training.samples_seen["6k"]
+    assert (dose.seed, dose.root) != (night.seed, night.root)
+
+
+def test_a_dose_changes_what_a_profile_is_known_by():
+    mini = profile("mini")
+    groundtruth = mini.groundtruth.model_copy(update={"noise_dose": "code"})
+    other = mini.model_copy(update={"groundtruth": groundtruth})
+    assert config_hash(mini) != config_hash(other)
+    assert read_design(mini).model_dump() != read_design(other).model_dump()
+    with pytest.raises(InputError, match=r"groundtruth\.noise_dose: .*'text' or 'code'"):
+        parse_config(
+            merge(read_yaml(CONFIG / "config.yaml"), {"groundtruth": {"noise_dose": "print"}}),
+            "my.yaml",
+        )
 
 
 @pytest.mark.parametrize("name", ["mini", "paper"])

@@ -10,10 +10,16 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from baselines.labels.drift import CORRELATED_FRAMES, drift_along_paths, walks
-from baselines.labels.injected import LABEL_ERRORS, add_noise, seed_names, with_error
+from baselines.labels.injected import (
+    LABEL_ERRORS,
+    add_noise,
+    seed_names,
+    with_error,
+    write_erroneous_labels,
+)
 from baselines.labels.label_error import absolute_errors, share_within
 from reproduction.design.experiments import INJECTED
-from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.geometry.poses import pose_error, position_error_m
 from tests import ROOT
 from tests.support.property_support import (
@@ -212,6 +218,32 @@ def test_two_sizes_of_a_kind_differ_in_size_alone(kind):
     np.testing.assert_allclose(3 * small[0], large[0], atol=1e-9)
     if kind != "scale":
         np.testing.assert_allclose(4 * small[1], large[1], atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", INJECTED)
+def test_the_published_codes_dose_is_longer_by_the_root_of_three(kind, tmp_path):
+    train = random_table(201, 0, 7)
+    write_pose_table(tmp_path / "true.csv", train)
+    found = {}
+    for dose in ("text", "code"):
+        write_erroneous_labels(
+            error_kind=kind,
+            truth=tmp_path / "true.csv",
+            train=tmp_path / "true.csv",
+            noise_m=0.3,
+            noise_deg=0.0 if kind == "scale" else 20.0,
+            dose=dose,
+            seed=1,
+            out_labels=tmp_path / "labels.csv",
+        )
+        found[dose] = noise_of(train, read_pose_table(tmp_path / "labels.csv"))
+    median_m = {d: np.median(np.linalg.norm(shift, axis=1)) for d, (shift, _) in found.items()}
+    assert median_m == pytest.approx({"text": 0.3, "code": 0.3 * np.sqrt(3)}, rel=1e-6)
+    # The root mean square over the axes is what the code calls the size.
+    if kind in ("noise", "offset"):
+        assert np.sqrt((found["code"][0] ** 2).mean()) == pytest.approx(0.3, rel=1e-6)
+    np.testing.assert_array_equal(found["code"][1], found["text"][1])
+    np.testing.assert_allclose(found["code"][0], np.sqrt(3) * found["text"][0], atol=1e-6)
 
 
 @few

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from reproduction.tables.cells import read_cells
+from reproduction.tables.layouts import DOSE
 from reproduction.tables.write import sheet_of, write_table
 from reproduction.tables.yardstick import COLUMNS, against_noisy_labels
 from tests.support.report_results import (
@@ -19,6 +20,7 @@ from tests.support.report_results import (
 )
 
 INF = math.inf
+CODES = {"noise_dose": "code"}
 
 
 def test_closed_forms():
@@ -85,3 +87,29 @@ def test_table_3_shows_it_beside_the_scores(tmp_path):
     )
     (line,) = [line for line in sheet.lines if line.kind == "yardstick"]
     assert [value.text for value in line.cells[2]] == ["0.50 m", "22.34°"]
+
+
+def test_at_the_codes_dose_the_noise_is_longer_by_the_root_of_three_and_tables_say_so(tmp_path):
+    levels = ((0.0, 0.0, "synfeal"), (0.3, 20.0, "noise"))
+    rows = [
+        experiment("table3_inconsistencies", block="both", labels=labels, noise_m=m, noise_deg=d)
+        for m, d, labels in levels
+    ]
+    fill(tmp_path, rows)
+    write_errors(tmp_path, rows[0], "posenet", np.tile([9.0, 9.0, 0.4, 10.0], (7, 1)))
+    text, code = design_of(rows), design_of(rows).model_copy(update=CODES)
+    files = table_files(tmp_path, "table3")
+    for design, moved_m, remarked in ((text, 0.3, False), (code, 0.3 * math.sqrt(3), True)):
+        write_table("table3_inconsistencies", design, tmp_path, *files)
+        written = read(files[0])
+        assert {row["noise_m"] for row in written[5:]} == {"0.3"}  # the row of print
+        assert [float(row["moved_m"]) for row in written] == pytest.approx(
+            [0.0] * 5 + [moved_m] * 5
+        )
+        # Pythagoras, for the median direction is at right angles.
+        alone = math.hypot(0.4, moved_m)
+        assert float(written[5][COLUMNS[0]]) == pytest.approx(alone, abs=2e-3)
+        assert float(written[5][COLUMNS[1]]) == pytest.approx(22.34, abs=0.05)  # whatever the dose
+        cells = read_cells("table3_inconsistencies", design, tmp_path)
+        assert (DOSE in sheet_of("table3_inconsistencies", cells).remarks) == remarked
+        assert ("times the metres that a row names" in files[1].read_text()) == remarked

@@ -26,6 +26,7 @@ rule erroneous_labels:
         seed=lambda w: seed_of(
             CONFIG.seed, *seed_names(w.error_kind, w.split), w.scene, w.size
         ),
+        dose=CONFIG.groundtruth.noise_dose,
     script:
         "../scripts/run_erroneous_labels.py"
 

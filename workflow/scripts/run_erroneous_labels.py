@@ -11,6 +11,7 @@ run_job(
     train=snakemake.input.train,
     noise_m=snakemake.wildcards.noise_m,
     noise_deg=snakemake.wildcards.noise_deg,
+    dose=snakemake.params.dose,
     seed=snakemake.params.seed,
     out_labels=snakemake.output.labels,
 )
