@@ -96,7 +96,7 @@ def reference(root: Path, method: str, noise: tuple[float, float] = (0.0, 0.0)) 
 
 
 def most_noise(root: Path) -> tuple[float, float]:
-    """Return the highest noise in both parts of the labels as its row names it, metres and degrees."""
+    """Return the highest noise in both parts of the labels, metres and degrees, as rows name it."""
     cells = read_table(root, "table3_inconsistencies")
     top = cells[cells.block == "both"].sort_values("noise_m").iloc[-1]
     return float(top.noise_m), float(top.noise_deg)

@@ -180,6 +180,19 @@ def test_labels_of_estimators(told):
     assert numbers(text) == expected
 
 
+def test_sentences_name_the_metres_that_labels_truly_moved_by(tmp_path):
+    root = tmp_path / "night"
+    shutil.copytree(NIGHT, root)
+    path = root / "tables/table3_inconsistencies.csv"
+    cells = pd.read_csv(path)
+    cells.assign(moved_m=3**0.5 * cells.noise_m).to_csv(path, index=False)
+    expected = [text.replace("30 cm and 20°", "52 cm and 20°") for text in sentences(NIGHT)]
+    assert expected != sentences(NIGHT)
+    assert sentences(root) == expected
+    drawn = [panel.title for panel in findings_figure.panels(root)]
+    assert any("Labels 52 cm, 20° off" in title for title in drawn)
+
+
 def test_sentences_follow_the_results(tmp_path):
     root = tmp_path / "night"
     shutil.copytree(NIGHT, root)

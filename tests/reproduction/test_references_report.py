@@ -128,6 +128,8 @@ def test_the_finding_counts_the_localizers_that_are_closer(table):
     failed.loc[failed.method == "structure-depth", "orientation_deg_true"] = None
     assert "2 in position and 5 in orientation at 0.1 m and 5°" in crossing_finding(failed)
     assert crossing_finding(table[table.noise_m == 0]) == ""
+    at_codes_dose = crossing_finding(table.assign(moved_m=3**0.5 * table.noise_m))
+    assert at_codes_dose == finding.replace("0.1 m", "0.173 m").replace("0.3 m", "0.52 m")
 
 
 PX = 32
