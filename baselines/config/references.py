@@ -44,5 +44,9 @@ class ReferencesConfig(Strict):
     max_features: Count = Field(1000, description="structure: SIFT features per image")
     contrast: Positive = Field(0.013, description="structure: least contrast (OpenCV: 0.04)")
     retrieved: Count = Field(20, description="structure: training images matched with a test image")
-    coordinate_samples: Count = Field(2000, description="scene coordinates: images shown in all")
+    coordinate_samples: Count | None = Field(
+        None,
+        description="scene coordinates: images shown in all; null: a fifteenth of"
+        " `training.samples_seen` of the size, for as much processor time as a localizer",
+    )
     external: dict[Slug, ExternalConfig] = part(dict, "localizers of somebody else's")

@@ -32,6 +32,7 @@ PRIOR_M = 0.1
     title="Structure, bundle-adjusted",
     rank=6,
     group="adjusted",
+    query=("vlad", "features", "matches"),
 )
 def adjusted(evidence: Evidence) -> Array:
     """Find poses (N, 4, 4) against points triangulated from bundle-adjusted training poses.
@@ -39,11 +40,12 @@ def adjusted(evidence: Evidence) -> Array:
     Images say nothing of where the world is: the adjusted model is put where its camera centres fit
     the labels best (Umeyama), so that errors of single labels average out.
     """
-    labels, tracks = evidence.train.world_from_cam, evidence.tracks
-    found = adjust(tracks, labels, triangulate(tracks, labels), pinhole(evidence.camera))
-    return on_points(
-        evidence, triangulate(tracks, placed_on(found, labels, evidence.train.usable_rows))
-    )
+    with evidence.preparing():
+        labels, tracks = evidence.train.world_from_cam, evidence.tracks
+        found = adjust(tracks, labels, triangulate(tracks, labels), pinhole(evidence.camera))
+        placed = placed_on(found, labels, evidence.train.usable_rows)
+        point_m = triangulate(tracks, placed)
+    return on_points(evidence, point_m)
 
 
 def placed_on(poses: Array, labels: Array, usable: Rows | None = None) -> Array:

@@ -13,7 +13,9 @@ from scipy.sparse.csgraph import connected_components
 from tqdm import tqdm
 
 from baselines.references.arrays import VLAD, ByFrame, Stored, most_alike, read_described
+from baselines.references.costs import write_costs
 from baselines.references.features import Features
+from synfeal.records.timing import Facts, timed
 
 Rows = NDArray[np.int64]
 
@@ -75,17 +77,29 @@ def mutual_matches(
 
 
 def write_matches(
-    descriptors: Path, train: Path, test: Path, retrieved: int, out_matches: Path
+    descriptors: Path,
+    train: Path,
+    test: Path,
+    retrieved: int,
+    out_matches: Path,
+    out_costs: Path | None = None,
 ) -> None:
     """Match each test frame with the training frames that look most alike, and write the matches.
+
+    ``out_costs``, if given, is a JSON file with the processor seconds per test frame, retrieval
+    included.
 
     Raises:
         InputError: descriptors or features cannot be read.
     """
     of_train, of_test = Features.read(train), Features.read(test)
     described = read_described(descriptors, len(of_train), len(of_test))
-    rows = most_alike(*described[VLAD], retrieved)
-    match_test_frames(of_train, of_test, rows).write(out_matches)
+    spent: Facts = {}
+    with timed(spent, "matches"):
+        rows = most_alike(*described[VLAD], retrieved)
+        found = match_test_frames(of_train, of_test, rows)
+    found.write(out_matches)
+    write_costs(out_costs, {"matches": spent["matches"]}, len(of_test))
 
 
 # Frames that each frame is matched with: those that look most alike, and the next of its path.

@@ -24,7 +24,9 @@ from scipy.cluster.vq import kmeans2
 from torch import Tensor
 
 from baselines.references.arrays import THUMBNAIL, VLAD, Vectors, write_arrays
+from baselines.references.costs import write_costs
 from synfeal.dataset.packed import read_packed
+from synfeal.records.timing import Facts, timed
 
 Frames = NDArray[np.uint8]
 T = TypeVar("T", bound=np.generic)
@@ -150,6 +152,7 @@ def write_descriptors(
     seed: int,
     out_descriptors: Path,
     counts: Mapping[str, int] | None = None,
+    out_costs: Path | None = None,
 ) -> None:
     """Describe packed frames as wholes.
 
@@ -160,6 +163,7 @@ def write_descriptors(
         seed: Seed of the samples and of k-means.
         out_descriptors: Arrays to write, ``<descriptor>_<name>`` (N, D).
         counts: Number of frames of each, if not all.
+        out_costs: JSON to write: processor seconds per frame of ``test``, by descriptor.
 
     Raises:
         InputError: packed frames cannot be read.
@@ -169,7 +173,13 @@ def write_descriptors(
     frames = {name: read_packed(path)[: counts.get(name)] for name, path in files.items()}
     vlad = Vlad.learn(frames["train"][:learned_from], seed)
     methods = {THUMBNAIL: thumbnails, VLAD: vlad.describe}
-    write_arrays(
-        out_descriptors,
-        {f"{name}_{n}": work(part) for name, work in methods.items() for n, part in frames.items()},
-    )
+    vectors: dict[str, Vectors] = {}
+    spent: Facts = {}
+    for descriptor, work in methods.items():
+        for name, part in frames.items():
+            with timed(spent, f"{descriptor}_{name}"):
+                vectors[f"{descriptor}_{name}"] = work(part)
+    write_arrays(out_descriptors, vectors)
+    if out_costs:
+        of_test = {descriptor: spent[f"{descriptor}_test"] for descriptor in methods}
+        write_costs(out_costs, of_test, len(frames["test"]))

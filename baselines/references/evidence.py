@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 from baselines.references.arrays import Described, read_described
 from baselines.references.correspondences import Correspondences, Tracks
+from baselines.references.costs import read_costs
 from baselines.references.features import Views
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
+from synfeal.records.timing import Facts, timed
 
 
 @dataclass(frozen=True)
@@ -27,12 +30,27 @@ class Evidence:
         camera: Camera of the frames that features were found in.
         seed: Seed of whatever is random.
         samples_seen: Images that a method that learns is shown.
+        spent: Processor seconds: ``prepare_s``, in :meth:`preparing`.
     """
 
     files: Mapping[str, Path]
     camera: CameraConfig
     seed: int
     samples_seen: int = 0
+    spent: Facts = field(default_factory=dict)
+
+    @contextmanager
+    def preparing(self) -> Iterator[None]:
+        """Count what a block takes as learning or building a map, not as answering."""
+        before, own = self.spent.get("prepare_s", 0.0), Facts()
+        with timed(own, "prepare_s"):
+            yield
+        self.spent["prepare_s"] = before + own["prepare_s"]
+
+    @cached_property
+    def query_costs(self) -> dict[str, float]:
+        """Processor seconds per test frame of what was done with it before, by name."""
+        return read_costs(path for name, path in self.files.items() if name.endswith("_costs"))
 
     @cached_property
     def train(self) -> PoseTable:

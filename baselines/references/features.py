@@ -21,10 +21,12 @@ from tqdm import tqdm
 from baselines.config.references import ReferencesConfig
 from baselines.labels.batches import read_image
 from baselines.references.arrays import ByFrame, Stored
+from baselines.references.costs import write_costs
 from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.sevenscenes import frames_between, read_depth_m
+from synfeal.records.timing import Facts, timed
 from synfeal.render.base import Depth
 
 log = logging.getLogger(__name__)
@@ -88,8 +90,11 @@ def write_features(
     camera: CameraConfig,
     references: ReferencesConfig,
     out_features: Path,
+    out_costs: Path | None = None,
 ) -> None:
     """Find features in the first frames of a split, and write them.
+
+    ``out_costs``, if given, is a JSON file with the processor seconds per frame.
 
     Raises:
         InputError: a sequence or an image cannot be read.
@@ -98,7 +103,11 @@ def write_features(
     paths = tqdm(color, "features", unit="frame", mininterval=5)
     greys = (read_image(path, camera, "L") for path in paths)
     depths_m = map(read_depth_m, depth) if depth else None
-    features_of(greys, depths_m, camera, references).write(out_features)
+    spent: Facts = {}
+    with timed(spent, "features"):
+        found = features_of(greys, depths_m, camera, references)
+    found.write(out_features)
+    write_costs(out_costs, {"features": spent["features"]}, n_frames)
 
 
 def features_of(
@@ -170,8 +179,11 @@ def write_views(
     camera: CameraConfig,
     side: tuple[int, int],
     out_views: Path,
+    out_costs: Path | None = None,
 ) -> None:
     """Reduce the first frames of a split to ``side`` (width, height), and write them.
+
+    ``out_costs``, if given, is a JSON file with the processor seconds per frame.
 
     Raises:
         InputError: a sequence or an image cannot be read.
@@ -182,11 +194,14 @@ def write_views(
     column, row = np.moveaxis(pixel.astype(int), -1, 0)
     images = np.empty((len(color), height, width, 3), np.uint8)
     depth_m = np.full((len(color), *column.shape), np.inf, np.float32)
-    for index, path in enumerate(tqdm(color, "views", unit="frame", mininterval=5)):
-        full = read_image(path, camera, "RGB")
-        images[index] = cv2.resize(full, side, interpolation=cv2.INTER_AREA)
-        if depth is not None:
-            depth_m[index] = read_depth_m(depth[index])[row, column]
+    spent: Facts = {}
+    with timed(spent, "views"):
+        for index, path in enumerate(tqdm(color, "views", unit="frame", mininterval=5)):
+            full = read_image(path, camera, "RGB")
+            images[index] = cv2.resize(full, side, interpolation=cv2.INTER_AREA)
+            if depth is not None:
+                depth_m[index] = read_depth_m(depth[index])[row, column]
+    write_costs(out_costs, {"views": spent["views"]}, len(color))
     Views(images, normalised_of_pixels(camera, pixel), depth_m).write(out_views)
 
 

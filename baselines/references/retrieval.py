@@ -17,7 +17,8 @@ METRES_PER_RADIAN = 1.0
 
 def nearest_label(evidence: Evidence, descriptor: str) -> NDArray[np.float64]:
     """Return the labels (N, 4, 4) of the training images nearest to the test images."""
-    train, test = evidence.descriptors[descriptor]
+    with evidence.preparing():
+        train, test = evidence.descriptors[descriptor]
     usable = evidence.train.usable_rows
     return evidence.train.world_from_cam[usable[most_alike(train[usable], test, 1)[:, 0]]]
 
@@ -27,6 +28,7 @@ def nearest_label(evidence: Evidence, descriptor: str) -> NDArray[np.float64]:
     title="Nearest image, thumbnails",
     rank=1,
     group="images",
+    query=("thumbnail",),
 )
 def by_thumbnail(evidence: Evidence) -> NDArray[np.float64]:
     """Answer with the label (N, 4, 4) of the training image with the nearest thumbnail."""
@@ -38,6 +40,7 @@ def by_thumbnail(evidence: Evidence) -> NDArray[np.float64]:
     title="Nearest image, DenseVLAD",
     rank=2,
     group="images",
+    query=("vlad",),
 )
 def by_vlad(evidence: Evidence) -> NDArray[np.float64]:
     """Answer with the label (N, 4, 4) of the training image with the nearest DenseVLAD."""

@@ -55,9 +55,13 @@ def answer_and_score(
     """
     for name in names:
         facts: Facts = {}
+        answer = resolve_name(REFERENCES[name].place)
+        evidence.spent.clear()
         with timed(facts, "answer_s"):
-            answer = resolve_name(REFERENCES[name].place)
             poses = pose_table(evidence.test_frames, answer(evidence))
+        facts["prepare_s"] = evidence.spent.get("prepare_s", 0.0)
+        facts["answer_s"] -= facts["prepare_s"]
+        facts["query_s"] = sum(evidence.query_costs[cost] for cost in REFERENCES[name].query)
         known = {**info, "reference": name}
         score_answers(poses, evidence.files, out_dir / name, known, facts)
 
@@ -76,7 +80,9 @@ def score_answers(
         files: Labels and true poses by name: ``train``, ``test``, ``test_truth``.
         folder: Folder of the files.
         info: Further keys of the metrics.
-        facts: Times and memory that the answers took.
+        facts: Processor seconds and memory: ``answer_s`` for all answers, ``prepare_s`` for
+            learning or building a map from the labels before, ``query_s`` for what each test frame
+            took before that, once for all label sets.
     """
     predictions = folder / "predictions.csv"
     write_pose_table(predictions, answers)
@@ -136,6 +142,7 @@ def answer_externally(
         found = files["poses"] if method["poses"] else None
         path = found or run_external(method["command"], files, named, folder)
     facts["answer_s"] = 0.0 if found else time.perf_counter() - begin  # another process worked
+    facts |= {"prepare_s": 0.0, "query_s": 0.0}  # of a command, both are in the above
     poses = read_answers(path, read_pose_table(files["test"]))
     score_answers(poses, files, folder, wildcards, facts)
 

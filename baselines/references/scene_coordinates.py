@@ -118,19 +118,20 @@ LOGGED = 50  # steps
     title="Scene coordinates",
     rank=7,
     group="coordinates",
+    query=("views",),
 )
 def by_coordinates(evidence: Evidence) -> Array:
     """Find the poses (N, 4, 4) of the test frames, NaN where none is found."""
     device = open_device("auto")
-    train, test = evidence.views
-    usable = evidence.train.usable_rows
-    rows = torch.from_numpy(usable[usable < len(train)])
-    points = torch.from_numpy(world_points(train, evidence.train.world_from_cam[: len(train)]))[
-        rows
-    ]
-    images = torch.from_numpy(train.images).permute(0, 3, 1, 2)[rows]
-    statistics = image_statistics(images)
-    network = learn(images, points, statistics, evidence.samples_seen, evidence.seed, device)
+    with evidence.preparing():
+        train, test = evidence.views
+        usable = evidence.train.usable_rows
+        rows = torch.from_numpy(usable[usable < len(train)])
+        world = world_points(train, evidence.train.world_from_cam[: len(train)])
+        points = torch.from_numpy(world)[rows]
+        images = torch.from_numpy(train.images).permute(0, 3, 1, 2)[rows]
+        statistics = image_statistics(images)
+        network = learn(images, points, statistics, evidence.samples_seen, evidence.seed, device)
     return poses_of(test, predict(network, test, statistics, device), evidence)
 
 

@@ -35,11 +35,14 @@ MIN_INLIERS = 8
     title="Structure, points from depth",
     rank=4,
     group="structure",
+    query=("vlad", "features", "matches"),
 )
 def on_depth(evidence: Evidence) -> Array:
     """Find poses (N, 4, 4) against features lifted by training depth; NaN where none is found."""
-    places = lifted(evidence.correspondences, evidence.train)
-    return localize(evidence.correspondences, places, evidence.camera, evidence.seed)
+    with evidence.preparing():
+        matches = evidence.correspondences
+        places = lifted(matches, evidence.train)
+    return localize(matches, places, evidence.camera, evidence.seed)
 
 
 def lifted(matches: Correspondences, train: PoseTable) -> Array:
@@ -189,18 +192,23 @@ SCALE_RAD = 0.007
     title="Structure, points triangulated",
     rank=5,
     group="structure",
+    query=("vlad", "features", "matches"),
 )
 def triangulated(evidence: Evidence) -> Array:
     """Find poses (N, 4, 4) against points triangulated from the labels; NaN where none is found."""
-    return on_points(evidence, triangulate(evidence.tracks, evidence.train.world_from_cam))
+    with evidence.preparing():
+        point_m = triangulate(evidence.tracks, evidence.train.world_from_cam)
+    return on_points(evidence, point_m)
 
 
 def on_points(evidence: Evidence, point_m: Array) -> Array:
     """Find the poses of the test frames against the points (T, 3) of the tracks."""
-    track = evidence.tracks.of_feature[evidence.correspondences.feature]
+    with evidence.preparing():
+        matches, tracks = evidence.correspondences, evidence.tracks
+    track = tracks.of_feature[matches.feature]
     places = np.full((len(track), 3), np.nan)
     places[track >= 0] = point_m[track[track >= 0]]
-    return localize(evidence.correspondences, places, evidence.camera, evidence.seed)
+    return localize(matches, places, evidence.camera, evidence.seed)
 
 
 def triangulate(tracks: Tracks, world_from_cam: Array) -> Array:

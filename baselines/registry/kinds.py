@@ -110,7 +110,11 @@ class ReferenceMethod(Kind):
             of every data set; ``structure`` at frames with depth, where some label set of the data
             set is estimated from them. ``adjusted`` and ``coordinates`` do, too, for label sets of
             the paper alone, the latter for the true ones and the noisiest: they take longer.
+        query: Work on a test frame that is done before, once for all label sets, and that an answer
+            has to wait for: ``thumbnail`` or ``vlad`` (its descriptor), ``features``, ``matches``
+            (retrieval and matching), ``views``.
     """
 
     room: ClassVar[str] = "references"
     group: Group
+    query: tuple[str, ...] = ()

@@ -26,6 +26,11 @@ from synfeal.config.collection import (
 from synfeal.config.dataset import CameraConfig, DatasetConfig
 from synfeal.config.effects import RobustnessConfig
 
+# An image costs the network of scene coordinates as much as so many cost a localizer: where
+# localizers of the published `night` were shown 30,000 images and scene coordinates 2,000, their
+# jobs took the same processor time (results/published/night/benchmarks.csv).
+IMAGES_PER_COORDINATE_IMAGE = 15
+
 
 class RenderSpeedConfig(Strict):
     """Measurement of the speed and error of rendering, for `speed_vs_error.csv`."""
@@ -98,6 +103,11 @@ class Config(DatasetConfig):
     def rooms(self) -> list[str]:
         """Scenes that backbones are pretrained on: no table has them."""
         return [name for name, scene in self.scenes.items() if scene.builder == "random_room"]
+
+    def coordinate_samples(self, size: str) -> int:
+        """Images that scene coordinates of a size are learned from."""
+        given = self.references.coordinate_samples
+        return given or max(1, self.training.samples_seen[size] // IMAGES_PER_COORDINATE_IMAGE)
 
     def n_largest(self, scene: str, split: str) -> int:
         """Count frames planned and rendered for a split: those of the scene's largest size."""

@@ -242,7 +242,7 @@ OWN_SIZES: dict[str, Callable[[Profile, Part, Stage], dict[str, float]]] = {
     **dict.fromkeys(("train", "train_varied"), _train),
     "features": _features,
     "coordinate_references": lambda profile, part, kind: {
-        "size": profile.config.references.coordinate_samples,
+        "size": profile.config.coordinate_samples(part["size"]),
         "disk_bytes": kind.disk * _frames(profile, part, kind),
     },
     **dict.fromkeys(("render_varied", "pack_varied"), _varied),

@@ -20,7 +20,14 @@ from reproduction.design.references import answered_by, data_sets
 from reproduction.runs.results import read_result
 from reproduction.statistics.limits import MEASURES, REMEDY, combine, read_metrics
 from reproduction.tables.cells import LIMITS, MOVED
-from reproduction.tables.columns import Column, SideTable, by_method, method_columns, write_side
+from reproduction.tables.columns import (
+    NOTHING,
+    Column,
+    SideTable,
+    by_method,
+    method_columns,
+    write_side,
+)
 from reproduction.tables.layouts import (
     DOSE,
     SOURCES,
@@ -52,9 +59,10 @@ SCHEMA = {
     **dict.fromkeys(KEYS, TEXT) | dict.fromkeys(("noise_m", "noise_deg"), NUMBER),
     **dict.fromkeys((*MEASURES, *LIMITS, *WITHIN), MAYBE),
     **dict.fromkeys(("n_train", "n_test", "n_seeds"), COUNT),
-    **{"failed": MAYBE_COUNT, "seconds_per_frame": MAYBE, MOVED: EXTRA},
+    **{"failed": MAYBE_COUNT, MOVED: EXTRA},
+    **{"seconds_per_frame": MAYBE, "preparation_seconds": EXTRA},  # last, as they are measured
 }
-TIME = "Time per frame, one core"
+TIME, PREPARATION = "Time per frame, one core", "Time to learn or to build the map"
 LINES = ["data_set", "labels", "against"]
 CAPTION = (
     "Reference methods beside the localizers, all from the labels of the data set: median errors,"
@@ -108,8 +116,11 @@ def read_references(path: Path) -> pd.DataFrame:
 
 
 def _seconds(folder: Path) -> dict[str, float]:
-    facts = read_result(folder / "facts.json", ("answer_s", "frames"), "answer again")
-    return {"seconds_per_frame": facts["answer_s"] / facts["frames"]}
+    """Processor seconds: of a whole query, and of what is learned or built from labels before."""
+    needed = ("answer_s", "query_s", "prepare_s", "frames")
+    facts = read_result(folder / "facts.json", needed, "answer again")
+    seconds = facts["answer_s"] / facts["frames"] + facts["query_s"]
+    return {"seconds_per_frame": seconds, "preparation_seconds": facts["prepare_s"]}
 
 
 def _record(folders: Sequence[Path]) -> dict[str, Any]:
@@ -139,7 +150,7 @@ def side_table(table: pd.DataFrame) -> SideTable:
         *method_columns(titles_in(table[table.kind == LOCALIZER]), on_paper=False),
     ]
     rows["style"] = followed.where(rows.labels != SOURCES[SIMULATOR], "")
-    rows["on_paper"] = rows.labels != TIME  # paper is the same in every run
+    rows["on_paper"] = ~rows.labels.isin([TIME, PREPARATION])  # paper is the same in every run
     moved = bool((table[MOVED] > table.noise_m).any())
     remark = f"{REMARK} {DOSE}" if moved else REMARK
     return SideTable(NAME, CAPTION, columns, rows, remark, block="data_set")
@@ -160,8 +171,10 @@ def _cost(table: pd.DataFrame) -> pd.DataFrame:
     """Return cells of what a method's answers take, and of how many failed, over all label sets."""
     methods = table[table.seconds_per_frame.notna()].groupby("method")
     seconds, counts = methods.seconds_per_frame.median(), methods[["failed", "n_test"]].sum()
+    prepared = methods.preparation_seconds.median()
     texts = {
         TIME: [f"{1e3 * s:.2g} ms" for s in seconds],
+        PREPARATION: [NOTHING if pd.isna(s) else f"{two_digits(s)} s" for s in prepared],
         "Failed answers": [f"{row.failed:,} of {row.n_test:,}" for row in rows_of(counts)],
     }
     same = {"data_set": "All data sets", "against": "", "method": seconds.index, "number": seconds}

@@ -1,6 +1,7 @@
 """Reference methods against closed forms, naive twins, and rooms whose poses are known."""
 
 import json
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from baselines.references.retrieval import METRES_PER_RADIAN, nearest_rows
 from baselines.references.run import answer_and_score
 from baselines.references.structure import on_depth, triangulate
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
+from synfeal.errors import InputError
 from synfeal.geometry.poses import (
     inverse,
     pose_error,
@@ -32,6 +34,7 @@ from synfeal.geometry.poses import (
     position_error_m,
 )
 from synfeal.geometry.rotations import rotation_angle_rad, rotation_from_rpy
+from synfeal.records.files import read_json, write_json
 from tests.support.property_support import random_table, table_of
 from tests.support.room_scene import CAMERA, pose_at, write_room
 
@@ -218,3 +221,34 @@ def test_retrieval_and_oracle_answer_with_labels(room, tmp_path):
         assert metrics["position_m"] == 0
         assert metrics["position_m_true"] == pytest.approx(0.1)
         assert metrics["orientation_deg_true"] == pytest.approx(4.0)
+
+
+def test_a_query_costs_what_was_done_for_it_before(room, tmp_path):
+    """Preparing is not answering; the descriptor that a method does not use costs it nothing."""
+    costs = tmp_path / "descriptors-costs.json"
+    write_json(costs, {"vlad": 0.25, "thumbnail": 4.0})
+    vectors = np.eye(len(TRAIN), dtype=np.float32)
+    evidence = Evidence({**room.files, "descriptor_costs": costs}, CAMERA, 0)
+    evidence.__dict__["descriptors"] = {"vlad": (vectors, vectors[: len(TEST)])}
+    answer_and_score(evidence, ["nearest-vlad", "nearest-pose"], tmp_path, {})
+    with_vlad, oracle = (
+        read_json(tmp_path / name / "facts.json") for name in ("nearest-vlad", "nearest-pose")
+    )
+    assert (with_vlad["query_s"], oracle["query_s"]) == (0.25, 0)
+    assert all(
+        facts[name] >= 0 for facts in (with_vlad, oracle) for name in ("answer_s", "prepare_s")
+    )
+    write_json(costs, {"vlad": "cheap"})
+    unread = Evidence({"descriptor_costs": costs}, CAMERA, 0)
+    with pytest.raises(InputError, match=r"costs\.json: must hold seconds by name; make it again"):
+        _ = unread.query_costs
+
+
+def test_what_is_prepared_is_not_part_of_answers():
+    evidence = Evidence({}, CAMERA, 0)
+    for _ in range(2):
+        with evidence.preparing():
+            begin = time.process_time()
+            while time.process_time() < begin + 0.02:
+                pass
+    assert evidence.spent["prepare_s"] >= 0.04

@@ -62,7 +62,8 @@ def root(tmp_path):
             score = structure_m if name == "structure-depth" else 0.9
             recalls = {"recall_5cm_5deg": 0.5, "recall_5cm_5deg_true": 1.0}
             write_json(place / name / "metrics.json", metrics("6k", score, 10 * score) | recalls)
-            write_json(place / name / "facts.json", {"answer_s": 5.0, "frames": 125})
+            facts = {"answer_s": 5.0, "query_s": 0.125, "prepare_s": 20.0, "frames": 125}
+            write_json(place / name / "facts.json", facts)
         for k, model in enumerate(MODELS):
             recalls = {"recall_5cm_5deg": 0.0, "recall_5cm_5deg_true": 0.0}
             write_run(tmp_path, row, model, metrics("6k", 0.20 + 0.01 * k, 12.0) | recalls)
@@ -89,7 +90,9 @@ def test_the_table_has_a_row_per_data_set_and_method_and_all_are_shown(table, ro
     row = table[(table.labels == "noise-p0.1-r5") & (table.method == "structure-depth")].iloc[0]
     assert (row.position_m, row.orientation_deg) == (0.215, 2.15)
     assert (row.within_5cm_5deg, row.within_5cm_5deg_true) == (0.5, 1.0)
-    assert row.seconds_per_frame == pytest.approx(5 / 125)
+    # A whole query: its features and retrieval, too. The map is not part of it.
+    assert row.seconds_per_frame == pytest.approx(5 / 125 + 0.125)
+    assert row.preparation_seconds == 20
     assert (row.noise_m, row.noise_deg, row.kind) == (0.1, 5, "reference")
     mine = table[table.method == "mine"].iloc[0]
     assert (mine.title, mine.kind, mine.labels) == ("Mine", "external", "synfeal")
@@ -106,7 +109,8 @@ def test_the_table_has_a_row_per_data_set_and_method_and_all_are_shown(table, ro
     page = ET.fromstring(side_html(side_table(table)))
     rows = page.findall(".//tbody/tr")
     assert len(page.findall(".//thead/tr/th")) == 1 + len(sheet.headings) + len(MODELS)
-    assert [row.get("class") for row in rows] == [*("labels", "true") * 3, None, None, None]
+    assert [row.get("class") for row in rows] == [*("labels", "true") * 3, *[None] * 4]
+    assert "20 s" in "".join(rows[-2].itertext())
     rows = [row for row in design() if row.table == TABLE3]
     (upper, lower) = references_by_noise(table, rows).axes
     drawn = {line.get_label(): line.get_ydata() for line in upper.lines}

@@ -17,6 +17,8 @@ rule descriptors:
         test=f"{ROOT}/frames/{{scene}}/test.npy",
     output:
         descriptors=f"{ROOT}/references/{{scene}}/descriptors.npz",
+        # Processor seconds per test frame, here and below: they are part of an answer.
+        costs=f"{ROOT}/references/{{scene}}/descriptors-costs.json",
     log:
         f"{ROOT}/logs/descriptors/{{scene}}.log",
     benchmark:
@@ -42,6 +44,7 @@ rule features:
         ),
     output:
         features=temp(f"{FOUND}/features-{{split}}.npz"),
+        costs=f"{FOUND}/features-{{split}}-costs.json",
     log:
         f"{ROOT}/logs/features/{{scene}}/{{size}}/{{split}}.log",
     benchmark:
@@ -65,6 +68,7 @@ rule correspondences:
         test=f"{FOUND}/features-test.npz",
     output:
         matches=f"{FOUND}/correspondences.npz",
+        costs=f"{FOUND}/correspondences-costs.json",
     log:
         f"{ROOT}/logs/correspondences/{{scene}}/{{size}}.log",
     benchmark:
@@ -101,6 +105,7 @@ rule image_references:
     input:
         **POSES,
         descriptors=rules.descriptors.output.descriptors,
+        descriptor_costs=rules.descriptors.output.costs,
     output:
         references=FILES.reference_files(REFERENCE, in_group("images")),
     log:
@@ -119,9 +124,18 @@ rule image_references:
         "../scripts/run_references.py"
 
 
+# What a test frame takes before structure answers for it.
+STRUCTURE_COSTS = {
+    "descriptor_costs": rules.descriptors.output.costs,
+    "feature_costs": f"{FOUND}/features-test-costs.json",
+    "match_costs": rules.correspondences.output.costs,
+}
+
+
 use rule image_references as structure_references with:
     input:
         **POSES,
+        **STRUCTURE_COSTS,
         correspondences=rules.correspondences.output.matches,
         tracks=rules.tracks.output.tracks,
     output:
@@ -141,6 +155,7 @@ use rule image_references as structure_references with:
 use rule structure_references as adjusted_references with:
     input:
         **POSES,
+        **STRUCTURE_COSTS,
         correspondences=rules.correspondences.output.matches,
         tracks=rules.tracks.output.tracks,
     output:
@@ -158,6 +173,7 @@ rule views:
         sequences=rules.features.input.sequences,
     output:
         views=temp(f"{FOUND}/views-{{split}}.npz"),
+        costs=f"{FOUND}/views-{{split}}-costs.json",
     log:
         f"{ROOT}/logs/views/{{scene}}/{{size}}/{{split}}.log",
     benchmark:
@@ -179,6 +195,7 @@ use rule structure_references as coordinate_references with:
         **POSES,
         train_views=f"{FOUND}/views-train.npz",
         test_views=f"{FOUND}/views-test.npz",
+        view_costs=f"{FOUND}/views-test-costs.json",
     output:
         references=FILES.reference_files(REFERENCE, in_group("coordinates")),
     log:
@@ -187,7 +204,7 @@ use rule structure_references as coordinate_references with:
         f"{ROOT}/benchmarks/coordinate_references/{{scene}}/{{size}}/{{labels}}.tsv"
     params:
         group="coordinates",
-        samples_seen=CONFIG.references.coordinate_samples,
+        samples_seen=lambda w: CONFIG.coordinate_samples(w.size),
         # One seed for all label sets: what is drawn does not depend on them.
         seed=lambda w: seed_of(CONFIG.seed, "scene coordinates", w.scene, w.size),
 

@@ -11,4 +11,5 @@ run_job(
     test=snakemake.input.test,
     retrieved=snakemake.params.retrieved,
     out_matches=snakemake.output.matches,
+    out_costs=snakemake.output.costs,
 )

@@ -10,4 +10,5 @@ run_job(
     learned_from=snakemake.params.learned_from,
     seed=snakemake.params.seed,
     out_descriptors=snakemake.output.descriptors,
+    out_costs=snakemake.output.costs,
 )

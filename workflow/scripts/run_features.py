@@ -12,4 +12,5 @@ run_job(
     camera=snakemake.params.camera,
     references=snakemake.params.references,
     out_features=snakemake.output.features,
+    out_costs=snakemake.output.costs,
 )

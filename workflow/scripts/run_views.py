@@ -12,4 +12,5 @@ run_job(
     camera=snakemake.params.camera,
     side=snakemake.params.side,
     out_views=snakemake.output.views,
+    out_costs=snakemake.output.costs,
 )

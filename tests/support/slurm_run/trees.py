@@ -16,6 +16,7 @@ TIMED = {
     "provenance.json": "dates, times and hashes of timed files",
     "report.html": "shows what jobs took",
     "references/*/facts.json": "what answers took",
+    "references/*-costs.json": "what test frames took before",
     "scenes/*/collection_speed.json": "times of frames",
     "scenes/*/effects_speed.csv": "times of frames",
     "scenes/*/render_speed.csv": "times of frames",
@@ -28,7 +29,7 @@ TIMED = {
 TIMED_PARTS = {
     "claims.csv": re.compile(rb"^C14,.*\n", re.MULTILINE),  # the rate of collection
     "tables/label_error.csv": re.compile(rb",[^,\n]*,[^,\n]*$", re.MULTILINE),  # seconds and MB
-    "tables/references.csv": re.compile(rb",[^,\n]*$", re.MULTILINE),  # seconds
+    "tables/references.csv": re.compile(rb",[^,\n]*,[^,\n]*$", re.MULTILINE),  # seconds
     "tables/label_error.tex": re.compile(rb"&[^&\n]*&[^&\n]*$", re.MULTILINE),
 }
 # Files that go when what needs them is made.
