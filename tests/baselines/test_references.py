@@ -20,6 +20,7 @@ from baselines.references.correspondences import (
 from baselines.references.descriptors import Vlad, dense_sift, residuals, thumbnails
 from baselines.references.evidence import Evidence
 from baselines.references.features import Features, write_features
+from baselines.references.interpolated import RIDGE, affine_weights, combined
 from baselines.references.registry import in_group
 from baselines.references.retrieval import METRES_PER_RADIAN, nearest_rows
 from baselines.references.run import answer_and_score
@@ -252,3 +253,31 @@ def test_what_is_prepared_is_not_part_of_answers():
             while time.process_time() < begin + 0.02:
                 pass
     assert evidence.spent["prepare_s"] >= 0.04
+
+
+def test_interpolated_poses_lie_where_the_descriptor_does():
+    """A query at three quarters of the way between two descriptors, with six others about."""
+    rng = np.random.default_rng(0)
+    descriptors = rng.standard_normal((1, 8, 30)).astype(np.float32)
+    query = 0.25 * descriptors[:, 0] + 0.75 * descriptors[:, 1]
+    weights = affine_weights(descriptors, query)
+    assert weights == pytest.approx(np.array([[0.25, 0.75, *[0] * 6]]), abs=0.01)
+    ends = np.stack([pose_at([0, 0, 1], yaw_deg=170), pose_at([4, 0, 1], yaw_deg=-150)])
+    others = np.tile(pose_at([9, 9, 9], yaw_deg=10), (6, 1, 1))
+    found = combined(np.concatenate([ends, others])[None], np.array([[0.5, 0.5, *[0] * 6]]))
+    position_m, angle_rad = pose_error(found[0], pose_at([2, 0, 1], yaw_deg=-170))
+    assert (position_m, angle_rad) == (pytest.approx(0), pytest.approx(0, abs=1e-9))
+
+
+def test_weights_solve_the_constrained_least_squares():
+    """By Lagrange's equations, another way to the same weights, of other descriptors."""
+    rng = np.random.default_rng(1)
+    retrieved, query = rng.standard_normal((5, 6, 40)), rng.standard_normal((5, 40))
+    for own, wanted, found in zip(retrieved, query, affine_weights(retrieved, query), strict=True):
+        ridge = RIDGE * np.square(own - wanted).sum(axis=1).mean()
+        system = np.ones((7, 7))
+        system[:6, :6] = own @ own.T + ridge * np.eye(6)
+        system[6, 6] = 0.0
+        expected = np.linalg.solve(system, [*(own @ wanted), 1.0])[:6]
+        assert found == pytest.approx(expected)
+        assert found.sum() == pytest.approx(1)
