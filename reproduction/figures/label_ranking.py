@@ -46,8 +46,8 @@ def label_ranking(table: pd.DataFrame, rows: Sequence[Experiment]) -> Figure:
     table = table[(table.scene == first.scene) & (table["size"] == first["size"])]
     panels = panels_of(table, rows)
     down = -(-len(panels) // ACROSS)
+    across = -(-len(panels) // down)
     origins = [origin for origin in TRAINED_ON if (table.trained_on == origin).any()]
-    across = min(ACROSS, len(panels))
     figure = Figure(figsize=(0.6 + 3.4 * across, len(origins) * (0.4 + 3.1 * down)))
     figure.set_layout_engine("constrained")
     figure.suptitle(f"{scene_title(str(first.scene))}, {first['size']}")
@@ -62,7 +62,7 @@ def label_ranking(table: pd.DataFrame, rows: Sequence[Experiment]) -> Figure:
             fontsize=10,
         )
         for axes in half.axes:
-            axes.set_ylim(lowest - 0.05, 1.05)
+            axes.set(xlim=(-0.6, max(PLACES.values()) + 0.6), ylim=(lowest - 0.05, 1.05))
     return figure
 
 

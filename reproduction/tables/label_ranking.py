@@ -33,7 +33,7 @@ from baselines.training.score import read_predictions
 from reproduction.design.experiments import Design
 from reproduction.design.ranking import Ranking, rankings
 from reproduction.statistics.ranking import agreement
-from reproduction.tables.columns import Column, SideTable, write_side
+from reproduction.tables.columns import NOTHING, Column, SideTable, write_side
 from reproduction.tables.layouts import data_set_titles, label_title
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
@@ -61,6 +61,9 @@ SCHEMA = {
     **dict.fromkeys(("methods", "pairs", "swapped", "tied", "reversed", "paths"), COUNT),
     "ranked": TEXT,
 }
+# A threshold ranks rightly where the lower limit of tau is no less: without ties, three of four
+# pairs are ordered as by the truth.
+RIGHTLY = 0.5
 TRAINED_ON = {"labels": "these labels", "exact": "exact labels"}
 CAPTION = (
     "Which labels rank methods rightly, and down to which threshold: rank correlation (Kendall's"
@@ -75,6 +78,7 @@ REMARK = (
     " label sets, so that only the yardstick differs. Ranked are methods that see images (neither"
     " the mean pose nor the oracle) and answer for every label set. Reversed: pairs of methods that"
     " labels and truth order oppositely, both in at least 97.5 % of resamples; over all scores."
+    " Rightly from: the least threshold from which on the lower limit is 0.5 or more."
 )
 LINES = ["data_set", "labels", "trained_on", "methods"]
 
@@ -155,16 +159,20 @@ def side_table(table: pd.DataFrame) -> SideTable:
         trained_on=table.trained_on.map(TRAINED_ON),
         limits=[_limits(row) for row in records_of(table)],
     )
-    reversed_pairs = cells.groupby(LINES, sort=False).reversed.sum()
+    lines = cells.groupby(LINES, sort=False)
+    reversed_pairs = lines.reversed.sum()
+    rightly = pd.Series({line: rightly_from(own) for line, own in lines}, name="rightly")
     wide = cells.pivot(index=LINES, columns="score", values=["tau", "limits"])
     wide = wide.reindex(reversed_pairs.index)
     limits = wide["limits"].add_suffix("_limits")
-    rows = pd.concat([wide["tau"], limits, reversed_pairs], axis=1).reset_index()
+    rows = reversed_pairs.to_frame().assign(rightly=rightly.to_numpy())
+    rows = rows.join([wide["tau"], limits]).reset_index()
     columns = [
         Column("Data set", "data_set"),
         Column("Labels", "labels"),
         Column("Trained on", "trained_on"),
         Column("Methods", "methods", "{:.0f}"),
+        Column("Rightly, from", "rightly"),
         *(
             Column(title, name, "{:.2f}", small=f"{name}_limits")
             for name, title in TITLES.items()
@@ -173,6 +181,24 @@ def side_table(table: pd.DataFrame) -> SideTable:
         Column("Reversed, pairs", "reversed", "{:.0f}"),
     ]
     return SideTable(NAME, CAPTION, columns, rows, REMARK, block="data_set")
+
+
+def rightly_from(rows: pd.DataFrame) -> str:
+    """Name the least threshold from which on all thresholds rank rightly.
+
+    Args:
+        rows: Rows of the table, of one label set and one origin of the predictions.
+
+    Returns:
+        The threshold as printed; a dash where even the largest does not.
+    """
+    low = rows.set_index("score").tau_low.where(rows.set_index("score").tau.notna())
+    found = NOTHING
+    for name, bound in reversed(THRESHOLDS.items()):
+        if not low.get(name, np.nan) >= RIGHTLY:
+            break
+        found = bound.title
+    return found
 
 
 def _limits(row: Mapping[str, Any]) -> str:

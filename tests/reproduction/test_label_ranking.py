@@ -1,6 +1,7 @@
 """Rankings by labels against rankings by the truth, made by hand or known in closed form."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import kendalltau
 
@@ -15,6 +16,7 @@ from reproduction.tables.label_ranking import (
     THRESHOLDS,
     TITLES,
     read_label_ranking,
+    rightly_from,
     sample_of,
     side_table,
     write_label_ranking_table,
@@ -194,12 +196,34 @@ def test_predictions_of_other_frames_are_refused(root):
         written(root)
 
 
+@pytest.mark.parametrize(
+    ("tau_low", "expected"),
+    [
+        ((0.9, 0.4, 0.5, 0.6, 0.9, 0.9), "5 cm, 5°"),
+        ((0.9, 0.5, 0.5, 0.6, 0.9, 0.9), "1 cm, 1°"),
+        ((0.9, 0.5, 0.5, 0.6, 0.9, 0.4), "–"),
+        ((None, None, 0.5, 0.6, 0.9, 0.9), "5 cm, 5°"),
+    ],
+)
+def test_labels_rank_rightly_from_the_threshold_where_they_stay_right(tau_low, expected):
+    rows = [
+        {
+            "score": score,
+            "tau": None if low is None else 1.0,
+            "tau_low": -1.0 if low is None else low,
+        }
+        for score, low in zip(THRESHOLDS, tau_low, strict=True)
+    ]
+    assert rightly_from(pd.DataFrame(rows).astype({"tau": float})) == expected
+
+
 def test_table_and_figure_show_every_label_set(root):
     table = written(root)
     sheet = side_sheet(side_table(table))
     texts = [[cell[0].text for cell in line.cells] for line in sheet.lines]
     first, second = (dict(zip(sheet.headings, line, strict=True)) for line in texts)
     assert first["Trained on"] == "these labels"
+    assert (first["Rightly, from"], second["Rightly, from"]) == ("–", "–")
     assert first["Median, m"] == "1.00 (1.00 to 1.00)"
     assert second["Median, m"] == "-1.00 (-1.00 to -1.00)"
     assert second["Median, °"] == "–"
