@@ -150,7 +150,11 @@ onstart:
         begin_run(CONFIG.root)
     except InputError as error:
         sys.exit(f"error: {error}")
-    logger.info(None, extra={"plan": run_plan})  # for workflow/plugins alone
+    from reproduction.plan.progress import seconds_by_rule
+
+    # For workflow/plugins alone.
+    expected = {"expected_s": seconds_by_rule(FILES), "cores": workflow.cores or 1}
+    logger.info(None, extra=expected)
 
 
 onsuccess:

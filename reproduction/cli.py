@@ -6,13 +6,9 @@ import argparse
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from synfeal.cli.options import command, option
 from synfeal.errors import InputError
-
-if TYPE_CHECKING:
-    from reproduction.plan.laws import Machine
 
 SNAKEFILE = Path("Snakefile")
 PLUGINS = Path("workflow/plugins")
@@ -20,7 +16,7 @@ PLUGINS = Path("workflow/plugins")
 
 @command(
     "predict what a run of a profile costs",
-    "synfeal plan --profile paper --cores 16 --gpus 1",
+    "synfeal plan --profile paper --cores 16",
     option("--profile", "a profile of config/, or its .yaml file (mini)", default="mini"),
     option(
         "--cores",
@@ -30,65 +26,34 @@ PLUGINS = Path("workflow/plugins")
         metavar="N",
     ),
     option(
-        "--gpus",
-        "GPUs, one training run each (0: train on cores); one number, or as many as --cores has",
-        type=int,
-        nargs="+",
-        default=[0],
-        metavar="N",
-    ),
-    option("--gpu-tflops", "assumed throughput of a GPU, TFLOP/s (10)", type=float, default=10.0),
-    option(
         "--measured",
-        "runs to predict from (results/published/mini)",
+        "runs to predict from (results/published/mini and night)",
         type=Path,
         nargs="+",
-        default=[Path("results/published/mini")],
         metavar="RESULTS",
-    ),
-    option(
-        "--time-steps", "time some training steps on this machine: a minute", action="store_true"
     ),
     option("--csv", "write the plan as a table too", type=Path, metavar="FILE"),
     option(
         "--compare",
-        "instead of a plan, predict this measured run from the others, and these from it",
+        "instead of a plan, predict this measured run from each of the others, and them from it",
         type=Path,
         metavar="RESULTS",
     ),
 )
 def plan(arguments: argparse.Namespace) -> None:
     """Predict jobs, hours, memory and disk of a run of the workflow before it is started."""
-    from reproduction.plan.plan import compare_runs, plan_of, write_check, write_plans
-    from reproduction.plan.text import comparison_text, plan_text
+    from reproduction.plan.pace import PUBLISHED
+    from reproduction.plan.plan import compare_text, plan_text
 
-    machines = _machines(arguments)
-    if arguments.compare is None:
-        plans = plan_of(arguments.profile, arguments.measured, machines, arguments.time_steps)
-        print(plan_text(plans), end="")
-        if arguments.csv is not None:
-            write_plans(arguments.csv, plans)
+    measured = arguments.measured or PUBLISHED
+    if arguments.compare is not None:
+        text = compare_text(measured, arguments.compare, arguments.csv)
     else:
-        comparisons = compare_runs(arguments.measured, arguments.compare, arguments.time_steps)
-        print(comparison_text(comparisons), end="")
-        if arguments.csv is not None:
-            write_check(arguments.csv, comparisons)
-
-
-def _machines(arguments: argparse.Namespace) -> list[Machine]:
-    """Return the machines to plan for: as many numbers of GPUs as of cores, or one for all."""
-    from reproduction.plan.laws import Machine
-
-    cores, gpus = arguments.cores or [os.cpu_count() or 1], arguments.gpus
-    for flag, values, least in (("--cores", cores, 1), ("--gpus", gpus, 0)):
-        if min(values) < least:
-            raise InputError(f"{flag}: must be at least {least}, found {min(values)}")
-    if not 0 < arguments.gpu_tflops < float("inf"):
-        raise InputError(f"--gpu-tflops: must be above 0, found {arguments.gpu_tflops:g}")
-    gpus = gpus * len(cores) if len(gpus) == 1 else gpus
-    if len(gpus) != len(cores):
-        raise InputError(f"--gpus: {len(gpus)} numbers for {len(cores)} of --cores; give as many")
-    return [Machine(c, g, arguments.gpu_tflops) for c, g in zip(cores, gpus, strict=True)]
+        cores = arguments.cores or [os.cpu_count() or 1]
+        if min(cores) < 1:
+            raise InputError(f"--cores: must be at least 1, found {min(cores)}")
+        text = plan_text(arguments.profile, measured, cores, arguments.csv)
+    print(text, end="")
 
 
 @command(
@@ -114,7 +79,7 @@ def run(arguments: argparse.Namespace) -> None:
 
     It is started in a clone of Synfeal, and shows its progress.
     """
-    from reproduction.plan.runs import is_default, profile_path
+    from reproduction.design.profiles import is_default, profile_path
     from synfeal.config.load import read_yaml
 
     if not SNAKEFILE.is_file():
@@ -126,7 +91,7 @@ def run(arguments: argparse.Namespace) -> None:
     for path in paths:
         read_yaml(path)  # Snakemake would end in a traceback; what it holds the Snakefile checks
     paths = [path for path in paths if not is_default(path)]
-    display = ["--logger", "synfeal", "--quiet", "host"]  # one line that stays, a table of scores
+    display = ["--logger", "synfeal", "--quiet", "host"]  # one line that stays
     files = ["--configfile", *map(str, paths)] if paths else []
     command = ["snakemake", *display, *files, "--cores", str(cores), *arguments.snakemake]
     found = (str(PLUGINS.resolve()), os.environ.get("PYTHONPATH"))

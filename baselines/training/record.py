@@ -2,7 +2,7 @@
 
 Predictions travel further than models and frames (``make archive``). Where they arrive, this record
 tells whether the configuration and the labels there are those that they were made with. Free of
-torch, as is the memory of a run, so that a workflow may import both.
+torch, so that a workflow may import it.
 """
 
 from __future__ import annotations
@@ -11,30 +11,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from baselines.config.learning import NetworkConfig
 from synfeal.errors import InputError, why
 from synfeal.records.files import file_sha256, read_json, write_json
 from synfeal.records.provenance import provenance
-
-# The program and its libraries.
-PROGRAM_MB = 1000.0
-PACKED_MB_PER_PX = 3e-6  # three bytes
-# Of Hourglass, the largest network. At 224 px it puts out 34 MB for an image and has 0.5 GB of
-# parameters, which lie there four times, with gradients and two moments; the rest is margin.
-LAYERS_MB_PER_PX = 1.2e-3
-PARAMETERS_MB_PER_PX = 0.05
-
-
-def training_mb(n_frames: int, network: NetworkConfig, batch_size: int) -> int:
-    """Estimate the peak memory in MB of training any localizer, training and test frames included.
-
-    They are held as they are, packed; layers grow with the width, parameters with its square.
-    """
-    layers = LAYERS_MB_PER_PX * batch_size * network.width
-    parameters = PARAMETERS_MB_PER_PX * network.width**2
-    per_px = PACKED_MB_PER_PX * n_frames + layers + parameters
-    return round(PROGRAM_MB + network.input_px**2 * per_px)
-
 
 RECORD = "training.json"
 

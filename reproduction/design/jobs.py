@@ -21,6 +21,29 @@ from synfeal.config.effects import CLEAN, MIXED
 
 # Wildcards of a job, by name.
 Job = dict[str, str]
+# Measurements that are not called like their rule and its wildcards, below ``<root>/benchmarks``.
+_BATCH = "{scene}/{size}/{split}/batch-{batch}"
+MEASUREMENTS = {
+    "detail": "detail/{scene}/detail_{camera}",
+    "true_labels": "labels/{scene}/{size}/synfeal/{split}",
+    "erroneous_labels": "labels/{scene}/{size}/{error_kind}-p{noise_m}-r{noise_deg}/{split}",
+    "sfm": f"sfm/{_BATCH}",
+    "rgbd": f"rgbd/{_BATCH}",
+    "estimate": f"{{frame_method}}/{_BATCH}",
+    "posegraph": f"{{graph_method}}/{_BATCH}",
+    "train": "train/{scene}/{size}/{labels}/{init}/{model}/seed{repetition}",
+    "table": "tables/{table}",
+    "table1_meshes": "tables/table1_meshes",
+    "references_table": "tables/references",
+    "recall": "tables/recall",
+    "assistance": "tables/assistance",
+    "label_error": "tables/label_error",
+    "label_ranking": "tables/label_ranking",
+    "speed_vs_error": "tables/speed_vs_error",
+    "hard_cases": "tables/hard_cases",
+    "document": "tables/document",
+    "robustness": "tables/robustness",
+}
 
 
 def jobs_of_run(files: Files) -> dict[str, list[Job]]:
@@ -35,6 +58,11 @@ def jobs_of_run(files: Files) -> dict[str, list[Job]]:
     jobs = _scenes(files) | _frames(files) | _labels(files) | _training(files)
     jobs |= _references(files) | _robustness(files) | _evidence(files)
     return {rule: found for rule, found in jobs.items() if found}
+
+
+def measurement_of(rule: str, job: Job) -> str:
+    """Name the file that measures a job, below ``<root>/benchmarks`` and without ``.tsv``."""
+    return MEASUREMENTS.get(rule, "/".join([rule, *job.values()])).format(**job)
 
 
 def _scenes(files: Files) -> dict[str, list[Job]]:

@@ -1,146 +1,146 @@
-"""The plan of a profile, from its files to a table of costs; and a check of such predictions."""
+"""Plan of a run, and its check against measured ones."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pandas as pd
 
-from reproduction.plan.dry_run import planned_jobs
+from baselines.training.memory import training_mb
+from reproduction.design.experiments import read_design
+from reproduction.design.files import Files
+from reproduction.design.profiles import read_profile
 from reproduction.plan.jobs import jobs_of
-from reproduction.plan.laws import (
-    ALONE,
-    OWN,
-    RUN,
-    Machine,
-    compare_cost,
-    fit_laws,
-    job_costs,
-    stage_costs,
-    summed,
-    table_costs,
-)
-from reproduction.plan.runs import profile_path, read_profile, read_runs
-from reproduction.plan.steps import timed_rates
+from reproduction.plan.pace import paces_of, read_run, seconds_of
+from reproduction.plan.text import SIZES, duration, number, scaled
+from reproduction.tables.sheet import text_table
 from synfeal.records.tables import write_frame
 
-# By the runs that were predicted from and the run that was predicted.
-Comparisons = dict[tuple[str, str], pd.DataFrame]
+NOTES = """\
+measured    {measured}
+CPU time    of a core like theirs; the sum is meant to be within a factor of 1.5 (docs/cost.md)
+wall time   rule after rule, a job on each core
+x measured  largest planned job over largest measured one; far above 1 is extrapolated
+training    on a GPU: divide the images by those that it trains in a second
+"""
 
 
-@dataclass(frozen=True)
-class Plan:
-    """Cost of a run of a profile on a machine."""
+def plan_text(
+    profile: str, measured: Sequence[Path], cores: Sequence[int], csv: Path | None = None
+) -> str:
+    """Plan a run of a profile that begins with nothing.
 
-    profile: str  # its name
-    machine: Machine  # what it is planned for
-    # A row for each stage, for each table, and last for the run; see ``laws.py``.
-    costs: pd.DataFrame
-    origin: str  # what the laws were fitted to
-
-
-def plan_of(
-    profile_name: str,
-    measured: Sequence[Path],
-    machines: Sequence[Machine],
-    time_steps: bool = False,
-) -> list[Plan]:
-    """Plan a run of a profile on each machine, stage by stage and table by table.
-
-    It is predicted from the results of ``measured`` runs, and with ``time_steps`` from some
-    training steps that are timed here, on the GPU if there is one.
+    Args:
+        profile: Its name, or its file.
+        measured: Results of the runs it is predicted from.
+        cores: Jobs at a time; a plan for each number.
+        csv: File for the plans as one table.
     """
-    profile = read_profile(profile_name)
-    pairs, unknown = read_runs(*measured)
-    timed = timed_rates(profile.config) if time_steps else None
-    laws = fit_laws(pairs, timed.rates if timed and not timed.on_gpu else None)
-    planned = planned_jobs(profile_path(profile_name))
-    jobs = jobs_of(profile, planned.keys)
-    if len(jobs) < len(planned.keys):  # a rule measures jobs under names that jobs.py cannot read
-        known = set(zip(jobs["stage"], jobs["job"], strict=True))
-        raise ValueError(f"no size of {sorted(set(planned.keys) - known)[:3]}")
-    origin = f"{len(pairs)} jobs of {', '.join(map(str, measured))}"
-    if unknown:
-        origin += f" ({unknown} more are of another design or an older workflow)"
-    if timed:
-        origin += f"; training steps timed here, on a {'GPU' if timed.on_gpu else 'core'}"
-    plans = []
-    for machine in machines:
-        if timed and timed.on_gpu:
-            machine = replace(machine, gpu_rates=timed.rates)
-        if profile.config.training.device == "cpu":
-            machine = Machine(machine.cores, 0, machine.gpu_tflops)
-        costs = job_costs(jobs, laws, machine)
-        rows = [*stage_costs(costs, machine), *table_costs(costs, planned.needed, machine)]
-        rows.append({"part": RUN, "name": "total", **summed(costs, machine)})
-        plans.append(Plan(profile.config.profile, machine, pd.DataFrame(rows), origin))
-    return plans
+    files = read_profile(profile)
+    paces = paces_of(map(read_run, measured))
+    plans = [_costs(files, paces, count) for count in cores]
+    if csv is not None:
+        write_frame(csv, pd.concat(plans), "%.4g")
+    return "\n".join(_text(files, costs, measured) for costs in plans)
 
 
-def compare_runs(measured: Sequence[Path], compared: Path, time_steps: bool = False) -> Comparisons:
-    """Compare predictions from measured runs with the cost of another, and the other way round.
+def compare_text(measured: Sequence[Path], compared: Path, csv: Path | None = None) -> str:
+    """Predict a measured run from each of others, and each of those from it.
 
-    With ``time_steps`` training steps of the run that is predicted are timed here, on a core.
+    Args:
+        measured: Results of the others.
+        compared: Results of the run.
+        csv: File for predictions and measurements as one table.
     """
-    named, name = ", ".join(map(str, measured)), str(compared)
-    (pairs, _), (others, _) = read_runs(*measured), read_runs(compared)
-    return {
-        (named, name): compare_cost(fit_laws(pairs, _rates(compared, time_steps)), others),
-        (name, named): compare_cost(fit_laws(others, _rates(measured[0], time_steps)), pairs),
-    }
-
-
-def _rates(run: Path, time_steps: bool) -> tuple[float, float] | None:
-    """Return rates of a measured run's networks, on a core as those of all measured runs were."""
-    if not time_steps:
-        return None
-    config = read_profile(run.resolve().name).config
-    training = config.training.model_copy(update={"device": "cpu"})
-    return timed_rates(config.model_copy(update={"training": training})).rates
-
-
-def write_plans(path: Path, plans: Sequence[Plan]) -> None:
-    """Write plans as a table: hours, 10^9 bytes; a row per stage, per table alone, and for all."""
-    write_frame(path, pd.concat(map(_rows, plans)), "%.4g")
-
-
-def _rows(plan: Plan) -> pd.DataFrame:
-    machine, costs = plan.machine, plan.costs[plan.costs["part"] != OWN]
-    is_whole = costs["part"] != ALONE  # what a table leaves behind others share
-    ends = {"": "mid", "_low": "low", "_high": "high"}
-    columns = {
-        **{"profile": plan.profile, "cores": machine.cores, "gpus": machine.gpus},
-        "gpu_tflops": f"{machine.gpu_tflops:g}" if machine.gpus else "",
-        **{name: costs[name] for name in ("part", "name", "jobs")},
-        "work": costs["work"].map("{:.6g}".format, na_action="ignore"),
-        "unit": costs["unit"],
-        **{
-            f"{what}_h{end}": costs[f"{what}_{column}"] / 3600
-            for what in ("cpu", "gpu", "wall")
-            for end, column in ends.items()
-        },
-        "disk_gb": (costs["disk_bytes"] / 1e9).where(is_whole),
-        "peak_memory_gb": (costs["peak_mb"] / 1e3).where(is_whole),
-        **{"times_measured_size": costs["beyond"], "measured": costs["measured"]},
-    }
-    return pd.DataFrame(columns)
-
-
-def write_check(path: Path, comparisons: Comparisons) -> None:
-    """Write predictions beside measurements, processor seconds."""
-    tables = [
-        pd.DataFrame(
-            {
-                **{"predicted_from": source, "predicted": predicted},
-                **{name: rows[name] for name in ("stage", "jobs")},
-                "predicted_cpu_s": rows["mid"],
-                **{f"predicted_{end}_cpu_s": rows[end] for end in ("low", "high")},
-                "measured_cpu_s": rows["cpu_s"],
-                "factor": rows["factor"].map("{:.3g}".format),
-            }
-        )
+    run, comparisons = read_run(compared), {}
+    for other in measured:
+        jobs = read_run(other)
+        comparisons[str(other), str(compared)] = _comparison(paces_of([jobs]), run)
+        comparisons[str(compared), str(other)] = _comparison(paces_of([run]), jobs)
+    if csv is not None:
+        names = ["predicted_from", "predicted"]
+        write_frame(csv, pd.concat(comparisons, names=names).reset_index(names), "%.4g")
+    return "\n".join(
+        f"{predicted} predicted from {source}\n\n{_compared(rows)}"
         for (source, predicted), rows in comparisons.items()
+    )
+
+
+def _costs(files: Files, paces: pd.DataFrame, cores: int) -> pd.DataFrame:
+    """Compute the costs of each rule, of the run, and of a run that makes one table alone."""
+    rules = _by_rule(files, paces, cores)
+    wholes = {("run", "total"): rules}
+    for table in files.design.tables:
+        config = files.config.model_copy(update={"tables": (table,)})
+        alone = Files(config, read_design(config))
+        wholes["table alone", table] = _by_rule(alone, paces, cores)
+    sums = [
+        {"part": part, "name": name, **rows[["jobs", "cpu_s", "wall_s"]].sum()}
+        for (part, name), rows in wholes.items()
     ]
-    write_frame(path, pd.concat(tables), "%.4g")
+    costs = pd.concat([rules, pd.DataFrame(sums)], ignore_index=True).astype({"jobs": int})
+    costs.insert(0, "profile", files.config.profile)
+    costs.insert(1, "cores", cores)
+    return costs
+
+
+def _by_rule(files: Files, paces: pd.DataFrame, cores: int) -> pd.DataFrame:
+    jobs = jobs_of(files)
+    jobs["cpu_s"] = seconds_of(jobs, paces)
+    jobs["times_measured"] = jobs["cost"] / jobs["pace"].map(paces["largest"])
+    costs = jobs.groupby("rule", sort=False).agg(
+        jobs=("job", "size"),
+        work=("count", "sum"),
+        unit=("unit", "first"),
+        cpu_s=("cpu_s", lambda seconds: seconds.sum(skipna=False)),  # known of all jobs or of none
+        longest_s=("cpu_s", "max"),
+        times_measured=("times_measured", "max"),
+    )
+    costs["wall_s"] = costs.pop("longest_s").clip(lower=costs["cpu_s"] / cores)
+    costs.insert(0, "part", "rule")
+    return costs.rename_axis("name").reset_index()
+
+
+def _text(files: Files, costs: pd.DataFrame, measured: Sequence[Path]) -> str:
+    """Format a run in one line, its costs by rule and by table, and what they rest on."""
+    config, total = files.config, costs[costs["part"] == "run"].iloc[0]
+    batch_size = config.training.batch_size
+    memory_mb = max(
+        training_mb(files.n_of_size(*key), config.network, batch_size) for key in files.sizes
+    )
+    packed = costs.loc[costs["name"].isin(["pack", "pack_varied"]), "work"].sum()
+    disk = scaled(3 * config.network.input_px**2 * packed, SIZES)
+    cores = "1 core" if total.cores == 1 else f"{total.cores} cores"
+    heading = (
+        f"Profile {config.profile} on {cores}: {duration(total.wall_s)}; processor time"
+        f" {duration(total.cpu_s)}, disk for packed frames {disk},"
+        f" memory of a training job up to {scaled(1e6 * memory_mb, SIZES)}"
+    )
+    rows = [["", "jobs", "work", "CPU time", "wall time", "x measured"]]
+    for r in costs.fillna({"unit": "", "times_measured": 0.0}).to_dict("records"):
+        work = f"{number(r['work'])} {r['unit']}" if r["unit"] else ""
+        times = [duration(r["cpu_s"]) or "unknown", duration(r["wall_s"])]
+        beyond = number(r["times_measured"]) if r["times_measured"] else ""
+        rows.append([r["name"], f"{r['jobs']:,}", work, *times, beyond])
+    notes = NOTES.format(measured=", ".join(map(str, measured)))
+    return f"{heading}\n\n{text_table(rows)}\n{notes}"
+
+
+def _comparison(paces: pd.DataFrame, run: pd.DataFrame) -> pd.DataFrame:
+    """Compare predicted with measured seconds, for every rule whose paces are known."""
+    known = run[run["pace"].isin(paces.index)].rename(columns={"cpu_s": "measured_cpu_s"})
+    known = known.assign(predicted_cpu_s=seconds_of(known, paces), jobs=1)
+    rows = known.groupby("rule")[["jobs", "predicted_cpu_s", "measured_cpu_s"]].sum()
+    rows = rows.sort_values("measured_cpu_s", ascending=False)
+    rows.loc["total"] = rows.sum()
+    rows["factor"] = rows["predicted_cpu_s"] / rows["measured_cpu_s"]
+    return rows.astype({"jobs": int}).reset_index()
+
+
+def _compared(rows: pd.DataFrame) -> str:
+    table = [["rule", "jobs", "predicted CPU", "measured CPU", "predicted/measured"]]
+    for r in rows.to_dict("records"):
+        times = duration(r["predicted_cpu_s"]), duration(r["measured_cpu_s"])
+        table.append([r["rule"], f"{r['jobs']:,}", *times, f"{r['factor']:.2f}"])
+    return text_table(table)

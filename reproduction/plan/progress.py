@@ -1,145 +1,191 @@
-"""Remaining work of a run, and the time it takes."""
+"""Progress of a run: one line with jobs done, rules at work, rate and time left."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+import sys
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from statistics import median
 
-from reproduction.config.profile import Config
-from reproduction.design.experiments import Design, Run
-from reproduction.plan.dry_run import job_name, key_of
-from reproduction.plan.jobs import Profile, jobs_of
-from reproduction.plan.laws import fit_laws, seconds_of
-from reproduction.plan.runs import read_runs
+from rich.console import Console
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from reproduction.design.files import Files
+from reproduction.plan.jobs import jobs_of
+from reproduction.plan.pace import PUBLISHED, paces_of, read_run, seconds_of
+from reproduction.plan.text import duration, number
 from synfeal.errors import InputError
-
-MEASURED = Path("results/published/mini")
-
-
-@dataclass(frozen=True)
-class RunPlan:
-    """Announcement of the workflow at the start of a run."""
-
-    root: Path  # results of the profile
-    # Seconds each job that is to run may take, by ``stage/name`` as in ``<root>/benchmarks``.
-    expected_s: Mapping[str, float]
-    runs: tuple[Run, ...]  # training runs of the design, whether they are to run or have run
-    cores: int  # jobs at a time
-
-
-def plan_run(config: Config, design: Design, benchmarks: Iterable[str], cores: int) -> RunPlan:
-    """Plan a run on ``cores`` whose jobs write ``<root>/benchmarks/<stage>/<name>.tsv``."""
-    paths = list(benchmarks)
-    known = _expected_s(Profile(config, design), paths)
-    usual = median(known.values()) if known else 1.0
-    expected_s = {job: known.get(job, usual) for job in map(job_name, paths)}
-    return RunPlan(config.root, expected_s, tuple(design.runs), cores)
-
-
-def to_do(measured: Mapping[str, Sequence[str]], counts: Mapping[str, int]) -> list[str]:
-    """Choose the jobs that a run most likely does.
-
-    Args:
-        measured: By rule, the file of each of its jobs that Snakemake writes what it took to.
-        counts: Jobs that Snakemake says it is going to do, by rule.
-
-    Returns:
-        As many of these files as there are jobs to do, those that are not there yet first.
-    """
-    chosen = []
-    for rule, paths in measured.items():
-        by_need = sorted(paths, key=lambda path: Path(path).exists())
-        chosen += by_need[: counts.get(rule, 0)]
-    return chosen
-
-
-def _expected_s(profile: Profile, benchmarks: Iterable[str]) -> dict[str, float]:
-    """Predict seconds by job by the planner's laws (docs/cost.md); none without a published run."""
-    try:
-        laws = fit_laws(read_runs(MEASURED)[0])
-    except InputError:
-        return {}
-    jobs = jobs_of(profile, map(key_of, benchmarks))
-    names = jobs["stage"].str.cat(jobs["job"], sep="/").str.rstrip("/")
-    return dict(seconds_of(jobs, laws).set_axis(names).dropna())
-
 
 # So many expected seconds count as much as what was measured: the first short jobs, which mostly
 # wait for the disk, do not decide what hours of training will take.
 TRUSTED_S = 60.0
+INTERVAL_S = 60.0  # between lines where there is no terminal
+BAR_CELLS, LOG_LINES, RULES_SHOWN = 20, 20, 2
+
+
+def seconds_by_rule(files: Files) -> dict[str, float]:
+    """Predict what a job of each rule takes on average; empty where no run was published."""
+    try:
+        paces = paces_of(map(read_run, PUBLISHED))
+    except InputError:
+        return {}
+    jobs = jobs_of(files)
+    return dict(seconds_of(jobs, paces).groupby(jobs["rule"]).mean().dropna())
 
 
 class TimeLeft:
-    """Time left of a run on ``cores``, from what its jobs (``stage/name``) were expected to take.
+    """Time left of a run, from what jobs were expected to take and what they took.
 
-    The ratio of measured to expected seconds is known for the whole run and for each stage; both
-    start at what is expected (the stages at the ratio of the run), with a weight of ``TRUSTED_S``.
     One thread may ask while another tells: what changes is copied before it is gone through.
+
+    Args:
+        counts: Jobs of the run, by rule.
+        expected_s: Seconds that a job is expected to take, by rule; where that is not known, the
+            median of the others.
+        cores: Jobs at a time.
     """
 
-    def __init__(self, expected_s: Mapping[str, float], cores: int) -> None:
-        self.expected_s = dict(expected_s)
+    def __init__(
+        self, counts: Mapping[str, int], expected_s: Mapping[str, float], cores: int
+    ) -> None:
+        usual_s = median(expected_s.values()) if expected_s else 1.0
+        self.counts = dict(counts)
+        self._expected_s = {rule: expected_s.get(rule, usual_s) for rule in counts}
         self._cores = max(cores, 1)
-        self._began: dict[str, float] = {}
-        self._taken_s: dict[str, float] = {}
+        self._began: dict[int, tuple[str, float]] = {}
+        self._taken_s: dict[str, float] = defaultdict(float)
+        self.done: Counter[str] = Counter()
 
-    def started(self, job: str, now_s: float) -> None:
-        """Note that a job began; if unexpected, it replaces an expected one of its stage."""
-        self._began[job] = now_s
-        if job not in self.expected_s:
-            begun = self._began.keys() | self._taken_s.keys()
-            waiting = (other for other in self.expected_s if other not in begun)
-            instead = next((other for other in waiting if _stage(other) == _stage(job)), None)
-            if instead is not None:
-                self.expected_s = {
-                    job if other == instead else other: seconds
-                    for other, seconds in self.expected_s.items()
-                }
+    def started(self, job: int, rule: str, now_s: float) -> None:
+        """Note that a job of a rule began."""
+        self._began[job] = rule, now_s
 
-    def finished(self, job: str, now_s: float) -> None:
-        """Note that a job ended."""
-        self._taken_s[job] = now_s - self._began.pop(job, now_s)
-        self.expected_s.setdefault(job, self._taken_s[job])
+    def finished(self, job: int, now_s: float) -> None:
+        """Note that a job ended, well or not."""
+        if job in self._began:
+            rule, began_s = self._began.pop(job)
+            self._taken_s[rule] += now_s - began_s
+            self.done[rule] += 1
 
     @property
-    def running(self) -> tuple[str, ...]:
-        """Jobs that began and did not end, in that order."""
-        return tuple(self._began)
-
-    def count(self, stage: str) -> tuple[int, int]:
-        """Return how many jobs of a stage are done, and how many it has."""
-        jobs = [job for job in tuple(self.expected_s) if _stage(job) == stage]
-        return sum(job in self._taken_s for job in jobs), len(jobs)
+    def running(self) -> list[str]:
+        """Rules at work, in the order in which their jobs began."""
+        return list(dict.fromkeys(rule for rule, _ in tuple(self._began.values())))
 
     def seconds(self, now_s: float) -> float:
-        """Return the seconds left: the work there is on all cores, or the longest job on one."""
-        left = list(self._left_s(now_s).values())
-        return max(sum(left) / self._cores, max(left, default=0.0))
+        """Estimate the seconds left: all work on all cores, or the longest job on one."""
+        done, taken_s = Counter(self.done), dict(self._taken_s)
+        began = tuple(self._began.values())
+        expected_s = {rule: n * self._expected_s.get(rule, 1.0) for rule, n in done.items()}
+        ratio = (sum(taken_s.values()) + TRUSTED_S) / (sum(expected_s.values()) + TRUSTED_S)
+        work_s, longest_s = 0.0, 0.0
+        for rule, count in self.counts.items():
+            known = taken_s.get(rule, 0.0) + ratio * TRUSTED_S
+            job_s = self._expected_s[rule] * known / (expected_s.get(rule, 0.0) + TRUSTED_S)
+            runs_s = [now_s - at_s for other, at_s in began if other == rule]
+            left_s = [max(job_s - at_s, 0.0) for at_s in runs_s]
+            waiting = max(count - done[rule] - len(left_s), 0)
+            work_s += sum(left_s) + waiting * job_s
+            longest_s = max([longest_s, *left_s, job_s if waiting else 0.0])
+        return max(work_s / self._cores, longest_s)
 
     def share(self) -> float:
-        """Return the part of the expected work that is done, from 0 to 1; it never falls."""
-        expected_s = dict(self.expected_s)
-        done_s = sum(expected_s[job] for job in tuple(self._taken_s))
-        return done_s / sum(expected_s.values()) if expected_s else 1.0
-
-    def _left_s(self, now_s: float) -> dict[str, float]:
-        expected_s: dict[str, float] = defaultdict(float)  # of finished jobs, by stage
-        taken_s: dict[str, float] = defaultdict(float)
-        for job, seconds in tuple(self._taken_s.items()):
-            expected_s[_stage(job)] += self.expected_s[job]
-            taken_s[_stage(job)] += seconds
-        ratio = (sum(taken_s.values()) + TRUSTED_S) / (sum(expected_s.values()) + TRUSTED_S)
-        left = {}
-        for job, seconds in tuple(self.expected_s.items()):
-            if job not in self._taken_s:
-                stage = _stage(job)
-                factor = (taken_s[stage] + ratio * TRUSTED_S) / (expected_s[stage] + TRUSTED_S)
-                left[job] = max(seconds * factor - (now_s - self._began.get(job, now_s)), 0.0)
-        return left
+        """Return the part of the expected work that is done, from 0 to 1."""
+        done = Counter(self.done)
+        whole_s = sum(count * self._expected_s[rule] for rule, count in self.counts.items())
+        done_s = sum(n * self._expected_s.get(rule, 0.0) for rule, n in done.items())
+        return min(done_s / whole_s, 1.0) if whole_s else 1.0
 
 
-def _stage(job: str) -> str:
-    return job.partition("/")[0]
+class RunView:
+    """Show a run on a console as its events come in.
+
+    Args:
+        console: A terminal, where the line stays, or none, where it comes once a minute.
+        clock: Seconds, monotonic.
+    """
+
+    def __init__(self, console: Console, clock: Callable[[], float] = time.monotonic) -> None:
+        self._console, self._clock = console, clock
+        self._said_s = self._begin_s = clock()
+        self.left = TimeLeft({}, {}, 1)
+        self._done, self._total = 0, 0
+        self._live = Live(
+            console=console,
+            get_renderable=self._picture,
+            refresh_per_second=2,
+            redirect_stdout=sys.stdout.isatty(),
+            redirect_stderr=False,
+            transient=True,
+        )
+
+    def begin(self, left: TimeLeft) -> None:
+        """Show the line, now that the jobs are known."""
+        self._begin_s = self._clock()
+        self.left, self._total = left, sum(left.counts.values())
+        if self._console.is_terminal:
+            self._live.start()
+        else:
+            self._say_line()
+
+    def started(self, job: int, rule: str) -> None:
+        """Note that a job of a rule began."""
+        self.left.started(job, rule, self._clock())
+
+    def finished(self, job: int) -> None:
+        """Note that a job ended, well or not."""
+        self.left.finished(job, self._clock())
+
+    def progress(self, done: int, total: int) -> None:
+        """Note how many jobs are done."""
+        self._done, self._total = done, total
+        if done == total:
+            self.end()
+        elif not self._live.is_started and self._clock() - self._said_s >= INTERVAL_S:
+            self._say_line()
+
+    def failed(self, job: str, logs: Iterable[Path]) -> None:
+        """Print that a job failed, and what its logs end with."""
+        self.say(f"error: {job} failed", "red")
+        for log in logs:
+            lines = log.read_text(errors="replace").splitlines() if log.is_file() else []
+            self.say("\n".join([f"{log}:", *(f"    {line}" for line in lines[-LOG_LINES:])]))
+
+    def say(self, text: str, style: str = "") -> None:
+        """Print a message that stays."""
+        self._console.print(Text(text, style), soft_wrap=True)
+
+    def end(self) -> None:
+        """Take the line away once a run is over or broken off, and print what was done."""
+        if self._total:
+            self._live.stop()
+            done = f"{self._done} of {self._total} jobs"
+            self.say(f"{done} done in {duration(self._clock() - self._begin_s)}")
+            self._total = 0
+
+    def line(self) -> str:
+        """Return jobs done, rules at work, rate and time left."""
+        now_s = self._clock()
+        parts = [f"{self._done} of {self._total} jobs"]
+        for rule in self.left.running[:RULES_SHOWN]:
+            total = self.left.counts.get(rule, 1)
+            done = f" {self.left.done[rule]} of {total}" if total > 1 else ""
+            parts.append(f"{rule.replace('_', ' ')}{done}")
+        if self._done and now_s > self._begin_s:
+            parts.append(f"{number(60 * self._done / (now_s - self._begin_s))} jobs/min")
+        return " · ".join([*parts, f"about {duration(self.left.seconds(now_s))} left"])
+
+    def _say_line(self) -> None:
+        self._said_s = self._clock()
+        self.say(f"{time.strftime('%H:%M')}  {100 * self.left.share():.0f} %  {self.line()}")
+
+    def _picture(self) -> Table:
+        line = Table.grid(padding=(0, 1))
+        bar = ProgressBar(1, self.left.share(), BAR_CELLS)
+        line.add_row(bar, Text(self.line(), no_wrap=True))
+        return line

@@ -80,7 +80,7 @@ def test_tables_and_figures_know_them_without_loading_them(installed):
 def test_a_design_with_them_is_planned(installed, tmp_path):
     profile, out = tmp_path / "mine.yaml", tmp_path / "jobs.json"
     profile.write_text(yaml.safe_dump(merge(read_yaml(ROOT / "config/smoke.yaml"), DESIGN)))
-    command = [sys.executable, "-m", "reproduction.plan.dry_run", profile, tmp_path, out]
+    command = [sys.executable, "-m", "tests.support.dry_run", profile, tmp_path, out]
     run = subprocess.run(command, env=installed, cwd=ROOT, capture_output=True, text=True)
     assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
     outputs = {name for job in json.loads(out.read_text()) for name in job["output"]}

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from reproduction.config.load import check_mesh_files, check_results
-from reproduction.plan.runs import read_profile
+from reproduction.design.profiles import read_profile
 from synfeal.cli import main
 from tests import ROOT
 from tests.support.careless import FILES

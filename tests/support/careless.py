@@ -86,8 +86,7 @@ TABLE = {
     "run cores": ("run", "--cores", ("0", "-1")),
     "plan measured": ("plan", "--measured", (*PLACES[1:], "empty")),
     "plan cores": ("plan", "--cores", ("0", "-1")),
-    "plan gpus": ("plan", "--gpus", ("-1",)),
-    "plan throughput": ("plan", "--gpu-tflops", NUMBERS[:4]),
+    "plan compare": ("plan", "--compare", (*PLACES[1:], "empty")),
     "compare": ("compare {} empty", "", DATA_SETS),
 }
 

@@ -4,13 +4,15 @@ import re
 import tomllib
 
 import pytest
+import torch
 import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from baselines.training.record import training_mb
-from reproduction.plan.networks import pretext_work, training_work
-from reproduction.plan.runs import read_profile
+from baselines.localizers.registry import build_localizer
+from baselines.training.memory import training_mb
+from baselines.training.pretrain import RoomsNetwork
+from reproduction.design.profiles import read_profile
 from tests import ROOT
 from tests.workflow.test_workflow import planned_jobs
 
@@ -106,18 +108,37 @@ def test_the_papers_design_is_planned_for_slurm(tmp_path):
     assert jobs["train"] == 125
 
 
+def held_mb(build, px, batch_size):
+    """What a training step holds: weights, gradients and two moments, and the layers' outputs."""
+    outputs = []
+
+    def note(_, __, out):  # a recurrent layer gives its sequence first
+        outputs.append((out[0] if isinstance(out, tuple) else out).numel())
+
+    with torch.device("meta"), torch.no_grad():
+        network = build().eval()
+        for layer in network.modules():
+            if list(layer.parameters(recurse=False)) and not list(layer.children()):
+                layer.register_forward_hook(note)
+        network(torch.empty(1, 3, px, px))
+    parameters = sum(p.numel() for p in network.parameters())
+    return 4 * (4 * parameters + batch_size * sum(outputs)) / 1e6
+
+
 @pytest.mark.parametrize(
     ("name", "models"), [("mini", ["hourglass"]), ("paper", ["hourglass", "posenet", "poselstm"])]
 )
 def test_a_training_asks_for_what_the_largest_network_takes_and_not_for_twice_that(name, models):
     config = read_profile(name).config
-    batch = config.training.batch_size
-    works = [training_work(m, config.network, config.localizers[m]) for m in models]
+    network, px, batch = config.network, config.network.input_px, config.training.batch_size
+    hyper = config.localizers
+    held = [held_mb(lambda m=m: build_localizer(m, network, hyper[m]), px, batch) for m in models]
     frames = 10_000
-    frames_mb = frames * 3 * config.network.input_px**2 / 1e6
-    counted_mb = max(work.held_bytes(batch) for work in works) / 1e6 + frames_mb
-    asked_mb = training_mb(frames, config.network, batch)
+    counted_mb = max(held) + frames * 3 * px**2 / 1e6
+    asked_mb = training_mb(frames, network, batch)
     assert counted_mb < asked_mb - 900  # the program itself takes 0.5 to 0.9 GB
     assert asked_mb - 1000 < 2 * counted_mb
-    pretraining = pretext_work("resnet34", config.network).held_bytes(config.pretraining.batch_size)
-    assert pretraining / 1e6 < training_mb(0, config.network, batch) - 900
+    rooms = held_mb(
+        lambda: RoomsNetwork("resnet34", network.width, 1), px, config.pretraining.batch_size
+    )
+    assert rooms < training_mb(0, network, batch) - 900

@@ -61,7 +61,7 @@ def test_the_record_of_a_run_reads_what_every_job_took_and_all_asks_every_job_fo
 ):
     """Else the record depends on which jobs happen to have ended, and on a shared file system."""
     out = tmp_path / "jobs.json"
-    command = ["reproduction.plan.dry_run", "config/smoke.yaml", str(tmp_path), str(out)]
+    command = ["tests.support.dry_run", "config/smoke.yaml", str(tmp_path), str(out)]
     subprocess.run([sys.executable, "-m", *command], cwd=ROOT, check=True, capture_output=True)
     jobs = json.loads(out.read_text())
     (read,) = (set(job["input"]) for job in jobs if job["rule"] == "provenance")

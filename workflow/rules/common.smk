@@ -9,7 +9,7 @@ from baselines.labels.injected import seed_names
 from baselines.labels.methods import METHODS, frame_methods, graph_methods, truth_used
 from baselines.localizers.registry import backbone_of
 from baselines.references.registry import in_group
-from baselines.training.record import training_mb
+from baselines.training.memory import training_mb
 from reproduction.config.load import check_mesh_files, check_results, parse_config
 from reproduction.design.experiments import (
     INJECTED,
@@ -122,11 +122,3 @@ def measured_by(*names):
 def plain(path):
     """A file of the results as rules name it, wherever a storage plugin keeps it."""
     return f"{ROOT}{str(path).partition(ROOT)[2]}"
-
-
-def run_plan(counts):
-    """What a run is going to do, by the number of jobs of each rule, as Snakemake tells plugins."""
-    from reproduction.plan.progress import plan_run, to_do
-
-    measured = {rule: measured_by(rule) for rule in JOBS}
-    return plan_run(CONFIG, DESIGN, to_do(measured, counts), workflow.cores or 1)

@@ -14,9 +14,8 @@ from rich.console import Console
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from reproduction.plan.dry_run import job_name
 from reproduction.plan.planned import planned_text
-from reproduction.plan.view import RunView
+from reproduction.plan.progress import RunView, TimeLeft
 
 SAID = ("Nothing to be done", "Complete log")
 
@@ -34,9 +33,9 @@ class LogHandler(LogHandlerBase):
         """Before any event."""
         Handler.__init__(self)  # the interface of Snakemake 9.0 leaves that out
         self.view = RunView(Console(stderr=True, no_color=self.common_settings.nocolor or None))
-        self.jobs: dict[int, tuple[str, list[Path]]] = {}
         self.planned: list[str] = []  # of a dry run: names of its jobs
         self.counts: dict[str, int] = {}  # jobs that are to run, by rule
+        self.names: dict[int, str] = {}  # of jobs that began
 
     def emit(self, record: LogRecord) -> None:
         """Called for one event after the other, in one thread."""
@@ -60,30 +59,28 @@ class LogHandler(LogHandlerBase):
         match fields.get("event"):
             case LogEvent.JOB_INFO if self.common_settings.dryrun:
                 if fields["benchmark"]:  # targets are no work
-                    self.planned.append(job_name(fields["benchmark"]))
-            case LogEvent.JOB_INFO if fields["benchmark"]:
-                job = job_name(fields["benchmark"])
-                self.jobs[fields["jobid"]] = job, [Path(path) for path in fields["output"]]
-                self.view.started(job)
+                    self.planned.append(_job_name(fields["benchmark"]))
+            case LogEvent.JOB_INFO:
+                self.view.started(fields["jobid"], fields["rule_name"])
+                if fields["benchmark"]:
+                    self.names[fields["jobid"]] = _job_name(fields["benchmark"])
             case LogEvent.JOB_FINISHED:
-                self._finish(fields["job_id"])
+                self.view.finished(fields["job_id"])
             case LogEvent.PROGRESS:
                 self.view.progress(fields["done"], fields["total"])
             case LogEvent.JOB_ERROR:
-                job = self._finish(fields["jobid"])
-                self.view.failed(job or fields["rule_name"], map(Path, fields["log"]))
+                self.view.finished(fields["jobid"])
+                name = self.names.get(fields["jobid"], fields["rule_name"])
+                self.view.failed(name, map(Path, fields["log"]))
             case LogEvent.RUN_INFO:
-                self.counts = dict(fields["stats"])
-            case _ if "plan" in fields:  # of the Snakefile's `onstart`
-                self.view.begin(fields["plan"](self.counts))
+                self.counts = {rule: n for rule, n in fields["stats"].items() if rule != "total"}
+            case _ if "expected_s" in fields:  # of the Snakefile's `onstart`
+                left = TimeLeft(self.counts, fields["expected_s"], fields["cores"])
+                self.view.begin(left)
             case _ if record.levelno >= WARNING or record.getMessage().startswith(SAID):
                 self.view.say(self.format(record))
 
-    def _finish(self, jobid: int) -> str:
-        job, outputs = self.jobs.pop(jobid, ("", []))
-        if job:
-            self.view.finished(job)
-        for path in outputs:
-            if path.name == "metrics.json" and path.exists():
-                self.view.scored(path)
-        return job
+
+def _job_name(benchmark: str) -> str:
+    """Return ``stage/name`` of a job, from the file that measures it."""
+    return benchmark.partition("/benchmarks/")[2].removesuffix(".tsv")

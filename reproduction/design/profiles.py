@@ -1,0 +1,50 @@
+"""Profiles by the names that commands take."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from reproduction.config.load import load_config
+from reproduction.design.experiments import design_name, read_design
+from reproduction.design.files import Files
+from reproduction.design.labels import check_sources
+from synfeal.config.load import read_yaml
+from synfeal.errors import InputError
+
+FOLDER = Path("config")
+DEFAULT = FOLDER / "config.yaml"
+
+
+def read_profile(name: str) -> Files:
+    """Read a profile and its design.
+
+    Args:
+        name: Of the profile in a file of ``config/``, or the path of its file.
+
+    Raises:
+        InputError: There is no such profile, or it is wrong.
+    """
+    path = profile_path(name)
+    paths = [path] if is_default(path) else [DEFAULT, path]
+    config = load_config(*paths)
+    design = read_design(config)
+    check_sources(design.rows, design_name(config))
+    return Files(config, design)
+
+
+def is_default(path: Path) -> bool:
+    """Tell whether a file is the one that all others extend; links may form a circle."""
+    return os.path.realpath(path) == os.path.realpath(DEFAULT)
+
+
+def profile_path(name: str) -> Path:
+    """Return the file of a profile, by name or path."""
+    if name.endswith((".yaml", ".yml")):
+        return Path(name)
+    paths = sorted(FOLDER.glob("*.yaml"))
+    found = {str(read_yaml(path).get("profile", path.stem)): path for path in paths}
+    if name not in found:
+        known = ", ".join(sorted(found)) or "none"
+        raise InputError(f"profile '{name}': no such profile in {FOLDER}/; known: {known}")
+    return found[name]
