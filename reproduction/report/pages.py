@@ -22,7 +22,7 @@ import pandas as pd
 from baselines.config.learning import MODELS
 from reproduction.claims.table import claims_markdown
 from reproduction.real.findings import real_findings, real_table
-from reproduction.report.findings import read_table, sentences
+from reproduction.report.findings import can_tell, read_table, sentences, verdict_sentence
 from reproduction.report.findings_figure import is_drawn_from, panels, write_findings_figure
 from reproduction.report.publish import PUBLISHED, RESULTS
 from reproduction.report.published_claims import read_published, rows_now, rules_note
@@ -73,6 +73,8 @@ def findings(root: Path, top: str = "", claims_page: str = "docs/results.md") ->
         top: from the page to the top of the repository, ending in a slash.
         claims_page: from the page to the one with the claims.
     """
+    if not can_tell(root):
+        return verdict_sentence(root)
     *found, verdicts = sentences(root, f"{top}{root.as_posix()}")
     items = "\n".join(f"{n}. {text}" for n, text in enumerate(found, start=1))
     return f"{items}\n\n{verdicts}\n\n{LIMITS_NOTE.format(claims=f'{claims_page}#claims')}"
@@ -229,8 +231,9 @@ def stale(check: bool) -> list[Path]:
         new = rewritten(old, part_of)
         if new != old:
             writers[page] = partial(write_text, page, new)
-    drawn = panels(PUBLISHED / headline())
-    if not is_drawn_from(FIGURE, drawn):
+    shown = PUBLISHED / headline()
+    drawn = panels(shown) if can_tell(shown) else []
+    if drawn and not is_drawn_from(FIGURE, drawn):
         writers[FIGURE] = partial(write_findings_figure, drawn, FIGURE)
     for write in () if check else writers.values():
         write()

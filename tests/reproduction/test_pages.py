@@ -22,6 +22,7 @@ from tests.support.report_results import change_cell
 
 REPOSITORY = Path(__file__).parents[2]
 MINI = REPOSITORY / "results/published/mini"
+NIGHT = REPOSITORY / "results/published/night"
 DIFFICULTY = "results/benchmarks/scene_difficulty"
 
 
@@ -100,7 +101,14 @@ def test_unknown_parts_and_unpublished_results_are_input_errors(root):
         part_of("sizes", "mini")
 
 
+def test_a_run_without_the_tables_of_the_findings_tells_its_verdicts_alone(root):
+    told = part_of("findings", "mini")
+    assert "Of the paper's 16 claims" in told
+    assert "1." not in told.split("Of the paper")[0]
+
+
 def test_check_writes_nothing_and_publishing_writes_all(root, capsys):
+    shutil.copytree(NIGHT, root.with_name("night"))  # it has what the figure is drawn from
     for page in PAGES:
         page.parent.mkdir(exist_ok=True)
         page.write_text("<!-- size headline --><!-- /size -->\n")
@@ -111,7 +119,7 @@ def test_check_writes_nothing_and_publishing_writes_all(root, capsys):
     assert main([]) == 0
     assert "Large Room 6k" in PAGES[0].read_text()
     assert main(["--check"]) == 0
-    references = root / "tables/references.csv"
+    references = root.with_name("night") / "tables/references.csv"
     rows = pd.read_csv(references)
     rows["position_m_true"] /= 2
     rows.to_csv(references, index=False)
