@@ -53,6 +53,7 @@ archive: $(INSTALLED)  ## PROFILE's report, figures, and all that its tables are
 plan: smoke  ## what paper costs, and what such plans are worth (results/benchmarks)
 	mkdir -p results/benchmarks/smoke && cp results/smoke/benchmarks.csv results/benchmarks/smoke/
 	$(BIN)/synfeal plan --profile paper --cores 16 64 --csv results/benchmarks/plan_paper.csv
+	$(BIN)/synfeal plan --profile night --cores 2 --csv results/benchmarks/plan_night.csv
 	$(BIN)/synfeal plan --measured results/benchmarks/smoke results/published/night \
 	  --compare results/published/mini --csv results/benchmarks/plan_check.csv
 

@@ -299,21 +299,35 @@ def read_design(config: Config) -> Design:
         InputError: a row, a further scene, or the data set of the robustness table is wrong.
     """
     _check_robustness(config)
-    rows, more_scenes = read_experiments(config), config.groundtruth.more_scenes
-    design = Design(
+    whole = _design_of(config, read_experiments(config.model_copy(update={"tables": None})))
+    missing = _without_frames(whole)
+    if missing:
+        scene, size = missing[0]
+        raise InputError(
+            f"groundtruth.more_scenes: '{scene}': {design_name(config)} has no row of size"
+            f" '{size}' in that scene"
+        )
+    # `tables` may leave out every row of a further scene: then its labels are left out, too.
+    design = _design_of(config, read_experiments(config))
+    left_out = {scene for scene, _ in _without_frames(design)}
+    kept = tuple(scene for scene in design.more_scenes if scene not in left_out)
+    return design.model_copy(update={"more_scenes": kept})
+
+
+def _design_of(config: Config, rows: tuple[Experiment, ...]) -> Design:
+    """Put the rows of a profile and its settings of them together."""
+    return Design(
         rows=rows,
         repetitions=config.training.repetitions,
-        more_scenes=more_scenes,
+        more_scenes=config.groundtruth.more_scenes,
         noise_dose=config.groundtruth.noise_dose,
     )
-    known = {(row.scene, row.size) for row in rows}
-    for scene, size, _ in design.estimated:
-        if (scene, size) not in known:
-            raise InputError(
-                f"groundtruth.more_scenes: '{scene}': {design_name(config)} has no row of size"
-                f" '{size}' in that scene"
-            )
-    return design
+
+
+def _without_frames(design: Design) -> list[tuple[str, str]]:
+    """List scenes and sizes whose labels are to be estimated and that no row collects."""
+    known = {(row.scene, row.size) for row in design.rows}
+    return [(scene, size) for scene, size, _ in design.estimated if (scene, size) not in known]
 
 
 def _check_robustness(config: Config) -> None:

@@ -116,6 +116,16 @@ def test_further_scenes_are_labelled_as_the_rows_are():
         read_design(config.model_copy(update={"groundtruth": groundtruth}))
 
 
+def test_a_run_of_one_table_leaves_out_further_scenes_that_it_has_no_rows_of():
+    config = load_config(CONFIG / "config.yaml", CONFIG / "night.yaml")
+    alone = read_design(config.model_copy(update={"tables": ("table2_ground_truth",)}))
+    assert {scene for scene, _, _ in alone.estimated} == {"large_room"}
+    groundtruth = config.groundtruth.model_copy(update={"more_scenes": ("attic",)})
+    wrong = {"groundtruth": groundtruth, "tables": ("table2_ground_truth",)}
+    with pytest.raises(InputError, match="more_scenes: 'attic'"):
+        read_design(config.model_copy(update=wrong))
+
+
 def test_controls_show_small_sets_as_many_images_and_large_ones_every_frame_twice():
     night, controls = (
         load_config(CONFIG / "config.yaml", CONFIG / f"{name}.yaml")

@@ -1,6 +1,7 @@
 """What a run costs: its jobs as Snakemake lists them, and what measured runs say of them."""
 
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -18,6 +19,7 @@ from tests.support.report_results import read
 
 HEADER = "s\tmax_rss\tcpu_time\n"
 MINI, NIGHT = PUBLISHED
+SMOKE = Path("results/benchmarks/smoke")
 
 
 @pytest.fixture(autouse=True)
@@ -90,15 +92,18 @@ def test_large_jobs_that_happen_to_be_quick_are_not_free():
     assert (seconds >= 4).all()
 
 
-def test_published_runs_predict_each_other_within_the_factor_that_is_promised(capsys, tmp_path):
+@pytest.mark.parametrize("other", [NIGHT, SMOKE], ids=str)
+def test_measured_runs_predict_each_other_within_the_factor_that_is_promised(
+    other, capsys, tmp_path
+):
     out = tmp_path / "check.csv"
-    arguments = ["--measured", str(NIGHT), "--compare", str(MINI), "--csv", str(out)]
+    arguments = ["--measured", str(other), "--compare", str(MINI), "--csv", str(out)]
     assert main(["plan", *arguments]) == 0
     totals = [row for row in read(out) if row["rule"] == "total"]
-    assert [row["predicted"] for row in totals] == [str(MINI), str(NIGHT)]
+    assert [row["predicted"] for row in totals] == [str(MINI), str(other)]
     for row in totals:
         assert 1 / 1.5 < float(row["factor"]) < 1.5, row
-    assert f"{MINI} predicted from {NIGHT}" in capsys.readouterr().out
+    assert f"{MINI} predicted from {other}" in capsys.readouterr().out
 
 
 def test_a_run_at_half_the_speed_takes_twice_as_long(tmp_path, capsys):
