@@ -2,6 +2,7 @@
 
 import json
 import time
+from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
 
@@ -115,7 +116,9 @@ TEST = [pose_at([-1.85, -0.2, 1.25], yaw_deg=-6), pose_at([-0.95, 0.1, 1.4], yaw
 def evidence_of(labels, truth):
     files = {split: labels / f"{split}.csv" for split in ("train", "test")}
     files |= {f"{split}_truth": truth / f"{split}.csv" for split in ("train", "test")}
-    return Evidence(files, CAMERA, 0)
+    evidence = Evidence(files, CAMERA, 0)
+    evidence.__dict__["query_costs"] = defaultdict(float)  # of features and matches made here
+    return evidence
 
 
 @pytest.fixture(scope="module")
@@ -190,6 +193,7 @@ def test_a_frame_without_matches_fails_and_is_counted(room, tmp_path):
     bare.point_m[first] = np.nan
     other = replace(room)
     other.__dict__["correspondences"] = bare
+    other.__dict__["query_costs"] = room.query_costs
     answer_and_score(other, ["structure-depth"], tmp_path, {"scene": "room"})
     folder = tmp_path / "structure-depth"
     metrics = json.loads((folder / "metrics.json").read_text())
@@ -216,12 +220,14 @@ def test_retrieval_and_oracle_answer_with_labels(room, tmp_path):
     evidence.__dict__["descriptors"] = dict.fromkeys(("thumbnail", "vlad"), (vectors, vectors[:4]))
     answer_and_score(evidence, in_group("images"), tmp_path / "out", {})
     for name in in_group("images"):
+        # Interpolation is exact but for the ridge that its weights are held small by.
+        off_m = 5e-3 if name == "interpolated-vlad" else 0
         answered = read_pose_table(tmp_path / "out" / name / "predictions.csv")
-        np.testing.assert_array_equal(answered.position_m, noisy.position_m[:4])
+        np.testing.assert_allclose(answered.position_m, noisy.position_m[:4], rtol=0, atol=off_m)
         metrics = json.loads((tmp_path / "out" / name / "metrics.json").read_text())
-        assert metrics["position_m"] == 0
-        assert metrics["position_m_true"] == pytest.approx(0.1)
-        assert metrics["orientation_deg_true"] == pytest.approx(4.0)
+        assert metrics["position_m"] <= off_m
+        assert metrics["position_m_true"] == pytest.approx(0.1, abs=max(off_m, 1e-6))
+        assert metrics["orientation_deg_true"] == pytest.approx(4.0, abs=0.2 if off_m else 1e-5)
 
 
 def test_a_query_costs_what_was_done_for_it_before(room, tmp_path):

@@ -1,6 +1,7 @@
 """Frames that no method registered: their labels are filled in, and nothing is trained on them."""
 
 import json
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -96,7 +97,9 @@ def test_the_nearest_image_is_one_that_was_registered():
     table = labelled(12)
     angle = np.linspace(0, 1, 12)
     vectors = np.column_stack([np.cos(angle), np.sin(angle)]).astype(np.float32)
-    evidence = SimpleNamespace(train=table, descriptors={"d": (vectors, vectors)})
+    evidence = SimpleNamespace(
+        train=table, descriptors={"d": (vectors, vectors)}, preparing=nullcontext
+    )
     found = nearest_label(evidence, "d")[:, :3, 3]
     known = np.setdiff1d(np.arange(12), LOST)
     np.testing.assert_array_equal(found[known], table.position_m[known])

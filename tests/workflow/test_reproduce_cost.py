@@ -4,8 +4,13 @@ import pandas as pd
 import pytest
 
 from benchmarks.reproduce_cost import PART_OF, REST, cost_by_part, part_of
-from reproduction.plan.jobs import STAGES
+from reproduction.plan.pace import PUBLISHED
+from reproduction.runs.job_times import read_measured
 from synfeal.errors import InputError
+from tests import ROOT
+
+# Made where a profile asks for it, or by a version before the published runs.
+UNPUBLISHED = ("detail", "score", "rgbd-odometry", "rgbd-open3d", "external_reference")
 
 
 def jobs(*rows):
@@ -37,20 +42,18 @@ def test_runs_without_common_work_are_refused():
 
 
 def test_every_stage_of_a_plan_belongs_to_a_part():
-    rest = {stage for stage in STAGES if part_of(stage) == REST}
+    stages = {stage for root in PUBLISHED for stage in read_measured(ROOT / root)["stage"]}
+    rest = {stage for stage in stages if part_of(stage) == REST}
     assert rest == {
         "scene",
         "plan",
         "dataset",
         "coverage",
-        "cartons",
         "render_speed",
         "collection_speed",
         "tables",
         "claims",
         "figures",
         "summary",
-        "provenance",
-        "report",
     }
-    assert set(PART_OF) <= {*STAGES, "score", "detail"}
+    assert set(PART_OF) <= {*stages, *UNPUBLISHED}
