@@ -190,10 +190,14 @@ rule train:
         out=subpath(output.model, parent=True),
         images=REAL.images,
         randomisation=lambda w: "off" if w.row == RENDERED else "on",
+        # Of photographs by the camera that the scan found; rendered frames say theirs.
+        camera=lambda w, input: (
+            f"--camera {input.camera}" if w.row in (PHOTOGRAPHS, BOTH) else ""
+        ),
     shell:
         "synfeal train {params.datasets} --out {params.out} --localizer {wildcards.localizer}"
         " --images {params.images} --randomisation {params.randomisation}"
-        " --seed {wildcards.seed} --camera {input.camera} > {log} 2>&1"
+        " --seed {wildcards.seed} {params.camera} > {log} 2>&1"
 
 
 rule localize:
