@@ -117,7 +117,7 @@ def named(out: Path, number: int, packed_px: int | None) -> Path:
 
 
 def last_outs(task: Task, outs: dict[str, Path]) -> dict[str, Path]:
-    """What the last round wrote, by way."""
+    """Return the outputs of the last round, by way."""
     return {way: named(out, task.rounds - 1, task.packed_px) for way, out in outs.items()}
 
 

@@ -1,4 +1,4 @@
-"""How far two label sets of the same real frames are apart, and for how long the difference lasts.
+"""Measure the difference of two label sets of the same real frames, and how long it lasts.
 
     python -m benchmarks.label_differences results/benchmarks/label_differences.csv --poses pgt
 

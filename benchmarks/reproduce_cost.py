@@ -1,4 +1,4 @@
-"""What ``make reproduce`` takes, by part, beside what it took at another commit.
+"""Compare the processor time of ``make reproduce``, by part, with that at another commit.
 
 Writes ``results/benchmarks/reproduce_cost.csv``::
 

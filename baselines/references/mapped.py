@@ -63,7 +63,7 @@ REMEDY = "make the map again with synfeal map"
 
 
 class Shown(Strict):
-    """What ``map.json`` says of the frames; earlier versions did not note the mesh."""
+    """Frames of a map, as ``map.json`` describes them; earlier versions did not note the mesh."""
 
     camera: CameraConfig
     mesh_file: MeshFile | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -151,10 +151,25 @@ def split_init(init: str) -> tuple[Start, str]:
 
 
 def read_experiments(config: Config) -> tuple[Experiment, ...]:
-    """Read ``config.experiments``, checked against the scenes and sizes of the profile.
+    """Read the rows of ``config.experiments`` that ``config.tables`` asks for.
 
-    What is wrong is said with file, or the configuration's key, with row and column.
+    All rows are checked against the scenes and sizes of the profile. Errors name file, or the
+    configuration's key, with row and column.
     """
+    return _of_asked_tables(_every_row(config), config)
+
+
+def _of_asked_tables(rows: Sequence[Experiment], config: Config) -> tuple[Experiment, ...]:
+    """Select the rows that ``config.tables`` asks for; refuse a design without any."""
+    asked = [row for row in rows if config.tables is None or row.table in config.tables]
+    if not asked:
+        of = "" if config.tables is None else f" of tables {', '.join(config.tables)}"
+        raise InputError(f"{design_name(config)}: has no rows{of}; nothing would be run")
+    return tuple(asked)
+
+
+def _every_row(config: Config) -> tuple[Experiment, ...]:
+    """Read and check all rows, those of tables that are not asked for, too."""
     seen: dict[tuple[str, ...], str] = {}
     experiments = []
     for where, row in _given_rows(config):
@@ -171,11 +186,7 @@ def read_experiments(config: Config) -> tuple[Experiment, ...]:
         if problem:
             raise InputError(f"{where}: {problem}")
         seen[identity] = where
-        if config.tables is None or experiment.table in config.tables:
-            experiments.append(experiment)
-    if not experiments:
-        of = "" if config.tables is None else f" of tables {', '.join(config.tables)}"
-        raise InputError(f"{design_name(config)}: has no rows{of}; nothing would be run")
+        experiments.append(experiment)
     return tuple(experiments)
 
 
@@ -299,7 +310,13 @@ def read_design(config: Config) -> Design:
         InputError: a row, a further scene, or the data set of the robustness table is wrong.
     """
     _check_robustness(config)
-    whole = _design_of(config, read_experiments(config.model_copy(update={"tables": None})))
+    every_row = _every_row(config)
+    whole = Design(
+        rows=every_row,
+        repetitions=config.training.repetitions,
+        more_scenes=config.groundtruth.more_scenes,
+        noise_dose=config.groundtruth.noise_dose,
+    )
     missing = _without_frames(whole)
     if missing:
         scene, size = missing[0]
@@ -308,20 +325,10 @@ def read_design(config: Config) -> Design:
             f" '{size}' in that scene"
         )
     # `tables` may leave out every row of a further scene: then its labels are left out, too.
-    design = _design_of(config, read_experiments(config))
+    design = whole.model_copy(update={"rows": _of_asked_tables(every_row, config)})
     left_out = {scene for scene, _ in _without_frames(design)}
     kept = tuple(scene for scene in design.more_scenes if scene not in left_out)
     return design.model_copy(update={"more_scenes": kept})
-
-
-def _design_of(config: Config, rows: tuple[Experiment, ...]) -> Design:
-    """Put the rows of a profile and its settings of them together."""
-    return Design(
-        rows=rows,
-        repetitions=config.training.repetitions,
-        more_scenes=config.groundtruth.more_scenes,
-        noise_dose=config.groundtruth.noise_dose,
-    )
 
 
 def _without_frames(design: Design) -> list[tuple[str, str]]:

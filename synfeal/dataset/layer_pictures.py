@@ -43,7 +43,7 @@ def _depth(file: FrameFile) -> Image.Image:
 
 
 class Layer(NamedTuple):
-    """How a kind of file is shown.
+    """Display of a kind of file.
 
     Attributes:
         kind: Ending of its files.
