@@ -118,7 +118,15 @@ def read_trajectory(path: Path) -> BatchTrajectory:
 
 
 def read_image(path: FrameFile, camera: CameraConfig, mode: str | None = None) -> NDArray[Any]:
-    """Read an image of the camera's size as an array, converted to ``mode`` if one is given.
+    """Read an image and check that it has the camera's size.
+
+    Args:
+        path: Image file, on its own or inside an archive.
+        camera: Camera whose width and height the image must have.
+        mode: Pillow mode to convert to, such as ``RGB`` or ``L``; None keeps the file's own.
+
+    Returns:
+        Pixels (H, W) or (H, W, C), in the type of the file's mode.
 
     Raises:
         InputError: it is missing, cannot be read, or has another size.
@@ -135,9 +143,15 @@ def read_image(path: FrameFile, camera: CameraConfig, mode: str | None = None) -
 
 
 def link_images(color_paths: Sequence[FrameFile], camera: CameraConfig, images: Path) -> None:
-    """Link frames into a new directory ``images``, under names whose order is that of the frames.
+    """Link frames into a new directory, under names that sort in the order of the frames.
 
-    COLMAP leaves out an image that it cannot read, which would look like a frame without texture.
+    Each image is read first: COLMAP silently leaves out one that it cannot read, which would then
+    look like a frame without texture.
+
+    Args:
+        color_paths: Colour images in order; those in an archive are unpacked instead of linked.
+        camera: Camera whose size they must have.
+        images: Directory to create; it must not exist yet.
 
     Raises:
         InputError: as :func:`read_image`.

@@ -196,7 +196,7 @@ def _place(
     true_world_from_last: Array,
     cfg: GroundTruthConfig,
 ) -> tuple[Array, BatchRecord]:
-    """Place one batch in the world, assist it where needed; returns poses (n, 4, 4) and a record.
+    """Place one batch in the world and assist it where needed.
 
     Args:
         batch: The batch.
@@ -205,6 +205,9 @@ def _place(
         world_from_batch: Pose (4, 4) that ``first_from_cam`` is relative to.
         true_world_from_last: True pose (4, 4) of the last frame.
         cfg: The two thresholds.
+
+    Returns:
+        Labels (n, 4, 4) of the batch's frames, and its record.
     """
     lost = not trajectory.registered[1:].any()
     poses = world_from_batch @ fill_gaps(trajectory)
@@ -271,9 +274,26 @@ def write_label_set(
     out_assistance: Path,
     out_record: Path,
 ) -> None:
-    """Chain the batches of both splits, and record what the labels depend on.
+    """Chain the batches of both splits into a label set, and record how it was made.
 
-    ``estimation`` is that record; ``truth_used`` decides whether batches are anchored.
+    Args:
+        reconstructed: Name of the label method.
+        train_batches: Trajectories of the training batches, in order.
+        test_batches: Trajectories of the test batches, in order.
+        train_truth: Pose table with the true training poses.
+        test_truth: Pose table with the true test poses.
+        groundtruth: Frames per batch, and the thresholds of assistance.
+        truth_used: True poses the method itself used; batches placed by ``POSES`` are anchored.
+        estimation: Settings the labels depend on, written to ``out_record`` as they are.
+        out_train: Pose table of the training labels.
+        out_test: Pose table of the test labels.
+        out_train_unassisted: The training labels as they would be without assistance.
+        out_test_unassisted: The test labels as they would be without assistance.
+        out_assistance: JSON with a record per batch; see :func:`write_assistance`.
+        out_record: JSON with ``estimation`` under ``parameters``.
+
+    Raises:
+        InputError: a file cannot be read, or a trajectory does not fit its batch.
     """
     anchored = truth_used == TruthUsed.POSES
     records = {
@@ -339,6 +359,13 @@ def write_assistance(
     splits: Mapping[str, list[BatchRecord]],
     truth_used: TruthUsed = TruthUsed.NOTHING,
 ) -> None:
-    """Write the records of all splits of one method, and the truth it used, as JSON."""
+    """Write what assistance each batch of a method needed, as JSON.
+
+    Args:
+        path: File to write.
+        method: Name of the label method.
+        splits: Records of the batches, in order, by split (``train``, ``test``).
+        truth_used: True poses the method used beside those that assistance put in.
+    """
     summaries = {split: summary_of(records) for split, records in splits.items()}
     write_json(path, {"method": method, "truth_used": truth_used, "splits": summaries})

@@ -32,10 +32,11 @@ def drift_along_paths(
     noise_deg: float,
     rng: np.random.Generator,
 ) -> PoseTable:
-    """Displace and turn by two random walks along each path that are pulled back to zero.
+    """Displace and turn poses by two random walks along each path that are pulled back to zero.
 
-    The median size of each is exact on the poses given, as it is of independent noise: not only on
-    those of the training split. Where cameras stand plays no part.
+    Arguments are those of :func:`baselines.labels.injected.with_error`. Where cameras stand plays
+    no part. As with independent noise, the median sizes are exact on ``table`` itself, whichever
+    split it is; ``train`` is not looked at.
     """
     shift, turn = walks(table.path, rng), walks(table.path, rng)
     return displaced(table, _sized(shift, noise_m), _sized(turn, math.radians(noise_deg)))

@@ -46,7 +46,10 @@ def independent_noise(
     noise_deg: float,
     rng: np.random.Generator,
 ) -> PoseTable:
-    """Displace and turn each frame by itself; see :func:`add_noise` and :func:`with_error`."""
+    """Displace and turn each frame by itself.
+
+    Arguments are those of :func:`with_error`; ``train`` is not looked at. See :func:`add_noise`.
+    """
     return add_noise(table, noise_m, noise_deg, rng)
 
 
@@ -114,7 +117,10 @@ def offset_per_path(
     noise_deg: float,
     rng: np.random.Generator,
 ) -> PoseTable:
-    """Give each path one displacement and one rotation; see :func:`with_error`."""
+    """Give each path one displacement and one rotation, shared by all its frames.
+
+    Arguments are those of :func:`with_error`; ``train`` is not looked at.
+    """
     paths, place = np.unique(table.path, return_inverse=True)
     shift, axis = unit_vectors(len(paths), rng), unit_vectors(len(paths), rng)
     return displaced(table, noise_m * shift[place], np.radians(noise_deg) * axis[place])
@@ -128,9 +134,10 @@ def bend_of_space(
     noise_deg: float,
     rng: np.random.Generator,
 ) -> PoseTable:
-    """Displace and turn by two smooth fields in space; see :func:`with_error`.
+    """Displace and turn by two smooth fields in space, scaled on the training positions.
 
-    Both sizes are given, so the rotations are not those that the displacements would imply.
+    The sizes of both are given, so the rotations are not those that the displacements would imply.
+    Arguments are those of :func:`with_error`.
     """
     shift_m = _smooth_field(train.position_m, noise_m, rng)
     rotvec_rad = _smooth_field(train.position_m, np.radians(noise_deg), rng)
@@ -145,9 +152,10 @@ def wrong_scale(
     noise_deg: float,
     rng: np.random.Generator,
 ) -> PoseTable:
-    """Multiply distances from the first training camera, where a map would begin, by a factor.
+    """Scale distances from the first training camera, where a map would begin, by one factor.
 
-    Nothing is drawn and nothing is turned; see :func:`with_error`.
+    Arguments are those of :func:`with_error`. The factor follows from ``noise_m`` and ``train``;
+    ``noise_deg`` and ``rng`` are not used, since nothing turns and nothing is drawn.
     """
     origin_m = train.position_m[0]
     distance_m = np.median(np.linalg.norm(train.position_m - origin_m, axis=1))

@@ -137,7 +137,16 @@ class FusedModel:
         self._cast(o3d.core.Tensor.from_numpy(repeated), matrix, first_from_cam, (16, 16), 1)
 
     def track(self, frame: RgbdFrame, last: Array, min_fitness: float) -> Array | None:
-        """Find the pose (4, 4) of a frame near the last one (4, 4), or None when it is lost."""
+        """Register a frame to the surface that the model shows from the last known pose.
+
+        Args:
+            frame: Frame to track; its depth alone is used.
+            last: Pose ``first_from_cam`` (4, 4) of the last frame that was found.
+            min_fitness: Least share of the frame's depth that must agree with the model, 0 to 1.
+
+        Returns:
+            Pose ``first_from_cam`` (4, 4); None where the frame is lost or nothing was fused yet.
+        """
         if not self._grid.hashmap().size():
             return None
         shown_m = self.show(last)

@@ -67,7 +67,13 @@ def spread(errors: Array) -> Spread:
 
 
 def share_within(errors: PoseErrors, limit_m: float, limit_deg: float) -> float:
-    """Compute the share of frames whose position and orientation are both within the limits."""
+    """Compute the share of frames whose position and orientation are both within limits.
+
+    Args:
+        errors: Position errors (N,) in metres and orientation errors (N,) in degrees.
+        limit_m: Largest position error that counts as within, metres.
+        limit_deg: Largest orientation error that counts as within, degrees.
+    """
     position_m, orientation_deg = errors
     return float(np.mean((position_m <= limit_m) & (orientation_deg <= limit_deg)))
 
@@ -76,7 +82,13 @@ def relative_error(sequences: Sequence[Pair], frames: int) -> RelativeError | No
     """Compute the error of the motion from each frame to the one ``frames`` further on its path.
 
     With labels P and true poses Q it is that of ``inverse(inverse(Q_i) Q_j) inverse(P_i) P_j``.
-    None when no sequence has more frames than that.
+
+    Args:
+        sequences: Labels and true poses of each path.
+        frames: Number of frames the motion spans.
+
+    Returns:
+        The error over all motions; None where no sequence has more than ``frames`` frames.
     """
     long = [pair for pair in sequences if len(pair[1]) > frames]
     if not long:

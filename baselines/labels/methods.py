@@ -63,7 +63,22 @@ def write_estimate(
     out_trajectory: Path,
     out_facts: Path,
 ) -> None:
-    """Write :func:`estimate_batch` of the frames ``start`` to ``stop`` of a split."""
+    """Estimate one batch by a method that works on frames, and write its trajectory.
+
+    Args:
+        frame_method: Key of ``METHODS``.
+        sequences: Sequences of the split with colour and depth, from its first one.
+        start: First frame of the batch, counted from 0 in the split.
+        stop: One past its last frame.
+        camera: Camera of colour and depth.
+        groundtruth: Settings of all methods.
+        seed: Seed of whatever is random.
+        out_trajectory: CSV to write.
+        out_facts: JSON to write: what the estimation took.
+
+    Raises:
+        InputError: an image is missing, cannot be read, or has another size than the camera.
+    """
     color, depth = (
         frames_between(sequences, f"{kind}.png", start, stop) for kind in ("color", "depth")
     )
@@ -80,7 +95,7 @@ def estimate_batch(
     groundtruth: GroundTruthConfig,
     seed: int,
 ) -> tuple[BatchTrajectory, Facts]:
-    """Estimate a batch by a method that works on frames; returns its trajectory and what it took.
+    """Estimate one batch by a method that works on frames.
 
     Args:
         name: Key of ``METHODS``.
@@ -90,6 +105,9 @@ def estimate_batch(
         groundtruth: Settings of all methods; the function is given those that
             ``LabelMethod.settings`` names.
         seed: Seed of whatever is random.
+
+    Returns:
+        The trajectory, and what estimating it took.
     """
     method = METHODS[name]
     function = resolve_name(method.place)
@@ -107,14 +125,36 @@ def write_solved(
     out_trajectory: Path,
     out_facts: Path,
 ) -> None:
-    """Write :func:`solve_graph` of a ``.g2o`` file."""
+    """Optimise the pose graph of one batch, and write the resulting trajectory.
+
+    Args:
+        graph_method: Key of ``METHODS``; a method that works on a graph.
+        graph: ``.g2o`` file of the batch.
+        posegraph: Settings of the optimiser.
+        out_trajectory: CSV to write.
+        out_facts: JSON to write: what the optimisation took.
+
+    Raises:
+        InputError: the graph cannot be read.
+        ValueError: its edges do not connect all nodes.
+    """
     trajectory, facts = solve_graph(graph_method, read_g2o(graph), posegraph)
     write_json(out_facts, facts)
     write_trajectory(out_trajectory, trajectory)
 
 
 def solve_graph(name: str, graph: PoseGraph, cfg: PoseGraphConfig) -> tuple[BatchTrajectory, Facts]:
-    """Optimise a batch's pose graph; return the trajectory and what the optimiser took.
+    """Optimise the pose graph of one batch.
+
+    The optimiser is first run on a graph of two nodes, so that loading and compiling are not timed.
+
+    Args:
+        name: Key of ``METHODS``; a method that works on a graph.
+        graph: Initial poses and edges.
+        cfg: Settings of the optimiser.
+
+    Returns:
+        The trajectory, with every frame registered, and what the optimisation took.
 
     Raises:
         ValueError: the edges do not connect all nodes.

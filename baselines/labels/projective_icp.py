@@ -45,7 +45,12 @@ class Surface(NamedTuple):
 
 
 def pyramid_of(depth_m: Depth, camera: CameraConfig) -> list[Surface]:
-    """Turn a depth image (H, W), metres, not finite where nothing was measured, into all levels."""
+    """Compute points and normals of a depth image at each of ``LEVELS``, coarse to fine.
+
+    Args:
+        depth_m: Depth (H, W), metres; not finite where nothing was measured.
+        camera: Camera of the full image.
+    """
     measured = np.where(np.isfinite(depth_m), depth_m, np.float32(np.nan))
     image = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(np.ascontiguousarray(measured)))
     smooth_m = image.filter_bilateral(*_SMOOTHING).as_tensor().numpy()[..., 0]
@@ -62,10 +67,16 @@ def _surface(depth_m: Depth, smooth_m: Depth, camera: CameraConfig, stride: int)
 def register(
     shown: list[Surface], seen: list[Surface], camera: CameraConfig
 ) -> tuple[Array, float]:
-    """Find the motion ``shown_from_seen`` (4, 4) of a frame to the surface expected, both by level.
+    """Register a frame to the surface expected in its place, starting without motion.
 
-    It starts without motion. Beside it is how well the matched surfaces constrain it: 0 where some
-    motion leaves them in place, and then the motion means nothing.
+    Args:
+        shown: Surface that is expected, from :func:`pyramid_of`.
+        seen: Surface that the frame measures, from :func:`pyramid_of`.
+        camera: Camera of both.
+
+    Returns:
+        Motion ``shown_from_seen`` (4, 4), and how well the matched surfaces constrain it, at most
+        1/3. The latter is 0 where some motion leaves them in place; the motion then means nothing.
     """
     motion = np.eye(4)
     for (stride, steps), target, source in zip(LEVELS, shown, seen, strict=True):

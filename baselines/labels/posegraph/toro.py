@@ -72,7 +72,15 @@ class _PathEdge:
 
 
 def optimise_toro(graph: PoseGraph, iterations: int, epsilon: float) -> Array:
-    """Optimise poses (n, 4, 4) relative to the first, in at most ``iterations`` passes.
+    """Optimise a pose graph by stochastic gradient descent on its tree.
+
+    Args:
+        graph: Initial poses and edges.
+        iterations: Most passes over all edges.
+        epsilon: Relative change of the summed error (chi²) at which the descent stops.
+
+    Returns:
+        Poses ``first_from_cam`` (n, 4, 4).
 
     Raises:
         ValueError: a node has no edge to a lower-numbered one, so no tree spans the graph.

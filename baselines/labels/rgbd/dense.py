@@ -49,11 +49,17 @@ def depth_agreement(
 def matched_depths(
     depth_i_m: Depth, depth_j_m: Depth, i_from_j: Array, camera: CameraConfig
 ) -> tuple[Array, Array, int]:
-    """Project the points of image j (H, W) into image i (H, W) by a motion ``i_from_j`` (4, 4).
+    """Project the points of image j into image i, and pair their depths with those measured there.
+
+    Args:
+        depth_i_m: Depth (H, W) of image i, metres.
+        depth_j_m: Depth (H, W) of image j, metres; every fourth row and column is used.
+        i_from_j: Motion (4, 4).
+        camera: Camera of both.
 
     Returns:
-        For the points inside image i the depth (n,) measured there, inf where there is none, and
-        their own (n,); and the number of all points of j.
+        For the n points that fall inside image i, the depth (n,) measured there, inf where there is
+        none, and the depth (n,) of the points themselves; and the number of all points of j.
     """
     fx, fy, cx, cy = camera.intrinsics
     focal, centre = np.array([fx, fy]), np.array([cx, cy])
@@ -201,25 +207,44 @@ def register(
 
 @dataclass(frozen=True)
 class DenseOdometry:
-    """Settings with which pairs of frames are registered."""
+    """Registration of pairs of frames with one camera and one set of settings."""
 
     camera: CameraConfig
     cfg: RgbdConfig
 
     def constrained(self, frame: RgbdFrame) -> bool:
-        """Check that what is compared can tell every motion of the camera."""
+        """Check that what is compared in this frame can tell every motion of the camera."""
         if self.cfg.method != "point-to-plane":
             return True
         return constraint(frame.depth_m, self.camera) >= MIN_CONSTRAINT
 
     def overlap(self, i: RgbdFrame, j: RgbdFrame, i_from_j: Array) -> float:
-        """Compute the share of points of j that agree with i under a motion (4, 4); 0: rejected."""
+        """Compute the share of the points of j whose depth agrees with i under a motion.
+
+        Args:
+            i: Frame the motion leads to.
+            j: Frame the motion comes from.
+            i_from_j: Motion (4, 4).
+
+        Returns:
+            The share, 0 to 1; 0 also where it, or the RMS of the depth differences, misses the
+            limit of the settings.
+        """
         max_rmse_m = self.cfg.max_rmse_m
         fitness, rmse_m = depth_agreement(i.depth_m, j.depth_m, i_from_j, self.camera, max_rmse_m)
         return fitness if fitness >= self.cfg.min_fitness and rmse_m <= max_rmse_m else 0.0
 
     def refine(self, i: RgbdFrame, j: RgbdFrame, start: Array) -> Motion | None:
-        """Refine a motion ``i_from_j`` (4, 4) from a start; None where it is not accepted."""
+        """Refine a motion, and accept it if it stays near its start and the depths agree.
+
+        Args:
+            i: Frame the motion leads to.
+            j: Frame the motion comes from.
+            start: Motion ``i_from_j`` (4, 4) to start from.
+
+        Returns:
+            The refined motion; None where none is found or accepted.
+        """
         if self.cfg.method == "point-to-plane":
             found = align(i.surfaces, j.surfaces, start, 2 * self.cfg.max_rmse_m)
         else:

@@ -191,7 +191,14 @@ class RgbdFrame:
 def read_frame(
     color_path: FrameFile, depth_path: FrameFile, camera: CameraConfig, cfg: DepthConfig, seed: int
 ) -> RgbdFrame:
-    """Read a frame; depth is as the sensor of the configuration measures it.
+    """Read a colour and a depth image, the latter as the configured sensor would measure it.
+
+    Args:
+        color_path: Colour image.
+        depth_path: 16-bit depth image in millimetres, 0 or 65535 where nothing was measured.
+        camera: Camera of both.
+        cfg: Sensor, and the depth beyond which it measures nothing.
+        seed: Seed of the sensor's noise; unused by the ideal one.
 
     Raises:
         InputError: an image cannot be read, has another size than the camera, or the depth is not

@@ -58,7 +58,21 @@ def write_rgbd(
     out_graph: Path,
     out_facts: Path,
 ) -> None:
-    """Write the pose graph of the frames ``start`` to ``stop`` of a split, and what it took."""
+    """Build the pose graph of one batch by RGB-D odometry, and write it.
+
+    Args:
+        sequences: Sequences of the split with colour and depth, from its first one.
+        start: First frame of the batch, counted from 0 in the split.
+        stop: One past its last frame.
+        camera: Camera of colour and depth.
+        rgbd: Sensor, odometry, keyframes, and the gates of accepted motions.
+        seed: Seed of the sensor's noise; unused by the ideal one.
+        out_graph: ``.g2o`` file to write.
+        out_facts: JSON to write: what making the graph took.
+
+    Raises:
+        InputError: an image is missing, cannot be read, or has another size than the camera.
+    """
     color, depth = (
         frames_between(sequences, f"{kind}.png", start, stop) for kind in ("color", "depth")
     )

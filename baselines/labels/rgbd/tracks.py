@@ -124,9 +124,16 @@ class View:
 
 
 def neighbour(i: View, j: View, previous: Array) -> tuple[Array, bool]:
-    """Find the motion ``i_from_j`` (4, 4) between neighbours and whether it was accepted.
+    """Find the motion between neighbours by depth or, where that cannot tell it, by features.
 
-    ``previous`` is the motion (4, 4) of the pair before.
+    Args:
+        i: The earlier frame.
+        j: The frame after it.
+        previous: Motion (4, 4) of the pair before, a starting point if the settings say so.
+
+    Returns:
+        ``i_from_j`` (4, 4), and whether it was accepted. One that was not is only a guess: the
+        motion by features, or ``previous``.
     """
     if not (i.constrained and j.constrained):
         return _by_features(i, j, previous)
@@ -157,9 +164,16 @@ def _by_features(i: View, j: View, previous: Array) -> tuple[Array, bool]:
 
 
 def closure(i: View, j: View, predicted: Array | None) -> Array | None:
-    """Find the motion ``i_from_j`` (4, 4) between keyframes, i the earlier one, or None.
+    """Find the motion between two keyframes that may view the same place.
 
-    ``predicted`` is the motion by odometry, None where that was interrupted between them.
+    Args:
+        i: The earlier keyframe.
+        j: The later one.
+        predicted: Motion ``i_from_j`` (4, 4) by odometry, from which depth is registered; None
+            where odometry was interrupted between the two, so that features have to give one.
+
+    Returns:
+        ``i_from_j`` (4, 4); None where no motion is accepted.
     """
     if not (i.constrained and j.constrained):
         found = i.from_features(j, _MIN_LOOP_INLIERS)
@@ -188,11 +202,16 @@ def loop_candidates(first_from_cam: Array, keyframe_every: int) -> list[tuple[in
 def most_telling(
     candidates: Sequence[tuple[int, int]], overlap: Callable[[int, int], float], per_keyframe: int
 ) -> list[tuple[int, int]]:
-    """Keep each later keyframe's ``per_keyframe`` earliest partners that overlap it.
+    """Keep for each later keyframe its earliest partners: they take away the most drift.
 
-    The further apart in time, the more drift a closure takes away. Candidates are pairs (i, j),
-    i < j, ordered by i; ``overlap`` is the share of image j that image i shows, 0 where the pair is
-    not worth trying.
+    Args:
+        candidates: Pairs (i, j) of keyframes, i < j, ordered by i.
+        overlap: Returns for a pair the share of image j that image i shows, 0 where it is not worth
+            trying.
+        per_keyframe: Most partners of one later keyframe.
+
+    Returns:
+        The pairs kept, in the order of ``candidates``.
     """
     chosen: dict[int, int] = {}
     kept = []

@@ -48,7 +48,13 @@ Array = NDArray[np.float64]
 
 
 def match_features(database: Path, cfg: SfmConfig, seed: int) -> None:
-    """Write verified matches between frames near in time; ``seed`` is that of RANSAC."""
+    """Match frames that are near in time, and write the verified matches to the database.
+
+    Args:
+        database: COLMAP database that holds the features of all images.
+        cfg: Matching and verification; ``overlap`` and ``quadratic_overlap`` say which frames.
+        seed: Seed of RANSAC.
+    """
     pairing = pycolmap.SequentialPairingOptions(
         overlap=cfg.overlap, quadratic_overlap=cfg.quadratic_overlap, num_threads=1
     )
@@ -98,7 +104,23 @@ def write_sfm(
     out_trajectory: Path,
     out_facts: Path,
 ) -> None:
-    """Write the trajectory of the frames ``start`` to ``stop`` of a split, and what it took."""
+    """Estimate the poses of one batch by structure from motion, and write its trajectory.
+
+    Args:
+        sequences: Sequences of the split with colour, from its first one.
+        truth: Pose table of the split's true poses, which place and scale the model.
+        start: First frame of the batch, counted from 0 in the split.
+        stop: One past its last frame.
+        camera: Camera of the images.
+        sfm: Features, matching and mapping.
+        seed: Seed of RANSAC and of the mapper.
+        out_trajectory: CSV to write.
+        out_facts: JSON to write: what it took and how the model came about; see :func:`sfm_batch`.
+
+    Raises:
+        InputError: an image or the true poses cannot be read, or an image has another size than the
+            camera.
+    """
     color = frames_between(sequences, "color.png", start, stop)
     poses = read_frames(truth, start, stop).world_from_cam
     trajectory, facts = sfm_batch(color, camera, poses, sfm, seed)

@@ -75,7 +75,17 @@ def read_matches(images: Path, database: Path) -> Matches:
 
 
 def map_matches(matches: Matches, work_dir: Path, cfg: SfmConfig, seed: int) -> Mapping:
-    """Map a batch by ``cfg.mapper`` and return its best model; ``work_dir`` is a new directory."""
+    """Map a batch, and choose its best model.
+
+    Args:
+        matches: Verified matches of the batch.
+        work_dir: Directory to create, for the mapper's own files.
+        cfg: Settings; ``cfg.mapper`` says whether to map incrementally or globally.
+        seed: Seed of the mapper.
+
+    Returns:
+        The mapping, without a model where there are no matches or the mapper finds none.
+    """
     work_dir.mkdir()
     if not matches.matched_points:
         return Mapping(None, 0, 0, 0.0)
@@ -146,7 +156,13 @@ _MAX_MODELS = 5  # of one start, where the batch falls into pieces
 def incremental_options(
     cfg: SfmConfig, seed: int, max_seconds: int
 ) -> pycolmap.IncrementalPipelineOptions:
-    """Return the options of the incremental mapper, which stops after ``max_seconds``."""
+    """Return the options of the incremental mapper.
+
+    Args:
+        cfg: Least inliers of a pair, and least triangulation angle of the first.
+        seed: Seed of the mapper.
+        max_seconds: Time after which the mapper stops with what it has.
+    """
     options = pycolmap.IncrementalPipelineOptions(
         num_threads=1,
         random_seed=seed,
@@ -236,7 +252,12 @@ def refine_model(model: pycolmap.Reconstruction) -> None:
 def adjustment_of(
     model: pycolmap.Reconstruction, steps: int
 ) -> tuple[pycolmap.BundleAdjustmentConfig, pycolmap.BundleAdjustmentOptions]:
-    """Prepare the adjustment of all poses and points; one thread makes it repeatable."""
+    """Prepare the adjustment of all poses and points of a model; one thread makes it repeatable.
+
+    Args:
+        model: Model to adjust; its camera stays as it is.
+        steps: Most iterations of the solver.
+    """
     config = pycolmap.BundleAdjustmentConfig()
     for image_id in model.reg_image_ids():
         config.add_image(image_id)
