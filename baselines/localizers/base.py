@@ -81,7 +81,16 @@ class Localizer(nn.Module):
     def loss(
         self, predictions: list[PosePrediction], position_m: Tensor, quat_wxyz: Tensor
     ) -> Tensor:
-        """Compute the loss of the main prediction plus 0.3 times that of each auxiliary one."""
+        """Compute the loss of the main prediction plus 0.3 times that of each auxiliary one.
+
+        Args:
+            predictions: What the network returned: the main prediction, then auxiliary ones.
+            position_m: True positions (B, 3), metres.
+            quat_wxyz: True rotations (B, 4), unit quaternions.
+
+        Returns:
+            A scalar.
+        """
         main, *auxiliary = (self.criterion(p, position_m, quat_wxyz) for p in predictions)
         return torch.as_tensor(main + AUXILIARY_WEIGHT * sum(auxiliary))
 

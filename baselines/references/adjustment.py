@@ -49,10 +49,18 @@ def adjusted(evidence: Evidence) -> Array:
 
 
 def placed_on(poses: Array, labels: Array, usable: Rows | None = None) -> Array:
-    """Move, turn and scale poses (N, 4, 4) as one so that their centres fit those of labels.
+    """Move, turn and scale poses as one so that their centres fit those of labels.
 
-    Frames whose centres stay far off, three times the median, have no say: estimated labels can be
-    wrong by metres where a batch was lost. Nor have frames besides the ``usable`` rows, if given.
+    Frames whose centres stay off by more than three times the median have no say: estimated labels
+    can be wrong by metres where a batch was lost.
+
+    Args:
+        poses: ``model_from_cam`` (N, 4, 4) in a world of any place and scale.
+        labels: ``world_from_cam`` (N, 4, 4) of the same frames.
+        usable: Rows of the frames that are fitted; None for all. The others are moved along.
+
+    Returns:
+        The poses (N, 4, 4) in the world of the labels.
     """
     centre, wanted = poses[:, :3, 3], labels[:, :3, 3]
     every = np.arange(len(poses))
@@ -117,7 +125,16 @@ def errors_px(
 
 
 def longest(tracks: Tracks, usable: NDArray[np.bool_], n_frames: int) -> Rows:
-    """Select the usable tracks with the most observations, enough for all frames."""
+    """Select the usable tracks with the most observations, four for each frame.
+
+    Args:
+        tracks: Tracks of T points.
+        usable: Whether each track (T,) may be selected.
+        n_frames: Number of frames, which sets how many tracks are kept at the most.
+
+    Returns:
+        Indices of the tracks, ascending.
+    """
     length = np.bincount(tracks.track, minlength=tracks.count) * usable
     order = np.argsort(-length, kind="stable")[: POINTS_PER_FRAME * n_frames]
     return np.sort(order[length[order] > 0])

@@ -108,9 +108,18 @@ QUERIES = 500  # looked up at a time
 
 
 def read_described(path: Path, n_train: int, n_test: int, test: str = "test") -> Described:
-    """Read the first vectors of each split by descriptor: smaller sets are prefixes of larger ones.
+    """Read the global descriptors of the first frames of each split.
 
-    ``test`` names the test frames, where there are several of the same poses.
+    Smaller data sets are prefixes of larger ones, so one file serves all sizes.
+
+    Args:
+        path: File of descriptors.
+        n_train: Number of training frames to read.
+        n_test: Number of test frames to read.
+        test: Name of the test frames, where the file holds several renderings of the same poses.
+
+    Returns:
+        Unit vectors (n_train, D) and (n_test, D), by the name of the descriptor.
 
     Raises:
         InputError: the file cannot be read.
@@ -121,9 +130,15 @@ def read_described(path: Path, n_train: int, n_test: int, test: str = "test") ->
 
 
 def most_alike(train: Vectors, test: Vectors, count: int) -> NDArray[np.int64]:
-    """Find rows (N, count) of training vectors (M, D) nearest to unit vectors (N, D), best first.
+    """Find for each test vector the training vectors that are most alike.
 
-    Where M < count, all of them.
+    Args:
+        train: Unit vectors (M, D).
+        test: Unit vectors (N, D).
+        count: Number of training vectors to find; all where there are fewer.
+
+    Returns:
+        Rows of ``train`` (N, count), the most alike first.
     """
     count = min(count, len(train))
     found = []

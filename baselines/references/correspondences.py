@@ -44,7 +44,13 @@ class Correspondences(ByFrame):
 def match_test_frames(
     train: Features, test: Features, retrieved: NDArray[np.int64]
 ) -> Correspondences:
-    """Find the matches of each test frame with the training frames ``retrieved`` (N, k) for it."""
+    """Match each test frame with the training frames that were retrieved for it.
+
+    Args:
+        train: Features of all training frames.
+        test: Features of the N test frames.
+        retrieved: Training frames (N, k) to match with each test frame.
+    """
     slopes, features, counts = [], [], [0]
     for query, rows in enumerate(tqdm(retrieved, "matching", unit="frame", mininterval=5)):
         roots, slope, count = test.roots(query), test.slope[test.of(query)], 0
@@ -62,7 +68,18 @@ def match_test_frames(
 def mutual_matches(
     own: NDArray[np.float32], other: NDArray[np.float32], ratio: float = RATIO
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Match unit descriptors (a, D) and (b, D): each other's nearest that pass the ratio test."""
+    """Match descriptors that are each other's nearest and pass the ratio test.
+
+    Args:
+        own: Unit descriptors (a, D).
+        other: Unit descriptors (b, D).
+        ratio: A match passes if its distance is below this share of the distance to the second
+            nearest of ``other``.
+
+    Returns:
+        Rows of ``own`` and rows of ``other``, both (m,), that match. None where ``other`` has fewer
+        than two descriptors.
+    """
     if len(own) == 0 or len(other) < 2:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     alike = own @ other.T
@@ -86,8 +103,14 @@ def write_matches(
 ) -> None:
     """Match each test frame with the training frames that look most alike, and write the matches.
 
-    ``out_costs``, if given, is a JSON file with the processor seconds per test frame, retrieval
-    included.
+    Args:
+        descriptors: Global descriptors of both splits.
+        train: Features of the training frames.
+        test: Features of the test frames.
+        retrieved: Number of training frames to match with each test frame.
+        out_matches: File of :class:`Correspondences` to write.
+        out_costs: JSON to write: processor seconds per test frame, retrieval included; None for
+            none.
 
     Raises:
         InputError: descriptors or features cannot be read.
@@ -145,6 +168,11 @@ class Tracks(Stored):
 
 def write_tracks(descriptors: Path, train: Path, out_tracks: Path) -> None:
     """Match training frames with each other, and write the tracks.
+
+    Args:
+        descriptors: Global descriptors, which say which frames look alike.
+        train: Features of the training frames.
+        out_tracks: File of :class:`Tracks` to write.
 
     Raises:
         InputError: descriptors or features cannot be read.

@@ -72,7 +72,15 @@ def roots_of(descriptor: NDArray[np.uint8]) -> NDArray[np.float32]:
 def files_of_split(
     sequences: Sequence[Path], split: str, n_frames: int
 ) -> tuple[list[FrameFile], list[FrameFile] | None]:
-    """List colour and depth images of the first frames; no depth of a test set: none may be used.
+    """List the colour and depth images of the first frames of a split.
+
+    Args:
+        sequences: Sequences of the split, from its first one.
+        split: ``train`` or ``test``.
+        n_frames: Number of frames.
+
+    Returns:
+        Colour images and depth images, in order. No depth of a test set: no method may use it.
 
     Raises:
         InputError: a sequence cannot be read or has no such file.
@@ -94,7 +102,14 @@ def write_features(
 ) -> None:
     """Find features in the first frames of a split, and write them.
 
-    ``out_costs``, if given, is a JSON file with the processor seconds per frame.
+    Args:
+        sequences: Sequences of the split, from its first one.
+        split: ``train`` or ``test``; depth is read of training frames alone.
+        n_frames: Number of frames.
+        camera: Camera of the images.
+        references: Number and contrast of the features.
+        out_features: File of :class:`Features` to write.
+        out_costs: JSON to write: processor seconds per frame; None writes none.
 
     Raises:
         InputError: a sequence or an image cannot be read.
@@ -116,7 +131,15 @@ def features_of(
     camera: CameraConfig,
     cfg: ReferencesConfig,
 ) -> Features:
-    """Extract features of grey images (H, W), with their depth (H, W) where there is one."""
+    """Extract SIFT features of images, with the depth at each.
+
+    Args:
+        greys: Grey images (H, W), frame by frame.
+        depths_m: Their depth images (H, W), metres; None where there is no depth, which makes that
+            of all features infinite.
+        camera: Camera of both, whose distortion is removed.
+        cfg: Number and contrast of the features.
+    """
     cv2.setNumThreads(1)
     sift = cv2.SIFT.create(
         cfg.max_features, contrastThreshold=cfg.contrast, enable_precise_upscale=True
@@ -181,9 +204,16 @@ def write_views(
     out_views: Path,
     out_costs: Path | None = None,
 ) -> None:
-    """Reduce the first frames of a split to ``side`` (width, height), and write them.
+    """Reduce the first frames of a split to what a scene-coordinate network sees, and write them.
 
-    ``out_costs``, if given, is a JSON file with the processor seconds per frame.
+    Args:
+        sequences: Sequences of the split, from its first one.
+        split: ``train`` or ``test``; depth is read of training frames alone.
+        n_frames: Number of frames.
+        camera: Camera of the images.
+        side: Width and height to reduce images to, pixels.
+        out_views: File of :class:`Views` to write.
+        out_costs: JSON to write: processor seconds per frame; None writes none.
 
     Raises:
         InputError: a sequence or an image cannot be read.
@@ -206,9 +236,15 @@ def write_views(
 
 
 def cell_pixels(camera: CameraConfig, width: int, height: int) -> Array:
-    """Compute the pixels (R, C, 2) of the cell centres of a reduced image in the camera's image.
+    """Compute where the centres of a reduced image's cells lie in the camera's full image.
 
-    The first pixel's centre is at (0.5, 0.5) in both.
+    Args:
+        camera: Camera of the full image.
+        width: Width of the reduced image, pixels.
+        height: Height of the reduced image, pixels.
+
+    Returns:
+        Pixels (R, C, 2) of the full image, x before y; the first pixel's centre is at (0.5, 0.5).
     """
     column, row = np.meshgrid(np.arange(0, width, STRIDE) + 0.5, np.arange(0, height, STRIDE) + 0.5)
     return np.stack([column * camera.width / width, row * camera.height / height], axis=-1)

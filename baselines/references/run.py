@@ -40,7 +40,21 @@ def answer_group(
     out_references: Sequence[Path],
     samples_seen: int = 0,
 ) -> None:
-    """Answer by all methods of a group; see :class:`Evidence` and :func:`answer_and_score`."""
+    """Let all methods of a group answer for one data set, and score them.
+
+    Args:
+        group: Group of methods that one job answers by; see
+            :class:`~baselines.registry.kinds.ReferenceMethod`.
+        files: Files of the data set by name; see :class:`Evidence`.
+        camera: Camera of the frames that features were found in.
+        seed: Seed of whatever is random.
+        wildcards: Further keys of the metrics: scene, size and labels.
+        out_references: Files to write, each method's in a folder of its own beside the others'.
+        samples_seen: Images that a method that learns is shown.
+
+    Raises:
+        InputError: something the methods need cannot be read.
+    """
     evidence = Evidence(files, camera, seed, samples_seen)
     answer_and_score(evidence, in_group(group), out_references[0].parents[1], wildcards)
 
@@ -48,7 +62,13 @@ def answer_group(
 def answer_and_score(
     evidence: Evidence, names: Sequence[str], out_dir: Path, info: Mapping[str, Any]
 ) -> None:
-    """Answer by some of ``REFERENCES``, each in a folder of ``out_dir``, and score them.
+    """Let some methods answer for one data set, and score each in a folder of its own.
+
+    Args:
+        evidence: The data set.
+        names: Keys of ``REFERENCES``.
+        out_dir: Folder in which each method gets one of its name; see :func:`score_answers`.
+        info: Further keys of the metrics.
 
     Raises:
         InputError: something the methods need cannot be read.

@@ -181,7 +181,17 @@ def learn(
 def predict(
     network: CoordinateNetwork, views: Views, statistics: ImageStatistics, device: torch.device
 ) -> Array:
-    """Predict the points (N, R, C, 3) of the cells of every image."""
+    """Predict the points of the cells of every image.
+
+    Args:
+        network: Trained network, on ``device``.
+        views: Images (N, h, w, 3) as it sees them.
+        statistics: Statistics of the images that it was trained on.
+        device: Device to predict on.
+
+    Returns:
+        Points (N, R, C, 3), world, metres.
+    """
     images = torch.from_numpy(views.images).permute(0, 3, 1, 2)
     parts = torch.split(images, BATCH)
     found = torch.cat([_answer(network, part, statistics, device).cpu() for part in parts])
@@ -198,7 +208,16 @@ def _answer(
 
 
 def poses_of(views: Views, points: Array, evidence: Evidence) -> Array:
-    """Find poses (N, 4, 4) from points (N, R, C, 3) of the cells; NaN where none is found."""
+    """Find the poses of images from the points that their cells show, by PnP.
+
+    Args:
+        views: The images, with the rays of their cells.
+        points: Points (N, R, C, 3), world, metres.
+        evidence: Data set whose camera and seed are used.
+
+    Returns:
+        Poses ``world_from_cam`` (N, 4, 4); NaN where none is found.
+    """
     camera = pinhole(evidence.camera)
     pixel = views.slope.reshape(-1, 2) * camera.params[:2]
     error_px = MAX_ERROR_OF_WIDTH * camera.width

@@ -84,14 +84,9 @@ def absolute_pose(
     seed: int,
     max_error_px: float = MAX_ERROR_PX,
 ) -> Array:
-    """Estimate a pose as :func:`supported_pose` does.
+    """Estimate a pose as :func:`supported_pose` does, for stacking with those of other frames.
 
-    Args:
-        pixel: Pixels (n, 2) that show the points, from the principal point.
-        point_m: Points (n, 3), world, metres.
-        camera: Camera without distortion.
-        seed: Seed of RANSAC's samples.
-        max_error_px: Largest reprojection error of an inlier, pixels.
+    Arguments are the same.
 
     Returns:
         ``world_from_cam`` (4, 4); NaN where no pose is found.
@@ -122,9 +117,9 @@ def supported_pose(
     """Estimate a pose by P3P in LO-RANSAC, refined on its inliers.
 
     Args:
-        pixel: Pixels (n, 2) that show the points, from the principal point.
-        point_m: Points (n, 3), world, metres.
-        camera: Camera without distortion.
+        pixel: Pixels (n, 2) that show the points, measured from the principal point.
+        point_m: Points (n, 3), world, metres; all finite.
+        camera: Camera without distortion, its principal point at 0.
         seed: Seed of RANSAC's samples.
         max_error_px: Largest reprojection error of an inlier, pixels.
 

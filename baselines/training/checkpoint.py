@@ -148,7 +148,15 @@ def save_checkpoint(
     description: ModelDescription,
     calibration: Calibration | None = None,
 ) -> None:
-    """Write everything prediction needs; tensors and plain values, so that reading runs no code."""
+    """Write everything prediction needs: tensors and plain values, so that reading runs no code.
+
+    Args:
+        path: File to write.
+        localizer: Network whose weights are stored, on any device.
+        statistics: Statistics of the images that it was trained on.
+        description: What it is and how to build it again.
+        calibration: Tells pictures of another place; None where that was not calibrated.
+    """
     checkpoint = {
         "description": description.model_dump(mode="json"),
         "localizer": {name: v.detach().cpu() for name, v in localizer.state_dict().items()},

@@ -200,10 +200,18 @@ class BatchOrder:
 
 
 def held_out_paths(path: NDArray[np.int64], share: float, seed: int) -> NDArray[np.bool_]:
-    """Mark the frames (N,) to hold out: those of a share of the paths (N,), drawn by seed.
+    """Mark the frames of some paths, drawn at random, to hold out of training.
 
-    Whole paths, because neighbouring frames of a path are nearly the same image. At least one path
-    where there are two or more and ``share`` is not 0; never all.
+    Whole paths, because neighbouring frames of a path are nearly the same image.
+
+    Args:
+        path: Path (N,) of each frame.
+        share: Share of the paths to hold out, 0 to 1. Unless it is 0, at least one of two or more
+            paths is held out, and never all.
+        seed: Seed of the draw.
+
+    Returns:
+        Whether each frame (N,) is held out.
     """
     paths = np.unique(path)
     count = min(max(round(share * len(paths)), 1), len(paths) - 1) if share > 0 else 0

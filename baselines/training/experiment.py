@@ -46,30 +46,31 @@ def train_and_score(
 ) -> None:
     """Train a localizer, predict its test frames, and score the predictions.
 
-    What scoring reads is looked at before training: no run is lost for what could be known before.
+    Everything that scoring will read is checked before training: no run is lost to a file that
+    could have been found missing or damaged at once.
 
     Args:
-        model: the localizer.
-        frames: packed frames to learn from.
-        labels: their poses.
-        test_frames: packed frames of the test set.
-        test_labels: their poses, as the data set labels them.
-        run: see :func:`reproduction.design.runs.training_parameters`.
-        truth: true poses of the test frames.
-        depth: what the test frames show, for the reprojection error.
-        camera: camera of the frames, for the reprojection error.
-        common: true poses of the common test set.
-        every: of how many frames of the common test set one is predicted.
-        wildcards: what the run is; stands in the metrics, too.
-        out_model: checkpoint.
-        out_history: losses.
-        out_record: what the run was trained from.
-        out_predictions: poses of the test frames.
-        out_common: poses of the common test set.
-        out_errors: errors of the test frames; without it nothing is scored.
-        out_common_errors: errors on the common test set.
-        out_metrics: what is printed of the errors.
-        weights: of the backbone; none: from scratch.
+        model: Name of the localizer.
+        frames: Packed training frames.
+        labels: Poses of the training frames, as the data set labels them.
+        test_frames: Packed test frames.
+        test_labels: Poses of the test frames, as the data set labels them.
+        run: Settings of the run; see :func:`reproduction.design.runs.training_parameters`.
+        truth: True poses of the test frames.
+        depth: Depth that the test frames show, for the reprojection error.
+        camera: Camera of the frames, for the reprojection error.
+        common: True poses of the common test set.
+        every: Predict the first of each so many frames of the common test set.
+        wildcards: Names of the run, which are copied into its metrics.
+        out_model: Checkpoint to write.
+        out_history: CSV of the losses to write.
+        out_record: Record to write of what the run was trained from.
+        out_predictions: Predicted poses of the test frames to write.
+        out_common: Predicted poses of the common test set to write.
+        out_errors: Errors of the test frames to write; None scores nothing.
+        out_common_errors: Errors on the common test set to write.
+        out_metrics: Scores to write.
+        weights: State dict that the backbone starts from; None trains from scratch.
 
     Raises:
         InputError: a file cannot be used.
@@ -110,7 +111,12 @@ def train_and_score(
 
 
 def check_scorable(labels: Path, truth: Path, depth: Path) -> None:
-    """Read what scores are made from.
+    """Check that the files which scores are made from can be read and belong together.
+
+    Args:
+        labels: Poses of the test frames, as the data set labels them.
+        truth: True poses of the test frames.
+        depth: Depths of the cells of the test frames.
 
     Raises:
         InputError: a file cannot be read, or they are not about the same frames.

@@ -121,7 +121,13 @@ class _Stack:
         ]
 
     def step(self, ahead: Sequence[Tensor], rate: float, weight_decay: float) -> None:
-        """Step along the orthogonal factors of the parameters' entries in ``ahead``."""
+        """Move every parameter of the stack along the orthogonal factor of its step.
+
+        Args:
+            ahead: Nesterov's step of every parameter with a gradient, whichever stack it is in.
+            rate: Learning rate.
+            weight_decay: Share of a weight that decays per unit of ``rate``.
+        """
         steps = [self._as_matrix(ahead[member.position], member) for member in self._members]
         for member, step in zip(self._members, steps, strict=True):
             left, right = (step.mT, step) if member.upright else (step, step.mT)
@@ -146,9 +152,6 @@ def _member(position: int, parameter: Tensor, gram: Tensor) -> _Member:
     """View a parameter as a matrix with columns in the order of memory, so that it is not copied.
 
     Orthogonalisation does not mind: to exchange columns before it or after it is the same.
-
-    So it is not copied. Orthogonalisation does not mind: to exchange columns before it or after it
-    is the same.
     """
     kernel = parameter.detach()
     permuted = kernel.ndim == 4 and kernel.is_contiguous(memory_format=torch.channels_last)
@@ -237,7 +240,13 @@ class Optimisation:
 
 
 def optimisation_of(kind: OptimiserName, network: nn.Module, schedule: Schedule) -> Optimisation:
-    """Make the optimiser of a protocol for a network."""
+    """Make the optimiser of a protocol for a network.
+
+    Args:
+        kind: Key of ``OPTIMISERS``.
+        network: Network whose parameters are optimised.
+        schedule: Length of the run and its learning rates.
+    """
     return OPTIMISERS[kind](network, schedule)
 
 

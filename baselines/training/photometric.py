@@ -191,10 +191,18 @@ def _cosine_transform(side: int) -> Tensor:
 
 
 def noisy(light: Tensor, normal: Tensor, noise: NoiseConfig) -> Tensor:
-    """Add noise to light (B, 3, H, W) between 0 and 1, from standard normal values of its shape.
+    """Add a sensor's noise to linear light.
 
     Variance ``light / full_well + (read / full_well)^2``, as in
     :func:`synfeal.effects.light.with_noise`.
+
+    Args:
+        light: Linear light (B, 3, H, W), 0 to 1.
+        normal: Standard normal values of the same shape.
+        noise: Read noise and full-well capacity, electrons.
+
+    Returns:
+        Light (B, 3, H, W), which may leave 0 to 1.
     """
     variance = light / noise.full_well_e + (noise.read_e / noise.full_well_e) ** 2
     return torch.addcmul(light, variance.sqrt_(), normal)

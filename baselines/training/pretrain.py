@@ -74,7 +74,16 @@ class RoomsNetwork(Localizer):
     def loss(  # type: ignore[override]
         self, features: Tensor, place: Tensor, quat_wxyz: Tensor
     ) -> Tensor:
-        """Compute the loss of features (B, n) at places (B, 4): position in metres, room."""
+        """Compute the loss of the poses that the rooms' regressors predict.
+
+        Args:
+            features: Features (B, n).
+            place: True positions in metres, relative to the mean of the room, then the room (B, 4).
+            quat_wxyz: True rotations (B, 4), unit quaternions.
+
+        Returns:
+            A scalar.
+        """
         prediction = self.heads(features.float(), place[:, 3].long())
         loss: Tensor = self.criterion(prediction, place[:, :3], quat_wxyz)
         return loss

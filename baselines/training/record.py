@@ -21,7 +21,14 @@ RECORD = "training.json"
 def write_training_record(
     path: Path, parameters: Mapping[str, Any], inputs: Mapping[str, Path]
 ) -> None:
-    """Record the inputs of a training run; packed frames by the hash in their own record."""
+    """Record what a training run was made from, and by which versions.
+
+    Args:
+        path: JSON to write.
+        parameters: Settings of the run, ``seed`` among them.
+        inputs: Input files by name, of which hashes are kept; that of packed frames is taken from
+            the record beside them.
+    """
     hashes = {name: _sha256(file) for name, file in inputs.items()}
     origin = provenance(parameters["seed"], "")
     kept = {key: origin[key] for key in ("commit", "packages", "platform")}

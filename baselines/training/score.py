@@ -132,7 +132,10 @@ def score_run(
 def score_common(predictions: Path, truth: Path, out: Path) -> None:
     """Write the errors on the common test set, against the true poses.
 
-    Predictions, which may hold ``nan``, are of some of its frames.
+    Args:
+        predictions: Predicted poses of some frames of the set; may hold ``nan``.
+        truth: True poses of the whole set.
+        out: CSV to write, one row per predicted frame.
 
     Raises:
         InputError: a file cannot be read, or the truth lacks frames of the predictions.

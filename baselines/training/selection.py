@@ -112,7 +112,14 @@ class Selection:
 def held_out_errors(
     localizer: Localizer, frames: LabelledFrames, statistics: ImageStatistics, precision: Precision
 ) -> HeldOutErrors:
-    """Compute errors of the main predictions against labels; leave the network training."""
+    """Compute the errors of a localizer's main predictions on held-out frames.
+
+    Args:
+        localizer: Network, which is left in training mode.
+        frames: Held-out frames with their labels, on the network's device.
+        statistics: Statistics of the training images.
+        precision: Precision of the forward pass.
+    """
     localizer.eval()
     device = frames.images.device
     predictions: list[PosePrediction] = []
