@@ -22,10 +22,17 @@ SWITCHED = ("large_room", "sanctuary")
 
 
 def save_light_shares(builder: str, seed: int, out_shares: Sequence[Path]) -> None:
-    """Write ``light_<group>.glb`` of a stand-in for :func:`synfeal.effects.scene.open_scene`.
+    """Write what share of a stand-in's light comes from each group of sources.
+
+    The meshes are for :func:`synfeal.effects.scene.open_scene`, which switches the groups.
+
+    Args:
+        builder: Key of ``BUILDERS``.
+        seed: Seed of the room.
+        out_shares: Files ``light_<group>.glb`` to write, one per group, all in one folder.
 
     Raises:
-        InputError: its lights cannot be switched.
+        InputError: the lights of this room cannot be switched.
     """
     if builder not in SWITCHED:
         raise InputError(f"builder: the lights of {builder} cannot be switched; leave states out")

@@ -36,6 +36,13 @@ def scanned_mesh(
 
     Light falls on the clean surfaces; the scan then rounds and bends them and leaves out what the
     scanner could not see. Every texture becomes one part.
+
+    Args:
+        rng: Source of the scan's noise; the same state gives the same geometry as
+            :func:`light_shares`.
+        item: Everything in the room, walls included.
+        lighting: Sources of light.
+        scanner: Settings of the scan.
     """
     surface = surface_of(rng, item.patches, scanner.cell_m)
     log.info("%d patches, %d faces", len(item.patches), len(surface.faces))
@@ -50,9 +57,20 @@ def scanned_mesh(
 def light_shares(
     rng: np.random.Generator, item: Item, lighting: Lighting, scanner: Scanner
 ) -> dict[str, TexturedMesh]:
-    """Bake the same scan by groups of sources: vertices hold the share of their light, 255 is 1.
+    """Bake by which group of sources each vertex of the scan is lit.
 
-    What shines by itself belongs to the source that is nearest to it.
+    What shines by itself belongs to the group of the lamp that is nearest to it.
+
+    Args:
+        rng: Source of the scan's noise; the same state gives the same geometry as
+            :func:`scanned_mesh`.
+        item: Everything in the room, walls included.
+        lighting: Sources of light.
+        scanner: Settings of the scan.
+
+    Returns:
+        The scan by group, without pictures. Vertex colours are the group's share of the light in
+        each channel, 255 for all of it; those of all groups add up to 255.
     """
     surface = surface_of(rng, item.patches, scanner.cell_m)
     albedo, glow = _reflecting(surface, item.patches)

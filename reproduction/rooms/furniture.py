@@ -52,13 +52,27 @@ def chair(make: Maker, colour: Colour) -> Item:
 
 
 def cabinet(make: Maker, size_m: Size, colour: Colour, doors: int = 2, rows: int = 1) -> Item:
-    """Build a closed cupboard with doors, or with rows of drawers."""
+    """Build a closed cupboard with doors or drawers in its front.
+
+    Args:
+        make: Maker of shapes.
+        size_m: Width, depth and height, metres.
+        colour: Colour of the front; the sides are a little darker.
+        doors: Doors, or columns of drawers, side by side.
+        rows: Rows of them, one above another.
+    """
     front = materials.cabinet_front(colour, doors=doors, rows=rows)
     return make.box(size_m, painted(shade(colour, 0.85), 0.08), 150, "flrt", front=front)
 
 
 def bookshelf(make: Maker, size_m: Size, rows: int = 5) -> Item:
-    """Build a bookcase with a back, boards and sides, filled with books."""
+    """Build a bookcase with a back, boards and sides, filled with books.
+
+    Args:
+        make: Maker of shapes.
+        size_m: Width, depth and height, metres.
+        rows: Rows of books.
+    """
     width, depth, height = size_m
     grain = materials.wood((0.5, 0.36, 0.22))
     levels = np.linspace(0.02, height - 0.025, rows + 1)
@@ -80,7 +94,14 @@ def bookshelf(make: Maker, size_m: Size, rows: int = 5) -> Item:
 
 
 def cushion(make: Maker, size_m: Size, painter: Painter, px_per_m: float = 130) -> Item:
-    """Build a soft box: one bulging sheet over top and sides."""
+    """Build a soft box: one bulging sheet over top and sides.
+
+    Args:
+        make: Maker of shapes.
+        size_m: Width, depth and height, metres.
+        painter: Paints the cover.
+        px_per_m: Texels per metre of the cover.
+    """
     width, depth, height = size_m
     grid = np.linspace(-1, 1, 11)
     x, y = np.meshgrid(grid, -grid)
@@ -121,7 +142,13 @@ MUG_M = [(0.03, 0.1), (0.042, 0.1), (0.04, 0.0)]
 
 
 def on_table(make: Maker, width_m: float, depth_m: float) -> Item:
-    """Build keyboard, sheets of paper, mugs and boxes spread over a table top at z = 0."""
+    """Build what lies on a table: keyboard, sheets of paper, mugs and boxes, at z = 0.
+
+    Args:
+        make: Maker of shapes.
+        width_m: Width of the table top (x), metres.
+        depth_m: Its depth (y), metres.
+    """
     rng, scale = make.rng, (width_m, depth_m)
     keys = make.box((0.42, 0.14, 0.02), materials.keyboard(), 300, "fblrt")
     things = [keys.placed(rng.uniform(-0.2, 0.2), -depth_m * 0.25, 0.001, rng.uniform(-8, 8))]
@@ -142,7 +169,14 @@ def on_table(make: Maker, width_m: float, depth_m: float) -> Item:
 
 
 def books(make: Maker, width_m: float, depth_m: float, height_m: float) -> Item:
-    """Build a row of books on z = 0, some leaning, with gaps; the spines face -y."""
+    """Build a row of books on z = 0, some leaning, with gaps; the spines face -y.
+
+    Args:
+        make: Maker of shapes.
+        width_m: Width of the row, metres.
+        depth_m: Depth of the shelf, metres; books are less deep.
+        height_m: Clear height of the shelf, metres; books are lower.
+    """
     rng, things, x = make.rng, [], -width_m / 2
     while x < width_m / 2 - 0.05:
         thick = rng.uniform(0.018, 0.055)
@@ -200,7 +234,14 @@ def coat(make: Maker, colour: Colour) -> Item:
 
 
 def plant(make: Maker, height_m: float, pot: Colour, leaves: int = 40) -> Item:
-    """Build a pot plant: bent leaves around a stem."""
+    """Build a pot plant: bent leaves around a stem.
+
+    Args:
+        make: Maker of shapes.
+        height_m: Height of the stem with its pot, metres.
+        pot: Colour of the pot.
+        leaves: Number of leaves.
+    """
     rng, rim = make.rng, 0.14
     profile = [(0.005, 0.24), (rim - 0.02, 0.24), (rim, 0.28), (rim * 0.7, 0.0)]
     things = [make.turned(profile, painted(pot, 0.1), 150, 14)]

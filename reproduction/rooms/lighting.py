@@ -211,10 +211,17 @@ def _sun_light(sun: Sun, origins: Vectors, normals: Vectors, caster: RayCaster) 
 def ambient_corners(
     near_left: Colour, far_left: Colour, near_right: Colour, far_right: Colour, top: float
 ) -> NDArray[np.float32]:
-    """Compute ambient light (2, 2, 2, 3) by x, y, z from the colours at the floor's corners.
+    """Compute the ambient light at the corners of a room from that at the corners of its floor.
 
-    ``left`` and ``right`` are low and high x, ``near`` and ``far`` low and high y; the light at the
-    ceiling is ``top`` times that at the floor.
+    Args:
+        near_left: Linear light at the floor's corner of low y and low x.
+        far_left: The same at high y and low x.
+        near_right: The same at low y and high x.
+        far_right: The same at high y and high x.
+        top: Factor of the light at the ceiling over that at the floor.
+
+    Returns:
+        Ambient light (2, 2, 2, 3), by x, y and z.
     """
     floor = np.array([[near_left, far_left], [near_right, far_right]], np.float32)
     return np.stack([floor, np.float32(top) * floor], axis=2)

@@ -1,4 +1,7 @@
-"""Painters of what hangs on walls: posters, whiteboards, windows, stained glass, frescoes."""
+"""Painters of what hangs on walls: posters, whiteboards, windows, stained glass, frescoes.
+
+Each function is called with its settings alone and returns a painter, which is given the canvas.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +56,13 @@ def poster(canvas: Canvas, ground: Colour | None = None) -> Pixels:
 def painting(
     canvas: Canvas, palette: tuple[Colour, ...] = VIVID, frame: Colour = (0.45, 0.3, 0.1)
 ) -> Pixels:
-    """Paint an abstract landscape in a frame: noise layers as sky and hills, dabs of paint."""
+    """Paint an abstract landscape in a frame: noise layers as sky and hills, dabs of paint.
+
+    Args:
+        canvas: Canvas to paint.
+        palette: Colours to pick from at random.
+        frame: Colour of the frame.
+    """
     rng = canvas.rng
     image = ramp(canvas, shade(pick(rng, palette), 1.4), (0.95, 0.9, 0.8), np.pi / 2)
     y = (np.arange(canvas.height_px, dtype=np.float32) / canvas.height_px)[:, None]
@@ -106,7 +115,13 @@ def noticeboard(canvas: Canvas, ground: Colour = (0.62, 0.45, 0.27)) -> Pixels:
 
 @painter
 def window_view(canvas: Canvas, panes: tuple[int, int] = (2, 2), blind: float = 0.0) -> Pixels:
-    """Paint sky, houses and trees behind glazing bars; slats cover a share ``blind`` from above."""
+    """Paint sky, houses and trees behind glazing bars.
+
+    Args:
+        canvas: Canvas to paint.
+        panes: Number of panes across and down.
+        blind: Share of the height that slats cover, from above.
+    """
     rng = canvas.rng
     sky = ramp(canvas, (0.62, 0.8, 1.0), (0.97, 0.98, 1.0), np.pi / 2)
     clouds = np.clip(canvas.noise((0.7, 0.3), 4), 0, 1)
@@ -138,7 +153,13 @@ def _skyline(sketch: Sketch, rng: np.random.Generator) -> None:
 
 @painter
 def stained_glass(canvas: Canvas, palette: tuple[Colour, ...] = VIVID, cells: int = 160) -> Pixels:
-    """Paint glass cells in lead: a Voronoi diagram with a rose of larger cells in the middle."""
+    """Paint glass cells in lead: a Voronoi diagram of random points.
+
+    Args:
+        canvas: Canvas to paint.
+        palette: Colours to pick from at random.
+        cells: Number of cells.
+    """
     rng = canvas.rng
     seeds = rng.uniform(0, 1, (cells, 2)) * canvas.size_m
     x, y = canvas.coordinates_m()
@@ -161,7 +182,14 @@ SKIN: Colour = (0.85, 0.65, 0.5)
 
 @painter
 def mural(canvas: Canvas, ground: Colour, sky: Colour, figures: int = 5) -> Pixels:
-    """Paint saints before a landscape of ``ground`` and ``sky``, framed by a painted border."""
+    """Paint saints before a landscape, framed by a painted border.
+
+    Args:
+        canvas: Canvas to paint.
+        ground: Colour of the landscape; the border is a darker shade of it.
+        sky: Colour of the sky.
+        figures: Number of saints.
+    """
     rng = canvas.rng
     y = (np.arange(canvas.height_px, dtype=np.float32) / canvas.height_px)[:, None]
     horizon = 0.55 + 0.06 * canvas.noise((canvas.size_m[0] / 3, 1e3), 3)

@@ -35,7 +35,14 @@ class Wall(NamedTuple):
     yaw_deg: float
 
     def place(self, item: Item, at_m: float, off_m: float, z_m: float = 0.0) -> Item:
-        """Place an item ``at_m`` along the wall and ``off_m`` off it, its front to the room."""
+        """Place an item at the wall, its front to the room.
+
+        Args:
+            item: Item with its back towards +y.
+            at_m: Place of its origin along the wall, from the left end, metres.
+            off_m: Distance of its origin from the wall, into the room, metres.
+            z_m: Height of its origin, metres.
+        """
         (x, y), (ax, ay) = self.start_m, self.along
         x, y = x + at_m * ax + off_m * ay, y + at_m * ay - off_m * ax
         return item.placed(x, y, z_m, self.yaw_deg)

@@ -77,9 +77,17 @@ def _divided(points: Points, cell_m: float) -> Shares:
 def jittered(
     rng: np.random.Generator, grid: Grid, points_m: Points
 ) -> tuple[Points, NDArray[np.float64]]:
-    """Move points (R·C, 3) along the surface; also return their places on the picture (R·C, 2).
+    """Move the inner points of a grid along the surface; its picture stays in place.
 
-    The picture stays in place. Rims stay even, so that neighbours still meet.
+    Rims stay even, so that neighbours still meet.
+
+    Args:
+        rng: Source of the moves.
+        grid: Grid (R, C) of the patch.
+        points_m: Points (R·C, 3) to move, row by row, metres.
+
+    Returns:
+        The points (R·C, 3), and their places on the picture (R·C, 2): row and column, 0 to 1.
     """
     offsets = rng.uniform(-JITTER, JITTER, (2, *grid.shape))
     offsets[:, [0, -1]] = offsets[:, :, [0, -1]] = 0
@@ -131,7 +139,13 @@ class Surface:
 
 
 def surface_of(rng: np.random.Generator, patches: Sequence[Patch], cell_m: float) -> Surface:
-    """Join all patches, refined to cells of about ``cell_m``."""
+    """Refine all patches and join them to one surface.
+
+    Args:
+        rng: Decides along which diagonal each cell is cut.
+        patches: Patches of the room.
+        cell_m: Side of the cells to refine to, metres.
+    """
     grids = tuple(refined(patch, cell_m) for patch in patches)
     sizes = [grid.n_points for grid in grids]
     first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
@@ -174,13 +188,33 @@ class Scanner:
 def stations(
     lower_m: tuple[float, ...], upper_m: tuple[float, ...], shape: tuple[int, ...]
 ) -> Points:
-    """Place stations (S, 3) on a lattice of ``shape`` along x, y and z, away from the walls."""
+    """Place the stations of a scanner on a lattice in a room, away from the walls.
+
+    Args:
+        lower_m: Lower corner of the room (3,), metres.
+        upper_m: Its upper corner (3,), metres.
+        shape: Number of stations along x, y and z.
+
+    Returns:
+        Stations (S, 3), metres.
+    """
     share = (np.array(list(np.ndindex(*shape))) + 0.5) / shape
     return np.asarray(lower_m + share * np.subtract(upper_m, lower_m))
 
 
 def scanned(rng: np.random.Generator, surface: Surface, scanner: Scanner) -> Points:
-    """Scan vertices (V, 3); those at one place stay at one place, so nothing tears."""
+    """Displace the vertices of a surface as a scan does, and fit it into the room again.
+
+    Vertices at one place stay at one place, so nothing tears.
+
+    Args:
+        rng: Source of the displacement.
+        surface: Clean surface of V vertices.
+        scanner: Settings of the scan, among them the bounding box to fit.
+
+    Returns:
+        Displaced vertices (V, 3), metres.
+    """
     welded, index = weld(surface.points_m)
     rough = rounded(welded, index[surface.edges], index[surface.faces])
     rough = rough + displacement(rng, rough)
@@ -191,9 +225,17 @@ def scanned(rng: np.random.Generator, surface: Surface, scanner: Scanner) -> Poi
 
 
 def rounded(points: Points, edges: Faces, faces: Faces) -> Points:
-    """Move every vertex a step towards the mean of its neighbours along ``edges`` (E, 2).
+    """Move every vertex a step towards the mean of its neighbours.
 
-    Open rims stay, so that nothing comes off a wall; in the plane an even grid stays too.
+    Open rims stay, so that nothing comes off a wall; in the plane an even grid stays, too.
+
+    Args:
+        points: Vertices (V, 3), each place once.
+        edges: Neighbours (E, 2), rows of ``points``.
+        faces: Triangles (F, 3), rows of ``points``, which tell where the rims are.
+
+    Returns:
+        Vertices (V, 3).
     """
     ends = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0)
     ends = ends[ends[:, 0] != ends[:, 1]]
@@ -222,7 +264,16 @@ def displacement(rng: np.random.Generator, points_m: Points) -> Points:
 
 
 def seen_faces(points_m: Points, faces: Faces, stations_m: Points) -> NDArray[np.bool_]:
-    """Mark faces (F,) that a station sees, from either side, or that touch one that is seen."""
+    """Find the faces that a station sees, from either side, and those that touch one that is seen.
+
+    Args:
+        points_m: Vertices (V, 3), metres.
+        faces: Triangles (F, 3), rows of ``points_m``.
+        stations_m: Stations of the scanner (S, 3), metres.
+
+    Returns:
+        Whether each face (F,) is one of them.
+    """
     caster = RayCaster(points_m, faces)
     corners = points_m[faces]
     normals = cross(corners)
