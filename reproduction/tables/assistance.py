@@ -82,10 +82,13 @@ class _Splits(BaseModel):
 
 
 def write_assistance_table(design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
-    """Write one row per re-estimated label set and split, and one of both splits together.
+    """Write how often label methods needed assistance, and how far off their batches ended.
 
-    Counts of batches and frames, and how far off the last poses of batches were; in LaTeX the rows
-    of both splits together.
+    Args:
+        design: The profile's table of experiments.
+        root: Results of the profile.
+        out_csv: CSV to write: for each re-estimated label set a row per split, and one of both.
+        out_tex: LaTeX to write: the rows of both splits together.
     """
     records = [
         assistance_record(root, *label_set, split)
@@ -100,7 +103,15 @@ def write_assistance_table(design: Design, root: Path, out_csv: Path, out_tex: P
 def assistance_record(
     root: Path, scene: str, size: str, method: str, split: str = TOTAL
 ) -> dict[str, Any]:
-    """Compute one row of the table, by column; both splits together unless one is named."""
+    """Compute one row of the table, by column.
+
+    Args:
+        root: Results of the profile.
+        scene: Name of the scene.
+        size: Name of the size.
+        method: Label method.
+        split: ``train``, ``test``, or ``TOTAL`` for both together.
+    """
     splits = SPLITS if split == TOTAL else (split,)
     found = [r for name in splits for r in batch_records(root, scene, size, method, name)]
     batches = pd.DataFrame(found, columns=[*BatchRecord.__annotations__])
@@ -123,7 +134,21 @@ def assistance_record(
 
 
 def batch_records(root: Path, scene: str, size: str, method: str, split: str) -> Records:
-    """Record what happened to each batch of a split, in order."""
+    """Read what happened to each batch of a split, in order.
+
+    Args:
+        root: Results of the profile.
+        scene: Name of the scene.
+        size: Name of the size.
+        method: Label method.
+        split: ``train`` or ``test``.
+
+    Returns:
+        Fields of :class:`~baselines.labels.chain.BatchRecord`, by name, for each batch.
+
+    Raises:
+        InputError: the labels' record cannot be read.
+    """
     path = root / "labels" / scene / size / method / "assistance.json"
     remedy = "chain these labels again"
     splits = read_result(path, ["splits"], remedy)["splits"]
@@ -133,7 +158,20 @@ def batch_records(root: Path, scene: str, size: str, method: str, split: str) ->
 
 
 def truth_used_by(root: Path, scene: str, size: str, method: str) -> str:
-    """Return which true poses placed the batches of a method; nothing where that was not kept."""
+    """Return which true poses placed the batches of a method, in words.
+
+    Args:
+        root: Results of the profile.
+        scene: Name of the scene.
+        size: Name of the size.
+        method: Label method.
+
+    Returns:
+        The words; empty where that was not recorded.
+
+    Raises:
+        InputError: the labels' record cannot be read.
+    """
     path = root / "labels" / scene / size / method / "assistance.json"
     return str(read_result(path, ["splits"], "chain these labels again").get("truth_used", ""))
 

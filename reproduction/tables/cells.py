@@ -105,6 +105,11 @@ PUBLISHED = {name: f"published_{name}" for name in SCHEMA if name not in KEY}
 def read_cells(table: str, design: Design, root: Path) -> pd.DataFrame:
     """Read the cells of one of tables 2 to 7, row by row, five localizers each.
 
+    Args:
+        table: Name of the table.
+        design: The profile's table of experiments.
+        root: Results of the profile.
+
     Returns:
         Columns ``CELL`` (``row`` counts the rows of the table, ``n_finished`` the runs that have a
         score, ``failed`` the predictions that were not finite) and ``PUBLISHED``, of which the text

@@ -80,10 +80,14 @@ REMARK = (
 
 
 def write_label_error_table(design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
-    """Write two rows, before and after assistance, per re-estimated label set and split.
+    """Write the errors of re-estimated labels against the true poses, and what a frame took.
 
-    Errors of the labels against the true poses, and what a frame took; in LaTeX the rows of both
-    splits together.
+    Args:
+        design: The profile's table of experiments.
+        root: Results of the profile.
+        out_csv: CSV to write: for each re-estimated label set and split, and for both splits
+            together, a row before and one after assistance.
+        out_tex: LaTeX to write: the rows of both splits together.
     """
     records = [
         record
@@ -99,7 +103,18 @@ def write_label_error_table(design: Design, root: Path, out_csv: Path, out_tex: 
 def label_records(
     root: Path, scene: str, size: str, method: str, split: str
 ) -> list[dict[str, Any]]:
-    """Compute both rows of a label set and a split, or of both splits together."""
+    """Compute the two rows of a label set, before and after assistance.
+
+    Args:
+        root: Results of the profile.
+        scene: Name of the scene.
+        size: Name of the size.
+        method: Label method.
+        split: ``train``, ``test``, or ``TOTAL`` for both together.
+
+    Returns:
+        Both rows, by column.
+    """
     splits = SPLITS if split == TOTAL else (split,)
     batches = [b for s in splits for b in batch_records(root, scene, size, method, s)]
     folder, records = root / "labels" / scene / size, []
@@ -142,7 +157,19 @@ def error_record(pairs: Sequence[Pair]) -> dict[str, Any]:
 def cost_record(
     root: Path, scene: str, size: str, method: str, splits: Sequence[str], frames: int
 ) -> dict[str, Any]:
-    """Compute processor seconds per frame and the largest memory, over all stages and batches."""
+    """Compute processor seconds per frame and the largest memory, over all stages and batches.
+
+    Args:
+        root: Results of the profile.
+        scene: Name of the scene.
+        size: Name of the size.
+        method: Label method.
+        splits: Splits to add up.
+        frames: Number of their frames.
+
+    Raises:
+        InputError: the facts of a batch cannot be read.
+    """
     seconds, peaks = 0.0, [0.0]
     for stage in stages_of(method):
         for split in splits:

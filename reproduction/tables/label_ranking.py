@@ -86,7 +86,15 @@ LINES = ["data_set", "labels", "trained_on", "methods"]
 def write_label_ranking_table(
     design: Design, references: ReferencesConfig, root: Path, out_csv: Path, out_tex: Path
 ) -> None:
-    """Write a row per label set, origin of the predictions and score."""
+    """Write which labels rank methods as the truth does.
+
+    Args:
+        design: The profile's table of experiments.
+        references: Reference methods that are ranked beside the localizers.
+        root: Results of the profile.
+        out_csv: CSV to write: a row per label set, origin of the predictions and score.
+        out_tex: LaTeX to write: the same, a column per score.
+    """
     records = [
         record for ranking in rankings(design, references) for record in ranked(ranking, root)
     ]

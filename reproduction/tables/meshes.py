@@ -44,7 +44,14 @@ REMARK = (
 
 
 def write_meshes_table(scenes: Sequence[str], root: Path, out_csv: Path, out_tex: Path) -> None:
-    """Write Table 1 from the properties of the scenes' meshes: a row per scene, ``SCHEMA``."""
+    """Write Table 1 from the properties of the scenes' meshes.
+
+    Args:
+        scenes: Names of the scenes.
+        root: Results of the profile.
+        out_csv: CSV to write: a row per scene, columns ``SCHEMA``.
+        out_tex: LaTeX to write, laid out as in the paper.
+    """
     meshes = read_meshes(scenes, root)
     write_frame(out_csv, meshes)
     write_side(out_tex, side_table(meshes))

@@ -59,10 +59,14 @@ SHOWN = (
 
 
 def write_recall_table(design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
-    """Write one row per cell of any table; in LaTeX those whose labels are true poses.
+    """Write means, recalls and reprojection errors of all cells, each with 95 % limits.
 
-    Scores against the labels, under names that end in ``_true`` against the true poses, each with
-    95 % limits; empty where a run failed.
+    Args:
+        design: The profile's table of experiments.
+        root: Results of the profile.
+        out_csv: CSV to write: a row per cell of any table, scores against the labels and, under
+            names that end in ``_true``, against the true poses; empty where a run failed.
+        out_tex: LaTeX to write: the cells whose labels are true poses.
     """
     table = recall_table(design, root)
     write_frame(out_csv, table)

@@ -77,6 +77,13 @@ def write_references_table(
     """Write the scores of all reference methods and localizers, data set by data set.
 
     Localizers are those that start pretrained; ``external`` ones are somebody else's.
+
+    Args:
+        design: The profile's table of experiments.
+        references: Groups of methods that were asked, and external localizers.
+        root: Results of the profile.
+        out_csv: CSV to write: a row per data set and method, columns ``SCHEMA``.
+        out_tex: LaTeX to write: a row per label set and score, a column per method.
     """
     table = references_table(design, references, root)
     write_frame(out_csv, table)
@@ -84,7 +91,16 @@ def write_references_table(
 
 
 def references_table(design: Design, references: ReferencesConfig, root: Path) -> pd.DataFrame:
-    """Compute the table of :data:`SCHEMA`; no score where more than half of the answers failed."""
+    """Compute the table of reference methods and localizers.
+
+    Args:
+        design: The profile's table of experiments.
+        references: Groups of methods that were asked, and external localizers.
+        root: Results of the profile.
+
+    Returns:
+        Columns :data:`SCHEMA`; no score where more than half of the answers failed.
+    """
     titles = {**titles_of(references.external), **TITLES}
     rows = {(row.scene, row.size, row.label_id): row for row in design.rows}
     trained = {key: row for key, row in rows.items() if design.runs_of(row.pretrained, MODELS[0])}

@@ -149,7 +149,17 @@ def markdown_table(table: pd.DataFrame) -> str:
 
 
 def text_table(rows: Sequence[Sequence[str]], n_left: int = 1, form: str = PLAIN) -> str:
-    """Format rows under their headings, the first row; right-aligned but the first ``n_left``."""
+    """Format rows of text as a table with headings.
+
+    Args:
+        rows: Headings, then the rows, all of one length.
+        n_left: Number of columns that are left-aligned, from the first; the others are
+            right-aligned.
+        form: Format of the package tabulate: ``PLAIN`` or ``MARKDOWN``.
+
+    Returns:
+        The table, ending in a newline.
+    """
     sides = ["left" if i < n_left else "right" for i in range(len(rows[0]))]
     frame = pd.DataFrame(rows[1:], columns=list(rows[0]))
     text = frame.to_markdown(index=False, tablefmt=form, disable_numparse=True, colalign=sides)

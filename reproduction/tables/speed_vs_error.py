@@ -96,15 +96,30 @@ SCHEMA = {
 
 
 def write_speed_vs_error(scenes: Sequence[str], root: Path, out_csv: Path) -> None:
-    """Write one row per stage, scene and variant; ``chosen`` is 1 where the pipeline uses it.
+    """Write speed and error of the variants that each stage could choose among.
 
     Speeds are measured, so this table is not the same in every run.
+
+    Args:
+        scenes: Names of the scenes.
+        root: Results of the profile.
+        out_csv: CSV to write: a row per stage, scene and variant; ``chosen`` is 1 where the
+            pipeline uses it.
     """
     write_frame(out_csv, pd.concat([speeds_of(stage, scenes, root) for stage in READERS]))
 
 
 def speeds_of(stage: str, scenes: Sequence[str], root: Path) -> pd.DataFrame:
-    """Tabulate a stage, columns ``SCHEMA``; an item is what the stage makes one of."""
+    """Tabulate the variants of one stage.
+
+    Args:
+        stage: Key of ``READERS``.
+        scenes: Names of the scenes.
+        root: Results of the profile.
+
+    Returns:
+        Columns ``SCHEMA``; an item is what the stage makes one of.
+    """
     parts = [READERS[stage](root, scene).assign(scene=scene) for scene in scenes]
     rows = [row for part in parts for row in records_of(part)]
     same = {"stage": stage}
