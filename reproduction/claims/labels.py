@@ -37,12 +37,29 @@ LEVELS = {
 
 
 def changes(evidence: Evidence, new: Sequence[Cell], old: Sequence[Cell]) -> Array:
-    """Compute relative changes of both median errors (N, 2, 1 + RESAMPLES), percent."""
+    """Compute the relative changes of both median errors between pairs of cells.
+
+    Args:
+        evidence: Results to read the errors from.
+        new: Cells (N).
+        old: Cells (N) that each of them is compared with.
+
+    Returns:
+        Changes in percent (N, 2, B), position before orientation: negative where ``new`` is better.
+        The last axis is a sample; see :class:`~reproduction.statistics.seeds.Layout`.
+    """
     return relative_change(evidence.errors(*new), evidence.errors(*old))
 
 
 def effects(found: Array, claim: Claim, evidence: Evidence) -> Outcome:
-    """Judge changes of both errors, percent, against the two that the paper prints."""
+    """Judge the changes of both errors against the two that the paper prints.
+
+    Args:
+        found: Changes in percent (2, B), position before orientation.
+        claim: Claim whose ``numbers`` are the printed changes, with the sign of the claimed
+            direction.
+        evidence: Results the changes were computed from, for the layout of their samples.
+    """
     signs = np.sign(claim.numbers)
     conditions = [
         Condition(name, sign * sample, evidence.layout, number)
@@ -56,9 +73,13 @@ def effects(found: Array, claim: Claim, evidence: Evidence) -> Outcome:
 def every_localizer(
     found: Array, groups: Sequence[str], joint: str, evidence: Evidence
 ) -> Judgement:
-    """Judge a claim about all localizers from effects (groups, localizers, 2, ...).
+    """Judge a claim about all localizers by its mean effects, which no single effect may refute.
 
-    ``joint`` stands between a localizer and a group in their names.
+    Args:
+        found: Effects in percent (groups, localizers, 2, B), positive in the claimed direction.
+        groups: Names of the groups, as verdicts print them.
+        joint: Text between the names of a localizer and a group, such as `` with ``.
+        evidence: Results the effects were computed from, for the layout of their samples.
     """
     means = [
         Condition(f"{group} {name}", mean, evidence.layout)

@@ -44,7 +44,13 @@ IN_PRINT = np.array([[np.sqrt(3)], [1.0]])
 
 
 def grows(claim: Claim, evidence: Evidence, scene: str) -> Outcome:
-    """Judge C7, C8: mean errors fall by two thirds of the published share, or more."""
+    """Judge C7 or C8: mean errors fall by two thirds of the published share, or more.
+
+    Args:
+        claim: The claim, which prints one change for position and one for orientation.
+        evidence: Results to judge it by.
+        scene: Room of the claim, a key of ``SIZES``; its largest set is compared with its smallest.
+    """
     sizes = SIZES[scene]
     series = np.array([evidence.errors(*(Cell(m, scene, size) for size in sizes)) for m in MODELS])
     found = mean_of(list(relative_change(series[:, -1], series[:, 0])))

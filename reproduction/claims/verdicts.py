@@ -144,7 +144,13 @@ def values_text(forms: Sequence[str], samples: Iterable[Array]) -> str:
 
 
 def limits_text(forms: Sequence[str], samples: Iterable[Array], layout: Layout) -> str:
-    """Format 95 % limits, e.g. ``p -60.1 % to -40.2 %, o -70.0 % to -50.0 %``."""
+    """Format 95 % limits, e.g. ``p -60.1 % to -40.2 %, o -70.0 % to -50.0 %``.
+
+    Args:
+        forms: Format of each value with its name before it, such as ``PERCENT``.
+        samples: One sample (B,) per format.
+        layout: Layout of the samples.
+    """
     pairs = [limits(sample, layout) for sample in samples]
     ends = [
         (_print(form, low), _print(form.partition(" ")[2], high))
@@ -302,7 +308,17 @@ def best_of(rivals: Sequence[Condition]) -> Judgement:
 
 
 def compared(low: float, high: float, number: float) -> Verdict:
-    """Return ``holds`` for an interval from ``number`` upwards, ``opposite`` for one below it."""
+    """Compare an interval with a number that the paper says is reached.
+
+    Args:
+        low: Lower end of the interval.
+        high: Its upper end.
+        number: The number, in the unit of the interval.
+
+    Returns:
+        ``holds`` where the whole interval reaches it, ``opposite`` where all of it is below, else
+        ``undecided``.
+    """
     if low >= number:
         return Verdict.HOLDS
     return Verdict.OPPOSITE if high < number else Verdict.UNDECIDED

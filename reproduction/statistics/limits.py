@@ -124,7 +124,13 @@ def sign_test(changes: Sequence[float]) -> tuple[int, int, float]:
 
 
 def share_limits(count: int, total: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Compute exact (Clopper-Pearson) limits of a share observed as ``count`` of ``total`` > 0."""
+    """Compute exact (Clopper-Pearson) limits of a share.
+
+    Args:
+        count: How many were observed.
+        total: Out of how many; above 0.
+        confidence: Two-sided confidence of the limits.
+    """
     found = binomtest(count, total).proportion_ci(confidence, method="exact")
     return float(found.low), float(found.high)
 

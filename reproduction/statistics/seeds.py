@@ -113,10 +113,22 @@ class Layout:
 
 
 def limits(sample: Array, layout: Layout, comparisons: int = 1) -> tuple[float, float]:
-    """Compute limits over paths and seeds at 95 %, or at ``1 - 0.05 / k`` (Bonferroni).
+    """Compute limits over test paths and training runs.
 
     Where a run failed, so that the value or one of its seed rows is infinite, the limits span what
     paths and rows give.
+
+    Args:
+        sample: The sample (B,).
+        layout: Its layout.
+        comparisons: Number k of conditions it is one of; limits are at 95 %, and above one
+            condition at ``1 - 0.05 / k`` (Bonferroni).
+
+    Returns:
+        The lower and the upper limit.
+
+    Raises:
+        ValueError: the sample has another length than the layout.
     """
     if len(sample) != layout.length:
         raise ValueError(f"a sample of {len(sample)} values, where {layout.length} are laid out")
