@@ -54,10 +54,19 @@ SEVERAL_SEEDS = (
 
 
 def compare(root_a: Path, root_b: Path, out: Path | None) -> str:
-    """Compare two result trees, before and after; the text to print.
+    """Compare two result trees, before and after.
 
-    ``compare.csv``, ``compare.md`` and ``compare.png`` go into ``out``, made if need be; earlier
-    files of these names are replaced.
+    Args:
+        root_a: Results before.
+        root_b: Results after.
+        out: Folder for ``compare.csv``, ``compare.md`` and ``compare.png``, made if need be;
+            earlier files of these names are replaced. None writes none.
+
+    Returns:
+        The comparison as text for a terminal.
+
+    Raises:
+        InputError: a tree cannot be read, or ``out`` holds something else than a comparison.
     """
     if out is not None:
         refuse_foreign(out, OUTPUTS, "a comparison")

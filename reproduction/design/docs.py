@@ -122,10 +122,17 @@ def documents(folder: Path) -> dict[str, str]:
 def key_rows(
     schema: Node, defs: Node, prefix: str = "", told: dict[str, str] | None = None
 ) -> Iterator[tuple[str, ...]]:
-    """Yield dotted key, value and meaning of every key of an object's schema, depth first.
+    """Tabulate every key of an object's schema, depth first.
 
-    For a model that was listed before, only the place of that list is named; ``told`` collects
-    these places.
+    Args:
+        schema: JSON schema of the object.
+        defs: Schemas of the models that it refers to, by name.
+        prefix: Dotted key of the object with a final dot; empty for the whole profile.
+        told: Dotted key of each model listed so far, which is added to; None begins anew. A model
+            that was listed before is not listed again: its row refers to that key.
+
+    Yields:
+        Dotted key, value and meaning, as Markdown.
     """
     told = {} if told is None else told
     for name, field in schema["properties"].items():

@@ -34,6 +34,9 @@ DRAWN_TABLES = ("table3_inconsistencies", "table4_size", "table7_images_shown")
 class Files:
     """Names of the files of a profile, below its results.
 
+    In all methods ``scene`` and ``size`` are keys of the profile, ``split`` is ``train`` or
+    ``test``, ``camera`` is ``network`` or ``groundtruth``, and ``method`` is a label method.
+
     Args:
         config: The profile.
         design: Its table of experiments.
@@ -93,7 +96,17 @@ class Files:
     # Frames
 
     def n_frames(self, scene: str, camera: str, split: str) -> int:
-        """Count frames of a split that are rendered with a camera: no more than are used."""
+        """Count the frames of a split that are rendered with a camera: no more than are used.
+
+        Args:
+            scene: Name of the scene.
+            camera: ``network`` for frames that localizers see, ``groundtruth`` for those that
+                labels are estimated from.
+            split: ``train`` or ``test``.
+
+        Returns:
+            Frames of the largest size that needs them; 0 where none does.
+        """
         if camera == "network":
             return self.config.n_largest(scene, split)
         sizes = {size for labelled, size, _ in self.design.estimated if labelled == scene}
@@ -105,11 +118,17 @@ class Files:
         return sequences_of(n_train, n_test, self.config.shard_frames)
 
     def sequence(self, scene: str, camera: str, name: str) -> Sequence:
-        """Return the part of this name."""
+        """Return the part of this name, such as ``seq-01``."""
         return next(s for s in self.sequences(scene, camera) if s.name == name)
 
     def packed_shards(self, scene: str, split: str, kind: str) -> list[str]:
-        """List parts of packed frames in order: ``npy``, or ``json`` that describes them."""
+        """List the parts of a split's packed frames, in order.
+
+        Args:
+            scene: Name of the scene.
+            split: ``train`` or ``test``.
+            kind: ``npy`` for the frames, ``json`` for the files that describe them.
+        """
         sequences = (s for s in self.sequences(scene, "network") if s.split == split)
         return [f"{self.root}/frames/{scene}/shards/{s.name}.{kind}" for s in sequences]
 
@@ -132,9 +151,13 @@ class Files:
         ]
 
     def plans(self, scene: str, camera: str, kind: str) -> list[str]:
-        """List plans of the splits that have frames; ``kind`` is ``csv`` or ``coverage.json``.
+        """List the plans of the splits that have frames.
 
-        Coverage is known of whole plans, which only the network camera renders.
+        Args:
+            scene: Name of the scene.
+            camera: ``network`` or ``groundtruth``.
+            kind: ``csv`` for the poses, ``coverage.json`` for what they cover: only of ``network``,
+                which alone renders whole plans.
         """
         if kind != "csv" and camera != "network":
             return []
@@ -167,9 +190,16 @@ class Files:
     def detail(
         self, scene: str, camera: str, kind: str, render: RenderConfig | None = None
     ) -> str | None:
-        """Return the mesh that a camera's colours are drawn of (``glb``), or its record (``json``).
+        """Return the level of detail that a camera's colours are drawn of.
 
-        None where the full mesh is drawn.
+        Args:
+            scene: Name of the scene.
+            camera: ``network`` or ``groundtruth``.
+            kind: ``glb`` for the mesh, ``json`` for the record of how it was chosen.
+            render: Settings of rendering; None for the profile's own.
+
+        Returns:
+            The file; None where the full mesh is drawn.
         """
         if (render or self.config.render).draws_full_mesh:
             return None
@@ -192,7 +222,7 @@ class Files:
         return batches_of(count, self.config.groundtruth.batch_frames)
 
     def batch(self, scene: str, size: str, split: str, index: str) -> Batch:
-        """Return a batch by its number in file names."""
+        """Return a batch by its number in file names, such as ``003``."""
         return self.batches(scene, size, split)[int(index)]
 
     def frames_of_batch(self, scene: str, size: str, split: str, index: str) -> list[str]:

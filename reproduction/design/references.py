@@ -20,14 +20,29 @@ def data_sets(rows: Iterable[Experiment]) -> list[DataSet]:
 
 
 def has_structure(rows: Iterable[Experiment], scene: str, size: str) -> bool:
-    """Tell whether frames with depth are rendered of a size, to estimate labels from."""
+    """Tell whether frames with depth are rendered of a size, to estimate labels from.
+
+    Args:
+        rows: Rows of the design.
+        scene: Name of the scene.
+        size: Name of the size.
+    """
     return any((r.scene, r.size) == (scene, size) and r.labels in METHODS for r in rows)
 
 
 def answered_by(
     rows: Iterable[Experiment], data_set: DataSet, references: ReferencesConfig
 ) -> list[str]:
-    """List the methods that answer for a data set: those of the registry, then somebody else's."""
+    """List the reference methods that answer for a data set.
+
+    Args:
+        rows: Rows of the design, which decide what is rendered for the data set.
+        data_set: Scene, size and label set.
+        references: Groups of methods that are asked, and external localizers.
+
+    Returns:
+        Names of methods of the registry, then those of external localizers.
+    """
     rows, (scene, size, labels) = list(rows), data_set
     groups: set[Group] = {"images"}
     if has_structure(rows, scene, size):

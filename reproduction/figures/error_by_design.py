@@ -30,9 +30,14 @@ ASIDE = dict(zip(MODELS, np.linspace(-0.16, 0.16, len(MODELS)), strict=True))
 
 
 def draw_localizers(axes: Axes, rows: pd.DataFrame, measure: str, published: bool) -> None:
-    """Draw a line per localizer over its rows' places 0, 1, ..., with 95 % limits.
+    """Draw one line per localizer over the places 0, 1, ..., with 95 % limits.
 
-    ``measure`` is the column of the error; with ``published`` the paper's values are drawn, too.
+    Args:
+        axes: Axes to draw on.
+        rows: Rows of a table, one place after another; each localizer has one at every place.
+        measure: Column of the error; its limits are in the columns that end in ``_low`` and
+            ``_high``.
+        published: Also draw the paper's values, in grey.
     """
     for model in MODELS:
         chosen = rows[rows["model"] == model]
@@ -145,7 +150,13 @@ def draw_by_noise(results: Results) -> Figure | None:
 
 
 def by_noise(rows: pd.DataFrame, references: pd.DataFrame, title: str) -> Figure:
-    """Draw ``table3_inconsistencies.csv``, and ``references.csv`` on its data sets."""
+    """Draw errors over the noise of the labels, against the labels above and the truth below.
+
+    Args:
+        rows: Rows of ``table3_inconsistencies.csv``.
+        references: Rows of ``references.csv``; those on the same data sets are drawn.
+        title: Title of the whole figure.
+    """
     blocks = {name: rows[rows["block"] == block] for block, name in BLOCKS.items()}
     blocks = {name: chosen for name, chosen in blocks.items() if len(chosen)}
     figure = Figure(figsize=(1.6 + 2.9 * len(blocks), 9.0), layout="constrained")

@@ -200,9 +200,14 @@ def draw_trajectories(results: Results) -> Figure | None:
 
 
 def draw_paths(axes: Axes, part: LabelledSplit, method: str) -> None:
-    """Draw the true path, the estimated one, where batches meet, and which were assisted.
+    """Draw the true path, the estimated one, where batches meet, and which of them were assisted.
 
-    Assisted batches are drawn wide; a ring is where the last label is the true pose.
+    Assisted batches are drawn wide; a ring marks a last label that was replaced by the true pose.
+
+    Args:
+        axes: Axes to draw on, seen from above.
+        part: The split, with the labels of one method.
+        method: Name of the label method, which decides colour and title.
     """
     assisted = [batch for batch in part.batches if batch["assisted"]]
     title = f"{SOURCES[method]}\n{len(assisted)} of {len(part.batches)} batches assisted"

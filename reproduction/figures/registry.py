@@ -134,9 +134,15 @@ METADATA: dict[str, dict[str, str | None]] = {".png": {"Software": None}, ".svg"
 
 
 def write_figures(design: Design, root: Path, out_dir: Path) -> list[str]:
-    """Write every figure whose inputs the design makes, as SVG and PNG; their names.
+    """Draw every figure whose inputs the design makes; equal results give equal files.
 
-    Equal results give equal files.
+    Args:
+        design: The profile's table of experiments.
+        root: Results of the profile.
+        out_dir: Folder of the files, which are SVG and PNG, or PNG alone, as ``FIGURES`` says.
+
+    Returns:
+        Names of the figures that were drawn, in order.
     """
     results, written = Results(root, design), []
     for name, entry in FIGURES.items():

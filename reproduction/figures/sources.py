@@ -46,7 +46,14 @@ class Results:
         return table[table["stage"] == stage]
 
     def labels(self, scene: str, size: str, labels: str, split: str) -> PoseTable:
-        """Read the poses a data set carries; those of ``synfeal`` are the true ones."""
+        """Read the poses that a data set carries as labels.
+
+        Args:
+            scene: Name of the scene.
+            size: Name of the size.
+            labels: Label set; ``synfeal`` are the true poses.
+            split: ``train`` or ``test``.
+        """
         return read_pose_table(self.root / "labels" / scene / size / labels / f"{split}.csv")
 
     def sizes(self, scene: str) -> list[str]:

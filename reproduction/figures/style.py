@@ -93,7 +93,14 @@ RC: dict[Any, Any] = {
 
 
 def add_legend(figure: Figure, axes: Axes, columns: int, more: Mapping[str, Artist] = {}) -> None:
-    """Add a legend below everything: what ``axes`` shows, once each, and ``more`` by title."""
+    """Add a legend below all axes of a figure.
+
+    Args:
+        figure: Figure to add it to.
+        axes: Axes whose entries it lists; titles that occur several times are listed once.
+        columns: Number of columns of entries.
+        more: Further entries by title.
+    """
     entries: dict[str, Artist] = {}
     for handle, title in zip(*axes.get_legend_handles_labels(), strict=True):
         entries.setdefault(title, handle)

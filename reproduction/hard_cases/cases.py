@@ -76,7 +76,17 @@ def examined(families: tuple[Family, ...]) -> Iterator[dict[str, object]]:
 
 
 def error_of_case(family: Family, answer: Answer, stored: Values) -> float:
-    """Compare an answer with the stored truth; raising is to refuse."""
+    """Measure how far an answer is from the stored truth; to raise an error is to refuse.
+
+    Args:
+        family: Family of the case, which says what kind of number is compared.
+        answer: Function that is asked.
+        stored: Inputs of the case, and its truth.
+
+    Returns:
+        The largest difference, in the unit of the family; see
+        :func:`~reproduction.hard_cases.values.error_of`.
+    """
     try:
         found = answer(stored.inputs)
     except REFUSALS:

@@ -27,7 +27,17 @@ CAMERA = CameraConfig(width=16, height=16, near_m=0.05, far_m=100.0)
 def first_hit_m(
     vertices: Array, faces: NDArray[np.int64], origins: Array, directions: Array
 ) -> Array:
-    """Cast rays with the project's ray caster."""
+    """Cast rays with the project's ray caster.
+
+    Args:
+        vertices: Corners (V, 3) of the triangles, metres.
+        faces: Rows of ``vertices`` (F, 3).
+        origins: Starts of the rays (N, 3), metres.
+        directions: Directions (N, 3) of any length but zero.
+
+    Returns:
+        Distances (N,) to the first triangle, metres; ``inf`` where a ray meets none.
+    """
     return rays.RayCaster(vertices, faces).first_hit_m(origins, directions)
 
 

@@ -62,7 +62,13 @@ class TimeLeft:
         self.done: Counter[str] = Counter()
 
     def started(self, job: int, rule: str, now_s: float) -> None:
-        """Note that a job of a rule began."""
+        """Note that a job began.
+
+        Args:
+            job: Number of the job in this run.
+            rule: Rule it belongs to.
+            now_s: Seconds of a monotonic clock.
+        """
         self._began[job] = rule, now_s
 
     def finished(self, job: int, now_s: float) -> None:

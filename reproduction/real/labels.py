@@ -109,7 +109,17 @@ def of_depth_camera(world_from_color: Array, depth_from_color: Array) -> Array:
 
 
 def label_difference(given: Array, other: Array, gauge: Gauge) -> dict[str, Any]:
-    """Measure how far labels (N, 4, 4) from two sources are apart, ready for JSON."""
+    """Measure how far the labels of the same photographs from two sources are apart.
+
+    Args:
+        given: Poses ``world_from_cam`` (N, 4, 4) of one source.
+        other: Poses (N, 4, 4) of the other, in its own world.
+        gauge: Motion from the other world to that of ``given``.
+
+    Returns:
+        Median and largest difference of position in metres and of orientation in degrees, and the
+        gauge's scale, by name.
+    """
     position_m, angle_rad = pose_error(gauge.to_from_other @ other, given)
     angle_deg = np.degrees(angle_rad)
     return {

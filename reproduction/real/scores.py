@@ -157,13 +157,25 @@ def cell(runs: Sequence[Errors], draws: Draws) -> dict[str, float | int]:
 
 
 def median_of(name: str, runs: Sequence[Array], draws: Draws) -> dict[str, float]:
-    """Return the mean over runs of median errors (N,) and its limits, by column."""
+    """Compute the median error of some runs, averaged over them, with 95 % limits.
+
+    Args:
+        name: Column of the value; limits are under ``<name>_low`` and ``<name>_high``.
+        runs: Errors (N,) of each run.
+        draws: Draws of the photographs.
+    """
     layout, (sample,) = samples_of(draws.medians(runs))
     return named(name, sample, layout)
 
 
 def named(name: str, sample: Array, layout: Layout) -> dict[str, float]:
-    """Return a sample's value and limits, by column."""
+    """Name the value and the 95 % limits of a sample.
+
+    Args:
+        name: Column of the value; limits are under ``<name>_low`` and ``<name>_high``.
+        sample: The sample (B,).
+        layout: Its layout.
+    """
     low, high = limits(sample, layout)
     return {name: float(sample[0]), f"{name}_low": low, f"{name}_high": high}
 
@@ -171,7 +183,17 @@ def named(name: str, sample: Array, layout: Layout) -> dict[str, float]:
 def times_as_exact(
     runs: Sequence[Errors], photographs: Sequence[Errors], draws: Draws
 ) -> dict[str, float]:
-    """Compare errors with those of the same localizer trained on photographs, as ratios."""
+    """Compare runs with those of the same localizer trained on photographs, by the ratio of errors.
+
+    Args:
+        runs: Errors of the runs to judge.
+        photographs: Errors, on the same photographs, of the runs trained on photographs.
+        draws: Draws of the photographs.
+
+    Returns:
+        The ratios ``times_position`` and ``times_orientation``, above 1 where ``runs`` are more
+        exact, with their 95 % limits under ``_low`` and ``_high``.
+    """
     found: dict[str, float] = {}
     for measure in ("position_m", "orientation_deg"):
         layout, (trained, other) = samples_of(

@@ -136,7 +136,13 @@ def write_frames(frames: PosedFrames, only_sequence: str, out: Path) -> None:
 
 
 def place_frames(frames: PosedFrames, only_sequence: str, directory: Path) -> None:
-    """Put frames into folders ``seq-XX`` of a folder; see :func:`write_frames`."""
+    """Put frames into folders ``seq-XX``; images are links to where they lie.
+
+    Args:
+        frames: Photographs.
+        only_sequence: Name of the sequence of frames that do not say theirs.
+        directory: Folder of the sequences.
+    """
     for name, color, depth, pose in zip(
         frames.names, frames.color, frames.depth, frames.world_from_cam, strict=True
     ):
@@ -153,7 +159,13 @@ def full_name(name: str, only_sequence: str) -> str:
 
 
 def write_truth(frames: PosedFrames, only_sequence: str, out: Path) -> None:
-    """Write poses and names of photographs."""
+    """Write the poses and names of photographs as a pose table.
+
+    Args:
+        frames: Photographs.
+        only_sequence: Name of the sequence of frames that do not say theirs.
+        out: CSV to write.
+    """
     table = PoseTable(
         frame=np.arange(len(frames)),
         path=np.zeros(len(frames), np.int64),

@@ -202,7 +202,13 @@ def _write_poses(out: Path, images: list[str], world_from_cam: Array) -> None:
 
 
 def write_cover(scan: Path, test: Path, out_cover: Path) -> None:
-    """Write which share of each photograph's pixels the scan covers, seen from the true pose."""
+    """Write what share of each photograph's pixels the scan covers, seen from the true pose.
+
+    Args:
+        scan: Mesh by ``synfeal scan``, with its record beside it.
+        test: Folder of the photographs to localize.
+        out_cover: CSV to write: image and share, 0 to 1.
+    """
     photographs = read_posed_sequence(test)
     camera = scan_camera(scan, COVER_WIDTH_PX)
     poses = _in_scan(scan, photographs)
@@ -218,7 +224,13 @@ def write_cover(scan: Path, test: Path, out_cover: Path) -> None:
 
 
 def write_comparison(scan: Path, test: Path, out_picture: Path) -> None:
-    """Draw photographs that were not scanned, renderings from their poses, and both overlaid."""
+    """Draw some photographs that were not scanned, renderings from their poses, and both overlaid.
+
+    Args:
+        scan: Mesh by ``synfeal scan``, with its record beside it.
+        test: Folder of the photographs to localize; up to 8 of them are shown, evenly chosen.
+        out_picture: Picture to write.
+    """
     photographs = read_posed_sequence(test)
     count = min(8, len(photographs))
     step = len(photographs) // count

@@ -45,7 +45,16 @@ class Finding(NamedTuple):
 
 
 def read_table(root: Path, name: str, schema: Schema | None = None) -> pd.DataFrame:
-    """Read a published table; of localizers, where no columns are named."""
+    """Read a table of published results.
+
+    Args:
+        root: Published results, or those of a finished run.
+        name: Name of the table, without folder and suffix.
+        schema: Columns to read; None for those of a table of localizers.
+
+    Raises:
+        InputError: the table is missing or lacks a column.
+    """
     kinds = schema or schema_of(name, repeated=True)
     return read_frame(root / "tables" / f"{name}.csv", kinds, "publish again")
 
@@ -87,7 +96,16 @@ def localizers(root: Path, noise: tuple[float, float] = (0.0, 0.0)) -> pd.DataFr
 
 
 def reference(root: Path, method: str, noise: tuple[float, float] = (0.0, 0.0)) -> Any | None:
-    """Select a reference method on the same frames; None where it was not run."""
+    """Select a reference method on the same frames as :func:`localizers`.
+
+    Args:
+        root: Published results, or those of a finished run.
+        method: Name of the method.
+        noise: Position noise, metres, and orientation noise, degrees, of the labels.
+
+    Returns:
+        The method's row; None where it was not run or has no score.
+    """
     rows = read_table(root, "references", REFERENCES)
     labels = "synfeal" if noise == (0.0, 0.0) else f"noise-p{noise[0]:g}-r{noise[1]:g}"
     chosen = (rows.scene == ROOM) & (rows["size"] == SMALL) & (rows.labels == labels)
@@ -295,9 +313,18 @@ def no_difference_at_this_dose(root: Path) -> Finding | None:
 
 
 def paired_changes(root: Path, claim: str, part: str = "") -> tuple[Interval, Interval] | None:
-    """Return changes of both errors on the same test frames, where a claim was judged by them.
+    """Return the changes of both errors on the same test frames, as a claim was judged by them.
 
     Limits are narrower than those of :func:`mean_change`, for what makes a path hard cancels.
+
+    Args:
+        root: Published results, or those of a finished run.
+        claim: Id of the claim.
+        part: Part of the claim, as ``claims.csv`` names it; empty where it has one alone.
+
+    Returns:
+        Factors on the position and the orientation error with their limits; None where the claim
+        was not judged.
     """
     rows = read_published(root)
     position, orientation = (interval_in(rows, claim, part, place) for place in range(2))

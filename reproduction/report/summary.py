@@ -33,7 +33,13 @@ frame counts are in `tables/*.csv`, and as LaTeX in `tables/*.tex`.
 
 
 def write_summary(design: Design, root: Path, out_md: Path) -> None:
-    """Write whether localizers learned, then every table beside the paper's."""
+    """Write whether localizers learned anything, then every table beside the paper's.
+
+    Args:
+        design: The profile's table of experiments.
+        root: Results of the profile; tables that it lacks are left out.
+        out_md: Markdown to write.
+    """
     cells = {name: read_cells(name, design, root) for name in design.tables}
     findings = run_sentences(cells)
     mesh_facts = meshes.read_meshes([*dict.fromkeys(row.scene for row in design.rows)], root)

@@ -47,7 +47,20 @@ def read_result(path: Path, needed: Iterable[str], remedy: str, shape: Any = Non
 
 
 def shaped(path: Path, value: Any, shape: Any, remedy: str) -> Any:
-    """Read a result file, or a part of it, as a model or type."""
+    """Validate a result, or a part of one, as a model or type.
+
+    Args:
+        path: File it is from, for messages.
+        value: The result as read from JSON.
+        shape: Model or type that it must fit, without conversion.
+        remedy: What to do where it does not, for messages.
+
+    Returns:
+        The result as that model or type.
+
+    Raises:
+        InputError: it does not fit; names the file and ``remedy``.
+    """
     try:
         return ADAPTER_OF(shape).validate_json(json.dumps(value), strict=True)
     except ValidationError as error:

@@ -96,7 +96,16 @@ def write_effects_speed(
     effects: Mapping[str, EffectsConfig],
     out_csv: Path,
 ) -> None:
-    """Write a row for ideal frames and one for each of the effects; times differ between runs."""
+    """Measure what effects cost per frame, and write the times, which differ between runs.
+
+    Args:
+        mesh: Textured mesh, world frame.
+        plan: Pose table; its first 40 poses are drawn.
+        camera: Camera of the frames.
+        render: How frames are drawn.
+        effects: Effects by name.
+        out_csv: CSV to write: a row for ideal frames and one for each of the effects.
+    """
     poses = read_frames(plan, 0, min(EFFECTS_FRAMES, len(read_pose_table(plan))))
     seconds = seconds_of_effects(mesh, poses, camera, render, effects)
     size = {"width": camera.width, "height": camera.height}

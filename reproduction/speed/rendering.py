@@ -235,7 +235,16 @@ def measure_camera(
 
 
 def truth_of(full: Variant, camera: CameraConfig, poses: Poses) -> Truth:
-    """Render colours by 64 samples of the backend in use; cast depth against the full mesh."""
+    """Render reference images of a mesh: colours by 64 samples per pixel, depth by ray casting.
+
+    Args:
+        full: The full mesh, and the backend to draw its colours with.
+        camera: Camera of the images.
+        poses: ``world_from_cam`` (P, 4, 4).
+
+    Returns:
+        Colours (P, H, W, 3), 0 to 255, and depth (P, H, W), metres.
+    """
     mesh = full.mesh
     plain = full.render.model_copy(update={"supersampling": 1})
     views = reference_images(lambda large: open_renderer(mesh, large, plain), camera, poses)
@@ -248,7 +257,16 @@ def truth_of(full: Variant, camera: CameraConfig, poses: Poses) -> Truth:
 
 
 def errors_of(renderer: Renderer, poses: Poses, truth: Truth) -> dict[str, float]:
-    """Measure how far a renderer's views are from the truth; afterwards each was drawn once."""
+    """Measure how far a renderer's views are from the truth; afterwards each was drawn once.
+
+    Args:
+        renderer: Renderer to judge.
+        poses: ``world_from_cam`` (P, 4, 4).
+        truth: Colours and depth of the same views, by :func:`truth_of`.
+
+    Returns:
+        What :func:`colour_errors` and :func:`depth_errors` return, in one mapping.
+    """
     views = [renderer.render_rgbd(pose) for pose in poses]
     rgb, depth_m = (np.stack(images) for images in zip(*views, strict=True))
     return colour_errors(rgb, truth[0]) | depth_errors(depth_m, truth[1])

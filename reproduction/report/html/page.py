@@ -250,7 +250,13 @@ class Trajectory:
 
 
 def room_html(scene: str, root: Path, design: Design) -> Markup:
-    """Build the view of one scene, ready for ``report.js``; the design tells its label sets."""
+    """Build the view of one scene, ready for ``report.js``.
+
+    Args:
+        scene: Name of the scene.
+        root: Results of the profile.
+        design: Its table of experiments, which tells the scene's label sets.
+    """
     mesh = load_mesh(root / "scenes" / scene / "mesh.glb")
     small = viewer_mesh(mesh, SurfacePoints.of(mesh, generator_of(0, "report", scene)))
     drawn = trajectories(scene, root, design)
@@ -259,7 +265,16 @@ def room_html(scene: str, root: Path, design: Design) -> Markup:
 
 
 def trajectories(scene: str, root: Path, design: Design) -> list[Trajectory]:
-    """List the planned cameras of both splits, then every estimated label set of the scene."""
+    """List the planned cameras of both splits, then every estimated label set of the scene.
+
+    Args:
+        scene: Name of the scene.
+        root: Results of the profile.
+        design: Its table of experiments, which tells the scene's label sets.
+
+    Returns:
+        Trajectories, of which only planned ones are shown from the start.
+    """
     found = [
         Trajectory(title, rgb, paths_of(read_pose_table(path)), True)
         for split, (title, rgb) in SPLITS.items()

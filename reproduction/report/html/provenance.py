@@ -25,11 +25,17 @@ from synfeal.render.choose import graphics
 def write_provenance(
     seed: int, config_hash: str, measured: Sequence[Path], results: Sequence[Path], out_json: Path
 ) -> None:
-    """Write the record, and beside it what every job took, ``benchmarks.csv``.
+    """Write where a run's results come from, and beside it what every job took.
 
-    The record is ``synfeal.records.provenance.provenance``, ``machine``, ``stages``
-    (:func:`stages_of`) and ``files``: SHA-256 of the ``results`` and of files in directories of
-    them. ``measured`` are files below ``benchmarks`` beside it.
+    The record is that of :func:`synfeal.records.provenance.provenance`, with ``machine``,
+    ``stages`` (:func:`stages_of`), and ``files``: SHA-256 of the results by path.
+
+    Args:
+        seed: Seed of the profile.
+        config_hash: Hash of its configuration.
+        measured: Files of Snakemake's measurements, in the folder ``benchmarks`` beside the record.
+        results: Files to hash, or folders all of whose files are hashed.
+        out_json: Record to write; ``benchmarks.csv`` is written beside it.
     """
     root = out_json.parent
     jobs = read_jobs(sorted(measured), root / "benchmarks")
