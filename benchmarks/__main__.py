@@ -16,7 +16,7 @@ OUT = Path("results/benchmarks")
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """The options."""
+    """Build the parser of the options."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     names = ", ".join(sorted(path.stem for path in SWEEPS.glob("*.yaml")))
     parser.add_argument("sweep", help=f"one of {names}, or a YAML file of your own")
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point: 0, or 1 with ``error: ...`` for what a person can put right."""
+    """Run the command; return 0, or 1 after ``error: ...`` for what a person can put right."""
     options = build_parser().parse_args(arguments)
     return exit_status(lambda: run(options), "rows that were measured are kept")
 

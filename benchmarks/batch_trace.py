@@ -58,7 +58,13 @@ def nearest_surface_m(points_m: np.ndarray, collision: Path) -> np.ndarray:
 
 
 def draw(trace: pd.DataFrame, names: list[str], title: str) -> Figure:
-    """Draw distance, features and registered frames below each other."""
+    """Draw distance, features and registered frames below each other.
+
+    Args:
+        trace: A row per frame, with the columns of the CSV.
+        names: Names of the trajectories, each with a column ``registered_<name>``.
+        title: Title of the figure.
+    """
     figure = Figure(figsize=(9.0, 5.5), layout="constrained")
     figure.suptitle(title)
     heights = [2, 2, 0.4 * len(names)]

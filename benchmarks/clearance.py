@@ -35,7 +35,17 @@ FEW = 60
 
 
 def count_features(mesh: Path, plan: PoseTable, config: Config, every: int) -> np.ndarray:
-    """Return the number of features of one of every so many frames of a plan."""
+    """Draw some views of a plan, and count the SIFT features of each.
+
+    Args:
+        mesh: Textured mesh of the room.
+        plan: Poses.
+        config: Profile, for the camera and the settings of features.
+        every: Draw the first of each so many poses.
+
+    Returns:
+        Number of features of each view (N,).
+    """
     camera = config.groundtruth_camera
     sfm = config.groundtruth.sfm.model_copy(update={"few_features": 0})
     with TemporaryDirectory() as temporary:

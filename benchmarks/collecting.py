@@ -56,7 +56,7 @@ class Task(NamedTuple):
     rounds: int  # turns of each way
 
     def command(self, way: str, out: Path | None) -> list[str | Path]:
-        """Return the command that makes the frames, or where ``out`` is None only draws them."""
+        """Return the command that makes the frames or, where ``out`` is None, only draws them."""
         samples = 1 if way == EDGES else RENDER.supersampling
         size = ["--width", str(self.camera.width), "--height", str(self.camera.height)]
         packed = [] if self.packed_px is None else ["--packed", str(self.packed_px)]
@@ -69,7 +69,17 @@ class Task(NamedTuple):
 
 
 def measure(task: Task, scene: str, n_frames: int, detail_cpu_s: float) -> list[dict[str, object]]:
-    """Return one row for each way, ours first."""
+    """Measure every way of making the frames, in turns.
+
+    Args:
+        task: Frames to make.
+        scene: Name of the scene, for the table.
+        n_frames: Number of frames, for the table.
+        detail_cpu_s: Processor seconds that choosing the level of detail took; stands in our row.
+
+    Returns:
+        One row for each way, ours first.
+    """
     ways = (OURS, SAME, EDGES)
     with tempfile.TemporaryDirectory() as folder:
         outs = {way: Path(folder, f"{index}") for index, way in enumerate(ways)}
@@ -103,7 +113,7 @@ def measure(task: Task, scene: str, n_frames: int, detail_cpu_s: float) -> list[
 
 
 def rounds_of(task: Task, outs: dict[str, Path]) -> Iterator[list[Taken]]:
-    """Seconds of all ways, in turns; what the last round wrote stays."""
+    """Yield the seconds of all ways, round by round; what the last round wrote stays."""
     for number in range(task.rounds):
         yield [
             seconds_of_process(task.command(way, named(out, number, task.packed_px)))
@@ -112,7 +122,13 @@ def rounds_of(task: Task, outs: dict[str, Path]) -> Iterator[list[Taken]]:
 
 
 def named(out: Path, number: int, packed_px: int | None) -> Path:
-    """Return what one round writes."""
+    """Return where one round writes its frames: a folder of images, or a packed file.
+
+    Args:
+        out: Path that all rounds of a way share.
+        number: Number of the round.
+        packed_px: Side of packed frames; None for images.
+    """
     return out.with_name(f"{out.name}-{number}{'' if packed_px is None else '.npy'}")
 
 
@@ -122,7 +138,7 @@ def last_outs(task: Task, outs: dict[str, Path]) -> dict[str, Path]:
 
 
 def frames_in(out: Path, packed_px: int | None) -> NDArray[np.float32]:
-    """Colours (N, H, W, 3) of some frames, 0 to 255."""
+    """Read colours (N, H, W, 3) of some frames, 0 to 255."""
     if packed_px is not None:
         return np.asarray(read_packed(out)[:COMPARED], np.float32)
     paths = sorted(out.glob("*.color.png"))[:COMPARED]
@@ -130,7 +146,7 @@ def frames_in(out: Path, packed_px: int | None) -> NDArray[np.float32]:
 
 
 def drawing_ms(command: Sequence[str | Path]) -> float:
-    """Processor time of drawing a frame alone, milliseconds."""
+    """Measure the processor time of drawing a frame alone, in milliseconds."""
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     return float(done.stdout)
 
@@ -167,7 +183,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point: 0, or 1 with ``error: ...`` for what a person can put right."""
+    """Run the command; return 0, or 1 after ``error: ...`` for what a person can put right."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.collecting", description=__doc__)
     parser.add_argument("scene", help="name below scenes/")
     parser.add_argument("--results", type=Path, default=Path("results/mini"))

@@ -16,7 +16,13 @@ from synfeal.effects.scene import open_scene
 
 
 def drawing_ms(options: argparse.Namespace, camera: CameraConfig, render: RenderConfig) -> float:
-    """Processor time of drawing a pose alone, milliseconds, after the first."""
+    """Measure the processor time of drawing a pose alone, in milliseconds, the first one left out.
+
+    Args:
+        options: Command line: mesh, level of detail and plan, and whether depth is drawn, too.
+        camera: Camera of the frames.
+        render: Settings of rendering.
+    """
     poses = read_pose_table(options.plan).world_from_cam
     with open_scene(options.mesh, camera, render, options.detail) as renderer:
         draw = renderer.render_rgbd if options.depth else renderer.render

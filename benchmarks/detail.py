@@ -58,7 +58,17 @@ class Way(NamedTuple):
 
 
 def ways(mesh: TexturedMesh, camera: CameraConfig, poses: Poses) -> Iterator[Way]:
-    """The full mesh and the level chosen for two samples, by samples; and one detail less alone."""
+    """List the ways to draw a scene: with all detail, the level chosen, or one detail less.
+
+    Args:
+        mesh: The full mesh.
+        camera: Camera of the images.
+        poses: ``world_from_cam`` (N, 4, 4) by which the level is chosen.
+
+    Yields:
+        The full mesh and the level chosen, with each of ``SAMPLES``; then smaller textures, and
+        fewer triangles, alone.
+    """
     chosen = choose_detail(mesh, camera, poses, USUAL).chosen.mesh
     for samples in SAMPLES:
         yield Way("full", mesh, samples)
@@ -70,7 +80,16 @@ def ways(mesh: TexturedMesh, camera: CameraConfig, poses: Poses) -> Iterator[Way
 
 
 def measure(name: str, results: Path, camera: CameraConfig) -> Iterator[dict[str, object]]:
-    """One row for each way to draw a scene."""
+    """Measure time and error of all ways to draw a scene.
+
+    Args:
+        name: Name of the scene.
+        results: Results of a profile, with its mesh and plan.
+        camera: Camera of the images.
+
+    Yields:
+        One row for each way.
+    """
     mesh = load_mesh(results / "scenes" / name / "mesh.glb")
     every = read_pose_table(results / "plans" / name / "test.csv").world_from_cam
     poses = every[np.linspace(0, len(every) - 1, min(POSES, len(every))).astype(int)]
@@ -105,7 +124,7 @@ def draw_all(renderer: Renderer, poses: Poses) -> None:
 
 
 def draw(path: Path, table: pd.DataFrame) -> None:
-    """Error against time, a panel for each scene and size; the shipped way is ringed."""
+    """Draw error against time, a panel for each scene and size; the shipped way is ringed."""
     scenes = list(table.groupby("scene", sort=False))
     n_sizes = max(rows.groupby(["width", "height"]).ngroups for _, rows in scenes)
     with mpl.rc_context(RC), atomic_path(path) as temporary:

@@ -56,7 +56,18 @@ def frames_of(root: Path, config: Config, scene: str, index: int) -> tuple[Files
 def estimate(
     method: str, config: Config, scene: str, index: int, files: tuple[Files, Files, Any]
 ) -> tuple[BatchTrajectory, dict[str, Any], float]:
-    """Return the trajectory of a batch, facts about it, and the processor seconds it took."""
+    """Estimate the poses of a batch.
+
+    Args:
+        method: ``sfm`` or ``kinect-fusion``.
+        config: The profile.
+        scene: Name of the scene.
+        index: Number of the batch in the training set.
+        files: Colour images, depth images and true poses, by :func:`frames_of`.
+
+    Returns:
+        The trajectory, facts about it, and the processor seconds it took.
+    """
     color, depth, truth = files
     cfg, camera = config.groundtruth, config.groundtruth_camera
     began = time.process_time()
@@ -71,7 +82,16 @@ def estimate(
 
 
 def measured(trajectory: BatchTrajectory, truth: Any, config: Config) -> dict[str, Any]:
-    """Return errors of a batch that starts at its true first pose, gaps filled as in the chain."""
+    """Compute the errors of a batch that starts at its true first pose, gaps filled as in chaining.
+
+    Args:
+        trajectory: Estimate of the batch.
+        truth: True poses (N, 4, 4).
+        config: Profile, for the thresholds of assistance.
+
+    Returns:
+        Numbers of a row, by column.
+    """
     cfg, true = config.groundtruth, relative(truth[0], truth)
     error_m, error_rad = pose_error(fill_gaps(trajectory), true)
     error_deg = np.degrees(error_rad)

@@ -49,9 +49,17 @@ Array = NDArray[np.float64]
 
 
 def free_poses(mesh: TexturedMesh, count: int, rng: np.random.Generator) -> Array:
-    """Poses (N, 4, 4) in the middle half of the bounds of a mesh that look all round.
+    """Draw poses that look all round from the middle half of a mesh's bounds.
 
-    Two and two are near each other: 3 % of the diagonal and 15 degrees apart.
+    Poses come in pairs whose cameras stand 3 % of the diagonal apart and look 15 degrees apart.
+
+    Args:
+        mesh: The mesh.
+        count: Number of poses; even.
+        rng: Source of places and directions.
+
+    Returns:
+        ``world_from_cam`` (count, 4, 4), one of a pair after the other.
     """
     lower, upper = mesh.bounds_m
     diagonal_m = float(np.linalg.norm(upper - lower))
@@ -68,7 +76,7 @@ class Open3dRays:
     """First hits by Open3D's ray-casting scene."""
 
     def __init__(self, mesh: TexturedMesh) -> None:
-        """Build it; ids are those of ``mesh.merged()``."""
+        """Build the scene; ids of triangles are those of ``mesh.merged()``."""
         import open3d as o3d
 
         self._tensor = o3d.core.Tensor.from_numpy
@@ -81,12 +89,21 @@ class Open3dRays:
         )
 
     def faces(self, camera: CameraConfig, pose: Array, step_px: tuple[float, float]) -> Any:
-        """Triangles (H, W), -1 for none, seen a step from the centres of the pixels."""
+        """Find the triangle that shows a step from the centre of each pixel.
+
+        Args:
+            camera: Camera.
+            pose: ``world_from_cam`` (4, 4).
+            step_px: Step to the right and down, pixels.
+
+        Returns:
+            Triangles (H, W), -1 for none.
+        """
         origin_m, rays = self._from_near_plane(camera, pose, step_px)
         return _face_of(self._cast(origin_m, rays))
 
     def stand_alone(self, camera: CameraConfig, pose: Array) -> Any:
-        """Check of which pixels (H, W) no other surface is just behind the one they show.
+        """Mark pixels (H, W) that have no other surface just behind the one they show.
 
         From :data:`APART_M` behind it, the way back must meet that surface first.
         """
@@ -100,13 +117,23 @@ class Open3dRays:
     def _from_near_plane(
         self, camera: CameraConfig, pose: Array, step_px: tuple[float, float]
     ) -> tuple[Array, Array]:
-        """Origins and rays (H, W, 3) of pixels, from where the camera begins to see."""
+        """Return origins and rays (H, W, 3) of pixels, from where the camera begins to see."""
         pixel = cell_pixels(camera, camera.width, camera.height) + step_px
         rays = rays_of_pixels(camera, pixel) @ pose[:3, :3].T
         return pose[:3, 3] + camera.near_m * rays, rays
 
     def reached(self, camera: CameraConfig, pose: Array, point_m: Array) -> Any:
-        """Return the free share (N,) of the ways to points (N, 3), 1 where all of the way is."""
+        """Measure how much of the way from a camera to each of some points is free.
+
+        Args:
+            camera: Camera; rays begin at its near plane.
+            pose: ``world_from_cam`` (4, 4).
+            point_m: Points (N, 3), world, metres.
+
+        Returns:
+            The free share (N,) of each way, 1 where all of it is; above 1 where what it meets lies
+            beyond.
+        """
         way = point_m - pose[:3, 3]
         begin = camera.near_m / (way @ pose[:3, 2])
         origin_m = pose[:3, 3] + begin[:, None] * way
@@ -119,13 +146,13 @@ class Open3dRays:
 
 
 def _face_of(hits: Any) -> Any:
-    """Triangles of hits, -1 for none."""
+    """Return the triangles of hits, -1 for none."""
     face = hits["primitive_ids"].numpy()
     return np.where(face == 2**32 - 1, -1, face.astype(np.int64))
 
 
 def measure(path: Path, camera: CameraConfig) -> dict[str, object]:
-    """One row of the table."""
+    """Measure one mesh at one size, as a row of the table."""
     mesh = load_mesh(path)
     poses = free_poses(mesh, N_FRAMES, np.random.default_rng(0))
     rays = Open3dRays(mesh)
@@ -171,7 +198,18 @@ def measure(path: Path, camera: CameraConfig) -> dict[str, object]:
 def pair_values(
     camera: CameraConfig, depths: Sequence[NDArray[np.float32]], poses: Array, rays: Open3dRays
 ) -> dict[str, float]:
-    """Times of an overlap and of a flow, and shares of the pixels whose state is that of rays."""
+    """Measure overlaps and flow between pairs of neighbouring views, and check them by rays.
+
+    Args:
+        camera: Camera of the views.
+        depths: Depth (H, W) of each view, metres.
+        poses: ``world_from_cam`` (N, 4, 4), one of a pair after the other.
+        rays: Rays into the same mesh.
+
+    Returns:
+        Processor milliseconds of an overlap and of a flow, the share of visible pixels, and the
+        share of pixels whose state is the one that rays find.
+    """
     times: dict[str, list[float]] = {}
     points = grid_points(camera, depths.__getitem__, poses, GRID, lambda: None)
     rows = np.arange(len(depths)).repeat(20)
@@ -205,7 +243,16 @@ def pair_values(
 
 
 def timed(times: dict[str, list[float]], name: str, work: Callable[[], Any]) -> Any:
-    """Run ``work`` and return its result; add its processor time, milliseconds, to ``times``."""
+    """Run some work, and note the processor time it took.
+
+    Args:
+        times: Milliseconds of each run by name, which is added to.
+        name: Name of the work.
+        work: Function to run.
+
+    Returns:
+        What ``work`` returned.
+    """
     began = time.process_time()
     value = work()
     times.setdefault(name, []).append(1e3 * (time.process_time() - began))
@@ -213,7 +260,7 @@ def timed(times: dict[str, list[float]], name: str, work: Callable[[], Any]) -> 
 
 
 def angle_deg(a: NDArray[np.float32], b: NDArray[np.float32]) -> Array:
-    """Angles (H, W) between vectors (H, W, 3); 0 between zeros."""
+    """Compute the angles (H, W) between vectors (H, W, 3), degrees; 0 between zeros."""
     sine = np.linalg.norm(np.cross(a.astype(float), b.astype(float)), axis=-1)
     return np.asarray(np.degrees(np.arctan2(sine, np.einsum("hwi,hwi->hw", a, b))))
 

@@ -24,7 +24,14 @@ LEGEND_INCHES = 7.0  # of four columns of settings
 
 
 def write_page(out: Path, name: str, sweep: Sweep, rows: pd.DataFrame) -> None:
-    """Write ``out.md`` and, where the sweep asks for one, the picture ``out.png``."""
+    """Write the page of a benchmark and, where the sweep asks for one, its picture.
+
+    Args:
+        out: Path whose suffix becomes ``.md`` for the page and ``.png`` for the picture.
+        name: Name of the sweep's file.
+        sweep: The sweep.
+        rows: Its measured runs.
+    """
     if sweep.picture is not None:
         draw(out.with_suffix(".png"), sweep, sweep.picture, rows)
     environment = Environment(
@@ -43,7 +50,7 @@ def write_page(out: Path, name: str, sweep: Sweep, rows: pd.DataFrame) -> None:
 
 
 def summary(sweep: Sweep, rows: pd.DataFrame) -> pd.DataFrame:
-    """A line for each combination: means over the seeds with the least and the largest, as text."""
+    """Tabulate combinations as text: means over the seeds, with the least and the largest."""
     lines = []
     for values, runs in rows.groupby(list(sweep.vary), sort=False):
         line: dict[str, Any] = dict(zip(sweep.vary, values, strict=True))
@@ -55,7 +62,7 @@ def summary(sweep: Sweep, rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def with_range(values: pd.Series, digits: int) -> str:
-    """Mean, and the least and the largest where there are several."""
+    """Format the mean, with the least and the largest where there are several."""
     text = f"{values.mean():.{digits}f}"
     if len(values) == 1:
         return text
@@ -63,7 +70,14 @@ def with_range(values: pd.Series, digits: int) -> str:
 
 
 def draw(path: Path, sweep: Sweep, picture: Picture, rows: pd.DataFrame) -> None:
-    """A mark for every run; the means of one group are joined in the order of the table."""
+    """Draw a mark for every run, and join the means of one group in the order of the table.
+
+    Args:
+        path: PNG to write.
+        sweep: The sweep.
+        picture: Which measures and axes to draw.
+        rows: Measured runs of the sweep.
+    """
     columns = list(rows.groupby(picture.across, sort=False)) if picture.across else [("", rows)]
     # Measures stand side by side, or below one another where an axis goes across.
     shape = (len(picture.y), len(columns)) if picture.across else (1, len(picture.y))
@@ -86,7 +100,7 @@ def draw(path: Path, sweep: Sweep, picture: Picture, rows: pd.DataFrame) -> None
 def _draw_panel(
     panel: Axes, sweep: Sweep, picture: Picture, rows: pd.DataFrame, measure: str
 ) -> None:
-    """One measure against the column of costs."""
+    """Draw one measure against the column of costs."""
     axes = [name for name in sweep.vary if name not in (*picture.average, picture.across)]
     joined = [name for name in axes if name != picture.group]
     groups = [("", rows)] if picture.group is None else rows.groupby(picture.group, sort=False)
@@ -113,7 +127,12 @@ def _draw_panel(
 def mark_front(panel: Axes, means: pd.DataFrame, x: str, y: str, chosen: Mapping[str, str]) -> None:
     """Join what nothing beats in both columns, cover what is beaten with grey, ring the choice.
 
-    ``chosen`` are axes and the values in use, as text.
+    Args:
+        panel: Axes to draw on.
+        means: A row per combination, with both columns and the axes of the sweep.
+        x: Column along the horizontal axis; less is better.
+        y: Column along the vertical axis; less is better.
+        chosen: Values in use by axis of the sweep, as text.
     """
     front = pareto_front(means[x], means[y])
     best = means[front].sort_values(x)

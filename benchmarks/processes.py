@@ -22,7 +22,7 @@ class Taken(NamedTuple):
 
 
 def seconds_of_process(command: Sequence[str | Path]) -> Taken:
-    """Run a command in the root of this tree, to its end.
+    """Run a command in the root of this tree to its end.
 
     Raises:
         InputError: it failed; what it says stands above.

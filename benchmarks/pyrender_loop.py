@@ -46,14 +46,20 @@ class Loop:
         self._renderer = pyrender.OffscreenRenderer(width, height)
 
     def draw(self, world_from_cam: NDArray[np.float64]) -> NDArray[np.uint8]:
-        """Colours (H, W, 3) seen from a pose (4, 4)."""
+        """Draw the colours (H, W, 3) seen from a pose (4, 4)."""
         self._scene.set_pose(self._camera, FILE_FROM_WORLD @ world_from_cam @ CAM_FROM_GL)
         seen = self._renderer.render(self._scene, flags=UNLIT)[0]
         return np.asarray(Image.fromarray(seen).reduce(self._samples))
 
 
 def write_images(loop: Loop, poses: NDArray[np.float64], out: Path) -> None:
-    """Write a PNG image and a text file of the pose for each pose (N, 4, 4)."""
+    """Write a PNG image and a text file of the pose for each view.
+
+    Args:
+        loop: Scene and camera.
+        poses: ``world_from_cam`` (N, 4, 4).
+        out: Folder to create.
+    """
     out.mkdir(parents=True)
     for index, pose in enumerate(poses):
         Image.fromarray(loop.draw(pose)).save(out / f"frame-{index:06d}.color.png")
@@ -61,7 +67,14 @@ def write_images(loop: Loop, poses: NDArray[np.float64], out: Path) -> None:
 
 
 def write_packed(loop: Loop, poses: NDArray[np.float64], side_px: int, out: Path) -> None:
-    """Write all images, made square, as one array."""
+    """Write all images, made square, as one array.
+
+    Args:
+        loop: Scene and camera.
+        poses: ``world_from_cam`` (N, 4, 4).
+        side_px: Side of the images, pixels.
+        out: File to write: uint8 (N, S, S, 3).
+    """
     frames = np.empty((len(poses), side_px, side_px, 3), np.uint8)
     for index, pose in enumerate(poses):
         image = Image.fromarray(loop.draw(pose))
@@ -70,7 +83,7 @@ def write_packed(loop: Loop, poses: NDArray[np.float64], side_px: int, out: Path
 
 
 def drawing_ms(draw: Any, poses: NDArray[np.float64]) -> float:
-    """Processor time of drawing a pose alone, milliseconds, after the first, which uploads."""
+    """Measure the processor time of drawing a pose, in milliseconds, the first one left out."""
     draw(poses[0])
     began = time.process_time()
     for pose in poses[1:]:

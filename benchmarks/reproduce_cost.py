@@ -83,7 +83,7 @@ def slower_here(before: pd.DataFrame, now: pd.DataFrame) -> float:
 
 
 def cost_by_part(before: pd.DataFrame, now: pd.DataFrame) -> pd.DataFrame:
-    """Jobs and processor seconds of two runs by part; of ``before`` also as if it ran here.
+    """Add up jobs and processor seconds of two runs by part; of ``before`` also as if it ran here.
 
     Args:
         before: Jobs of the other commit's run, with ``stage``, ``job`` and ``cpu_s``.
@@ -138,7 +138,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point: 0, or 1 with ``error: ...`` for what a person can put right."""
+    """Run the command; return 0, or 1 after ``error: ...`` for what a person can put right."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.reproduce_cost")
     parser.add_argument("--before", type=Path, required=True, help="results of the other commit")
     parser.add_argument("--now", type=Path, default=Path("results/published/mini"))

@@ -43,7 +43,7 @@ WORK: dict[str, Callable[[str], float]] = {"render_packed": drawing_s, "train": 
 
 
 def shares(jobs: pd.DataFrame, logs: Path) -> pd.DataFrame:
-    """Seconds of jobs and of their work, means by stage.
+    """Compute the mean seconds of jobs and of their work, by stage.
 
     Args:
         jobs: Jobs of a run, with ``stage``, ``job`` and ``wall_s``.
@@ -73,7 +73,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point: 0, or 1 with ``error: ...`` for what a person can put right."""
+    """Run the command; return 0, or 1 after ``error: ...`` for what a person can put right."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.starting")
     parser.add_argument("--results", type=Path, default=Path("results/mini"))
     parser.add_argument("--out", type=Path, default=Path("results/benchmarks/starting.csv"))

@@ -51,7 +51,7 @@ class Worker:
         self._process.communicate()
 
     def seconds(self, steps: int) -> float:
-        """Processor seconds of a step, the mean over so many."""
+        """Measure the mean processor seconds of a step over so many."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.write(f"{steps}\n")
@@ -98,14 +98,14 @@ def compare(model: str, before: Path, profile: Path, rounds: int, steps: int) ->
 
 
 def median_interval(values: NDArray[np.float64]) -> tuple[float, float]:
-    """95 % limits of the median of values (N,), by the bootstrap."""
+    """Compute 95 % limits of the median of values (N,) by the bootstrap."""
     drawn = np.random.default_rng(0).choice(values, (RESAMPLES, len(values)))
     low, high = np.percentile(np.median(drawn, axis=1), [2.5, 97.5])
     return float(low), float(high)
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """The options."""
+    """Build the parser of the options."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.step_time", description=__doc__)
     parser.add_argument("--before", type=Path, required=True, help="root of the other tree")
     parser.add_argument("--models", nargs="+", default=MODELS, help="(all five)")
@@ -136,7 +136,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point: 0, or 1 with ``error: ...`` for what a person can put right."""
+    """Run the command; return 0, or 1 after ``error: ...`` for what a person can put right."""
     options = build_parser().parse_args(arguments)
     return exit_status(lambda: run(options), "nothing was written")
 

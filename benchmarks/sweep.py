@@ -106,7 +106,12 @@ def read_sweep(path: Path) -> Sweep:
 
 
 def runs_of(sweep: Sweep, results: Path, n_seeds: int) -> list[Run]:
-    """All runs of a sweep, one seed after the other.
+    """List all runs of a sweep, one seed after the other.
+
+    Args:
+        sweep: The sweep.
+        results: Directory that ``{results}`` in its settings stands for.
+        n_seeds: Seeds of each combination, from 0.
 
     Raises:
         InputError: a setting does not exist or its value is not allowed.
@@ -120,7 +125,7 @@ def runs_of(sweep: Sweep, results: Path, n_seeds: int) -> list[Run]:
 
 
 def _combinations(sweep: Sweep) -> Iterator[tuple[dict[str, str], Changes]]:
-    """The value of every axis as text, and all changes it stands for."""
+    """Yield combinations: the value of every axis as text, and all changes they stand for."""
     axes = [
         [(name, str(value), {name: value}) for value in values]
         if isinstance(values, list)
@@ -154,7 +159,7 @@ def _nested(name: str, value: Value) -> dict[str, Any]:
 
 
 def _filled(value: Any, results: str) -> Any:
-    """Every text in a nested mapping with the directory of results filled in."""
+    """Fill the directory of results into every text of a nested mapping."""
     if isinstance(value, dict):
         return {key: _filled(inner, results) for key, inner in value.items()}
     return value.replace(RESULTS, results) if isinstance(value, str) else value
@@ -164,7 +169,7 @@ SETTINGS = "settings"
 
 
 def read_table(path: Path, keys: Sequence[str]) -> pd.DataFrame:
-    """All rows, keys as text and measured values as numbers; none where there is no table.
+    """Read all rows, keys as text and values as numbers; none where there is no table.
 
     Raises:
         InputError: the file is no table of such runs.
@@ -177,9 +182,18 @@ def read_table(path: Path, keys: Sequence[str]) -> pd.DataFrame:
 
 
 def run_missing(measure: str, runs: Sequence[Run], table: Path, jobs: int) -> pd.DataFrame:
-    """The rows of all runs of a sweep, in their order, after those that lack were measured.
+    """Measure the runs that the table lacks, and return the rows of all.
 
     Rows are added to the table one by one, so stopping loses only the runs under way.
+
+    Args:
+        measure: Name of what is measured, one of ``MEASURES``.
+        runs: All runs of the sweep.
+        table: CSV with the rows so far; made if need be.
+        jobs: Number of runs at a time.
+
+    Returns:
+        The rows of ``runs``, in their order.
 
     Raises:
         InputError: a row of the table was made with other settings, or a run cannot be made.

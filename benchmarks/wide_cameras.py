@@ -55,7 +55,17 @@ def seconds_per_frame(draw: Callable[[Array], object], poses: Array) -> float:
 def depth_errors_m(
     caster: RayCaster, camera: CameraConfig, poses: Array, depths_m: list[NDArray[np.float32]]
 ) -> Array:
-    """Return the differences (N,) of depth from rays where both meet something, metres."""
+    """Compare the depth of frames with that of rays through the same pixels.
+
+    Args:
+        caster: Rays into the mesh.
+        camera: Camera of the frames.
+        poses: ``world_from_cam`` (P, 4, 4).
+        depths_m: Depth (H, W) of each frame, metres.
+
+    Returns:
+        Absolute differences (N,) of the pixels that the frame shows a surface in, metres.
+    """
     rays = cell_directions(camera, camera.width, camera.height).reshape(-1, 3)
     errors = []
     for pose, depth_m in zip(poses, depths_m, strict=True):

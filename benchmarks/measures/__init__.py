@@ -26,6 +26,6 @@ class Measure(NamedTuple):
 
 
 def open_measure(name: str) -> Measure:
-    """The measure of this name."""
+    """Return the measure of this name."""
     run = resolve_name(f"benchmarks.measures.{MEASURES[name]}")
     return Measure(get_type_hints(run)["case"], run)

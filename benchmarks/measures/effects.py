@@ -24,7 +24,7 @@ class Case(Strict):
 
 
 def run(case: Case, seed: int) -> dict[str, float]:
-    """Seconds of the processor an ideal frame, and how many of them one with each effect takes.
+    """Measure the processor seconds of an ideal frame, and each effect's as a multiple of them.
 
     Raises:
         InputError: mesh or plan cannot be used.

@@ -48,7 +48,7 @@ class BatchFiles(NamedTuple):
 
 
 def run_sfm(case: BatchCase, seed: int) -> dict[str, float]:
-    """Errors of all frames when the batch starts at its true first pose, gaps filled.
+    """Measure the errors of all frames when the batch starts at its true first pose, gaps filled.
 
     Raises:
         InputError: the frames cannot be used.
@@ -69,7 +69,7 @@ def run_sfm(case: BatchCase, seed: int) -> dict[str, float]:
 
 
 def run_rgbd(case: BatchCase, seed: int) -> dict[str, float]:
-    """Errors of the odometry, and of the graph as Levenberg-Marquardt leaves it.
+    """Measure the errors of the odometry, and of the graph as Levenberg-Marquardt leaves it.
 
     Raises:
         InputError: the frames cannot be used.
@@ -91,7 +91,7 @@ def run_rgbd(case: BatchCase, seed: int) -> dict[str, float]:
 
 
 def run_kinect_fusion(case: BatchCase, seed: int) -> dict[str, float]:
-    """Frames lost, and errors of the others, the first pose given.
+    """Count the frames lost, and measure the errors of the others, the first pose given.
 
     Raises:
         InputError: the frames cannot be used.
@@ -112,7 +112,7 @@ def run_kinect_fusion(case: BatchCase, seed: int) -> dict[str, float]:
 
 
 def open_batch(case: BatchCase) -> BatchFiles:
-    """The frames of a case.
+    """Open the frames of a case.
 
     Raises:
         InputError: the sequence is shorter.
@@ -130,7 +130,16 @@ def open_batch(case: BatchCase) -> BatchFiles:
 
 
 def errors(name: str, first_from_cam: Array, world_from_cam: Array) -> dict[str, float]:
-    """Median, largest and last error of poses (N, 4, 4) relative to the first: metres, degrees."""
+    """Compute the median, largest and last error of the poses of a batch.
+
+    Args:
+        name: What the names of the values begin with.
+        first_from_cam: Estimated poses (N, 4, 4), relative to the first.
+        world_from_cam: True poses (N, 4, 4).
+
+    Returns:
+        Errors in metres and degrees, by name.
+    """
     true = relative(world_from_cam[0], world_from_cam)
     error_m, error_rad = pose_error(first_from_cam, true)
     measured = {}

@@ -117,7 +117,7 @@ def run(case: Case, seed: int) -> dict[str, float]:
 
 
 def _test_set(case: Case, folder: Path) -> tuple[Path, Path]:
-    """Frames and labels of the test set, copied where only some of its rows are meant."""
+    """Return frames and labels of the test set, copied where only some of its rows are meant."""
     if case.test_rows is None:
         return case.test_frames, case.test_labels
     first, last = map(int, case.test_rows.split("-"))
@@ -131,7 +131,7 @@ def _test_set(case: Case, folder: Path) -> tuple[Path, Path]:
 
 
 def _ms_per_image(model: Path, frames: Path, count: int) -> float:
-    """Median milliseconds per image of predicting ``count`` images at once."""
+    """Measure the median milliseconds per image of predicting ``count`` images at once."""
     trained = read_checkpoint(model, torch.device("cpu"))
     images = read_images(frames, count, trained.description.network.input_px, trained.device)
     return predict_ms(trained, images) / count
