@@ -78,11 +78,11 @@ def compare(model: str, before: Path, profile: Path, rounds: int, steps: int) ->
     """Measure one localizer in both trees by turns.
 
     Args:
-        model: the localizer.
-        before: root of the other tree.
-        profile: configuration that both train with.
-        rounds: how often each tree has its turn.
-        steps: training steps of a turn.
+        model: Name of the localizer.
+        before: Root of the other tree.
+        profile: Configuration that both train with.
+        rounds: Number of turns of each tree.
+        steps: Training steps of a turn.
     """
     with ExitStack() as stack:
         workers = [stack.enter_context(Worker(tree, model, profile)) for tree in (before, HERE)]

@@ -43,8 +43,8 @@ class PhotometricRandomisation:
     Draws are made on the processor, so that one seed gives one training run wherever it runs.
 
     Args:
-        config: ranges to draw from.
-        seed: of all draws.
+        config: Ranges to draw from.
+        seed: Seed of all draws.
     """
 
     def __init__(self, config: PhotometricConfig, seed: int) -> None:

@@ -50,8 +50,8 @@ def best_quintic(low: float, high: float) -> tuple[Quintic, float]:
     signs (Chebyshev): at the ends of the interval and at its two extrema between them.
 
     Args:
-        low: lower end of the interval, above 0.
-        high: upper end of the interval.
+        low: Lower end of the interval, above 0.
+        high: Upper end of the interval.
     """
     nodes = np.linspace(low, high, 4)
     signs = (-1.0) ** np.arange(4)
@@ -68,8 +68,8 @@ def quintics_for(lowest: float, count: int) -> tuple[Quintic, ...]:
     """Choose the quintics that together bring ``[lowest, 1]`` nearest to 1.
 
     Args:
-        lowest: smallest singular value that is to come near 1, where the largest is at most 1.
-        count: number of quintics.
+        lowest: Smallest singular value that is to come near 1, where the largest is at most 1.
+        count: Number of quintics.
 
     Returns:
         The quintics in the order of their use.

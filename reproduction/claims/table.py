@@ -58,10 +58,10 @@ def write_claims(design: Design, root: Path, seed: int, out_csv: Path) -> None:
     """Write one row per claim of the paper, columns :data:`COLUMNS`.
 
     Args:
-        design: what was run.
-        root: results of the profile.
-        seed: the profile's, the root of all seeds.
-        out_csv: file to write.
+        design: The profile's table of experiments.
+        root: Results of the profile.
+        seed: Seed of the profile, from which all others follow.
+        out_csv: CSV to write.
     """
     rows = claim_rows(evidence_of(design, root), seed)
     write_frame(out_csv, pd.DataFrame(rows, columns=list(COLUMNS)))

@@ -163,8 +163,8 @@ def images_ratio(new: Array, old: Array) -> Array:
     through the logarithms of errors and images; not a number where they do not fall.
 
     Args:
-        new: logarithms (L, B) of errors after the shares of images ``LENGTHS``.
-        old: of what it is compared with.
+        new: Logarithms (L, B) of the errors after each share of the images in ``LENGTHS``.
+        old: The same of the runs that they are compared with.
     """
     images = np.log(list(LENGTHS.values()))
     images -= images.mean()

@@ -71,8 +71,8 @@ def few_verdict(counts: Mapping[str, tuple[int, int]], thresholds: Thresholds = 
     """Decide whether few batches of every method are assisted.
 
     Args:
-        counts: by method, assisted batches and all.
-        thresholds: of them what is few.
+        counts: Number of assisted batches, and of all, by method.
+        thresholds: Thresholds, of which ``few`` is used.
     """
     if all(share_limits(*count, 0.9)[1] < thresholds.few for count in counts.values()):
         return Verdict.HOLDS

@@ -242,8 +242,8 @@ def all_of(conditions: Sequence[Condition], each: Sequence[Condition] = ()) -> J
     """Judge a claim that holds if all conditions do, and say how each of them came out.
 
     Args:
-        conditions: all of them have to hold.
-        each: what the conditions are means of: none of them may be decided otherwise.
+        conditions: Conditions that all have to hold.
+        each: Single effects that the conditions are means of: none may be decided otherwise.
     """
     levels = [(conditions, 1), (conditions, len(conditions)), (each, len(each))]
     intervals = [
@@ -291,7 +291,7 @@ def best_of(rivals: Sequence[Condition]) -> Judgement:
     """Judge a claim that one thing is better than every other.
 
     Args:
-        rivals: by how much it is better than each of the others.
+        rivals: For each of the others, by how much the one is better.
     """
     orders = [rival._replace(is_order=True) for rival in rivals]
     parts = [verdict_of(rival) for rival in orders]

@@ -47,9 +47,9 @@ def compare_errors(a: RunErrors, b: RunErrors, paired: bool) -> pd.DataFrame:
     ones; and ``se_seeds``, the standard error of the difference from both.
 
     Args:
-        a: the run in tree A.
-        b: the run in tree B.
-        paired: both saw the same frames: each resample draws the same paths for both, so that what
+        a: The run in tree A.
+        b: The run in tree B.
+        paired: Both saw the same frames: each resample draws the same paths for both, so that what
             makes a path hard for both cancels. Otherwise their paths are drawn independently.
     """
     draws_a = draws_of(a.path, "a")

@@ -138,10 +138,10 @@ class Files:
         """List sequences of image files, directories or archives.
 
         Args:
-            scene: Of these frames.
+            scene: Name of the scene.
             camera: ``network`` or ``groundtruth``.
-            split: Of one split alone.
-            stop: Those alone that hold frames below this one.
+            split: ``train`` or ``test``; None for both.
+            stop: List only sequences with frames below this one, counted in their split; None for all.
         """
         suffix = SUFFIX if self.config.archive_sequences else ""
         return [
@@ -315,7 +315,7 @@ class Files:
         """Return the file with answers of an external localizer; None where it is run here.
 
         Args:
-            name: Of the localizer, a key of ``references.external``.
+            name: Name of the localizer, a key of ``references.external``.
             data_set: Its ``scene``, ``size`` and ``labels``.
         """
         pattern = self.config.references.external[name].poses

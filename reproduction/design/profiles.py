@@ -20,7 +20,7 @@ def read_profile(name: str) -> Files:
     """Read a profile and its design.
 
     Args:
-        name: Of the profile in a file of ``config/``, or the path of its file.
+        name: Name of a profile in ``config/``, or the path of its file.
 
     Raises:
         InputError: There is no such profile, or it is wrong.

@@ -89,10 +89,10 @@ class RealDesign:
         main: The direction that the finding is of.
         parts: Rows of the table are of these.
         fewer: Scans of fewer photographs, for the figure.
-        runs: Of the table.
+        runs: Runs of the table.
         fewer_frames: Runs on fewer rendered frames, for the figure.
         fewer_photographs: Runs on scans of fewer photographs and on these, for the figure.
-        maps: Of the table.
+        maps: Maps of the table.
     """
 
     main: str

@@ -84,11 +84,11 @@ def gauge_between(other: Array, to: Array) -> Gauge:
 
 
 def relabelled(frames: PosedFrames, names: Sequence[str], labels: dict[str, Array]) -> PosedFrames:
-    """Take other poses for the same photographs.
+    """Give photographs other poses.
 
     Args:
         frames: Photographs.
-        names: Of each, as the labels call it.
+        names: Name of each photograph, as the labels call it.
         labels: Poses (4, 4) by name.
 
     Raises:

@@ -29,7 +29,7 @@ class Truth:
     """Labels of the photographs that are localized.
 
     Attributes:
-        names: Of the photographs, ``seq-01/frame-000500``.
+        names: Names of the photographs, such as ``seq-01/frame-000500``.
         world_from_cam: Poses (N, 4, 4).
     """
 
@@ -95,7 +95,7 @@ class Draws:
     """One set of draws for all that is tested on the same photographs, so differences are paired.
 
     Args:
-        names: Of the photographs; blocks of neighbours are what is drawn.
+        names: Names of the photographs, by which neighbours are found; blocks of them are drawn.
         block_frames: How many neighbours a block has.
     """
 
@@ -109,7 +109,7 @@ class Draws:
         return [medians(errors, self.place, self.counts) for errors in runs]
 
     def means(self, runs: Sequence[Array]) -> list[Array]:
-        """Return the same of means of values (N,)."""
+        """Return the mean (1 + resamples,) of each run's values (N,): observed, then drawn."""
         return [np.asarray(means(values, self.place, self.counts)) for values in runs]
 
 
@@ -119,7 +119,7 @@ def samples_of(*results: Sequence[Array]) -> tuple[Layout, list[Array]]:
     A result of a single run, such as a map's, has limits over blocks alone.
 
     Args:
-        results: Of each result, what its runs measured (1 + resamples,).
+        results: For each result, what each of its runs measured (1 + resamples,).
     """
     groups = tuple(Group(len(runs), len(runs) - 1.0) for runs in results if len(runs) > 1)
     layout = Layout(len(results[0][0]) - 1, groups)

@@ -79,7 +79,7 @@ def _of_split(scene: Path, split: str, every: PosedFrames, of: NDArray[np.str_])
 
 
 def frames_at(frames: PosedFrames, index: Sequence[int] | Rows) -> PosedFrames:
-    """Take frames by their place."""
+    """Select frames by index."""
     rows = [int(i) for i in index]
     return PosedFrames(
         names=tuple(frames.names[i] for i in rows),
@@ -90,7 +90,7 @@ def frames_at(frames: PosedFrames, index: Sequence[int] | Rows) -> PosedFrames:
 
 
 def spread(frames: PosedFrames, count: int | None) -> PosedFrames:
-    """Take so many frames at even steps from the first on; all where None or too many."""
+    """Select ``count`` frames at even steps from the first on; all where it is None or too large."""
     if count is None or count >= len(frames):
         return frames
     return frames_at(frames, np.arange(count) * len(frames) // count)

@@ -118,8 +118,8 @@ def write_prefix(dataset: Path, frames: int, out_dataset: Path) -> None:
     """Make a data set of the first training frames of another; images are links.
 
     Args:
-        dataset: Of ``synfeal collect``.
-        frames: How many.
+        dataset: Data set by ``synfeal collect``.
+        frames: Number of training frames to keep.
         out_dataset: Folder of the new data set.
     """
     with atomic_directory(out_dataset) as out:
@@ -154,8 +154,8 @@ def write_references(
         train: Photographs of the scan.
         test: Photographs to localize.
         truth: Their poses.
-        out_retrieval: Of each, the pose of the rendered frame that looks most alike, by thumbnail.
-        out_nearest: Of each, the rendered pose that is nearest to the true one: an oracle.
+        out_retrieval: For each, the pose of the rendered frame that looks most alike, by thumbnail.
+        out_nearest: For each, the rendered pose that is nearest to the true one: an oracle.
         out_mean: The mean pose of the photographs of the scan.
     """
     photographs = read_posed_sequence(test)

@@ -48,10 +48,10 @@ def write_stand_in(
 
     Args:
         out: Folder to create.
-        frames: How many photographs.
-        width: Of an image, pixels; it is three quarters as high.
-        spacing_m: Between neighbours, metres.
-        seed: Of room, paths and effects.
+        frames: Number of photographs.
+        width: Width of an image, pixels; it is three quarters as high.
+        spacing_m: Distance between neighbours, metres.
+        seed: Seed of room, paths and effects.
     """
     with tempfile.TemporaryDirectory() as temporary:
         work = Path(temporary)

@@ -30,7 +30,7 @@ def seed_deviations(root: Path) -> pd.DataFrame:
     """Pool the relative variances over seeds of all cells that have several.
 
     Args:
-        root: published results with several training runs per cell, as ``results/published/night``.
+        root: Published results with several training runs per cell, as ``results/published/night``.
 
     Returns:
         Columns ``model``, ``measure``, ``relative_sd``, ``cells`` and ``degrees_of_freedom``. A

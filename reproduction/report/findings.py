@@ -356,8 +356,8 @@ def sentences(root: Path, link: str = "") -> list[str]:
     """List findings and verdict counts as Markdown, one item each.
 
     Args:
-        root: published results.
-        link: from the page to ``root``, for the tables that findings rest on; no links without.
+        root: Published results.
+        link: Path from the page to ``root``, for links to tables; empty for no links.
     """
     items = []
     for found in findings(root):

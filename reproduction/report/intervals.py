@@ -44,8 +44,8 @@ def cell_interval(row: Any, measure: str) -> Interval:
     """Return a cell of a published table with limits over test paths and training runs.
 
     Args:
-        row: a row of one of tables 2 to 7, or of a reference method, which trains nothing.
-        measure: name of its error.
+        row: Row of one of tables 2 to 7, or of a reference method, which trains nothing.
+        measure: Name of its error.
     """
     value, low, high, sd = (
         float(getattr(row, f"{measure}{end}", math.nan)) for end in ("", "_low", "_high", "_sd")
@@ -71,9 +71,9 @@ def mean_change(before: pd.DataFrame, after: pd.DataFrame, measure: str) -> Inte
     What moves one localizer is taken to move all of them: limits do not shrink with their number.
 
     Args:
-        before: a row per localizer, of tables 2 to 7.
-        after: the same localizers.
-        measure: name of the error.
+        before: Rows of tables 2 to 7, one per localizer.
+        after: Rows of the same localizers.
+        measure: Name of the error.
     """
     old = {row.model: cell_interval(row, measure) for row in rows_of(before)}
     new = {row.model: cell_interval(row, measure) for row in rows_of(after)}

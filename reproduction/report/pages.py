@@ -69,9 +69,9 @@ def findings(root: Path, top: str = "", claims_page: str = "docs/results.md") ->
     """Say what the run found, most important first, and how far its limits reach.
 
     Args:
-        root: published results.
-        top: from the page to the top of the repository, ending in a slash.
-        claims_page: from the page to the one with the claims.
+        root: Published results.
+        top: Path from the page to the top of the repository, ending in a slash.
+        claims_page: Path from the page to the one with the claims.
     """
     if not can_tell(root):
         return verdict_sentence(root)

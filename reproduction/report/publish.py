@@ -30,8 +30,8 @@ def publish(root: Path, target: Path, pages: Iterable[Path]) -> None:
     A run of labels alone (target ``labels``) has tables and figures and no more.
 
     Args:
-        root: results of the run, ``results/<profile>``.
-        target: where its published files go; what lies there is replaced as a whole, or stays.
+        root: Results of the run, ``results/<profile>``.
+        target: Folder of its published files; what lies there is replaced as a whole, or stays.
         pages: Markdown files; figures of ``target`` that they show are published.
 
     Raises:

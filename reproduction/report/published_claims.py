@@ -92,9 +92,9 @@ def interval_in(rows: Sequence[Row], claim: str, part: str, place: int) -> Inter
     """Return a change that a claim was judged by, as a factor; None where it was not.
 
     Args:
-        rows: of ``claims.csv``.
-        claim: its id.
-        part: what stands before the changes, as in ``both: p ...``; empty where nothing does.
+        rows: Rows of ``claims.csv``.
+        claim: Id of the claim.
+        part: Text before the changes, as in ``both: p ...``; empty where there is none.
         place: 0 for the position, 1 for the orientation.
     """
     found = {row["id"]: row for row in rows}.get(claim)

@@ -33,7 +33,7 @@ def agreement(scores: Array, true_scores: Array) -> Agreement:
     """Compare two rankings.
 
     Args:
-        scores: Of each method in each resample (1 + R, M), the observed ones first.
+        scores: Scores (1 + R, M) of each method: observed, then in each resample.
         true_scores: The same methods, scored against the truth.
     """
     orders, true_orders = pair_orders(scores), pair_orders(true_scores)

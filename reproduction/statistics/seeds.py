@@ -91,9 +91,9 @@ class Layout:
         """Make the sample of one localizer's mean over its runs.
 
         Args:
-            runs: of each run, its median error (1 + resamples,): observed, then resampled.
-            place: of its group among ``groups``.
-            relative_sd: what a single run borrows.
+            runs: Median error (1 + resamples,) of each run: observed, then resampled.
+            place: Index of its group among ``groups``.
+            relative_sd: Relative standard deviation that a single run borrows.
         """
         by_run = np.asarray(runs)
         observed = by_run[:, 0]
@@ -171,10 +171,10 @@ def half_width(
     """Compute the half-width of an interval over paths and seeds.
 
     Args:
-        of_paths: half-width over the test paths alone, at the same confidence.
-        seed_error: standard error of the value over the seeds.
-        degrees: degrees of freedom of ``seed_error``.
-        confidence: of the interval, two-sided.
+        of_paths: Half-width over the test paths alone, at the same confidence.
+        seed_error: Standard error of the value over the seeds.
+        degrees: Degrees of freedom of ``seed_error``.
+        confidence: Two-sided confidence of the interval.
     """
     if seed_error == 0:
         return of_paths

@@ -40,10 +40,10 @@ def against_noisy_labels(
     """Compute median errors against labels with noise, from errors against the truth.
 
     Args:
-        position_m: errors of the frames (N,).
-        orientation_deg: the same of orientation (N,), degrees.
-        noise_m: length of the noise of each test label.
-        noise_deg: its angle.
+        position_m: Position errors of the frames (N,), metres.
+        orientation_deg: Their orientation errors (N,), degrees.
+        noise_m: Length of the displacement of each test label, metres.
+        noise_deg: Angle that each test label is turned by, degrees.
 
     Returns:
         The median distance in metres and the median angle in degrees, over frames and directions.

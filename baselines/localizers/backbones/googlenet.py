@@ -57,9 +57,9 @@ def convolved(conv: nn.Conv2d, kernels: Tensor, maps: Tensor) -> Tensor:
     Kernels of one pixel are one matrix product with all pixels, which takes less time so.
 
     Args:
-        conv: stride and padding; its own kernels are not looked at.
-        kernels: what to convolve with.
-        maps: what to convolve.
+        conv: Layer whose stride and padding are used; its own kernels are not.
+        kernels: Kernels (n_out, n_in, h, w).
+        maps: Maps (B, n_in, H, W), channels last in memory.
     """
     if conv.kernel_size == (1, 1) and conv.stride == (1, 1):
         pixels = functional.linear(maps.permute(0, 2, 3, 1), kernels.flatten(1))
@@ -73,8 +73,8 @@ def side_by_side(layers: Sequence[ConvBn], maps: Tensor) -> Sequence[Tensor]:
     That takes less time: layers of few channels are done sooner than they are started.
 
     Args:
-        layers: of one kernel size and stride; they keep parameters and statistics of their own.
-        maps: what they read (B, n_in, H, W).
+        layers: Layers of one kernel size and stride; each keeps its own parameters and statistics.
+        maps: Maps (B, n_in, H, W) that all of them read.
 
     Returns:
         The maps of each layer (B, n_out, H', W').
