@@ -141,7 +141,7 @@ class Files:
             scene: Name of the scene.
             camera: ``network`` or ``groundtruth``.
             split: ``train`` or ``test``; None for both.
-            stop: List only sequences with frames below this one, counted in their split; None for all.
+            stop: List only sequences with frames below this one in their split; None for all.
         """
         suffix = SUFFIX if self.config.archive_sequences else ""
         return [

@@ -90,7 +90,7 @@ def frames_at(frames: PosedFrames, index: Sequence[int] | Rows) -> PosedFrames:
 
 
 def spread(frames: PosedFrames, count: int | None) -> PosedFrames:
-    """Select ``count`` frames at even steps from the first on; all where it is None or too large."""
+    """Select ``count`` frames at even steps from the first on; all if it is None or too large."""
     if count is None or count >= len(frames):
         return frames
     return frames_at(frames, np.arange(count) * len(frames) // count)
